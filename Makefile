@@ -1,0 +1,59 @@
+# Each command sets up what it needs, and is quick the second time.
+#   make demo          the sample scene rendered by Cycles and by the tracer, compared; ends with the report
+#   make test          lint and the tests, with the newest bpy wheel for the Python found
+#   make test-matrix   the tests with Blender 4.2, 4.5 and 5.0 (and 5.2 where there is a Python 3.13) as wheels
+#   make test-blender  the extension in a real Blender 5.2: $BLENDER, or blender on the PATH, or Debian's in a folder of its own
+#   make extension     dist/virtual_pinhole-VERSION-PLATFORM.zip for artists, built by that Blender
+#   make scenes        sample_scenes/*.blend anew, by Blender 4.2
+#   make benchmark     the tracer against Cycles
+#   make clean         removes all that these made, but for ~/.cache/virtual-pinhole
+
+.PHONY: demo test lint test-matrix test-blender extension scenes benchmark clean
+.DELETE_ON_ERROR:
+
+# bpy has wheels for these two only.
+PYTHON ?= $(shell .ci/python 3.11 3.13)
+PYTHON_FOUND = $(if $(PYTHON),$(PYTHON),$(error Python 3.11 or 3.13 is needed, the only ones that bpy 5 has wheels for: install one or say make PYTHON=...))
+PROJECT = pyproject.toml blender_manifest.toml .ci/environment.py
+PYTEST = env -u BLENDER $(1)/bin/python -m pytest
+
+demo: .venv/demo
+	.venv/bin/viewcam demo
+
+test: lint
+	$(call PYTEST,.venv)
+
+lint: .venv/test
+	.venv/bin/python -m ruff check .
+	.venv/bin/python -m ruff format --check .
+
+.venv/demo: $(PROJECT)
+	$(PYTHON_FOUND) .ci/environment.py .venv --editable '.[blender]'
+	touch $@
+
+.venv/test: $(PROJECT)
+	$(PYTHON_FOUND) .ci/environment.py .venv --editable '.[blender,test]'
+	touch $@ .venv/demo
+
+# One environment for each Blender, with the NumPy that this Blender brings along where the wheel leaves it open.
+wheel-4.2 = bpy==4.2.23 numpy==1.24.*
+wheel-4.5 = bpy==4.5.15
+wheel-5.0 = bpy==5.0.1
+wheel-5.2 = bpy==5.2.3
+python-4.2 = 3.11
+python-4.5 = 3.11
+python-5.0 = 3.11
+python-5.2 = 3.13
+MATRIX = 4.2 4.5 5.0 $(if $(shell .ci/python 3.13),5.2)
+
+test-matrix: $(MATRIX:%=test-wheel-%)
+	@$(if $(filter 5.2,$(MATRIX)),,echo "NOT TESTED: the wheel of Blender 5.2, since there is no Python 3.13 on the PATH or in pyenv")
+
+test-wheel-%: .venvs/%/ready
+	$(call PYTEST,.venvs/$*)
+
+.venvs/%/ready: $(PROJECT)
+	python=$$(.ci/python $(python-$*)) || { echo "Blender $*'s wheel needs Python $(python-$*), and there is none on the PATH or in pyenv"; exit 1; }; \
+	$$python .ci/environment.py .venvs/$* $(wheel-$*) --editable '.[test]'
+	touch $@
+.PRECIOUS: .venvs/%/ready

@@ -1,0 +1,66 @@
+"""What every test may ask for: the registered add-on, an empty Blender, the folder of real models.
+
+Modules that need Blender start with `bpy = pytest.importorskip("bpy")`, so that after collection `sys.modules` tells whether
+this session is one with Blender. Rejected: registering through `addon_utils.enable`, which any `read_factory_settings` undoes.
+"""
+
+import os
+import sys
+from pathlib import Path
+
+import hypothesis
+import pytest
+
+# tests/real_blender drives a Blender that is installed beside: make test-blender says which.
+collect_ignore = [] if os.environ.get("BLENDER") else ["real_blender"]
+
+# Deterministic in CI: a failure there is the same failure here. No deadlines: the machines differ and Blender's first call is slow.
+hypothesis.settings.register_profile("ci", derandomize=True, database=None, deadline=None)
+hypothesis.settings.register_profile("explore", deadline=None)
+hypothesis.settings.load_profile("ci" if os.environ.get("CI") else "explore")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def registered_addon():
+    """The add-on, registered once for all tests where Blender is there; None in a session without Blender."""
+    if "bpy" not in sys.modules:
+        yield None
+        return
+    import viewcam_addon
+
+    viewcam_addon.register()
+    yield viewcam_addon
+    viewcam_addon.unregister()
+
+
+@pytest.fixture
+def fresh_blender(registered_addon):
+    """bpy with an empty file open, factory settings, and the add-on still registered."""
+    bpy = pytest.importorskip("bpy")
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    return bpy
+
+
+@pytest.fixture(scope="session")
+def models_folder() -> Path:
+    """The folder of real scanned and modelled meshes that VIEWCAM_MODELS names; they are no part of the project."""
+    folder = os.environ.get("VIEWCAM_MODELS")
+    if not folder:
+        pytest.skip("VIEWCAM_MODELS names no folder of models")
+    return Path(folder).resolve(strict=True)
+
+
+_exit_status = pytest.StashKey[int]()
+
+
+def pytest_sessionfinish(session, exitstatus):
+    session.config.stash[_exit_status] = int(exitstatus)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config):
+    """Leave without Python's clean-up: after properties with `update=` were registered, bpy 4.2 crashes in it and 4.5 hangs."""
+    if "bpy" in sys.modules and _exit_status in config.stash:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(config.stash[_exit_status])
