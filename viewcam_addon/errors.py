@@ -1,0 +1,18 @@
+"""The errors that a user meets: one sentence that names the culprit and says what to do.
+
+Everything that a wrong input can cause is raised as one of these, so that the command line, the panel and the render engine
+can show `str(error)` as it stands and need no knowledge of what went wrong. A rejected alternative: letting OSError, KeyError
+and the like travel up and be translated at the top, where the object and the key are no longer known.
+"""
+
+
+class InputError(ValueError):
+    """What was given can't be used. The message is one sentence: what is wrong (object, key, value), what to do."""
+
+    exit_status = 2
+
+
+class NotModelledError(InputError):
+    """Something in the scene has no counterpart in the model, and `--strict` does not let it pass."""
+
+    exit_status = 3

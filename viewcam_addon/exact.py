@@ -1,0 +1,168 @@
+"""Sums, products and cross products whose rounding errors are kept instead of lost.
+
+The direction "right" of a camera is up × (e − l). Close to vertical this cross product cancels nearly all of its digits, and
+the rounding of e − l and of each product becomes the roll of the picture. Here e − l is kept as an unevaluated pair
+high + low, each product as the pair of its rounded value and its error, and their sum is rounded once, at the end.
+
+Every function takes floats or float64 arrays and runs the same formulas on both. Vectors are triples of such numbers, so that a
+single pose costs no array at all.
+
+Sources: two_sum is Knuth's (TAOCP 2, 4.2.2), two_product Dekker's (Numer. Math. 18, 1971), the array sum is Kahan's
+distillation as analysed by Ogita, Rump and Oishi (SIAM J. Sci. Comput. 26, 2005). math.fma would replace Dekker's
+splitting, but Python has it from 3.13 only. Rejected: mpmath or Fraction for every pose (a hundred times slower; Fraction serves
+the rare inputs whose products would leave float64's range), and numpy.longdouble (64 bits of mantissa on some machines, 53 on others).
+"""
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+Number = float | NDArray[np.float64]
+Vector = tuple[Number, Number, Number]
+
+# Terms of a sum settle in as many passes as there are terms or fewer; what has not settled by then is reported.
+_DISTILLATION_PASSES = 12
+_SPLITTER = 2.0**27 + 1
+# Of vectors whose largest component is about 1: the product of two components this small still has an exact error term.
+SMALLEST_FACTOR = 2.0**-400
+
+
+def two_sum(a: Number, b: Number) -> tuple[Number, Number]:
+    """The rounded sum and its error: a + b = sum + error, exactly, unless the sum overflows."""
+    total = a + b
+    b_part = total - a
+    return total, (a - (total - b_part)) + (b - b_part)
+
+
+def two_product(a: Number, b: Number) -> tuple[Number, Number]:
+    """The rounded product and its error: a · b = product + error, exactly, for |a|, |b| < 2^996 and |a · b| > 2^-969 or 0."""
+    product = a * b
+    a_high, a_low = _split(a)
+    b_high, b_low = _split(b)
+    return product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
+
+
+def _split(a: Number) -> tuple[Number, Number]:
+    """Two numbers of at most 26 significant bits each whose sum is `a`."""
+    shifted = _SPLITTER * a
+    high = shifted - (shifted - a)
+    return high, a - high
+
+
+def sum_terms(terms: Sequence[Number]) -> tuple[Number, Number, bool | NDArray[np.bool_]]:
+    """The sum of `terms` as a pair high + low, high correctly rounded but for ties, whatever cancels.
+
+    The third value says where the sum has settled (always, for floats).
+    """
+    if isinstance(terms[0], float):
+        high = math.fsum(terms)
+        return high, math.fsum([*terms, -high]), True
+    settled = np.zeros(np.shape(terms[0]), dtype=bool)
+    parts = list(terms)
+    for _ in range(_DISTILLATION_PASSES):
+        before = list(parts)
+        for i in range(1, len(parts)):
+            parts[i], parts[i - 1] = two_sum(parts[i], parts[i - 1])
+        settled = np.logical_and.reduce([new == old for new, old in zip(parts, before, strict=True)])
+        if settled.all():
+            break
+    return parts[-1], parts[-2], settled
+
+
+def difference(a: Vector, b: Vector) -> tuple[Vector, Vector]:
+    """a − b as a pair of vectors high + low, exactly, unless it overflows."""
+    pairs = [two_sum(x, -y) for x, y in zip(a, b, strict=True)]
+    return tuple(high for high, _ in pairs), tuple(low for _, low in pairs)
+
+
+def cross(a: Vector, b_high: Vector, b_low: Vector) -> tuple[Vector, Vector, bool | NDArray[np.bool_]]:
+    """a × (b_high + b_low) as a pair of vectors, each component correctly rounded however much cancels.
+
+    The third value says where all three sums have settled. Non-zero components must not be smaller than `SMALLEST_FACTOR`.
+    """
+    high, low, settled = zip(*(sum_terms(_cross_terms(a, b_high, b_low, j, k)) for j, k in ((1, 2), (2, 0), (0, 1))), strict=True)
+    return high, low, settled[0] & settled[1] & settled[2]
+
+
+def _cross_terms(a: Vector, b_high: Vector, b_low: Vector, j: int, k: int) -> list[Number]:
+    return [
+        *two_product(a[j], b_high[k]),
+        *two_product(a[j], b_low[k]),
+        *two_product(-a[k], b_high[j]),
+        *two_product(-a[k], b_low[j]),
+    ]
+
+
+def cross_of_perpendicular(a_high: Vector, a_low: Vector, b_high: Vector, b_low: Vector) -> Vector:
+    """a × b for perpendicular a and b, each component within 2⁻⁵² of |a| |b| times its own size plus 2⁻¹⁰⁰ of |a| |b|.
+
+    Two perpendicular vectors lose nothing in their product as a whole, so the second-order terms need no care.
+    """
+
+    def component(j: int, k: int) -> Number:
+        first, first_error = two_product(a_high[j], b_high[k])
+        second, second_error = two_product(a_high[k], b_high[j])
+        total, total_error = two_sum(first, -second)
+        mixed = a_high[j] * b_low[k] + a_low[j] * b_high[k] - a_high[k] * b_low[j] - a_low[k] * b_high[j]
+        return total + (total_error + (first_error - second_error) + mixed)
+
+    return component(1, 2), component(2, 0), component(0, 1)
+
+
+def length(a: Vector) -> Number:
+    """|a|, correctly rounded but for 2⁻¹⁰⁰, of a vector whose largest component is about 1 (see `scaled_to_one`)."""
+    squares = [two_product(component, component) for component in a]
+    total, error = squares[0]
+    for square, square_error in squares[1:]:
+        total, sum_error = two_sum(total, square)
+        error = error + (sum_error + square_error)
+    total = total + error
+    return math.sqrt(total) if isinstance(total, float) else np.sqrt(total)
+
+
+def scaled_to_one(*vectors: Vector) -> list[Vector]:
+    """The vectors times the power of two that brings the largest component of the *first* into [½, 1)."""
+    if isinstance(vectors[0][0], float):
+        exponent = math.frexp(max(map(abs, vectors[0])))[1]
+        return [tuple(math.ldexp(component, -exponent) for component in vector) for vector in vectors]
+    exponent = np.frexp(largest_component(vectors[0]))[1]
+    return [tuple(np.ldexp(component, -exponent) for component in vector) for vector in vectors]
+
+
+def largest_component(a: Vector) -> Number:
+    """max |aᵢ|, elementwise."""
+    if isinstance(a[0], float):
+        return max(map(abs, a))
+    return np.maximum(np.maximum(np.abs(a[0]), np.abs(a[1])), np.abs(a[2]))
+
+
+def are_factors(vector: Vector, scaled: Vector) -> bool | NDArray[np.bool_]:
+    """Whether every component of `scaled`, which was `vector` before, is 0 or large enough for `cross`."""
+    x, y, z = ((before == 0) | (abs(after) >= SMALLEST_FACTOR) for before, after in zip(vector, scaled, strict=True))
+    return x & y & z
+
+
+def rational_cross(a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...]) -> tuple[tuple, tuple, float]:
+    """b − c and a × (b − c) by rational arithmetic, for floats of any size.
+
+    Returns two pairs of vectors high + low, each scaled so that its largest component is ±1 (what is smaller than float64's range
+    beside it becomes 0), and the largest component that the product would have if a and b − c were so scaled before.
+    """
+    a, b, c = (tuple(map(Fraction, vector)) for vector in (a, b, c))
+    apart = tuple(x - y for x, y in zip(b, c, strict=True))
+    product = tuple(a[j] * apart[k] - a[k] * apart[j] for j, k in ((1, 2), (2, 0), (0, 1)))
+    largest_a, largest_apart, largest_product = (max(map(abs, vector)) for vector in (a, apart, product))
+    return (
+        _pair_of_floats(apart, largest_apart),
+        _pair_of_floats(product, largest_product or Fraction(1)),
+        float(largest_product / (largest_a * largest_apart)),
+    )
+
+
+def _pair_of_floats(vector: tuple[Fraction, ...], unit: Fraction) -> tuple[Vector, Vector]:
+    scaled = [component / unit for component in vector]
+    high = tuple(float(component) for component in scaled)
+    return high, tuple(float(component - Fraction(rounded)) for component, rounded in zip(scaled, high, strict=True))

@@ -1,0 +1,221 @@
+"""EXR files: pass names, the one row flip, attributes, whole-or-nothing writing.
+
+In memory a picture is a set of passes, each (height, width, channels) float32, its rows from the **bottom**, as the text counts
+them; files store rows from the top, and the flip happens here and nowhere else. Passes are named as Blender 5 names them; the
+names of older versions are read as the same passes. Channels are named as Cycles names them in a multilayer file
+(`ViewLayer.Depth.Z`), so that Blender and any EXR viewer can open the tracer's files and this reader opens Cycles'.
+
+The camera travels with the picture: as the standard attributes worldToCamera and worldToNDC (float32 matrices for row vectors, as
+OpenEXR has them) and, in full precision, as JSON in our own attribute.
+
+OpenEXR is the format's own project. Rejected: imageio and OpenCV (no multi-part files, no attributes). It is imported where it is
+needed, because Blender's own process must not have a second copy of that library.
+"""
+
+import contextlib
+import dataclasses
+import json
+import os
+import sys
+from collections import defaultdict
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InputError
+from .files import written_whole
+from .pinhole import Pinhole
+
+# The channels of each pass, in the order of its last axis, as Cycles names them. The last two are the tracer's own: the largest
+# coordinate that took part in a hit and the cosine between ray and true normal, by which a tolerance can be derived.
+CHANNELS = {
+    "Combined": "RGBA",
+    "Depth": "Z",
+    "Position": "XYZ",
+    "Normal": "XYZ",
+    "UV": "UVA",
+    "Object Index": "X",
+    "Material Index": "X",
+    "Magnitude": "X",
+    "Facing": "X",
+}
+# What Blender 4 calls some of them in a file.
+_OLDER_NAMES = {"IndexOB": "Object Index", "IndexMA": "Material Index"}
+
+BACKGROUND_DEPTH = 1e10
+"""The Depth pass where there is nothing: Cycles' value."""
+
+_LAYER = "ViewLayer"
+_CAMERA_ATTRIBUTE = "virtualPinhole"
+# Threads beyond a few wait for one another; -1 would share a pool sized for the machine, which File does not create.
+_THREADS = min(os.cpu_count() or 1, 8)
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """Passes of one picture and the camera that took it.
+
+    passes : name → (height, width, channels) float32, rows from the bottom.
+    camera : the camera of the picture, or None where the file does not tell.
+    attributes : further text attributes of the file.
+    """
+
+    passes: dict[str, NDArray[np.float32]]
+    camera: Pinhole | None = None
+    attributes: dict[str, str] = field(default_factory=dict)
+    source: str = "the image"
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) in pixels."""
+        height, width, _ = next(iter(self.passes.values())).shape
+        return width, height
+
+    def __getitem__(self, name: str) -> NDArray[np.float32]:
+        """A pass by its name.
+
+        Raises
+        ------
+        InputError
+            if the picture does not have it.
+        """
+        if name not in self.passes:
+            raise InputError(f"{self.source} has no pass {name!r} but {', '.join(self.passes) or 'none'}: render it with that pass")
+        return self.passes[name]
+
+
+def read(path: str | os.PathLike[str], only: Collection[str] | None = None) -> Image:
+    """Read an EXR of Cycles (4.2 to 5.2) or of the tracer; of several view layers the first.
+
+    only : names of the passes to keep, all by default.
+
+    Raises
+    ------
+    InputError
+        if there is no such file, if it is no EXR or a damaged one, or if it holds no known pass.
+    """
+    import OpenEXR
+
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path} does not exist: check the name of the EXR file")
+    try:
+        with _silent_libraries():
+            parts = OpenEXR.File(str(path), separate_channels=True, num_threads=_THREADS).parts
+    except Exception as error:  # OpenEXR raises what its C++ raised, of no common class
+        raise InputError(f"{path} can't be read as an EXR file ({_first_line(error)}): render it again") from error
+    if any(len(part.channels) < len(part.header["channels"]) for part in parts):
+        raise InputError(f"{path} is cut short or damaged, its pixels can't be read: render it again")
+    channels = {name: channel.pixels for part in parts for name, channel in part.channels.items()}
+    passes = {
+        name: np.stack([channel[::-1] for channel in found], axis=-1).astype(np.float32, copy=False)
+        for name, found in _passes(channels).items()
+        if only is None or name in only
+    }
+    if not passes:
+        wanted = ", ".join(only or CHANNELS)
+        raise InputError(f"{path} holds none of the passes {wanted}: render a multilayer EXR with them")
+    if len({array.shape[:2] for array in passes.values()}) > 1:
+        raise InputError(f"{path} holds passes of different sizes: render it again")
+    header = parts[0].header
+    attributes = {key: value for key, value in header.items() if isinstance(value, str) and key not in (_CAMERA_ATTRIBUTE, "name")}
+    return Image(passes, _camera(header.get(_CAMERA_ATTRIBUTE), path), attributes, str(path))
+
+
+def write(path: str | os.PathLike[str], image: Image) -> None:
+    """Write a 32-bit multilayer EXR, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        if the folder can't be written or the disk is full.
+    """
+    import OpenEXR
+
+    channels = {
+        f"{_LAYER}.{name}.{letter}": np.ascontiguousarray(array[::-1, :, i])
+        for name, array in image.passes.items()
+        for i, letter in enumerate(CHANNELS[name])
+    }
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **image.attributes}
+    if image.camera is not None:
+        header |= _camera_attributes(image.camera)
+    with written_whole(path) as temporary:
+        try:
+            with _silent_libraries():
+                OpenEXR.File(header, channels, num_threads=_THREADS).write(str(temporary))
+        except RuntimeError as error:
+            raise OSError(_first_line(error)) from error
+
+
+def _passes(channels: dict[str, NDArray]) -> dict[str, list[NDArray]]:
+    """The known passes of the first view layer, each as its channels in order."""
+    found: dict[str, dict[str, dict[str, NDArray]]] = defaultdict(lambda: defaultdict(dict))
+    for full_name, pixels in channels.items():
+        layer, _, rest = full_name.rpartition(".")[0].rpartition(".")
+        found[layer][_OLDER_NAMES.get(rest, rest)][full_name.rpartition(".")[2]] = pixels
+    for passes in found.values():
+        complete = {
+            name: [passes[name][letter] for letter in letters]
+            for name, letters in CHANNELS.items()
+            if name in passes and set(letters) <= set(passes[name])
+        }
+        if complete:
+            return complete
+    return {}
+
+
+def camera_to_dict(camera: Pinhole) -> dict:
+    """A camera as JSON has it, in full precision; `Pinhole(**…)` reads it back."""
+    return dataclasses.asdict(camera)
+
+
+def _camera(text: str | None, path: Path) -> Pinhole | None:
+    if text is None:
+        return None
+    try:
+        return Pinhole(**json.loads(text))
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{path} has a camera attribute that can't be read ({_first_line(error)}): render it again") from error
+
+
+def _camera_attributes(camera: Pinhole) -> dict:
+    u, v, w = camera.basis()
+    to_camera = np.eye(4)
+    to_camera[:3, :3] = np.stack([-u if camera.mirrored else u, v, w], axis=1)
+    to_camera[3, :3] = -np.array(camera.eye) @ to_camera[:3, :3]
+    # x and y of normalised device coordinates run over [−1, 1] across the picture, z is −1 at infinity as in OpenGL's limit.
+    (d_x, d_y), (c_x, c_y) = camera.distance, camera.principal_point
+    to_ndc = np.zeros((4, 4))
+    to_ndc[0, 0], to_ndc[1, 1] = 2 * d_x / camera.width, 2 * d_y / camera.height
+    to_ndc[2] = [1 - 2 * c_x / camera.width, 1 - 2 * c_y / camera.height, -1, -1]
+    return {
+        "worldToCamera": to_camera.astype(np.float32),
+        "worldToNDC": (to_camera @ to_ndc).astype(np.float32),
+        _CAMERA_ATTRIBUTE: json.dumps(camera_to_dict(camera)),
+    }
+
+
+@contextlib.contextmanager
+def _silent_libraries() -> Iterator[None]:
+    """Keep OpenEXR's own lines off the terminal: what it prints of a damaged file, it raises or leaves out as well."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    kept = [os.dup(stream) for stream in (1, 2)]
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        for stream in (1, 2):
+            os.dup2(nowhere, stream)
+        yield
+    finally:
+        for stream, copy in zip((1, 2), kept, strict=True):
+            os.dup2(copy, stream)
+            os.close(copy)
+        os.close(nowhere)
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).strip() or type(error).__name__).splitlines()[0]
