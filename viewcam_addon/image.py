@@ -104,10 +104,11 @@ def read(path: str | os.PathLike[str], only: Collection[str] | None = None) -> I
         raise InputError(f"{path} does not exist: check the name of the EXR file")
     try:
         with _silent_libraries():
+            promised = len(OpenEXR.File(str(path), header_only=True).parts)
             parts = OpenEXR.File(str(path), separate_channels=True, num_threads=_THREADS).parts
     except Exception as error:  # OpenEXR raises what its C++ raised, of no common class
         raise InputError(f"{path} can't be read as an EXR file ({_first_line(error)}): render it again") from error
-    if any(len(part.channels) < len(part.header["channels"]) for part in parts):
+    if len(parts) < promised:  # a part whose pixels fail is left out
         raise InputError(f"{path} is cut short or damaged, its pixels can't be read: render it again")
     channels = {name: channel.pixels for part in parts for name, channel in part.channels.items()}
     passes = {
