@@ -14,7 +14,7 @@ import pytest
 # tests/real_blender drives a Blender that is installed beside: make test-blender says which.
 collect_ignore = [] if os.environ.get("BLENDER") else ["real_blender"]
 
-# Deterministic in CI: a failure there is the same failure here. No deadlines: the machines differ and Blender's first call is slow.
+# Deterministic in CI, so that a failure there is the same failure here. No deadlines: Blender's first call is slow.
 hypothesis.settings.register_profile("ci", derandomize=True, database=None, deadline=None)
 hypothesis.settings.register_profile("explore", deadline=None)
 hypothesis.settings.load_profile("ci" if os.environ.get("CI") else "explore")

@@ -1,0 +1,89 @@
+"""Builds the extension with its wheels: `python .ci/extension.py BLENDER OUTPUT-FOLDER [PLATFORM…]`, all platforms by default.
+
+The wheels are no part of the checkout, and a manifest that names missing ones can't be built; so the manifest in the checkout
+names none, and Blender builds from a copy to which the wheels and their names are added. One zip a platform (some 50 MB each,
+for the Pythons of Blender 4.2 to 5.2) rather than one for all (200 MB).
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+CONTENTS = ["__init__.py", "viewcam_addon", "README.md", "LICENSE"]
+
+PYTHONS = ["3.11", "3.13", "3.14"]
+WHEELS = {"embreex": "4.4.0.post1", "OpenEXR": "3.5.3"}
+# Blender's name of a platform, and pip's: what a wheel may ask for and Blender 4.2's own minimum grants.
+PLATFORMS = {
+    "linux-x64": ["manylinux_2_28_x86_64"],
+    "macos-arm64": ["macosx_13_0_arm64", "macosx_11_0_arm64"],
+    "macos-x64": ["macosx_13_0_x86_64"],
+    "windows-x64": ["win_amd64"],
+    "windows-arm64": ["win_arm64"],
+}
+# There NumPy stands in for Embree.
+WITHOUT_EMBREE = ["windows-arm64"]
+
+
+def wheels_of(platform: str) -> list[Path]:
+    """The wheels of one platform for every Python, downloaded where they are not there yet."""
+    folder = ROOT / "wheels" / platform
+    found = []
+    for package, version in WHEELS.items():
+        if package == "embreex" and platform in WITHOUT_EMBREE:
+            continue
+        for python in PYTHONS:
+            pattern = f"{package.lower()}-{version}-cp{python.replace('.', '')}-*.whl"
+            if not list(folder.glob(pattern)):
+                print(f"Downloading {package} {version} for {platform}, Python {python}", flush=True)
+                pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "download", "--quiet", "--no-deps"]
+                tags = [f"--platform={tag}" for tag in PLATFORMS[platform]]
+                target = ["--only-binary=:all:", f"--python-version={python}", *tags, f"--dest={folder}"]
+                subprocess.run([*pip, *target, f"{package}=={version}"], check=True)
+            found += folder.glob(pattern)
+    return found
+
+
+def stage(folder: Path, platforms: list[str]) -> None:
+    """Copy what belongs into the extension, with the wheels, to `folder`."""
+    for name in CONTENTS:
+        source = ROOT / name
+        if source.is_dir():
+            shutil.copytree(source, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+        else:
+            shutil.copy(source, folder)
+    wheels = [wheel for platform in platforms for wheel in wheels_of(platform)]
+    (folder / "wheels").mkdir()
+    for wheel in wheels:
+        os.symlink(wheel, folder / "wheels" / wheel.name)
+    names = "".join(f'    "./wheels/{wheel.name}",\n' for wheel in wheels)
+    manifest = (ROOT / "blender_manifest.toml").read_text(encoding="utf-8")
+    top, permissions, rest = manifest.partition("[permissions]")
+    added = f"platforms = {platforms}\nwheels = [\n{names}]\n\n".replace("'", '"')
+    (folder / "blender_manifest.toml").write_text(top + added + permissions + rest, encoding="utf-8")
+
+
+def main(blender: str, output: Path, platforms: list[str]) -> None:
+    """Build one zip a platform into `output` and print their paths."""
+    output.mkdir(parents=True, exist_ok=True)
+    before = {path: path.stat().st_mtime_ns for path in output.glob("*.zip")}
+    with tempfile.TemporaryDirectory(prefix="virtual-pinhole-") as scratch:
+        stage(Path(scratch), platforms)
+        command = [blender, "--command", "extension", "build", "--split-platforms"]
+        subprocess.run([*command, f"--source-dir={scratch}", f"--output-dir={output.resolve()}"], check=True)
+    built = [path for path in sorted(output.glob("*.zip")) if before.get(path) != path.stat().st_mtime_ns]
+    if len(built) != len(platforms):
+        sys.exit(f"Blender built {len(built)} zips of {len(platforms)}: what it says is above")
+    for path in built:
+        print(f"{path}  {path.stat().st_size / 1e6:.1f} MB")
+
+
+if __name__ == "__main__":
+    try:
+        main(sys.argv[1], Path(sys.argv[2]), sys.argv[3:] or list(PLATFORMS))
+    except subprocess.CalledProcessError as error:
+        sys.exit(f"{' '.join(map(str, error.cmd))} failed with status {error.returncode}: what it says is above")
