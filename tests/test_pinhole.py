@@ -10,6 +10,7 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
+from viewcam_addon import exact
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole, basis, canonical_axes
 
@@ -74,11 +75,15 @@ def test_basis_is_exact_over_10_000_poses_from_1_to_1e_16_radians_from_vertical(
             assert any(across), f"pose {i} came out exactly singular: the sweep must not hold such a one"
             u, w = normalised(across), normalised(apart)
             true = [*u, *cross(w, u), *w]
-            errors.append(max(abs(float(mpmath.mpf(have) - want)) for have, want in zip(axes[i].ravel().tolist(), true, strict=True)))
+            errors.append(
+                max(abs(float(mpmath.mpf(have) - want)) for have, want in zip(axes[i].ravel().tolist(), true, strict=True))
+            )
     sines = np.array([Pinhole(*pose, 500, 64, 48).sine_to_up for pose in zip(e, l, up, strict=True)])
     assert sines.min() < 1e-16 and sines.max() > 0.8, "the sweep must reach from one end to the other"
     worst = int(np.argmax(errors))
-    assert errors[worst] <= BASIS_TOLERANCE, f"error {errors[worst]:.3g} at sin θ = {sines[worst]:.3g}: {e[worst]}, {l[worst]}, {up[worst]}"
+    assert errors[worst] <= BASIS_TOLERANCE, (
+        f"error {errors[worst]:.3g} at sin θ = {sines[worst]:.3g}: {e[worst]}, {l[worst]}, {up[worst]}"
+    )
 
 
 @given(points, points, st.tuples(*[st.floats(-1, 1)] * 3), st.integers(-16, 0), points)
@@ -146,8 +151,9 @@ def test_canonical_axes_of_any_up_are_right_handed_and_along_it(up, looking_down
     # Each component is a few products of rounded unit components: 8 units of 2⁻⁵³.
     assert np.abs(matrix @ matrix.T - np.eye(3)).max() < 8 * 2.0**-53
     assert np.abs(np.cross(u, v) - w).max() < 8 * 2.0**-53
-    assert np.abs(np.cross(w, up)).max() < 8 * 2.0**-53 * np.abs(up).max()
-    assert (w @ np.array(up) > 0) == looking_down
+    (up,) = np.array(exact.scaled_to_one(up))
+    assert np.abs(np.cross(w, up)).max() < 8 * 2.0**-53
+    assert (w @ up > 0) == looking_down
 
 
 @given(points, points, points, st.floats(10, 1e4), st.floats(10, 1e4), st.booleans(), st.data())
@@ -160,8 +166,10 @@ def test_projecting_a_point_of_a_ray_gives_back_its_pixel(eye, look_at, up, d_x,
     assert abs(np.linalg.norm(direction) - 1) < 4 * 2.0**-53
     far = 10 * max(1.0, *map(abs, eye))
     at_column, at_row, depth = camera.project(np.array(eye) + far * direction)
-    # The point is rounded at |e| + far, seen from far away, 16 roundings of the picture's size at a slant of up to 80 (700/10).
-    tolerance = 16 * 2.0**-53 * (700 + max(d_x, d_y)) * 100
+    # The point is rounded to 2⁻⁵³ (|e| + far) ≤ 2.8 · 2⁻⁵³ far, at the depth far / s; both, divided, move the picture by s² d
+    # of that.
+    s = math.hypot(1, (column + px - camera.principal_point[0]) / d_x, (row + py - 180) / d_y)
+    tolerance = 16 * 2.0**-53 * (700 + max(d_x, d_y) * s * s)
     assert abs(at_column - column - px) < tolerance and abs(at_row - row - py) < tolerance
     assert depth > 0
 
@@ -205,7 +213,9 @@ def test_cropping_and_resizing_keep_what_each_pixel_sees(width, height, column, 
     part = camera.cropped(column, row, width, height)
     assert np.abs(part.ray_directions(0, 0) - camera.ray_directions(column, row)).max() < 8 * 2.0**-53
     double = camera.resized(1280, 960)
-    assert np.abs(double.ray_directions(column, row, 0, 0) - camera.ray_directions(column / 2, row / 2, 0, 0)).max() < 8 * 2.0**-53
+    assert (
+        np.abs(double.ray_directions(column, row, 0, 0) - camera.ray_directions(column / 2, row / 2, 0, 0)).max() < 8 * 2.0**-53
+    )
 
 
 def test_roll_uncertainty_is_the_rounding_of_the_inputs_over_the_sine():

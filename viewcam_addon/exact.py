@@ -9,8 +9,9 @@ single pose costs no array at all.
 
 Sources: two_sum is Knuth's (TAOCP 2, 4.2.2), two_product Dekker's (Numer. Math. 18, 1971), the array sum is Kahan's
 distillation as analysed by Ogita, Rump and Oishi (SIAM J. Sci. Comput. 26, 2005). math.fma would replace Dekker's
-splitting, but Python has it from 3.13 only. Rejected: mpmath or Fraction for every pose (a hundred times slower; Fraction serves
-the rare inputs whose products would leave float64's range), and numpy.longdouble (64 bits of mantissa on some machines, 53 on others).
+splitting, but Python has it from 3.13 only. Rejected: mpmath or Fraction for every pose (a hundred times slower; Fraction
+serves the rare inputs whose products would leave float64's range), and numpy.longdouble (64 bits of mantissa on some machines,
+53 on others).
 """
 
 import math
@@ -83,7 +84,9 @@ def cross(a: Vector, b_high: Vector, b_low: Vector) -> tuple[Vector, Vector, boo
 
     The third value says where all three sums have settled. Non-zero components must not be smaller than `SMALLEST_FACTOR`.
     """
-    high, low, settled = zip(*(sum_terms(_cross_terms(a, b_high, b_low, j, k)) for j, k in ((1, 2), (2, 0), (0, 1))), strict=True)
+    high, low, settled = zip(
+        *(sum_terms(_cross_terms(a, b_high, b_low, j, k)) for j, k in ((1, 2), (2, 0), (0, 1))), strict=True
+    )
     return high, low, settled[0] & settled[1] & settled[2]
 
 
@@ -148,8 +151,8 @@ def are_factors(vector: Vector, scaled: Vector) -> bool | NDArray[np.bool_]:
 def rational_cross(a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...]) -> tuple[tuple, tuple, float]:
     """b − c and a × (b − c) by rational arithmetic, for floats of any size.
 
-    Returns two pairs of vectors high + low, each scaled so that its largest component is ±1 (what is smaller than float64's range
-    beside it becomes 0), and the largest component that the product would have if a and b − c were so scaled before.
+    Returns two pairs of vectors high + low, each scaled so that its largest component is ±1 (what is smaller than float64's
+    range beside it becomes 0), and the largest component that the product would have if a and b − c were so scaled before.
     """
     a, b, c = (tuple(map(Fraction, vector)) for vector in (a, b, c))
     apart = tuple(x - y for x, y in zip(b, c, strict=True))

@@ -36,6 +36,9 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
             os.fsync(written.fileno())
         os.replace(temporary, target)
     except OSError as error:
-        raise InputError(f"{target} can't be written ({error.strerror or error}): choose another folder or free some space") from error
+        raise InputError(
+            f"{target} can't be written ({error.strerror or error}): choose another folder or free some space"
+        ) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # where it could not be written, it is not there either
+            temporary.unlink()

@@ -5,15 +5,16 @@ them; files store rows from the top, and the flip happens here and nowhere else.
 names of older versions are read as the same passes. Channels are named as Cycles names them in a multilayer file
 (`ViewLayer.Depth.Z`), so that Blender and any EXR viewer can open the tracer's files and this reader opens Cycles'.
 
-The camera travels with the picture: as the standard attributes worldToCamera and worldToNDC (float32 matrices for row vectors, as
-OpenEXR has them) and, in full precision, as JSON in our own attribute.
+The camera travels with the picture: as the standard attributes worldToCamera and worldToNDC (float32 matrices for row vectors,
+as OpenEXR has them) and, in full precision, as JSON in our own attribute.
 
-OpenEXR is the format's own project. Rejected: imageio and OpenCV (no multi-part files, no attributes). It is imported where it is
-needed, because Blender's own process must not have a second copy of that library.
+OpenEXR is the format's own project. Rejected: imageio and OpenCV (no multi-part files, no attributes). It is imported where it
+is needed, because Blender's own process must not have a second copy of that library.
 """
 
 import contextlib
 import dataclasses
+import io
 import json
 import os
 import sys
@@ -83,7 +84,9 @@ class Image:
             if the picture does not have it.
         """
         if name not in self.passes:
-            raise InputError(f"{self.source} has no pass {name!r} but {', '.join(self.passes) or 'none'}: render it with that pass")
+            raise InputError(
+                f"{self.source} has no pass {name!r} but {', '.join(self.passes) or 'none'}: render it with that pass"
+            )
         return self.passes[name]
 
 
@@ -122,7 +125,9 @@ def read(path: str | os.PathLike[str], only: Collection[str] | None = None) -> I
     if len({array.shape[:2] for array in passes.values()}) > 1:
         raise InputError(f"{path} holds passes of different sizes: render it again")
     header = parts[0].header
-    attributes = {key: value for key, value in header.items() if isinstance(value, str) and key not in (_CAMERA_ATTRIBUTE, "name")}
+    attributes = {
+        key: value for key, value in header.items() if isinstance(value, str) and key not in (_CAMERA_ATTRIBUTE, "name")
+    }
     return Image(passes, _camera(header.get(_CAMERA_ATTRIBUTE), path), attributes, str(path))
 
 
@@ -203,19 +208,15 @@ def _camera_attributes(camera: Pinhole) -> dict:
 @contextlib.contextmanager
 def _silent_libraries() -> Iterator[None]:
     """Keep OpenEXR's own lines off the terminal: what it prints of a damaged file, it raises or leaves out as well."""
-    sys.stdout.flush()
     sys.stderr.flush()
-    kept = [os.dup(stream) for stream in (1, 2)]
-    nowhere = os.open(os.devnull, os.O_WRONLY)
+    kept = os.dup(2)
     try:
-        for stream in (1, 2):
-            os.dup2(nowhere, stream)
-        yield
+        with contextlib.redirect_stdout(io.StringIO()), open(os.devnull, "w") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
+            yield
     finally:
-        for stream, copy in zip((1, 2), kept, strict=True):
-            os.dup2(copy, stream)
-            os.close(copy)
-        os.close(nowhere)
+        os.dup2(kept, 2)
+        os.close(kept)
 
 
 def _first_line(error: Exception) -> str:

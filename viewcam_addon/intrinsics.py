@@ -6,9 +6,9 @@ percentage and n the number of square units along the side that the sensor fits,
     d_x = lens / sensor · n / pixel_aspect_x          c_x = W/2 − shift_x · n / pixel_aspect_x      from the left edge
     d_y = lens / sensor · n / pixel_aspect_y          c_y = H/2 − shift_y · n / pixel_aspect_y      from the bottom edge
 
-Source: BKE_camera_params_compute_viewplane in Blender's source/blender/blenkernel/intern/camera.cc and blender_camera_viewplane in
-Cycles' intern/cycles/blender/camera.cpp. Rejected: going through the field of view, which loses digits for wide angles and is
-limited to one axis.
+Source: BKE_camera_params_compute_viewplane in Blender's source/blender/blenkernel/intern/camera.cc and blender_camera_viewplane
+in Cycles' intern/cycles/blender/camera.cpp. Rejected: going through the field of view, which loses digits for wide angles and
+is limited to one axis.
 """
 
 import math
@@ -43,7 +43,8 @@ class Frame:
 
     resolution_x, resolution_y : pixels at 100 %. percentage : whole per cent.
     pixel_aspect_x, pixel_aspect_y : width and height of a pixel, each ≥ 1.
-    border : (left, bottom, right, top) as fractions of the picture, or None for the whole. crop : whether only the border is kept.
+    border : (left, bottom, right, top) as fractions of the picture, or None for the whole. crop : whether only the border is
+    kept.
     """
 
     resolution_x: int
@@ -100,7 +101,9 @@ def view_plane(camera: CameraData, frame: Frame) -> ViewPlane:
     width, height = frame.size
     column, row, window_width, window_height = frame.window
     if window_width < 1 or window_height < 1:
-        raise InputError(f"the picture is {window_width} × {window_height} pixels: enlarge the resolution, percentage or border")
+        raise InputError(
+            f"the picture is {window_width} × {window_height} pixels: enlarge the resolution, percentage or border"
+        )
     fitted_x, fitted_y = _fitted_pixels(camera.sensor_fit, frame)
     magnification = camera.lens / _fitted_sensor(camera.sensor_fit, camera.sensor_width, camera.sensor_height)
     return ViewPlane(
@@ -124,8 +127,8 @@ def camera_data(plane: ViewPlane, frame: Frame, sensor_width: float, sensor_heig
     column, row, *window_size = frame.window
     if [plane.width, plane.height] != window_size:
         raise InputError(
-            f"the camera is for {plane.width} × {plane.height} pixels and the scene renders {window_size[0]} × {window_size[1]}: "
-            "set the scene's resolution, or give the camera the scene's size"
+            f"the camera is for {plane.width} × {plane.height} pixels and the scene renders "
+            f"{window_size[0]} × {window_size[1]}: set the scene's resolution, or give the camera the scene's size"
         )
     width, height = frame.size
     fitted_x, fitted_y = _fitted_pixels(sensor_fit, frame)
@@ -133,10 +136,11 @@ def camera_data(plane: ViewPlane, frame: Frame, sensor_width: float, sensor_heig
     if abs(magnification - other) > _FLOAT32_STEP * magnification:
         raise InputError(
             f"the distances {plane.distance[0]:g} and {plane.distance[1]:g} pixels ask for pixels of aspect "
-            f"{plane.distance[1] / plane.distance[0]:g} and the scene's have {fitted_y / fitted_x:g}: set the scene's pixel aspect"
+            f"{plane.distance[1] / plane.distance[0]:g} and the scene's have {fitted_y / fitted_x:g}: "
+            "set the scene's pixel aspect"
         )
     lens = magnification * _fitted_sensor(sensor_fit, sensor_width, sensor_height)
-    growth = 2.0 ** max(0, math.ceil(math.log2(SHORTEST_LENS / lens)))
+    growth = 2.0 ** max(0, math.ceil(math.log2(SHORTEST_LENS / np.float32(lens))))  # as Blender will round it
     return CameraData(
         lens=lens * growth,
         sensor_width=sensor_width * growth,

@@ -3,18 +3,18 @@
     w = (e − l) / |e − l|     u = (up × w) / |up × w|     v = w × u
 
 The viewing coordinates have their origin at the eye e. w points away from the view, so that u is right, v is up and (u, v, w)
-is right-handed. The view plane lies at the distance d before the eye and holds width × height pixels of unit size: d is in pixels.
-The sample point (p_x, p_y) in [0, 1)² of the pixel in column c (from the left) and row r (from the bottom) gives
+is right-handed. The view plane lies at the distance d before the eye and holds width × height pixels of unit size: d is in
+pixels. The sample point (p_x, p_y) in [0, 1)² of the pixel in column c (from the left) and row r (from the bottom) gives
 
     x_v = c − width/2 + p_x    y_v = r − height/2 + p_y    direction = x_v u + y_v v − d w, normalised
 
 Blender's cameras ask for a little more, and the model gains just that: a distance for each axis (pixel aspect), a principal
 point in place of the centre (shift, border), and mirroring (negative scale), in which u points left.
 
-**Singularity.** Where the view is exactly parallel to up, u does not exist, and the axes become canonical (`canonical_axes`). In
-every other pose the basis is that of exact arithmetic on the same float64 inputs to within 4e-16, however close to singular it is
-(exact.py). Rejected: a threshold below which the pose counts as singular (the roll would jump there), and another up near the
-pole (the picture would not be the one that the four values state).
+**Singularity.** Where the view is exactly parallel to up, u does not exist, and the axes become canonical (`canonical_axes`).
+In every other pose the basis is that of exact arithmetic on the same float64 inputs to within 4e-16, however close to singular
+it is (exact.py). Rejected: a threshold below which the pose counts as singular (the roll would jump there), and another up near
+the pole (the picture would not be the one that the four values state).
 """
 
 import math
@@ -108,7 +108,9 @@ class Pinhole:
 
     @cached_property
     def sine_to_up(self) -> float:
-        """sin θ of the angle θ between the view and up, to full precision however small it is; 0 if singular or below float64's range."""
+        """sin θ of the angle θ between the view and up, to full precision however small it is; 0 if singular
+        or below float64's range.
+        """
         return _view_of_one(self.eye, self.look_at, self.up)[2]
 
     def roll_uncertainty(self, precision: float = 2.0**-24) -> float:
@@ -134,7 +136,8 @@ class Pinhole:
     def ray_directions(self, columns: ArrayLike, rows: ArrayLike, px: ArrayLike = 0.5, py: ArrayLike = 0.5) -> Array:
         """Directions from the eye through sample points of pixels.
 
-        columns, rows : pixels from the left and from the bottom; px, py : the sample point in [0, 1)² of each pixel. All broadcast.
+        columns, rows : pixels from the left and from the bottom; px, py : the sample point in [0, 1)² of each pixel. All
+        broadcast.
 
         Returns (..., 3) float64 unit vectors, world space.
         """
@@ -157,9 +160,9 @@ class Pinhole:
 
         points : (..., 3), world space.
 
-        Returns (column, row, depth), each (...) float64: continuous pixels from the left and from the bottom edge, the centre of
-        the first pixel at (0.5, 0.5), and the planar depth −w·(P − e) in world units. What does not lie before the eye (depth ≤ 0)
-        has no picture: its column and row are nan.
+        Returns (column, row, depth), each (...) float64: continuous pixels from the left and from the bottom edge, the centre
+        of the first pixel at (0.5, 0.5), and the planar depth −w·(P − e) in world units. What does not lie before the eye
+        (depth ≤ 0) has no picture: its column and row are nan.
         """
         u, v, w = self._basis
         relative = np.asarray(points, dtype=np.float64) - np.array(self.eye)
@@ -218,8 +221,9 @@ def canonical_axes(up: Triple, looking_down: bool) -> tuple[Triple, Triple, Trip
     """(u, v, w) of a view exactly along up (looking_down is False) or against it (True).
 
     With up = (0, 1, 0) these are the text's: down u = (0, 0, 1), v = (1, 0, 0), w = (0, 1, 0); up u = (1, 0, 0), v = (0, 0, 1),
-    w = (0, −1, 0). For any other up they are the text's, carried by the smallest rotation that takes (0, 1, 0) to up (for an up in the
-    lower half-space, after half a turn about the x axis). With up = (0, 0, 1) that is (x, y, z) → (x, −z, y), Blender's world.
+    w = (0, −1, 0). For any other up they are the text's, carried by the smallest rotation that takes (0, 1, 0) to up (for an up
+    in the lower half-space, after half a turn about the x axis). With up = (0, 0, 1) that is (x, y, z) → (x, −z, y), Blender's
+    world.
     """
     (unit,) = exact.scaled_to_one(up)
     size = exact.length(unit)

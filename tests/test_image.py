@@ -1,0 +1,123 @@
+"""EXR files: what goes in comes out, rows flip once, names of all versions mean the same, damage is named."""
+
+import numpy as np
+import OpenEXR
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from viewcam_addon import image
+from viewcam_addon.errors import InputError
+from viewcam_addon.image import Image
+from viewcam_addon.pinhole import Pinhole
+
+CAMERA = Pinhole((0.1, 2, 3), (0, 0.3, 0), (0, 0, 1), (500, 250), 5, 4, (2, 2.5), mirrored=True)
+
+
+def numbered(height=4, width=5):
+    """Every known pass, each value of its own."""
+    count = 0
+    passes = {}
+    for name, channels in image.CHANNELS.items():
+        size = height * width * len(channels)
+        passes[name] = np.arange(count, count + size, dtype=np.float32).reshape(height, width, len(channels))
+        count += size
+    return passes
+
+
+def test_passes_camera_and_attributes_come_back_as_they_were_written(tmp_path):
+    written = Image(numbered(), CAMERA, {"command": "viewcam render"})
+    image.write(tmp_path / "a.exr", written)
+    back = image.read(tmp_path / "a.exr")
+    assert back.size == (5, 4)
+    assert back.camera == CAMERA, "the camera must come back to the last bit"
+    assert back.attributes["command"] == "viewcam render"
+    assert back.passes.keys() == written.passes.keys()
+    for name, array in written.passes.items():
+        assert np.array_equal(back[name], array), name
+
+
+@settings(max_examples=20)
+@given(hnp.arrays(np.float32, hnp.array_shapes(min_dims=2, max_dims=2), elements=st.floats(width=32)))
+def test_every_float32_survives_the_file(tmp_path_factory, values):
+    path = tmp_path_factory.mktemp("image") / "a.exr"
+    image.write(path, Image({"Depth": values[..., None]}))
+    assert np.array_equal(image.read(path)["Depth"][..., 0], values, equal_nan=True)
+
+
+def test_the_first_row_of_a_file_is_the_top_of_the_picture(tmp_path):
+    image.write(tmp_path / "a.exr", Image({"Depth": np.array([[[1.0]], [[2.0]]], dtype=np.float32)}))
+    stored = OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True).channels()["ViewLayer.Depth.Z"].pixels
+    assert stored.tolist() == [[2.0], [1.0]]
+
+
+def test_names_of_blender_4_and_parts_of_blender_5_mean_the_same_passes(tmp_path):
+    index, depth = np.full((2, 3), 7, dtype=np.float32), np.full((2, 3), 9, dtype=np.float32)
+    one = {"View Layer.001.IndexOB.X": index, "View Layer.001.IndexMA.X": index, "View Layer.001.Depth.Z": depth}
+    OpenEXR.File({}, one).write(str(tmp_path / "4.exr"))
+    parts = [
+        OpenEXR.Part({}, {f"ViewLayer.{name}": pixels}, name)
+        for name, pixels in (("Object Index.X", index), ("Depth.Z", depth))
+    ]
+    OpenEXR.File(parts).write(str(tmp_path / "5.exr"))
+    for name in ("4.exr", "5.exr"):
+        back = image.read(tmp_path / name)
+        assert (back["Object Index"] == 7).all() and (back["Depth"] == 9).all()
+
+
+def test_of_two_view_layers_the_first_is_read(tmp_path):
+    values = {f"{layer}.Depth.Z": np.full((1, 1), depth, dtype=np.float32) for layer, depth in (("A", 1), ("B", 2))}
+    OpenEXR.File({}, values).write(str(tmp_path / "a.exr"))
+    assert image.read(tmp_path / "a.exr")["Depth"] == 1
+
+
+def test_only_the_passes_asked_for_are_kept(tmp_path):
+    image.write(tmp_path / "a.exr", Image(numbered()))
+    assert set(image.read(tmp_path / "a.exr", only=["Depth", "UV"]).passes) == {"Depth", "UV"}
+
+
+def test_the_standard_attributes_take_world_points_to_the_camera_and_to_their_pixels(tmp_path):
+    image.write(tmp_path / "a.exr", Image(numbered(), CAMERA))
+    header = OpenEXR.File(str(tmp_path / "a.exr"), header_only=True).header()
+    points = np.array(CAMERA.eye) + 3 * CAMERA.ray_directions([0, 4, 2], [3, 1, 0])
+    column, row, depth = CAMERA.project(points)
+    homogeneous = np.column_stack([points, np.ones(3)])
+    # float32 matrices: each product is rounded to 2⁻²⁴ of its largest term, up to 500/5 · 2 · |P| ≈ 1000 before the division.
+    assert (homogeneous @ header["worldToCamera"])[:, 2] == pytest.approx(-depth, abs=8 * 2.0**-24 * 10)
+    clip = homogeneous @ header["worldToNDC"]
+    ndc = clip[:, :2] / clip[:, 3:]
+    assert ndc[:, 0] == pytest.approx(2 * column / CAMERA.width - 1, abs=8 * 2.0**-24 * 1000)
+    assert ndc[:, 1] == pytest.approx(2 * row / CAMERA.height - 1, abs=8 * 2.0**-24 * 1000)
+
+
+def test_a_missing_pass_is_named_with_those_that_are_there(tmp_path):
+    image.write(tmp_path / "a.exr", Image({"Depth": np.zeros((1, 1, 1), dtype=np.float32)}))
+    with pytest.raises(InputError, match=r"a\.exr has no pass 'Position' but Depth"):
+        image.read(tmp_path / "a.exr")["Position"]
+
+
+@pytest.mark.parametrize("share", [0.01, 0.3, 0.6, 0.99])
+def test_a_truncated_file_is_refused_in_one_sentence_and_prints_nothing(tmp_path, capfd, share):
+    passes = {"Depth": np.random.default_rng(0).normal(size=(200, 100, 1)).astype(np.float32)}
+    image.write(tmp_path / "whole.exr", Image(passes))
+    data = (tmp_path / "whole.exr").read_bytes()
+    (tmp_path / "cut.exr").write_bytes(data[: int(len(data) * share)])
+    with pytest.raises(InputError, match=r"cut\.exr .*render it again"):
+        image.read(tmp_path / "cut.exr")
+    assert capfd.readouterr() == ("", "")
+
+
+def test_files_that_are_no_exr_or_hold_nothing_known_are_refused(tmp_path):
+    (tmp_path / "text.exr").write_text("no picture")
+    OpenEXR.File({}, {"R": np.zeros((1, 1), dtype=np.float32)}).write(str(tmp_path / "plain.exr"))
+    for name, words in (("none.exr", "does not exist"), ("text.exr", "can't be read"), ("plain.exr", "none of the passes")):
+        with pytest.raises(InputError, match=words):
+            image.read(tmp_path / name)
+
+
+def test_nothing_is_left_where_the_folder_can_not_be_written(tmp_path):
+    (tmp_path / "file").write_text("no folder")
+    with pytest.raises(InputError, match="can't be written"):
+        image.write(tmp_path / "file" / "a.exr", Image(numbered()))
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]

@@ -1,0 +1,129 @@
+"""Blender's camera data to the view plane and back, for every fit, shape, aspect, shift, percentage and border."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from viewcam_addon.errors import InputError
+from viewcam_addon.intrinsics import CameraData, Frame, ViewPlane, camera_data, view_plane
+
+fits = st.sampled_from(["AUTO", "HORIZONTAL", "VERTICAL"])
+fractions = st.tuples(st.floats(0, 0.4), st.floats(0, 0.4), st.floats(0.6, 1), st.floats(0.6, 1))
+frames = st.builds(
+    Frame,
+    resolution_x=st.integers(16, 4000),
+    resolution_y=st.integers(16, 4000),
+    percentage=st.integers(25, 200),
+    pixel_aspect_x=st.floats(1, 3),
+    pixel_aspect_y=st.floats(1, 3),
+    border=st.none() | fractions,
+    crop=st.booleans(),
+)
+cameras = st.builds(
+    CameraData,
+    lens=st.floats(1, 5000),
+    sensor_width=st.floats(1, 100),
+    sensor_height=st.floats(1, 100),
+    sensor_fit=fits,
+    shift_x=st.floats(-2, 2),
+    shift_y=st.floats(-2, 2),
+)
+
+
+@given(cameras, frames)
+def test_camera_data_of_a_view_plane_gives_the_camera_back(camera, frame):
+    plane = view_plane(camera, frame)
+    back = camera_data(plane, frame, camera.sensor_width, camera.sensor_height, camera.sensor_fit)
+    # Nine roundings each way; shift is a difference of pixels, so that their size over the fitted side counts.
+    assert back.lens == pytest.approx(camera.lens, rel=9 * 2.0**-53)
+    roundings = 9 * 2.0**-53 * 4000 * 2 / 16 * 3
+    assert (back.shift_x, back.shift_y) == pytest.approx((camera.shift_x, camera.shift_y), abs=roundings)
+    assert (back.sensor_width, back.sensor_height) == (camera.sensor_width, camera.sensor_height)
+
+
+@given(st.floats(1e-3, 1e7), frames, fits)
+def test_a_lens_below_one_millimetre_grows_the_sensor_and_keeps_the_distance(distance, frame, fit):
+    width, height = frame.window[2:]
+    plane = ViewPlane(
+        (distance, distance * frame.pixel_aspect_x / frame.pixel_aspect_y), (width / 2, height / 2), width, height
+    )
+    camera = camera_data(plane, frame, 36, 24, fit)
+    assert np.float32(camera.lens) >= 1 and camera.sensor_width >= 36
+    assert camera.lens < 2 or camera.sensor_width == 36, "grown further than needed"
+    assert camera.sensor_width / camera.sensor_height == 1.5
+    assert view_plane(camera, frame).distance == pytest.approx(plane.distance, rel=9 * 2.0**-53)
+
+
+@given(cameras, frames.filter(lambda frame: frame.border and frame.crop))
+def test_a_window_of_a_picture_is_a_crop_of_it(camera, frame):
+    whole = view_plane(
+        camera, Frame(frame.resolution_x, frame.resolution_y, frame.percentage, frame.pixel_aspect_x, frame.pixel_aspect_y)
+    )
+    column, row, width, height = frame.window
+    part = view_plane(camera, frame)
+    assert (part.width, part.height, part.distance) == (width, height, whole.distance)
+    assert part.principal_point == (whole.principal_point[0] - column, whole.principal_point[1] - row)
+
+
+def test_blenders_default_camera_at_full_hd_has_the_distance_2666_and_two_thirds():
+    plane = view_plane(CameraData(lens=50), Frame(1920, 1080))
+    assert plane == ViewPlane((50 / 36 * 1920,) * 2, (960, 540), 1920, 1080)
+
+
+@pytest.mark.parametrize(
+    ("fit", "resolution", "expected"),
+    [
+        ("AUTO", (200, 100), 200 / 36),
+        ("AUTO", (100, 200), 200 / 36),  # the long side, and still the sensor's width
+        ("HORIZONTAL", (100, 200), 100 / 36),
+        ("VERTICAL", (100, 200), 200 / 24),
+        ("VERTICAL", (200, 100), 100 / 24),
+    ],
+)
+def test_each_fit_takes_its_side_of_the_picture_and_of_the_sensor(fit, resolution, expected):
+    plane = view_plane(CameraData(lens=50, sensor_fit=fit), Frame(*resolution))
+    assert plane.distance == pytest.approx((50 * expected,) * 2, rel=4 * 2.0**-53)
+
+
+def test_pixel_aspect_decides_which_side_auto_fits_and_divides_each_distance():
+    plane = view_plane(CameraData(lens=36), Frame(100, 150, pixel_aspect_x=2))
+    assert plane.distance == (100, 200)
+
+
+def test_shift_moves_the_principal_point_against_it_by_the_fitted_side():
+    plane = view_plane(CameraData(lens=50, shift_x=0.25, shift_y=-0.1), Frame(200, 100))
+    assert plane.principal_point == (100 - 0.25 * 200, 50 + 0.1 * 200)
+
+
+def test_odd_sizes_at_a_percentage_round_down_as_blender_does():
+    assert Frame(1921, 1081, 33).size == (633, 356)
+    assert Frame(101, 51, 50, border=(0.1, 0.2, 0.9, 0.8), crop=True).window == (5, 5, 40, 15)
+
+
+@pytest.mark.parametrize(
+    ("plane", "words"),
+    [
+        (ViewPlane((100, 100), (50, 50), 100, 100), ["100 × 100", "200 × 100", "resolution"]),
+        (ViewPlane((100, 110), (100, 50), 200, 100), ["100", "110", "pixel aspect"]),
+    ],
+)
+def test_a_view_plane_that_the_scene_can_not_render_is_refused_by_name(plane, words):
+    with pytest.raises(InputError) as caught:
+        camera_data(plane, Frame(200, 100), 36, 24, "AUTO")
+    assert all(word in str(caught.value) for word in words), caught.value
+
+
+def test_an_empty_border_is_refused():
+    with pytest.raises(InputError, match="0 × "):
+        view_plane(CameraData(50), Frame(200, 100, border=(0.5, 0, 0.501, 1), crop=True))
+
+
+def test_an_extreme_wide_angle_needs_no_clamp():
+    width = 640
+    distance = width / 2 / math.tan(math.radians(179.9999 / 2))
+    camera = camera_data(ViewPlane((distance,) * 2, (320, 180), width, 360), Frame(width, 360), 36, 24, "AUTO")
+    assert camera.lens >= 1
+    assert view_plane(camera, Frame(width, 360)).distance[0] == pytest.approx(distance, rel=9 * 2.0**-53)
