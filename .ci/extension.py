@@ -70,16 +70,18 @@ def stage(folder: Path, platforms: list[str]) -> None:
 def main(blender: str, output: Path, platforms: list[str]) -> None:
     """Build one zip a platform into `output` and print their paths."""
     output.mkdir(parents=True, exist_ok=True)
-    before = {path: path.stat().st_mtime_ns for path in output.glob("*.zip")}
     with tempfile.TemporaryDirectory(prefix="virtual-pinhole-") as scratch:
-        stage(Path(scratch), platforms)
+        source, built = Path(scratch, "source"), Path(scratch, "built")
+        source.mkdir()
+        built.mkdir()
+        stage(source, platforms)
         command = [blender, "--command", "extension", "build", "--split-platforms"]
-        subprocess.run([*command, f"--source-dir={scratch}", f"--output-dir={output.resolve()}"], check=True)
-    built = [path for path in sorted(output.glob("*.zip")) if before.get(path) != path.stat().st_mtime_ns]
-    if len(built) != len(platforms):
-        sys.exit(f"Blender built {len(built)} zips of {len(platforms)}: what it says is above")
-    for path in built:
-        print(f"{path}  {path.stat().st_size / 1e6:.1f} MB")
+        subprocess.run([*command, f"--source-dir={source}", f"--output-dir={built}"], check=True)
+        zips = sorted(built.glob("*.zip"))
+        if len(zips) != len(platforms):
+            sys.exit(f"Blender built {len(zips)} zips of {len(platforms)}: what it says is above")
+        for path in zips:
+            print(f"{shutil.move(path, output / path.name)}  {(output / path.name).stat().st_size / 1e6:.1f} MB")
 
 
 if __name__ == "__main__":
