@@ -1,0 +1,198 @@
+"""Pixels where the two pictures see another surface, and whether the tolerance explains it.
+
+On a silhouette, or on a crease between two faces, the smallest shift of a ray decides what it sees. Whether such a shift is
+within tolerance is proved by re-tracing: rays are sent around the pixel's centre on rings that grow up to the tolerance, and
+the pixel is explained by the first ring on which some ray sees what the test picture shows, in every pass.
+
+Rejected: accepting a pixel when a neighbour shows the test's object. Next to an edge that is so for any error below a pixel.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..pinhole import Pinhole
+from . import law
+from .law import Array, Seen
+
+# surface_at(columns, rows, px, py) -> dict of pass name to (n, channels) float32: what rays through sub-pixel positions see.
+SurfaceAt = Callable[[NDArray, NDArray, Array, Array], Seen]
+
+KINDS = ("not a number", "coverage", "object index", "material index", "surface")
+
+# One pixel in a million may stay unexplained (what was measured on 11.5 million), and none in smaller pictures.
+PIXELS_PER_UNEXPLAINED = 1_000_000
+
+# The rings, in roundings (law.ROUNDINGS): the smallest that explains tells how far the ray was off.
+_RINGS = (0.5, 1.0, *law.ROUNDINGS[:4], 20.0, law.ROUNDINGS[4])
+_DIRECTIONS = 16
+_BATCH = 1_000
+
+
+@dataclass(frozen=True, eq=False)
+class Mismatches:
+    """The pixels that see another surface in the test picture than in the reference.
+
+    columns, rows : (n,) int, rows from the bottom. kinds : (n,) int, index in KINDS.
+    shifts : (n,) float64, pixels: the smallest shift that explains each; nan where none within tolerance does.
+    reach : (n,) float64, pixels: the tolerance up to which shifts were tried.
+    retraced : how many were re-traced; 0 without a scene to trace.
+    """
+
+    columns: NDArray[np.intp]
+    rows: NDArray[np.intp]
+    kinds: NDArray[np.intp]
+    shifts: Array
+    reach: Array
+    retraced: int
+
+    @property
+    def explained(self) -> NDArray[np.bool_]:
+        return np.isfinite(self.shifts)
+
+    @property
+    def unexplained_count(self) -> int:
+        return int((~self.explained).sum())
+
+    def counts(self) -> dict[str, tuple[int, int]]:
+        """For each kind: (how many, how many of them explained)."""
+        return {
+            kind: (int((self.kinds == i).sum()), int((self.explained & (self.kinds == i)).sum()))
+            for i, kind in enumerate(KINDS)
+        }
+
+    def to_json(self) -> dict:
+        """Counts for each kind, and the first hundred unexplained pixels."""
+        counts = {kind: {"count": count, "explained": explained} for kind, (count, explained) in self.counts().items()}
+        first = np.flatnonzero(~self.explained)[:100]
+        unexplained = [
+            {
+                "column": int(self.columns[i]),
+                "row": int(self.rows[i]),
+                "kind": KINDS[self.kinds[i]],
+                "tried_up_to_px": float(self.reach[i]),
+            }
+            for i in first
+        ]
+        largest = float(np.max(self.shifts[self.explained], initial=0.0))
+        return {"kinds": counts, "retraced": self.retraced, "largest_shift_px": largest, "unexplained": unexplained}
+
+
+@dataclass(frozen=True, eq=False)
+class Agreement:
+    """Judges whether two sights of the same pixels are the same surface, within the law's last percentile.
+
+    slopes : pass name to (n,), how much Normal and UV change per pixel there (law.slopes).
+    """
+
+    pinhole: Pinhole
+    slopes: dict[str, Array]
+
+    def at(self, chosen: NDArray) -> "Agreement":
+        """That of some of the pixels, by their indices."""
+        return Agreement(self.pinhole, {name: slope[chosen] for name, slope in self.slopes.items()})
+
+    def errors(self, expected: Seen, seen: Seen) -> dict[str, tuple[Array, Array, float]]:
+        """For Depth, Normal and UV: (error, what one rounding causes, what storage causes), each (n,) but the last.
+
+        The law is taken at `expected`. Meaningless where either side missed.
+        """
+        depth = expected["Depth"][..., 0].astype(np.float64)
+        errors = {
+            "Depth": (np.abs(seen["Depth"][..., 0] - depth) / depth, law.depth_error(self.pinhole, expected), law.FLOAT32)
+        }
+        if "Normal" in self.slopes:
+            allowed = law.normal_error(self.pinhole, expected, self.slopes["Normal"])
+            errors["Normal"] = (law.angle_between(expected["Normal"], seen["Normal"]), allowed, law.NORMAL_STORAGE)
+        if "UV" in self.slopes:
+            apart = np.abs(expected["UV"][..., :2].astype(np.float64) - seen["UV"][..., :2]).max(axis=-1)
+            errors["UV"] = (apart, law.uv_error(self.pinhole, expected, self.slopes["UV"]), 0.0)
+        return errors
+
+    def same_surface(self, expected: Seen, seen: Seen) -> NDArray[np.bool_]:
+        """(n,) bool: equal indices, and depth, normal and UV within tolerance; or a miss on both sides."""
+        hit, also = law.is_hit(expected), law.is_hit(seen)
+        same = hit & also
+        for name in ("Object Index", "Material Index"):
+            if name in expected and name in seen:
+                same &= expected[name][..., 0] == seen[name][..., 0]
+        for error, allowed, floor in self.errors(expected, seen).values():
+            same &= error <= law.ROUNDINGS[-1] * allowed + floor
+        return same | (~hit & ~also)
+
+
+def kinds_of(expected: Seen, seen: Seen, agreement: Agreement) -> NDArray[np.intp]:
+    """(n,) int: for each pixel the index in KINDS of what sets the two sides apart, −1 where nothing does."""
+    kinds = np.where(agreement.same_surface(expected, seen), -1, KINDS.index("surface"))
+    for name, kind in (("Material Index", "material index"), ("Object Index", "object index")):
+        if name in expected and name in seen:
+            kinds[expected[name][..., 0] != seen[name][..., 0]] = KINDS.index(kind)
+    kinds[law.is_hit(expected) != law.is_hit(seen)] = KINDS.index("coverage")
+    for values in seen.values():
+        kinds[~np.isfinite(values).all(axis=-1)] = KINDS.index("not a number")
+    return kinds
+
+
+def reach_of(shift: Array) -> Array:
+    """(height, width) pixels: how far a ray may be off, from law.ray_shift of the reference (nan where nothing was hit).
+
+    At an edge the ray may belong to either surface, so the largest of the 3 × 3 neighbourhood counts; never the test's figures,
+    which may be the fault that is looked for. Where nothing was hit around, the picture's median.
+    """
+    around = largest_around(np.nan_to_num(shift, nan=0.0))
+    hits = shift[np.isfinite(shift)]
+    around[around == 0.0] = np.median(hits) if hits.size else 0.0
+    return law.ROUNDINGS[-1] * around
+
+
+def largest_around(values: Array) -> Array:
+    """(height, width): the largest value of each pixel's 3 × 3 neighbourhood."""
+    height, width = values.shape
+    padded = np.pad(values, 1, mode="edge")
+    across = np.maximum(np.maximum(padded[:, :width], padded[:, 1 : width + 1]), padded[:, 2:])
+    return np.maximum(np.maximum(across[:height], across[1 : height + 1]), across[2:])
+
+
+def explain(
+    columns: NDArray, rows: NDArray, seen: Seen, reach: Array, agreement: Agreement, surface_at: SurfaceAt
+) -> tuple[Array, int]:
+    """The smallest shift of the ray that explains what the test picture shows.
+
+    columns, rows : (n,) the pixels. seen : what the test shows there. reach : (n,) pixels. agreement : of these pixels.
+
+    Returns (n,) pixels, nan where no shift within reach explains it, and the number of pixels that were re-traced: all, unless
+    most of a batch stays unexplained. Such a picture has failed, and tracing the rest of it would only take time.
+    """
+    shifts = np.full(len(columns), np.nan)
+    for start in range(0, len(columns), _BATCH):
+        batch = np.arange(start, min(start + _BATCH, len(columns)))
+        pending = batch
+        for ring in _RINGS:
+            radius = reach[pending] * (ring / _RINGS[-1])
+            found = _explained_by(columns[pending], rows[pending], at(seen, pending), radius, agreement.at(pending), surface_at)
+            shifts[pending[found]] = radius[found]
+            pending = pending[~found]
+            if not len(pending):
+                break
+        if len(pending) > len(batch) / 2:
+            return shifts, start + len(batch)
+    return shifts, len(columns)
+
+
+def _explained_by(
+    columns: NDArray, rows: NDArray, seen: Seen, radius: Array, agreement: Agreement, surface_at: SurfaceAt
+) -> NDArray[np.bool_]:
+    """(n,) bool: whether some ray on the ring of this radius sees the same."""
+    angles = (np.arange(_DIRECTIONS) + 0.5) * (2.0 * np.pi / _DIRECTIONS)
+    each = np.repeat(np.arange(len(columns)), _DIRECTIONS)
+    px = 0.5 + np.outer(radius, np.cos(angles)).ravel()
+    py = 0.5 + np.outer(radius, np.sin(angles)).ravel()
+    traced = surface_at(columns[each], rows[each], px, py)
+    return agreement.at(each).same_surface(traced, at(seen, each)).reshape(-1, _DIRECTIONS).any(axis=1)
+
+
+def at(seen: Seen, chosen: NDArray) -> Seen:
+    """The same passes at some of the pixels, by their indices."""
+    return {name: values[chosen] for name, values in seen.items()}

@@ -1,0 +1,145 @@
+"""The comparison in words: one sentence, and aligned lines for the shell."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .law import PERCENTILES
+from .statistics import Row, percentile_name
+
+if TYPE_CHECKING:
+    from .geometry import Comparison
+
+
+# A sentence with more faults is not read; the table has them all.
+_MOST_FAULTS = 2
+
+
+def sentence(comparison: "Comparison") -> str:
+    """The verdict in one sentence, which names the gravest fault where there is one."""
+    if comparison.passed:
+        return _praise(comparison)
+    if comparison.hits == (0, 0):
+        return "Nothing to compare: no pixel of either picture shows an object, point the camera at something."
+    return "Not the same picture: " + "; ".join(_faults(comparison)[:_MOST_FAULTS]) + "."
+
+
+def lines(comparison: "Comparison") -> list[str]:
+    """One line for each pass, aligned, and the verdict last."""
+    head = (
+        f"{'pass':<16}{'pixels':>11}"
+        + "".join(f"{percentile_name(p):>10}" for p in PERCENTILES)
+        + f"  {'unit':<10}{'of tolerance':<16}"
+    )
+    table = [head.rstrip(), *(_row_line(row) for row in comparison.rows)]
+    mismatches = comparison.mismatches
+    table.append(
+        f"{'Mismatches':<16}{len(mismatches.kinds):>11,}  {_explained(comparison)}; "
+        f"unexplained {mismatches.unexplained_count} of "
+        f"{comparison.allowed_unexplained} allowed  {_mark(comparison.mismatches_ok)}"
+    )
+    table += [
+        f"  {kind:<14}{count:>11,}  {explained:,} explained"
+        for kind, (count, explained) in mismatches.counts().items()
+        if count
+    ]
+    if comparison.systematic:
+        s = comparison.systematic
+        table.append(
+            f"{'Systematic':<16}{'':>11}  shift {s.shift_x:+.1e}, {s.shift_y:+.1e} px; zoom {s.zoom_x:+.1e}, {s.zoom_y:+.1e}; "
+            f"roll {s.roll:+.1e} rad; mean {s.mean:.1e} of {s.tolerance:.1e} px  {_mark(s.ok)}"
+        )
+    if comparison.conversion:
+        c = comparison.conversion
+        table.append(
+            f"{'Conversion':<16}{'':>11}  stated camera against the one read back: {c.largest:.1e} px, {c.share:.0%} of what "
+            f"float32 storage allows  {_mark(c.ok)}"
+        )
+    return [*table, comparison.sentence]
+
+
+def _row_line(row: Row) -> str:
+    if not row.count:
+        return f"{row.name:<16}{0:>11}  nothing was compared  {_mark(False)}"
+    figures = "".join(f"{value:>10.1e}" for value in row.values)
+    percentile, share = row.worst
+    used = f"{_percent(share):>7} at {percentile_name(percentile):<6}"
+    return f"{row.name:<16}{row.count:>11,}{figures}  {row.unit:<10}{used}{_mark(row.ok)}"
+
+
+def _praise(comparison: "Comparison") -> str:
+    position = comparison.rows[0]
+    count = len(comparison.mismatches.kinds)
+    edges = f"; {count:,} pixels on edges, {_explained(comparison)}" if count else ""
+    return (
+        f"The same picture: over {position.count:,} pixels the median is {position.values[0]:.1e} px off and the worst "
+        f"{position.values[-1]:.1e} px, {_percent(position.worst[1])} of what float32 allows{edges}."
+    )
+
+
+def _faults(comparison: "Comparison") -> list[str]:
+    """What is wrong, the gravest first."""
+    faults = []
+    position = comparison.rows[0]
+    if position.count and not (position.ok and comparison.systematic.ok):
+        median, allowed = position.values[0], position.tolerances[0]
+        faults.append(f"positions are {median:.2g} px off in the median ({allowed:.1e} px allowed) and {_cause(comparison)}")
+    mismatches = comparison.mismatches
+    if not comparison.mismatches_ok:
+        kinds = ", ".join(
+            f"{count - explained:,} of {kind}" for kind, (count, explained) in mismatches.counts().items() if count > explained
+        )
+        faults.append(f"{mismatches.unexplained_count:,} pixels see another surface ({kinds}), {_why_unexplained(comparison)}")
+    for row in comparison.rows[1:]:
+        if row.count and not row.ok:
+            percentile, share = row.worst
+            value = row.values[PERCENTILES.index(percentile)]
+            faults.append(
+                f"{row.name} is {value:.2g} {row.unit} off at {percentile_name(percentile)}, {_percent(share)} of its tolerance"
+            )
+    if not position.count:
+        faults.append("no pixel shows the same object in both")
+    if comparison.conversion and not comparison.conversion.ok:
+        c = comparison.conversion
+        faults.append(f"the camera in Blender is {c.largest:.2g} px from the stated one ({c.tolerance:.1e} px allowed)")
+    return faults
+
+
+def _cause(comparison: "Comparison") -> str:
+    """What the systematic part looks like: the largest of shift, zoom and roll, in pixels at the picture's border."""
+    s = comparison.systematic
+    radius = max(comparison.pinhole.width, comparison.pinhole.height) / 2
+    if s.zoom_x < -1:
+        return "the picture looks mirrored left to right"
+    if s.zoom_y < -1:
+        return "the picture looks upside down"
+    zoom = max(s.zoom_x, s.zoom_y, key=abs)
+    effects = {
+        f"the picture is shifted by ({s.shift_x:+.3g}, {s.shift_y:+.3g}) px": np.hypot(s.shift_x, s.shift_y),
+        f"the picture is magnified by {1 + s.zoom_x:.6g} × {1 + s.zoom_y:.6g}": abs(zoom) * radius,
+        f"the picture is rolled by {s.roll:+.3g} rad": abs(s.roll) * radius,
+    }
+    cause, effect = max(effects.items(), key=lambda pair: pair[1])
+    return cause if effect > s.tolerance else "the error has no common direction"
+
+
+def _explained(comparison: "Comparison") -> str:
+    mismatches = comparison.mismatches
+    explained = int(mismatches.explained.sum())
+    if not explained:
+        return "none explained" if len(mismatches.kinds) else "none"
+    return f"{explained:,} explained by a shift of at most {np.max(mismatches.shifts[mismatches.explained]):.1e} px"
+
+
+def _why_unexplained(comparison: "Comparison") -> str:
+    if not comparison.mismatches.retraced:
+        return "which may be edges: give the scene too, so that they can be re-traced"
+    return "and no shift within tolerance explains it"
+
+
+def _percent(share: float) -> str:
+    return f"{share:.0%}" if share < 10 else f"{share:.1e} ×"
+
+
+def _mark(ok: bool) -> str:
+    return "ok" if ok else "FAILED"
