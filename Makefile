@@ -57,3 +57,23 @@ test-wheel-%: .venvs/%/ready
 	$$python .ci/environment.py .venvs/$* $(wheel-$*) --editable '.[test]'
 	touch $@
 .PRECIOUS: .venvs/%/ready
+
+# The zip built by a real Blender, in that Blender and in those that are wheels; and the panel in a window.
+test-blender: .venv/test $(MATRIX:%=.venvs/%/ready)
+	BLENDER=$$(.ci/find-blender) || exit 1; export BLENDER; \
+	.venv/bin/python -m pytest tests/real_blender
+
+extension: .venv/demo
+	blender=$$(.ci/find-blender) || exit 1; \
+	.venv/bin/python .ci/extension.py "$$blender" dist $(PLATFORM)
+
+# Blender 4.2 writes them, so that every later one opens them.
+scenes: .venvs/4.2/ready
+	.venvs/4.2/bin/python sample_scenes/make.py
+
+benchmark: .venv/demo
+	.venv/bin/python benchmarks/geometry.py
+
+clean:
+	rm -rf .venv .venvs .pytest_cache .ruff_cache .hypothesis wheels dist build demo
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,75 @@
+"""The Blenders that the extension is installed into: the real one of $BLENDER, and the wheels of `make test-matrix`.
+
+Each has a user folder of its own, so no test touches the extensions or the preferences of whoever runs it.
+"""
+
+import os
+import platform
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+INSIDE = Path(__file__).with_name("inside_blender.py")
+WHEELS = {version: ROOT / ".venvs" / version / "bin" / "python" for version in ("4.2", "4.5", "5.0", "5.2")}
+PLATFORMS = {("Linux", "x86_64"): "linux-x64", ("Darwin", "arm64"): "macos-arm64", ("Darwin", "x86_64"): "macos-x64"}
+
+
+@dataclass(frozen=True)
+class Host:
+    """A Blender with a user folder of its own."""
+
+    command: tuple[str, ...]
+    user_folder: Path
+
+    @property
+    def is_real(self) -> bool:
+        """Whether this is a program, not a Python module."""
+        return self.command[0] == os.environ["BLENDER"]
+
+    def run(self, *arguments: str | Path) -> subprocess.CompletedProcess:
+        """Run the command with more arguments and keep what it says."""
+        environment = {**os.environ, "BLENDER_USER_RESOURCES": str(self.user_folder)}
+        return subprocess.run(
+            [*self.command, *map(str, arguments)], env=environment, cwd=self.user_folder, capture_output=True, text=True
+        )
+
+    def run_inside(self, *arguments: str | Path) -> str:
+        """Run inside_blender.py with these arguments; what it printed. Fails the test if that fails."""
+        if self.is_real:
+            outcome = self.run("-b", "--factory-startup", "--python-exit-code", "9", "--python", INSIDE, "--", *arguments)
+        else:
+            outcome = self.run(INSIDE, "--", *arguments)
+        assert outcome.returncode == 0, outcome.stdout + outcome.stderr
+        return outcome.stdout
+
+
+@pytest.fixture(scope="session")
+def extension_zip(tmp_path_factory) -> Path:
+    """The extension for this machine, built by the real Blender."""
+    folder = tmp_path_factory.mktemp("dist")
+    target = PLATFORMS[platform.system(), platform.machine()]
+    subprocess.run([sys.executable, ROOT / ".ci" / "extension.py", os.environ["BLENDER"], folder, target], check=True)
+    (built,) = folder.glob("*.zip")
+    return built
+
+
+@pytest.fixture(scope="session")
+def real_blender(tmp_path_factory, extension_zip) -> Host:
+    """The real Blender with the extension installed from the shell, as its manual says."""
+    host = Host((os.environ["BLENDER"],), tmp_path_factory.mktemp("real"))
+    host.run("--command", "extension", "install-file", "-r", "user_default", "-e", extension_zip)
+    return host
+
+
+@pytest.fixture(scope="session", params=["real", *(version for version, python in WHEELS.items() if python.exists())])
+def host(request, tmp_path_factory, extension_zip) -> Host:
+    """Each Blender in turn with the extension installed."""
+    if request.param == "real":
+        return request.getfixturevalue("real_blender")
+    host = Host((str(WHEELS[request.param]),), tmp_path_factory.mktemp(f"wheel-{request.param}"))
+    host.run_inside("install", extension_zip)
+    return host

@@ -1,0 +1,92 @@
+"""Runs inside the Blender under test, real or wheel, with the extension installed: `… inside_blender.py -- COMMAND ARGUMENT…`.
+
+install ZIP            installs and enables the extension, as the button in the preferences does
+make FILE              a small scene whose camera is stated in the four values, saved
+render FILE OUT        opens FILE with the extension enabled and renders its frame 1
+apply FILE OUT JSON    the same, but turns the four values off, throws the camera away and applies the Pinhole in JSON instead
+"""
+
+import importlib
+import json
+import sys
+
+import bpy
+
+EXTENSION = "bl_ext.user_default.virtual_pinhole"
+
+
+def enable():
+    """The package inside the installed extension, enabled."""
+    if EXTENSION not in bpy.context.preferences.addons:
+        bpy.ops.preferences.addon_enable(module=EXTENSION)
+    return importlib.import_module(f"{EXTENSION}.viewcam_addon")
+
+
+def install(zip_path):
+    bpy.ops.extensions.package_install_files(filepath=zip_path, repo="user_default", enable_on_install=True)
+    print(
+        json.dumps(
+            {"enabled": EXTENSION in bpy.context.preferences.addons, "registered": hasattr(bpy.types.Object, "virtual_pinhole")}
+        )
+    )
+
+
+def make(file):
+    enable()
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scene = bpy.context.scene
+    bpy.ops.mesh.primitive_monkey_add()
+    bpy.ops.mesh.primitive_plane_add(size=20, location=(0, 0, -1))
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    render = scene.render
+    render.engine = "CYCLES"
+    render.resolution_x, render.resolution_y, render.resolution_percentage = 320, 240, 50
+    if hasattr(render.image_settings, "media_type"):
+        render.image_settings.media_type = "MULTI_LAYER_IMAGE"
+    render.image_settings.file_format = "OPEN_EXR_MULTILAYER"
+    render.image_settings.color_depth = "32"
+    scene.cycles.samples = 1
+    scene.cycles.use_denoising = False
+    layer = scene.view_layers[0]
+    layer.use_pass_z = layer.use_pass_position = layer.use_pass_normal = True
+    values = camera.virtual_pinhole
+    values.enabled = True
+    values.eye, values.look_at, values.up, values.distance = (4.5, -3.25, 2.125), (0.25, 0.125, -0.5), (0.0, 0.5, 2.0), 410.5
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+
+
+def open_file(file):
+    addon = enable()
+    bpy.ops.wm.open_mainfile(filepath=file)
+    return addon, bpy.context.scene
+
+
+def render(file, output):
+    open_file(file)
+    write_frame(output)
+
+
+def apply(file, output, pinhole):
+    addon, scene = open_file(file)
+    camera = scene.camera
+    camera.virtual_pinhole.enabled = False
+    camera.rotation_euler, camera.location, camera.data.lens = (1.0, 2.0, 3.0), (7.0, 8.0, 9.0), 11.0
+    Pinhole = importlib.import_module(f"{addon.__name__}.pinhole").Pinhole
+    findings = importlib.import_module(f"{addon.__name__}.blender.camera").apply(camera, Pinhole(**json.loads(pinhole)), scene)
+    if findings:
+        sys.exit(f"the camera did not stick: {findings}")
+    write_frame(output)
+
+
+def write_frame(output):
+    bpy.context.scene.frame_set(1)
+    bpy.context.scene.render.filepath = output
+    bpy.ops.render.render(write_still=True)
+
+
+if __name__ == "__main__":
+    command, *arguments = sys.argv[sys.argv.index("--") + 1 :]
+    {"install": install, "make": make, "render": render, "apply": apply}[command](*arguments)
+    sys.stdout.flush()

@@ -1,0 +1,92 @@
+"""The zip that artists install: built by a real Blender, accepted by it, and the same camera in every Blender it is for."""
+
+import json
+import tomllib
+import zipfile
+
+import numpy as np
+import pytest
+
+from viewcam_addon import image
+
+# The four values that inside_blender.py states, in numbers that float32 holds, so that no rounding differs. The file renders
+# 320 × 240 at 50 %, and the stated distance counts the pixels of 100 %.
+PINHOLE = {
+    "eye": (4.5, -3.25, 2.125),
+    "look_at": (0.25, 0.125, -0.5),
+    "up": (0.0, 0.5, 2.0),
+    "distance": 410.5 / 2,
+    "width": 160,
+    "height": 120,
+}
+
+
+@pytest.fixture(scope="session")
+def scene_file(host):
+    path = host.user_folder / "scene.blend"
+    host.run_inside("make", path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def python_picture(host, scene_file):
+    """The passes of the picture whose camera `apply` set."""
+    path = host.user_folder / "applied.exr"
+    host.run_inside("apply", scene_file, path, json.dumps(PINHOLE))
+    return image.read(path).passes
+
+
+def differing(one, other):
+    """The names of the passes in which two pictures differ in any bit."""
+    assert one.keys() == other.keys()
+    return [name for name in one if not np.array_equal(one[name], other[name])]
+
+
+def test_blender_accepts_the_zip(real_blender, extension_zip):
+    outcome = real_blender.run("--command", "extension", "validate", extension_zip)
+    assert outcome.returncode == 0, outcome.stdout + outcome.stderr
+
+
+def test_the_zip_holds_the_extension_and_its_wheels_and_nothing_else(extension_zip):
+    with zipfile.ZipFile(extension_zip) as archive:
+        names = archive.namelist()
+        manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())
+    tops = {name.split("/")[0] for name in names}
+    assert tops == {"__init__.py", "blender_manifest.toml", "viewcam_addon", "wheels", "README.md", "LICENSE"}
+    assert not [name for name in names if "__pycache__" in name]
+    # Two wheels for each Python of Blender 4.2 to 5.2.
+    assert sorted(f"./{name}" for name in names if name.endswith(".whl")) == sorted(manifest["wheels"])
+    assert len(manifest["wheels"]) == 6
+
+
+def test_it_installs_from_the_shell(real_blender):
+    """install-file's status says nothing; what it left behind does."""
+    folder = real_blender.user_folder / "extensions" / "user_default" / "virtual_pinhole"
+    assert (folder / "viewcam_addon" / "pinhole.py").exists()
+    listing = real_blender.run("--command", "extension", "list")
+    assert "virtual_pinhole" in listing.stdout, listing.stdout + listing.stderr
+
+
+def test_it_installs_from_the_preferences_and_registers(host, extension_zip):
+    found = json.loads(host.run_inside("install", extension_zip).splitlines()[-1])
+    assert found == {"enabled": True, "registered": True}
+
+
+def test_a_frame_of_the_file_is_the_picture_of_the_python_path(host, scene_file, python_picture):
+    """With -f 1 and the preferences' own add-ons in a real Blender; a wheel has no command line and renders by its operator."""
+    path = host.user_folder / "stated_0001.exr"
+    if host.is_real:
+        outcome = host.run("-b", scene_file, "-o", host.user_folder / "stated_####", "-f", "1")
+        assert path.exists(), outcome.stdout + outcome.stderr
+    else:
+        host.run_inside("render", scene_file, path)
+    stated = image.read(path).passes
+    assert {"Combined", "Depth", "Position", "Normal"} <= stated.keys()
+    assert differing(stated, python_picture) == []
+
+
+def test_a_camera_a_thousandth_of_a_pixel_off_makes_another_picture(host, scene_file, python_picture):
+    path = host.user_folder / "off.exr"
+    off = {**PINHOLE, "distance": PINHOLE["distance"] + 1e-3}
+    host.run_inside("apply", scene_file, path, json.dumps(off))
+    assert {"Depth", "Position"} <= set(differing(image.read(path).passes, python_picture))
