@@ -1,0 +1,223 @@
+"""Blender's camera from a Pinhole, and a Pinhole from Blender's camera.
+
+`apply` states a Pinhole on a camera object and moves the camera there; `read` says which Pinhole the camera is as Cycles
+renders it; `stated` says which Pinhole the four values of `object.virtual_pinhole` ask for. findings.py compares the last two.
+
+**How the pose is set.** As location and rotation, in whatever rotation mode the artist has, computed in float64 relative to the
+parent, with delta transforms taken off: within 1.3e-7 of a matrix entry, and without trouble in gimbal lock. Rejected:
+`matrix_parent_inverse` (3e-8, but the location and rotation in the sidebar would say nothing, and the camera would not be where
+its channels say), `matrix_world =` (4.9e-7; 2.5e-3 in gimbal lock; wrong by whole units under a non-uniformly scaled parent),
+`to_track_quat` (an arbitrary roll near vertical) and a TRACK_TO constraint (another object, and its own pole).
+
+**What is left alone.** The scene, always. Of the camera its sensor fit, and its sensor unless the lens would fall below
+Blender's 1 mm: then lens and sensor double together, and the artist's sensor comes back as soon as the distance allows. A
+negative scale mirrors the picture, as in Cycles; its sign changes only if the Pinhole asks for the other picture.
+"""
+
+import math
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import intrinsics
+from ..errors import InputError
+from ..pinhole import Pinhole
+from . import datablocks, findings, pose, rotation, suspects
+
+Array = NDArray[np.float64]
+
+_LARGEST_FLOAT32 = float(np.finfo(np.float32).max)
+
+
+def apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene) -> list[str]:
+    """State `pinhole` in the camera's four values, move the camera there, and read it back.
+
+    pinhole : the camera of the picture that `scene` renders (resolution percentage and cropped border included), world space.
+
+    Returns what a reader should know, one sentence each: why the camera is not where it was put, or will not stay.
+
+    Raises
+    ------
+    InputError
+        if the object is no perspective camera, if the pinhole has another size or pixel aspect than the scene renders, or if
+        a number is too large for Blender. Nothing has changed then.
+    """
+    depsgraph = datablocks.depsgraph_of(scene)
+    place(camera_object, pinhole, scene, depsgraph)
+    frame = datablocks.frame_of(scene)
+    camera_object.virtual_pinhole.state(
+        pinhole.eye, pinhole.look_at, pinhole.up, pinhole.distance[0] * frame.resolution_x / frame.size[0], frame.size
+    )
+    return check(camera_object, pinhole, scene)
+
+
+def place(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Move the camera to `pinhole` without stating it and without reading back; otherwise as `apply`."""
+    datablocks.check_perspective(camera_object)
+    camera = camera_object.data
+    plane = intrinsics.ViewPlane(pinhole.distance, pinhole.principal_point, pinhole.width, pinhole.height)
+    sensor = datablocks.own_sensor(camera)
+    data = intrinsics.camera_data(plane, datablocks.frame_of(scene), *sensor, camera.sensor_fit)
+    location, turn, scale = pose.channels(camera_object, pinhole, depsgraph)
+    for name, numbers in (
+        ("distance", (data.lens, data.sensor_width)),
+        ("shift", (data.shift_x, data.shift_y)),
+        ("eye", location),
+    ):
+        if not all(abs(number) <= _LARGEST_FLOAT32 for number in numbers):
+            raise InputError(
+                f"the {name} of {camera_object.name!r} asks for {max(numbers, key=abs):g}, too large for Blender: reduce it"
+            )
+    # Nothing fails from here on.
+    camera_object.location = location
+    if camera_object.rotation_mode == "QUATERNION":
+        camera_object.rotation_quaternion = rotation.quaternion(turn)
+    elif camera_object.rotation_mode == "AXIS_ANGLE":
+        camera_object.rotation_axis_angle = rotation.axis_angle(turn)
+    else:
+        camera_object.rotation_euler = rotation.euler(turn, camera_object.rotation_mode)
+    if scale != tuple(camera_object.scale):
+        camera_object.scale = scale
+    camera.lens, camera.shift_x, camera.shift_y = data.lens, data.shift_x, data.shift_y
+    if (camera.sensor_width, camera.sensor_height) != (data.sensor_width, data.sensor_height):
+        camera.sensor_width, camera.sensor_height = data.sensor_width, data.sensor_height
+    camera.virtual_pinhole_sensor = sensor if data.sensor_width != sensor[0] else (0.0, 0.0)
+
+
+def check(camera_object: bpy.types.Object, wanted: Pinhole, scene: bpy.types.Scene) -> list[str]:
+    """One sentence for each thing that keeps the camera from being `wanted`, or will; empty where all is well."""
+    culprits = list(suspects.suspects(camera_object, scene))
+    try:
+        found = read(camera_object, scene)
+    except InputError as error:
+        return [datablocks.sentence(error), *findings.blame({}, culprits)]
+    reach = pose.reach(camera_object, datablocks.depsgraph_of(scene))
+    return findings.blame(findings.differences(wanted, found, reach), culprits)
+
+
+def read(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
+    """The Pinhole as which Cycles renders this camera: its evaluated matrix with normalised columns, and its evaluated lens.
+
+    The look-at point is any point on the view axis, up is v. The evaluated object of another depsgraph may be given as well.
+
+    Raises
+    ------
+    InputError
+        if the object is no perspective camera, or takes no part in the scene, is sheared or scaled to zero.
+    """
+    datablocks.check_perspective(camera_object)
+    evaluated = camera_object if camera_object.is_evaluated else camera_object.evaluated_get(datablocks.depsgraph_of(scene))
+    if not evaluated.is_evaluated:
+        raise InputError(
+            f"camera {camera_object.name!r} takes no part in scene {scene.name!r}: "
+            "enable it and its collection in the viewport, or make it the scene's camera"
+        )
+    matrix = np.array(evaluated.matrix_world)
+    if not np.isfinite(matrix).all() or not np.linalg.norm(matrix[:3, :3], axis=0).all():
+        raise InputError(f"camera {camera_object.name!r} is scaled to zero, or beyond all numbers: set its scale to 1")
+    axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
+    if rotation.skew(axes) > pose.LARGEST_SKEW:
+        raise InputError(
+            f"camera {camera_object.name!r} is oblique, {pose.who_shears(camera_object)}: apply the scale of the parent"
+        )
+    mirrored = bool(np.linalg.det(axes) < 0)
+    _, v, w = rotation.nearest(axes).T
+    eye = matrix[:3, 3]
+    # As far away as the eye's largest coordinate: then eye − reach · w loses none of w's digits.
+    reach = 2.0 ** math.ceil(math.log2(max(1.0, np.abs(eye).max())))
+    plane = intrinsics.view_plane(datablocks.camera_data_of(evaluated.data), datablocks.frame_of(scene))
+    return Pinhole(
+        tuple(eye.tolist()),
+        tuple((eye - reach * w).tolist()),
+        tuple(v.tolist()),
+        plane.distance,
+        plane.width,
+        plane.height,
+        plane.principal_point,
+        mirrored,
+    )
+
+
+def stated(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole | None:
+    """The Pinhole that `object.virtual_pinhole` asks for in the picture that `scene` renders, or None where it is not enabled.
+
+    The principal point is that of the camera's own shift, and mirroring that of its scale: the four values do not speak of
+    them.
+
+    Raises
+    ------
+    InputError
+        if the values make no camera: eye = look-at, up = 0, distance ≤ 0, a number that is not finite.
+    """
+    group = camera_object.virtual_pinhole
+    if not group.enabled:
+        return None
+    datablocks.check_perspective(camera_object)
+    evaluated = camera_object if camera_object.is_evaluated else camera_object.evaluated_get(datablocks.depsgraph_of(scene))
+    frame = datablocks.frame_of(scene)
+    plane = intrinsics.view_plane(datablocks.camera_data_of(evaluated.data), frame)
+    eye, look_at, up, distance = group.numbers()
+    distance *= frame.size[0] / frame.resolution_x
+    mirrored = np.linalg.det(np.array(evaluated.matrix_world)[:3, :3]) < 0
+    return Pinhole(
+        eye,
+        look_at,
+        up,
+        (distance, distance * (frame.pixel_aspect_x / frame.pixel_aspect_y)),
+        plane.width,
+        plane.height,
+        plane.principal_point,
+        bool(mirrored),
+    )
+
+
+def adopt(camera_object: bpy.types.Object, scene: bpy.types.Scene, keep: frozenset[str] = frozenset()) -> None:
+    """State the four values that make the camera as it stands, and enable them. The camera does not move.
+
+    The look-at point keeps its distance to the eye if the values were in use before; else it lies in the plane of focus (that
+    of the focus object, if it stands before the camera, or the focus distance, 10 m in a new camera). Up is the world's Z where
+    this gives the same picture, else v.
+
+    keep : names of values that stay as they are; the others follow the camera.
+
+    Raises
+    ------
+    InputError
+        as `read` does.
+    """
+    found = read(camera_object, scene)
+    group = camera_object.virtual_pinhole
+    _, v, w = found.basis()
+    eye, look_at, up, distance = group.numbers()
+    reach = math.dist(eye, look_at) if group.enabled and not keep else 0.0
+    if not 0 < reach < math.inf:
+        reach = _focus_distance(camera_object, found, datablocks.depsgraph_of(scene))
+    frame = datablocks.frame_of(scene)
+    if "eye" not in keep:
+        eye = found.eye
+    if "look_at" not in keep:
+        look_at = tuple((np.array(found.eye) - reach * w).tolist())
+    if "up" not in keep:
+        up = _simplest_up(eye, look_at, v)
+    if "distance" not in keep:
+        distance = found.distance[0] * frame.resolution_x / frame.size[0]
+    group.state(eye, look_at, up, distance, frame.size)
+
+
+def _simplest_up(eye: tuple, look_at: tuple, v: Array) -> tuple[float, float, float]:
+    """(0, 0, 1) where its v is the given one but for the rounding of a float32 matrix, else v."""
+    vertical = (0.0, 0.0, 1.0)
+    pinhole = Pinhole(eye, look_at, vertical, 1.0, 1, 1)
+    if np.abs(pinhole.basis()[1] - v).max() <= findings.LARGEST_TURN:
+        return vertical
+    return tuple(v.tolist())
+
+
+def _focus_distance(camera_object: bpy.types.Object, pinhole: Pinhole, depsgraph: bpy.types.Depsgraph) -> float:
+    focus = camera_object.data.dof
+    if focus.focus_object:
+        depth = float(pinhole.project(np.array(focus.focus_object.evaluated_get(depsgraph).matrix_world.translation))[2])
+        if depth > 0:
+            return depth
+    return focus.focus_distance or 10.0

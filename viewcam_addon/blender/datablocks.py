@@ -1,0 +1,98 @@
+"""What Blender says about a camera and its picture, in the plain classes of intrinsics.py. Nothing here changes anything."""
+
+import math
+
+import bpy
+
+from .. import intrinsics
+from ..errors import InputError
+
+_KINDS = {"ORTHO": "orthographic", "PANO": "panoramic", "CUSTOM": "a custom camera"}
+
+
+def check_perspective(camera_object: bpy.types.Object) -> None:
+    """Raise InputError, by name, if the object is no perspective camera."""
+    if camera_object.type != "CAMERA":
+        raise InputError(f"object {camera_object.name!r} is no camera: choose a camera")
+    kind = camera_object.data.type
+    if kind != "PERSP":
+        raise InputError(
+            f"camera {camera_object.name!r} is {_KINDS.get(kind, kind)}, no pinhole: set its lens type to Perspective"
+        )
+
+
+def frame_of(scene: bpy.types.Scene) -> intrinsics.Frame:
+    """The picture that the scene renders."""
+    render = scene.render
+    border = (render.border_min_x, render.border_min_y, render.border_max_x, render.border_max_y) if render.use_border else None
+    return intrinsics.Frame(
+        render.resolution_x,
+        render.resolution_y,
+        render.resolution_percentage,
+        render.pixel_aspect_x,
+        render.pixel_aspect_y,
+        border,
+        render.use_border and render.use_crop_to_border,
+    )
+
+
+def camera_data_of(camera: bpy.types.Camera) -> intrinsics.CameraData:
+    """The intrinsics that Blender stores, as plain numbers."""
+    return intrinsics.CameraData(
+        camera.lens, camera.sensor_width, camera.sensor_height, camera.sensor_fit, camera.shift_x, camera.shift_y
+    )
+
+
+def own_sensor(camera: bpy.types.Camera) -> tuple[float, float]:
+    """The artist's sensor (width, height) in mm: what it was before `place` grew it, unless the artist has changed it since."""
+    current = (camera.sensor_width, camera.sensor_height)
+    before = tuple(camera.virtual_pinhole_sensor)
+    if not all(before):
+        return current
+    growth = current[0] / before[0]
+    grown_by_place = math.frexp(growth)[0] == 0.5 and growth > 1 and growth == current[1] / before[1]
+    return before if grown_by_place else current
+
+
+def depsgraph_of(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
+    """The scene's dependency graph, up to date: of the current view layer, or the first one of another scene."""
+    if bpy.context.scene == scene:
+        return bpy.context.evaluated_depsgraph_get()
+    layer = scene.view_layers[0]
+    layer.update()
+    return layer.depsgraph
+
+
+def scene_of(camera_object: bpy.types.Object) -> bpy.types.Scene:
+    """The current scene if the object is in it, else the first one that it is in."""
+    scenes = camera_object.users_scene
+    return bpy.context.scene if bpy.context.scene in scenes or not scenes else scenes[0]
+
+
+def camera_in(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The camera that is meant: that of the shown (perhaps pinned) camera data, else the active one, else the scene's."""
+    active = context.active_object
+    data = getattr(context, "camera", None)
+    if data:
+        if active and active.data == data:
+            return active
+        return next((item for item in context.scene.objects if item.data == data), None)
+    return active if active and active.type == "CAMERA" else context.scene.camera
+
+
+def beyond_pinhole(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> list[str]:
+    """One sentence for each feature in use that makes the render something else than a pinhole's picture."""
+    sentences = []
+    if camera_object.data.dof.use_dof:
+        sentences.append("Depth of field is on, and a pinhole has none: the picture is blurred off the plane of focus")
+    if scene.render.use_multiview:
+        sentences.append("Stereoscopy is on: each eye has another camera")
+    if scene.render.use_motion_blur:
+        sentences.append("Motion blur is on: the picture of whatever moves is a mean over the shutter's time")
+    return sentences
+
+
+def sentence(error: InputError) -> str:
+    """An error's message with a capital, as it stands alone in a panel or a report."""
+    message = str(error)
+    return message[:1].upper() + message[1:]

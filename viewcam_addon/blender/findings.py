@@ -1,0 +1,94 @@
+"""What became of a camera after it was set: where it differs from what was asked, and who did it.
+
+`differences` says what is off by more than float32 storage explains, `blame` says which suspects (suspects.py) explain it. Both
+are pure and know no Blender. A suspect is told of when what it acts on differs, so that a constraint which leaves the camera
+where it belongs is never accused; some (animation, libraries, locks) are told of always, since they act later. Rejected: to
+remember what was set and when, which undo, linking and scripts would make stale.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..pinhole import Pinhole
+
+_FLOAT32 = 2.0**-24  # the relative error of storing a number as float32
+
+# Roundings of 2⁻²⁴ between a float64 rotation and the float32 matrix: three angles of up to π, half of 2⁻²² off each (2 · 3),
+# the product of three rotations (3), and for a parent the products with its inverse and with the local matrix (4 each).
+LARGEST_TURN = 17 * _FLOAT32
+# A location is rounded once, then multiplied by the parent's matrices, twice four roundings.
+_LOCATION_ROUNDINGS = 9
+# Lens, sensor and pixel aspect.
+_LENS_ROUNDINGS = 3
+# The shift, and its product with the size.
+_SHIFT_ROUNDINGS = 2
+
+EYE, VIEW, DISTANCE, CENTRE = "eye", "view", "distance", "centre"
+POSE = frozenset({EYE, VIEW})
+REMEDY = "apply the values again, or adopt the camera as it stands"
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """Something that may keep a camera from being what its four values say.
+
+    culprit : a clause with the culprit's name and its deed. acts_on : some of EYE, VIEW, DISTANCE, CENTRE.
+    remedy : what to do. always : told even where nothing differs yet.
+    """
+
+    culprit: str
+    acts_on: frozenset[str]
+    remedy: str
+    always: bool = False
+
+
+def differences(wanted: Pinhole, found: Pinhole, reach: float) -> dict[str, str]:
+    """What differs by more than Blender's float32 storage explains: its name → the figures, in words. Pure.
+
+    reach : the largest coordinate that went into the camera's location, world units.
+    """
+    result = {}
+    apart = math.dist(wanted.eye, found.eye)
+    if apart > _LOCATION_ROUNDINGS * _FLOAT32 * reach:
+        result[EYE] = f"the eye is {apart:.3g} away"
+    turn = np.column_stack(wanted.basis()) - np.column_stack(found.basis())
+    if wanted.mirrored != found.mirrored:
+        result[VIEW] = "the picture is mirrored"
+    elif np.abs(turn).max() > LARGEST_TURN:
+        angle = 2 * math.asin(min(1.0, np.linalg.norm(turn) / math.sqrt(8)))
+        result[VIEW] = f"the view is turned by {math.degrees(angle):.3g}°"
+    if any(abs(a - b) > _LENS_ROUNDINGS * _FLOAT32 * a for a, b in zip(wanted.distance, found.distance, strict=True)):
+        result[DISTANCE] = f"the view plane is {found.distance[0]:.6g} px away and not {wanted.distance[0]:.6g}"
+    allowed = _SHIFT_ROUNDINGS * _FLOAT32 * (max(wanted.width, wanted.height) + max(map(abs, wanted.principal_point)))
+    off_centre = math.dist(wanted.principal_point, found.principal_point)
+    if off_centre > allowed:
+        result[CENTRE] = f"the principal point is {off_centre:.3g} px away"
+    return result
+
+
+def blame(differing: dict[str, str], suspects: Iterable[Suspect]) -> list[str]:
+    """One sentence for each suspect that explains a difference, and for each difference that none explains. Pure."""
+    sentences, unexplained = [], dict(differing)
+    for suspect in suspects:
+        guilty_of = [name for name in differing if name in suspect.acts_on]
+        if guilty_of:
+            sentences.append(f"{suspect.culprit}, {_and(differing[name] for name in guilty_of)}: {suspect.remedy}")
+        elif suspect.always:
+            sentences.append(f"{suspect.culprit}: {suspect.remedy}")
+        for name in guilty_of:
+            unexplained.pop(name, None)
+    if POSE & unexplained.keys():
+        words = _and(unexplained[name] for name in (EYE, VIEW) if name in unexplained)
+        sentences.append(f"The camera or its parent was moved since, {words}: {REMEDY}")
+    if DISTANCE in unexplained:
+        sentences.append(f"The lens, sensor or pixel aspect was changed since, {unexplained[DISTANCE]}: {REMEDY}")
+    if CENTRE in unexplained:
+        sentences.append(f"The shift was changed since, {unexplained[CENTRE]}: {REMEDY}")
+    return sentences
+
+
+def _and(clauses: Iterable[str]) -> str:
+    return " and ".join(clauses)

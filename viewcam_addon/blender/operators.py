@@ -1,0 +1,67 @@
+"""Two buttons: set the camera by its four values once more, and take the four values from the camera as it stands.
+
+Both work in any mode and on any camera: the one that is named, else the active one, else the scene's.
+"""
+
+from typing import ClassVar
+
+import bpy
+
+from ..errors import InputError
+from . import camera as cameras
+from . import datablocks
+
+
+class _CameraOperator:
+    bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
+
+    camera: bpy.props.StringProperty(
+        name="Camera",
+        description="Name of the camera object, or empty for the active or the scene's camera",
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.scene and len(bpy.data.cameras):
+            return True
+        cls.poll_message_set("There is no camera")
+        return False
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        try:
+            found = bpy.data.objects.get(self.camera) if self.camera else datablocks.camera_in(context)
+            if found is None:
+                raise InputError(f"there is no camera {self.camera!r}" if self.camera else "there is no camera: select one")
+            self.work(found, datablocks.scene_of(found))
+        except InputError as error:
+            self.report({"ERROR"}, datablocks.sentence(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class VIEWCAM_OT_apply_camera(_CameraOperator, bpy.types.Operator):
+    bl_idname = "viewcam.apply_camera"
+    bl_label = "Apply Again"
+    bl_description = "Set the camera by its eye, look-at, up and distance"
+
+    def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
+        pinhole = cameras.stated(camera_object, scene)
+        if pinhole is None:
+            raise InputError(
+                f"the Virtual Pinhole of camera {camera_object.name!r} is not enabled: enable it, or adopt the camera"
+            )
+        for finding in cameras.apply(camera_object, pinhole, scene):
+            self.report({"WARNING"}, finding)
+
+
+class VIEWCAM_OT_adopt_camera(_CameraOperator, bpy.types.Operator):
+    bl_idname = "viewcam.adopt_camera"
+    bl_label = "Adopt Camera"
+    bl_description = "Take eye, look-at, up and distance from the camera as it stands. It does not move"
+
+    def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
+        cameras.adopt(camera_object, scene)
+
+
+CLASSES = (VIEWCAM_OT_apply_camera, VIEWCAM_OT_adopt_camera)

@@ -1,0 +1,94 @@
+"""The panel "Virtual Pinhole": in Properties › Camera data, and in the 3D viewport's sidebar."""
+
+import math
+
+import bpy
+
+from ..errors import InputError
+from . import camera as cameras
+from . import datablocks, readouts
+from .properties import VALUES
+
+
+class _CameraPanel:
+    bl_label = "Virtual Pinhole"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return datablocks.camera_in(context) is not None
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        self.layout.prop(datablocks.camera_in(context).virtual_pinhole, "enabled", text="")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        camera_object, layout = datablocks.camera_in(context), self.layout
+        group, scene = camera_object.virtual_pinhole, context.scene
+        layout.use_property_split = True
+        column = layout.column()
+        column.active = group.enabled
+        for name in VALUES:
+            column.prop(group, name)
+        buttons = layout.row(align=True)
+        for operator in ("viewcam.apply_camera", "viewcam.adopt_camera"):
+            button = buttons.row(align=True)
+            button.enabled = group.enabled or operator != "viewcam.apply_camera"
+            button.operator(operator).camera = camera_object.name
+        rows, warnings = contents(camera_object, scene)
+        self._draw_warnings(warnings, context)
+        _draw_rows(rows, layout)
+
+    def _draw_warnings(self, warnings: list[str], context: bpy.types.Context) -> None:
+        width = context.region.width / context.preferences.system.ui_scale - 60
+        for sentence in warnings:
+            column = self.layout.column(align=True)
+            for i, line in enumerate(readouts.wrapped(sentence, width)):
+                column.label(text=line, icon="BLANK1" if i else "ERROR")
+
+
+def _draw_rows(rows: list[tuple[str, str]], layout: bpy.types.UILayout) -> None:
+    column = layout.column(align=True)
+    for label, text in rows:
+        split = column.split(factor=0.4)
+        name = split.row()
+        name.alignment = "RIGHT"
+        name.label(text=label)
+        split.label(text=text)
+
+
+def contents(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> tuple[list[tuple[str, str]], list[str]]:
+    """The read-outs (label, text) and the warnings that the panel shows for a camera."""
+    group, warnings = camera_object.virtual_pinhole, []
+    try:
+        stated = cameras.stated(camera_object, scene)
+        if stated:
+            warnings += readouts.pose_warnings(stated, group.precision())
+            warnings += cameras.check(camera_object, stated, scene)
+        found = cameras.read(camera_object, scene)
+    except InputError as error:
+        sentence = datablocks.sentence(error)
+        return [], [*warnings, *([] if sentence in warnings else [sentence])]
+    warnings += datablocks.beyond_pinhole(camera_object, scene)
+    length = _length(math.dist(stated.eye, stated.look_at), scene) if stated else None
+    return readouts.readouts(found, camera_object.data.lens, length), warnings
+
+
+def _length(length: float, scene: bpy.types.Scene) -> str:
+    units = scene.unit_settings
+    if units.system == "NONE":
+        return f"{length:.6g}"
+    return bpy.utils.units.to_string(units.system, "LENGTH", length * units.scale_length, precision=6)
+
+
+class VIEWCAM_PT_data(_CameraPanel, bpy.types.Panel):
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "data"
+
+
+class VIEWCAM_PT_sidebar(_CameraPanel, bpy.types.Panel):
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Pinhole"
+
+
+CLASSES = (VIEWCAM_PT_data, VIEWCAM_PT_sidebar)

@@ -1,0 +1,107 @@
+"""Rotation matrices ↔ Blender's rotation modes, in float64. Pure arithmetic, no Blender.
+
+Blender's own conversions run in float32, and near gimbal lock `Matrix.to_euler` (and so `matrix_world =`) turns rounding into
+up to 2.5e-3 of a matrix entry. Here the third angle is read off after the first has been undone, which is well-conditioned in
+gimbal lock too and needs no threshold (Herter and Lott, "Algorithms for decomposing 3-D orthogonal matrices into primitive
+rotations", Computers & Graphics 17, 1993). What remains is the rounding of three angles to float32, 1.3e-7 of a matrix entry.
+
+Every matrix is (3, 3) float64 and takes column vectors: its columns are the images of the axes.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def euler(rotation: Array, order: str) -> tuple[float, float, float]:
+    """The angles about x, y and z in radians, applied in `order` ("XYZ": about x first), of a rotation matrix.
+
+    Of the two triples of angles that give the same rotation, the one of the smaller sum, which float32 also stores better.
+    """
+    i, j, k, sign = _axes(order)
+    m = rotation
+    first = math.atan2(m[k, j], m[k, k])
+    second = math.atan2(-m[k, i], math.hypot(m[i, i], m[j, i]))
+    sine, cosine = math.sin(first), math.cos(first)
+    third = math.atan2(sine * m[i, k] - cosine * m[i, j], cosine * m[j, j] - sine * m[j, k])
+    angles = [0.0, 0.0, 0.0]
+    angles[i], angles[j], angles[k] = sign * first, sign * second, sign * third
+    other = [0.0, 0.0, 0.0]
+    other[i], other[j], other[k] = (sign * angle for angle in (_opposite(first), _opposite(-second), _opposite(third)))
+    return min(tuple(angles), tuple(other), key=lambda triple: sum(map(abs, triple)))
+
+
+def _opposite(angle: float) -> float:
+    return angle - math.copysign(math.pi, angle)
+
+
+def from_euler(angles: Sequence[float], order: str) -> Array:
+    """The rotation matrix of the angles about x, y and z, applied in `order`."""
+    result = np.eye(3)
+    for axis in order:
+        i = "XYZ".index(axis)
+        j, k = (i + 1) % 3, (i + 2) % 3
+        sine, cosine = math.sin(angles[i]), math.cos(angles[i])
+        turn = np.eye(3)
+        turn[j, j], turn[j, k], turn[k, j], turn[k, k] = cosine, -sine, sine, cosine
+        result = turn @ result
+    return result
+
+
+def _axes(order: str) -> tuple[int, int, int, int]:
+    """The axes in the order of their application, and −1 where they are a left-handed sequence (angles change their sign)."""
+    i, j, k = ("XYZ".index(axis) for axis in order)
+    return i, j, k, 1 if (j - i) % 3 == 1 else -1
+
+
+def quaternion(rotation: Array) -> tuple[float, float, float, float]:
+    """(w, x, y, z), w ≥ 0, of a rotation matrix: from its largest component, so that nothing cancels (Shepperd 1978)."""
+    trace = np.trace(rotation)
+    squares = np.array([trace, *np.diag(rotation)]) * [1.0, 2.0, 2.0, 2.0] + np.array([1.0, *[1.0 - trace] * 3])
+    largest = int(np.argmax(squares))
+    skew = [rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]]
+    if largest == 0:
+        numbers = np.array([squares[0], *skew])
+    else:
+        i = largest - 1
+        numbers = np.array([skew[i], *(rotation[i] + rotation[:, i])])
+        numbers[largest] = squares[largest]
+    numbers /= math.copysign(np.linalg.norm(numbers), numbers[0])
+    return tuple(numbers.tolist())
+
+
+def from_quaternion(numbers: Sequence[float]) -> Array:
+    """The rotation matrix of (w, x, y, z) of any length but zero."""
+    w, x, y, z = np.array(numbers) / np.linalg.norm(numbers)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def axis_angle(rotation: Array) -> tuple[float, float, float, float]:
+    """(angle, x, y, z): radians in [0, π] about a unit axis, Blender's (0, 1, 0) where the angle is 0."""
+    w, *axis = quaternion(rotation)
+    sine = math.hypot(*axis)
+    if sine == 0:
+        return 0.0, 0.0, 1.0, 0.0
+    return 2 * math.atan2(sine, w), *(component / sine for component in axis)
+
+
+def nearest(matrix: Array) -> Array:
+    """The orthonormal matrix nearest to `matrix` (the polar decomposition's), a mirroring one if `matrix` mirrors."""
+    left, _, right = np.linalg.svd(matrix)
+    return left @ right
+
+
+def skew(matrix: Array) -> float:
+    """The largest |cosine| between two columns: 0 if they are perpendicular."""
+    columns = matrix / np.linalg.norm(matrix, axis=0)
+    return float(np.abs((columns.T @ columns)[[0, 0, 1], [1, 2, 2]]).max())
