@@ -1,0 +1,78 @@
+"""A picture of a scene at level `geometry`: tiles over threads.
+
+A tile is a run of pixels, row after row, whose temporary arrays stay in a core's cache: the memory that a render takes beside the
+passes does not depend on the size of the picture. Every pixel is computed alone, so that the result is the same, bit for bit, for any
+number of threads.
+"""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .ellipsoids import ellipsoids_of
+from .scene import Mesh, Scene, Spheres
+from .surface import Passes, Surface, background
+from .triangles import Planes, triangles_of
+from .view import View
+from .visibility import visibility
+
+_TILE = 16384  # pixels; the fastest of 4096 … 131072, see benchmarks/geometry_level.py
+
+
+class Tracer:
+    """A scene made ready for tracing from its camera.
+
+    scene : what to trace. threads : how many threads to trace with, all cores if it is None.
+    """
+
+    def __init__(self, scene: Scene, threads: int | None = None) -> None:
+        self._camera = scene.camera
+        self._threads = threads or os.cpu_count() or 1
+        self._view = View(scene.camera)
+        placed = [(placed, scene.geometries[placed.geometry]) for placed in scene.objects]
+        triangles = triangles_of([pair for pair in placed if isinstance(pair[1], Mesh)], self._view)
+        ellipsoids = ellipsoids_of([pair for pair in placed if isinstance(pair[1], Spheres)], self._view)
+        planes = Planes(triangles, self._view)
+        self._visibility = visibility(triangles, planes, ellipsoids, scene.clip)
+        self._surface = Surface(self._view, triangles, planes, ellipsoids)
+
+    def render(self) -> Passes:
+        """Pass name → (height, width, channels) float32, rows from the bottom: the surfaces at the pixel centres."""
+        width, height = self._camera.width, self._camera.height
+        passes = background((height, width))
+        flat = {name: values.reshape(width * height, -1) for name, values in passes.items()}
+
+        def trace(first: int) -> None:
+            tile = slice(first, min(first + _TILE, width * height))
+            rows, columns = np.divmod(np.arange(tile.start, tile.stop), width)
+            self._trace({name: values[tile] for name, values in flat.items()}, columns + 0.5, rows + 0.5)
+
+        with ThreadPoolExecutor(self._threads) as pool:
+            for done in pool.map(trace, range(0, width * height, _TILE)):
+                assert done is None  # map() hands on what a tile raised
+        return passes
+
+    def surface_at(self, columns: ArrayLike, rows: ArrayLike, px: ArrayLike = 0.5, py: ArrayLike = 0.5) -> Passes:
+        """The surfaces at sample points of pixels.
+
+        columns, rows : pixels from the left and from the bottom; px, py : the sample point in each pixel. All broadcast to (n,).
+
+        Returns pass name → (n, channels) float32.
+        """
+        column, row = np.broadcast_arrays(np.add(columns, px, dtype=np.float64), np.add(rows, py, dtype=np.float64))
+        passes = background(column.shape)
+        for first in range(0, len(column), _TILE):
+            tile = slice(first, first + _TILE)
+            self._trace({name: values[tile] for name, values in passes.items()}, column[tile], row[tile])
+        return passes
+
+    def _trace(self, passes: Passes, column: np.ndarray, row: np.ndarray) -> None:
+        x, y = self._view.x(column), self._view.y(row)
+        self._surface.write(passes, self._visibility.first(x, y), x, y)
+
+
+def render(scene: Scene, threads: int | None = None) -> Passes:
+    """Trace the scene: pass name → (height, width, channels) float32, rows from the bottom."""
+    return Tracer(scene, threads).render()

@@ -1,0 +1,126 @@
+"""What the tracer traces: meshes and spheres, the objects that place them in the world, and the camera.
+
+A geometry is stored once, in its object's space, and placed by any number of objects. Nothing here knows files (scene_file.py)
+or rays (visibility.py, surface.py); the classes hold arrays and check their shapes.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..pinhole import Pinhole
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles in object space.
+
+    vertices : (n, 3) float64, object space.
+    triangles : (m, 3) int32, indices into `vertices`, counter-clockwise seen from the front.
+    corner_normals : (m, 3, 3) float32, object space, unit length, or None where every face is flat. On a flat face of a mesh
+        that has smooth ones, the three corners hold the face's own normal.
+    corner_uvs : (m, 3, 2) float32, or None where the mesh has no UV map.
+    materials : (m,) int32, the index of each triangle's material in `Object.material_indices`.
+    """
+
+    vertices: NDArray[np.float64]
+    triangles: NDArray[np.int32]
+    materials: NDArray[np.int32]
+    corner_normals: NDArray[np.float32] | None = None
+    corner_uvs: NDArray[np.float32] | None = None
+
+    def __post_init__(self) -> None:
+        count = len(self.triangles)
+        _check_shape("vertices", self.vertices, (None, 3))
+        _check_shape("triangles", self.triangles, (None, 3))
+        _check_shape("materials", self.materials, (count,))
+        if self.corner_normals is not None:
+            _check_shape("corner_normals", self.corner_normals, (count, 3, 3))
+        if self.corner_uvs is not None:
+            _check_shape("corner_uvs", self.corner_uvs, (count, 3, 2))
+        if count and not 0 <= self.triangles.min() <= self.triangles.max() < len(self.vertices):
+            raise InputError(f"triangles name a vertex outside 0 … {len(self.vertices) - 1}: check the mesh")
+        if not np.isfinite(self.vertices).all():
+            raise InputError("vertices hold a number that is not finite: check the mesh")
+
+
+@dataclass(frozen=True, eq=False)
+class Spheres:
+    """Exact spheres in object space; the object's matrix may make ellipsoids of them.
+
+    centers : (n, 3) float64, object space.
+    radii : (n,) float64, object space, not negative.
+    materials : (n,) int32, as in `Mesh`.
+    """
+
+    centers: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    materials: NDArray[np.int32]
+
+    def __post_init__(self) -> None:
+        _check_shape("centers", self.centers, (None, 3))
+        _check_shape("radii", self.radii, (len(self.centers),))
+        _check_shape("materials", self.materials, (len(self.centers),))
+        if not (np.isfinite(self.centers).all() and np.isfinite(self.radii).all() and (self.radii >= 0).all()):
+            raise InputError("centers and radii of spheres must be finite and radii not negative: check the spheres")
+
+
+@dataclass(frozen=True, eq=False)
+class Object:
+    """One geometry, placed in the world.
+
+    geometry : key in `Scene.geometries`.
+    matrix : (4, 4) float64, object space to world space, affine; negative and non-uniform scale are welcome.
+    object_index : what the Object Index pass shows.
+    material_indices : what the Material Index pass shows, for each material of the geometry; at least one.
+    """
+
+    name: str
+    geometry: str
+    matrix: NDArray[np.float64]
+    object_index: int = 0
+    material_indices: tuple[int, ...] = (0,)
+
+    def __post_init__(self) -> None:
+        _check_shape(f"the matrix of object {self.name!r}", self.matrix, (4, 4))
+        if not np.isfinite(self.matrix).all():
+            raise InputError(f"the matrix of object {self.name!r} holds a number that is not finite: check its transform")
+
+
+@dataclass(frozen=True)
+class LedgerEntry:
+    """What became of one thing that the exporter met.
+
+    object : its name in Blender.
+    status : "exported", "approximated" or "skipped".
+    reason : one clause that says why, empty where it was exported whole.
+    """
+
+    object: str
+    status: str
+    reason: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A camera and what stands before it.
+
+    camera : the camera to trace. For a scene from Blender, as read back from Blender's float32 matrix and lens.
+    stated_camera : the camera as the four values state it, or None where nobody stated one.
+    clip : nearest and farthest planar depth z = −w·(P − e) that is visible.
+    """
+
+    camera: Pinhole
+    geometries: dict[str, Mesh | Spheres]
+    objects: tuple[Object, ...]
+    stated_camera: Pinhole | None = None
+    clip: tuple[float, float] = (0.0, float("inf"))
+    ledger: tuple[LedgerEntry, ...] = field(default=())
+
+
+def _check_shape(name: str, array: NDArray, shape: tuple[int | None, ...]) -> None:
+    if array.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, array.shape, strict=True)):
+        wanted = " × ".join("n" if size is None else str(size) for size in shape)
+        raise InputError(f"{name} has the shape {array.shape} and must have {wanted}: check the scene")

@@ -1,0 +1,190 @@
+"""The triangles of a scene in camera space, and where a ray that meets one meets it, in float64.
+
+Seen from the eye, the reciprocal of the depth and the two barycentric coordinates divided by the depth are linear in the view
+plane: 1/t = N·(x, y, 1), b₁/t = G₁·(x, y, 1), b₂/t = G₂·(x, y, 1). N, G₁ and G₂ are computed once for each triangle, from the differences
+of its vertices, so that a hit costs nine products.
+
+Rejected: the scalar triple products of vertices (they lose the square of distance/size instead of distance/size), and keeping
+Embree's own t, u, v (float32).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .scene import Mesh, Object
+from .view import Floats, View
+
+Float32s = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Triangles:
+    """m triangles.
+
+    vertices : (3, v) float64, camera space: [axis, vertex].
+    corners : (3, m) int32: [corner, triangle], indices into `vertices`.
+    corner_normals : (9, m) float32, world space: [3 · corner + axis, triangle], on the side of the face that the eye sees, of any
+        length; or None where all faces of all meshes are flat.
+    corner_uvs : (9, m) float32: [3 · corner + channel, triangle] with the channels u, v, 1 (0, 0, 0 without a UV map); or None
+        where no mesh has a UV map.
+    object_index, material_index : (m,) float32, what the passes show.
+    magnitude : (m,) float32: the largest |coordinate| of the three vertices, world space.
+    """
+
+    vertices: Floats
+    corners: NDArray[np.int32]
+    corner_normals: Float32s | None
+    corner_uvs: Float32s | None
+    object_index: Float32s
+    material_index: Float32s
+    magnitude: Float32s
+
+    @property
+    def count(self) -> int:
+        return self.corners.shape[1]
+
+
+def triangles_of(pairs: list[tuple[Object, Mesh]], view: View) -> Triangles:
+    """The triangles of all objects that are meshes, instances written out (embreex has no instances)."""
+    users = {}
+    for _, mesh in pairs:
+        users[id(mesh)] = users.get(id(mesh), 0) + 1
+    smooth = any(mesh.corner_normals is not None for _, mesh in pairs)
+    mapped = any(mesh.corner_uvs is not None for _, mesh in pairs)
+    vertices, corners, normals, uvs, objects, materials, magnitudes = [], [], [], [], [], [], []
+    vertex_count = 0
+    for placed, mesh in pairs:
+        points, magnitude = view.points(placed.matrix, mesh.vertices)
+        indices = np.ascontiguousarray(mesh.triangles.T)
+        vertices.append(points)
+        corners.append(indices + np.int32(vertex_count))
+        vertex_count += points.shape[1]
+        magnitudes.append(magnitude[indices].max(axis=0))
+        objects.append(np.full(len(mesh.triangles), placed.object_index, np.float32))
+        materials.append(np.array(placed.material_indices, np.float32)[mesh.materials])
+        if smooth:
+            normals.append(_corner_normals(placed, mesh, points[:, indices], view, users[id(mesh)] > 1))
+        if mapped:
+            uvs.append(_corner_uvs(mesh))
+    return Triangles(
+        vertices=_joined(vertices, (3, 0)),
+        corners=_joined(corners, (3, 0)).astype(np.int32, copy=False),
+        corner_normals=_joined(normals, (9, 0)) if smooth else None,
+        corner_uvs=_joined(uvs, (9, 0)) if mapped else None,
+        object_index=_joined(objects, (0,)).astype(np.float32, copy=False),
+        material_index=_joined(materials, (0,)).astype(np.float32, copy=False),
+        magnitude=_joined(magnitudes, (0,)).astype(np.float32, copy=False),
+    )
+
+
+def _joined(parts: list[NDArray], empty: tuple[int, ...]) -> NDArray:
+    return np.concatenate(parts, axis=-1) if parts else np.empty(empty)
+
+
+def _corner_normals(placed: Object, mesh: Mesh, points: Floats, view: View, shared: bool) -> Float32s:
+    """(9, m) corner normals of one object; where the mesh has none, each corner holds the face's.
+
+    Cycles turns the normals of a mesh that only one object uses into world space before it interpolates, and normalises
+    them there; those of a mesh that several objects share it interpolates in object space.
+    """
+    face = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0], axis=0)
+    linear = placed.matrix[:3, :3]
+    cofactors = np.stack([np.cross(linear[:, j], linear[:, k]) for j, k in ((1, 2), (2, 0), (0, 1))], axis=1)
+    cofactors /= np.abs(cofactors).max() or 1.0
+    mirrors = np.linalg.det(linear) < 0
+    towards_eye = np.sign(-view.handedness * np.einsum("im,im->m", face, points[:, 0]))
+    if mesh.corner_normals is None:
+        normals = np.broadcast_to(view.axes.T @ (view.handedness * face), (3, *face.shape))
+    else:
+        if mirrors:
+            cofactors, towards_eye = -cofactors, -towards_eye
+        normals = np.einsum("ij,mcj->cim", cofactors, mesh.corner_normals, optimize=True)
+    if not shared or mesh.corner_normals is None:
+        length = np.sqrt(np.einsum("cim,cim->cm", normals, normals))
+        normals = normals / np.where(length > 0, length, 1.0)[:, None]
+    return (normals * towards_eye).reshape(9, -1).astype(np.float32)
+
+
+def _corner_uvs(mesh: Mesh) -> Float32s:
+    uvs = np.zeros((3, 3, len(mesh.triangles)), np.float32)
+    if mesh.corner_uvs is not None:
+        uvs[:, :2] = mesh.corner_uvs.transpose(1, 2, 0)
+        uvs[:, 2] = 1
+    return uvs.reshape(9, -1)
+
+
+class Planes:
+    """Where rays meet the planes of triangles: the linear forms N, G₁, G₂ and the face normals.
+
+    forms : (9, m) float64. span : (2, m) float64, least and greatest depth of the triangle's vertices.
+    normals : (3, m) float32, unit, world space, facing the eye. distance : (m,) float64, of the plane from the eye.
+    """
+
+    def __init__(self, triangles: Triangles, view: View) -> None:
+        count = triangles.count
+        self.forms: Floats = np.empty((9, count))
+        self.span: Floats = np.empty((2, count))
+        self.normals: Float32s = np.empty((3, count), np.float32)
+        self.distance: Floats = np.empty(count)
+        step = 16384
+        with np.errstate(all="ignore"):  # a triangle without area, or one seen edge-on, has no forms: depth() sees to it
+            for first in range(0, count, step):
+                self._fill(slice(first, first + step), triangles, view)
+
+    def _fill(self, part: slice, triangles: Triangles, view: View) -> None:
+        a, b, c = np.take(triangles.vertices, triangles.corners[:, part], axis=1).transpose(1, 0, 2)
+        self.span[0, part] = np.minimum(np.minimum(a[2], b[2]), c[2])
+        self.span[1, part] = np.maximum(np.maximum(a[2], b[2]), c[2])
+        first, second = b - a, c - a
+        normal = _cross(first, second)
+        squared = _dot(normal, normal)
+        volume = _dot(normal, a)
+        plane = normal / volume
+        self.forms[0:3, part] = plane
+        for rows, gradient in ((slice(3, 6), _cross(second, normal)), (slice(6, 9), _cross(normal, first))):
+            gradient /= squared
+            self.forms[rows, part] = gradient - _dot(gradient, a) * plane
+        length = np.sqrt(squared)
+        self.distance[part] = np.nan_to_num(np.abs(volume) / length)
+        self.normals[:, part] = np.nan_to_num(view.axes.T @ (normal * (-np.sign(volume) / length)))
+
+    def depth(self, triangle: NDArray[np.intp], x: Floats, y: Floats) -> Floats:
+        """Planar depth at which rays (x, y, 1) meet the triangles that were found for them; all broadcast.
+
+        A triangle seen so nearly edge-on that its plane tells nothing is met within the depths of its vertices.
+        """
+        return self._depth(np.take(self.forms[:3], triangle, axis=1), triangle, x, y)
+
+    def _depth(self, plane: Floats, triangle: NDArray[np.intp], x: Floats, y: Floats) -> Floats:
+        with np.errstate(all="ignore"):
+            depth = 1.0 / _linear(plane, x, y)
+        depth = np.fmax(depth, np.take(self.span[0], triangle))
+        return np.fmin(depth, np.take(self.span[1], triangle), out=depth)
+
+    def hit(self, triangle: NDArray[np.intp], x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
+        """Depth and the barycentric coordinates b₁, b₂ of the hits, each (n,), b₁ and b₂ within the triangle."""
+        forms = np.take(self.forms, triangle, axis=1)
+        depth = self._depth(forms[:3], triangle, x, y)
+        with np.errstate(all="ignore"):
+            first = _linear(forms[3:6], x, y) * depth
+            second = _linear(forms[6:9], x, y) * depth
+        np.fmax(np.fmin(first, 1.0, out=first), 0.0, out=first)
+        np.fmax(np.fmin(second, 1.0 - first, out=second), 0.0, out=second)
+        return depth, first, second
+
+
+def _linear(form: Floats, x: Floats, y: Floats) -> Floats:
+    value = form[0] * x
+    value += form[1] * y
+    value += form[2]
+    return value
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

@@ -1,0 +1,198 @@
+"""Which primitive each ray from the eye meets first: Embree's answer, or that of plain NumPy.
+
+A primitive is a number, triangles first and spheres after them; −1 is none. Rays are points (x, y) of the view plane at distance 1 (see
+view.py), and only depths within the clip range count: what lies before it is looked through.
+
+**Spheres** are found through cards: each is hidden behind a rectangle that covers its outline and stands before it, parallel to the
+view plane. Embree gives the first card, float64 the exact sphere behind it, and the ray goes on behind that card
+until the next one stands behind the best hit. Since cards are parallel and no two share a depth, all rays meet them in
+the same order, and none is stepped over. Closed boxes round each sphere were rejected: rays that continue behind one box's entry skip, by
+float32's rounding, those of overlapping boxes. Spheres that reach behind the eye's plane have no card; every ray whose
+tile they touch tests them.
+
+embreex offers no nearest distance, so a ray starts where its clip range does, or behind the last card.
+"""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .ellipsoids import Ellipsoids
+from .triangles import Planes, Triangles
+from .view import Floats
+
+try:
+    from embreex.mesh_construction import TriangleMesh
+    from embreex.rtcore_scene import EmbreeScene
+except ImportError:  # no wheel for this machine: `Plain` gives the same answers, slowly
+    EmbreeScene = None
+
+Indices = NDArray[np.intp]
+
+# Cards overlap the outline by far more than float32's rounding of card and ray, and follow one another at depths that
+# differ by 16 units in float32's last place, so that a ray that starts in between is sure to have the one behind it and the other before it.
+_MARGIN = 2.0**-20
+_CARD_SPACING = 2.0**-20
+_FAR = 1e37
+
+
+class Visibility(Protocol):
+    def first(self, x: Floats, y: Floats) -> Indices:
+        """The primitive that each ray meets first, or −1. x, y : (n,) float64."""
+
+
+def visibility(triangles: Triangles, planes: Planes, ellipsoids: Ellipsoids, clip: tuple[float, float]) -> Visibility:
+    """Embree where there is its wheel, otherwise plain NumPy."""
+    return (Plain if EmbreeScene is None else Embree)(triangles, planes, ellipsoids, clip)
+
+
+class Embree:
+    """Embree finds triangles and cards in float32; depths are compared in float64."""
+
+    def __init__(self, triangles: Triangles, planes: Planes, ellipsoids: Ellipsoids, clip: tuple[float, float]) -> None:
+        self._planes, self._ellipsoids = planes, ellipsoids
+        self._start, self._end = clip
+        self._triangle_count = triangles.count
+        self._triangles = _embree_scene(triangles.vertices.T, triangles.corners.T) if triangles.count else None
+        self._without_card = int(np.count_nonzero(np.isinf(ellipsoids.bounds[0])))
+        if ellipsoids.count > self._without_card:
+            self._cards, self._card_depth = _cards(ellipsoids, self._without_card)
+        else:
+            self._cards = None
+
+    def first(self, x: Floats, y: Floats) -> Indices:
+        directions = np.empty((len(x), 3), np.float32)
+        directions[:, 0], directions[:, 1], directions[:, 2] = x, y, 1
+        if self._triangles is None:
+            found = np.full(len(x), -1, np.intp)
+        else:
+            length = min(self._end - self._start, _FAR)
+            found = self._triangles.run(directions * np.float32(self._start), directions, dists=length).astype(np.intp)
+        if self._ellipsoids.count:
+            self._spheres_before(found, directions, x, y)
+        return found
+
+    def _spheres_before(self, found: Indices, directions: NDArray[np.float32], x: Floats, y: Floats) -> None:
+        """Put spheres into `found` where they stand before the triangle there."""
+        nearest = np.full(len(x), self._end, np.float64)
+        met = np.flatnonzero(found >= 0)
+        nearest[met] = self._planes.depth(found[met], x[met], y[met])
+        for sphere in _touching(self._ellipsoids, self._without_card, x, y):
+            depth = self._ellipsoids.depth(np.array([sphere]), x, y)
+            nearer = (depth < nearest) & (depth >= self._start)
+            nearest[nearer], found[nearer] = depth[nearer], self._triangle_count + sphere
+        if self._cards is None:
+            return
+        rays, origin = np.arange(len(x)), np.zeros(len(x), np.float32)
+        while len(rays):
+            ahead = directions[rays]
+            limits = np.minimum(nearest[rays] - origin, _FAR).astype(np.float32)
+            card = self._cards.run(ahead * origin[:, None], ahead, dists=limits) >> 1
+            behind = np.flatnonzero(card >= 0)
+            rays, card = rays[behind], card[behind].astype(np.intp)
+            sphere = card + self._without_card
+            depth = self._ellipsoids.depth(sphere, x[rays], y[rays])
+            nearer = (depth < nearest[rays]) & (depth >= self._start)
+            nearest[rays[nearer]], found[rays[nearer]] = depth[nearer], self._triangle_count + sphere[nearer]
+            origin = self._card_depth[card] * np.float32(1 + _CARD_SPACING / 2)
+            onwards = np.flatnonzero(origin < nearest[rays])
+            rays, origin = rays[onwards], origin[onwards]
+
+
+def _embree_scene(vertices: Floats, triangles: NDArray[np.int32]) -> "EmbreeScene":
+    scene = EmbreeScene(robust=True)
+    TriangleMesh(scene, np.ascontiguousarray(vertices, dtype=np.float32), np.ascontiguousarray(triangles))
+    scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))  # builds the hierarchy, once, before threads come
+    return scene
+
+
+def _cards(ellipsoids: Ellipsoids, first: int) -> tuple["EmbreeScene", NDArray[np.float32]]:
+    """A card of two triangles before each sphere from `first` on, and the cards' depths."""
+    nearest = ellipsoids.nearest[first:]
+    place = np.arange(len(nearest)) * _CARD_SPACING
+    # The greatest depths that are not behind the spheres and grow by the spacing from card to card.
+    depth = np.exp(np.minimum.accumulate((np.log(nearest) - place)[::-1])[::-1] + place) * (1 - _CARD_SPACING)
+    depth = depth.astype(np.float32)
+    x0, x1, y0, y1 = ellipsoids.bounds[:, first:]
+    margin = _MARGIN * (1 + np.abs([x0, x1, y0, y1]).max(axis=0))
+    x0, x1, y0, y1 = x0 - margin, x1 + margin, y0 - margin, y1 + margin
+    vertices = np.empty((len(depth), 4, 3))
+    vertices[:, :, 0] = np.stack([x0, x1, x1, x0], axis=1) * depth[:, None]
+    vertices[:, :, 1] = np.stack([y0, y0, y1, y1], axis=1) * depth[:, None]
+    vertices[:, :, 2] = depth[:, None]
+    corners = np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(len(depth))[:, None, None]
+    return _embree_scene(vertices.reshape(-1, 3), corners.reshape(-1, 3).astype(np.int32)), depth
+
+
+class Plain:
+    """Every ray against every primitive near it, in float64: watertight, since neighbours share the sign of their edge, and slow."""
+
+    _RAYS, _CANDIDATES = 256, 2048  # at a time: some arrays of 4 MB
+
+    def __init__(self, triangles: Triangles, planes: Planes, ellipsoids: Ellipsoids, clip: tuple[float, float]) -> None:
+        self._planes, self._ellipsoids = planes, ellipsoids
+        self._start, self._end = clip
+        self._triangle_count = triangles.count
+        corners = np.take(triangles.vertices, triangles.corners, axis=1).transpose(1, 0, 2)
+        self._edges = np.stack([np.cross(corners[j], corners[k], axis=0) for j, k in ((1, 2), (2, 0), (0, 1))])
+        self._bounds = np.concatenate([_triangle_bounds(corners, planes), ellipsoids.bounds], axis=1)
+        self._bounds += np.array([[-1], [1], [-1], [1]]) * _MARGIN * (1 + np.nan_to_num(np.abs(self._bounds), posinf=0.0))
+
+    def first(self, x: Floats, y: Floats) -> Indices:
+        found = np.full(len(x), -1, np.intp)
+        nearest = np.full(len(x), np.inf)
+        near_all = self._candidates(np.arange(self._bounds.shape[1]), x, y)
+        for start in range(0, len(x), self._RAYS):
+            part = slice(start, start + self._RAYS)
+            near = self._candidates(near_all, x[part], y[part])
+            for first in range(0, len(near), self._CANDIDATES):
+                some = near[first : first + self._CANDIDATES]
+                depth = self._depths(some, x[part, None], y[part, None])
+                best = depth.argmin(axis=1)
+                best_depth = np.take_along_axis(depth, best[:, None], axis=1)[:, 0]
+                nearer = best_depth < nearest[part]
+                nearest[part] = np.where(nearer, best_depth, nearest[part])
+                found[part] = np.where(nearer, some[best], found[part])
+        return found
+
+    def _candidates(self, primitives: Indices, x: Floats, y: Floats) -> Indices:
+        if not len(x):
+            return primitives[:0]
+        x0, x1, y0, y1 = np.take(self._bounds, primitives, axis=1)
+        return primitives[(x0 <= x.max()) & (x1 >= x.min()) & (y0 <= y.max()) & (y1 >= y.min())]
+
+    def _depths(self, primitives: Indices, x: Floats, y: Floats) -> Floats:
+        """(n, k) depths at which n rays meet k primitives, inf where they don't or where the depth is clipped."""
+        split = np.searchsorted(primitives, self._triangle_count)
+        triangles, spheres = primitives[:split], primitives[split:] - self._triangle_count
+        a, b, c = (edge[0] * x + edge[1] * y + edge[2] for edge in np.take(self._edges, triangles, axis=2))
+        inside = ((a >= 0) & (b >= 0) & (c >= 0)) | ((a <= 0) & (b <= 0) & (c <= 0))
+        inside &= (a != 0) | (b != 0) | (c != 0)
+        depth = np.concatenate(
+            [np.where(inside, self._planes.depth(triangles, x, y), np.inf), self._ellipsoids.depth(spheres, x, y)], axis=1
+        )
+        return np.where((depth > 0) & (depth >= self._start) & (depth <= self._end), depth, np.inf)
+
+
+def _triangle_bounds(corners: Floats, planes: Planes) -> Floats:
+    """(4, m) bounds of triangles in the view plane, as in `Ellipsoids`; empty where a triangle can't be seen."""
+    least, greatest = planes.span
+    with np.errstate(all="ignore"):
+        across = corners[:, :2] / corners[:, 2:]
+    bounds = np.stack([across[:, 0].min(axis=0), across[:, 0].max(axis=0), across[:, 1].min(axis=0), across[:, 1].max(axis=0)])
+    wide = ~(least > 2.0**-10 * greatest)
+    bounds[0::2, wide], bounds[1::2, wide] = -np.inf, np.inf
+    unseen = (greatest <= 0) | ~(planes.distance > 0)
+    bounds[0::2, unseen], bounds[1::2, unseen] = np.inf, -np.inf
+    return bounds
+
+
+def _touching(ellipsoids: Ellipsoids, count: int, x: Floats, y: Floats) -> Indices:
+    """Which of the first `count` spheres reach into the pyramid of the rays, by the balls round them."""
+    (right, up, forward), reach = ellipsoids.positions[:, :count], ellipsoids.reach[:count]
+    touching = np.ones(count, bool)
+    for across, least, greatest in ((right, x.min(), x.max()), (up, y.min(), y.max())):
+        touching &= across - least * forward >= -reach * np.hypot(1, least)
+        touching &= greatest * forward - across >= -reach * np.hypot(1, greatest)
+    return np.flatnonzero(touching)
