@@ -31,11 +31,9 @@ class Host:
         return self.command[0] == os.environ["BLENDER"]
 
     def run(self, *arguments: str | Path) -> subprocess.CompletedProcess:
-        """Run the command with more arguments and keep what it says."""
+        """Run the command with more arguments, from the checkout, and keep what it says."""
         environment = {**os.environ, "BLENDER_USER_RESOURCES": str(self.user_folder)}
-        return subprocess.run(
-            [*self.command, *map(str, arguments)], env=environment, cwd=self.user_folder, capture_output=True, text=True
-        )
+        return subprocess.run([*self.command, *map(str, arguments)], env=environment, cwd=ROOT, capture_output=True, text=True)
 
     def run_inside(self, *arguments: str | Path) -> str:
         """Run inside_blender.py with these arguments; what it printed. Fails the test if that fails."""

@@ -3,11 +3,13 @@
 install ZIP            installs and enables the extension, as the button in the preferences does
 make FILE              a small scene whose camera is stated in the four values, saved
 render FILE OUT        opens FILE with the extension enabled and renders its frame 1
-apply FILE OUT JSON    the same, but turns the four values off, throws the camera away and applies the Pinhole in JSON instead
+apply FILE OUT JSON    the same, but turns the four values off, moves the camera away and applies the Pinhole in JSON instead
+pytest PACKAGES …      runs pytest with these arguments, from the checkout, with packages from the folder PACKAGES
 """
 
 import importlib
 import json
+import os
 import sys
 
 import bpy
@@ -24,11 +26,8 @@ def enable():
 
 def install(zip_path):
     bpy.ops.extensions.package_install_files(filepath=zip_path, repo="user_default", enable_on_install=True)
-    print(
-        json.dumps(
-            {"enabled": EXTENSION in bpy.context.preferences.addons, "registered": hasattr(bpy.types.Object, "virtual_pinhole")}
-        )
-    )
+    if EXTENSION not in bpy.context.preferences.addons or not hasattr(bpy.types.Object, "virtual_pinhole"):
+        sys.exit("the extension did not install, or did not register")
 
 
 def make(file):
@@ -86,7 +85,15 @@ def write_frame(output):
     bpy.ops.render.render(write_still=True)
 
 
+def run_pytest(packages, *arguments):
+    sys.path += [packages, os.getcwd()]
+    os.environ["PYTHONPATH"] = packages
+    import pytest
+
+    sys.exit(pytest.main(list(arguments)))
+
+
 if __name__ == "__main__":
     command, *arguments = sys.argv[sys.argv.index("--") + 1 :]
-    {"install": install, "make": make, "render": render, "apply": apply}[command](*arguments)
+    {"install": install, "make": make, "render": render, "apply": apply, "pytest": run_pytest}[command](*arguments)
     sys.stdout.flush()
