@@ -50,6 +50,7 @@ class Comparison:
     maps : pass name to (height, width) float32, rows from the bottom: the error of each pixel in the unit of the pass's row,
     nan
         where it was not compared.
+    roundings : (n,) float64, the error of each compared position over what one rounding of float32 causes there.
     """
 
     pinhole: Pinhole
@@ -60,6 +61,7 @@ class Comparison:
     systematic: Systematic | None
     conversion: ConversionError | None
     maps: dict[str, NDArray[np.float32]]
+    roundings: Array
 
     @property
     def pixels(self) -> int:
@@ -138,14 +140,14 @@ def compare(
     explained = mismatches.explained
     compared[mismatches.rows[explained] * pinhole.width + mismatches.columns[explained]] = False
     chosen = np.flatnonzero(compared)
-    rows, systematic, maps = _measure(chosen, at(expected, chosen), at(seen, chosen), agreement.at(chosen))
+    rows, systematic, maps, roundings = _measure(chosen, at(expected, chosen), at(seen, chosen), agreement.at(chosen))
 
     depths = expected["Depth"][hit, 0]
     conversion = None
     if stated is not None and len(depths):
         conversion = conversion_error(stated, pinhole, np.percentile(depths, (0, 50, 100)))
     hits = (int(hit.sum()), int(law.is_hit(seen).sum()))
-    return Comparison(pinhole, stated, hits, rows, mismatches, systematic, conversion, maps)
+    return Comparison(pinhole, stated, hits, rows, mismatches, systematic, conversion, maps, roundings)
 
 
 def _passes(reference: Image, test: Image, pinhole: Pinhole) -> tuple[Seen, Seen]:
@@ -187,8 +189,8 @@ def _mismatches(kinds: NDArray, seen: Seen, reach: Array, agreement: Agreement, 
 
 def _measure(
     chosen: NDArray, expected: Seen, seen: Seen, agreement: Agreement
-) -> tuple[tuple[Row, ...], Systematic | None, dict[str, NDArray[np.float32]]]:
-    """The rows, the systematic part, and the maps, over the chosen pixels."""
+) -> tuple[tuple[Row, ...], Systematic | None, dict[str, NDArray[np.float32]], Array]:
+    """The rows, the systematic part, the maps and the positions' roundings, over the chosen pixels."""
     pinhole = agreement.pinhole
     columns, rows = chosen % pinhole.width + 0.5, chosen // pinhole.width + 0.5
     column, row, along = pinhole.project(seen["Position"])
@@ -215,4 +217,4 @@ def _measure(
         maps[name] = flat.reshape(pinhole.height, pinhole.width)
     rows_measured = tuple(measure(name, *figures) for name, figures in measured.items())
     systematic = systematic_error(pinhole, columns, rows, off_x, off_y, shift) if len(chosen) else None
-    return rows_measured, systematic, maps
+    return rows_measured, systematic, maps, across / shift
