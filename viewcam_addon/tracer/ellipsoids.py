@@ -1,9 +1,9 @@
 """The spheres of a scene in camera space, ellipsoids by their objects' matrices, and where a ray meets one, in float64.
 
 A sphere under an affine map is the set of points P with |A⁻¹P − f| = 1, A its linear part times the radius. The ray is taken
-into that space, where the discriminant is that of the perpendicular from the centre to the ray and the near root is c/q: both keep their
-digits for a small sphere far away (Haines et al., Precision improvements for ray/sphere intersection, Ray Tracing Gems, 2019).
-As in Cycles, an eye inside a sphere does not see it.
+into that space, where the discriminant is that of the perpendicular from the centre to the ray and the near root is c/q: both
+keep their digits for a small sphere far away (Haines et al., Precision improvements for ray/sphere intersection, Ray Tracing
+Gems, 2019). As in Cycles, an eye inside a sphere does not see it.
 """
 
 from dataclasses import dataclass
@@ -11,17 +11,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Float32s, Floats, Indices, dot, gather, linear
 from .scene import Object, Spheres
-from .view import Floats, View
-
-Float32s = NDArray[np.float32]
+from .view import View
 
 
 @dataclass(frozen=True, eq=False)
 class Ellipsoids:
     """n spheres that the eye can see, in the order of their nearest depth.
 
-    inverse : (9, n) float64: [3 · column + row, sphere] of A⁻¹. centres : (3, n) float64: f. tangent : (n,) float64: |f|² − 1 > 0.
+    inverse : (9, n) float64: [3 · column + row, sphere] of A⁻¹. centres : (3, n) float64: f.
+    tangent : (n,) float64: |f|² − 1 > 0.
     positions : (3, n) float64, camera space, the centres. reach : (n,) float64, no point is farther from the centre.
     nearest : (n,) float64, least depth z. The spheres without bounds come first, then the others, nearest first.
     bounds : (4, n) float64: least x, greatest x, least y, greatest y in the view plane at distance 1, −inf and inf where the
@@ -44,33 +44,32 @@ class Ellipsoids:
     def count(self) -> int:
         return len(self.nearest)
 
-    def depth(self, sphere: NDArray[np.intp], x: Floats, y: Floats) -> Floats:
+    def depth(self, sphere: Indices, x: Floats, y: Floats) -> Floats:
         """Planar depth at which rays (x, y, 1) first meet spheres, inf where they miss; all broadcast."""
-        centre = np.take(self.centres, sphere, axis=1)
+        centre = gather(self.centres, sphere)
         direction = self._direction(sphere, x, y)
-        squared = _dot(direction, direction)
-        along = _dot(centre, direction)
+        squared = dot(direction, direction)
+        along = dot(centre, direction)
         foot = along / squared
         beside = [f - foot * d for f, d in zip(centre, direction, strict=True)]
-        discriminant = 1.0 - _dot(beside, beside)
+        discriminant = 1.0 - dot(beside, beside)
         met = (discriminant >= 0) & (along > 0)
         root = np.sqrt(np.where(met, discriminant, 0.0) * squared)
-        depth = np.take(self.tangent, sphere) / np.where(met, along + root, 1.0)
+        depth = gather(self.tangent, sphere) / np.where(met, along + root, 1.0)
         return np.where(met, depth, np.inf)
 
-    def normal(self, sphere: NDArray[np.intp], x: Floats, y: Floats, depth: Floats, view: View) -> list[Floats]:
+    def normal(self, sphere: Indices, x: Floats, y: Floats, depth: Floats, view: View) -> list[Floats]:
         """World-space components, each (n,), of the unit normals at the depths that `depth` found."""
-        inverse = np.take(self.inverse, sphere, axis=1)
-        radial = [
-            d * depth - f for d, f in zip(self._direction(sphere, x, y), np.take(self.centres, sphere, axis=1), strict=True)
-        ]
-        gradient = [_dot(inverse[3 * axis : 3 * axis + 3], radial) for axis in range(3)]
-        length = np.sqrt(_dot(gradient, gradient))
-        return [_dot(axis, gradient) / length for axis in view.axes.T]
+        inverse = gather(self.inverse, sphere)
+        radial = [d * depth - f for d, f in zip(self._direction(sphere, x, y), gather(self.centres, sphere), strict=True)]
+        gradient = [dot(inverse[column : column + 3], radial) for column in (0, 3, 6)]
+        length = np.sqrt(dot(gradient, gradient))
+        return [dot(axis, gradient) / length for axis in view.axes.T]
 
-    def _direction(self, sphere: NDArray[np.intp], x: Floats, y: Floats) -> list[Floats]:
-        inverse = np.take(self.inverse, sphere, axis=1)
-        return [inverse[row] * x + inverse[row + 3] * y + inverse[row + 6] for row in range(3)]
+    def _direction(self, sphere: Indices, x: Floats, y: Floats) -> list[Floats]:
+        """The three components of A⁻¹ (x, y, 1)."""
+        inverse = gather(self.inverse, sphere)
+        return [linear(inverse[row::3], x, y) for row in range(3)]
 
 
 def ellipsoids_of(pairs: list[tuple[Object, Spheres]], view: View) -> Ellipsoids:
@@ -98,7 +97,7 @@ def _of_object(placed: Object, spheres: Spheres, view: View) -> list[NDArray]:
     with np.errstate(all="ignore"):  # a sphere of radius 0 has no inverse and is never seen
         inverse = np.linalg.inv(view.axes @ linear)
         scaled = (inverse @ centres) / radii
-        length = np.sqrt(_dot(scaled, scaled))
+        length = np.sqrt(dot(scaled, scaled))
         tangent = (length - 1) * (length + 1)
         nearest, bounds = _extent(centres, view.axes @ linear, radii)
         inverses = inverse.T.reshape(9, 1) / radii
@@ -122,8 +121,8 @@ def _of_object(placed: Object, spheres: Spheres, view: View) -> list[NDArray]:
 def _extent(centres: Floats, linear: Floats, radii: Floats) -> tuple[Floats, Floats]:
     """Least depth, and bounds in the view plane, of spheres.
 
-    A plane x = k z through the eye touches the ellipsoid where (c_x − k c_z)² = (1, 0, −k) Q (1, 0, −k)ᵀ with Q = A Aᵀ: the two k are
-    the bounds.
+    A plane x = k z through the eye touches the ellipsoid where (c_x − k c_z)² = (1, 0, −k) Q (1, 0, −k)ᵀ with Q = A Aᵀ: the
+    two k are the bounds.
     """
     q = linear @ linear.T
     reach = np.sqrt(q[2, 2]) * radii
@@ -138,7 +137,3 @@ def _extent(centres: Floats, linear: Floats, radii: Floats) -> tuple[Floats, Flo
         bounds[2 * axis] = np.where(before, (half - root) / squared, -np.inf)
         bounds[2 * axis + 1] = np.where(before, (half + root) / squared, np.inf)
     return nearest, bounds
-
-
-def _dot(a, b) -> Floats:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -1,8 +1,8 @@
 """A picture of a scene at level `geometry`: tiles over threads.
 
-A tile is a run of pixels, row after row, whose temporary arrays stay in a core's cache: the memory that a render takes beside the
-passes does not depend on the size of the picture. Every pixel is computed alone, so that the result is the same, bit for bit, for any
-number of threads.
+A tile is a run of pixels, row after row, whose temporary arrays stay in a core's cache: the memory that a render takes beside
+the passes does not depend on the size of the picture. Every pixel is computed alone, so that the result is the same, bit for
+bit, for any number of threads.
 """
 
 import os
@@ -57,7 +57,7 @@ class Tracer:
     def surface_at(self, columns: ArrayLike, rows: ArrayLike, px: ArrayLike = 0.5, py: ArrayLike = 0.5) -> Passes:
         """The surfaces at sample points of pixels.
 
-        columns, rows : pixels from the left and from the bottom; px, py : the sample point in each pixel. All broadcast to (n,).
+        columns, rows : pixels from the left and from the bottom; px, py : the sample point in each pixel. They broadcast to (n,).
 
         Returns pass name → (n, channels) float32.
         """

@@ -1,8 +1,8 @@
 """The triangles of a scene in camera space, and where a ray that meets one meets it, in float64.
 
 Seen from the eye, the reciprocal of the depth and the two barycentric coordinates divided by the depth are linear in the view
-plane: 1/t = N·(x, y, 1), b₁/t = G₁·(x, y, 1), b₂/t = G₂·(x, y, 1). N, G₁ and G₂ are computed once for each triangle, from the differences
-of its vertices, so that a hit costs nine products.
+plane: 1/t = N·(x, y, 1), b₁/t = G₁·(x, y, 1), b₂/t = G₂·(x, y, 1). N, G₁ and G₂ are computed once for each triangle, from the
+differences of its vertices, so that a hit costs nine products.
 
 Rejected: the scalar triple products of vertices (they lose the square of distance/size instead of distance/size), and keeping
 Embree's own t, u, v (float32).
@@ -13,10 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Float32s, Floats, Indices, cross, dot, gather, linear
 from .scene import Mesh, Object
-from .view import Floats, View
-
-Float32s = NDArray[np.float32]
+from .view import View
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +24,8 @@ class Triangles:
 
     vertices : (3, v) float64, camera space: [axis, vertex].
     corners : (3, m) int32: [corner, triangle], indices into `vertices`.
-    corner_normals : (9, m) float32, world space: [3 · corner + axis, triangle], on the side of the face that the eye sees, of any
-        length; or None where all faces of all meshes are flat.
+    corner_normals : (9, m) float32, world space: [3 · corner + axis, triangle], of any length, turned with the face towards the
+        eye; or None where all faces of all meshes are flat.
     corner_uvs : (9, m) float32: [3 · corner + channel, triangle] with the channels u, v, 1 (0, 0, 0 without a UV map); or None
         where no mesh has a UV map.
     object_index, material_index : (m,) float32, what the passes show.
@@ -134,57 +133,42 @@ class Planes:
                 self._fill(slice(first, first + step), triangles, view)
 
     def _fill(self, part: slice, triangles: Triangles, view: View) -> None:
-        a, b, c = np.take(triangles.vertices, triangles.corners[:, part], axis=1).transpose(1, 0, 2)
+        a, b, c = gather(triangles.vertices, triangles.corners[:, part]).transpose(1, 0, 2)
         self.span[0, part] = np.minimum(np.minimum(a[2], b[2]), c[2])
         self.span[1, part] = np.maximum(np.maximum(a[2], b[2]), c[2])
         first, second = b - a, c - a
-        normal = _cross(first, second)
-        squared = _dot(normal, normal)
-        volume = _dot(normal, a)
+        normal = cross(first, second)
+        squared = dot(normal, normal)
+        volume = dot(normal, a)
         plane = normal / volume
         self.forms[0:3, part] = plane
-        for rows, gradient in ((slice(3, 6), _cross(second, normal)), (slice(6, 9), _cross(normal, first))):
+        for rows, gradient in ((slice(3, 6), cross(second, normal)), (slice(6, 9), cross(normal, first))):
             gradient /= squared
-            self.forms[rows, part] = gradient - _dot(gradient, a) * plane
+            self.forms[rows, part] = gradient - dot(gradient, a) * plane
         length = np.sqrt(squared)
         self.distance[part] = np.nan_to_num(np.abs(volume) / length)
         self.normals[:, part] = np.nan_to_num(view.axes.T @ (normal * (-np.sign(volume) / length)))
 
-    def depth(self, triangle: NDArray[np.intp], x: Floats, y: Floats) -> Floats:
+    def depth(self, triangle: Indices, x: Floats, y: Floats) -> Floats:
         """Planar depth at which rays (x, y, 1) meet the triangles that were found for them; all broadcast.
 
         A triangle seen so nearly edge-on that its plane tells nothing is met within the depths of its vertices.
         """
-        return self._depth(np.take(self.forms[:3], triangle, axis=1), triangle, x, y)
+        return self._depth(gather(self.forms[:3], triangle), triangle, x, y)
 
-    def _depth(self, plane: Floats, triangle: NDArray[np.intp], x: Floats, y: Floats) -> Floats:
+    def _depth(self, plane: Floats, triangle: Indices, x: Floats, y: Floats) -> Floats:
         with np.errstate(all="ignore"):
-            depth = 1.0 / _linear(plane, x, y)
-        depth = np.fmax(depth, np.take(self.span[0], triangle))
-        return np.fmin(depth, np.take(self.span[1], triangle), out=depth)
+            depth = 1.0 / linear(plane, x, y)
+        depth = np.fmax(depth, gather(self.span[0], triangle))
+        return np.fmin(depth, gather(self.span[1], triangle), out=depth)
 
-    def hit(self, triangle: NDArray[np.intp], x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
+    def hit(self, triangle: Indices, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
         """Depth and the barycentric coordinates b₁, b₂ of the hits, each (n,), b₁ and b₂ within the triangle."""
-        forms = np.take(self.forms, triangle, axis=1)
+        forms = gather(self.forms, triangle)
         depth = self._depth(forms[:3], triangle, x, y)
         with np.errstate(all="ignore"):
-            first = _linear(forms[3:6], x, y) * depth
-            second = _linear(forms[6:9], x, y) * depth
+            first = linear(forms[3:6], x, y) * depth
+            second = linear(forms[6:9], x, y) * depth
         np.fmax(np.fmin(first, 1.0, out=first), 0.0, out=first)
         np.fmax(np.fmin(second, 1.0 - first, out=second), 0.0, out=second)
         return depth, first, second
-
-
-def _linear(form: Floats, x: Floats, y: Floats) -> Floats:
-    value = form[0] * x
-    value += form[1] * y
-    value += form[2]
-    return value
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _cross(a: Floats, b: Floats) -> Floats:
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

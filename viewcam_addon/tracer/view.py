@@ -1,19 +1,18 @@
 """Camera space, in which everything is traced.
 
 Its origin is the eye, its axes are right, up and forward: u, v and −w, or −u, v and −w where the camera is mirrored. A ray is
-(x, y, 1) for the point (x, y) of the view plane at distance 1. So the parameter t of a hit *is* its planar depth, clipping is an
-interval of t, and a float32 coordinate moves a vertex in the picture by no more than 2⁻²⁴ of its distance from the principal point,
-however long the lens and wherever in the world the camera stands.
+(x, y, 1) for the point (x, y) of the view plane at distance 1. So the parameter t of a hit *is* its planar depth and clipping
+is an interval of t. Rounded to float32, a vertex moves in the picture by no more than 2⁻²³ of its distance from the principal
+point, however long the lens and wherever in the world the camera stands.
 
-Rejected: world axes with the origin at the eye. The lens magnifies the rounding then, to 2⁻²⁴ · d pixels.
+Rejected: world axes with the origin at the eye, where the lens magnifies that rounding to 2⁻²⁴ · d pixels.
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..pinhole import Pinhole
-
-Floats = NDArray[np.float64]
+from .arrays import Floats, linear
 
 
 class View:
@@ -52,7 +51,4 @@ class View:
 
     def world_position(self, depth: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
         """World coordinates, each (n,), of the points at (n,) planar depths on the rays (x, y, 1)."""
-        x, y = x * depth, y * depth
-        return tuple(
-            x * right + y * up + (depth * forward + eye) for right, up, forward, eye in zip(*self.axes, self.eye, strict=True)
-        )
+        return tuple(linear(axis, x, y) * depth + eye for axis, eye in zip(self.axes.T, self.eye, strict=True))

@@ -1,16 +1,16 @@
 """Which primitive each ray from the eye meets first: Embree's answer, or that of plain NumPy.
 
-A primitive is a number, triangles first and spheres after them; −1 is none. Rays are points (x, y) of the view plane at distance 1 (see
-view.py), and only depths within the clip range count: what lies before it is looked through.
+A primitive is a number, triangles first and spheres after them; −1 is none. Rays are points (x, y) of the view plane at
+distance 1 (see view.py). Only depths within the clip range count: what lies before it is looked through.
 
-**Spheres** are found through cards: each is hidden behind a rectangle that covers its outline and stands before it, parallel to the
-view plane. Embree gives the first card, float64 the exact sphere behind it, and the ray goes on behind that card
-until the next one stands behind the best hit. Since cards are parallel and no two share a depth, all rays meet them in
-the same order, and none is stepped over. Closed boxes round each sphere were rejected: rays that continue behind one box's entry skip, by
-float32's rounding, those of overlapping boxes. Spheres that reach behind the eye's plane have no card; every ray whose
-tile they touch tests them.
+**Spheres** are found through cards: each hides behind a rectangle that covers its outline and stands before it, parallel to
+the view plane. Embree gives the first card, float64 the exact sphere behind it, and the ray goes on behind that card until the
+next one stands behind the best hit. Since cards are parallel and no two share a depth, all rays meet them in the same order
+and step over none. Rejected: closed boxes round the spheres, where a ray that continues behind one's entry skips, by float32's
+rounding, the entries of others. Spheres that reach behind the eye's plane have no card and are tested by all rays of a tile
+that they touch.
 
-embreex offers no nearest distance, so a ray starts where its clip range does, or behind the last card.
+embreex knows no nearest distance, so a ray starts where the clip range does, or behind the last card.
 """
 
 from typing import Protocol
@@ -18,9 +18,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Floats, Indices, cross, gather, linear
 from .ellipsoids import Ellipsoids
 from .triangles import Planes, Triangles
-from .view import Floats
 
 try:
     from embreex.mesh_construction import TriangleMesh
@@ -28,10 +28,8 @@ try:
 except ImportError:  # no wheel for this machine: `Plain` gives the same answers, slowly
     EmbreeScene = None
 
-Indices = NDArray[np.intp]
-
-# Cards overlap the outline by far more than float32's rounding of card and ray, and follow one another at depths that
-# differ by 16 units in float32's last place, so that a ray that starts in between is sure to have the one behind it and the other before it.
+# Cards overlap the outline by 16 units of float32's last place, more than card and ray are rounded by, and follow one another
+# as far apart in depth, so that a ray that starts half-way between two has one surely behind it and the other before it.
 _MARGIN = 2.0**-20
 _CARD_SPACING = 2.0**-20
 _FAR = 1e37
@@ -126,7 +124,7 @@ def _cards(ellipsoids: Ellipsoids, first: int) -> tuple["EmbreeScene", NDArray[n
 
 
 class Plain:
-    """Every ray against every primitive near it, in float64: watertight, since neighbours share the sign of their edge, and slow."""
+    """Every ray against every primitive near it, in float64: slow, and watertight, since neighbours agree about their edge."""
 
     _RAYS, _CANDIDATES = 256, 2048  # at a time: some arrays of 4 MB
 
@@ -134,8 +132,8 @@ class Plain:
         self._planes, self._ellipsoids = planes, ellipsoids
         self._start, self._end = clip
         self._triangle_count = triangles.count
-        corners = np.take(triangles.vertices, triangles.corners, axis=1).transpose(1, 0, 2)
-        self._edges = np.stack([np.cross(corners[j], corners[k], axis=0) for j, k in ((1, 2), (2, 0), (0, 1))])
+        corners = gather(triangles.vertices, triangles.corners).transpose(1, 0, 2)
+        self._edges = np.stack([cross(corners[j], corners[k]) for j, k in ((1, 2), (2, 0), (0, 1))])
         self._bounds = np.concatenate([_triangle_bounds(corners, planes), ellipsoids.bounds], axis=1)
         self._bounds += np.array([[-1], [1], [-1], [1]]) * _MARGIN * (1 + np.nan_to_num(np.abs(self._bounds), posinf=0.0))
 
@@ -159,14 +157,14 @@ class Plain:
     def _candidates(self, primitives: Indices, x: Floats, y: Floats) -> Indices:
         if not len(x):
             return primitives[:0]
-        x0, x1, y0, y1 = np.take(self._bounds, primitives, axis=1)
+        x0, x1, y0, y1 = gather(self._bounds, primitives)
         return primitives[(x0 <= x.max()) & (x1 >= x.min()) & (y0 <= y.max()) & (y1 >= y.min())]
 
     def _depths(self, primitives: Indices, x: Floats, y: Floats) -> Floats:
         """(n, k) depths at which n rays meet k primitives, inf where they don't or where the depth is clipped."""
         split = np.searchsorted(primitives, self._triangle_count)
         triangles, spheres = primitives[:split], primitives[split:] - self._triangle_count
-        a, b, c = (edge[0] * x + edge[1] * y + edge[2] for edge in np.take(self._edges, triangles, axis=2))
+        a, b, c = (linear(edge, x, y) for edge in gather(self._edges, triangles))
         inside = ((a >= 0) & (b >= 0) & (c >= 0)) | ((a <= 0) & (b <= 0) & (c <= 0))
         inside &= (a != 0) | (b != 0) | (c != 0)
         depth = np.concatenate(
