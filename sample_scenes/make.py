@@ -1,0 +1,50 @@
+"""Make the sample scenes: python sample_scenes/make.py [NAME …] [--folder DIR] [--pictures SAMPLES]
+
+Each scene is a module here with a build(), whose docstring goes into the file as a note. `make scenes` runs this with
+bpy 4.2, so that all later Blenders open the files. --pictures also renders each with Cycles, beside its file.
+"""
+
+import argparse
+import importlib
+from pathlib import Path
+
+import bpy
+import staging
+
+import viewcam_addon
+
+SCENES = ("studio", "spheres", "straight_down", "portrait", "wide", "telephoto", "flight")
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description="Make the sample scenes.")
+    options.add_argument("names", metavar="NAME", nargs="*", help=f"which of {', '.join(SCENES)}; all if none is named")
+    options.add_argument("--folder", type=Path, default=Path(__file__).parent, help="where the files go; here by default")
+    options.add_argument("--pictures", metavar="SAMPLES", type=int, help="also render each scene to a PNG")
+    given = options.parse_args()
+    unknown = set(given.names) - set(SCENES)
+    if unknown:
+        options.error(f"there is no scene {', '.join(sorted(unknown))}; the scenes are {', '.join(SCENES)}")
+    viewcam_addon.register()
+    try:
+        for name in given.names or SCENES:
+            make(name, given.folder.resolve(), given.pictures)
+    finally:
+        viewcam_addon.unregister()  # bpy 4.2 crashes at exit where an update callback is still registered
+
+
+def make(name: str, folder: Path, picture_samples: int | None) -> None:
+    """Build one scene, save it, and render it if it is wanted."""
+    module = importlib.import_module(name)
+    scene = module.build()
+    path = folder / f"{name}.blend"
+    staging.save(scene, module.__doc__, path)
+    print(f"{path.name}: {path.stat().st_size / 1000:.0f} kB")
+    if picture_samples:
+        scene.cycles.samples = picture_samples
+        scene.render.filepath = str(path.with_suffix(".png"))
+        bpy.ops.render.render(write_still=True)
+
+
+if __name__ == "__main__":
+    main()
