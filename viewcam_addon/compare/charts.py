@@ -35,8 +35,10 @@ def histogram(roundings: NDArray[np.float64]) -> str:
     counts, edges = np.histogram(np.log10(np.clip(roundings, 10**low, 10**high)), bins=84, range=(low, high))
     tall = (_BASE - 8) * np.sqrt(counts / max(int(counts.max(initial=0)), 1))
     bars = "".join(
-        f'<rect x="{place(10**start):.1f}" y="{_BASE - bar:.1f}" width="{place(10**stop) - place(10**start) - 1:.1f}"
-        height="{bar:.1f}"/>' for bar, start, stop in zip(tall, edges[:-1], edges[1:], strict=True) if bar
+        f'<rect x="{place(10**start):.1f}" y="{_BASE - bar:.1f}" '
+        f'width="{place(10**stop) - place(10**start) - 1:.1f}" height="{bar:.1f}"/>'
+        for bar, start, stop in zip(tall, edges[:-1], edges[1:], strict=True)
+        if bar
     )
     ticks = "".join(
         f'<line x1="{place(10.0**decade):.1f}" x2="{place(10.0**decade):.1f}" y1="{_BASE}" y2="{_BASE + 5}"/>'
@@ -50,8 +52,8 @@ def histogram(roundings: NDArray[np.float64]) -> str:
     label = "Histogram of position errors in roundings of float32, and below it each percentile with the limit of the law"
     return (
         f'<svg class="chart" viewBox="0 0 {_WIDTH} {_BASE + 128}" role="img" aria-label="{label}"><g class="bars">{bars}</g>'
-        f'<line class="axis" x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{_BASE}" y2="{_BASE}"/><g
-        class="ticks">{ticks}</g>{lanes}</svg>'
+        f'<line class="axis" x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{_BASE}" y2="{_BASE}"/>'
+        f'<g class="ticks">{ticks}</g>{lanes}</svg>'
     )
 
 
@@ -82,7 +84,8 @@ def marks(mismatches: Mismatches, width: int, height: int) -> str:
             arm = radius * 0.8
             path = f"M{x - arm:.2f} {y - arm:.2f}l{2 * arm:.2f} {2 * arm:.2f}m0 {-2 * arm:.2f}l{-2 * arm:.2f} {2 * arm:.2f}"
             shapes.append(f'<path class="unexplained" d="{path}"><title>{told}</title></path>')
-    return f'<svg class="marks" viewBox="0 0 {width} {height}" preserveAspectRatio="none" aria-hidden="true">{"".join(shapes)}</svg>'
+    box = f'viewBox="0 0 {width} {height}" preserveAspectRatio="none"'
+    return f'<svg class="marks" {box} aria-hidden="true">{"".join(shapes)}</svg>'
 
 
 def mismatch_words(mismatches: Mismatches, i: int) -> str:

@@ -63,7 +63,7 @@ def png(picture: Picture) -> bytes:
 
 
 def shaded(image: Image) -> Picture:
-    """Depth, Normal and Object Index as a clay model: a key light, a sky, darker where something stands before something else."""
+    """Depth, Normal and Object Index as a clay model: a key light, a sky, darker where one thing stands behind another."""
     depth = image["Depth"][..., 0].astype(np.float64)
     hit = depth < BACKGROUND_DEPTH
     tint = _tints(image["Object Index"][..., 0])

@@ -31,10 +31,7 @@ from .statistics import Row, percentile_name
 # Under the loupe: so many mismatches, the unexplained ones first.
 _MOST_CROPS = 8
 _UNIT_WORDS = {"px": "in pixels", "relative": "relative to its depth", "°": "in degrees", "absolute": "in texture coordinates"}
-_ICONS = {
-    True: '<path d="M20 6 9.5 17 4 11.5"/>',
-    False: '<path d="M5 5l14 14M19 5L5 19"/>',
-}
+_ICONS = {True: "M20 6 9.5 17 4 11.5", False: "M5 5l14 14M19 5L5 19"}
 
 
 def write_report(
@@ -72,13 +69,12 @@ def _parts(
     headline, _, rest = comparison.sentence.partition(": ")
     names = [Path(image.source).name for image in (reference, test)]
     width, height = comparison.pinhole.width, comparison.pinhole.height
-    icon = f'<svg viewBox="0 0 24 24" fill="none" stroke="currentColor" stroke-width="2.6"
-    aria-hidden="true">{_ICONS[comparison.passed]}</svg>' shades = (pictures.shaded(reference), pictures.shaded(test)) return
-    {
+    shades = (pictures.shaded(reference), pictures.shaded(test))
+    return {
         "outcome": "passed" if comparison.passed else "failed",
         "title": escape(f"{headline} · {names[1]}"),
         "names": escape(f"{names[0]} against {names[1]}"),
-        "icon": icon,
+        "icon": _ICONS[comparison.passed],
         "headline": escape(headline) + ".",
         "lede": escape(_with_powers(rest[:1].upper() + rest[1:])),
         "tiles": _tiles(comparison),
@@ -181,16 +177,13 @@ def _legend(row: Row, low: float, high: float) -> str:
 
 
 def _passes(comparison: Comparison) -> str:
-    head = "".join(f"<th scope=col>{percentile_name(p)}</th>" for p in PERCENTILES)
-    rows = [
-        f"<thead><tr><th scope=col>Pass</th><th scope=col>Pixels</th>{head}<th scope=col>Unit</th><th scope=col></th></tr></thead><tbody>"
-    ]
+    head = "".join(f"<th scope=col>{name}</th>" for name in ("Pass", "Pixels", *map(percentile_name, PERCENTILES), "Unit", ""))
+    rows = [f"<thead><tr>{head}</tr></thead><tbody>"]
     for row in comparison.rows:
         cells = "".join(_cell(*figures) for figures in zip(row.values, row.tolerances, row.shares, strict=True))
         cells = cells or f'<td colspan="{len(PERCENTILES)}">nothing was compared</td>'
-        rows.append(
-            f"<tr><th scope=row>{escape(row.name)}</th><td>{row.count:,}</td>{cells}<td class=unit>{row.unit}</td><td>{_mark(row.ok)}</td></tr>"
-        )
+        cells = f"<td>{row.count:,}</td>{cells}<td class=unit>{row.unit}</td><td>{_mark(row.ok)}</td>"
+        rows.append(f"<tr><th scope=row>{row.name}</th>{cells}</tr>")
     for kind, (count, explained) in comparison.mismatches.counts().items():
         words = f"{count - explained:,} unexplained, {explained:,} explained" if count else "none"
         ok = count == 0 or (kind != "not a number" and comparison.mismatches_ok)
@@ -212,19 +205,20 @@ def _errors(comparison: Comparison) -> str:
     if comparison.conversion:
         c = comparison.conversion
         words = (
-            f"The stated camera and the one read back from Blender differ by at most <b>{figure(c.largest)} px</b> over corners, edges and "
-            f"centre; float32 storage allows {figure(c.tolerance)} px there."
+            f"The stated camera and the one read back from Blender differ by at most <b>{figure(c.largest)} px</b> over "
+            f"corners, edges and centre; float32 storage allows {figure(c.tolerance)} px there."
         )
         cards.append(_card("Conversion: the four values → Blender's camera", words, "" if c.ok else "bad-card"))
     else:
         cards.append(_card("Conversion", "Nobody stated a camera, so there is none to compare Blender's with.", "no-card"))
     if comparison.systematic:
         s, position = comparison.systematic, comparison.rows[0]
-        words = f"Positions are <b>{figure(position.values[0])} px</b> off in the median and <b>{figure(position.values[-1])} px</b> at worst."
+        median, worst = figure(position.values[0]), figure(position.values[-1])
+        words = f"Positions are <b>{median} px</b> off in the median and <b>{worst} px</b> at worst."
         cards.append(_card("Renderer: Blender's camera → the picture", words, "" if position.ok else "bad-card"))
         words = (
-            f"Shift ({figure(s.shift_x)}, {figure(s.shift_y)}) px, zoom ({figure(s.zoom_x)}, {figure(s.zoom_y)}), roll {figure(s.roll)} rad. "
-            f"The mean of all errors is <b>{figure(s.mean)} px</b> long; {figure(s.tolerance)} px are allowed."
+            f"Shift ({figure(s.shift_x)}, {figure(s.shift_y)}) px, zoom ({figure(s.zoom_x)}, {figure(s.zoom_y)}), "
+            f"roll {figure(s.roll)} rad. The mean of all errors is <b>{figure(s.mean)} px</b> long; {figure(s.tolerance)} px are allowed."
         )
         cards.append(_card("What all pixels share", words, "" if s.ok else "bad-card"))
     return "".join(cards)
@@ -243,9 +237,10 @@ def _loupe(comparison: Comparison, shades: tuple) -> str:
     size = (comparison.pinhole.width, comparison.pinhole.height)
     items = []
     for i in chosen:
+        column, row = mismatches.columns[i], mismatches.rows[i]
         crops = "".join(
-            f'<span><img alt="{side}" src="{pictures.png_uri(pictures.crop(shade, size, mismatches.columns[i],
-            mismatches.rows[i]))}"></span>' for side, shade in zip(("reference", "test"), shades, strict=True)
+            f'<span><img alt="{side}" src="{pictures.png_uri(pictures.crop(shade, size, column, row))}"></span>'
+            for side, shade in zip(("reference", "test"), shades, strict=True)
         )
         words = escape(charts.mismatch_words(mismatches, int(i)))
         items.append(f'<li><div class="crops">{crops}</div>{words[:1].upper() + words[1:]}</li>')
