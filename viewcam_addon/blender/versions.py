@@ -25,3 +25,32 @@ def _curves_of(source: bpy.types.AnimData | bpy.types.NlaStrip) -> list[bpy.type
         strip.channelbag(source.action_slot) for layer in source.action.layers for strip in layer.strips if source.action_slot
     ]
     return [curve for bag in bags if bag for curve in bag.fcurves]
+
+
+def adaptive_subdivision(block: bpy.types.Object, scene: bpy.types.Scene) -> tuple[bpy.types.bpy_struct, str] | None:
+    """The property by which Cycles subdivides this object by its size in the picture, or None where it does not.
+
+    Until 4.5 it is the object's and counts with Cycles' experimental features only; since 5.0 it is the modifier's.
+    """
+    last = block.modifiers[-1] if block.modifiers else None
+    if last is None or last.type != "SUBSURF" or not last.show_render:
+        return None
+    if hasattr(last, "use_adaptive_subdivision"):
+        owner = last
+    elif scene.cycles.feature_set == "EXPERIMENTAL":
+        owner = block.cycles
+    else:
+        return None
+    return (owner, "use_adaptive_subdivision") if owner.use_adaptive_subdivision else None
+
+
+def set_multilayer_file(settings: bpy.types.ImageFormatSettings) -> None:
+    """Let a render write a multilayer EXR of 32-bit floats."""
+    # Since 5.0 the kind of medium comes first, and the parts of a file collide where pixels are not square, unless interleaved.
+    if hasattr(settings, "media_type"):
+        settings.media_type = "MULTI_LAYER_IMAGE"
+    settings.file_format = "OPEN_EXR_MULTILAYER"
+    settings.color_depth = "32"
+    settings.exr_codec = "ZIP"
+    if hasattr(settings, "use_exr_interleave"):
+        settings.use_exr_interleave = True

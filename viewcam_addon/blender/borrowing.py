@@ -1,0 +1,65 @@
+"""Settings of Blender that are changed for a while and given back, whatever happens in between.
+
+    with borrowed() as borrow:
+        borrow.set(scene.cycles, "samples", 1)
+        ...
+
+Rejected: a copy of the scene to change freely (rigid bodies, caches and drivers that name the scene would see another scene).
+"""
+
+import contextlib
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import bpy
+
+
+class Borrower:
+    """Hands settings out, and remembers how to give each back."""
+
+    def __init__(self, stack: contextlib.ExitStack) -> None:
+        self._stack = stack
+
+    def set(self, owner: bpy.types.bpy_struct, name: str, value: Any) -> None:
+        """Set a property until the loan ends."""
+        before = getattr(owner, name)
+        if before != value:
+            self.afterwards(setattr, owner, name, before)
+            setattr(owner, name, value)
+
+    def afterwards(self, undo: Callable[..., Any], *arguments: Any) -> None:
+        """Call `undo(*arguments)` when the loan ends; what was borrowed last is given back first."""
+        self._stack.callback(undo, *arguments)
+
+
+@contextlib.contextmanager
+def borrowed() -> Iterator[Borrower]:
+    """Give a Borrower; at the end of the block everything is as it was."""
+    with contextlib.ExitStack() as stack:
+        yield Borrower(stack)
+
+
+def still_of_one_layer(
+    borrow: Borrower, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_object: bpy.types.Object
+) -> None:
+    """Make `bpy.ops.render.render` render this view layer through this camera, sharp, and nothing after it.
+
+    What both sides of a comparison have in common: compositor and sequencer, motion blur, stereo and Freestyle are off, a render
+    border is cropped to, and Cycles' culling keeps no object back. Simplify stays as the artist has it.
+    """
+    render = scene.render
+    for name in (
+        "use_compositing",
+        "use_sequencer",
+        "use_multiview",
+        "use_motion_blur",
+        "use_freestyle",
+        "use_persistent_data",
+        "use_single_layer",
+        "use_stamp",
+    ):
+        borrow.set(render, name, False)
+    borrow.set(render, "use_crop_to_border", render.use_border)
+    borrow.set(scene, "camera", camera_object)
+    for each in scene.view_layers:
+        borrow.set(each, "use", each == view_layer)

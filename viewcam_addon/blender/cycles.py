@@ -1,0 +1,108 @@
+"""Cycles' side of a comparison: one sample through each pixel's centre, and the passes of geometry, in 32 bits.
+
+The settings are those under which Cycles follows a pinhole best. Its first sample stands in the middle of the pixel but for a
+bias of the filter table, 3e-6 px at the narrowest Blackman-Harris filter; adaptive sampling, denoising and light thresholds would
+make of it something else. Everything is borrowed and given back.
+"""
+
+import os
+from collections.abc import Iterable
+
+import bpy
+
+from ..errors import InputError
+from ..files import written_whole
+from . import versions
+from .borrowing import Borrower, borrowed, still_of_one_layer
+from .depsgraph import render_still
+from .ledger import Remedy
+
+_SAMPLING = {
+    "device": "CPU",
+    "samples": 1,
+    "use_adaptive_sampling": False,
+    "use_denoising": False,
+    "time_limit": 0.0,
+    "sample_offset": 0,
+    "use_sample_subset": False,
+    "pixel_filter_type": "BLACKMAN_HARRIS",
+    "filter_width": 0.01,
+    "light_sampling_threshold": 0.0,
+    "use_light_tree": False,
+    "use_layer_samples": "IGNORE",
+    "film_exposure": 1.0,
+    "use_camera_cull": False,
+    "use_distance_cull": False,
+}
+_PASSES = ("combined", "z", "position", "normal", "uv", "object_index", "material_index")
+
+
+def render(
+    scene: bpy.types.Scene,
+    view_layer: bpy.types.ViewLayer,
+    camera_object: bpy.types.Object,
+    path: str | os.PathLike[str],
+    remedies: Iterable[Remedy] = (),
+    threads: int | None = None,
+) -> None:
+    """Render one view layer at the current frame to a multilayer EXR, whole or not at all.
+
+    remedies : what to take out for the time of the render (ledger.py). threads : all by default.
+
+    Raises
+    ------
+    InputError
+        if Cycles is disabled or reports an error, or if the file can't be written.
+    """
+    if not hasattr(scene, "cycles"):
+        raise InputError("Cycles is disabled: enable the add-on Cycles Render Engine in Blender's preferences")
+    with written_whole(path) as temporary, borrowed() as borrow:
+        still_of_one_layer(borrow, scene, view_layer, camera_object)
+        _borrow_sampling(borrow, scene)
+        _borrow_passes(borrow, view_layer)
+        _borrow_file(borrow, scene, temporary)
+        if threads:
+            borrow.set(scene.render, "threads_mode", "FIXED")
+            borrow.set(scene.render, "threads", threads)
+        for remedy in remedies:
+            remedy(borrow)
+        render_still(scene, to_file=True)
+
+
+def _borrow_sampling(borrow: Borrower, scene: bpy.types.Scene) -> None:
+    borrow.set(scene.render, "engine", "CYCLES")
+    for name, value in _SAMPLING.items():
+        if hasattr(scene.cycles, name):  # versions know fewer of them
+            borrow.set(scene.cycles, name, value)
+
+
+def _borrow_passes(borrow: Borrower, view_layer: bpy.types.ViewLayer) -> None:
+    """The passes of geometry beside those that are on; surfaces, without hair and volumes."""
+    for name in _PASSES:
+        borrow.set(view_layer, f"use_pass_{name}", True)
+    borrow.set(view_layer, "use_strand", False)
+    borrow.set(view_layer, "use_volumes", False)
+
+
+def _borrow_file(borrow: Borrower, scene: bpy.types.Scene, path: os.PathLike[str]) -> None:
+    borrow.set(scene.render, "filepath", str(path))
+    borrow.set(scene.render, "use_file_extension", False)
+    borrow.set(scene.render, "use_overwrite", True)
+    settings = scene.render.image_settings
+    _borrow_whole(borrow, settings)
+    settings.color_management = "FOLLOW_SCENE"
+    versions.set_multilayer_file(settings)
+
+
+def _borrow_whole(borrow: Borrower, settings: bpy.types.ImageFormatSettings) -> None:
+    """Give back all settings of the file together, since the kind of file changes what the others may be."""
+    names = [prop.identifier for prop in settings.bl_rna.properties if not prop.is_readonly]
+    names.sort(key=lambda name: ("media_type", "file_format").index(name) if name in ("media_type", "file_format") else 2)
+    before = {name: getattr(settings, name) for name in names}
+
+    def give_back() -> None:
+        for name, value in before.items():
+            if getattr(settings, name) != value:
+                setattr(settings, name, value)
+
+    borrow.afterwards(give_back)

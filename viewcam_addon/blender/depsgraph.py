@@ -1,0 +1,91 @@
+"""The dependency graph as a final render sees it.
+
+`context.evaluated_depsgraph_get()` is the viewport's: viewport subdivision levels, `hide_viewport`, modifiers' `show_viewport`.
+Blender makes a graph in render mode for render engines only, so that a render engine that renders nothing is what gets it: it
+sees exactly what Cycles sees, in `blender -b`, in a window and in the bpy module. Rejected: copying viewport settings from the
+render settings and back (drivers, GeometryNodes' "Is Viewport", particle percentages and more would still differ).
+"""
+
+import contextlib
+import os
+import sys
+from collections.abc import Callable, Iterator
+from typing import TypeVar
+
+import bpy
+
+from ..errors import InputError
+from .borrowing import borrowed
+
+Result = TypeVar("Result")
+
+
+class _Visitor(bpy.types.RenderEngine):
+    """Renders nothing, and lets `work` look at the depsgraph."""
+
+    bl_idname = "VIEWCAM_VISITOR"
+    bl_label = "Virtual Pinhole (export)"
+
+    work: Callable[[bpy.types.Depsgraph], None]
+
+    def render(self, depsgraph: bpy.types.Depsgraph) -> None:
+        type(self).work(depsgraph)
+
+
+def visit(scene: bpy.types.Scene, work: Callable[[bpy.types.Depsgraph], Result]) -> Result:
+    """Call `work(depsgraph)` with the graph of the render that the scene is set to, and return what it returns.
+
+    Nothing of the graph may be kept: it is gone when this returns. What `work` raises is raised here.
+    """
+    outcome: list[Result] = []
+    failure: list[BaseException] = []
+
+    def guarded(depsgraph: bpy.types.Depsgraph) -> None:
+        try:
+            outcome.append(work(depsgraph))
+        except BaseException as error:  # Blender would print it and go on
+            failure.append(error)
+
+    _Visitor.work = staticmethod(guarded)
+    bpy.utils.register_class(_Visitor)
+    try:
+        with borrowed() as borrow:
+            borrow.set(scene.render, "engine", _Visitor.bl_idname)
+            render_still(scene)
+    finally:
+        bpy.utils.unregister_class(_Visitor)
+    if failure:
+        raise failure[0]
+    if not outcome:
+        raise InputError(f"Blender renders nothing of scene {scene.name!r}: check its render settings")
+    return outcome[0]
+
+
+def render_still(scene: bpy.types.Scene, to_file: bool = False) -> None:
+    """Render the scene's current frame, without Blender's progress lines on the terminal.
+
+    Raises
+    ------
+    InputError
+        with Blender's own reason, if it reports an error.
+    """
+    try:
+        with _silent_progress():
+            bpy.ops.render.render(scene=scene.name, write_still=to_file)
+    except RuntimeError as error:
+        reason = str(error).strip().splitlines()[0].removeprefix("Error: ").rstrip(".")
+        raise InputError(f"Blender can't render scene {scene.name!r} ({reason}): make it render with F12 first") from error
+
+
+@contextlib.contextmanager
+def _silent_progress() -> Iterator[None]:
+    """Blender prints its progress from C, past sys.stdout."""
+    sys.stdout.flush()
+    kept = os.dup(1)
+    try:
+        with open(os.devnull, "w") as nowhere:
+            os.dup2(nowhere.fileno(), 1)
+            yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)

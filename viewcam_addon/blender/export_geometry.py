@@ -1,0 +1,89 @@
+"""Blender's evaluated meshes and point clouds as the tracer's arrays, read in bulk.
+
+As Cycles reads them (intern/cycles/blender/mesh.cpp and pointcloud.cpp): Blender's own triangulation, material indices clamped to
+the slots, a face is smooth unless it is marked sharp, custom normals do not count on a sharp face, and a flat face has the normal
+of each of its triangles.
+"""
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..tracer.scene import Mesh, Spheres
+
+# Cycles' radius of points that have none.
+DEFAULT_RADIUS = 0.01
+
+Array = NDArray[np.generic]
+
+
+def mesh_of(mesh: bpy.types.Mesh, slot_count: int) -> Mesh:
+    """The triangles of an evaluated mesh, object space.
+
+    slot_count : the object's material slots, which material indices are clamped to.
+    """
+    mesh.calc_loop_triangles()
+    vertices = _read(mesh.vertices, "co", np.float32, 3).astype(np.float64)
+    corner_vertices = _read(mesh.loops, "vertex_index", np.int32)
+    corners = _read(mesh.loop_triangles, "loops", np.int32, 3)
+    faces = _read(mesh.loop_triangles, "polygon_index", np.int32)
+    triangles = corner_vertices[corners]
+    return Mesh(
+        vertices=vertices,
+        triangles=triangles,
+        materials=_materials(mesh, slot_count)[faces],
+        corner_normals=_corner_normals(mesh, vertices, triangles, corners, faces),
+        corner_uvs=_corner_uvs(mesh, corners),
+    )
+
+
+def spheres_of(points: bpy.types.PointCloud) -> Spheres:
+    """The points of an evaluated point cloud, object space. Cycles gives all of them the first material."""
+    centers = _attribute(points, "position", "vector", np.float32, 3)
+    radii = _attribute(points, "radius", "value", np.float32)
+    if radii is None:
+        radii = np.full(len(centers), DEFAULT_RADIUS, np.float32)
+    return Spheres(centers.astype(np.float64), radii.astype(np.float64), np.zeros(len(centers), np.int32))
+
+
+def _materials(mesh: bpy.types.Mesh, slot_count: int) -> Array:
+    """(faces,) int32: each face's index among the material slots."""
+    indices = _attribute(mesh, "material_index", "value", np.int32, domain="FACE")
+    if indices is None:
+        return np.zeros(len(mesh.polygons), np.int32)
+    return np.clip(indices, 0, max(slot_count - 1, 0))
+
+
+def _corner_normals(mesh: bpy.types.Mesh, vertices: Array, triangles: Array, corners: Array, faces: Array) -> Array | None:
+    """(triangles, 3, 3) float32, or None where all faces are flat."""
+    sharp = _attribute(mesh, "sharp_face", "value", np.bool_, domain="FACE")
+    if sharp is None:
+        sharp = np.full(len(mesh.polygons), mesh.normals_domain == "FACE")
+    if sharp.all():
+        return None
+    normals = _read(mesh.corner_normals, "vector", np.float32, 3)[corners]
+    flat = sharp[faces]
+    first, second, third = np.moveaxis(vertices[triangles[flat]], 1, 0)
+    across = np.cross(second - first, third - first)
+    lengths = np.linalg.norm(across, axis=1, keepdims=True)
+    normals[flat] = (across / np.where(lengths > 0, lengths, 1.0))[:, np.newaxis].astype(np.float32)
+    return normals
+
+
+def _corner_uvs(mesh: bpy.types.Mesh, corners: Array) -> Array | None:
+    """(triangles, 3, 2) float32: the UV map that is active for rendering, or None where there is none."""
+    layer = next((layer for layer in mesh.uv_layers if layer.active_render), None)
+    return None if layer is None else _read(layer.uv, "vector", np.float32, 2)[corners]
+
+
+def _attribute(owner: bpy.types.ID, name: str, field: str, dtype: type, width: int = 1, domain: str = "POINT") -> Array | None:
+    """An attribute's values, or None where there is none of this name and domain."""
+    attribute = owner.attributes.get(name)
+    return _read(attribute.data, field, dtype, width) if attribute and attribute.domain == domain else None
+
+
+def _read(collection: bpy.types.bpy_prop_collection, field: str, dtype: type, width: int = 1) -> Array:
+    """(items,) or (items, width) of `dtype`."""
+    values = np.empty(len(collection) * width, dtype)
+    collection.foreach_get(field, values)
+    return values.reshape(-1, width) if width > 1 else values

@@ -1,0 +1,97 @@
+"""What of a scene the tracer does not model, found and named: each with the remedy that takes it out of Cycles' render too.
+
+Hair, curves and volumes need no remedy: the view layer is told to leave them out (cycles.py).
+"""
+
+import bpy
+
+from . import datablocks, materials, versions
+from .ledger import Ledger
+
+_NO_SURFACE = {
+    "VOLUME": "volumes are not modelled",
+    "CURVES": "hair and curves without a surface are not modelled",
+    "GREASEPENCIL": "Grease Pencil is not modelled",
+    "GPENCIL": "Grease Pencil is not modelled",
+}
+
+
+def note_render(scene: bpy.types.Scene, camera_object: bpy.types.Object, ledger: Ledger) -> None:
+    """What the camera and the render settings do beyond a pinhole. To be asked before the settings are borrowed."""
+    for sentence in datablocks.beyond_pinhole(camera_object, scene):
+        ledger.note(camera_object.name, "approximated", f"{sentence} (off on both sides)")
+    ledger.set_for_cycles(camera_object.data.dof, "use_dof", False)
+    world = scene.world
+    if world and world.use_nodes and world.node_tree:
+        output = world.node_tree.get_output_node("CYCLES")
+        if output and output.inputs["Volume"].is_linked:
+            ledger.note(world.name, "approximated", "the world's volume is left out")
+            ledger.set_for_cycles(scene, "world", None)
+
+
+def is_surface(shown: bpy.types.Object, real: bpy.types.Object, ledger: Ledger) -> bool:
+    """Whether an evaluated object is a mesh or a point cloud; what is drawn but is neither is noted.
+
+    shown : the object that the depsgraph places. real : the object it comes from.
+    """
+    name = real.original.name
+    if shown.type in _NO_SURFACE:
+        ledger.note(name, "skipped", _NO_SURFACE[shown.type])
+    elif shown.type == "LIGHT":
+        ledger.note(name, "exported", "a light, which leaves no mark in the passes of level geometry")
+    elif _holds_gas(real) and shown.data == real.data:
+        ledger.note(name, "skipped", _NO_SURFACE["VOLUME"])
+    else:
+        return isinstance(shown.data, bpy.types.Mesh | bpy.types.PointCloud)
+    return False
+
+
+def note_object(
+    shown: bpy.types.Object,
+    parent: bpy.types.Object,
+    slots: list[bpy.types.Material | None],
+    depsgraph: bpy.types.Depsgraph,
+    ledger: Ledger,
+) -> None:
+    """What a visible surface is beyond its geometry.
+
+    parent : what instances the object, or the object itself. slots : its materials.
+    """
+    name = shown.original.name
+    if parent.holdout_get(view_layer=depsgraph.view_layer_eval):
+        ledger.note(name, "approximated", "a holdout, a plain object on both sides")
+        ledger.set_for_cycles(parent.original, "is_holdout", False)
+        for collection in _layer_collections(depsgraph.view_layer.layer_collection):
+            ledger.set_for_cycles(collection, "holdout", False)
+    for each in (shown, parent):
+        if each.is_shadow_catcher:
+            ledger.note(name, "approximated", "a shadow catcher, a plain object on both sides")
+            ledger.set_for_cycles(each.original, "is_shadow_catcher", False)
+    adaptive = versions.adaptive_subdivision(shown.original, depsgraph.scene)
+    if adaptive:
+        ledger.note(name, "approximated", "adaptive subdivision is subdivision at the render level on both sides")
+        ledger.set_for_cycles(*adaptive, False)
+    for material in filter(None, slots):
+        for reason in materials.departures(material):
+            ledger.note(name, "approximated", f"material {material.name!r} {reason}, and a plain one stands in")
+            ledger.call_for_cycles(material.original, materials.make_plain)
+
+
+def note_hair(instance: bpy.types.DepsgraphObjectInstance, ledger: Ledger) -> None:
+    """Hair of a particle system, which grows beside the object itself."""
+    shown = instance.object
+    if instance.show_particles and any(
+        system.settings.type == "HAIR" and system.settings.render_type == "PATH" for system in shown.particle_systems
+    ):
+        ledger.note(shown.original.name, "skipped", "particle hair is not modelled")
+
+
+def _holds_gas(real: bpy.types.Object) -> bool:
+    return any(
+        modifier.type == "FLUID" and modifier.fluid_type == "DOMAIN" and modifier.domain_settings.domain_type == "GAS"
+        for modifier in real.modifiers
+    )
+
+
+def _layer_collections(top: bpy.types.LayerCollection) -> list[bpy.types.LayerCollection]:
+    return [top, *(each for child in top.children for each in _layer_collections(child))]

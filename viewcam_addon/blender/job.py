@@ -1,0 +1,172 @@
+"""One job on one .blend, as the command line asks for it: export, render with Cycles, or both from the same state.
+
+A job opens the file (or takes the one that is open), chooses camera, frame and size for its own time only, and never saves.
+Scripts of the file do not run.
+"""
+
+import contextlib
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import bpy
+
+from .. import intrinsics
+from ..errors import InputError
+from ..tracer.scene import LedgerEntry, Scene
+from . import cycles, datablocks, indices, register
+from .borrowing import Borrower, borrowed
+from .export import export_scene, survey
+from .ledger import Ledger
+
+# What a .blend starts with: itself, or a gzip or Zstandard stream.
+_MAGIC = (b"BLENDER", b"\x1f\x8b", b"\x28\xb5\x2f\xfd")
+
+
+@dataclass(frozen=True)
+class Request:
+    """blend : the file, or None for the one that is open. camera, frame, size : the scene's own where None."""
+
+    blend: str | os.PathLike[str] | None = None
+    camera: str | None = None
+    frame: int | None = None
+    size: tuple[int, int] | None = None
+    strict: bool = False
+    threads: int | None = None
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """What a job works on while it lasts."""
+
+    scene: bpy.types.Scene
+    view_layer: bpy.types.ViewLayer
+    camera: bpy.types.Object
+    ledger: Ledger = field(default_factory=Ledger)
+
+
+def export(request: Request) -> Scene:
+    """The tracer's scene of a .blend.
+
+    Raises
+    ------
+    InputError
+        if the file can't be opened, or has no such camera, or one that is no pinhole.
+    NotModelledError
+        if `strict` and anything is approximated or left out.
+    """
+    with _stage(request) as stage:
+        return _export(stage, request)
+
+
+def render(request: Request, path: str | os.PathLike[str]) -> tuple[LedgerEntry, ...]:
+    """Render a .blend with Cycles for a comparison; returns what the ledger says.
+
+    Raises as `export` does, and InputError if the picture can't be written.
+    """
+    with _stage(request) as stage:
+        survey(stage.scene, stage.view_layer, stage.camera, stage.ledger)
+        if request.strict:
+            stage.ledger.check_strict()
+        _render(stage, request, path)
+        return stage.ledger.entries()
+
+
+def export_and_render(request: Request, path: str | os.PathLike[str]) -> Scene:
+    """Both sides of one state of the file, objects and materials numbered alike. Raises as `render` does."""
+    with _stage(request) as stage, indices.numbered():
+        scene = _export(stage, request)
+        _render(stage, request, path)
+        return scene
+
+
+def _export(stage: _Stage, request: Request) -> Scene:
+    scene = export_scene(stage.scene, stage.view_layer, stage.camera, stage.ledger)
+    if request.strict:
+        stage.ledger.check_strict()
+    return scene
+
+
+def _render(stage: _Stage, request: Request, path: str | os.PathLike[str]) -> None:
+    cycles.render(stage.scene, stage.view_layer, stage.camera, path, stage.ledger.remedies.values(), request.threads)
+
+
+@contextlib.contextmanager
+def _stage(request: Request) -> Iterator[_Stage]:
+    """Open the file, and set it to the request until the job is done."""
+    if not hasattr(bpy.types.Object, "virtual_pinhole"):  # the bpy module knows no add-ons
+        register()
+    if request.blend is not None:
+        open_blend(request.blend)
+    scene = bpy.context.scene
+    camera = _camera(scene, request.camera)
+    with borrowed() as borrow:
+        if request.size:
+            _borrow_size(borrow, scene, camera, request.size)
+        if request.frame is not None and request.frame != scene.frame_current:
+            borrow.afterwards(scene.frame_set, scene.frame_current, subframe=scene.frame_subframe)
+            scene.frame_set(request.frame)
+        yield _Stage(scene, bpy.context.view_layer, camera)
+
+
+def open_blend(path: str | os.PathLike[str]) -> None:
+    """Open a .blend without running its scripts.
+
+    Raises
+    ------
+    InputError
+        if there is no such file, or if Blender can't read it.
+    """
+    path = Path(path).absolute()
+    if not path.is_file():
+        raise InputError(f"{path} does not exist: check the name of the .blend file")
+    try:
+        with open(path, "rb") as file:
+            start = file.read(7)
+    except OSError as error:
+        raise InputError(f"{path} can't be read ({error.strerror}): check its permissions") from error
+    if not start.startswith(_MAGIC):
+        raise InputError(f"{path} is not a .blend file: give a file that Blender has saved")
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
+    except RuntimeError as error:
+        reason = str(error).strip().splitlines()[0].removeprefix("Error: ").rstrip(".")
+        raise InputError(f"{path} can't be opened by Blender {bpy.app.version_string} ({reason}): save it again") from error
+
+
+def _camera(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object:
+    """The camera object that is meant, checked to be a perspective one."""
+    if name is None:
+        if scene.camera is None:
+            raise InputError(f"scene {scene.name!r} has no camera: add one, or name one with --camera")
+        camera = scene.camera
+    else:
+        camera = scene.objects.get(name)
+        if camera is None:
+            cameras = sorted(each.name for each in scene.objects if each.type == "CAMERA")
+            raise InputError(f"scene {scene.name!r} has no object {name!r}: its cameras are {', '.join(cameras) or 'none'}")
+    datablocks.check_perspective(camera)
+    return camera
+
+
+def _borrow_size(borrow: Borrower, scene: bpy.types.Scene, camera: bpy.types.Object, size: tuple[int, int]) -> None:
+    """Another number of pixels for the same lens; the stated distance counts pixels and goes with the lens."""
+    before = _distance_at_full_size(scene, camera)
+    for name, value in zip(("resolution_x", "resolution_y", "resolution_percentage"), (*size, 100), strict=True):
+        borrow.set(scene.render, name, value)
+    group = camera.virtual_pinhole
+    if group.enabled:
+        *pose, distance = group.numbers()
+        # Last borrowed, first given back: the values are stated anew, then their digits and their size as they were.
+        borrow.afterwards(setattr, group, "size", tuple(group.size))
+        borrow.afterwards(setattr, group, "exact", group.exact)
+        borrow.afterwards(group.state, *pose, distance, tuple(group.size))
+        group.state(*pose, distance * _distance_at_full_size(scene, camera) / before, size)
+
+
+def _distance_at_full_size(scene: bpy.types.Scene, camera: bpy.types.Object) -> float:
+    """The lens in pixels of the picture at 100 %."""
+    frame = datablocks.frame_of(scene)
+    plane = intrinsics.view_plane(datablocks.camera_data_of(camera.data), frame)
+    return plane.distance[0] * frame.resolution_x / frame.size[0]

@@ -1,0 +1,89 @@
+"""Which materials change where a surface is or what its passes say, and the plain one that stands in for them in Cycles.
+
+Level geometry models no material. Most leave the passes of geometry alone; some do not: displacement moves the surface, bump and
+normal maps turn the Normal pass, and where a surface is transparent Cycles writes what lies behind. For the time of a comparison
+such a material gets a second output for Cycles, a diffuse surface of its viewport colour; its own nodes stay untouched.
+"""
+
+from collections.abc import Iterator
+
+import bpy
+
+from .borrowing import Borrower
+
+# Node types that let something else than the surface's own geometry into the passes.
+_TRANSPARENT = {"BSDF_TRANSPARENT", "HOLDOUT"}
+_TURNING = {"BUMP", "NORMAL_MAP", "BEVEL"}
+_UNKNOWN = {"SCRIPT"}
+
+
+def departures(material: bpy.types.Material) -> list[str]:
+    """Why this material's surface is not what level geometry models, one clause each; empty for most materials."""
+    tree = material.node_tree
+    if not material.use_nodes or tree is None:
+        return []
+    output = tree.get_output_node("CYCLES")
+    if output is None:
+        return ["has no output, so that Cycles draws nothing"]
+    reasons = []
+    if output.inputs["Displacement"].is_linked:
+        reasons.append("is displaced")
+    if output.inputs["Volume"].is_linked:
+        reasons.append("has a volume")
+    nodes = list(_nodes(tree, set()))
+    if any(node.type in _TRANSPARENT or _sees_through(node) for node in nodes):
+        reasons.append("is transparent")
+    if any(node.type in _TURNING or _is_turned(node) for node in nodes):
+        reasons.append("turns the normals")
+    if any(node.type in _UNKNOWN for node in nodes):
+        reasons.append("runs a script")
+    if not output.inputs["Surface"].is_linked:
+        reasons.append("has no surface")
+    return reasons
+
+
+def make_plain(borrow: Borrower, material: bpy.types.Material) -> None:
+    """Let Cycles see a diffuse surface until the loan ends."""
+    nodes = material.node_tree.nodes
+    active = nodes.active
+    outputs = [(node, node.is_active_output) for node in nodes if node.type == "OUTPUT_MATERIAL"]
+    output, surface = nodes.new("ShaderNodeOutputMaterial"), nodes.new("ShaderNodeBsdfDiffuse")
+
+    def undo() -> None:
+        nodes.remove(output)
+        nodes.remove(surface)
+        for node, was_active in outputs:
+            node.is_active_output = was_active
+        nodes.active = active
+
+    borrow.afterwards(undo)
+    output.target = "CYCLES"
+    surface.inputs["Color"].default_value = material.diffuse_color
+    material.node_tree.links.new(surface.outputs["BSDF"], output.inputs["Surface"])
+    for node, _ in outputs:
+        node.is_active_output = False
+    output.is_active_output = True
+
+
+def _nodes(tree: bpy.types.NodeTree, seen: set[bpy.types.NodeTree]) -> Iterator[bpy.types.Node]:
+    """All nodes of the tree and of the groups in it; whether they lead to the output is not asked."""
+    seen.add(tree)
+    for node in tree.nodes:
+        if node.mute:
+            continue
+        yield node
+        group = getattr(node, "node_tree", None)
+        if group and group not in seen:
+            yield from _nodes(group, seen)
+
+
+def _sees_through(node: bpy.types.Node) -> bool:
+    """Whether the node has an opacity that is not plainly 1."""
+    alpha = node.inputs.get("Alpha") if node.type == "BSDF_PRINCIPLED" else None
+    return alpha is not None and (alpha.is_linked or alpha.default_value != 1.0)
+
+
+def _is_turned(node: bpy.types.Node) -> bool:
+    """Whether a shader takes its normal from another node."""
+    normal = node.inputs.get("Normal")
+    return normal is not None and normal.is_linked and any(output.type == "SHADER" for output in node.outputs)
