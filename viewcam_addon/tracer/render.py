@@ -57,7 +57,7 @@ class Tracer:
     def surface_at(self, columns: ArrayLike, rows: ArrayLike, px: ArrayLike = 0.5, py: ArrayLike = 0.5) -> Passes:
         """The surfaces at sample points of pixels.
 
-        columns, rows : pixels from the left and from the bottom; px, py : the sample point in each pixel. They broadcast to (n,).
+        columns, rows : pixels from the left and from the bottom; px, py : the sample point in each pixel; broadcast to (n,).
 
         Returns pass name → (n, channels) float32.
         """

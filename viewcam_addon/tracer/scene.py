@@ -87,6 +87,10 @@ class Object:
         _check_shape(f"the matrix of object {self.name!r}", self.matrix, (4, 4))
         if not np.isfinite(self.matrix).all():
             raise InputError(f"the matrix of object {self.name!r} holds a number that is not finite: check its transform")
+        if not np.array_equal(self.matrix[3], (0, 0, 0, 1)):
+            raise InputError(f"the matrix of object {self.name!r} is not affine: its last row must be 0, 0, 0, 1")
+        if not self.material_indices:
+            raise InputError(f"object {self.name!r} has no material_indices: give at least one, 0 where it has no material")
 
 
 @dataclass(frozen=True)
@@ -118,6 +122,28 @@ class Scene:
     stated_camera: Pinhole | None = None
     clip: tuple[float, float] = (0.0, float("inf"))
     ledger: tuple[LedgerEntry, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        start, end = (float(depth) for depth in self.clip)
+        if not 0 <= start < end:
+            raise InputError(f"clip is {start:g} … {end:g}: give a nearest depth of at least 0 and a greater farthest depth")
+        object.__setattr__(self, "clip", (start, end))
+        materials = {name: _material_range(geometry.materials) for name, geometry in self.geometries.items()}
+        for placed in self.objects:
+            if placed.geometry not in materials:
+                raise InputError(
+                    f"object {placed.name!r} names the geometry {placed.geometry!r}, which the scene does not have"
+                )
+            least, greatest = materials[placed.geometry]
+            if least < 0 or greatest >= len(placed.material_indices):
+                raise InputError(
+                    f"object {placed.name!r} has {len(placed.material_indices)} material_indices and its geometry "
+                    f"{placed.geometry!r} uses materials {least} … {greatest}: give one for each"
+                )
+
+
+def _material_range(materials: NDArray[np.int32]) -> tuple[int, int]:
+    return (int(materials.min()), int(materials.max())) if len(materials) else (0, 0)
 
 
 def _check_shape(name: str, array: NDArray, shape: tuple[int | None, ...]) -> None:
