@@ -12,7 +12,9 @@
 .DELETE_ON_ERROR:
 
 # bpy has wheels for these two only.
-PYTHON ?= $(shell .ci/python 3.11 3.13)
+ifndef PYTHON
+PYTHON := $(shell .ci/python 3.11 3.13)
+endif
 PYTHON_FOUND = $(if $(PYTHON),$(PYTHON),$(error Python 3.11 or 3.13 is needed, the only ones that bpy 5 has wheels for: install one or say make PYTHON=...))
 PROJECT = pyproject.toml blender_manifest.toml .ci/environment.py
 PYTEST = env -u BLENDER $(1)/bin/python -m pytest
@@ -29,10 +31,12 @@ lint: .venv/test
 
 .venv/demo: $(PROJECT)
 	$(PYTHON_FOUND) .ci/environment.py .venv --editable '.[blender]'
+	.venv/bin/python -c 'import bpy'
 	touch $@
 
 .venv/test: $(PROJECT)
 	$(PYTHON_FOUND) .ci/environment.py .venv --editable '.[blender,test]'
+	.venv/bin/python -c 'import bpy'
 	touch $@ .venv/demo
 
 # One environment for each Blender, with the NumPy that this Blender brings along where the wheel leaves it open.
@@ -44,7 +48,7 @@ python-4.2 = 3.11
 python-4.5 = 3.11
 python-5.0 = 3.11
 python-5.2 = 3.13
-MATRIX = 4.2 4.5 5.0 $(if $(shell .ci/python 3.13),5.2)
+MATRIX := 4.2 4.5 5.0 $(if $(shell .ci/python 3.13),5.2)
 
 test-matrix: $(MATRIX:%=test-wheel-%)
 	@$(if $(filter 5.2,$(MATRIX)),,echo "NOT TESTED: the wheel of Blender 5.2, since there is no Python 3.13 on the PATH or in pyenv")

@@ -175,6 +175,15 @@ def test_no_file_is_too_long_to_be_one_room():
     assert lengths and not long, f"over 400 lines: {long}"
 
 
+def test_what_the_readme_says_viewcam_does_it_does():
+    promised = set(re.findall(r"(?m)(?:`|--command |^ *)viewcam ([a-z]+)", (ROOT / "README.md").read_text(encoding="utf-8")))
+    assert {"check", "demo"} <= promised
+    for name in sorted(promised):
+        command = [sys.executable, "-m", "viewcam_addon.cli", name, "--help"]
+        outcome = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+        assert outcome.returncode == 0 and name in outcome.stdout, f"viewcam {name}: {outcome.stderr}"
+
+
 def test_what_the_readme_says_to_make_can_be_made():
     targets = set(re.findall(r"(?m)^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8")))
     promised = set(re.findall(r"(?m)(?:`|^ *)make ([a-z-]+)", (ROOT / "README.md").read_text(encoding="utf-8")))
