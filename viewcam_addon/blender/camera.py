@@ -43,8 +43,8 @@ def apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Sc
         if the object is no perspective camera, if the pinhole has another size or pixel aspect than the scene renders, or if
         a number is too large for Blender. Nothing has changed then.
     """
-    depsgraph = datablocks.depsgraph_of(scene)
-    place(camera_object, pinhole, scene, depsgraph)
+    _check_storable(camera_object, look_at=pinhole.look_at, up=pinhole.up, distance=pinhole.distance)
+    place(camera_object, pinhole, scene, datablocks.depsgraph_of(scene))
     frame = datablocks.frame_of(scene)
     camera_object.virtual_pinhole.state(
         pinhole.eye, pinhole.look_at, pinhole.up, pinhole.distance[0] * frame.resolution_x / frame.size[0], frame.size
@@ -60,15 +60,7 @@ def place(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Sc
     sensor = datablocks.own_sensor(camera)
     data = intrinsics.camera_data(plane, datablocks.frame_of(scene), *sensor, camera.sensor_fit)
     location, turn, scale = pose.channels(camera_object, pinhole, depsgraph)
-    for name, numbers in (
-        ("distance", (data.lens, data.sensor_width)),
-        ("shift", (data.shift_x, data.shift_y)),
-        ("eye", location),
-    ):
-        if not all(abs(number) <= _LARGEST_FLOAT32 for number in numbers):
-            raise InputError(
-                f"the {name} of {camera_object.name!r} asks for {max(numbers, key=abs):g}, too large for Blender: reduce it"
-            )
+    _check_storable(camera_object, distance=(data.lens, data.sensor_width), shift=(data.shift_x, data.shift_y), eye=location)
     # Nothing fails from here on.
     camera_object.location = location
     if camera_object.rotation_mode == "QUATERNION":
@@ -83,6 +75,13 @@ def place(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Sc
     if (camera.sensor_width, camera.sensor_height) != (data.sensor_width, data.sensor_height):
         camera.sensor_width, camera.sensor_height = data.sensor_width, data.sensor_height
     camera.virtual_pinhole_sensor = sensor if data.sensor_width != sensor[0] else (0.0, 0.0)
+
+
+def _check_storable(camera_object: bpy.types.Object, **numbers: tuple[float, ...]) -> None:
+    for name, values in numbers.items():
+        if not all(abs(value) <= _LARGEST_FLOAT32 for value in values):
+            largest = max(values, key=abs)
+            raise InputError(f"the {name} of camera {camera_object.name!r} needs {largest:g}, too large for Blender: reduce it")
 
 
 def check(camera_object: bpy.types.Object, wanted: Pinhole, scene: bpy.types.Scene) -> list[str]:

@@ -1,0 +1,116 @@
+"""Fixtures of the tests that need Blender: an empty file with one camera in it."""
+
+import numpy as np
+import pytest
+
+from viewcam_addon.compare import law
+
+
+@pytest.fixture
+def scene(fresh_blender):
+    """The scene of an empty file."""
+    return fresh_blender.context.scene
+
+
+@pytest.fixture
+def add_camera(fresh_blender, scene):
+    """A function that adds a camera object of the given name, with data of its own, and makes it the scene's camera."""
+
+    def add(name="Camera"):
+        camera_object = fresh_blender.data.objects.new(name, fresh_blender.data.cameras.new(name))
+        scene.collection.objects.link(camera_object)
+        scene.camera = camera_object
+        fresh_blender.context.view_layer.update()
+        return camera_object
+
+    return add
+
+
+@pytest.fixture
+def camera_object(add_camera):
+    """A new camera at the origin, looking down."""
+    return add_camera()
+
+
+@pytest.fixture
+def posed_camera(camera_object, fresh_blender):
+    """A camera enabled and stated: eye (7, −6, 5), look-at (0, 0, 1), up z, distance 1500."""
+    group = camera_object.virtual_pinhole
+    group.eye, group.look_at, group.up, group.distance = (7, -6, 5), (0, 0, 1), (0, 0, 1), 1500
+    group.enabled = True
+    fresh_blender.context.view_layer.update()
+    return camera_object
+
+
+@pytest.fixture
+def render_positions(fresh_blender, scene, tmp_path):
+    """A function that has Cycles render where in the world each pixel's centre falls, in a sphere about the origin.
+
+    Its radius is 40. The surface shines with its own position, so that Blender's plain EXR is enough.
+    animation : render all frames of the scene. also : objects that shall shine likewise.
+    Returns (height, width, 3) float32, rows from the bottom, or a dict of them by frame.
+    """
+    bpy = fresh_blender
+    render = scene.render
+    render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", 1, False
+    scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BLACKMAN_HARRIS", 0.01
+    render.image_settings.file_format, render.image_settings.color_depth = "OPEN_EXR", "32"
+    if (render.resolution_x, render.resolution_y) == (1920, 1080):
+        render.resolution_x = render.resolution_y = 32
+    material = _shining_position(bpy)
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=6, radius=40)
+    bpy.context.object.data.materials.append(material)
+
+    def read(path):
+        image = bpy.data.images.load(str(path))
+        image.colorspace_settings.name = "Non-Color"
+        width, height = image.size
+        pixels = np.empty(width * height * 4, dtype=np.float32)
+        image.pixels.foreach_get(pixels)
+        bpy.data.images.remove(image)
+        return pixels.reshape(height, width, 4)[..., :3]
+
+    def render_them(animation=False, also=()):
+        for item in also:
+            item.data.materials.append(material)
+        if animation:
+            render.filepath = str(tmp_path / "frame")
+            bpy.ops.render.render(animation=True)
+            frames = range(scene.frame_start, scene.frame_end + 1, scene.frame_step)
+            return {frame: read(tmp_path / f"frame{frame:04d}.exr") for frame in frames}
+        render.filepath = str(tmp_path / "picture.exr")
+        bpy.ops.render.render(write_still=True)
+        return read(tmp_path / "picture.exr")
+
+    return render_them
+
+
+def _shining_position(bpy):
+    material = bpy.data.materials.new("Position")
+    if not material.node_tree:  # new materials have one from 5.0 on
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    geometry, emission = tree.nodes.new("ShaderNodeNewGeometry"), tree.nodes.new("ShaderNodeEmission")
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(geometry.outputs["Position"], emission.inputs["Color"])
+    tree.links.new(emission.outputs["Emission"], output.inputs["Surface"])
+    return material
+
+
+@pytest.fixture
+def picture_error():
+    """A function (pinhole, positions) → (error, tolerance), for what `render_positions` renders.
+
+    error : pixels, the largest distance between the centre of a pixel and the picture of the point that was rendered there.
+    tolerance : the most that the law of float32 allows anywhere in it.
+    """
+
+    def measure(pinhole, positions):
+        rows, columns = np.indices(positions.shape[:2])
+        column, row, depth = pinhole.project(positions)
+        error = np.hypot(column - columns - 0.5, row - rows - 0.5).max()
+        largest = max(np.abs(positions).max(), np.linalg.norm(pinhole.eye))
+        return error, law.ROUNDINGS[-1] * law.FLOAT32 * max(pinhole.distance) * largest / np.nanmin(depth)
+
+    return measure

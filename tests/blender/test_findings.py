@@ -1,0 +1,67 @@
+from dataclasses import replace
+
+import pytest
+
+from viewcam_addon.blender.findings import CENTRE, DISTANCE, EYE, POSE, VIEW, Suspect, blame, differences
+from viewcam_addon.pinhole import Pinhole
+
+WANTED = Pinhole((7.0, -6.0, 5.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), 1500.0, 1920, 1080)
+REACH = 10.0
+
+
+def test_a_camera_does_not_differ_from_itself():
+    assert differences(WANTED, WANTED, REACH) == {}
+
+
+@pytest.mark.parametrize(
+    ("quantity", "found"),
+    [
+        (EYE, replace(WANTED, eye=(7.0, -6.0, 5.0001), look_at=(0.0, 0.0, 1.0001))),
+        (VIEW, replace(WANTED, up=(0.0, 1e-5, 1.0))),
+        (VIEW, replace(WANTED, mirrored=True)),
+        (DISTANCE, replace(WANTED, distance=1500.001)),
+        (DISTANCE, replace(WANTED, distance=(1500.0, 1500.001))),
+        (CENTRE, replace(WANTED, principal_point=(960.001, 540.0))),
+    ],
+)
+def test_what_is_off_by_more_than_float32_is_named_and_nothing_else(quantity, found):
+    assert list(differences(WANTED, found, REACH)) == [quantity]
+
+
+def test_what_float32_rounding_explains_is_no_difference():
+    one = 2.0**-24
+    found = replace(
+        WANTED,
+        eye=(7.0 * (1 + one), -6.0 * (1 - one), 5.0 * (1 + one)),
+        up=(one, 0.0, 1.0),
+        distance=1500.0 * (1 + 2 * one),
+        principal_point=(960.0 * (1 + one), 540.0),
+    )
+    assert differences(WANTED, found, REACH) == {}
+
+
+def test_far_from_the_origin_more_is_rounding():
+    found = replace(WANTED, eye=(7.001, -6.0, 5.0), look_at=(0.001, 0.0, 1.0))
+    assert EYE in differences(WANTED, found, REACH)
+    assert differences(WANTED, found, reach=1e5) == {}
+
+
+def test_only_a_suspect_that_acts_on_a_difference_is_blamed():
+    track = Suspect("The constraint 'Track' moves 'Camera'", POSE, "disable it")
+    driver = Suspect("A driver sets 'lens'", frozenset({DISTANCE}), "remove it")
+    found = blame({VIEW: "the view is turned by 3°"}, [track, driver])
+    assert found == ["The constraint 'Track' moves 'Camera', the view is turned by 3°: disable it"]
+
+
+def test_a_difference_that_nobody_explains_is_told_with_what_to_do():
+    (eye, lens, shift) = blame({EYE: "the eye is 1 away", DISTANCE: "d is 5", CENTRE: "off"}, [])
+    assert "moved since, the eye is 1 away" in eye
+    assert "lens" in lens
+    assert "shift" in shift
+    assert all("adopt" in sentence for sentence in (eye, lens, shift))
+
+
+def test_what_will_act_later_is_told_though_nothing_differs():
+    later = Suspect("'lens' is animated", frozenset({DISTANCE}), "animate the four values instead", always=True)
+    assert blame({}, [later]) == ["'lens' is animated: animate the four values instead"]
+    assert blame({}, [Suspect("The constraint", POSE, "disable it")]) == []

@@ -1,0 +1,201 @@
+import json
+import math
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from viewcam_addon.blender import camera as cameras  # noqa: E402
+from viewcam_addon.blender import findings  # noqa: E402
+from viewcam_addon.pinhole import Pinhole  # noqa: E402
+
+
+def pose(camera_object):
+    bpy.context.view_layer.update()
+    return [tuple(row) for row in camera_object.matrix_world], camera_object.data.lens
+
+
+def axes(camera_object):
+    bpy.context.view_layer.update()
+    return np.array(camera_object.matrix_world)[:3, :3]
+
+
+def test_enabling_for_the_first_time_moves_nothing(camera_object):
+    camera_object.location, camera_object.rotation_euler = (3, -4, 2), (1.2, 0.3, 0.5)
+    before = pose(camera_object)
+    camera_object.virtual_pinhole.enabled = True
+    assert pose(camera_object) == before
+    assert tuple(camera_object.virtual_pinhole.eye) == (3, -4, 2)
+
+
+def test_values_that_were_stated_before_enabling_are_applied(camera_object):
+    group = camera_object.virtual_pinhole
+    group.eye, group.look_at = (0, -5, 0), (0, 0, 0)
+    group.enabled = True
+    np.testing.assert_allclose(
+        axes(camera_object), np.column_stack([(1, 0, 0), (0, 0, 1), (0, -1, 0)]), atol=findings.LARGEST_TURN
+    )
+    assert camera_object.data.lens == pytest.approx(50)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [
+        ("eye", (0, 0, 9), Pinhole((0, 0, 9), (0, 0, 1), (0, 0, 1), 1500.0, 1920, 1080)),
+        ("look_at", (1, 1, 1), Pinhole((7, -6, 5), (1, 1, 1), (0, 0, 1), 1500.0, 1920, 1080)),
+        ("up", (1, 0, 0), Pinhole((7, -6, 5), (0, 0, 1), (1, 0, 0), 1500.0, 1920, 1080)),
+        ("distance", 800.0, Pinhole((7, -6, 5), (0, 0, 1), (0, 0, 1), 800.0, 1920, 1080)),
+    ],
+)
+def test_editing_a_value_moves_the_camera_at_once(posed_camera, scene, name, value, expected):
+    setattr(posed_camera.virtual_pinhole, name, value)
+    assert cameras.stated(posed_camera, scene) == expected
+    assert findings.differences(expected, cameras.read(posed_camera, scene), reach=10) == {}
+
+
+def test_editing_one_component_is_enough(posed_camera):
+    posed_camera.virtual_pinhole.eye[2] = 12.0
+    assert tuple(posed_camera.location) == (7, -6, 12)
+
+
+def test_editing_what_is_not_enabled_moves_nothing(camera_object):
+    before = pose(camera_object)
+    camera_object.virtual_pinhole.eye = (1, 2, 3)
+    assert pose(camera_object) == before
+
+
+@pytest.mark.parametrize(("name", "value"), [("look_at", (7, -6, 5)), ("up", (0, 0, 0)), ("distance", 0.0), ("distance", -5.0)])
+def test_values_that_make_no_camera_leave_it_where_it_was_and_raise_nothing(posed_camera, name, value):
+    before = pose(posed_camera)
+    setattr(posed_camera.virtual_pinhole, name, value)
+    assert pose(posed_camera) == before
+    assert np.allclose(getattr(posed_camera.virtual_pinhole, name), value)
+
+
+def test_a_number_that_is_none_leaves_the_camera_where_it_was(posed_camera):
+    before = pose(posed_camera)
+    posed_camera.virtual_pinhole.eye[0] = math.nan
+    assert pose(posed_camera) == before
+
+
+def test_a_value_mended_afterwards_moves_the_camera_again(posed_camera):
+    posed_camera.virtual_pinhole.distance = 0.0
+    posed_camera.virtual_pinhole.distance = 3000.0
+    assert posed_camera.data.lens == pytest.approx(3000 * 36 / 1920)
+
+
+def test_float64_values_survive_the_float32_properties(camera_object, scene):
+    pinhole = Pinhole((0.1, 1e-9, 1 / 3), (0.1, 0, -1), (0, 0, 1), 1234.56789, 1920, 1080)
+    cameras.apply(camera_object, pinhole, scene)
+    group = camera_object.virtual_pinhole
+    assert group.numbers() == (pinhole.eye, pinhole.look_at, pinhole.up, 1234.56789)
+    assert group.precision() == 2.0**-53
+
+
+def test_an_edited_number_overrules_its_exact_one_and_the_others_stay(camera_object, scene):
+    pinhole = Pinhole((0.1, 1e-9, 1 / 3), (0.1, 0, -1), (0, 0, 1), 1234.56789, 1920, 1080)
+    cameras.apply(camera_object, pinhole, scene)
+    camera_object.virtual_pinhole.eye[0] = 0.2
+    assert camera_object.virtual_pinhole.numbers()[0] == (float(np.float32(0.2)), 1e-9, 1 / 3)
+
+
+@pytest.mark.parametrize("text", ["", "nonsense", "[1, 2]", "{}", json.dumps([None] * 10), json.dumps(["a"] * 10)])
+def test_whatever_stands_in_the_hidden_text_the_shown_values_count(posed_camera, text):
+    group = posed_camera.virtual_pinhole
+    group.exact = text
+    assert group.numbers() == ((7, -6, 5), (0, 0, 1), (0, 0, 1), 1500)
+    assert group.precision() == 2.0**-24
+
+
+def test_percentage_shows_the_same_picture(posed_camera, scene):
+    at_full_size = cameras.stated(posed_camera, scene)
+    scene.render.resolution_percentage = 50
+    assert cameras.stated(posed_camera, scene) == at_full_size.resized(960, 540)
+    assert findings.differences(cameras.stated(posed_camera, scene), cameras.read(posed_camera, scene), reach=10) == {}
+
+
+def test_undo_and_redo_bring_values_and_camera_together(posed_camera, fresh_blender):
+    def state():
+        item = bpy.data.objects["Camera"]
+        return pose(item), item.virtual_pinhole.numbers()
+
+    fresh_blender.ops.ed.undo_push(message="stated")
+    before = state()
+    posed_camera.virtual_pinhole.eye = (0, 0, 20)
+    fresh_blender.ops.ed.undo_push(message="edited")
+    after = state()
+    assert after != before
+    fresh_blender.ops.ed.undo()
+    assert state() == before
+    fresh_blender.ops.ed.redo()
+    assert state() == after
+
+
+def test_saving_and_opening_keep_values_and_camera(posed_camera, scene, tmp_path):
+    pinhole = Pinhole((1 / 3, 2 / 3, 4), (0, 0, 1 / 7), (0, 0, 1), 10.0, 1920, 1080)
+    cameras.apply(posed_camera, pinhole, scene)
+    before = pose(posed_camera), posed_camera.virtual_pinhole.numbers()
+    path = str(tmp_path / "camera.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    found, scene = bpy.data.objects["Camera"], bpy.context.scene
+    assert (pose(found), found.virtual_pinhole.numbers()) == before
+    cameras.apply(found, Pinhole((1, 2, 4), (0, 0, 0), (0, 0, 1), 1000.0, 1920, 1080), scene)
+    assert found.data.sensor_width == 36  # the sensor that grew before saving comes back
+
+
+def test_renaming_changes_nothing(posed_camera, scene):
+    posed_camera.name, posed_camera.data.name = "Renamed", "Data"
+    posed_camera.virtual_pinhole.eye = (0, -9, 0)
+    assert tuple(posed_camera.location) == (0, -9, 0)
+    assert findings.differences(cameras.stated(posed_camera, scene), cameras.read(posed_camera, scene), reach=10) == {}
+
+
+def test_a_linked_duplicate_has_values_of_its_own_and_shares_the_lens(posed_camera, scene):
+    twin = posed_camera.copy()
+    scene.collection.objects.link(twin)
+    assert twin.virtual_pinhole.numbers() == posed_camera.virtual_pinhole.numbers()
+    twin.virtual_pinhole.eye = (0, -9, 0)
+    assert tuple(posed_camera.location) == (7, -6, 5)
+    twin.virtual_pinhole.distance = 700.0
+    (finding,) = cameras.check(posed_camera, cameras.stated(posed_camera, scene), scene)
+    assert "'Camera.001' shares the camera data" in finding
+    assert cameras.check(twin, cameras.stated(twin, scene), scene) == []
+
+
+def test_linked_duplicates_share_the_artists_sensor(posed_camera, scene):
+    twin = posed_camera.copy()
+    scene.collection.objects.link(twin)
+    posed_camera.virtual_pinhole.distance = 8.0
+    assert twin.data.sensor_width == 288
+    twin.virtual_pinhole.distance = 1000.0
+    assert twin.data.sensor_width == 36
+
+
+def test_a_library_override_keeps_its_values(posed_camera, tmp_path):
+    path = str(tmp_path / "library.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(path, link=True) as (_, names):
+        names.objects = ["Camera"]
+    linked = bpy.data.objects["Camera"]
+    bpy.context.scene.collection.objects.link(linked)
+    override = linked.override_create(remap_local_usages=True)
+    override.data.override_create(remap_local_usages=True)
+    override.virtual_pinhole.eye = (0, -9, 0)
+    assert tuple(override.location) == (0, -9, 0)
+    shot = str(tmp_path / "shot.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=shot)
+    bpy.ops.wm.open_mainfile(filepath=shot)
+    found = next(item for item in bpy.data.objects if item.override_library)
+    assert tuple(found.virtual_pinhole.eye) == (0, -9, 0)
+    assert tuple(found.location) == (0, -9, 0)
+
+
+def test_the_properties_work_in_edit_mode_of_another_object(posed_camera, scene):
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.ops.object.mode_set(mode="EDIT")
+    posed_camera.virtual_pinhole.eye = (0, -9, 0)
+    assert tuple(posed_camera.location) == (0, -9, 0)

@@ -1,0 +1,152 @@
+"""For everything that can keep a camera from its values, a scene in which it does, and the sentence that names it."""
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from viewcam_addon.blender import camera as cameras  # noqa: E402
+
+
+def findings_after_setting(camera_object, scene):
+    return cameras.apply(camera_object, cameras.stated(camera_object, scene), scene)
+
+
+def findings_later(camera_object, scene):
+    bpy.context.view_layer.update()
+    return cameras.check(camera_object, cameras.stated(camera_object, scene), scene)
+
+
+def add_empty(scene, name, location=(0, 0, 0)):
+    empty = bpy.data.objects.new(name, None)
+    scene.collection.objects.link(empty)
+    empty.location = location
+    bpy.context.view_layer.update()
+    return empty
+
+
+def test_a_camera_that_nothing_disturbs_has_no_findings(posed_camera, scene):
+    assert findings_after_setting(posed_camera, scene) == []
+
+
+def test_a_constraint_is_named(posed_camera, scene):
+    constraint = posed_camera.constraints.new("TRACK_TO")
+    constraint.target, constraint.name = add_empty(scene, "Target", (5, 5, 5)), "Watch the target"
+    (finding,) = findings_after_setting(posed_camera, scene)
+    assert finding.startswith("The constraint 'Watch the target' moves 'Camera', the view is turned by ")
+
+
+@pytest.mark.parametrize("how", ["muted", "no influence", "no effect"])
+def test_a_constraint_that_does_nothing_is_not_accused(posed_camera, scene, how):
+    constraint = posed_camera.constraints.new("LIMIT_LOCATION" if how == "no effect" else "TRACK_TO")
+    if how != "no effect":
+        constraint.target = add_empty(scene, "Target", (5, 5, 5))
+    constraint.mute, constraint.influence = how == "muted", 0 if how == "no influence" else 1
+    assert findings_after_setting(posed_camera, scene) == []
+
+
+def test_a_driver_on_the_location_is_named(posed_camera, scene):
+    posed_camera.driver_add("location", 0).driver.expression = "1.0 + 1.0"
+    (finding,) = findings_after_setting(posed_camera, scene)
+    assert finding.startswith("A driver sets 'location' of 'Camera', the eye is 5 away")
+
+
+def test_a_driver_on_the_lens_is_named(posed_camera, scene):
+    posed_camera.data.driver_add("lens").driver.expression = "20.0 + 1.0"
+    (finding,) = findings_after_setting(posed_camera, scene)
+    assert finding.startswith("A driver sets 'lens' of 'Camera', the view plane is 1120 px away and not 1500")
+
+
+def test_a_keyframe_on_the_location_is_named_before_it_acts(posed_camera, scene):
+    posed_camera.keyframe_insert("location", frame=1)
+    (finding,) = findings_after_setting(posed_camera, scene)
+    assert finding.startswith("'location' of 'Camera' is animated and will change with the frame")
+
+
+def test_a_keyframe_on_the_lens_is_named_when_it_has_acted(posed_camera, scene):
+    posed_camera.data.keyframe_insert("lens", frame=1)
+    posed_camera.virtual_pinhole.distance = 3000.0
+    scene.frame_set(2)
+    (finding,) = findings_later(posed_camera, scene)
+    assert finding.startswith("'lens' of 'Camera' is animated and will change with the frame, the view plane is 1500 px away")
+
+
+def test_a_keyframe_in_the_nla_is_named(posed_camera, scene):
+    posed_camera.keyframe_insert("rotation_euler", frame=1)
+    data = posed_camera.animation_data
+    data.nla_tracks.new().strips.new("Strip", 1, data.action)
+    data.action = None
+    (finding,) = findings_after_setting(posed_camera, scene)
+    assert finding.startswith("'rotation_euler' of 'Camera' is animated")
+
+
+def test_keyframes_on_the_four_values_are_no_culprits(posed_camera, scene):
+    posed_camera.virtual_pinhole.keyframe_insert("eye", frame=1)
+    assert findings_after_setting(posed_camera, scene) == []
+
+
+def test_locked_channels_are_told(posed_camera, scene):
+    posed_camera.lock_location[0] = posed_camera.lock_rotation[2] = True
+    (finding,) = findings_after_setting(posed_camera, scene)
+    assert finding.startswith("The location and rotation of 'Camera' is locked")
+
+
+def test_a_parent_that_is_scaled_non_uniformly_is_named(posed_camera, scene):
+    parent = add_empty(scene, "Stretched")
+    parent.scale = (1, 1, 3)
+    posed_camera.parent = parent
+    (finding,) = findings_after_setting(posed_camera, scene)
+    assert "oblique" in finding
+    assert "'Stretched' is scaled non-uniformly" in finding
+
+
+def test_a_parent_that_moved_later_is_told(posed_camera, scene):
+    parent = add_empty(scene, "Dolly")
+    posed_camera.parent = parent
+    assert findings_after_setting(posed_camera, scene) == []
+    parent.location = (0, 0, 2)
+    (finding,) = findings_later(posed_camera, scene)
+    assert finding.startswith("The camera or its parent was moved since, the eye is 2 away")
+
+
+def test_a_camera_that_was_moved_by_hand_is_told(posed_camera, scene):
+    posed_camera.rotation_euler[2] += 0.1
+    (finding,) = findings_later(posed_camera, scene)
+    assert "the view is turned by 5.73°" in finding
+
+
+def test_a_lens_that_was_changed_by_hand_is_told(posed_camera, scene):
+    posed_camera.data.lens = 50
+    (finding,) = findings_later(posed_camera, scene)
+    assert finding.startswith("The lens, sensor or pixel aspect was changed since")
+
+
+def test_blenders_clamp_is_told_with_what_was_done_about_it(posed_camera, scene):
+    posed_camera.virtual_pinhole.distance = 8.0
+    (finding,) = findings_later(posed_camera, scene)
+    assert finding.startswith(
+        "The lens would be 0.15 mm, which Blender clamps to 1 mm, so it and the sensor are 8 times as large"
+    )
+
+
+def test_a_changed_size_of_the_picture_is_told(posed_camera, scene):
+    scene.render.resolution_x = 1280
+    (finding,) = findings_later(posed_camera, scene)
+    assert finding.startswith("The picture was 1920 × 1080 px and is 1280 × 1080 now")
+
+
+def test_a_changed_size_that_leaves_the_camera_right_is_not_told(posed_camera, scene):
+    scene.render.resolution_percentage = 50
+    assert findings_later(posed_camera, scene) == []
+
+
+def test_a_linked_camera_is_told_with_its_library(posed_camera, tmp_path):
+    path = str(tmp_path / "library.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(path, link=True) as (_, names):
+        names.objects = ["Camera"]
+    scene, linked = bpy.context.scene, bpy.data.objects["Camera"]
+    scene.collection.objects.link(linked)
+    of_object, of_data = findings_later(linked, scene)
+    assert of_object.startswith("'Camera' is linked from 'library.blend'")
+    assert of_data.startswith("'Camera' is linked from 'library.blend'")
