@@ -14,10 +14,11 @@ import pytest
 # tests/real_blender drives a Blender that is installed beside: make test-blender says which.
 collect_ignore = [] if os.environ.get("BLENDER") else ["real_blender"]
 
-# Deterministic in CI, so that a failure there is the same failure here. No deadlines: Blender's first call is slow.
-hypothesis.settings.register_profile("ci", derandomize=True, database=None, deadline=None)
+# The same examples in every run, so that a failure in CI is the same failure here; `pytest --hypothesis-profile=explore` looks
+# for new ones. No deadlines: Blender's first call is slow.
+hypothesis.settings.register_profile("repeatable", derandomize=True, database=None, deadline=None)
 hypothesis.settings.register_profile("explore", deadline=None)
-hypothesis.settings.load_profile("ci" if os.environ.get("CI") else "explore")
+hypothesis.settings.load_profile("repeatable")
 
 
 @pytest.fixture(scope="session", autouse=True)
