@@ -98,37 +98,35 @@ def placements(depsgraph: bpy.types.Depsgraph, ledger: Ledger) -> Iterator[tuple
         real, parent = (instance.instance_object, instance.parent) if instance.is_instance else (shown, shown)
         identity = (real.as_pointer(), parent.as_pointer(), shown.data.as_pointer())
         if identity not in known:
-            known[identity] = _source(shown, real, parent, depsgraph, ledger)
+            known[identity] = _source(features.Placed(shown, real, parent), depsgraph, ledger)
         source = known[identity]
         if source:
             ledger.placed(source.name)
             yield source, np.array(instance.matrix_world)
 
 
-def _source(
-    shown: bpy.types.Object, real: bpy.types.Object, parent: bpy.types.Object, depsgraph: bpy.types.Depsgraph, ledger: Ledger
-) -> Source | None:
+def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Ledger) -> Source | None:
     """What one object shows, or None if the camera sees nothing of it."""
-    if not features.is_surface(shown, real, ledger):
+    if not features.is_surface(placed, ledger):
         return None
-    name = real.original.name
+    shown, real, parent = placed
     layer = depsgraph.view_layer_eval
     hidden = not (shown.visible_camera and parent.visible_camera) or (
         parent.indirect_only_get(view_layer=layer) and not parent.holdout_get(view_layer=layer)
     )
     if hidden:
-        ledger.note(name, "exported", "not visible to the camera")
+        ledger.note(placed.name, "exported", "not visible to the camera")
         return None
     if isinstance(shown.data, bpy.types.Mesh) and not layer.use_solid:
-        ledger.note(name, "exported", "the view layer leaves out surfaces")
+        ledger.note(placed.name, "exported", "the view layer leaves out surfaces")
         return None
     override = layer.material_override
     slots = [override or slot.material for slot in shown.material_slots] or [override]
-    features.note_object(shown, parent, slots, depsgraph, ledger)
+    features.note_object(placed, slots, depsgraph, ledger)
     # Cycles shares a geometry among objects unless a slot belongs to the object (BlenderSync::BKE_object_is_modified).
     own = any(slot.link == "OBJECT" for slot in shown.material_slots)
     return Source(
-        name=name,
+        name=placed.name,
         data=shown.data,
         key=(shown.data.as_pointer(), real.as_pointer() if own else 0),
         object_index=shown.pass_index,

@@ -3,6 +3,8 @@
 Hair, curves and volumes need no remedy: the view layer is told to leave them out (cycles.py).
 """
 
+from typing import NamedTuple
+
 import bpy
 
 from . import datablocks, materials, versions
@@ -29,12 +31,26 @@ def note_render(scene: bpy.types.Scene, camera_object: bpy.types.Object, ledger:
             ledger.set_for_cycles(scene, "world", None)
 
 
-def is_surface(shown: bpy.types.Object, real: bpy.types.Object, ledger: Ledger) -> bool:
-    """Whether an evaluated object is a mesh or a point cloud; what is drawn but is neither is noted.
+class Placed(NamedTuple):
+    """An object in the depsgraph, each of the three evaluated.
 
-    shown : the object that the depsgraph places. real : the object it comes from.
+    shown : what is placed, and its data. real : the object in the file that it comes from. parent : what places it; for an
+    object that is no instance all three are the same.
     """
-    name = real.original.name
+
+    shown: bpy.types.Object
+    real: bpy.types.Object
+    parent: bpy.types.Object
+
+    @property
+    def name(self) -> str:
+        return self.real.original.name
+
+
+def is_surface(placed: Placed, ledger: Ledger) -> bool:
+    """Whether this is a mesh or a point cloud; what is drawn but is neither is noted."""
+    shown, real, _ = placed
+    name = placed.name
     if shown.type in _NO_SURFACE:
         ledger.note(name, "skipped", _NO_SURFACE[shown.type])
     elif shown.type == "LIGHT":
@@ -47,17 +63,11 @@ def is_surface(shown: bpy.types.Object, real: bpy.types.Object, ledger: Ledger) 
 
 
 def note_object(
-    shown: bpy.types.Object,
-    parent: bpy.types.Object,
-    slots: list[bpy.types.Material | None],
-    depsgraph: bpy.types.Depsgraph,
-    ledger: Ledger,
+    placed: Placed, slots: list[bpy.types.Material | None], depsgraph: bpy.types.Depsgraph, ledger: Ledger
 ) -> None:
-    """What a visible surface is beyond its geometry.
-
-    parent : what instances the object, or the object itself. slots : its materials.
-    """
-    name = shown.original.name
+    """What a visible surface is beyond its geometry. slots : its materials."""
+    shown, real, parent = placed
+    name = placed.name
     if parent.holdout_get(view_layer=depsgraph.view_layer_eval):
         ledger.note(name, "approximated", "a holdout, a plain object on both sides")
         ledger.set_for_cycles(parent.original, "is_holdout", False)
@@ -67,11 +77,16 @@ def note_object(
         if each.is_shadow_catcher:
             ledger.note(name, "approximated", "a shadow catcher, a plain object on both sides")
             ledger.set_for_cycles(each.original, "is_shadow_catcher", False)
-    adaptive = versions.adaptive_subdivision(shown.original, depsgraph.scene)
+    adaptive = versions.adaptive_subdivision(real.original, depsgraph.scene)
     if adaptive:
         ledger.note(name, "approximated", "adaptive subdivision is subdivision at the render level on both sides")
         ledger.set_for_cycles(*adaptive, False)
+    if None in slots and versions.DEFAULT_SURFACE_BENDS_NORMALS and isinstance(shown.data, bpy.types.Mesh):
+        ledger.call_for_cycles(real.original, materials.fill_empty_slots)
+        if any(modifier.type == "NODES" and modifier.show_render for modifier in real.modifiers):
+            ledger.note(name, "approximated", "has no material, and Cycles may bend its normals where they graze")
     for material in filter(None, slots):
+        ledger.call_for_cycles(material.original, materials.keep_normals)
         for reason in materials.departures(material):
             ledger.note(name, "approximated", f"material {material.name!r} {reason}, and a plain one stands in")
             ledger.call_for_cycles(material.original, materials.make_plain)

@@ -65,6 +65,24 @@ def make_plain(borrow: Borrower, material: bpy.types.Material) -> None:
     output.is_active_output = True
 
 
+def keep_normals(borrow: Borrower, material: bpy.types.Material) -> None:
+    """Keep Cycles from bending the normals of smooth surfaces, seen at a grazing angle, so far that they reflect."""
+    borrow.set(material.cycles, "use_bump_map_correction", False)
+
+
+def fill_empty_slots(borrow: Borrower, block: bpy.types.Object) -> None:
+    """Give an object a material where it has none, until the loan ends: Cycles' own default bends normals."""
+    plain = bpy.data.materials.new("Virtual Pinhole")
+    borrow.afterwards(bpy.data.materials.remove, plain)
+    plain.cycles.use_bump_map_correction = False
+    if not block.material_slots:
+        borrow.afterwards(block.data.materials.pop)
+        block.data.materials.append(plain)
+    for slot in block.material_slots:
+        if slot.material is None:
+            borrow.set(slot, "material", plain)
+
+
 def _nodes(tree: bpy.types.NodeTree, seen: set[bpy.types.NodeTree]) -> Iterator[bpy.types.Node]:
     """All nodes of the tree and of the groups in it; whether they lead to the output is not asked."""
     seen.add(tree)

@@ -2,6 +2,9 @@
 
 import bpy
 
+# What Cycles draws without a material: a diffuse surface, and since 5.0 a Principled one, which bends grazing smooth normals.
+DEFAULT_SURFACE_BENDS_NORMALS = bpy.app.version >= (5, 0)
+
 
 def drivers(block: bpy.types.ID) -> list[bpy.types.FCurve]:
     """The drivers on a datablock's own properties."""
