@@ -12,6 +12,7 @@ to test.
 import argparse
 import json
 import os
+import shlex
 import subprocess
 import sys
 import tempfile
@@ -23,6 +24,7 @@ from typing import Any, NoReturn
 
 from .errors import InputError
 from .files import written_whole
+from .terminal import silent_libraries
 
 PACKAGE = Path(__file__).parent
 DEMO_SCENE = PACKAGE.parent / "sample_scenes" / "studio.blend"
@@ -35,10 +37,12 @@ def main(arguments: Sequence[str] | None = None, blend_is_open: bool = False) ->
 
     arguments : those of the shell by default. blend_is_open : inside Blender, where FILE.blend is the file that is open.
     """
+    arguments = sys.argv[1:] if arguments is None else list(arguments)
     try:
         options = _parser(blend_is_open).parse_args(arguments)
     except SystemExit as leaving:  # argparse leaves after --help and after an error
         return int(leaving.code or 0)
+    options.words = shlex.join(arguments)
     try:
         status, result = options.run(options)
     except InputError as error:
@@ -124,6 +128,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     added.add_argument(
         "--scene", metavar="SCENE.json", type=Path, help="the reference's scene: explains silhouettes, brings the ledger"
     )
+    added.add_argument("--repeat", help=argparse.SUPPRESS)  # what the report shall name as its command
     report(added)
 
     added = command(_check, "check", "Export, trace, render with Cycles and compare, all in one go.")
@@ -155,7 +160,8 @@ def _size(text: str) -> tuple[int, int]:
 def _export(options: argparse.Namespace) -> Result:
     from .tracer import scene_file
 
-    scene = _job().export(_request(options))
+    with silent_libraries():
+        scene = _job().export(_request(options))
     scene_file.write(scene, options.scene)
     lines = _ledger_lines(scene.ledger)
     print(*lines, sep="\n")
@@ -187,7 +193,8 @@ def _render(options: argparse.Namespace) -> Result:
 
 
 def _cycles(options: argparse.Namespace) -> Result:
-    ledger = _job().render(_request(options), options.image)
+    with silent_libraries():
+        ledger = _job().render(_request(options), options.image)
     print(*_ledger_lines(ledger), sep="\n")
     return 0, {"image": str(options.image), "ledger": _ledger_json(ledger)}
 
@@ -211,7 +218,10 @@ def _compare(options: argparse.Namespace) -> Result:
     ledger = scene.ledger if scene else ()
     print(*_ledger_lines(ledger), *comparison.lines(), sep="\n")
     if options.report:
-        print(f"report: {write_report(comparison, reference, test, options.report, ledger)}")
+        written = write_report(
+            comparison, reference, test, options.report, ledger, f"viewcam {options.repeat or options.words}"
+        )
+        print(f"report: {written}")
     return 0 if comparison.passed else 1, {**comparison.to_json(), "ledger": _ledger_json(ledger)}
 
 
@@ -226,7 +236,7 @@ def _check(options: argparse.Namespace) -> Result:
             return status, {}
         outputs = [word for flag in ("json", "report") if (to := getattr(options, flag)) for word in (f"--{flag}", str(to))]
         # The child has written the JSON: there is nothing to add.
-        return _child("compare", reference, test, "--scene", scene, *threads, *outputs), {}
+        return _child("compare", reference, test, "--scene", scene, "--repeat", options.words, *threads, *outputs), {}
 
 
 def _demo(options: argparse.Namespace) -> Result:
@@ -241,7 +251,8 @@ def _export_and_render(options: argparse.Namespace, scene_path: Path, image_path
     from .tracer import scene_file
 
     started = time.perf_counter()
-    scene = _job().export_and_render(_request(options), image_path)
+    with silent_libraries():
+        scene = _job().export_and_render(_request(options), image_path)
     scene_file.write(scene, scene_path)
     print(f"exported and rendered with Cycles in {time.perf_counter() - started:.1f} s", flush=True)
 

@@ -12,14 +12,11 @@ OpenEXR is the format's own project. Rejected: imageio and OpenCV (no multi-part
 is needed, because Blender's own process must not have a second copy of that library.
 """
 
-import contextlib
 import dataclasses
-import io
 import json
 import os
-import sys
 from collections import defaultdict
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -29,6 +26,7 @@ from numpy.typing import NDArray
 from .errors import InputError
 from .files import written_whole
 from .pinhole import Pinhole
+from .terminal import silent_libraries
 
 # The channels of each pass, in the order of its last axis, as Cycles names them. The last two are the tracer's own: the largest
 # coordinate that took part in a hit and the cosine between ray and true normal, by which a tolerance can be derived.
@@ -106,7 +104,7 @@ def read(path: str | os.PathLike[str], only: Collection[str] | None = None) -> I
     if not path.is_file():
         raise InputError(f"{path} does not exist: check the name of the EXR file")
     try:
-        with _silent_libraries():
+        with silent_libraries():
             promised = len(OpenEXR.File(str(path), header_only=True).parts)
             parts = OpenEXR.File(str(path), separate_channels=True, num_threads=_THREADS).parts
     except Exception as error:  # OpenEXR raises what its C++ raised, of no common class
@@ -151,7 +149,7 @@ def write(path: str | os.PathLike[str], image: Image) -> None:
         header |= _camera_attributes(image.camera)
     with written_whole(path) as temporary:
         try:
-            with _silent_libraries():
+            with silent_libraries():
                 OpenEXR.File(header, channels, num_threads=_THREADS).write(str(temporary))
         except RuntimeError as error:
             raise OSError(_first_line(error)) from error
@@ -203,20 +201,6 @@ def _camera_attributes(camera: Pinhole) -> dict:
         "worldToNDC": (to_camera @ to_ndc).astype(np.float32),
         _CAMERA_ATTRIBUTE: json.dumps(camera_to_dict(camera)),
     }
-
-
-@contextlib.contextmanager
-def _silent_libraries() -> Iterator[None]:
-    """Keep OpenEXR's own lines off the terminal: what it prints of a damaged file, it raises or leaves out as well."""
-    sys.stderr.flush()
-    kept = os.dup(2)
-    try:
-        with contextlib.redirect_stdout(io.StringIO()), open(os.devnull, "w") as nowhere:
-            os.dup2(nowhere.fileno(), 2)
-            yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
 
 
 def _first_line(error: Exception) -> str:
