@@ -26,7 +26,8 @@ class Ellipsoids:
     nearest : (n,) float64, least depth z. The spheres without bounds come first, then the others, nearest first.
     bounds : (4, n) float64: least x, greatest x, least y, greatest y in the view plane at distance 1, −inf and inf where the
         sphere reaches behind the eye's plane.
-    object_index, material_index, magnitude : (n,) float32, as in `Triangles`; magnitude is that of the sphere's extent.
+    object_index, material_index, magnitude : (n,) float32, as in `Triangles`; magnitude is that of the sphere's extent, and
+        a sphere is as slender as an equilateral triangle: not at all.
     """
 
     inverse: Floats
@@ -114,7 +115,7 @@ def _of_object(placed: Object, spheres: Spheres, view: View) -> list[NDArray]:
         bounds,
         np.full(len(radii), placed.object_index, np.float32),
         np.array(placed.material_indices, np.float32)[spheres.materials],
-        (np.abs(world) + extent).max(axis=0, initial=0.0).astype(np.float32),
+        ((np.abs(world) + extent).max(axis=0, initial=0.0) + np.sqrt(dot(centres, centres))).astype(np.float32),
     ]
 
 

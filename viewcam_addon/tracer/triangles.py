@@ -18,6 +18,10 @@ from .scene import Mesh, Object
 from .view import View
 
 
+# Thinner triangles than float32 can tell from a line are no surface.
+_MOST_SLENDER = 2.0**24
+
+
 @dataclass(frozen=True, eq=False)
 class Triangles:
     """m triangles.
@@ -29,7 +33,8 @@ class Triangles:
     corner_uvs : (9, m) float32: [3 · corner + channel, triangle] with the channels u, v, 1 (0, 0, 0 without a UV map); or None
         where no mesh has a UV map.
     object_index, material_index : (m,) float32, what the passes show.
-    magnitude : (m,) float32: the largest |coordinate| of the three vertices, world space.
+    magnitude : (m,) float32: what a renderer's relative rounding applies to: the largest |coordinate| of the three vertices in
+        world space, plus the distance of the farthest from the eye times the triangle's slenderness.
     """
 
     vertices: Floats
@@ -60,7 +65,7 @@ def triangles_of(pairs: list[tuple[Object, Mesh]], view: View) -> Triangles:
         vertices.append(points)
         corners.append(indices + np.int32(vertex_count))
         vertex_count += points.shape[1]
-        magnitudes.append(magnitude[indices].max(axis=0))
+        magnitudes.append(magnitude[indices].max(axis=0) + _slender_reach(points[:, indices]))
         objects.append(np.full(len(mesh.triangles), placed.object_index, np.float32))
         materials.append(np.array(placed.material_indices, np.float32)[mesh.materials])
         if smooth:
@@ -76,6 +81,21 @@ def triangles_of(pairs: list[tuple[Object, Mesh]], view: View) -> Triangles:
         material_index=_joined(materials, (0,)).astype(np.float32, copy=False),
         magnitude=_joined(magnitudes, (0,)).astype(np.float32, copy=False),
     )
+
+
+def _slender_reach(corners: Floats) -> Floats:
+    """(m,) distance of the farthest corner from the eye times the slenderness, longest side over height.
+
+    Barycentric coordinates that are computed from the eye are off by a rounding of that distance over the height, and move the
+    hit along the longest side. corners : (3, 3, m), camera space: [axis, corner, triangle].
+    """
+    a, b, c = corners.transpose(1, 0, 2)
+    sides = (b - a, c - b, a - c)
+    normal = cross(sides[0], sides[2])
+    longest = np.max([dot(side, side) for side in sides], axis=0)
+    farthest = np.max([dot(corner, corner) for corner in (a, b, c)], axis=0)
+    with np.errstate(all="ignore"):  # a triangle without area is never hit
+        return np.sqrt(farthest) * np.minimum(longest / np.sqrt(dot(normal, normal)), _MOST_SLENDER)
 
 
 def _joined(parts: list[NDArray], empty: tuple[int, ...]) -> NDArray:
