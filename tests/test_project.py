@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "viewcam_addon"
 
 # From the ground to the roof: a room imports from those before it. The package's __init__ and __main__ only open doors.
-FLOORS = ["errors", "files", "exact", "pinhole", "image", "intrinsics", "compare", "tracer", "blender", "cli"]
+FLOORS = ["errors", "files", "terminal", "exact", "pinhole", "image", "intrinsics", "compare", "tracer", "blender", "cli"]
 ROOF = {"__init__", "__main__"}
 
 # What exists inside Blender only.
@@ -92,6 +92,11 @@ def test_imports_point_down_only(path):
 )
 def test_an_import_that_climbs_is_seen(source, path):
     assert climbing_imports(source, Path(path))
+
+
+def test_every_room_has_a_floor():
+    rooms = {path.relative_to(PACKAGE).parts[0].removesuffix(".py") for path in sources()}
+    assert rooms - ROOF == set(FLOORS), "say in FLOORS on which floor the new room is"
 
 
 def test_imports_inside_the_package_are_relative():

@@ -3,32 +3,24 @@
 Importing this package needs no Blender. `register` and `unregister` are what Blender calls.
 """
 
-_command = None
-
 
 def register() -> None:
     """Add the panel, the properties and, where Blender runs in the shell, the command `viewcam`."""
-    global _command
-    import bpy
-
     from . import blender
 
     blender.register()
-    _command = bpy.utils.register_cli_command("viewcam", _run_command)
+    blender.register_command("viewcam", _run_command)
 
 
 def unregister() -> None:
-    global _command
-    import bpy
-
+    """Take all of it away again."""
     from . import blender
 
-    bpy.utils.unregister_cli_command(_command)
-    _command = None
+    blender.unregister_command()
     blender.unregister()
 
 
 def _run_command(arguments: list[str]) -> int:
     from . import cli
 
-    return cli.main(arguments)
+    return cli.main(arguments, blend_is_open=True)

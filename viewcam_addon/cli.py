@@ -10,6 +10,7 @@ to test.
 """
 
 import argparse
+import importlib.util
 import json
 import os
 import shlex
@@ -270,12 +271,10 @@ def _request(options: argparse.Namespace) -> Any:
 
 def _job() -> Any:
     """blender/job.py, where there is Blender."""
-    try:
-        import bpy  # noqa: F401
-    except ModuleNotFoundError as error:
+    if importlib.util.find_spec("bpy") is None:
         raise InputError(
             "this needs Blender: install it as a module (pip install bpy), or run blender -b FILE.blend --command viewcam"
-        ) from error
+        )
     from .blender import job
 
     return job

@@ -1,5 +1,9 @@
 """Everything that touches Blender. Importing this package needs no Blender; its modules do."""
 
+from collections.abc import Callable
+
+_command = None
+
 
 def register() -> None:
     """Classes, properties and handlers, in this order: a panel needs its operators, an operator its properties."""
@@ -23,3 +27,20 @@ def unregister() -> None:
     for each in reversed((*operators.CLASSES, *panel.CLASSES)):
         bpy.utils.unregister_class(each)
     properties.unregister()
+
+
+def register_command(name: str, run: Callable[[list[str]], int]) -> None:
+    """Add `blender --command NAME ARGUMENT…`; `run` takes the arguments and returns the exit status."""
+    global _command
+    import bpy
+
+    _command = bpy.utils.register_cli_command(name, run)
+
+
+def unregister_command() -> None:
+    """Take the command away again."""
+    global _command
+    import bpy
+
+    bpy.utils.unregister_cli_command(_command)
+    _command = None
