@@ -8,7 +8,7 @@ from viewcam_addon.blender import datablocks, panel  # noqa: E402
 def contents(camera_object, scene):
     bpy.context.view_layer.update()
     rows, warnings = panel.contents(camera_object, scene)
-    return dict(rows), warnings
+    return {label: " ".join(texts) for label, *texts in rows}, warnings
 
 
 def test_a_camera_that_is_well_shows_its_read_outs_and_no_warning(posed_camera, scene):

@@ -7,19 +7,19 @@ LEVEL = Pinhole((0, -5, 0), (0, 0, 0), (0, 0, 1), 50.0, 100, 60)
 
 
 def test_readouts_are_the_camera_in_words():
-    rows = dict(readouts.readouts(LEVEL, 18.0, "5 m"))
+    rows = {label: " ".join(texts) for label, *texts in readouts.readouts(LEVEL, 18.0, "5 m")}
     assert rows["Focal Length"] == "18 mm"
     assert rows["Horizontal FOV"] == "90.0000°"
     assert rows["Vertical FOV"] == f"{2 * math.degrees(math.atan(30 / 50)):.4f}°"
     assert rows["Diagonal FOV"] == f"{2 * math.degrees(math.atan(math.hypot(50, 30) / 50)):.4f}°"
-    assert rows["u"] == "+1.000000  +0.000000  +0.000000"
-    assert rows["v"] == "+0.000000  +0.000000  +1.000000"
-    assert rows["w"] == "+0.000000  -1.000000  +0.000000"
+    assert rows["u"] == "+1.00000 +0.00000 +0.00000"
+    assert rows["v"] == "+0.00000 +0.00000 +1.00000"
+    assert rows["w"] == "+0.00000 -1.00000 +0.00000"
     assert rows["To Look-At"] == "5 m"
 
 
 def test_a_camera_without_stated_values_has_no_distance_to_a_look_at_point():
-    assert "To Look-At" not in dict(readouts.readouts(LEVEL, 18.0, None))
+    assert "To Look-At" not in [row[0] for row in readouts.readouts(LEVEL, 18.0, None)]
 
 
 def test_a_singular_pose_is_said_to_be_so():

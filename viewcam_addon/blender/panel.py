@@ -45,18 +45,20 @@ class _CameraPanel:
                 column.label(text=line, icon="BLANK1" if i else "ERROR")
 
 
-def _draw_rows(rows: list[tuple[str, str]], layout: bpy.types.UILayout) -> None:
+def _draw_rows(rows: list[tuple[str, ...]], layout: bpy.types.UILayout) -> None:
     column = layout.column(align=True)
-    for label, text in rows:
-        split = column.split(factor=0.4)
+    for label, *texts in rows:
+        split = column.split(factor=0.46 if len(texts) == 1 else 0.1)
         name = split.row()
         name.alignment = "RIGHT"
         name.label(text=label)
-        split.label(text=text)
+        row = split.row()
+        for text in texts:
+            row.label(text=text)
 
 
-def contents(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> tuple[list[tuple[str, str]], list[str]]:
-    """The read-outs (label, text) and the warnings that the panel shows for a camera."""
+def contents(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> tuple[list[tuple[str, ...]], list[str]]:
+    """The read-outs (readouts.py) and the warnings that the panel shows for a camera."""
     group, warnings = camera_object.virtual_pinhole, []
     try:
         stated = cameras.stated(camera_object, scene)

@@ -6,8 +6,8 @@ import textwrap
 from ..pinhole import Pinhole, Triple
 
 
-def readouts(camera: Pinhole, lens: float, look_at_distance: str | None) -> list[tuple[str, str]]:
-    """(label, text) of the camera as Blender has it.
+def readouts(camera: Pinhole, lens: float, look_at_distance: str | None) -> list[tuple[str, ...]]:
+    """(label, text) of the camera as Blender has it; three texts for the vectors u, v and w.
 
     lens : mm. look_at_distance : with its unit, or None where no look-at point is stated.
     """
@@ -18,14 +18,14 @@ def readouts(camera: Pinhole, lens: float, look_at_distance: str | None) -> list
         ("Vertical FOV", f"{upright:.4f}°"),
         ("Diagonal FOV", f"{diagonal:.4f}°"),
     ]
-    rows += [(name, _vector(axis)) for name, axis in zip("uvw", camera.axes(), strict=True)]
+    rows += [(name, *_vector(axis)) for name, axis in zip("uvw", camera.axes(), strict=True)]
     if look_at_distance is not None:
         rows.append(("To Look-At", look_at_distance))
     return rows
 
 
-def _vector(vector: Triple) -> str:
-    return "  ".join(f"{round(component, 6) + 0.0:+.6f}" for component in vector)
+def _vector(vector: Triple) -> tuple[str, ...]:
+    return tuple(f"{round(component, 5) + 0.0:+.5f}" for component in vector)
 
 
 def pose_warnings(stated: Pinhole, precision: float) -> list[str]:

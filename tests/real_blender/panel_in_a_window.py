@@ -1,0 +1,213 @@
+"""Runs inside a real Blender with a window: uses the panel as an artist does, by mouse and keyboard, and checks what happens.
+
+blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python panel_in_a_window.py
+
+A timer takes one step at a time, so that Blender handles the events and draws in between. Buttons are found by moving the mouse
+over them and asking Blender which property it is on: no coordinate is assumed but that the buttons stand below the distance.
+Leaves with status 0, or 5 and a traceback.
+"""
+
+import os
+import sys
+import traceback
+
+import bpy
+import numpy as np
+
+KEYS = {"0": "ZERO", "3": "THREE", "5": "FIVE", "7": "SEVEN", ".": "PERIOD"}
+NOWHERE = (600, 500)  # a place in the 3D viewport
+ROW = 9  # pixels between two looks for a button, less than half its height
+BELOW = 27  # pixels from the middle of the distance to the middle of the buttons
+
+
+def window():
+    return bpy.context.window_manager.windows[0]
+
+
+def region(area_type, region_type):
+    area = next(area for area in window().screen.areas if area.type == area_type)
+    return area, next(region for region in area.regions if region.type == region_type)
+
+
+def camera():
+    return bpy.data.objects["Camera"]
+
+
+def values():
+    return camera().virtual_pinhole
+
+
+def move(x, y):
+    window().event_simulate(type="MOUSEMOVE", value="NOTHING", x=int(x), y=int(y))
+
+
+def press(key, x, y, **modifiers):
+    for value in ("PRESS", "RELEASE"):
+        window().event_simulate(type=key, value=value, x=int(x), y=int(y), **modifiers)
+
+
+def click(x, y):
+    """Steps: a button has to notice the mouse before it takes the click, and Blender to draw after it."""
+    move(x, y)
+    yield
+    press("LEFTMOUSE", x, y)
+    yield
+    yield
+
+
+def find(name, index, area_type="VIEW_3D", region_type="UI", across=0.6):
+    """Steps that end with the window coordinates of the property's button."""
+    area, where = region(area_type, region_type)
+    x = where.x + where.width * across
+    move(*NOWHERE)  # else the first look tells what was under the mouse before
+    yield
+    yield
+    for y in range(where.y + where.height - ROW, where.y, -ROW):
+        move(x, y)
+        yield
+        with bpy.context.temp_override(window=window(), area=area, region=where):
+            found = bpy.context.property
+        if found and found[0] == camera() and found[1:] == (f"virtual_pinhole.{name}", index):
+            return x, y - ROW / 2
+    raise AssertionError(f"no button of virtual_pinhole.{name}[{index}] in the {region_type} of the {area_type}")
+
+
+def type_into(name, index, text):
+    """Steps that click on a field, replace its text and confirm."""
+    x, y = yield from find(name, index)
+    yield from click(x, y)
+    press("A", x, y, ctrl=True)
+    for character in text:
+        key = KEYS[character]
+        window().event_simulate(type=key, value="PRESS", unicode=character, x=int(x), y=int(y))
+        window().event_simulate(type=key, value="RELEASE", x=int(x), y=int(y))
+    press("RET", x, y)
+    yield
+    yield
+
+
+def state():
+    matrix = np.array(camera().evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
+    return values().numbers(), matrix, camera().data.lens
+
+
+def is_at_its_values():
+    eye, look_at, _, distance = values().numbers()
+    _, matrix, lens = state()
+    ahead = np.array(look_at) - eye
+    np.testing.assert_allclose(matrix[:3, 3], eye, rtol=1e-6)
+    np.testing.assert_allclose(-matrix[:3, 2], ahead / np.linalg.norm(ahead), atol=1e-6)
+    np.testing.assert_allclose(lens, distance * 36 / 1920, rtol=1e-6)
+
+
+def same(one, other):
+    return one[0] == other[0] and np.array_equal(one[1], other[1]) and one[2] == other[2]
+
+
+def open_the_panels():
+    view, sidebar = region("VIEW_3D", "UI")
+    view.spaces.active.show_region_ui = True
+    window().view_layer.objects.active = camera()
+    yield
+    sidebar.active_panel_category = "Pinhole"
+    region("PROPERTIES", "WINDOW")[0].spaces.active.context = "DATA"
+    view.tag_redraw()
+    yield
+    yield
+
+
+def enable():
+    before = state()
+    x, y = yield from find("enabled", -1, across=0.13)
+    yield from click(x, y)
+    assert values().enabled, "the checkbox in the panel's header enables nothing"
+    assert np.array_equal(state()[1], before[1]), "enabling moved the camera"
+
+
+def edit_undo_redo():
+    before = state()
+    yield from type_into("eye", 2, "3.5")
+    after = state()
+    assert values().eye[2] == 3.5, f"typed 3.5, and the eye's z is {values().eye[2]}"
+    is_at_its_values()
+    press("Z", *NOWHERE, ctrl=True)
+    yield
+    yield
+    assert same(state(), before), "undo did not bring values and camera back"
+    press("Z", *NOWHERE, ctrl=True, shift=True)
+    yield
+    yield
+    assert same(state(), after), "redo did not bring values and camera back"
+
+
+def zoom():
+    yield from type_into("distance", -1, "750")
+    assert values().distance == 750, f"typed 750, and the distance is {values().distance}"
+    is_at_its_values()
+
+
+def press_the_buttons():
+    _, sidebar = region("VIEW_3D", "UI")
+    _, y = yield from find("distance", -1)
+    stated = values().numbers()
+    camera().location = (1, 2, 3)
+    yield
+    yield from click(sidebar.x + sidebar.width * 0.2, y - BELOW)
+    assert values().numbers() == stated
+    is_at_its_values()
+    camera().location = (1, 2, 3)
+    yield
+    yield from click(sidebar.x + sidebar.width * 0.65, y - BELOW)
+    assert tuple(values().eye) == (1, 2, 3), f"after Adopt Camera the eye is {tuple(values().eye)}"
+    is_at_its_values()
+
+
+def draw_a_warning():
+    values().look_at = values().eye
+    yield
+    yield
+    values().look_at = (0, 0, 0)
+    yield
+
+
+def look_into_the_properties_editor():
+    area, where = region("PROPERTIES", "WINDOW")
+    with bpy.context.temp_override(window=window(), area=area, region=where):
+        for _ in range(30):
+            bpy.ops.view2d.scroll_down(deltay=100)
+    yield
+    yield
+    yield from find("distance", -1, "PROPERTIES", "WINDOW")
+
+
+def steps():
+    yield
+    for part in (
+        open_the_panels,
+        enable,
+        edit_undo_redo,
+        zoom,
+        press_the_buttons,
+        draw_a_warning,
+        look_into_the_properties_editor,
+    ):
+        yield from part()
+        print(f"done: {part.__name__}", flush=True)
+
+
+def take_a_step(running):
+    try:
+        next(running)
+    except StopIteration:
+        os._exit(0)
+    except BaseException:
+        traceback.print_exc()
+        sys.stderr.flush()
+        os._exit(5)
+    return 0.05
+
+
+if __name__ == "__main__":
+    bpy.context.preferences.view.show_splash = False
+    running = steps()
+    bpy.app.timers.register(lambda: take_a_step(running), first_interval=1.0)
