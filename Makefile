@@ -76,7 +76,7 @@ scenes: .venvs/4.2/ready
 	.venvs/4.2/bin/python sample_scenes/make.py
 
 benchmark: .venv/demo
-	.venv/bin/python benchmarks/geometry.py
+	.venv/bin/python benchmarks/geometry_level.py
 
 clean:
 	rm -rf .venv .venvs .pytest_cache .ruff_cache .hypothesis wheels dist build demo
