@@ -58,8 +58,7 @@ def render(
         raise InputError("Cycles is disabled: enable the add-on Cycles Render Engine in Blender's preferences")
     with written_whole(path) as temporary, borrowed() as borrow:
         still_of_one_layer(borrow, scene, view_layer, camera_object)
-        _borrow_sampling(borrow, scene)
-        _borrow_passes(borrow, view_layer)
+        borrow_settings(borrow, scene, view_layer)
         _borrow_file(borrow, scene, temporary)
         if threads:
             borrow.set(scene.render, "threads_mode", "FIXED")
@@ -67,6 +66,12 @@ def render(
         for remedy in remedies:
             remedy(borrow)
         render_still(scene, to_file=True)
+
+
+def borrow_settings(borrow: Borrower, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
+    """Everything but the file; benchmarks render without one."""
+    _borrow_sampling(borrow, scene)
+    _borrow_passes(borrow, view_layer)
 
 
 def _borrow_sampling(borrow: Borrower, scene: bpy.types.Scene) -> None:

@@ -18,7 +18,7 @@ from .triangles import Planes, triangles_of
 from .view import View
 from .visibility import visibility
 
-_TILE = 16384  # pixels; the fastest of 4096 … 131072, see benchmarks/geometry_level.py
+TILE = 16384  # pixels; the fastest of 4096 … 131072, see benchmarks/geometry_level.py
 
 
 class Tracer:
@@ -45,12 +45,12 @@ class Tracer:
         flat = {name: values.reshape(width * height, -1) for name, values in passes.items()}
 
         def trace(first: int) -> None:
-            tile = slice(first, min(first + _TILE, width * height))
+            tile = slice(first, min(first + TILE, width * height))
             rows, columns = np.divmod(np.arange(tile.start, tile.stop), width)
             self._trace({name: values[tile] for name, values in flat.items()}, columns + 0.5, rows + 0.5)
 
         with ThreadPoolExecutor(self._threads) as pool:
-            for done in pool.map(trace, range(0, width * height, _TILE)):
+            for done in pool.map(trace, range(0, width * height, TILE)):
                 assert done is None  # map() hands on what a tile raised
         return passes
 
@@ -63,8 +63,8 @@ class Tracer:
         """
         column, row = np.broadcast_arrays(np.add(columns, px, dtype=np.float64), np.add(rows, py, dtype=np.float64))
         passes = background(column.shape)
-        for first in range(0, len(column), _TILE):
-            tile = slice(first, first + _TILE)
+        for first in range(0, len(column), TILE):
+            tile = slice(first, first + TILE)
             self._trace({name: values[tile] for name, values in passes.items()}, column[tile], row[tile])
         return passes
 

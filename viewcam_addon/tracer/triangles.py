@@ -17,7 +17,6 @@ from .arrays import Float32s, Floats, Indices, cross, dot, gather, linear
 from .scene import Mesh, Object
 from .view import View
 
-
 # Thinner triangles than float32 can tell from a line are no surface.
 _MOST_SLENDER = 2.0**24
 

@@ -52,7 +52,7 @@ class Embree:
         self._planes, self._ellipsoids = planes, ellipsoids
         self._start, self._end = clip
         self._triangle_count = triangles.count
-        self._triangles = _embree_scene(triangles.vertices.T, triangles.corners.T) if triangles.count else None
+        self._triangles = embree_scene(triangles.vertices.T, triangles.corners.T) if triangles.count else None
         self._without_card = int(np.count_nonzero(np.isinf(ellipsoids.bounds[0])))
         if ellipsoids.count > self._without_card:
             self._cards, self._card_depth = _cards(ellipsoids, self._without_card)
@@ -98,7 +98,7 @@ class Embree:
             rays, origin = rays[onwards], origin[onwards]
 
 
-def _embree_scene(vertices: Floats, triangles: NDArray[np.int32]) -> "EmbreeScene":
+def embree_scene(vertices: Floats, triangles: NDArray[np.int32]) -> "EmbreeScene":
     scene = EmbreeScene(robust=True)
     TriangleMesh(scene, np.ascontiguousarray(vertices, dtype=np.float32), np.ascontiguousarray(triangles))
     scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))  # builds the hierarchy, once, before threads come
@@ -120,7 +120,7 @@ def _cards(ellipsoids: Ellipsoids, first: int) -> tuple["EmbreeScene", NDArray[n
     vertices[:, :, 1] = np.stack([y0, y0, y1, y1], axis=1) * depth[:, None]
     vertices[:, :, 2] = depth[:, None]
     corners = np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(len(depth))[:, None, None]
-    return _embree_scene(vertices.reshape(-1, 3), corners.reshape(-1, 3).astype(np.int32)), depth
+    return embree_scene(vertices.reshape(-1, 3), corners.reshape(-1, 3).astype(np.int32)), depth
 
 
 class Plain:
