@@ -28,8 +28,9 @@ from .files import written_whole
 from .pinhole import Pinhole
 from .terminal import silent_libraries
 
-# The channels of each pass, in the order of its last axis, as Cycles names them. The last two are the tracer's own: the largest
-# coordinate that took part in a hit and the cosine between ray and true normal, by which a tolerance can be derived.
+# The channels of each pass, in the order of its last axis, as Cycles names them. The last two are the tracer's own, by which
+# a tolerance can be derived: the magnitude that float32's relative rounding applies to at a hit, in world units (its largest
+# coordinate, plus the distance times the slenderness of the triangle), and the cosine between ray and true normal.
 CHANNELS = {
     "Combined": "RGBA",
     "Depth": "Z",

@@ -9,12 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from viewcam_addon.compare import law
 from viewcam_addon.image import Image
 from viewcam_addon.pinhole import Pinhole
 
-# Rayleigh's distribution with this scale has its median at 1.4, its 99th percentile at 3.6 and its maximum over 10⁵ pixels
-# near 6 roundings: inside law.ROUNDINGS (2.2, 7.6 and 43), as float32 is.
-ROUNDINGS_OF_A_RENDERER = 1.2
+# Rayleigh's distribution with this scale has its median at 0.41, its 99th percentile at 1.06 and its maximum over 10⁵ pixels
+# near 1.7 roundings: inside law.ROUNDINGS (0.7, 2.1 and 12), as Cycles is.
+ROUNDINGS_OF_A_RENDERER = 0.35
 
 
 @dataclass(frozen=True)
@@ -42,9 +43,9 @@ class PaperScene:
         distance = np.where((distance > 0) & (flat < self.radius), distance, np.inf)
         found = np.where(np.isfinite(distance), 0, -1)
         for i, (*centre, radius) in enumerate(self.spheres):
-            towards = np.array(centre) + offset - origin
-            middle = directions @ towards
-            half = radius**2 - ((middle[:, None] * directions - towards) ** 2).sum(axis=1)
+            to_centre = np.array(centre) + offset - origin
+            middle = directions @ to_centre
+            half = radius**2 - ((middle[:, None] * directions - to_centre) ** 2).sum(axis=1)
             with np.errstate(invalid="ignore"):
                 near = middle - np.sqrt(half)
             closer = (half > 0) & (near > 0) & (near < distance)
@@ -56,6 +57,7 @@ class PaperScene:
         radii = np.array([self.radius, *(sphere[3] for sphere in self.spheres)])[found]
         normal = np.where((found == 0)[:, None], (0.0, 0.0, 1.0), (position - centres) / radii[:, None]) * hit[:, None]
         local = (position - offset) / self.radius
+        away = np.linalg.norm(position - origin, axis=1)
         passes = {
             "Depth": np.where(hit, -(position - origin) @ self.pinhole.basis()[2], 1e10)[:, None],
             "Position": position,
@@ -63,7 +65,7 @@ class PaperScene:
             "UV": np.column_stack([local[:, :2], np.ones(count)]) * hit[:, None],
             "Object Index": np.where(hit, found + 1, 0)[:, None],
             "Material Index": np.where(hit, 10 + found % 2, 0)[:, None],
-            "Magnitude": np.maximum(np.abs(centres).max(axis=1) + radii, np.abs(origin).max())[:, None] * hit[:, None],
+            "Magnitude": (np.maximum(np.abs(centres).max(axis=1) + radii, np.abs(origin).max()) + away)[:, None] * hit[:, None],
             "Facing": np.abs((normal * directions).sum(axis=1))[:, None],
         }
         return {name: values.astype(np.float32) for name, values in passes.items()}
@@ -78,10 +80,10 @@ class PaperScene:
 
     def rendered(self, roundings: float = ROUNDINGS_OF_A_RENDERER, seed: int = 0) -> Image:
         """The picture of a float32 renderer: every ray is off by so many roundings. Without the tracer's own passes."""
-        exact = self.picture().passes
-        with np.errstate(divide="ignore"):
-            shift = 2.0**-24 * max(self.pinhole.distance) * exact["Magnitude"][..., 0] / exact["Depth"][..., 0]
-        shift[shift == 0.0] = np.median(shift[shift > 0])
+        exact = self.picture()
+        shift = law.ray_shift(self.pinhole, exact.passes)
+        missed = exact["Object Index"][..., 0] == 0
+        shift[missed] = np.median(shift[~missed])
         dx, dy = roundings * shift * np.random.default_rng(seed).normal(size=(2, *shift.shape))
         image = self.picture(0.5 + dx, 0.5 + dy)
         return replace(

@@ -13,29 +13,44 @@ def seen(**passes):
     return {name.replace("_", " "): np.atleast_2d(np.asarray(values, dtype=float)) for name, values in passes.items()}
 
 
+def straight_down(depth=10.0, **passes):
+    """A point on the view axis of PINHOLE, at this depth."""
+    return seen(Depth=[[depth]], Position=[[0.0, 0.0, 10.0 - depth]], **passes)
+
+
 def test_one_rounding_at_a_kilometre_seen_from_ten_metres_is_six_thousandths_of_a_pixel():
-    shift = law.ray_shift(PINHOLE, seen(Depth=[[10.0]], Magnitude=[[1000.0]]))
-    assert shift == pytest.approx([2**-24 * 1000 * 1000 / 10])
+    shift = law.ray_shift(PINHOLE, straight_down(Magnitude=[[1000.0]]))
+    assert shift == pytest.approx([2**-24 * 1000 * (1000 + 10) / 10])
 
 
-def test_without_magnitude_the_farther_of_eye_and_point_counts():
-    assert law.magnitude(PINHOLE, seen(Position=[[3.0, 4.0, 0.0], [0.0, 30.0, 40.0]])) == pytest.approx([10.0, 50.0])
+def test_a_ray_aside_of_the_axis_is_off_by_more_as_its_perspective_is_steeper():
+    """At 60° off the axis t = 2 z: twice for its direction or distance, and twice for the slanted view plane."""
+    aside = seen(Depth=[[5.0]], Position=[[np.sqrt(75.0), 0.0, 5.0]], Magnitude=[[10.0]])
+    assert law.ray_shift(PINHOLE, aside) == pytest.approx([2**-24 * 1000 * (10 + 10) / 5 * 2])
+
+
+def test_without_magnitude_the_largest_coordinate_and_twice_the_distance_count():
+    below, beside = [0.0, 0.0, -5.0], [30.0, 0.0, 10.0]
+    assert law.magnitude(PINHOLE, seen(Position=[below, beside])) == pytest.approx([10.0 + 2 * 15.0, 30.0 + 2 * 30.0])
 
 
 def test_a_grazed_surface_is_allowed_more_and_a_facing_one_is_not():
-    shifts = law.position_shift(PINHOLE, seen(Depth=[[10.0]] * 3, Magnitude=[[10.0]] * 3, Facing=[[1.0], [0.1], [0.01]]))
+    shifts = [law.position_shift(PINHOLE, straight_down(Magnitude=[[10.0]], Facing=[[f]]))[0] for f in (1.0, 0.1, 0.01)]
     assert shifts[1] == shifts[0]
     assert shifts[2] == pytest.approx(10 * shifts[0])
 
 
 def test_depth_error_is_the_finite_difference_of_a_tilted_plane_under_the_laws_shift():
-    """A plane tilted by 60°: the relative depth error of a ray that is s pixels off, beside the rounding's own."""
+    """A plane tilted by 60°: the relative depth error of a ray that is s pixels off, beside s / d of its own."""
     normal = np.array([np.sin(np.pi / 3), 0.0, np.cos(np.pi / 3)])
-    depth_at = lambda px: 10.0 * normal[2] / -(np.array([px / 1000.0, 0.0, -1.0]) @ normal)  # noqa: E731
-    single = seen(Depth=[[10.0]], Magnitude=[[10.0]], Facing=[[0.5]])
-    s = law.ray_shift(PINHOLE, single)[0]
-    expected = abs(depth_at(s) - depth_at(0.0)) / 10.0 + 2**-24
-    assert law.depth_error(PINHOLE, single) == pytest.approx([expected], rel=1e-6)
+
+    def depth_at(px):
+        return 10.0 * normal[2] / -(np.array([px / 1000.0, 0.0, -1.0]) @ normal)
+
+    tilted = straight_down(Magnitude=[[10.0]], Facing=[[0.5]])
+    s = law.ray_shift(PINHOLE, tilted)[0]
+    expected = abs(depth_at(s) - depth_at(0.0)) / 10.0 + s / 1000.0
+    assert law.depth_error(PINHOLE, tilted) == pytest.approx([expected], rel=1e-6)
 
 
 def test_slopes_are_per_pixel_and_stop_at_the_objects_edge():

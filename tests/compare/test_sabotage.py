@@ -76,7 +76,7 @@ CAMERA_FAULTS = {
     "one object moved along the view": lambda s: moved_sphere(s, (-0.0005, 0.0007, -0.0004)).rendered(),
     "one object missing": lambda s: replace(s, spheres=s.spheres[:2]).rendered(),
     "one object too many": lambda s: replace(s, spheres=(*s.spheres, (1.2, -1.8, 0.2, 0.2))).rendered(),
-    "ten times the rounding": lambda s: s.rendered(roundings=12.0),
+    "ten times the rounding": lambda s: s.rendered(roundings=3.5),
 }
 FILE_FAULTS = {
     "Position with X and Y swapped": lambda i: changed(i, Position=swap(0, 1)),

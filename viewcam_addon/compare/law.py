@@ -1,16 +1,21 @@
 """What two exact pictures may differ by: tolerances in closed form, for every pixel of every pass.
 
-Cycles computes in float32, with a relative rounding of 2⁻²⁴. A coordinate that is rounded at its largest magnitude M moves by
-2⁻²⁴ · M, and is seen at the planar depth z through a view plane at the distance d; so the picture moves by
+Cycles computes in float32, with a relative rounding of 2⁻²⁴. Three things are rounded on the way to a hit at the distance t
+along the ray and the planar depth z: the world coordinates, of the size of the largest; the barycentric coordinates, computed
+from the eye, which move the hit along the triangle by the distance times the triangle's slenderness; and the ray's direction,
+which moves the hit by the distance. With M the sum of the first two (the tracer's Magnitude pass) a hit moves by 2⁻²⁴ · (M +
+t), and the picture, seen through a view plane at the distance d, by
 
-    s = 2⁻²⁴ · d · M / z    pixels,
+    s = 2⁻²⁴ · d · (M + t) / z · t / z    pixels,
 
-and k · s is allowed, where k counts the roundings. A renderer's errors are a distribution: k is given for five percentiles.
-Everything else follows from s by the chain rule: a picture that moves by s pixels shows a depth, a normal or a texture
-coordinate that is off by s times its slope in the picture.
+where t / z is what a perspective adds away from its axis. k · s is allowed, where k counts the roundings. A renderer's errors
+are a distribution: k is given for five percentiles. Everything else follows from s by the chain rule: a picture that moves by
+s pixels shows a depth, a normal or a texture coordinate that is off by s times its slope in the picture.
 
-Rejected: a fixed number of pixels (right for one scene, wrong for one that is small, far from the origin, wide or telephoto),
-and a number for each sample scene (it would be chosen, not derived).
+Rejected: a fixed number of pixels (right for one scene, wrong for one that is small, far from the origin, wide or telephoto);
+a number for each sample scene (it would be chosen, not derived); and k · 2⁻²⁴ · d · max(|P|, |e|) / z, which forgets the
+triangle and the ray: the same k would have to be 8 times larger for a view of 170° and 5 times for the slender triangles of a
+text.
 
 "Seen" below means a dict from pass name to (n, channels) arrays: the same pixels, or re-traced rays, in every pass.
 """
@@ -26,9 +31,8 @@ Seen = dict[str, NDArray]
 
 PERCENTILES = (50.0, 90.0, 99.0, 99.9, 100.0)
 
-# How many roundings of 2⁻²⁴ · M a position is off at each of PERCENTILES. Measured on 50 random cameras, 10.5 million hits
-# with a cosine above 0.1, Cycles of Blender 4.2 to 5.2, against a float64 tracer.
-ROUNDINGS = (2.2, 4.6, 7.6, 11.0, 43.0)
+# How many roundings of 2⁻²⁴ · (M + t) a position is off at each of PERCENTILES.
+ROUNDINGS = (0.7, 1.4, 2.1, 3.4, 12.0)
 
 FLOAT32 = 2.0**-24
 
@@ -47,14 +51,16 @@ def is_hit(seen: Seen) -> NDArray[np.bool_]:
 
 
 def magnitude(pinhole: Pinhole, seen: Seen) -> Array:
-    """(n,) M: the largest coordinate that a hit was computed from, world units.
+    """(n,) M: what float32's relative rounding applies to at a hit, world units.
 
-    From the Magnitude pass; an image without one gives max(|P|, |e|), which is too small where a huge triangle was hit.
+    From the Magnitude pass; without one max(|P|, |e|) and twice the distance, as for half a square: too small where a huge or a
+    slender triangle was hit.
     """
     if "Magnitude" in seen:
         return seen["Magnitude"][..., 0].astype(np.float64)
     position = seen["Position"].astype(np.float64)
-    return np.maximum(np.linalg.norm(position, axis=-1), np.linalg.norm(pinhole.eye))
+    largest = np.maximum(np.abs(position).max(axis=-1), np.abs(pinhole.eye).max())
+    return largest + 2.0 * _distance(pinhole, seen)
 
 
 def facing(pinhole: Pinhole, seen: Seen) -> Array:
@@ -71,7 +77,8 @@ def facing(pinhole: Pinhole, seen: Seen) -> Array:
 def ray_shift(pinhole: Pinhole, seen: Seen) -> Array:
     """(n,) s in pixels: by how much one rounding moves a ray, whatever surface it meets."""
     depth = np.maximum(seen["Depth"][..., 0].astype(np.float64), np.finfo(float).tiny)
-    return FLOAT32 * max(pinhole.distance) * magnitude(pinhole, seen) / depth
+    distance = _distance(pinhole, seen)
+    return FLOAT32 * max(pinhole.distance) * (magnitude(pinhole, seen) + distance) / depth * (distance / depth)
 
 
 def position_shift(pinhole: Pinhole, seen: Seen) -> Array:
@@ -82,7 +89,7 @@ def position_shift(pinhole: Pinhole, seen: Seen) -> Array:
 def depth_error(pinhole: Pinhole, seen: Seen) -> Array:
     """(n,) relative error of the planar depth that one rounding causes.
 
-    Along the view 2⁻²⁴ · M / z; and since the position lies on the surface but not exactly on the ray, its shift in the
+    Along the view at most s / d; and since the position lies on the surface but not exactly on the ray, its shift in the
     picture times the slope of ln z: for a plane whose normal makes the angle θ with the ray, tan θ / ρ for each pixel, where
     ρ ≥ d is the length of the ray as far as the view plane.
     """
@@ -102,8 +109,13 @@ def normal_error(pinhole: Pinhole, seen: Seen, slope: Array) -> Array:
 
 
 def uv_error(pinhole: Pinhole, seen: Seen, slope: Array) -> Array:
-    """(n,) error of a texture coordinate that one rounding causes: its own, and the picture's shift times the slope."""
-    return FLOAT32 * np.abs(seen["UV"][..., :2]).max(axis=-1) + position_shift(pinhole, seen) * slope
+    """(n,) error of a texture coordinate that one rounding causes: the picture's shift times the slope."""
+    return position_shift(pinhole, seen) * slope
+
+
+def uv_storage(seen: Seen) -> Array:
+    """(n,) error of a texture coordinate by its own rounding: of three products and two sums, each at most half the largest."""
+    return 2.5 * FLOAT32 * np.maximum(np.abs(seen["UV"][..., :2]).max(axis=-1), 1.0)
 
 
 def slopes(values: NDArray, belongs: NDArray) -> Array:
@@ -130,6 +142,11 @@ def angle_between(a: NDArray, b: NDArray) -> Array:
     """(n,) radians between unit vectors (n, 3), by their chord: exact for small angles, not fooled by a vector of length 0."""
     chord = np.linalg.norm(a.astype(np.float64) - b, axis=-1)
     return 2.0 * np.arcsin(np.minimum(chord / 2.0, 1.0))
+
+
+def _distance(pinhole: Pinhole, seen: Seen) -> Array:
+    """(n,) t: how far the hits are from the eye, world units."""
+    return np.linalg.norm(seen["Position"].astype(np.float64) - pinhole.eye, axis=-1)
 
 
 def _grazing_factor(cosine: Array) -> Array:

@@ -218,7 +218,8 @@ def _errors(comparison: Comparison) -> str:
         cards.append(_card("Renderer: Blender's camera → the picture", words, "" if position.ok else "bad-card"))
         words = (
             f"Shift ({figure(s.shift_x)}, {figure(s.shift_y)}) px, zoom ({figure(s.zoom_x)}, {figure(s.zoom_y)}), "
-            f"roll {figure(s.roll)} rad. The mean of all errors is <b>{figure(s.mean)} px</b> long; {figure(s.tolerance)} px are allowed."
+            f"roll {figure(s.roll)} rad. The mean of all errors is <b>{figure(s.mean)} px</b> long; "
+            f"{figure(s.tolerance)} px are allowed."
         )
         cards.append(_card("What all pixels share", words, "" if s.ok else "bad-card"))
     return "".join(cards)

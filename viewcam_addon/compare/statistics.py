@@ -51,17 +51,16 @@ class Row:
         return {"name": self.name, "unit": self.unit, "count": self.count, "ok": self.ok, "percentiles": figures}
 
 
-def measure(name: str, unit: str, errors: Array, one_rounding: Array, floor: float = 0.0) -> Row:
+def measure(name: str, unit: str, errors: Array, one_rounding: Array, floor: Array | float = 0.0) -> Row:
     """Errors against the law.
 
     errors : (n,) in `unit`, finite. one_rounding : (n,) in `unit`, what one rounding causes at each pixel.
-    floor : in `unit`, what storage alone may cause at every percentile.
+    floor : in `unit`, what storage alone may cause at every percentile; (n,) or one number.
     """
     if not len(errors):
         return Row(name, unit, 0, (), (), ())
     values = np.percentile(errors, PERCENTILES)
-    typical = np.median(one_rounding)
-    tolerances = [k * typical + floor for k in ROUNDINGS]
+    tolerances = [np.median(k * one_rounding + floor) for k in ROUNDINGS]
     shares = [
         np.percentile(errors / np.maximum(k * one_rounding + floor, np.finfo(float).tiny), p)
         for p, k in zip(PERCENTILES, ROUNDINGS, strict=True)
