@@ -1,9 +1,19 @@
-"""Fixtures of the tests that need Blender: an empty file with one camera in it."""
+"""Fixtures of the tests that need Blender: an empty file with one camera in it; both sides of a comparison."""
+
+import dataclasses
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from viewcam_addon.compare import law
+import viewcam_addon
+from viewcam_addon.compare import geometry, law
+from viewcam_addon.image import Image
+from viewcam_addon.tracer import render
+from viewcam_addon.tracer.scene import Scene
 
 
 @pytest.fixture
@@ -114,3 +124,49 @@ def picture_error():
         return error, law.ROUNDINGS[-1] * law.FLOAT32 * max(pinhole.distance) * largest / np.nanmin(depth)
 
     return measure
+
+
+@dataclasses.dataclass(frozen=True)
+class BothSides:
+    """One state of a file as the tracer and as Cycles see it. `traced` and `cycles` : passes, rows from the bottom."""
+
+    exported: Scene
+    traced: dict
+    cycles: dict
+    comparison: geometry.Comparison
+
+    def hits(self, object_index):
+        """How many pixels of Cycles' picture show the object."""
+        return int((self.cycles["Object Index"] == object_index).sum())
+
+    def check(self):
+        """Fail with the comparison's own words unless both sides are the same picture of something."""
+        assert self.comparison.passed, "\n" + "\n".join(self.comparison.lines())
+        assert self.comparison.hits[1] > 200, f"only {self.comparison.hits} pixels see anything"
+
+
+@pytest.fixture
+def both_sides(fresh_blender, scene, tmp_path):
+    """A function that exports the open file (or that of the request), traces it, has Cycles render it, and compares the two."""
+    scene.render.resolution_x, scene.render.resolution_y = 160, 120
+
+    def make(**request):
+        from viewcam_addon.blender import job
+
+        exported = job.export_and_render(job.Request(threads=2, **request), tmp_path / "cycles.exr")
+        tracer = render.Tracer(exported, 2)
+        traced, cycles = render.render(exported, 2), _passes_of(tmp_path / "cycles.exr")
+        comparison = geometry.compare(Image(traced), Image(cycles), exported.camera, tracer.surface_at, exported.stated_camera)
+        return BothSides(exported, traced, cycles, comparison)
+
+    return make
+
+
+def _passes_of(path):
+    """The passes of an EXR, read in a process without Blender, which has an OpenEXR library of its own."""
+    program = "import sys, numpy; from viewcam_addon import image; numpy.savez(sys.argv[2], **image.read(sys.argv[1]).passes)"
+    search_path = os.pathsep.join([str(Path(viewcam_addon.__file__).parent.parent), *filter(None, sys.path)])
+    arrays = path.with_suffix(".npz")
+    subprocess.run([sys.executable, "-c", program, path, arrays], check=True, env=os.environ | {"PYTHONPATH": search_path})
+    with np.load(arrays) as archive:
+        return dict(archive)

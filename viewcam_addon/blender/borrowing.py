@@ -27,9 +27,9 @@ class Borrower:
             self.afterwards(setattr, owner, name, before)
             setattr(owner, name, value)
 
-    def afterwards(self, undo: Callable[..., Any], *arguments: Any) -> None:
-        """Call `undo(*arguments)` when the loan ends; what was borrowed last is given back first."""
-        self._stack.callback(undo, *arguments)
+    def afterwards(self, undo: Callable[..., Any], *arguments: Any, **options: Any) -> None:
+        """Call `undo` when the loan ends; what was borrowed last is given back first."""
+        self._stack.callback(undo, *arguments, **options)
 
 
 @contextlib.contextmanager
@@ -44,8 +44,8 @@ def still_of_one_layer(
 ) -> None:
     """Make `bpy.ops.render.render` render this view layer through this camera, sharp, and nothing after it.
 
-    What both sides of a comparison have in common: compositor and sequencer, motion blur, stereo and Freestyle are off, a render
-    border is cropped to, and Cycles' culling keeps no object back. Simplify stays as the artist has it.
+    What both sides of a comparison have in common: compositor and sequencer, motion blur, stereo and Freestyle are off, and a
+    render border is cropped to. Simplify stays as the artist has it.
     """
     render = scene.render
     for name in (

@@ -1,8 +1,8 @@
 """Cycles' side of a comparison: one sample through each pixel's centre, and the passes of geometry, in 32 bits.
 
 The settings are those under which Cycles follows a pinhole best. Its first sample stands in the middle of the pixel but for a
-bias of the filter table, 3e-6 px at the narrowest Blackman-Harris filter; adaptive sampling, denoising and light thresholds would
-make of it something else. Everything is borrowed and given back.
+bias of the filter table, 3e-6 px at the narrowest Blackman-Harris filter; adaptive sampling, denoising and light thresholds
+would make of it something else. Everything is borrowed and given back.
 """
 
 import os

@@ -29,7 +29,7 @@ Matrix = NDArray[np.float64]
 class Source:
     """A visible surface that stands in the world once or many times.
 
-    data : evaluated. key : the same for all that share a geometry in Cycles. materials : pass indices of its slots, at least one.
+    data : evaluated. key : the same for all that share a geometry in Cycles. materials : pass indices of the slots, one at least.
     """
 
     name: str
@@ -117,9 +117,12 @@ def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Led
     if hidden:
         ledger.note(placed.name, "exported", "not visible to the camera")
         return None
-    if isinstance(shown.data, bpy.types.Mesh) and not layer.use_solid:
-        ledger.note(placed.name, "exported", "the view layer leaves out surfaces")
-        return None
+    if isinstance(shown.data, bpy.types.Mesh):
+        if not shown.data.polygons:
+            return None
+        if not layer.use_solid:
+            ledger.note(placed.name, "exported", "the view layer leaves out surfaces")
+            return None
     override = layer.material_override
     slots = [override or slot.material for slot in shown.material_slots] or [override]
     features.note_object(placed, slots, depsgraph, ledger)

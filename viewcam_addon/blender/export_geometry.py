@@ -1,8 +1,9 @@
 """Blender's evaluated meshes and point clouds as the tracer's arrays, read in bulk.
 
-As Cycles reads them (intern/cycles/blender/mesh.cpp and pointcloud.cpp): Blender's own triangulation, material indices clamped to
-the slots, a face is smooth unless it is marked sharp, custom normals do not count on a sharp face, and a flat face has the normal
-of each of its triangles.
+As Cycles reads them (intern/cycles/blender/mesh.cpp and pointcloud.cpp, and what its Normal pass shows): Blender's own
+triangulation; material indices clamped to the slots; where all faces are flat, the normal of each triangle, else Blender's
+corner normals, in which a flat face has one normal for all of its triangles. Until 5.0 a mesh that is smooth but for flat faces
+is another case: they have the normals of their triangles, and their neighbours the normals of their vertices.
 """
 
 import bpy
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..tracer.scene import Mesh, Spheres
+from . import versions
 
 # Cycles' radius of points that have none.
 DEFAULT_RADIUS = 0.01
@@ -56,18 +58,25 @@ def _materials(mesh: bpy.types.Mesh, slot_count: int) -> Array:
 
 def _corner_normals(mesh: bpy.types.Mesh, vertices: Array, triangles: Array, corners: Array, faces: Array) -> Array | None:
     """(triangles, 3, 3) float32, or None where all faces are flat."""
-    sharp = _attribute(mesh, "sharp_face", "value", np.bool_, domain="FACE")
-    if sharp is None:
-        sharp = np.full(len(mesh.polygons), mesh.normals_domain == "FACE")
-    if sharp.all():
+    if mesh.normals_domain == "FACE":
         return None
-    normals = _read(mesh.corner_normals, "vector", np.float32, 3)[corners]
-    flat = sharp[faces]
+    if not (versions.CYCLES_KEEPS_FLAT_FACES and _only_faces_are_sharp(mesh)):
+        return _read(mesh.corner_normals, "vector", np.float32, 3)[corners]
+    normals = _read(mesh.vertex_normals, "vector", np.float32, 3)[triangles]
+    flat = _attribute(mesh, "sharp_face", "value", np.bool_, domain="FACE")[faces]
     first, second, third = np.moveaxis(vertices[triangles[flat]], 1, 0)
     across = np.cross(second - first, third - first)
     lengths = np.linalg.norm(across, axis=1, keepdims=True)
     normals[flat] = (across / np.where(lengths > 0, lengths, 1.0))[:, np.newaxis].astype(np.float32)
     return normals
+
+
+def _only_faces_are_sharp(mesh: bpy.types.Mesh) -> bool:
+    """Whether flat faces stand beside smooth ones, without sharp edges and without custom normals."""
+    if mesh.normals_domain != "CORNER" or mesh.has_custom_normals:
+        return False
+    edges = _attribute(mesh, "sharp_edge", "value", np.bool_, domain="EDGE")
+    return edges is None or not edges.any()
 
 
 def _corner_uvs(mesh: bpy.types.Mesh, corners: Array) -> Array | None:

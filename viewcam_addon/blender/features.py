@@ -23,11 +23,10 @@ def note_render(scene: bpy.types.Scene, camera_object: bpy.types.Object, ledger:
     for sentence in datablocks.beyond_pinhole(camera_object, scene):
         ledger.note(camera_object.name, "approximated", f"{sentence} (off on both sides)")
     ledger.set_for_cycles(camera_object.data.dof, "use_dof", False)
-    world = scene.world
-    if world and world.use_nodes and world.node_tree:
-        output = world.node_tree.get_output_node("CYCLES")
+    if scene.world and (tree := versions.node_tree(scene.world)):
+        output = tree.get_output_node("CYCLES")
         if output and output.inputs["Volume"].is_linked:
-            ledger.note(world.name, "approximated", "the world's volume is left out")
+            ledger.note(scene.world.name, "approximated", "the world's volume is left out, and its light with it")
             ledger.set_for_cycles(scene, "world", None)
 
 
@@ -62,9 +61,7 @@ def is_surface(placed: Placed, ledger: Ledger) -> bool:
     return False
 
 
-def note_object(
-    placed: Placed, slots: list[bpy.types.Material | None], depsgraph: bpy.types.Depsgraph, ledger: Ledger
-) -> None:
+def note_object(placed: Placed, slots: list[bpy.types.Material | None], depsgraph: bpy.types.Depsgraph, ledger: Ledger) -> None:
     """What a visible surface is beyond its geometry. slots : its materials."""
     shown, real, parent = placed
     name = placed.name

@@ -1,14 +1,16 @@
 """Which materials change where a surface is or what its passes say, and the plain one that stands in for them in Cycles.
 
-Level geometry models no material. Most leave the passes of geometry alone; some do not: displacement moves the surface, bump and
-normal maps turn the Normal pass, and where a surface is transparent Cycles writes what lies behind. For the time of a comparison
-such a material gets a second output for Cycles, a diffuse surface of its viewport colour; its own nodes stay untouched.
+Level geometry models no material. Most leave the passes of geometry alone; some do not: displacement moves the surface, bump
+and normal maps turn the Normal pass, and where a surface is transparent Cycles writes what lies behind. For the time of a
+comparison such a material gets a second output for Cycles, a diffuse surface of its viewport colour; its own nodes stay as
+they are.
 """
 
 from collections.abc import Iterator
 
 import bpy
 
+from . import versions
 from .borrowing import Borrower
 
 # Node types that let something else than the surface's own geometry into the passes.
@@ -19,8 +21,8 @@ _UNKNOWN = {"SCRIPT"}
 
 def departures(material: bpy.types.Material) -> list[str]:
     """Why this material's surface is not what level geometry models, one clause each; empty for most materials."""
-    tree = material.node_tree
-    if not material.use_nodes or tree is None:
+    tree = versions.node_tree(material)
+    if tree is None:
         return []
     output = tree.get_output_node("CYCLES")
     if output is None:

@@ -4,6 +4,13 @@ import bpy
 
 # What Cycles draws without a material: a diffuse surface, and since 5.0 a Principled one, which bends grazing smooth normals.
 DEFAULT_SURFACE_BENDS_NORMALS = bpy.app.version >= (5, 0)
+# How Cycles reads a mesh in which flat faces stand beside smooth ones (export_geometry.py). Measured: 4.2, 4.5, 5.0 and 5.2.
+CYCLES_KEEPS_FLAT_FACES = bpy.app.version < (5, 1)
+
+
+def node_tree(block: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree | None:
+    """The nodes that count in the render. Since 5.0 there is no switch between them and a plain colour."""
+    return block.node_tree if bpy.app.version >= (5, 0) or block.use_nodes else None
 
 
 def drivers(block: bpy.types.ID) -> list[bpy.types.FCurve]:

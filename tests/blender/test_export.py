@@ -1,0 +1,451 @@
+"""What Cycles sees is what the tracer gets: scenes of all kinds, each rendered by both and compared pass by pass."""
+
+import math
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from viewcam_addon.errors import NotModelledError  # noqa: E402
+from viewcam_addon.tracer.scene import Mesh, Spheres  # noqa: E402
+
+
+@pytest.fixture
+def camera(camera_object):
+    """Above and before the origin, looking at it: a few metres around it are in the picture."""
+    camera_object.location = (0.3, -7, 4)
+    camera_object.rotation_euler = (math.atan2(7, 4), 0.02, 0.04)
+    return camera_object
+
+
+@pytest.fixture
+def add(fresh_blender, scene, camera):
+    """A function that adds an object with the given data, optionally to a collection, and returns it."""
+
+    def add(data, name=None, location=(0, 0, 0), collection=None, **properties):
+        block = bpy.data.objects.new(name or (data.name if data else "Empty"), data)
+        (collection or scene.collection).objects.link(block)
+        block.location = location
+        for key, value in properties.items():
+            setattr(block, key, value)
+        return block
+
+    return add
+
+
+@pytest.fixture
+def monkey(fresh_blender, camera):
+    """Suzanne, smooth, with a UV map."""
+    bpy.ops.mesh.primitive_monkey_add(rotation=(-0.4, 0.1, 0.3))
+    bpy.ops.object.shade_smooth()
+    return bpy.context.object
+
+
+def mesh_from(primitive, **options):
+    """A mesh datablock of one of Blender's primitives, without an object."""
+    getattr(bpy.ops.mesh, f"primitive_{primitive}_add")(**options)
+    block = bpy.context.object
+    data = block.data
+    bpy.data.objects.remove(block)
+    return data
+
+
+def node_group(name="Nodes"):
+    """A geometry node tree with a geometry input and output: (tree, input node, output node)."""
+    tree = bpy.data.node_groups.new(name, "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    return tree, tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+
+
+def entry(exported, name):
+    return next(each for each in exported.ledger if each.object == name)
+
+
+def test_render_settings_of_modifiers_count_and_not_those_of_the_viewport(monkey, both_sides):
+    subdivision = monkey.modifiers.new("Subdivision", "SUBSURF")
+    subdivision.levels, subdivision.render_levels = 0, 2
+    hidden = monkey.modifiers.new("Decimate", "DECIMATE")
+    hidden.ratio, hidden.show_render = 0.1, False
+    sides = both_sides()
+    sides.check()
+    (mesh,) = sides.exported.geometries.values()
+    assert len(mesh.triangles) == 15744, f"{len(mesh.triangles)} triangles, Suzanne has 968 and 15744 at level 2"
+
+
+def test_what_is_hidden_in_the_viewport_only_is_rendered(add, both_sides):
+    cube = mesh_from("cube")
+    add(cube, "Here", location=(-1.5, 0, 0)).hide_viewport = True
+    add(cube, "Gone", location=(1.5, 0, 0)).hide_render = True
+    sides = both_sides()
+    sides.check()
+    assert [placed.name for placed in sides.exported.objects] == ["Here"]
+
+
+def test_shape_keys_armatures_and_drivers_are_followed(monkey, scene, add, both_sides):
+    monkey.shape_key_add(name="Basis")
+    key = monkey.shape_key_add(name="Wide")
+    for point in key.data:
+        point.co.x *= 1.5
+    key.value = 0.7
+    bpy.ops.object.armature_add(location=(0, 0, -1))
+    armature = bpy.context.object
+    armature.pose.bones[0].rotation_mode = "XYZ"
+    armature.pose.bones[0].rotation_euler = (0.2, 0.5, 0.1)
+    monkey.parent, monkey.parent_type, monkey.parent_bone = armature, "BONE", armature.data.bones[0].name
+    monkey.driver_add("scale", 2).driver.expression = "frame / 2"
+    scene.frame_set(3)
+    sides = both_sides()
+    sides.check()
+    largest = np.abs(next(iter(sides.exported.geometries.values())).vertices[:, 0]).max()
+    assert largest > 1.4, f"the shape key is not there, x reaches {largest}"
+
+
+def test_another_frame_is_evaluated_and_the_files_own_comes_back(monkey, scene, both_sides):
+    monkey.keyframe_insert("location", frame=1)
+    monkey.location = (2, 0, 0)
+    monkey.keyframe_insert("location", frame=11)
+    scene.frame_set(1)
+    sides = both_sides(frame=11)
+    sides.check()
+    assert sides.exported.objects[0].matrix[0, 3] == pytest.approx(2)
+    assert scene.frame_current == 1 and monkey.location.x == 0
+
+
+def test_text_curves_surfaces_and_metaballs_arrive_as_meshes(add, both_sides):
+    text = bpy.data.curves.new("Text", "FONT")
+    text.body, text.extrude, text.bevel_depth = "Bg", 0.1, 0.02
+    add(text, location=(-2, 0, 0), rotation_euler=(1.2, 0, 0))
+    curve = bpy.data.curves.new("Curve", "CURVE")
+    curve.dimensions, curve.bevel_depth = "3D", 0.15
+    spline = curve.splines.new("BEZIER")
+    spline.bezier_points.add(1)
+    spline.bezier_points[1].co = (1, 1, 1)
+    for point in spline.bezier_points:
+        point.handle_left_type = point.handle_right_type = "AUTO"
+    add(curve, location=(1, 0, 0))
+    bpy.ops.surface.primitive_nurbs_surface_sphere_add(location=(0.5, -1, -0.5))
+    ball = bpy.data.metaballs.new("Ball")
+    ball.elements.new()
+    ball.elements.new().co = (0.8, 0, 0)
+    add(ball, location=(-1.5, 0.5, -1))
+    sides = both_sides()
+    sides.check()
+    assert len(sides.exported.objects) == 4
+    assert len(np.unique(sides.cycles["Object Index"])) == 5
+
+
+def test_scales_that_mirror_stretch_and_shear_give_the_same_normals(add, both_sides):
+    monkey = mesh_from("monkey")
+    for polygon in monkey.polygons:
+        polygon.use_smooth = polygon.index % 3 > 0
+    add(monkey, "Mirrored", location=(-1.7, 0, 0), scale=(-1, 1, 1))
+    add(monkey, "Stretched", location=(1.7, 0, 0), scale=(0.5, 1.7, 0.9), rotation_euler=(0.3, 0.4, 0.5))
+    parent = add(None, "Parent", scale=(1, 0.4, 1), location=(0, 0.5, 1.6))
+    add(monkey, "Sheared", rotation_euler=(0.5, 0.5, 0.5), parent=parent)
+    sides = both_sides()
+    sides.check()
+    assert len(sides.exported.geometries) == 1
+
+
+def test_objects_with_a_mesh_of_their_own_have_normals_as_if_applied(add, both_sides):
+    """Cycles interpolates the normals of a mesh that one object uses in world space, of a shared one in object space."""
+    monkey = mesh_from("monkey")
+    monkey.polygons.foreach_set("use_smooth", [True] * len(monkey.polygons))
+    add(monkey, scale=(0.5, 2.0, -0.9), rotation_euler=(0.3, 0.4, 0.5))
+    both_sides().check()
+
+
+def test_materials_of_object_and_data_have_their_own_indices(add, scene, both_sides):
+    cube = mesh_from("cube")
+    red, green, blue = (bpy.data.materials.new(name) for name in ("Red", "Green", "Blue"))
+    red.pass_index, green.pass_index, blue.pass_index = 5, 7, 11
+    for material in (red, green, None):
+        cube.materials.append(material)
+    cube.polygons.foreach_set("material_index", [0, 1, 2, 1, 0, 9])
+    add(cube, "Data", location=(-1.5, 0, 0), rotation_euler=(0.5, 0.5, 0.5))
+    own = add(cube, "Own", location=(1.5, 0, 0), rotation_euler=(2.5, 0.5, 0.5))
+    own.material_slots[0].link, own.material_slots[0].material = "OBJECT", blue
+    sides = both_sides()
+    sides.check()
+    assert set(np.unique(sides.cycles["Material Index"])) == {0, 5, 7, 11}
+    assert {placed.name: placed.material_indices for placed in sides.exported.objects} == {"Data": (5, 7, 0), "Own": (11, 7, 0)}
+
+
+def test_a_material_override_of_the_view_layer_overrides_the_index(monkey, both_sides):
+    material = bpy.data.materials.new("Clay")
+    material.pass_index = 3
+    bpy.context.view_layer.material_override = material
+    sides = both_sides()
+    sides.check()
+    assert set(np.unique(sides.cycles["Material Index"])) == {0, 3}
+
+
+def test_custom_normals_count_but_on_sharp_faces(monkey, both_sides):
+    mesh = monkey.data
+    rng = np.random.default_rng(1)
+    normals = np.array([loop.normal for loop in mesh.corner_normals if False] or rng.normal(size=(len(mesh.loops), 3)))
+    normals = (
+        np.repeat([polygon.normal for polygon in mesh.polygons], [p.loop_total for p in mesh.polygons], axis=0) + 0.3 * normals
+    )
+    mesh.normals_split_custom_set((normals / np.linalg.norm(normals, axis=1, keepdims=True)).tolist())
+    mesh.polygons.foreach_set("use_smooth", [index % 4 > 0 for index in range(len(mesh.polygons))])
+    both_sides().check()
+
+
+def test_flat_faces_that_are_not_plane_show_each_triangles_normal(add, both_sides):
+    grid = mesh_from("grid", x_subdivisions=8, y_subdivisions=8, size=5)
+    heights = np.random.default_rng(2).normal(scale=0.3, size=len(grid.vertices))
+    for vertex, height in zip(grid.vertices, heights, strict=True):
+        vertex.co.z = height
+    grid.polygons[0].use_smooth = True
+    add(grid)
+    both_sides().check()
+
+
+def test_the_uv_map_is_the_one_active_for_rendering(monkey, both_sides):
+    mesh = monkey.data
+    mirrored = mesh.uv_layers.new(name="Render")
+    first = np.empty(2 * len(mesh.loops), np.float32)
+    mesh.uv_layers[0].uv.foreach_get("vector", first)
+    mirrored.uv.foreach_set("vector", 1 - first)
+    mirrored.active_render = True
+    mesh.uv_layers.active_index = 0
+    both_sides().check()
+    mesh.uv_layers[0].active_render = True
+    sides = both_sides()
+    sides.check()
+    seen = sides.cycles["UV"][sides.cycles["Object Index"][..., 0] > 0]
+    assert np.ptp(seen[:, 0]) > 0.1
+
+
+def test_a_mesh_without_uv_map_has_none_on_both_sides(add, both_sides):
+    mesh = mesh_from("ico_sphere", subdivisions=3)
+    while mesh.uv_layers:
+        mesh.uv_layers.remove(mesh.uv_layers[0])
+    add(mesh)
+    sides = both_sides()
+    sides.check()
+    assert not sides.cycles["UV"].any() and not sides.traced["UV"].any()
+
+
+def test_collection_instances_share_one_geometry(add, scene, both_sides):
+    leaf = bpy.data.collections.new("Leaf")
+    add(mesh_from("cone", radius1=0.3, depth=0.8), "Cone", collection=leaf)
+    add(mesh_from("cube", size=0.3), "Cube", location=(0, 0, 0.5), collection=leaf)
+    for i in range(5):
+        add(
+            None,
+            f"Instancer {i}",
+            location=(i - 2, 0, 0),
+            rotation_euler=(0, 0, i),
+            scale=(1, 1 + 0.2 * i, -1 if i == 3 else 1),
+            instance_type="COLLECTION",
+            instance_collection=leaf,
+        )
+    sides = both_sides()
+    sides.check()
+    assert len(sides.exported.geometries) == 2 and len(sides.exported.objects) == 10
+    assert entry(sides.exported, "Cone").reason == "placed 5 times"
+
+
+def test_instances_on_vertices_and_faces(add, both_sides):
+    child = add(mesh_from("ico_sphere", radius=0.2), "Child")
+    for kind, x in (("VERTS", -1.5), ("FACES", 1.5)):
+        parent = add(mesh_from("cube", size=1.5), kind, location=(x, 0, 0), instance_type=kind)
+        parent.show_instancer_for_render = kind == "FACES"
+        copy = child.copy()
+        bpy.context.scene.collection.objects.link(copy)
+        copy.parent = parent
+    bpy.data.objects.remove(child)
+    sides = both_sides()
+    sides.check()
+    assert len(sides.exported.objects) == 8 + 6 + 1
+
+
+def test_particles_are_instances(add, scene, both_sides):
+    stone = add(mesh_from("ico_sphere", radius=0.15), "Stone", location=(0, 0, -50))
+    ground = add(mesh_from("grid", size=5), "Ground")
+    ground.modifiers.new("Particles", "PARTICLE_SYSTEM")
+    settings = ground.particle_systems[0].settings
+    settings.count, settings.frame_start, settings.frame_end, settings.lifetime = 60, 1, 1, 100
+    settings.render_type, settings.instance_object = "OBJECT", stone
+    settings.particle_size, settings.size_random, settings.use_rotations = 1.0, 0.7, True
+    settings.physics_type, settings.normal_factor = "NO", 0
+    scene.frame_set(2)
+    sides = both_sides()
+    sides.check()
+    assert sum(placed.name == "Stone" for placed in sides.exported.objects) == 61
+
+
+def test_a_scatter_of_geometry_nodes(add, both_sides):
+    """Points on a grid, each with an instance of a collection's objects, joined with the grid itself."""
+    pebbles = bpy.data.collections.new("Pebbles")
+    add(mesh_from("ico_sphere", radius=0.2), "Round", collection=pebbles)
+    add(mesh_from("cube", size=0.3), "Square", collection=pebbles)
+    ground = add(mesh_from("grid", size=5, x_subdivisions=6, y_subdivisions=6), "Ground")
+    tree, source, target = node_group()
+    collection = tree.nodes.new("GeometryNodeCollectionInfo")
+    collection.inputs["Collection"].default_value = pebbles
+    collection.inputs["Separate Children"].default_value = True
+    collection.inputs["Reset Children"].default_value = True
+    scatter, join = tree.nodes.new("GeometryNodeInstanceOnPoints"), tree.nodes.new("GeometryNodeJoinGeometry")
+    scatter.inputs["Pick Instance"].default_value = True
+    scatter.inputs["Rotation"].default_value = (0.3, 0.2, 0.1)
+    tree.links.new(source.outputs[0], scatter.inputs["Points"])
+    tree.links.new(collection.outputs[0], scatter.inputs["Instance"])
+    tree.links.new(source.outputs[0], join.inputs[0])
+    tree.links.new(scatter.outputs[0], join.inputs[0])
+    tree.links.new(join.outputs[0], target.inputs[0])
+    ground.modifiers.new("Scatter", "NODES").node_group = tree
+    sides = both_sides()
+    sides.check()
+    names = [placed.name for placed in sides.exported.objects]
+    assert len(names) == 50 and set(names) == {"Ground", "Round", "Square"}
+    assert len(sides.exported.geometries) == 3
+
+
+def test_geometry_nodes_know_that_this_is_a_render(add, both_sides):
+    block = add(mesh_from("cube"), "Switched")
+    tree, source, target = node_group()
+    viewport, switch = tree.nodes.new("GeometryNodeIsViewport"), tree.nodes.new("GeometryNodeSwitch")
+    sphere, switch.input_type = tree.nodes.new("GeometryNodeMeshIcoSphere"), "GEOMETRY"
+    tree.links.new(viewport.outputs[0], switch.inputs["Switch"])
+    tree.links.new(source.outputs[0], switch.inputs["True"])
+    tree.links.new(sphere.outputs[0], switch.inputs["False"])
+    tree.links.new(switch.outputs[0], target.inputs[0])
+    block.modifiers.new("Nodes", "NODES").node_group = tree
+    sides = both_sides()
+    sides.check()
+    assert len(next(iter(sides.exported.geometries.values())).triangles) == 20
+
+
+@pytest.fixture
+def beads(add):
+    """36 points, radii from 0.1 to 0.45, of one material with index 4."""
+    block = add(mesh_from("grid", size=4, x_subdivisions=5, y_subdivisions=5), "Beads", rotation_euler=(0.5, 0.1, 0))
+    material = bpy.data.materials.new("Bead")
+    material.pass_index = 4
+    tree, source, target = node_group()
+    points, index = tree.nodes.new("GeometryNodeMeshToPoints"), tree.nodes.new("GeometryNodeInputIndex")
+    radius, paint = tree.nodes.new("ShaderNodeMath"), tree.nodes.new("GeometryNodeSetMaterial")
+    radius.operation, radius.inputs[1].default_value, radius.inputs[2].default_value = "MULTIPLY_ADD", 0.01, 0.1
+    paint.inputs["Material"].default_value = material
+    for output, target_input in (
+        (index.outputs[0], radius.inputs[0]),
+        (radius.outputs[0], points.inputs["Radius"]),
+        (source.outputs[0], points.inputs[0]),
+        (points.outputs[0], paint.inputs[0]),
+        (paint.outputs[0], target.inputs[0]),
+    ):
+        tree.links.new(output, target_input)
+    block.modifiers.new("Nodes", "NODES").node_group = tree
+    return block
+
+
+def test_point_clouds_are_spheres_of_their_radii(beads, both_sides):
+    sides = both_sides()
+    sides.check()
+    (spheres,) = sides.exported.geometries.values()
+    assert isinstance(spheres, Spheres) and np.allclose(spheres.radii, 0.1 + 0.01 * np.arange(36), atol=1e-6)
+    assert set(np.unique(sides.cycles["Material Index"])) == {0, 4}
+
+
+def test_stretched_point_clouds_are_ellipsoids(beads, both_sides):
+    """Cycles' Normal pass is not theirs: it is the direction from the centre, turned to the viewer."""
+    beads.scale = (0.5, 1.5, 1)
+    rows = {row.name: row.ok for row in both_sides().comparison.rows}
+    assert rows.pop("Position") and rows.pop("Depth") and rows.pop("Position depth"), rows
+
+
+def test_excluded_hidden_and_indirect_collections(add, scene, both_sides):
+    cube = mesh_from("cube", size=0.8)
+    layers = {}
+    for i, name in enumerate(("Shown", "Excluded", "Hidden", "Disabled", "Indirect")):
+        collection = bpy.data.collections.new(name)
+        scene.collection.children.link(collection)
+        add(cube, name, location=(i - 2, 0, 0), collection=collection)
+        layers[name] = bpy.context.view_layer.layer_collection.children[name]
+    layers["Excluded"].exclude = True
+    layers["Hidden"].hide_viewport = True  # of the window only
+    bpy.data.collections["Disabled"].hide_render = True
+    layers["Indirect"].indirect_only = True
+    sides = both_sides()
+    sides.check()
+    assert {placed.name for placed in sides.exported.objects} == {"Shown", "Hidden"}
+    assert entry(sides.exported, "Indirect").reason == "not visible to the camera"
+
+
+def test_ray_visibility_of_object_and_instancer(add, both_sides):
+    cube = mesh_from("cube", size=0.8)
+    add(cube, "Shown", location=(-1.5, 0, 0))
+    add(cube, "Shadow only", location=(0, 0, 0)).visible_camera = False
+    collection = bpy.data.collections.new("Instanced")
+    add(cube, "Inside", collection=collection)
+    add(
+        None,
+        "Instancer",
+        location=(1.5, 0, 0),
+        instance_type="COLLECTION",
+        instance_collection=collection,
+        visible_camera=False,
+    )
+    sides = both_sides()
+    sides.check()
+    assert [placed.name for placed in sides.exported.objects] == ["Shown"]
+
+
+def test_holdouts_and_shadow_catchers_are_plain_objects_on_both_sides(add, scene, both_sides):
+    cube = mesh_from("cube", size=0.8)
+    add(cube, "Plain", location=(-2, 0, 0))
+    add(cube, "Holdout", location=(-0.7, 0, 0)).is_holdout = True
+    add(cube, "Catcher", location=(0.7, 0, 0)).is_shadow_catcher = True
+    collection = bpy.data.collections.new("Held out")
+    scene.collection.children.link(collection)
+    add(cube, "In collection", location=(2, 0, 0), collection=collection)
+    bpy.context.view_layer.layer_collection.children["Held out"].holdout = True
+    sides = both_sides()
+    sides.check()
+    approximated = {each.object for each in sides.exported.ledger if each.status == "approximated"}
+    assert approximated == {"Holdout", "Catcher", "In collection"}
+    assert len(np.unique(sides.cycles["Object Index"])) == 5
+    assert bpy.context.view_layer.layer_collection.children["Held out"].holdout and bpy.data.objects["Holdout"].is_holdout
+
+
+def test_the_view_layer_of_the_window_is_the_one_that_counts(add, scene, both_sides):
+    cube = mesh_from("cube")
+    first, second = bpy.data.collections.new("First"), bpy.data.collections.new("Second")
+    for collection, x in ((first, -1.5), (second, 1.5)):
+        scene.collection.children.link(collection)
+        add(cube, collection.name, location=(x, 0, 0), collection=collection)
+    other = scene.view_layers.new("Other")
+    other.layer_collection.children["First"].exclude = True
+    other.use = False
+    scene.view_layers[0].layer_collection.children["Second"].exclude = True
+    sides = both_sides()
+    sides.check()
+    assert [placed.name for placed in sides.exported.objects] == ["First"]
+    assert not other.use and scene.view_layers[0].use
+
+
+def test_strict_names_what_can_not_be_modelled(add, both_sides):
+    add(mesh_from("cube"), "Ghost").is_holdout = True
+    with pytest.raises(NotModelledError, match="'Ghost' can't be modelled, a holdout"):
+        both_sides(strict=True)
+
+
+def test_hair_and_volumes_are_skipped_on_both_sides(add, monkey, both_sides):
+    monkey.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    settings = monkey.particle_systems[0].settings
+    settings.type, settings.count, settings.hair_length = "HAIR", 100, 2
+    add(bpy.data.hair_curves.new("Curves"))
+    add(bpy.data.volumes.new("Volume"))
+    sides = both_sides()
+    sides.check()
+    assert (entry(sides.exported, monkey.name).status, entry(sides.exported, monkey.name).reason) == (
+        "approximated",
+        "particle hair is not modelled",
+    )
+    assert entry(sides.exported, "Curves").status == entry(sides.exported, "Volume").status == "skipped"
+    assert isinstance(next(iter(sides.exported.geometries.values())), Mesh)
