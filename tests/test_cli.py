@@ -1,0 +1,203 @@
+"""The command as its users type it: one sentence and an exit status for every bad input, and nothing half-written."""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from viewcam_addon import image
+from viewcam_addon.cli import main
+
+CAMERA = {"eye": [0, -5, 0], "look_at": [0, 0, 0], "up": [0, 0, 1], "distance": 100, "width": 64, "height": 48}
+SCENE = {
+    "format": "virtual-pinhole-scene",
+    "version": 1,
+    "camera": CAMERA,
+    "geometries": {"ball": {"type": "spheres", "centers": [[0, 0, 0]], "radii": [1]}},
+    "objects": [{"name": "Ball", "geometry": "ball", "object_index": 3}],
+}
+
+
+def fails(capfd, *arguments, status=2):
+    """Run viewcam; it must fail with one line on stderr, which is returned."""
+    assert main([str(word) for word in arguments]) == status
+    lines = capfd.readouterr().err.strip().splitlines()
+    assert len(lines) == 1, f"one line on stderr, not {lines}"
+    assert "bug" not in lines[0], lines[0]
+    return lines[0]
+
+
+def write_scene(folder, **changes):
+    path = folder / "scene.json"
+    path.write_text(json.dumps(SCENE | changes))
+    return path
+
+
+def without(mapping, key):
+    return {name: value for name, value in mapping.items() if name != key}
+
+
+def test_a_scene_written_by_hand_is_traced_and_compared_with_itself(tmp_path, capfd):
+    scene, picture = write_scene(tmp_path), tmp_path / "out.exr"
+    assert main(["render", str(scene), str(picture), "--json", str(tmp_path / "render.json")]) == 0
+    traced = image.read(picture)
+    assert traced["Object Index"][24, 32, 0] == 3
+    assert traced["Depth"][24, 32, 0] == pytest.approx(4, abs=1e-3)
+    assert json.loads((tmp_path / "render.json").read_text())["exit_status"] == 0
+    result = tmp_path / "compare.json"
+    assert main(["compare", str(picture), str(picture), "--scene", str(scene), "--json", str(result)]) == 0
+    assert json.loads(result.read_text())["passed"] is True
+    assert capfd.readouterr().err == ""
+
+
+def test_two_cameras_a_pixel_apart_are_not_the_same_picture(tmp_path, capfd):
+    for name, look_at in (("a", [0, 0, 0]), ("b", [0.05, 0, 0])):
+        (tmp_path / name).mkdir()
+        scene = write_scene(tmp_path / name, camera=CAMERA | {"look_at": look_at})
+        assert main(["render", str(scene), str(tmp_path / f"{name}.exr")]) == 0
+    report, result = tmp_path / "report", tmp_path / "result.json"
+    words = ["compare", str(tmp_path / "a.exr"), str(tmp_path / "b.exr"), "--report", str(report), "--json", str(result)]
+    assert main(words) == 1
+    assert "Not the same picture" in capfd.readouterr().out
+    assert json.loads(result.read_text())["exit_status"] == 1
+    assert "Not the same picture" in (report / "index.html").read_text(encoding="utf-8")
+
+
+def test_the_size_and_the_stated_camera_can_be_chosen(tmp_path, capfd):
+    scene = write_scene(tmp_path, stated_camera=CAMERA | {"distance": 50})
+    assert main(["render", str(scene), str(tmp_path / "a.exr"), "--size", "32x24"]) == 0
+    assert image.read(tmp_path / "a.exr").size == (32, 24)
+    assert main(["render", str(scene), str(tmp_path / "b.exr"), "--stated"]) == 0
+    assert image.read(tmp_path / "b.exr").camera.distance == (50, 50)
+    assert "stated_camera" in fails(capfd, "render", write_scene(tmp_path), tmp_path / "c.exr", "--stated")
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"camera": without(CAMERA, "eye")}, ["camera", "eye"]),
+        ({"camera": CAMERA | {"look_at": CAMERA["eye"]}}, ["camera", "eye", "look_at", "same point"]),
+        ({"camera": CAMERA | {"up": [0, 0, 0]}}, ["camera", "up"]),
+        ({"camera": CAMERA | {"eye": [0, float("nan"), 0]}}, ["NaN", "finite"]),
+        ({"camera": CAMERA | {"distance": 0}}, ["camera", "distance", "0"]),
+        ({"camera": CAMERA | {"distance": "far"}}, ["camera", "distance"]),
+        ({"camera": CAMERA | {"width": 1.5}}, ["camera", "width"]),
+        ({"version": 99}, ["version", "99"]),
+        ({"objects": [{"name": "Ball", "geometry": "none"}]}, ["Ball", "none"]),
+        ({"objects": "Ball"}, ["objects"]),
+        ({"geometries": {"ball": {"type": "spheres", "centers": [[0, 0, 0]]}}}, ["ball", "radii"]),
+        ({"geometries": {"ball": {"type": "spheres", "centers": [[0, 0]], "radii": [1]}}}, ["ball", "centers"]),
+        ({"geometries": {"ball": {"type": "cube"}}}, ["ball", "cube"]),
+        ({"surprise": 1}, ["surprise"]),
+        ({"arrays": "../elsewhere.npz"}, ["arrays", "../elsewhere.npz"]),
+    ],
+)
+def test_a_wrong_scene_file_is_refused_by_the_key_that_is_wrong(tmp_path, capfd, changes, words):
+    line = fails(capfd, "render", write_scene(tmp_path, **changes), tmp_path / "out.exr")
+    assert all(word in line for word in ["scene.json", *words]), line
+    assert not (tmp_path / "out.exr").exists()
+
+
+def test_a_scene_file_that_is_no_json_or_not_there_is_refused(tmp_path, capfd):
+    (tmp_path / "broken.json").write_text('{"version": 1,')
+    assert "broken.json" in fails(capfd, "render", tmp_path / "broken.json", tmp_path / "out.exr")
+    assert "none.json" in fails(capfd, "render", tmp_path / "none.json", tmp_path / "out.exr")
+
+
+class Exploit:
+    """What a pickle could do on being read."""
+
+    def __reduce__(self):
+        return (os.mkdir, ("was-executed",))
+
+
+def test_an_npz_with_pickled_objects_is_refused_and_nothing_of_it_runs(tmp_path, capfd, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    np.savez(tmp_path / "scene.npz", centers=np.array([Exploit()], dtype=object))
+    ball = {"type": "spheres", "centers": {"npz": "centers"}, "radii": [1]}
+    scene = write_scene(tmp_path, geometries={"ball": ball}, arrays="scene.npz")
+    line = fails(capfd, "render", scene, tmp_path / "out.exr")
+    assert "centers" in line and "object" in line, line
+    assert not (tmp_path / "was-executed").exists()
+
+
+def test_pictures_that_can_not_be_compared_are_refused(tmp_path, capfd):
+    for name, size in (("small", "32x24"), ("large", "64x48")):
+        assert main(["render", str(write_scene(tmp_path)), str(tmp_path / f"{name}.exr"), "--size", size]) == 0
+    small, large = tmp_path / "small.exr", tmp_path / "large.exr"
+    assert "32 × 24" in fails(capfd, "compare", large, small)
+    (tmp_path / "cut.exr").write_bytes(large.read_bytes()[:2000])
+    assert "cut.exr" in fails(capfd, "compare", large, tmp_path / "cut.exr")
+    image.write(tmp_path / "bare.exr", image.Image({"Depth": np.ones((48, 64, 1), np.float32)}))
+    assert "'Position'" in fails(capfd, "compare", large, tmp_path / "bare.exr")
+    assert "--scene" in fails(capfd, "compare", tmp_path / "bare.exr", large)
+    assert "none.exr" in fails(capfd, "compare", tmp_path / "none.exr", large)
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ([], "COMMAND"),
+        (["paint"], "paint"),
+        (["render"], "SCENE.json"),
+        (["render", "a", "b", "--size", "3"], "'3' is no size"),
+        (["render", "a", "b", "--size", "0x3"], "'0'"),
+        (["render", "a", "b", "--threads", "none"], "'none'"),
+        (["render", "a", "b", "--level", "magic"], "magic"),
+        (["check", "a.blend", "--frame", "1.5"], "1.5"),
+    ],
+)
+def test_wrong_usage_is_one_line_that_says_where_help_is(capfd, words, expected):
+    line = fails(capfd, *words)
+    assert expected in line and "--help" in line, line
+
+
+def limit_files_to_4_kilobytes():
+    import signal
+
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+
+
+def viewcam(*words, **options):
+    command = [sys.executable, "-m", "viewcam_addon.cli", *map(str, words)]
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent.parent)}
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False, **options)
+
+
+def test_a_file_that_can_not_grow_leaves_nothing_behind(tmp_path):
+    scene, out = write_scene(tmp_path), tmp_path / "out"
+    done = viewcam("render", scene, out / "picture.exr", preexec_fn=limit_files_to_4_kilobytes)
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1), done.stderr
+    assert "picture.exr can't be written" in done.stderr
+    assert list(out.iterdir()) == []
+
+
+def mounted(options, script, *arguments):
+    """Run a shell script beside a small file system mounted at $1, in a mount namespace of its own."""
+    mount = f'mount -t tmpfs -o {options} tmpfs "$1" && shift && '
+    rights = [] if os.geteuid() == 0 else ["--map-root-user", "--user"]
+    command = ["unshare", *rights, "--mount", "sh", "-c", mount + script, "sh", *map(str, arguments)]
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent.parent)}
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+
+RENDER_AND_LIST = '"$1" -m viewcam_addon.cli render "$2" "$3/picture.exr"; status=$?; ls -A "$3"; exit $status'
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"), [("size=8k", "space"), ("ro", "Read-only")], ids=["a full disk", "a read-only folder"]
+)
+def test_where_nothing_can_be_written_one_line_says_so_and_nothing_is_left(tmp_path, options, reason):
+    scene, disk = write_scene(tmp_path), tmp_path / "disk"
+    disk.mkdir()
+    done = mounted(options, RENDER_AND_LIST, disk, sys.executable, scene, disk)
+    if "unshare" in done.stderr or "mount" in done.stderr:
+        pytest.skip(f"no right to mount a file system here: {done.stderr.strip()}")
+    assert done.returncode == 2 and reason in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
+    assert done.stdout == "", "a file remains"
