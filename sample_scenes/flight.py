@@ -99,7 +99,7 @@ def islands():
     spots = [(-8, -2, 3.2), (9.5, 6, 4.2), (-7.5, 15, 2.6), (11, 24, 3.4), (-9, 33, 4.6), (8.5, 42, 3.0), (-15, 50, 5.5)]
     spots += [(16, 58, 6.5)]
     for number, (x, y, size) in enumerate(spots, 1):
-        islet = b.place(f"Islet {number}", b.mesh(f"Islet {number}", []), location=(x, y, -0.25))
+        islet = b.place(f"Islet {number}", b.mesh(f"Islet {number}", []), rock, location=(x, y, -0.25))
         use_nodes(islet, group, size=size, seed=number, rock=rock, moss=moss)
 
 

@@ -87,7 +87,8 @@ def square(steps):
     chimney = b.matte("Brick", "9c4f38")
     b.turned("Chimney", [(0, 0), (1.3, 0), (1.05, 14), (1.2, 14), (1.2, 14.6), (0.9, 14.6), (0.9, 13)], chimney, (-20.0, 36, 0))
     group = _paving_joints()
-    use_nodes(b.place("Paving joints", b.mesh("Paving joints", [])), group, material=b.matte("Joints", "b5824b"))
+    joints = b.matte("Joints", "b5824b")
+    use_nodes(b.place("Paving joints", b.mesh("Paving joints", []), joints), group, material=joints)
 
 
 def _paving_joints():

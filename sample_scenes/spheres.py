@@ -42,8 +42,8 @@ def pearls(group):
     """One point cloud a band, for a point cloud has one material."""
     into, first = b.collection("Pearls"), 0
     for number, (count, code) in enumerate(BANDS, 1):
-        cloud = b.place(f"Band {number}", b.mesh(f"Band {number}", []), into=into)
         material = b.glossy(f"Pearl {number}", code, roughness=0.22)
+        cloud = b.place(f"Band {number}", b.mesh(f"Band {number}", []), material, into=into)
         use_nodes(cloud, group, first=first, count=count, material=material)
         first += count
 
@@ -60,7 +60,7 @@ def drop():
         ("Droplet", (0.62, 0.35, 1.12), (0.36, 0.36, 0.3), (20, 30, 0)),
         ("Splash", (-0.52, -0.3, 0.98), (0.24, 0.24, 0.28), (0, 20, 0)),
     ]:
-        cloud = b.place(name, b.mesh(name, []), location=location, rotation=tilt, scale=scale)
+        cloud = b.place(name, b.mesh(name, []), gold, location=location, rotation=tilt, scale=scale)
         use_nodes(cloud, group, material=gold)
 
 

@@ -29,18 +29,18 @@ def build():
     b.sun(4.6, "ffe0b5", elevation=36, azimuth=118, angle=1.2)
     b.softbox("Window", 30, "bcd3ff", (-1.8, 1.0, 2.2), (0, 0, TABLE_HEIGHT), 1.2, 1.2)
     b.sky("b9cdea", 0.5)
-    state_camera(scene, eye=(0, 0, 3.6), look_at=(0, 0, TABLE_HEIGHT), distance=1590.0)
+    state_camera(scene, eye=(0, 0, 3.6), look_at=(0, 0, TABLE_HEIGHT), distance=1587.0)
     return scene
 
 
 def floor():
     """Tiles of two colours in a chequer, laid by geometry nodes."""
-    tile = b.box("Tile", (0.298, 0.298, 0.02), None, (0, 0, -0.02), bevel=0.004)
+    tile = b.box("Tile", (0.298, 0.298, 0.02), b.matte("Unglazed", "c9b79a"), (0, 0, -0.02), bevel=0.004)
     tile.hide_render = tile.hide_viewport = True
     group = _tiles(tile)
     for name, code, offset in [("Light tiles", "d9c3a0", 0), ("Dark tiles", "7d9488", 1)]:
         material = b.matte(name, code)
-        use_nodes(b.place(name, b.mesh(name, [])), group, odd=offset, material=material)
+        use_nodes(b.place(name, b.mesh(name, []), material), group, odd=offset, material=material)
     b.ground("Grout", 6, 6, b.matte("Grout", "b5a68c"), (0, 0, -0.004))
 
 

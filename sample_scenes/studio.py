@@ -137,7 +137,7 @@ def meadow(furniture):
     kept_clear = b.collection("Kept clear")
     for thing in furniture:
         kept_clear.objects.link(thing)
-    field = b.ground("Meadow", 9.0, 7.0, None, (0, 1.4, 0))
+    field = b.ground("Meadow", 9.0, 7.0, grasses[0], (0, 1.4, 0))
     use_nodes(field, _scatter(kit, kept_clear))
 
 

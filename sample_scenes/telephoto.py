@@ -28,7 +28,7 @@ def build():
     ]:
         width = 46.0 * (5000.0 + y) / 5000.0 * 1.15
         material = b.matte(name, code)
-        ridge = b.place(name, b.mesh(name, []), location=(0, y, z))
+        ridge = b.place(name, b.mesh(name, []), material, location=(0, y, z))
         use_nodes(ridge, near, width=width, height=height, seed=seed, density=density, material=material)
     clouds()
     photographer((7.4, -0.5, 2.1))
@@ -61,8 +61,9 @@ def moon(seen_at, distance: float, radius: float):
     is_sea = nodes.math("GREATER_THAN", noise, 0.5)
     coloured = nodes.add("GeometryNodeSetMaterial", {"Geometry": coloured, "Selection": is_sea, "Material": sea})
     group = nodes.finish(nodes.add("GeometryNodeSetShadeSmooth", {"Geometry": coloured}))
-    ball = b.place("Moon", b.mesh("Moon", []), location=(x, distance, z), rotation=(0, 20, 35))
-    use_nodes(ball, group, highland=b.matte("Highland", "f2e3c9"), sea=b.matte("Sea", "b3a08a"))
+    highland = b.matte("Highland", "f2e3c9")
+    ball = b.place("Moon", b.mesh("Moon", []), highland, (x, distance, z), rotation=(0, 20, 35))
+    use_nodes(ball, group, highland=highland, sea=b.matte("Sea", "b3a08a"))
 
 
 def pine_kit():
@@ -76,9 +77,8 @@ def pine_kit():
         for tier in range(tiers):
             t = tier / tiers
             wide = girth * (1 - t) ** 0.85 * (1 + 0.12 * math.sin(7 * tier + number)) + 0.08
-            cone = bmesh.ops.create_cone(shape, segments=11, radius1=wide, radius2=0.02, depth=0.95 * height / tiers * 1.7)[
-                "verts"
-            ]
+            tall = 1.6 * height / tiers
+            cone = bmesh.ops.create_cone(shape, segments=11, radius1=wide, radius2=0.0, depth=tall)["verts"]
             bmesh.ops.rotate(shape, verts=cone, matrix=_tilt(0.09 * math.sin(5 * tier), 0.09 * math.cos(3 * tier)))
             bmesh.ops.translate(shape, verts=cone, vec=(0, 0, height * (0.2 + 0.8 * t)))
         data = b.mesh(f"Pine {number}", [])

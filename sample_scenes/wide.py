@@ -104,7 +104,7 @@ def hall():
     b.ground("Floor", width, depth, b.glossy("Floor", "a8805c", 0.5), (0, 10, 0))
     strips = _strips()
     red = b.matte("Red tiles", "8c4630")
-    use_nodes(b.place("Tiles across", b.mesh("Tiles across", [])), strips, material=red)
+    use_nodes(b.place("Tiles across", b.mesh("Tiles across", []), red), strips, material=red)
     plank = b.matte("Ceiling", "6f5a48")
     b.ground("Ceiling", width, depth, plank, (0, 10, 6.65))
     beam = b.box("Beams", (0.22, depth, 0.3), b.matte("Beams", "4a3428"), (_first_x(), 10, 6.35), bevel=0.02)
