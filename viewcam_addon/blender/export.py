@@ -29,7 +29,7 @@ Matrix = NDArray[np.float64]
 class Source:
     """A visible surface that stands in the world once or many times.
 
-    data : evaluated. key : the same for all that share a geometry in Cycles. materials : pass indices of the slots, one at least.
+    data : evaluated. key : the same for all that share a geometry in Cycles. materials : pass indices of the slots, at least 1.
     """
 
     name: str

@@ -78,7 +78,7 @@ def fill_empty_slots(borrow: Borrower, block: bpy.types.Object) -> None:
     borrow.afterwards(bpy.data.materials.remove, plain)
     plain.cycles.use_bump_map_correction = False
     if not block.material_slots:
-        borrow.afterwards(block.data.materials.pop)
+        borrow.afterwards(block.data.materials.clear)  # pop would leave a slot behind on the object
         block.data.materials.append(plain)
     for slot in block.material_slots:
         if slot.material is None:
