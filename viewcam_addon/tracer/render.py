@@ -46,8 +46,9 @@ class Tracer:
 
         def trace(first: int) -> None:
             tile = slice(first, min(first + TILE, width * height))
-            rows, columns = np.divmod(np.arange(tile.start, tile.stop), width)
-            self._trace({name: values[tile] for name, values in flat.items()}, columns + 0.5, rows + 0.5)
+            pixels = np.arange(tile.start, tile.stop)
+            rows = pixels // width
+            self._trace({name: values[tile] for name, values in flat.items()}, pixels - rows * width + 0.5, rows + 0.5)
 
         with ThreadPoolExecutor(self._threads) as pool:
             for done in pool.map(trace, range(0, width * height, TILE)):
