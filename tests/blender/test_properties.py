@@ -161,7 +161,7 @@ def test_a_linked_duplicate_has_values_of_its_own_and_shares_the_lens(posed_came
     assert tuple(posed_camera.location) == (7, -6, 5)
     twin.virtual_pinhole.distance = 700.0
     (finding,) = cameras.check(posed_camera, cameras.stated(posed_camera, scene), scene)
-    assert "'Camera.001' shares the camera data" in finding
+    assert "The camera data 'Camera' is shared with 'Camera.001'" in finding
     assert cameras.check(twin, cameras.stated(twin, scene), scene) == []
 
 

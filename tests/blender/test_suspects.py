@@ -87,7 +87,7 @@ def test_keyframes_on_the_four_values_are_no_culprits(posed_camera, scene):
 def test_locked_channels_are_told(posed_camera, scene):
     posed_camera.lock_location[0] = posed_camera.lock_rotation[2] = True
     (finding,) = findings_after_setting(posed_camera, scene)
-    assert finding.startswith("The location and rotation of 'Camera' is locked")
+    assert finding.startswith("'Camera' is locked in its location and rotation")
 
 
 def test_a_parent_that_is_scaled_non_uniformly_is_named(posed_camera, scene):

@@ -162,6 +162,25 @@ def press_the_buttons():
     is_at_its_values()
 
 
+def play_keyframes():
+    for frame, height in ((1, 3), (40, 9)):
+        values().eye[2] = height
+        values().keyframe_insert("eye", frame=frame)
+    bpy.context.scene.frame_set(1)
+    view, _ = region("VIEW_3D", "UI")
+    with bpy.context.temp_override(window=window(), area=view):
+        bpy.ops.screen.animation_play()
+    heights = set()
+    while len(heights) < 4:
+        yield
+        heights.add(round(values().eye[2], 3))
+        is_at_its_values()
+    with bpy.context.temp_override(window=window(), area=view):
+        bpy.ops.screen.animation_cancel()
+    camera().animation_data_clear()
+    yield
+
+
 def draw_a_warning():
     values().look_at = values().eye
     yield
@@ -188,6 +207,7 @@ def steps():
         edit_undo_redo,
         zoom,
         press_the_buttons,
+        play_keyframes,
         draw_a_warning,
         look_into_the_properties_editor,
     ):

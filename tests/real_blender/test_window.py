@@ -12,6 +12,7 @@ PARTS = (
     "edit_undo_redo",
     "zoom",
     "press_the_buttons",
+    "play_keyframes",
     "draw_a_warning",
     "look_into_the_properties_editor",
 )

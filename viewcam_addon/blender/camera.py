@@ -81,7 +81,9 @@ def _check_storable(camera_object: bpy.types.Object, **numbers: tuple[float, ...
     for name, values in numbers.items():
         if not all(abs(value) <= _LARGEST_FLOAT32 for value in values):
             largest = max(values, key=abs)
-            raise InputError(f"the {name} of camera {camera_object.name!r} needs {largest:g}, too large for Blender: reduce it")
+            raise InputError(
+                f"the {name} of camera {camera_object.name!r} needs {largest:g}, beyond Blender's numbers: give one less extreme"
+            )
 
 
 def check(camera_object: bpy.types.Object, wanted: Pinhole, scene: bpy.types.Scene) -> list[str]:

@@ -73,7 +73,8 @@ def _locks(camera_object: bpy.types.Object) -> Iterator[Suspect]:
     locked = {"location": any(camera_object.lock_location), "rotation": any(camera_object.lock_rotation)}
     names = [name for name, is_locked in locked.items() if is_locked]
     if names:
-        culprit = f"The {' and '.join(names)} of {camera_object.name!r} is locked, and the Virtual Pinhole sets it all the same"
+        channels = " and ".join(names)
+        culprit = f"{camera_object.name!r} is locked in its {channels}, and the Virtual Pinhole moves it all the same"
         yield Suspect(culprit, frozenset(), "unlock it, or disable the Virtual Pinhole", always=True)
 
 
@@ -101,5 +102,5 @@ def _sharers(camera_object: bpy.types.Object) -> Iterator[Suspect]:
         return
     others = sorted(other.name for other in bpy.data.objects if other.data == camera and other != camera_object)
     if others:
-        culprit = f"{', '.join(map(repr, others))} shares the camera data {camera.name!r}"
+        culprit = f"The camera data {camera.name!r} is shared with {', '.join(map(repr, others))}"
         yield Suspect(culprit, frozenset({DISTANCE, CENTRE}), "make the data single-user, or give both the same distance")
