@@ -18,7 +18,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Floats, Indices, cross, gather, linear
+from .arrays import Floats, Indices, cross, dot, gather, linear
 from .ellipsoids import Ellipsoids
 from .triangles import Planes, Triangles
 
@@ -33,6 +33,11 @@ except ImportError:  # no wheel for this machine: `Plain` gives the same answers
 _MARGIN = 2.0**-20
 _CARD_SPACING = 2.0**-20
 _FAR = 1e37
+
+_EDGES = ((1, 2), (2, 0), (0, 1))
+# The side of an edge V, W that a ray d passes on is the sign of d·(V × W). Its nine products and eight sums are rounded by less
+# than 2⁻⁵⁰ |V| |W| |d| in all, and what is closer to the edge than that counts as inside on both sides of it.
+_EDGE_ROUNDING = 2.0**-50
 
 
 class Visibility(Protocol):
@@ -124,7 +129,7 @@ def _cards(ellipsoids: Ellipsoids, first: int) -> tuple["EmbreeScene", NDArray[n
 
 
 class Plain:
-    """Every ray against every primitive near it, in float64: slow, and watertight, since neighbours agree about their edge."""
+    """Every ray against every primitive near it, in float64: slow, and watertight by what rounding could lose."""
 
     _RAYS, _CANDIDATES = 256, 2048  # at a time: some arrays of 4 MB
 
@@ -133,7 +138,9 @@ class Plain:
         self._start, self._end = clip
         self._triangle_count = triangles.count
         corners = gather(triangles.vertices, triangles.corners).transpose(1, 0, 2)
-        self._edges = np.stack([cross(corners[j], corners[k]) for j, k in ((1, 2), (2, 0), (0, 1))])
+        length = np.sqrt(dot(corners.swapaxes(0, 1), corners.swapaxes(0, 1)))
+        self._edges = np.stack([cross(corners[j], corners[k]) for j, k in _EDGES])
+        self._edge_rounding = np.stack([length[j] * length[k] * _EDGE_ROUNDING for j, k in _EDGES])
         self._bounds = np.concatenate([_triangle_bounds(corners, planes), ellipsoids.bounds], axis=1)
         self._bounds += np.array([[-1], [1], [-1], [1]]) * _MARGIN * (1 + np.nan_to_num(np.abs(self._bounds), posinf=0.0))
 
@@ -164,9 +171,11 @@ class Plain:
         """(n, k) depths at which n rays meet k primitives, inf where they don't or where the depth is clipped."""
         split = np.searchsorted(primitives, self._triangle_count)
         triangles, spheres = primitives[:split], primitives[split:] - self._triangle_count
-        a, b, c = (linear(edge, x, y) for edge in gather(self._edges, triangles))
-        inside = ((a >= 0) & (b >= 0) & (c >= 0)) | ((a <= 0) & (b <= 0) & (c <= 0))
-        inside &= (a != 0) | (b != 0) | (c != 0)
+        sides = [linear(edge, x, y) for edge in gather(self._edges, triangles)]
+        length = np.sqrt(x * x + y * y + 1.0)
+        rounding = [edge * length for edge in gather(self._edge_rounding, triangles)]
+        inside = np.logical_and.reduce([side >= -error for side, error in zip(sides, rounding, strict=True)])
+        inside |= np.logical_and.reduce([side <= error for side, error in zip(sides, rounding, strict=True)])
         depth = np.concatenate(
             [np.where(inside, self._planes.depth(triangles, x, y), np.inf), self._ellipsoids.depth(spheres, x, y)], axis=1
         )

@@ -1,0 +1,118 @@
+"""Scenes for the tracer's tests: builders, as fixtures, of what several modules trace."""
+
+import numpy as np
+import pytest
+
+from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres
+
+
+@pytest.fixture(scope="session")
+def ball():
+    """A closed ball of triangles, smooth and with a UV map: ball(rings) → Mesh of radius 1."""
+
+    def build(rings: int = 12) -> Mesh:
+        theta, phi = np.meshgrid(np.linspace(0, np.pi, rings + 1), np.linspace(0, 2 * np.pi, 2 * rings + 1), indexing="ij")
+        phi[:, -1] = 0  # the seam's vertices are the same on both sides, so that the ball is closed
+        theta[-1] = np.pi
+        vertices = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
+        vertices[0], vertices[-1] = (0, 0, 1), (0, 0, -1)
+        vertices = vertices.reshape(-1, 3)
+        row = 2 * rings + 1
+        first = (np.arange(rings)[:, None] * row + np.arange(2 * rings)).ravel()
+        lower = np.stack([first, first + row, first + 1], axis=1)
+        upper = np.stack([first + 1, first + row, first + row + 1], axis=1)
+        triangles = np.concatenate([lower, upper]).astype(np.int32)
+        return mesh(vertices, triangles, corner_normals=vertices[triangles], corner_uvs=vertices[triangles][..., :2])
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def make_mesh():
+    """make_mesh(vertices, triangles, **more) → Mesh with the array types that Mesh wants."""
+    return mesh
+
+
+def mesh(vertices, triangles, materials=None, corner_normals=None, corner_uvs=None) -> Mesh:
+    triangles = np.array(triangles, np.int32).reshape(-1, 3)
+    return Mesh(
+        vertices=np.array(vertices, np.float64).reshape(-1, 3),
+        triangles=triangles,
+        materials=np.zeros(len(triangles), np.int32) if materials is None else np.array(materials, np.int32),
+        corner_normals=None if corner_normals is None else np.array(corner_normals, np.float32),
+        corner_uvs=None if corner_uvs is None else np.array(corner_uvs, np.float32),
+    )
+
+
+@pytest.fixture(scope="session")
+def make_spheres():
+    """make_spheres(centers, radii) → Spheres; one radius serves for all."""
+
+    def build(centers, radii) -> Spheres:
+        centers = np.array(centers, np.float64).reshape(-1, 3)
+        return Spheres(centers, np.array(np.broadcast_to(radii, len(centers)), np.float64), np.zeros(len(centers), np.int32))
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def make_scene():
+    """make_scene(camera, geometry, (geometry, matrix), …) → Scene; the objects' indices count from 1."""
+
+    def build(camera: Pinhole, *things, clip=(0.0, float("inf"))) -> Scene:
+        things = [thing if isinstance(thing, tuple) else (thing, np.eye(4)) for thing in things]
+        names = {id(geometry): f"geometry {number}" for number, (geometry, _) in enumerate(things)}
+        return Scene(
+            camera=camera,
+            geometries={names[id(geometry)]: geometry for geometry, _ in things},
+            objects=tuple(
+                Object(f"object {number}", names[id(geometry)], matrix, number)
+                for number, (geometry, matrix) in enumerate(things, start=1)
+            ),
+            clip=clip,
+        )
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def random_matrix():
+    """random_matrix(rng, spread) → (4, 4): rotated, scaled by axis from 0.3 to 2, often mirrored, sheared, moved."""
+
+    def build(rng: np.random.Generator, spread: float = 1.5):
+        matrix = np.eye(4)
+        rotation = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        matrix[:3, :3] = rotation @ np.diag(rng.uniform(0.3, 2, 3) * rng.choice([-1, 1], 3))
+        matrix[0, 1] += rng.uniform(-0.5, 0.5)
+        matrix[:3, 3] = rng.uniform(-spread, spread, 3)
+        return matrix
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def random_scene(ball, make_scene, make_mesh, make_spheres, random_matrix):
+    """random_scene(seed) → Scene of balls, a soup of triangles, spheres and ellipsoids round the origin, clipped a little."""
+
+    def build(seed: int, width: int = 96, height: int = 54) -> Scene:
+        rng = np.random.default_rng(seed)
+        soup = make_mesh(rng.normal(size=(90, 3)) * 2, np.arange(90))
+        spheres = make_spheres(rng.normal(size=(60, 3)), rng.uniform(0.02, 0.4, 60))
+        shared = ball(8)
+        eye = rng.normal(size=3)
+        eye *= rng.uniform(2, 9) / np.linalg.norm(eye)
+        camera = Pinhole(
+            tuple(eye),
+            tuple(rng.uniform(-0.5, 0.5, 3)),
+            tuple(rng.normal(size=3)),
+            (width * rng.uniform(0.4, 2), width * rng.uniform(0.4, 2)),
+            width,
+            height,
+            (width * rng.uniform(0.3, 0.7), height * rng.uniform(0.3, 0.7)),
+            bool(rng.integers(2)),
+        )
+        things = [(geometry, random_matrix(rng)) for geometry in (shared, shared, ball(5), soup, spheres)]
+        return make_scene(camera, *things, clip=(rng.uniform(0, 1.5), rng.uniform(6, 14)))
+
+    return build
