@@ -82,7 +82,7 @@ def _check_storable(camera_object: bpy.types.Object, **numbers: tuple[float, ...
         if not all(abs(value) <= _LARGEST_FLOAT32 for value in values):
             largest = max(values, key=abs)
             raise InputError(
-                f"the {name} of camera {camera_object.name!r} needs {largest:g}, beyond Blender's numbers: give one less extreme"
+                f"the {name} of camera {camera_object.name!r} needs {largest:g}, beyond Blender's numbers: choose another"
             )
 
 
