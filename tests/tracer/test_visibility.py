@@ -163,7 +163,7 @@ def test_a_hundred_thousand_spheres_are_told_apart_as_by_testing_each(make_scene
     for eye in ((0, -7, 1), (0.3, 0.1, 0.2)):  # before the cloud, and in it, where many spheres reach behind the eye
         scene = make_scene(Pinhole(eye, (0, 1, 0), (0, 0, 1), 80, 100, 100), spheres)
         embree, _ = prepared(scene, visibility.Embree)
-        x, y = rng.uniform(-0.6, 0.6, (2, 300))
+        x, y = rng.uniform(-0.6, 0.6, (2, 120))
         found = embree.first(x, y)
         _, depth = spheres_in_world(scene, spheres, x, y)
         assert np.array_equal(found >= 0, np.isfinite(depth)), "other rays hit than by testing each sphere"

@@ -1,0 +1,122 @@
+"""Where rays meet spheres and ellipsoids, against the quadric itself in many digits."""
+
+import mpmath
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.tracer.ellipsoids import ellipsoids_of
+from viewcam_addon.tracer.render import Tracer
+from viewcam_addon.tracer.scene import Object
+from viewcam_addon.tracer.view import View
+
+SEEDS = st.integers(0, 2**32 - 1)
+FLOAT32, FLOAT64 = 2.0**-24, 2.0**-53
+CAMERA = Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 1, 1, 1)  # its camera space is the world with z turned round: exact
+
+
+def quadric_root(matrix, centre, radius, x, y):
+    """The nearest depth > 0 at which the ray meets the ellipsoid, its discriminant over its square, in 60 digits, or None."""
+    with mpmath.workdps(60):
+        linear = mpmath.matrix(matrix[:3, :3].tolist())
+        moved = linear * mpmath.matrix(centre.tolist()) + mpmath.matrix(matrix[:3, 3].tolist())
+        inverse = linear**-1
+        ray = inverse * mpmath.matrix([mpmath.mpf(x), mpmath.mpf(y), -1]) / mpmath.mpf(radius)
+        centre = inverse * moved / mpmath.mpf(radius)
+        a, half = sum(d * d for d in ray), sum(d * f for d, f in zip(ray, centre, strict=True))
+        discriminant = half * half - a * (sum(f * f for f in centre) - 1)
+        if discriminant < 0 or half <= 0:
+            return None, float(discriminant / a), centre
+        return float((half - mpmath.sqrt(discriminant)) / a), float(discriminant / a), centre
+
+
+@settings(max_examples=80)
+@given(seed=SEEDS, log_distance=st.integers(0, 6))
+def test_the_near_root_agrees_with_the_quadric_in_sixty_digits(make_spheres, random_matrix, seed, log_distance):
+    rng = np.random.default_rng(seed)
+    matrix = random_matrix(rng)
+    matrix[2, 3] -= 6.0 * 10**log_distance
+    centre, radius = rng.uniform(-1, 1, 3), rng.uniform(0.1, 1)
+    view = View(CAMERA)
+    ellipsoids = ellipsoids_of([(Object("object", "spheres", matrix), make_spheres([centre], radius))], view)
+    middle = matrix[:3, :3] @ centre + matrix[:3, 3]
+    aim = middle + matrix[:3, :3] @ rng.normal(size=3) * radius * 0.6
+    x, y = aim[:2] / -aim[2]
+    depth = ellipsoids.depth(np.zeros(1, np.intp), np.array([x]), np.array([y]))[0]
+    exact, discriminant, unit_centre = quadric_root(matrix, centre, radius, x, y)
+
+    # In the space of the unit sphere, the centre stands at |f| and is rounded by some 2⁻⁵³ |f| times the matrix's condition; so
+    # is the foot of the perpendicular, and the discriminant 1 − l² by twice that.
+    size = float(mpmath.norm(unit_centre))
+    rounding = 32 * FLOAT64 * size * np.linalg.cond(matrix[:3, :3])
+    if abs(discriminant) <= 2 * rounding:
+        return  # the ray grazes the outline closer than float64 can tell
+    assert (exact is None) == np.isinf(depth), f"depth {depth} instead of {exact}"
+    if exact is not None:
+        reach = abs(middle[2]) / size  # depth per unit of that space
+        allowed = rounding * (1 + 1 / np.sqrt(discriminant)) * reach + 8 * FLOAT64 * exact
+        assert abs(depth - exact) <= allowed, f"depth off by {abs(depth - exact):.1e}, allowed {allowed:.1e}"
+
+
+def test_a_unit_sphere_a_million_away_keeps_its_digits(make_spheres):
+    """The textbook's quadratic is off by 7e-3 there; the perpendicular's discriminant by 2e-10 (facts of prior art)."""
+    placed = Object("object", "spheres", np.eye(4))
+    ellipsoids = ellipsoids_of([(placed, make_spheres([[0, 0, -1e6]], 1.0))], View(CAMERA))
+    x = np.linspace(0, 0.9e-6, 50)
+    depth = ellipsoids.depth(np.zeros(50, np.intp), x, np.zeros(50))
+    with mpmath.workdps(40):
+        exact = [
+            (mpmath.mpf(10) ** 6 - mpmath.sqrt(1 - mpmath.mpf(value) ** 2 * (mpmath.mpf(10) ** 12 - 1)))
+            / (1 + mpmath.mpf(value) ** 2)
+            for value in map(float, x)
+        ]
+    worst = max(abs(mpmath.mpf(float(a)) - b) for a, b in zip(depth, exact, strict=True))
+    assert worst <= 1e-9, f"{float(worst):.1e}"
+
+
+@settings(max_examples=40)
+@given(seed=SEEDS)
+def test_bounds_hold_the_outline_and_touch_it(make_spheres, random_matrix, seed):
+    rng = np.random.default_rng(seed)
+    matrix = random_matrix(rng)
+    matrix[2, 3] -= 8
+    ellipsoids = ellipsoids_of([(Object("object", "spheres", matrix), make_spheres([[0, 0, 0]], 1.0))], View(CAMERA))
+    directions = rng.normal(size=(20000, 3))
+    points = directions / np.linalg.norm(directions, axis=1, keepdims=True) @ matrix[:3, :3].T + matrix[:3, 3]
+    depth = -points[:, 2]
+    x, y = points[:, 0] / depth, points[:, 1] / depth
+    seen = np.array([x.min(), x.max(), y.min(), y.max()])
+    bounds = ellipsoids.bounds[:, 0]
+    extent = np.array([x.max() - x.min()] * 2 + [y.max() - y.min()] * 2)
+    inwards = (seen - bounds) * (1, -1, 1, -1) / extent
+    assert (inwards >= -1e-12).all(), f"points of the ellipsoid leave its bounds by {-inwards.min():.1e} of its size"
+    # 20,000 random points come within a few thousandths of every side.
+    assert (inwards <= 0.01).all(), f"the bounds stand off by {inwards.max():.1%}"
+    assert depth.min() >= ellipsoids.nearest[0] * (1 - 1e-12)
+
+
+@settings(max_examples=20)
+@given(seed=SEEDS)
+def test_positions_lie_on_the_ellipsoid_and_normals_are_its_gradient(make_scene, make_spheres, random_matrix, seed):
+    rng = np.random.default_rng(seed)
+    matrix = random_matrix(rng, spread=0.5)
+    camera = Pinhole((5, -6, 3), tuple(matrix[:3, 3]), (0, 0, 1), 60, 40, 40)
+    passes = Tracer(make_scene(camera, (make_spheres([[0, 0, 0]], 1.0), matrix))).render()
+    hit = passes["Object Index"][..., 0] == 1
+    inverse = np.linalg.inv(matrix)
+    position, normal = passes["Position"][hit].astype(float), passes["Normal"][hit].astype(float)
+    unit = position @ inverse[:3, :3].T + inverse[:3, 3]
+    stretch = np.linalg.norm(inverse[:3, :3], 2)
+    off = np.abs(np.linalg.norm(unit, axis=1) - 1).max()
+    assert off <= 2 * FLOAT32 * 4 * stretch, f"positions are off the ellipsoid by {off:.1e} of its radius"
+    gradient = unit @ inverse[:3, :3]
+    gradient /= np.linalg.norm(gradient, axis=1, keepdims=True)
+    worst = np.linalg.norm(normal - gradient, axis=1).max()
+    # The gradient is taken at a position that is rounded to float32, and turns with it by the ellipsoid's curvature.
+    assert worst <= FLOAT32 * (4 + 8 * stretch * np.linalg.cond(matrix[:3, :3])), f"{worst:.1e}"
+    rows, columns = np.nonzero(hit)
+    rays = camera.ray_directions(columns, rows)
+    cosine = -np.einsum("ij,ij->i", normal, rays)
+    assert (cosine > 0).all(), "a normal points away from the eye"
+    assert np.abs(cosine - passes["Facing"][hit][:, 0]).max() <= 4 * FLOAT32
