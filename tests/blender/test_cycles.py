@@ -1,6 +1,5 @@
 """Cycles' settings are borrowed: given back whatever happens, and right while they last."""
 
-import numpy as np
 import pytest
 
 bpy = pytest.importorskip("bpy")
@@ -9,13 +8,16 @@ from viewcam_addon.blender import cycles, depsgraph, indices  # noqa: E402
 from viewcam_addon.blender.borrowing import borrowed  # noqa: E402
 from viewcam_addon.errors import InputError  # noqa: E402
 
+# What describes the settings, what follows from them, and brushes (reading some of them crashes 4.2).
+NO_SETTINGS = {"rna_type", "is_evaluated", "depsgraph", "tool_settings"}
+
 
 def dump(block, depth=4):
     """All that can be read of a datablock's own settings, nested and as text, without following other datablocks."""
     found = {}
     for prop in block.bl_rna.properties:
         name = prop.identifier
-        if name in ("rna_type", "is_evaluated", "depsgraph"):
+        if name in NO_SETTINGS:
             continue
         value = getattr(block, name)
         if prop.type not in ("POINTER", "COLLECTION"):
@@ -36,7 +38,9 @@ def state(scene):
         "objects": {block.name: dump(block, 2) for block in bpy.data.objects},
         "cameras": {block.name: dump(block, 2) for block in bpy.data.cameras},
         "materials": {block.name: dump(block, 2) for block in bpy.data.materials},
-        "trees": {block.name: [dump(node, 0) for node in block.node_tree.nodes] for block in bpy.data.materials if block.node_tree},
+        "trees": {
+            block.name: [dump(node, 0) for node in block.node_tree.nodes] for block in bpy.data.materials if block.node_tree
+        },
         "worlds": [block.name for block in bpy.data.worlds],
         "frame": (scene.frame_current, scene.frame_subframe),
     }
@@ -179,7 +183,9 @@ def test_a_scene_without_a_camera_can_not_be_rendered_and_says_why(scene):
 
 def test_threads_are_limited_for_the_time_of_the_render(scene, camera_object, tmp_path, monkeypatch):
     seen = []
-    monkeypatch.setattr(cycles, "render_still", lambda scene, to_file: seen.append((scene.render.threads_mode, scene.render.threads)))
+    monkeypatch.setattr(
+        cycles, "render_still", lambda scene, to_file: seen.append((scene.render.threads_mode, scene.render.threads))
+    )
     with pytest.raises(InputError):  # nothing was written
         cycles.render(scene, scene.view_layers[0], camera_object, tmp_path / "picture.exr", threads=3)
     assert seen == [("FIXED", 3)] and scene.render.threads_mode == "AUTO"
@@ -206,6 +212,9 @@ def test_an_artists_own_numbers_stay(scene, camera_object):
     assert bpy.data.materials["First"].pass_index == 0
 
 
-def test_more_objects_than_indices_start_again(scene):
-    numbers = np.arange(indices._LARGEST + 2) % indices._LARGEST + 1
-    assert numbers.max() == 32767 and numbers[-2:].tolist() == [1, 2]
+def test_more_objects_than_indices_start_again(scene, camera_object, monkeypatch):
+    monkeypatch.setattr(indices, "LARGEST", 2)
+    for name in "abc":
+        bpy.data.objects.new(name, None)
+    with indices.numbered():
+        assert [block.pass_index for block in bpy.data.objects] == [1, 2, 1, 2]

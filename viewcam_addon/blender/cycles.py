@@ -5,6 +5,7 @@ bias of the filter table, 3e-6 px at the narrowest Blackman-Harris filter; adapt
 would make of it something else. Everything is borrowed and given back.
 """
 
+import errno
 import os
 from collections.abc import Iterable
 
@@ -15,6 +16,7 @@ from ..files import written_whole
 from . import versions
 from .borrowing import Borrower, borrowed, still_of_one_layer
 from .depsgraph import render_still
+from .exr import is_whole
 from .ledger import Remedy
 
 _SAMPLING = {
@@ -66,6 +68,8 @@ def render(
         for remedy in remedies:
             remedy(borrow)
         render_still(scene, to_file=True)
+        if not is_whole(temporary):
+            raise OSError(errno.EIO, "Blender did not finish the file")
 
 
 def borrow_settings(borrow: Borrower, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:

@@ -117,8 +117,11 @@ def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Led
     if hidden:
         ledger.note(placed.name, "exported", "not visible to the camera")
         return None
-    if isinstance(shown.data, bpy.types.Mesh):
-        if not shown.data.polygons:
+    data = shown.data
+    if isinstance(data, bpy.types.Mesh):
+        if data.is_editmode:  # the file is in edit mode: what is edited must be made a mesh first
+            data = real.to_mesh()
+        if not data.polygons:
             return None
         if not layer.use_solid:
             ledger.note(placed.name, "exported", "the view layer leaves out surfaces")
@@ -130,8 +133,8 @@ def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Led
     own = any(slot.link == "OBJECT" for slot in shown.material_slots)
     return Source(
         name=placed.name,
-        data=shown.data,
-        key=(shown.data.as_pointer(), real.as_pointer() if own else 0),
+        data=data,
+        key=(data.as_pointer(), real.as_pointer() if own else 0),
         object_index=shown.pass_index,
         materials=tuple(material.pass_index if material else 0 for material in slots),
     )

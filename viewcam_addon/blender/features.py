@@ -3,6 +3,7 @@
 Hair, curves and volumes need no remedy: the view layer is told to leave them out (cycles.py).
 """
 
+from pathlib import Path
 from typing import NamedTuple
 
 import bpy
@@ -23,6 +24,9 @@ def note_render(scene: bpy.types.Scene, camera_object: bpy.types.Object, ledger:
     for sentence in datablocks.beyond_pinhole(camera_object, scene):
         ledger.note(camera_object.name, "approximated", f"{sentence} (off on both sides)")
     ledger.set_for_cycles(camera_object.data.dof, "use_dof", False)
+    for library in bpy.data.libraries:
+        if not Path(bpy.path.abspath(library.filepath)).is_file():
+            ledger.note(library.name, "skipped", f"the library {library.filepath} is missing, and all that is linked from it")
     if scene.world and (tree := versions.node_tree(scene.world)):
         output = tree.get_output_node("CYCLES")
         if output and output.inputs["Volume"].is_linked:

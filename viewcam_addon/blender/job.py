@@ -22,6 +22,7 @@ from .ledger import Ledger
 
 # What a .blend starts with: itself, or a gzip or Zstandard stream.
 _MAGIC = (b"BLENDER", b"\x1f\x8b", b"\x28\xb5\x2f\xfd")
+_LAST_FRAME = 1048574
 
 
 @dataclass(frozen=True)
@@ -100,13 +101,12 @@ def _stage(request: Request) -> Iterator[_Stage]:
     if request.blend is not None:
         open_blend(request.blend)
     scene = bpy.context.scene
-    camera = _camera(scene, request.camera)
     with borrowed() as borrow:
+        if request.frame is not None:
+            _borrow_frame(borrow, scene, request.frame)
+        camera = _camera(scene, request.camera)  # a marker may have changed it
         if request.size:
             _borrow_size(borrow, scene, camera, request.size)
-        if request.frame is not None and request.frame != scene.frame_current:
-            borrow.afterwards(scene.frame_set, scene.frame_current, subframe=scene.frame_subframe)
-            scene.frame_set(request.frame)
         yield _Stage(scene, bpy.context.view_layer, camera)
 
 
@@ -150,11 +150,23 @@ def _camera(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object:
     return camera
 
 
+def _borrow_frame(borrow: Borrower, scene: bpy.types.Scene, frame: int) -> None:
+    before = (scene.frame_current, scene.frame_subframe)
+    if before == (frame, 0.0):
+        return
+    if abs(frame) > _LAST_FRAME:
+        raise InputError(f"frame {frame} is beyond Blender's last, {_LAST_FRAME}: give another")
+    borrow.afterwards(scene.frame_set, before[0], subframe=before[1])
+    scene.frame_set(frame)
+
+
 def _borrow_size(borrow: Borrower, scene: bpy.types.Scene, camera: bpy.types.Object, size: tuple[int, int]) -> None:
     """Another number of pixels for the same lens; the stated distance counts pixels and goes with the lens."""
     before = _distance_at_full_size(scene, camera)
     for name, value in zip(("resolution_x", "resolution_y", "resolution_percentage"), (*size, 100), strict=True):
         borrow.set(scene.render, name, value)
+    if (scene.render.resolution_x, scene.render.resolution_y) != size:
+        raise InputError(f"Blender can't render {size[0]} × {size[1]} pixels: choose from 4 to 65536 each way")
     group = camera.virtual_pinhole
     if group.enabled:
         *pose, distance = group.numbers()
