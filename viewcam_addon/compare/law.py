@@ -32,7 +32,7 @@ Seen = dict[str, NDArray]
 PERCENTILES = (50.0, 90.0, 99.0, 99.9, 100.0)
 
 # How many roundings of 2⁻²⁴ · (M + t) a position is off at each of PERCENTILES.
-ROUNDINGS = (0.7, 1.4, 2.1, 3.4, 12.0)
+ROUNDINGS = (0.7, 1.4, 2.1, 3.4, 20.0)
 
 FLOAT32 = 2.0**-24
 
