@@ -108,6 +108,7 @@ def test_odd_sizes_at_a_percentage_round_down_as_blender_does():
     [
         (ViewPlane((100, 100), (50, 50), 100, 100), ["100 × 100", "200 × 100", "resolution"]),
         (ViewPlane((100, 110), (100, 50), 200, 100), ["100", "110", "pixel aspect"]),
+        (ViewPlane((1e-307, 1e-307), (100, 50), 200, 100), ["1e-307", "too small"]),
     ],
 )
 def test_a_view_plane_that_the_scene_can_not_render_is_refused_by_name(plane, words):

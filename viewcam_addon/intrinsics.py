@@ -122,7 +122,8 @@ def camera_data(plane: ViewPlane, frame: Frame, sensor_width: float, sensor_heig
     Raises
     ------
     InputError
-        if the view plane has another size than the picture, or if its two distances ask for another pixel aspect.
+        if the view plane has another size than the picture, if its two distances ask for another pixel aspect, or if they are
+        too small for float32.
     """
     column, row, *window_size = frame.window
     if [plane.width, plane.height] != window_size:
@@ -140,6 +141,8 @@ def camera_data(plane: ViewPlane, frame: Frame, sensor_width: float, sensor_heig
             "set the scene's pixel aspect"
         )
     lens = magnification * _fitted_sensor(sensor_fit, sensor_width, sensor_height)
+    if not np.float32(lens):
+        raise InputError(f"the distance is {plane.distance[0]:g} pixels, too small for Blender's lens: enlarge it")
     growth = 2.0 ** max(0, math.ceil(math.log2(SHORTEST_LENS / np.float32(lens))))  # as Blender will round it
     return CameraData(
         lens=lens * growth,
