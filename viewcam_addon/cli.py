@@ -62,8 +62,17 @@ def main(arguments: Sequence[str] | None = None, blend_is_open: bool = False) ->
 
 
 def main_and_exit() -> NoReturn:
-    """The shell's entry point."""
-    sys.exit(main())
+    """The shell's entry point.
+
+    Leaves without Python's clean-up where Blender is a module of this process: after properties with `update=` were
+    registered, bpy 4.2 crashes in it and 4.5 hangs.
+    """
+    status = main()
+    if "bpy" in sys.modules:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
+    sys.exit(status)
 
 
 class _OneLineParser(argparse.ArgumentParser):
