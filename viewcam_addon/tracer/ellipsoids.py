@@ -59,18 +59,31 @@ class Ellipsoids:
         depth = gather(self.tangent, sphere) / np.where(met, along + root, 1.0)
         return np.where(met, depth, np.inf)
 
-    def normal(self, sphere: Indices, x: Floats, y: Floats, depth: Floats, view: View) -> list[Floats]:
-        """World-space components, each (n,), of the unit normals at the depths that `depth` found."""
+    def normal(self, sphere: Indices, x: Floats, y: Floats, depth: Floats) -> list[Floats]:
+        """Camera-space components, each (n,), of the unit normals at the depths that `depth` found; they face the eye."""
         inverse = gather(self.inverse, sphere)
-        radial = [d * depth - f for d, f in zip(self._direction(sphere, x, y), gather(self.centres, sphere), strict=True)]
-        gradient = [dot(inverse[column : column + 3], radial) for column in (0, 3, 6)]
-        length = np.sqrt(dot(gradient, gradient))
-        return [dot(axis, gradient) / length for axis in view.axes.T]
+        unit = [d * depth - f for d, f in zip(self._direction(sphere, x, y), gather(self.centres, sphere), strict=True)]
+        return _unit([dot(inverse[column : column + 3], unit) for column in (0, 3, 6)])
+
+    def shown_normal(self, sphere: Indices, x: Floats, y: Floats, depth: Floats) -> list[Floats]:
+        """What Cycles' Normal pass shows, as `normal`: the direction from the centre, or to it where that faces the eye.
+
+        Of a sphere this is the normal; of an ellipsoid it is not.
+        """
+        ray = (x, y, 1.0)
+        outward = _unit([d * depth - centre for d, centre in zip(ray, gather(self.positions, sphere), strict=True)])
+        towards_eye = np.where(dot(outward, ray) > 0, -1.0, 1.0)
+        return [component * towards_eye for component in outward]
 
     def _direction(self, sphere: Indices, x: Floats, y: Floats) -> list[Floats]:
         """The three components of A⁻¹ (x, y, 1)."""
         inverse = gather(self.inverse, sphere)
         return [linear(inverse[row::3], x, y) for row in range(3)]
+
+
+def _unit(vector: list[Floats]) -> list[Floats]:
+    length = np.sqrt(dot(vector, vector))
+    return [component / length for component in vector]
 
 
 def ellipsoids_of(pairs: list[tuple[Object, Spheres]], view: View) -> Ellipsoids:

@@ -69,10 +69,9 @@ class Surface:
 
     def _write_spheres(self, passes: Passes, where: Where, sphere: Indices, x: Floats, y: Floats) -> None:
         depth = self._ellipsoids.depth(sphere, x, y)
-        normal = self._ellipsoids.normal(sphere, x, y, depth, self._view)
-        right, up, forward = (dot(axis, normal) for axis in self._view.axes)
-        cosine = -(right * x + up * y + forward) / np.sqrt(x * x + y * y + 1.0)
-        _store(passes["Normal"], where, normal)
+        cosine = -dot(self._ellipsoids.normal(sphere, x, y, depth), (x, y, 1.0)) / np.sqrt(x * x + y * y + 1.0)
+        normal = self._ellipsoids.shown_normal(sphere, x, y, depth)
+        _store(passes["Normal"], where, [dot(axis, normal) for axis in self._view.axes.T])
         self._write_place(passes, where, x, y, depth, cosine)
         self._write_labels(passes, where, sphere, self._ellipsoids)
 
