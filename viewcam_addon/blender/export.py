@@ -8,6 +8,7 @@ geometry is stored once for each evaluated mesh. Rejected: `to_mesh` per object,
 What has no counterpart is noted in the ledger, with the remedy that takes it out of Cycles' render.
 """
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -72,7 +73,7 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
     objects = []
     for source, matrix in placements(depsgraph, ledger):
         if source.key not in names:
-            geometry = _geometry(source)
+            geometry = _geometry(source, ledger)
             names[source.key] = _free_name(source.data.name, geometries)
             geometries[names[source.key]] = geometry
         objects.append(Object(source.name, names[source.key], matrix, source.object_index, source.materials))
@@ -80,7 +81,7 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
     return Scene(
         camera=cameras.read(camera, depsgraph.scene),
         geometries=geometries,
-        objects=tuple(objects),
+        objects=tuple(_drawn(objects, geometries, ledger)),
         stated_camera=cameras.stated(camera, depsgraph.scene),
         clip=(camera.data.clip_start, camera.data.clip_end),
         ledger=ledger.entries(),
@@ -102,7 +103,7 @@ def placements(depsgraph: bpy.types.Depsgraph, ledger: Ledger) -> Iterator[tuple
         source = known[identity]
         if source:
             ledger.placed(source.name)
-            yield source, np.array(instance.matrix_world)
+            yield source, np.array(instance.matrix_world, dtype=np.float64)
 
 
 def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Ledger) -> Source | None:
@@ -140,10 +141,26 @@ def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Led
     )
 
 
-def _geometry(source: Source) -> Mesh | Spheres:
-    if isinstance(source.data, bpy.types.Mesh):
-        return export_geometry.mesh_of(source.data, len(source.materials))
-    return export_geometry.spheres_of(source.data)
+def _geometry(source: Source, ledger: Ledger) -> Mesh | Spheres:
+    if not isinstance(source.data, bpy.types.Mesh):
+        return export_geometry.spheres_of(source.data)
+    mesh = export_geometry.mesh_of(source.data, len(source.materials))
+    if nowhere := len(source.data.loop_triangles) - len(mesh.triangles):
+        ledger.note(
+            source.name, "exported", f"{nowhere} triangles have vertices that are not finite, and Cycles draws none of them"
+        )
+    return mesh
+
+
+def _drawn(objects: list[Object], geometries: dict[str, Mesh | Spheres], ledger: Ledger) -> Iterator[Object]:
+    """The objects without those that a scale of 0 flattens, of which Cycles draws only meshes that no other object uses."""
+    users = Counter(placed.geometry for placed in objects)
+    for placed in objects:
+        shared = users[placed.geometry] > 1 or isinstance(geometries[placed.geometry], Spheres)
+        if shared and np.linalg.det(placed.matrix[:3, :3]) == 0:
+            ledger.note(placed.name, "exported", "flattened by its scale, and Cycles does not draw it")
+        else:
+            yield placed
 
 
 def _free_name(name: str, taken: dict[str, Mesh | Spheres]) -> str:

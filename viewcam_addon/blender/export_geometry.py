@@ -30,6 +30,10 @@ def mesh_of(mesh: bpy.types.Mesh, slot_count: int) -> Mesh:
     corners = _read(mesh.loop_triangles, "loops", np.int32, 3)
     faces = _read(mesh.loop_triangles, "polygon_index", np.int32)
     triangles = corner_vertices[corners]
+    finite = np.isfinite(vertices).all(axis=1)
+    if not finite.all():  # Cycles draws no triangle that is nowhere
+        drawn = finite[triangles].all(axis=1)
+        vertices[~finite], triangles, corners, faces = 0, triangles[drawn], corners[drawn], faces[drawn]
     return Mesh(
         vertices=vertices,
         triangles=triangles,
