@@ -11,6 +11,8 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as cameras  # noqa: E402 (needs bpy)
+from viewcam_addon.blender import job  # noqa: E402
+from viewcam_addon.tracer.scene import Spheres  # noqa: E402
 
 FOLDER = Path(__file__).parent.parent / "sample_scenes"
 SCENES = ("studio", "spheres", "straight_down", "portrait", "wide", "telephoto", "flight")
@@ -111,12 +113,8 @@ def test_flight_moves_eye_and_look_at_and_the_camera_follows(opened):
     assert np.linalg.norm(np.subtract(eyes[-1], eyes[0])) > 40
 
 
-def test_spheres_are_exact_spheres_and_one_is_an_ellipsoid(opened):
-    from viewcam_addon.blender.export import export_scene
-    from viewcam_addon.tracer.scene import Spheres
-
-    scene, camera = opened("spheres")
-    exported = export_scene(scene, bpy.context.view_layer, camera)
+def test_spheres_are_exact_spheres_and_one_is_an_ellipsoid(fresh_blender):
+    exported = job.export(job.Request(blend=FOLDER / "spheres.blend", strict=True))
     spheres = {name: shape for name, shape in exported.geometries.items() if isinstance(shape, Spheres)}
     assert sum(len(shape.radii) for shape in spheres.values()) >= 6000
     scales = [np.linalg.norm(thing.matrix[:3, :3], axis=0) for thing in exported.objects if thing.geometry in spheres]
