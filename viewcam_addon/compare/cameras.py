@@ -98,18 +98,20 @@ def systematic_error(
     """Shift, zoom and roll that explain the displacements best.
 
     columns, rows : (n,) continuous pixel positions. off_x, off_y : (n,) displacements there, pixels.
-    one_rounding : (n,) law.position_shift. The mean of n errors can't exceed their typical size.
+    one_rounding : (n,) law.position_shift. A pixel weighs as much as it is certain, so that a few slender triangles do not hide
+        what all the others share. The mean of the errors can't exceed their typical size.
     """
     x, y = columns - pinhole.principal_point[0], rows - pinhole.principal_point[1]
-    design = np.column_stack([np.ones_like(x), x, y])
+    weight = one_rounding.min() / one_rounding
+    design = np.column_stack([weight, x * weight, y * weight])
     (shift_x, zoom_x, shear_x), (shift_y, shear_y, zoom_y) = (
-        np.linalg.lstsq(design, off, rcond=None)[0] for off in (off_x, off_y)
+        np.linalg.lstsq(design, off * weight, rcond=None)[0] for off in (off_x, off_y)
     )
     aspect = pinhole.distance[0] / pinhole.distance[1]
     roll = np.arctan2(shear_y * aspect - shear_x / aspect, 2.0 + zoom_x + zoom_y)
-    mean = np.hypot(off_x.mean(), off_y.mean())
-    tolerance = ROUNDINGS[0] * one_rounding.mean()
-    return Systematic(*(float(value) for value in (shift_x, shift_y, zoom_x, zoom_y, roll, mean, tolerance)))
+    mean_x, mean_y, typical = (np.average(values, weights=weight**2) for values in (off_x, off_y, one_rounding))
+    figures = (shift_x, shift_y, zoom_x, zoom_y, roll, np.hypot(mean_x, mean_y), ROUNDINGS[0] * typical)
+    return Systematic(*(float(figure) for figure in figures))
 
 
 def _storage_tolerance(camera: Pinhole, x: Array, y: Array, depth: Array) -> Array:

@@ -26,7 +26,7 @@ def histogram(roundings: NDArray[np.float64]) -> str:
 
     roundings : (n,) error of each pixel over what one rounding causes there.
     """
-    low, high = -2.0, max(2.0, math.ceil(math.log10(max(float(roundings.max(initial=0.0)), 1e-9))))
+    low, high = -3.0, max(2.0, math.ceil(math.log10(max(float(roundings.max(initial=0.0)), 1e-9))))
 
     def place(value: float) -> float:
         exponent = min(max(math.log10(max(value, 1e-30)), low), high)
@@ -102,10 +102,11 @@ def figure(value: float) -> str:
         return "−" + figure(-value)
     if value == 0:
         return "0"
-    exponent = math.floor(math.log10(value))
+    digits, exponent = f"{value:.1e}".split("e")
+    exponent = int(exponent)
     if -3 < exponent < 5:
-        return f"{value:.{max(1 - exponent, 0)}f}"
-    return f"{value / 10.0**exponent:.1f}·10{_superscript(exponent)}"
+        return f"{float(f'{value:.1e}'):.{max(1 - exponent, 0)}f}"
+    return f"{digits}·10{_superscript(exponent)}"
 
 
 def _superscript(exponent: int) -> str:

@@ -70,10 +70,11 @@ def _row_line(row: Row) -> str:
 def _praise(comparison: "Comparison") -> str:
     position = comparison.rows[0]
     count = len(comparison.mismatches.kinds)
-    edges = f"; {count:,} pixels on edges, {_explained(comparison)}" if count else ""
+    edges = f"; {count:,} on edges, {_explained(comparison)}" if count else ""
     return (
-        f"The same picture: over {position.count:,} pixels the median is {position.values[0]:.1e} px off and the worst "
-        f"{position.values[-1]:.1e} px, {_percent(position.worst[1])} of what float32 allows{edges}."
+        f"The same picture: over {position.count:,} pixels the median is {position.values[0]:.1e} px off, 99.9 % are within "
+        f"{position.values[-2]:.1e} px and the worst is {position.values[-1]:.1e} px, at most "
+        f"{_percent(position.worst[1])} of what float32 allows{edges}."
     )
 
 
@@ -82,8 +83,11 @@ def _faults(comparison: "Comparison") -> list[str]:
     faults = []
     position = comparison.rows[0]
     if position.count and not (position.ok and comparison.systematic.ok):
-        median, allowed = position.values[0], position.tolerances[0]
-        faults.append(f"positions are {median:.2g} px off in the median ({allowed:.1e} px allowed) and {_cause(comparison)}")
+        i = PERCENTILES.index(position.worst[0])
+        faults.append(
+            f"positions are {position.values[i]:.2g} px off at {percentile_name(PERCENTILES[i])}, "
+            f"{_share(position.shares[i])} their tolerance, and {_cause(comparison)}"
+        )
     mismatches = comparison.mismatches
     if not comparison.mismatches_ok:
         kinds = ", ".join(
@@ -95,7 +99,7 @@ def _faults(comparison: "Comparison") -> list[str]:
             percentile, share = row.worst
             value = row.values[PERCENTILES.index(percentile)]
             faults.append(
-                f"{row.name} is {value:.2g} {row.unit} off at {percentile_name(percentile)}, {_percent(share)} of its tolerance"
+                f"{row.name} is {value:.2g} {row.unit} off at {percentile_name(percentile)}, {_share(share)} its tolerance"
             )
     if not position.count:
         faults.append("no pixel shows the same object in both")
@@ -138,7 +142,11 @@ def _why_unexplained(comparison: "Comparison") -> str:
 
 
 def _percent(share: float) -> str:
-    return f"{share:.0%}" if share < 10 else f"{share:.1e} ×"
+    return f"{share:.0%}" if share < 10 else f"{share:.3g} times"
+
+
+def _share(share: float) -> str:
+    return f"{_percent(share)} of" if share < 10 else _percent(share)
 
 
 def _mark(ok: bool) -> str:
