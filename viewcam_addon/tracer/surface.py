@@ -58,14 +58,16 @@ class Surface:
         if self._triangles.corner_normals is not None:
             smooth = _interpolated(gather(self._triangles.corner_normals, triangle), first, second)
             length = np.sqrt(dot(smooth, smooth))
-            if not length.all():  # the corners' normals cancel, and Cycles shows the face's
-                smooth, length = np.where(length > 0, smooth, normal), np.where(length > 0, length, 1.0)
-            normal = [component / length for component in smooth]
+            side = gather(self._planes.side, triangle)
+            if not length.all():  # the mesh has none, or they cancel: as in Cycles, the face's own
+                smooth, length = np.where(length > 0, smooth, normal * side), np.where(length > 0, length, 1.0)
+            scale = side / length
+            normal = [component * scale for component in smooth]
         if self._triangles.corner_uvs is not None:
             _store(passes["UV"], where, _interpolated(gather(self._triangles.corner_uvs, triangle), first, second))
         _store(passes["Normal"], where, normal)
         self._write_place(passes, where, x, y, depth, cosine)
-        self._write_labels(passes, where, triangle, self._triangles)
+        self._write_labels(passes, where, triangle, self._triangles, self._planes.magnitude)
 
     def _write_spheres(self, passes: Passes, where: Where, sphere: Indices, x: Floats, y: Floats) -> None:
         depth = self._ellipsoids.depth(sphere, x, y)
@@ -73,17 +75,19 @@ class Surface:
         normal = self._ellipsoids.shown_normal(sphere, x, y, depth)
         _store(passes["Normal"], where, [dot(axis, normal) for axis in self._view.axes.T])
         self._write_place(passes, where, x, y, depth, cosine)
-        self._write_labels(passes, where, sphere, self._ellipsoids)
+        self._write_labels(passes, where, sphere, self._ellipsoids, self._ellipsoids.magnitude)
 
     def _write_place(self, passes: Passes, where: Where, x: Floats, y: Floats, depth: Floats, cosine: Floats) -> None:
         passes["Depth"][where, 0] = depth
         _store(passes["Position"], where, self._view.world_position(depth, x, y))
         passes["Facing"][where, 0] = np.clip(cosine, 0.0, 1.0)
 
-    def _write_labels(self, passes: Passes, where: Where, index: Indices, table: Triangles | Ellipsoids) -> None:
+    def _write_labels(
+        self, passes: Passes, where: Where, index: Indices, table: Triangles | Ellipsoids, magnitude: Float32s
+    ) -> None:
         passes["Object Index"][where, 0] = gather(table.object_index, index)
         passes["Material Index"][where, 0] = gather(table.material_index, index)
-        passes["Magnitude"][where, 0] = np.maximum(gather(table.magnitude, index), self._eye_magnitude)
+        passes["Magnitude"][where, 0] = np.maximum(gather(magnitude, index), self._eye_magnitude)
 
 
 def _interpolated(corners: Float32s, first: Floats, second: Floats) -> list[Floats]:

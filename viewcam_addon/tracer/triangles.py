@@ -8,6 +8,7 @@ Rejected: the scalar triple products of vertices (they lose the square of distan
 Embree's own t, u, v (float32).
 """
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,13 +28,12 @@ class Triangles:
 
     vertices : (3, v) float64, camera space: [axis, vertex].
     corners : (3, m) int32: [corner, triangle], indices into `vertices`.
-    corner_normals : (9, m) float32, world space: [3 · corner + axis, triangle], of any length, turned with the face towards the
-        eye; or None where all faces of all meshes are flat.
+    corner_normals : (9, m) float32, world space: [3 · corner + axis, triangle], of any length, on the side from which the
+        corners run counter-clockwise, 0 on meshes without; or None where no mesh has any.
     corner_uvs : (9, m) float32: [3 · corner + channel, triangle] with the channels u, v, 1 (0, 0, 0 without a UV map); or None
         where no mesh has a UV map.
     object_index, material_index : (m,) float32, what the passes show.
-    magnitude : (m,) float32: what a renderer's relative rounding applies to: the largest |coordinate| of the three vertices in
-        world space, plus the distance of the farthest from the eye times the triangle's slenderness.
+    largest_coordinate : (m,) float32, of the three vertices in world space, without its sign.
     """
 
     vertices: Floats
@@ -42,7 +42,7 @@ class Triangles:
     corner_uvs: Float32s | None
     object_index: Float32s
     material_index: Float32s
-    magnitude: Float32s
+    largest_coordinate: Float32s
 
     @property
     def count(self) -> int:
@@ -51,78 +51,54 @@ class Triangles:
 
 def triangles_of(pairs: list[tuple[Object, Mesh]], view: View) -> Triangles:
     """The triangles of all objects that are meshes, instances written out (embreex has no instances)."""
-    users = {}
-    for _, mesh in pairs:
-        users[id(mesh)] = users.get(id(mesh), 0) + 1
+    users = Counter(id(mesh) for _, mesh in pairs)
     smooth = any(mesh.corner_normals is not None for _, mesh in pairs)
     mapped = any(mesh.corner_uvs is not None for _, mesh in pairs)
-    vertices, corners, normals, uvs, objects, materials, magnitudes = [], [], [], [], [], [], []
+    vertices, corners, normals, uvs, objects, materials, largest = [], [], [], [], [], [], []
     vertex_count = 0
     for placed, mesh in pairs:
-        points, magnitude = view.points(placed.matrix, mesh.vertices)
-        indices = np.ascontiguousarray(mesh.triangles.T)
+        points, coordinate = view.points(placed.matrix, mesh.vertices)
         vertices.append(points)
-        corners.append(indices + np.int32(vertex_count))
+        corners.append(mesh.triangles.T + np.int32(vertex_count))
         vertex_count += points.shape[1]
-        magnitudes.append(magnitude[indices].max(axis=0) + _slender_reach(points[:, indices]))
+        largest.append(coordinate[mesh.triangles.T].max(axis=0))
         objects.append(np.full(len(mesh.triangles), placed.object_index, np.float32))
         materials.append(np.array(placed.material_indices, np.float32)[mesh.materials])
         if smooth:
-            normals.append(_corner_normals(placed, mesh, points[:, indices], view, users[id(mesh)] > 1))
+            normals.append(_corner_normals(placed, mesh, shared=users[id(mesh)] > 1))
         if mapped:
             uvs.append(_corner_uvs(mesh))
     return Triangles(
-        vertices=_joined(vertices, (3, 0)),
-        corners=_joined(corners, (3, 0)).astype(np.int32, copy=False),
-        corner_normals=_joined(normals, (9, 0)) if smooth else None,
-        corner_uvs=_joined(uvs, (9, 0)) if mapped else None,
-        object_index=_joined(objects, (0,)).astype(np.float32, copy=False),
-        material_index=_joined(materials, (0,)).astype(np.float32, copy=False),
-        magnitude=_joined(magnitudes, (0,)).astype(np.float32, copy=False),
+        vertices=_joined(vertices, (3, 0), np.float64),
+        corners=_joined(corners, (3, 0), np.int32),
+        corner_normals=_joined(normals, (9, 0), np.float32) if smooth else None,
+        corner_uvs=_joined(uvs, (9, 0), np.float32) if mapped else None,
+        object_index=_joined(objects, (0,), np.float32),
+        material_index=_joined(materials, (0,), np.float32),
+        largest_coordinate=_joined(largest, (0,), np.float32),
     )
 
 
-def _slender_reach(corners: Floats) -> Floats:
-    """(m,) distance of the farthest corner from the eye times the slenderness, longest side over height.
-
-    Barycentric coordinates that are computed from the eye are off by a rounding of that distance over the height, and move the
-    hit along the longest side. corners : (3, 3, m), camera space: [axis, corner, triangle].
-    """
-    a, b, c = corners.transpose(1, 0, 2)
-    sides = (b - a, c - b, a - c)
-    normal = cross(sides[0], sides[2])
-    longest = np.max([dot(side, side) for side in sides], axis=0)
-    farthest = np.max([dot(corner, corner) for corner in (a, b, c)], axis=0)
-    with np.errstate(all="ignore"):  # a triangle without area is never hit
-        return np.sqrt(farthest) * np.minimum(longest / np.sqrt(dot(normal, normal)), _MOST_SLENDER)
+def _joined(parts: list[NDArray], empty: tuple[int, ...], dtype: type) -> NDArray:
+    return np.concatenate(parts, axis=-1, dtype=dtype, casting="same_kind") if parts else np.empty(empty, dtype)
 
 
-def _joined(parts: list[NDArray], empty: tuple[int, ...]) -> NDArray:
-    return np.concatenate(parts, axis=-1) if parts else np.empty(empty)
-
-
-def _corner_normals(placed: Object, mesh: Mesh, points: Floats, view: View, shared: bool) -> Float32s:
-    """(9, m) corner normals of one object; where the mesh has none, each corner holds the face's.
+def _corner_normals(placed: Object, mesh: Mesh, shared: bool) -> Float32s:
+    """(9, m) corner normals of one object, turned by the cofactors of its matrix, as the normal of its faces is.
 
     Cycles turns the normals of a mesh that only one object uses into world space before it interpolates, and normalises
     them there; those of a mesh that several objects share it interpolates in object space.
     """
-    face = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0], axis=0)
-    linear = placed.matrix[:3, :3]
-    cofactors = np.stack([np.cross(linear[:, j], linear[:, k]) for j, k in ((1, 2), (2, 0), (0, 1))], axis=1)
-    cofactors /= np.abs(cofactors).max() or 1.0
-    mirrors = np.linalg.det(linear) < 0
-    towards_eye = np.sign(-view.handedness * np.einsum("im,im->m", face, points[:, 0]))
     if mesh.corner_normals is None:
-        normals = np.broadcast_to(view.axes.T @ (view.handedness * face), (3, *face.shape))
-    else:
-        if mirrors:
-            cofactors, towards_eye = -cofactors, -towards_eye
-        normals = np.einsum("ij,mcj->cim", cofactors, mesh.corner_normals, optimize=True)
-    if not shared or mesh.corner_normals is None:
-        length = np.sqrt(np.einsum("cim,cim->cm", normals, normals))
-        normals = normals / np.where(length > 0, length, 1.0)[:, None]
-    return (normals * towards_eye).reshape(9, -1).astype(np.float32)
+        return np.zeros((9, len(mesh.triangles)), np.float32)
+    linear = placed.matrix[:3, :3]
+    cofactors = cross(linear[:, [1, 2, 0]], linear[:, [2, 0, 1]])
+    cofactors /= np.abs(cofactors).max() or 1.0
+    normals = cofactors @ mesh.corner_normals.reshape(-1, 3).T
+    if not shared:
+        length = np.sqrt(dot(normals, normals))
+        normals /= np.where(length > 0, length, 1.0)
+    return normals.reshape(3, -1, 3).transpose(2, 0, 1).reshape(9, -1).astype(np.float32)
 
 
 def _corner_uvs(mesh: Mesh) -> Float32s:
@@ -138,6 +114,11 @@ class Planes:
 
     forms : (9, m) float64. span : (2, m) float64, least and greatest depth of the triangle's vertices.
     normals : (3, m) float32, unit, world space, facing the eye. distance : (m,) float64, of the plane from the eye.
+    side : (m,) float32: 1 where the eye sees the corners run counter-clockwise, −1 where clockwise.
+    magnitude : (m,) float32: what a renderer's relative rounding applies to, the largest coordinate in world space plus the
+        distance of the farthest corner from the eye times the triangle's slenderness, its longest side over its height:
+        barycentric coordinates that are computed from the eye are off by a rounding of that distance over the height, and
+        move the hit along the longest side.
     """
 
     def __init__(self, triangles: Triangles, view: View) -> None:
@@ -146,6 +127,8 @@ class Planes:
         self.span: Floats = np.empty((2, count))
         self.normals: Float32s = np.empty((3, count), np.float32)
         self.distance: Floats = np.empty(count)
+        self.side: Float32s = np.empty(count, np.float32)
+        self.magnitude: Float32s = np.empty(count, np.float32)
         step = 16384
         with np.errstate(all="ignore"):  # a triangle without area, or one seen edge-on, has no forms: depth() sees to it
             for first in range(0, count, step):
@@ -167,6 +150,11 @@ class Planes:
         length = np.sqrt(squared)
         self.distance[part] = np.nan_to_num(np.abs(volume) / length)
         self.normals[:, part] = np.nan_to_num(view.axes.T @ (normal * (-np.sign(volume) / length)))
+        self.side[part] = np.sign(volume) * -view.handedness
+        longest = np.maximum(np.maximum(dot(first, first), dot(second, second)), dot(c - b, c - b))
+        farthest = np.sqrt(np.maximum(np.maximum(dot(a, a), dot(b, b)), dot(c, c)))
+        reach = farthest * np.minimum(longest / length, _MOST_SLENDER)
+        self.magnitude[part] = triangles.largest_coordinate[part] + reach
 
     def depth(self, triangle: Indices, x: Floats, y: Floats) -> Floats:
         """Planar depth at which rays (x, y, 1) meet the triangles that were found for them; all broadcast.
