@@ -4,9 +4,11 @@ Rejected: a JSON schema (another dependency, and its messages speak of the schem
 gathered at the end (the first wrong key usually explains the others).
 """
 
+import contextlib
 import math
 import zipfile
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NoReturn
 
@@ -121,47 +123,52 @@ class Field:
 
 
 class Arrays:
-    """The .npz beside a scene file, open as long as the `with` block runs."""
+    """The arrays of the .npz beside a scene file; none where the scene names no such file."""
 
-    def __init__(self, scene_path: Path, field: Field | None) -> None:
-        self._field = field
-        self._path = None if field is None else _beside(scene_path, field)
-        self._archive: np.lib.npyio.NpzFile | None = None
-
-    def __enter__(self) -> "Arrays":
-        if self._path is not None:
-            try:
-                archive = np.load(self._path, allow_pickle=False)
-            except FileNotFoundError:
-                self._field.fail(f"names {self._path.name}, which is not there: put it beside the scene file")
-            except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-                raise InputError(f"{self._path.name} is no .npz file of arrays: export the scene again") from error
-            if not isinstance(archive, np.lib.npyio.NpzFile):
-                raise InputError(f"{self._path.name} is no .npz file of arrays: export the scene again")
-            self._archive = archive
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._archive is not None:
-            self._archive.close()
+    def __init__(self, file: str = "", archive: np.lib.npyio.NpzFile | None = None) -> None:
+        self._file, self._archive = file, archive
 
     def take(self, key: Field) -> NDArray:
         """The array of this key, of real numbers."""
         if self._archive is None:
             key.fail("names an array, and the scene has no key 'arrays': add it, with the name of the .npz file")
         if key.text() not in self._archive:
-            key.fail(f"is {key.value!r}, which {self._path.name} does not hold: export the scene again")
+            key.fail(f"is {key.value!r}, which {self._file} does not hold: export the scene again")
         try:
             array = self._archive[key.value]
         except ValueError as error:
             raise InputError(
-                f"{self._path.name}: the array {key.value!r} holds pickled objects, which are not read: store numbers"
+                f"{self._file}: the array {key.value!r} holds pickled objects, which are not read: store numbers"
             ) from error
         except (OSError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
-            raise InputError(f"{self._path.name}: the array {key.value!r} is damaged: export the scene again") from error
+            raise InputError(f"{self._file}: the array {key.value!r} is damaged: export the scene again") from error
         if array.dtype.kind not in "iuf":
             key.fail(f"names an array of {array.dtype}: store real numbers")
         return array
+
+
+@contextlib.contextmanager
+def arrays_beside(scene_path: Path, field: Field | None) -> Iterator[Arrays]:
+    """Open the .npz that the field names, for the time of the block."""
+    if field is None:
+        yield Arrays()
+        return
+    path = _beside(scene_path, field)
+    refusal = f"{path.name} is no .npz file of arrays: export the scene again"
+    try:
+        file = path.open("rb")
+    except FileNotFoundError:
+        field.fail(f"names {path.name}, which is not there: put it beside the scene file")
+    except OSError as error:
+        raise InputError(refusal) from error
+    with file:
+        try:
+            archive = np.load(file, allow_pickle=False)
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+            raise InputError(refusal) from error
+        if not isinstance(archive, np.lib.npyio.NpzFile):
+            raise InputError(refusal)
+        yield Arrays(path.name, archive)
 
 
 def _beside(scene_path: Path, field: Field) -> Path:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..files import written_whole
 from ..pinhole import Pinhole
-from .fields import Arrays, Field
+from .fields import Arrays, Field, arrays_beside
 from .scene import LedgerEntry, Mesh, Object, Scene, Spheres
 
 FORMAT = "virtual-pinhole-scene"
@@ -68,7 +68,7 @@ def read(path: str | os.PathLike[str]) -> Scene:
     fields = document.fields(
         ("format", "version", "camera", "geometries", "objects"), ("stated_camera", "clip", "ledger", "arrays")
     )
-    with Arrays(path, fields.get("arrays")) as arrays:
+    with arrays_beside(path, fields.get("arrays")) as arrays:
         geometries = {name: _geometry(field, arrays) for name, field in fields["geometries"].named("geometry").items()}
     objects = tuple(_object(field) for field in fields["objects"].items("object"))
     try:

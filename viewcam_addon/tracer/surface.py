@@ -54,20 +54,24 @@ class Surface:
     def _write_triangles(self, passes: Passes, where: Where, triangle: Indices, x: Floats, y: Floats) -> None:
         depth, first, second = self._planes.hit(triangle, x, y)
         cosine = gather(self._planes.distance, triangle) / (depth * np.sqrt(x * x + y * y + 1.0))
-        normal = gather(self._planes.normals, triangle)
-        if self._triangles.corner_normals is not None:
-            smooth = _interpolated(gather(self._triangles.corner_normals, triangle), first, second)
-            length = np.sqrt(dot(smooth, smooth))
-            side = gather(self._planes.side, triangle)
-            if not length.all():  # the mesh has none, or they cancel: as in Cycles, the face's own
-                smooth, length = np.where(length > 0, smooth, normal * side), np.where(length > 0, length, 1.0)
-            scale = side / length
-            normal = [component * scale for component in smooth]
         if self._triangles.corner_uvs is not None:
             _store(passes["UV"], where, _interpolated(gather(self._triangles.corner_uvs, triangle), first, second))
-        _store(passes["Normal"], where, normal)
+        _store(passes["Normal"], where, self._normal(triangle, first, second))
         self._write_place(passes, where, x, y, depth, cosine)
         self._write_labels(passes, where, triangle, self._triangles, self._planes.magnitude)
+
+    def _normal(self, triangle: Indices, first: Floats, second: Floats) -> Iterable[Floats]:
+        """Three components of the normals at barycentric coordinates: smooth where the mesh has normals, else of the face."""
+        if self._triangles.corner_normals is None:
+            return gather(self._planes.normals, triangle)
+        smooth = _interpolated(gather(self._triangles.corner_normals, triangle), first, second)
+        length = np.sqrt(dot(smooth, smooth))
+        side = gather(self._planes.side, triangle)
+        if not length.all():  # the mesh has none, or they cancel: as in Cycles, the face's own
+            smooth = np.where(length > 0, smooth, gather(self._planes.normals, triangle) * side)
+            length = np.where(length > 0, length, 1.0)
+        scale = side / length
+        return [component * scale for component in smooth]
 
     def _write_spheres(self, passes: Passes, where: Where, sphere: Indices, x: Floats, y: Floats) -> None:
         depth = self._ellipsoids.depth(sphere, x, y)
