@@ -413,7 +413,9 @@ def test_holdouts_and_shadow_catchers_are_plain_objects_on_both_sides(add, scene
     assert bpy.context.view_layer.layer_collection.children["Held out"].holdout and bpy.data.objects["Holdout"].is_holdout
 
 
-def test_the_view_layer_of_the_window_is_the_one_that_counts(add, scene, both_sides):
+@pytest.fixture
+def two_layers(add, scene):
+    """View layers ViewLayer and Other, each with a cube of its own, First and Second."""
     cube = mesh_from("cube")
     first, second = bpy.data.collections.new("First"), bpy.data.collections.new("Second")
     for collection, x in ((first, -1.5), (second, 1.5)):
@@ -421,12 +423,24 @@ def test_the_view_layer_of_the_window_is_the_one_that_counts(add, scene, both_si
         add(cube, collection.name, location=(x, 0, 0), collection=collection)
     other = scene.view_layers.new("Other")
     other.layer_collection.children["First"].exclude = True
-    other.use = False
     scene.view_layers[0].layer_collection.children["Second"].exclude = True
+    return scene.view_layers[0], other
+
+
+def test_one_view_layer_is_compared_and_the_others_are_told(two_layers, both_sides):
     sides = both_sides()
     sides.check()
     assert [placed.name for placed in sides.exported.objects] == ["First"]
-    assert not other.use and scene.view_layers[0].use
+    assert entry(sides.exported, "view layer Other").status == "skipped"
+    assert all(layer.use for layer in two_layers)
+
+
+def test_a_view_layer_that_is_not_rendered_is_not_compared(two_layers, both_sides):
+    two_layers[0].use = False
+    sides = both_sides()
+    sides.check()
+    assert [placed.name for placed in sides.exported.objects] == ["Second"]
+    assert not two_layers[0].use
 
 
 def test_strict_names_what_can_not_be_modelled(add, both_sides):

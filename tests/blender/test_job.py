@@ -219,6 +219,15 @@ def test_a_full_disk_leaves_no_partial_file(blend, scene, tmp_path):
         os.system(f"umount {small}")
 
 
+@pytest.mark.parametrize("name", ["plain.exr", "Ä ö.exr", "a#b####.exr", "{a}{{b.exr", "folder/deep {x} ##/picture.exr"])
+def test_a_picture_of_any_name_relative_to_the_working_folder(blend, tmp_path, monkeypatch, name):
+    path = blend()
+    monkeypatch.chdir(tmp_path)
+    job.render(job.Request(path), name)
+    assert (tmp_path / name).stat().st_size > 1000
+    assert {each.name for each in (tmp_path / name).parent.iterdir()} <= {(tmp_path / name).name, path.name}
+
+
 def test_render_and_export_tell_the_same(blend, camera_object, tmp_path):
     camera_object.data.dof.use_dof = True
     bpy.data.objects["Cube"].is_shadow_catcher = True

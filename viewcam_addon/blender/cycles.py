@@ -8,6 +8,7 @@ would make of it something else. Everything is borrowed and given back.
 import errno
 import os
 from collections.abc import Iterable
+from pathlib import Path
 
 import bpy
 
@@ -94,7 +95,7 @@ def _borrow_passes(borrow: Borrower, view_layer: bpy.types.ViewLayer) -> None:
 
 
 def _borrow_file(borrow: Borrower, scene: bpy.types.Scene, path: os.PathLike[str]) -> None:
-    borrow.set(scene.render, "filepath", str(path))
+    borrow.set(scene.render, "filepath", versions.literal_path(Path(path).absolute()))
     borrow.set(scene.render, "use_file_extension", False)
     borrow.set(scene.render, "use_overwrite", True)
     settings = scene.render.image_settings

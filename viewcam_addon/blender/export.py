@@ -52,7 +52,7 @@ def export_scene(
     InputError
         if the camera is no pinhole (orthographic, panoramic, sheared), or if Blender can't render the scene.
     """
-    features.note_render(scene, camera_object, ledger)
+    features.note_render(scene, view_layer, camera_object, ledger)
     with borrowed() as borrow:
         still_of_one_layer(borrow, scene, view_layer, camera_object)
         return visit(scene, lambda depsgraph: scene_in(depsgraph, camera_object, ledger))
@@ -60,7 +60,7 @@ def export_scene(
 
 def survey(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_object: bpy.types.Object, ledger: Ledger) -> None:
     """Fill the ledger as `export_scene` does, without reading any geometry."""
-    features.note_render(scene, camera_object, ledger)
+    features.note_render(scene, view_layer, camera_object, ledger)
     with borrowed() as borrow:
         still_of_one_layer(borrow, scene, view_layer, camera_object)
         visit(scene, lambda depsgraph: [None for _ in placements(depsgraph, ledger)])
@@ -155,9 +155,9 @@ def _geometry(source: Source, ledger: Ledger) -> Mesh | Spheres:
 def _drawn(objects: list[Object], geometries: dict[str, Mesh | Spheres], ledger: Ledger) -> Iterator[Object]:
     """The objects without those that a scale of 0 flattens, of which Cycles draws only meshes that no other object uses."""
     users = Counter(placed.geometry for placed in objects)
-    for placed in objects:
-        shared = users[placed.geometry] > 1 or isinstance(geometries[placed.geometry], Spheres)
-        if shared and np.linalg.det(placed.matrix[:3, :3]) == 0:
+    flat = np.linalg.det(np.array([placed.matrix[:3, :3] for placed in objects]).reshape(-1, 3, 3)) == 0
+    for placed, is_flat in zip(objects, flat, strict=True):
+        if is_flat and (users[placed.geometry] > 1 or isinstance(geometries[placed.geometry], Spheres)):
             ledger.note(placed.name, "exported", "flattened by its scale, and Cycles does not draw it")
         else:
             yield placed

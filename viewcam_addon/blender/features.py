@@ -19,11 +19,16 @@ _NO_SURFACE = {
 }
 
 
-def note_render(scene: bpy.types.Scene, camera_object: bpy.types.Object, ledger: Ledger) -> None:
+def note_render(
+    scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_object: bpy.types.Object, ledger: Ledger
+) -> None:
     """What the camera and the render settings do beyond a pinhole. To be asked before the settings are borrowed."""
     for sentence in datablocks.beyond_pinhole(camera_object, scene):
         ledger.note(camera_object.name, "approximated", f"{sentence} (off on both sides)")
     ledger.set_for_cycles(camera_object.data.dof, "use_dof", False)
+    for layer in scene.view_layers:
+        if layer.use and layer != view_layer:
+            ledger.note(f"view layer {layer.name}", "skipped", f"only view layer {view_layer.name!r} is compared")
     for library in bpy.data.libraries:
         if not Path(bpy.path.abspath(library.filepath)).is_file():
             ledger.note(library.name, "skipped", f"the library {library.filepath} is missing, and all that is linked from it")

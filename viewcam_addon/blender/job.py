@@ -107,7 +107,7 @@ def _stage(request: Request) -> Iterator[_Stage]:
         camera = _camera(scene, request.camera)  # a marker may have changed it
         if request.size:
             _borrow_size(borrow, scene, camera, request.size)
-        yield _Stage(scene, bpy.context.view_layer, camera)
+        yield _Stage(scene, _view_layer(scene), camera)
 
 
 def open_blend(path: str | os.PathLike[str]) -> None:
@@ -148,6 +148,12 @@ def _camera(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object:
             raise InputError(f"scene {scene.name!r} has no object {name!r}: its cameras are {', '.join(cameras) or 'none'}")
     datablocks.check_perspective(camera)
     return camera
+
+
+def _view_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
+    """The window's view layer if it is rendered at all, else the first that is."""
+    current = bpy.context.view_layer
+    return current if current.use else next((layer for layer in scene.view_layers if layer.use), current)
 
 
 def _borrow_frame(borrow: Borrower, scene: bpy.types.Scene, frame: int) -> None:

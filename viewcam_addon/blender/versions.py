@@ -1,5 +1,7 @@
 """Every difference between Blender 4.2 and 5.2 that this project meets, each in one place."""
 
+from pathlib import Path
+
 import bpy
 
 # What Cycles draws without a material: a diffuse surface, and since 5.0 a Principled one, which bends grazing smooth normals.
@@ -52,6 +54,11 @@ def adaptive_subdivision(block: bpy.types.Object, scene: bpy.types.Scene) -> tup
     else:
         return None
     return (owner, "use_adaptive_subdivision") if owner.use_adaptive_subdivision else None
+
+
+def literal_path(path: Path) -> str:
+    """A path as the render's output takes it. Since 5.0 braces in it name variables."""
+    return str(path).replace("{", "{{").replace("}", "}}") if bpy.app.version >= (5, 0) else str(path)
 
 
 def set_multilayer_file(settings: bpy.types.ImageFormatSettings) -> None:
