@@ -92,7 +92,7 @@ def _bare_embree(scene: Scene, threads: int) -> Callable[[], object]:
     triangles = triangles_of([(placed, scene.geometries[placed.geometry]) for placed in scene.objects], view)
     embree = visibility.embree_scene(triangles.vertices.T, triangles.corners.T)
     rows, columns = np.divmod(np.arange(camera.width * camera.height), camera.width)
-    directions = np.stack([view.x(columns + 0.5), view.y(rows + 0.5), np.ones(len(rows))], axis=1).astype(np.float32)
+    directions = np.stack([*camera.view_plane(columns + 0.5, rows + 0.5), np.ones(len(rows))], axis=1).astype(np.float32)
     origins = directions * np.float32(scene.clip[0])
 
     def trace(first: int) -> None:

@@ -125,8 +125,8 @@ class Pinhole:
 
     def field_of_view(self) -> Triple:
         """(horizontal, vertical, diagonal) in radians: between opposite edges and, diagonal, between opposite corners."""
-        left, right = self._plane(0, 0)[0], self._plane(self.width, 0)[0]
-        bottom, top = self._plane(0, 0)[1], self._plane(0, self.height)[1]
+        left, right = self.view_plane(0, 0)[0], self.view_plane(self.width, 0)[0]
+        bottom, top = self.view_plane(0, 0)[1], self.view_plane(0, self.height)[1]
         return (
             math.atan(right) - math.atan(left),
             math.atan(top) - math.atan(bottom),
@@ -141,7 +141,7 @@ class Pinhole:
 
         Returns (..., 3) float64 unit vectors, world space.
         """
-        x, y = np.broadcast_arrays(*self._plane(np.add(columns, px), np.add(rows, py)))
+        x, y = np.broadcast_arrays(*self.view_plane(np.add(columns, px), np.add(rows, py)))
         u, v, w = self._basis
         if self.mirrored:
             u = -u
@@ -151,8 +151,8 @@ class Pinhole:
         directions /= np.sqrt(x * x + y * y + 1.0)[..., None]
         return directions
 
-    def _plane(self, column: ArrayLike, row: ArrayLike) -> tuple:
-        """Continuous picture coordinates to those of the view plane at distance 1."""
+    def view_plane(self, column: ArrayLike, row: ArrayLike) -> tuple:
+        """Continuous picture coordinates to (x, y) in the view plane at distance 1: the ray is (±x) u + y v − w."""
         return (column - self.principal_point[0]) / self.distance[0], (row - self.principal_point[1]) / self.distance[1]
 
     def project(self, points: ArrayLike) -> tuple[Array, Array, Array]:

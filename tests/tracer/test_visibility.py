@@ -25,12 +25,12 @@ def prepared(scene, kind):
     things = [(placed, scene.geometries[placed.geometry]) for placed in scene.objects]
     triangles = triangles_of([thing for thing in things if isinstance(thing[1], Mesh)], view)
     ellipsoids = ellipsoids_of([thing for thing in things if isinstance(thing[1], Spheres)], view)
-    return kind(triangles, Planes(triangles, view), ellipsoids, scene.clip), view
+    return kind(triangles, Planes(triangles, view), ellipsoids, scene.clip)
 
 
-def centres(scene, view):
+def centres(scene):
     rows, columns = np.mgrid[: scene.camera.height, : scene.camera.width]
-    return view.x(columns.ravel() + 0.5), view.y(rows.ravel() + 0.5)
+    return scene.camera.view_plane(columns.ravel() + 0.5, rows.ravel() + 0.5)
 
 
 def unexplained(found, x, y, reach, oracle) -> int:
@@ -48,9 +48,9 @@ def unexplained(found, x, y, reach, oracle) -> int:
 @given(seed=SEEDS)
 def test_embree_and_plain_numpy_see_the_same_primitives_but_for_roundings_of_edges(random_scene, seed):
     scene = random_scene(seed)
-    embree, view = prepared(scene, visibility.Embree)
-    plain, _ = prepared(scene, visibility.Plain)
-    x, y = centres(scene, view)
+    embree = prepared(scene, visibility.Embree)
+    plain = prepared(scene, visibility.Plain)
+    x, y = centres(scene)
     found = embree.first(x, y)
     assert (found >= 0).any() or seed != 0, "the scene of seed 0 shows nothing"
     wrong = unexplained(found, x, y, ROUNDING, plain)
@@ -59,9 +59,9 @@ def test_embree_and_plain_numpy_see_the_same_primitives_but_for_roundings_of_edg
 
 def test_a_shift_by_half_a_pixel_is_not_explained_by_rounding(random_scene):
     scene = random_scene(0)
-    embree, view = prepared(scene, visibility.Embree)
-    plain, _ = prepared(scene, visibility.Plain)
-    x, y = centres(scene, view)
+    embree = prepared(scene, visibility.Embree)
+    plain = prepared(scene, visibility.Plain)
+    x, y = centres(scene)
     half = 0.5 * abs(x[1] - x[0])
     wrong = unexplained(embree.first(x + half, y), x, y, ROUNDING, plain)
     assert wrong > 50, f"only {wrong} rays differ after a shift by half a pixel"
@@ -75,11 +75,11 @@ def test_no_ray_leaves_a_closed_mesh_through_its_edges_or_vertices(ball, make_sc
     shell = ball(6)
     eye = rng.uniform(-0.4, 0.4, 3)
     scene = make_scene(Pinhole(tuple(eye), tuple(eye + rng.normal(size=3)), (0.1, 0.2, 1), 100, 100, 100), shell)
-    seen_from, view = prepared(scene, kind)
+    seen_from = prepared(scene, kind)
     corners = shell.vertices[shell.triangles]
     share = rng.uniform(0, 1, (len(corners), 3, 1))
     on_edges = corners * share + np.roll(corners, 1, axis=1) * (1 - share)
-    points, _ = view.points(np.eye(4), np.concatenate([shell.vertices, on_edges.reshape(-1, 3)]))
+    points, _ = View(scene.camera).points(np.eye(4), np.concatenate([shell.vertices, on_edges.reshape(-1, 3)]))
     points = points[:, points[2] > 1e-3]
     found = seen_from.first(points[0] / points[2], points[1] / points[2])
     assert (found >= 0).all(), f"{(found < 0).sum()} of {len(found)} rays leave the closed ball"
@@ -102,7 +102,7 @@ def test_what_lies_before_the_clip_range_is_looked_through_and_what_lies_behind_
         ((4, 5), 1),
         ((0, 0.9), -1),
     ):
-        seen_from, _ = prepared(make_scene(camera, *things, clip=clip), kind)
+        seen_from = prepared(make_scene(camera, *things, clip=clip), kind)
         found = seen_from.first(np.zeros(1), np.zeros(1))
         assert found[0] == seen, f"clip {clip}: primitive {found[0]} instead of {seen}"
 
@@ -123,8 +123,8 @@ def test_scenes_and_meshes_that_are_empty_or_degenerate_show_nothing(make_scene,
         ((make_spheres([[0, 0, 0]], 1.0), flat),),  # a sphere that its matrix flattens
     ):
         scene = make_scene(camera, *things)
-        seen_from, view = prepared(scene, kind)
-        found = seen_from.first(*centres(scene, view))
+        seen_from = prepared(scene, kind)
+        found = seen_from.first(*centres(scene))
         assert (found == -1).all(), f"{things}: {np.unique(found)}"
 
 
@@ -133,7 +133,7 @@ def test_an_eye_inside_a_sphere_sees_through_it_and_one_just_outside_sees_it(mak
     camera = Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 10, 1, 1)
     around, beyond = [0, 0, -0.5], [0, 0, -4]
     for radius, seen in ((0.5 + 1e-12, 1), (0.5 - 1e-12, 0)):
-        seen_from, _ = prepared(make_scene(camera, make_spheres([around], radius), make_spheres([beyond], 1.0)), kind)
+        seen_from = prepared(make_scene(camera, make_spheres([around], radius), make_spheres([beyond], 1.0)), kind)
         primitives = 2 if seen == 0 else 1  # the sphere round the eye is no primitive at all
         found = seen_from.first(np.zeros(1), np.zeros(1))
         assert seen_from._ellipsoids.count == primitives
@@ -162,7 +162,7 @@ def test_a_hundred_thousand_spheres_are_told_apart_as_by_testing_each(make_scene
     spheres = make_spheres(rng.uniform(-2, 2, (100_000, 3)), rng.uniform(0.5, 1.5, 100_000) * radius)
     for eye in ((0, -7, 1), (0.3, 0.1, 0.2)):  # before the cloud, and in it, where many spheres reach behind the eye
         scene = make_scene(Pinhole(eye, (0, 1, 0), (0, 0, 1), 80, 100, 100), spheres)
-        embree, _ = prepared(scene, visibility.Embree)
+        embree = prepared(scene, visibility.Embree)
         x, y = rng.uniform(-0.6, 0.6, (2, 120))
         found = embree.first(x, y)
         _, depth = spheres_in_world(scene, spheres, x, y)
@@ -185,8 +185,8 @@ def test_spheres_that_touch_one_depth_overlap_or_coincide_are_all_found(make_sce
         "fifty spheres of one centre, each larger by 1e-9": make_spheres(nested, 0.3 * (1 + 1e-9 * np.arange(50))),
     }.items():
         scene = make_scene(Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 100, 60, 60), spheres)
-        embree, view = prepared(scene, visibility.Embree)
-        x, y = centres(scene, view)
+        embree = prepared(scene, visibility.Embree)
+        x, y = centres(scene)
         found = embree.first(x, y)
         index, depth = spheres_in_world(scene, spheres, x, y)
         assert np.array_equal(found >= 0, index >= 0), name
@@ -202,9 +202,9 @@ def test_the_floor_is_seen_right_beside_where_a_sphere_rests_on_it(make_scene, m
     floor = make_mesh([[-50, -50, 0], [50, -50, 0], [50, 50, 0], [-50, 50, 0]], [[0, 1, 2], [0, 2, 3]])
     spheres = make_spheres(np.column_stack([np.mgrid[-3:4, -3:4].reshape(2, -1).T, np.full(49, 0.4)]), 0.4)
     scene = make_scene(Pinhole((0, -9, 0.6), (0, 0, 0.2), (0, 0, 1), 900, 400, 120), floor, spheres)
-    embree, view = prepared(scene, visibility.Embree)
-    plain, _ = prepared(scene, visibility.Plain)
-    x, y = centres(scene, view)
+    embree = prepared(scene, visibility.Embree)
+    plain = prepared(scene, visibility.Plain)
+    x, y = centres(scene)
     found = embree.first(x, y)
     assert {0, 1} & set(found) and (found >= 2).any(), "the picture shows floor and spheres"
     wrong = unexplained(found, x, y, ROUNDING, plain)

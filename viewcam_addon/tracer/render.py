@@ -70,7 +70,7 @@ class Tracer:
         return passes
 
     def _trace(self, passes: Passes, column: np.ndarray, row: np.ndarray) -> None:
-        x, y = self._view.x(column), self._view.y(row)
+        x, y = self._camera.view_plane(column, row)
         self._surface.write(passes, self._visibility.first(x, y), x, y)
 
 

@@ -1,15 +1,14 @@
 """Camera space, in which everything is traced.
 
 Its origin is the eye, its axes are right, up and forward: u, v and −w, or −u, v and −w where the camera is mirrored. A ray is
-(x, y, 1) for the point (x, y) of the view plane at distance 1. So the parameter t of a hit *is* its planar depth and clipping
-is an interval of t. Rounded to float32, a vertex moves in the picture by no more than 2⁻²³ of its distance from the principal
-point, however long the lens and wherever in the world the camera stands.
+(x, y, 1) for the point (x, y) of `Pinhole.view_plane`. So the parameter t of a hit *is* its planar depth, and clipping is an
+interval of t. Rounded to float32, a vertex moves in the picture by no more than 2⁻²³ of its distance from the principal point,
+however long the lens and wherever in the world the camera stands.
 
 Rejected: world axes with the origin at the eye, where the lens magnifies that rounding to 2⁻²⁴ · d pixels.
 """
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..pinhole import Pinhole
 from .arrays import Floats, linear
@@ -27,16 +26,6 @@ class View:
         self.eye: Floats = np.array(camera.eye)
         self.axes: Floats = np.stack([-u if camera.mirrored else u, v, -w])
         self.handedness = 1.0 if camera.mirrored else -1.0
-        self._distance = camera.distance
-        self._centre = camera.principal_point
-
-    def x(self, column: ArrayLike) -> Floats:
-        """Continuous columns of the picture to the view plane at distance 1."""
-        return (column - self._centre[0]) / self._distance[0]
-
-    def y(self, row: ArrayLike) -> Floats:
-        """Continuous rows of the picture, from the bottom, to the view plane at distance 1."""
-        return (row - self._centre[1]) / self._distance[1]
 
     def points(self, matrix: Floats, points: Floats) -> tuple[Floats, Floats]:
         """Points of an object's space in camera space, and how large their world coordinates are.
