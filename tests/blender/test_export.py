@@ -7,6 +7,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from mathutils import Vector  # noqa: E402
+
 from viewcam_addon.errors import NotModelledError  # noqa: E402
 from viewcam_addon.tracer.scene import Mesh, Spheres  # noqa: E402
 
@@ -441,6 +443,21 @@ def test_a_view_layer_that_is_not_rendered_is_not_compared(two_layers, both_side
     sides.check()
     assert [placed.name for placed in sides.exported.objects] == ["Second"]
     assert not two_layers[0].use
+
+
+@pytest.mark.parametrize("name", ["spot", "stanford-bunny", "teapot"])
+def test_real_models(scene, camera, both_sides, models_folder, name):
+    bpy.ops.wm.obj_import(filepath=str(models_folder / f"{name}.obj"))
+    (model,) = bpy.context.selected_objects
+    model.data.polygons.foreach_set("use_smooth", [True] * len(model.data.polygons))
+    scene.render.resolution_x, scene.render.resolution_y = 640, 480
+    corners = np.array([model.matrix_world @ Vector(corner) for corner in model.bound_box])
+    centre, size = corners.mean(axis=0), np.ptp(corners, axis=0).max()
+    group = camera.virtual_pinhole
+    group.look_at, group.eye, group.distance = centre, centre + size * np.array((0.9, -1.8, 0.9)), 640
+    group.enabled = True
+    camera.data.clip_start, camera.data.clip_end = size / 100, size * 100
+    both_sides().check()
 
 
 def test_strict_names_what_can_not_be_modelled(add, both_sides):

@@ -243,3 +243,29 @@ def test_triangles_that_are_nowhere_are_left_out_and_told(monkey, both_sides):
     (entry,) = [entry for entry in sides.exported.ledger if entry.object == "Cube"]
     assert "triangles have vertices that are not finite" in entry.reason
     assert len(sides.exported.geometries["Cube"].triangles) < 12
+
+
+def test_grease_pencil_is_skipped(monkey, both_sides):
+    bpy.ops.object.grease_pencil_add(type="MONKEY") if bpy.app.version >= (4, 3) else bpy.ops.object.gpencil_add(type="MONKEY")
+    pencil = bpy.context.object
+    sides = both_sides()
+    sides.check()
+    (entry,) = [entry for entry in sides.exported.ledger if entry.object == pencil.name]
+    assert (entry.status, entry.reason) == ("skipped", "Grease Pencil is not modelled")
+
+
+def test_what_geometry_nodes_make_without_a_material(monkey, both_sides):
+    """Since 5.0 nothing keeps Cycles from bending the normals of such a mesh where they graze, and it is told."""
+    tree = bpy.data.node_groups.new("Sphere", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    sphere, shade = tree.nodes.new("GeometryNodeMeshUVSphere"), tree.nodes.new("GeometryNodeSetShadeSmooth")
+    target = tree.nodes.new("NodeGroupOutput")
+    tree.links.new(sphere.outputs[0], shade.inputs[0])
+    tree.links.new(shade.outputs[0], target.inputs[0])
+    monkey.modifiers.new("Nodes", "NODES").node_group = tree
+    sides = both_sides()
+    rows = {row.name: row.ok for row in sides.comparison.rows}
+    bent = not rows.pop("Normal")
+    (entry,) = sides.exported.ledger
+    assert all(rows.values()), rows
+    assert ("may bend its normals" in entry.reason) == bent == (bpy.app.version >= (5, 0))

@@ -1,6 +1,6 @@
 """What of a scene the tracer does not model, found and named: each with the remedy that takes it out of Cycles' render too.
 
-Hair, curves and volumes need no remedy: the view layer is told to leave them out (cycles.py).
+Hair and volumes need no remedy: the view layer is told to leave them out (cycles.py).
 """
 
 from pathlib import Path
@@ -39,6 +39,10 @@ def note_render(
             ledger.set_for_cycles(scene, "world", None)
 
 
+# Blender itself draws them into Cycles' picture, and into its Depth pass.
+_DRAWN_OVER_CYCLES = ("GREASEPENCIL", "GPENCIL")
+
+
 class Placed(NamedTuple):
     """An object in the depsgraph, each of the three evaluated.
 
@@ -61,6 +65,8 @@ def is_surface(placed: Placed, ledger: Ledger) -> bool:
     name = placed.name
     if shown.type in _NO_SURFACE:
         ledger.note(name, "skipped", _NO_SURFACE[shown.type])
+        if shown.type in _DRAWN_OVER_CYCLES:
+            ledger.set_for_cycles(real.original, "hide_render", True)
     elif shown.type == "LIGHT":
         ledger.note(name, "exported", "a light, which leaves no mark in the passes of level geometry")
     elif _holds_gas(real) and shown.data == real.data:
