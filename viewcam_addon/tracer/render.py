@@ -18,7 +18,7 @@ from .triangles import Planes, triangles_of
 from .view import View
 from .visibility import visibility
 
-TILE = 16384  # pixels; the fastest of 4096 … 131072, see benchmarks/geometry_level.py
+TILE = 16384  # pixels: smaller ones spend their time in Python, larger ones leave the cache
 
 
 class Tracer:
@@ -51,8 +51,7 @@ class Tracer:
             self._trace({name: values[tile] for name, values in flat.items()}, pixels - rows * width + 0.5, rows + 0.5)
 
         with ThreadPoolExecutor(self._threads) as pool:
-            for done in pool.map(trace, range(0, width * height, TILE)):
-                assert done is None  # map() hands on what a tile raised
+            list(pool.map(trace, range(0, width * height, TILE)))  # the list hands on what a tile raised
         return passes
 
     def surface_at(self, columns: ArrayLike, rows: ArrayLike, px: ArrayLike = 0.5, py: ArrayLike = 0.5) -> Passes:
