@@ -14,7 +14,7 @@ from viewcam_addon.image import Image
 from viewcam_addon.pinhole import Pinhole
 
 # Rayleigh's distribution with this scale has its median at 0.41, its 99th percentile at 1.06 and its maximum over 10⁵ pixels
-# near 1.7 roundings: inside law.ROUNDINGS (0.7, 2.1 and 20), as Cycles is.
+# near 1.7 roundings: inside law.ROUNDINGS (0.7, 3.0 and 20), as Cycles is.
 ROUNDINGS_OF_A_RENDERER = 0.35
 
 

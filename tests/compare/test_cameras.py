@@ -69,11 +69,20 @@ def test_a_displaced_eye_shows_at_the_nearest_depth():
 
 
 def test_shift_zoom_and_roll_are_told_apart():
-    rows, columns = (grid.ravel() + 0.5 for grid in np.mgrid[:108, :192] * 10)
-    x, y = columns - 960, rows - 540
+    pixels = np.arange(0, STATED.width * STATED.height, 997)
+    x, y = pixels % STATED.width + 0.5 - 960, pixels // STATED.width + 0.5 - 540
     off_x, off_y = 0.25 + 1e-3 * x - 2e-4 * y, -0.5 + 1e-3 * y + 2e-4 * x
-    found = systematic_error(STATED, columns, rows, off_x, off_y, np.full(len(x), 1e-4))
+    found = systematic_error(STATED, pixels, off_x, off_y, np.full(len(x), 1e-4))
     assert (found.shift_x, found.shift_y) == pytest.approx((0.25, -0.5))
     assert (found.zoom_x, found.zoom_y) == pytest.approx((1e-3, 1e-3))
     assert found.roll == pytest.approx(2e-4, rel=2e-3)  # arctan of 2e-4 / 1.001
     assert not found.ok
+
+
+def test_what_all_share_is_not_hidden_by_a_few_uncertain_pixels():
+    pixels = np.arange(0, STATED.width * STATED.height, 997)
+    certain = np.arange(len(pixels)) % 10 > 0
+    one_rounding = np.where(certain, 1e-4, 1.0)
+    shared = np.full(len(pixels), 1e-2)
+    assert not systematic_error(STATED, pixels, np.where(certain, shared, 0.5), shared * 0, one_rounding).ok
+    assert systematic_error(STATED, pixels, np.where(certain, 0.0, 0.5), shared * 0, one_rounding).ok

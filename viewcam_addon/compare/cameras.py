@@ -92,16 +92,15 @@ def conversion_error(stated: Pinhole, read_back: Pinhole, depths: Array) -> Conv
     return ConversionError(float(displacement.max()), float(tolerance[worst]), float(displacement[worst] / tolerance[worst]))
 
 
-def systematic_error(
-    pinhole: Pinhole, columns: Array, rows: Array, off_x: Array, off_y: Array, one_rounding: Array
-) -> Systematic:
+def systematic_error(pinhole: Pinhole, pixels: NDArray, off_x: Array, off_y: Array, one_rounding: Array) -> Systematic:
     """Shift, zoom and roll that explain the displacements best.
 
-    columns, rows : (n,) continuous pixel positions. off_x, off_y : (n,) displacements there, pixels.
+    pixels : (n,) int, row after row. off_x, off_y : (n,) displacements there, pixels to the right and upwards.
     one_rounding : (n,) law.position_shift. A pixel weighs as much as it is certain, so that a few slender triangles do not hide
         what all the others share. The mean of the errors can't exceed their typical size.
     """
-    x, y = columns - pinhole.principal_point[0], rows - pinhole.principal_point[1]
+    row, column = np.divmod(pixels, pinhole.width)
+    x, y = column + 0.5 - pinhole.principal_point[0], row + 0.5 - pinhole.principal_point[1]
     weight = one_rounding.min() / one_rounding
     design = np.column_stack([weight, x * weight, y * weight])
     (shift_x, zoom_x, shear_x), (shift_y, shear_y, zoom_y) = (

@@ -6,7 +6,7 @@ so depth, normal and UV are compared with the reference's, and indices and cover
 at this level.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ from .statistics import Row, measure
 
 # The passes that are compared with their channels (the third of UV is constant), and which of them both pictures must have.
 _CHANNELS = {"Depth": 1, "Position": 3, "Normal": 3, "UV": 2, "Object Index": 1, "Material Index": 1}
+_UNITS = {"Position": "px", "Position depth": "relative", "Depth": "relative", "Normal": "°", "UV": "absolute"}
 _NEEDED = ("Depth", "Position", "Object Index")
 # Passes that only the reference has: what the law is evaluated with.
 _LAW = ("Magnitude", "Facing")
@@ -129,11 +130,13 @@ def compare(
     size = (pinhole.height, pinhole.width)
     hit = law.is_hit(expected)
     shift = np.where(hit, law.ray_shift(pinhole, expected), np.nan)
-    agreement = Agreement(pinhole, _slopes(expected, hit, size))
+    off_x, off_y, along = _displacement(pinhole, seen)
+    agreement = Agreement(pinhole, np.hypot(off_x, off_y), _slopes(expected, hit, size))
 
     kinds = kinds_of(expected, seen, agreement)
     # At an edge the ray may meet either surface, so a re-traced one is judged by the steepest slope around.
-    around = Agreement(pinhole, {name: largest_around(slope.reshape(size)).ravel() for name, slope in agreement.slopes.items()})
+    steepest = {name: largest_around(slope.reshape(size)).ravel() for name, slope in agreement.slopes.items()}
+    around = replace(agreement, slopes=steepest)
     mismatches = _mismatches(kinds, seen, reach_of(shift.reshape(size)).ravel(), around, surface_at)
 
     compared = hit & np.isin(kinds, (-1, KINDS.index("material index"), KINDS.index("surface")))
@@ -141,13 +144,20 @@ def compare(
     settled = mismatches.explained | (mismatches.unexplained_count <= _allowed_unexplained(pinhole))
     compared[mismatches.rows[settled] * pinhole.width + mismatches.columns[settled]] = False
     chosen = np.flatnonzero(compared)
-    rows, systematic, maps, roundings = _measure(chosen, at(expected, chosen), at(seen, chosen), agreement.at(chosen))
+    errors = agreement.at(chosen).errors(at(expected, chosen), at(seen, chosen))
+    depth = expected["Depth"][chosen, 0].astype(np.float64)
+    errors["Position depth"] = (np.abs(along[chosen] - depth) / depth, *errors["Depth"][1:])
+    systematic = None
+    if len(chosen):
+        systematic = systematic_error(pinhole, chosen, off_x[chosen], off_y[chosen], errors["Position"][1])
+    rows, maps = _measure(errors, chosen, size)
 
     depths = expected["Depth"][hit, 0]
     conversion = None
     if stated is not None and len(depths):
         conversion = conversion_error(stated, pinhole, np.percentile(depths, (0, 50, 100)))
     hits = (int(hit.sum()), int(law.is_hit(seen).sum()))
+    roundings = errors["Position"][0] / errors["Position"][1]
     return Comparison(pinhole, stated, hits, rows, mismatches, systematic, conversion, maps, roundings)
 
 
@@ -192,34 +202,26 @@ def _mismatches(kinds: NDArray, seen: Seen, reach: Array, agreement: Agreement, 
     return Mismatches(columns, rows, kinds[found], shifts, reach[found], retraced)
 
 
-def _measure(
-    chosen: NDArray, expected: Seen, seen: Seen, agreement: Agreement
-) -> tuple[tuple[Row, ...], Systematic | None, dict[str, NDArray[np.float32]], Array]:
-    """The rows, the systematic part, the maps and the positions' roundings, over the chosen pixels."""
-    pinhole = agreement.pinhole
-    columns, rows = chosen % pinhole.width + 0.5, chosen // pinhole.width + 0.5
-    column, row, along = pinhole.project(seen["Position"])
+def _displacement(pinhole: Pinhole, seen: Seen) -> tuple[Array, Array, Array]:
+    """How far the positions, projected, lie from the centres of their pixels, to the right and upwards; and their depths."""
+    row, column = np.divmod(np.arange(pinhole.width * pinhole.height), pinhole.width)
+    seen_column, seen_row, along = pinhole.project(seen["Position"])
     # A position behind the eye has no picture: it counts as far off as the picture is large.
     diagonal = float(np.hypot(pinhole.width, pinhole.height))
-    off_x, off_y = (np.nan_to_num(off, nan=diagonal) for off in (column - columns, row - rows))
-    shift = law.position_shift(pinhole, expected)
-    depth = expected["Depth"][:, 0].astype(np.float64)
-    across = np.hypot(off_x, off_y)
+    off_x, off_y = (np.nan_to_num(off, nan=diagonal) for off in (seen_column - column - 0.5, seen_row - row - 0.5))
+    return off_x, off_y, along
 
-    measured = {"Position": ("px", across, shift, 0.0)}
-    measured["Position depth"] = ("relative", np.abs(along - depth) / depth, law.depth_error(pinhole, expected), law.FLOAT32)
-    errors = agreement.errors(expected, seen)
-    measured["Depth"] = ("relative", *errors["Depth"])
-    if "Normal" in errors:
-        measured["Normal"] = ("°", *(np.degrees(figure) for figure in errors["Normal"]))
-    if "UV" in errors:
-        measured["UV"] = ("absolute", *errors["UV"])
 
-    maps = {}
-    for name, (_, error, *_) in measured.items():
-        flat = np.full(pinhole.width * pinhole.height, np.nan, dtype=np.float32)
+def _measure(errors: dict, chosen: NDArray, size: tuple[int, int]) -> tuple[tuple[Row, ...], dict[str, NDArray[np.float32]]]:
+    """The rows and the maps of the chosen pixels."""
+    rows, maps = [], {}
+    for name, unit in _UNITS.items():
+        if name not in errors:
+            continue
+        # The law speaks of radians, people of degrees.
+        error, one_rounding, storage = (np.degrees(figure) if unit == "°" else figure for figure in errors[name])
+        rows.append(measure(name, unit, error, one_rounding, storage))
+        flat = np.full(size[0] * size[1], np.nan, dtype=np.float32)
         flat[chosen] = error
-        maps[name] = flat.reshape(pinhole.height, pinhole.width)
-    rows_measured = tuple(measure(name, *figures) for name, figures in measured.items())
-    systematic = systematic_error(pinhole, columns, rows, off_x, off_y, shift) if len(chosen) else None
-    return rows_measured, systematic, maps, across / shift
+        maps[name] = flat.reshape(size)
+    return tuple(rows), maps

@@ -31,14 +31,17 @@ Seen = dict[str, NDArray]
 
 PERCENTILES = (50.0, 90.0, 99.0, 99.9, 100.0)
 
-# How many roundings of 2⁻²⁴ · (M + t) a position is off at each of PERCENTILES.
-ROUNDINGS = (0.7, 1.4, 2.1, 3.4, 20.0)
+# How many roundings of 2⁻²⁴ · (M + t) a position is off at each of PERCENTILES: half as much again as in the worst of 120
+# pictures by Cycles of Blender 4.2, 4.5, 5.0 and 5.2 against the tracer, 24 million hits (views of 0.1° to 172°, up to 20 km
+# from the origin, faces of 280 m, smooth and flat meshes, text): worst 0.47, 0.94, 1.96, 3.2 and 13; over all hits 0.23,
+# 0.54, 1.0, 1.5 and 10.
+ROUNDINGS = (0.7, 1.4, 3.0, 5.0, 20.0)
 
 FLOAT32 = 2.0**-24
 
 # Below this cosine between ray and surface the error grows with its inverse, since the barycentric coordinates are divided by
-# it.
-GRAZING = 0.1
+# it: in the same measurement k · cosine / 0.2 had its 99th percentile at 0.5 to 1.7 from 0.1 down to 0.001.
+GRAZING = 0.2
 
 # Blender 5.2 stores smooth normals as two 16-bit octahedral coordinates. Half a step of both is at most 2.11 / 32767 on the
 # sphere (found by encoding and decoding 2 million directions; 0.0037°).

@@ -32,6 +32,9 @@ PIXELS_PER_UNEXPLAINED = 1_000_000
 # The rings, in roundings (law.ROUNDINGS): the smallest that explains tells how far the ray was off.
 _RINGS = (0.25, 0.5, 1.0, 2.0, 3.4, 6.0, law.ROUNDINGS[-1])
 _DIRECTIONS = 16
+# A ray that sees a cosine below this is at the rim of what it grazes: √(2 a / r) for a ball of r = 100 pixels, a = 0.05
+# pixels from its silhouette.
+_RIM = 0.03
 _BATCH = 1_000
 
 
@@ -86,37 +89,40 @@ class Mismatches:
 
 @dataclass(frozen=True, eq=False)
 class Agreement:
-    """Judges whether two sights of the same pixels are the same surface, within the law's last percentile.
+    """Judges whether the test picture shows the surface that a ray sees, within the law's last percentile.
 
+    across : (n,) pixels, how far each of the test's positions, projected, lies from the centre of its pixel.
     slopes : pass name to (n,), how much Normal and UV change per pixel there (law.slopes).
     """
 
     pinhole: Pinhole
+    across: Array
     slopes: dict[str, Array]
 
     def at(self, chosen: NDArray) -> "Agreement":
         """That of some of the pixels, by their indices."""
-        return Agreement(self.pinhole, {name: slope[chosen] for name, slope in self.slopes.items()})
+        return Agreement(self.pinhole, self.across[chosen], {name: slope[chosen] for name, slope in self.slopes.items()})
 
     def errors(self, expected: Seen, seen: Seen) -> dict[str, tuple[Array, Array, Array | float]]:
-        """For Depth, Normal and UV: (error, what one rounding causes, what storage causes), the last may be one number.
+        """For each pass: (error, what one rounding causes, what storage causes), each (n,), the last may be one number.
 
         The law is taken at `expected`. Meaningless where either side missed.
         """
         depth = expected["Depth"][..., 0].astype(np.float64)
         errors = {
-            "Depth": (np.abs(seen["Depth"][..., 0] - depth) / depth, law.depth_error(self.pinhole, expected), law.FLOAT32)
+            "Position": (self.across, law.position_shift(self.pinhole, expected), 0.0),
+            "Depth": (np.abs(seen["Depth"][..., 0] - depth) / depth, law.depth_error(self.pinhole, expected), law.FLOAT32),
         }
         if "Normal" in self.slopes:
-            allowed = law.normal_error(self.pinhole, expected, self.slopes["Normal"])
-            errors["Normal"] = (law.angle_between(expected["Normal"], seen["Normal"]), allowed, law.NORMAL_STORAGE)
+            one_rounding = law.normal_error(self.pinhole, expected, self.slopes["Normal"])
+            errors["Normal"] = (law.angle_between(expected["Normal"], seen["Normal"]), one_rounding, law.NORMAL_STORAGE)
         if "UV" in self.slopes:
             apart = np.abs(expected["UV"][..., :2].astype(np.float64) - seen["UV"][..., :2]).max(axis=-1)
             errors["UV"] = (apart, law.uv_error(self.pinhole, expected, self.slopes["UV"]), law.uv_storage(expected))
         return errors
 
     def same_surface(self, expected: Seen, seen: Seen) -> NDArray[np.bool_]:
-        """(n,) bool: equal indices, and depth, normal and UV within tolerance; or a miss on both sides."""
+        """(n,) bool: equal indices, and every pass within tolerance; or a miss on both sides."""
         same = self.same_place(expected, seen)
         for name, figures in self.errors(expected, seen).items():
             if name != "Depth":
@@ -204,7 +210,7 @@ def _explained_by(
         for figure in (
             here.same_surface(traced, shown),
             here.same_place(traced, shown),
-            law.facing(agreement.pinhole, traced) < law.GRAZING,
+            law.facing(agreement.pinhole, traced) < _RIM,
         )
     )
     on_silhouette = grazed.any(axis=1) | ~same_place.all(axis=1)

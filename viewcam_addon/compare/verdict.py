@@ -71,10 +71,10 @@ def _praise(comparison: "Comparison") -> str:
     position = comparison.rows[0]
     count = len(comparison.mismatches.kinds)
     edges = f"; {count:,} on edges, {_explained(comparison)}" if count else ""
+    median, nearly_all = (position.values[PERCENTILES.index(p)] for p in (50.0, 99.9))
     return (
-        f"The same picture: over {position.count:,} pixels the median is {position.values[0]:.1e} px off, 99.9 % are within "
-        f"{position.values[-2]:.1e} px and the worst is {position.values[-1]:.1e} px, at most "
-        f"{_percent(position.worst[1])} of what float32 allows{edges}."
+        f"The same picture: over {position.count:,} pixels the median is {median:.1e} px off and 99.9 % are within "
+        f"{nearly_all:.1e} px; every one stays within {_percent(position.worst[1])} of what float32 allows there{edges}."
     )
 
 
