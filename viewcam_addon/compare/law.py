@@ -13,9 +13,9 @@ are a distribution: k is given for five percentiles. Everything else follows fro
 s pixels shows a depth, a normal or a texture coordinate that is off by s times its slope in the picture.
 
 Rejected: a fixed number of pixels (right for one scene, wrong for one that is small, far from the origin, wide or telephoto);
-a number for each sample scene (it would be chosen, not derived); and k · 2⁻²⁴ · d · max(|P|, |e|) / z, which forgets the
-triangle and the ray: the same k would have to be 8 times larger for a view of 170° and 5 times for the slender triangles of a
-text.
+a number for each sample scene (it would be chosen, not derived); and k · 2⁻²⁴ · d · max(|P|, |e|) / z, which forgets the ray
+and the triangle: k would have to be three times larger for a view of 170°, and thousands of times for the bevel of a long
+beam, along which Cycles' positions slide by whole pixels.
 
 "Seen" below means a dict from pass name to (n, channels) arrays: the same pixels, or re-traced rays, in every pass.
 """
@@ -32,15 +32,15 @@ Seen = dict[str, NDArray]
 PERCENTILES = (50.0, 90.0, 99.0, 99.9, 100.0)
 
 # How many roundings of 2⁻²⁴ · (M + t) a position is off at each of PERCENTILES: half as much again as in the worst of 120
-# pictures by Cycles of Blender 4.2, 4.5, 5.0 and 5.2 against the tracer, 24 million hits (views of 0.1° to 172°, up to 20 km
-# from the origin, faces of 280 m, smooth and flat meshes, text): worst 0.47, 0.94, 1.96, 3.2 and 13; over all hits 0.23,
-# 0.54, 1.0, 1.5 and 10.
+# pictures by Cycles of Blender 4.2, 4.5, 5.0 and 5.2 against the tracer, 24 million hits, and twice as much at the maximum.
+# They were views of 0.14° to 170°, up to 8 km from the origin, of smooth and flat meshes, faces of 270 m and text: worst
+# 0.41, 0.94, 1.96, 3.2 and 10, over all hits 0.23, 0.54, 1.0, 1.5 and 10.
 ROUNDINGS = (0.7, 1.4, 3.0, 5.0, 20.0)
 
 FLOAT32 = 2.0**-24
 
 # Below this cosine between ray and surface the error grows with its inverse, since the barycentric coordinates are divided by
-# it: in the same measurement k · cosine / 0.2 had its 99th percentile at 0.5 to 1.7 from 0.1 down to 0.001.
+# it. Measured: k · cosine / 0.2 has its 99th percentile between 0.5 and 1.7 all the way from 0.1 down to 0.001.
 GRAZING = 0.2
 
 # Blender 5.2 stores smooth normals as two 16-bit octahedral coordinates. Half a step of both is at most 2.11 / 32767 on the
