@@ -114,9 +114,8 @@ def _views(comparison: Comparison, shades: tuple, reference: Image, test: Image)
 
     def add(view: str, words: str, caption: str, **sides: pictures.Picture) -> None:
         checked = "" if tabs else " checked"
-        tabs.append(
-            f'<label><input type="radio" name="view" value="{view}" data-words="{words}"{checked}> {words.removesuffix(" error")}</label>'
-        )
+        radio = f'<input type="radio" name="view" value="{view}" data-words="{words}"{checked}>'
+        tabs.append(f"<label>{radio} {words.removesuffix(' error')}</label>")
         images.extend(
             f'<img class="{side}" data-view="{view}" alt="{words}, {side}" src="{pictures.png_uri(picture)}">'
             for side, picture in sides.items()
