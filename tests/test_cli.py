@@ -72,6 +72,7 @@ def test_the_size_and_the_stated_camera_can_be_chosen(tmp_path, capfd):
     scene = write_scene(tmp_path, stated_camera=CAMERA | {"distance": 50})
     assert main(["render", str(scene), str(tmp_path / "a.exr"), "--size", "32x24"]) == 0
     assert image.read(tmp_path / "a.exr").size == (32, 24)
+    assert main(["compare", str(tmp_path / "a.exr"), str(tmp_path / "a.exr"), "--scene", str(scene)]) == 0
     assert main(["render", str(scene), str(tmp_path / "b.exr"), "--stated"]) == 0
     assert image.read(tmp_path / "b.exr").camera.distance == (50, 50)
     assert "stated_camera" in fails(capfd, "render", write_scene(tmp_path), tmp_path / "c.exr", "--stated")

@@ -10,6 +10,7 @@ to test.
 """
 
 import argparse
+import dataclasses
 import importlib.util
 import json
 import os
@@ -179,8 +180,6 @@ def _export(options: argparse.Namespace) -> Result:
 
 
 def _render(options: argparse.Namespace) -> Result:
-    import dataclasses
-
     from . import image
     from .tracer import scene_file
     from .tracer.render import render
@@ -223,8 +222,12 @@ def _compare(options: argparse.Namespace) -> Result:
         raise InputError(
             f"{options.reference} does not tell its camera: give its scene with --scene, or trace it with viewcam render"
         )
-    surface_at = Tracer(scene, options.threads).surface_at if scene else None
-    comparison = compare(reference, test, camera, surface_at, scene and scene.stated_camera)
+    surface_at = stated = None
+    if scene:
+        # The picture may be of another size than the scene says, or of the stated camera.
+        surface_at = Tracer(dataclasses.replace(scene, camera=camera), options.threads).surface_at
+        stated = scene.stated_camera if camera == scene.camera else None
+    comparison = compare(reference, test, camera, surface_at, stated)
     ledger = scene.ledger if scene else ()
     print(*_ledger_lines(ledger), *comparison.lines(), sep="\n")
     if options.report:
@@ -243,7 +246,7 @@ def _check(options: argparse.Namespace) -> Result:
         threads = ["--threads", str(options.threads)] if options.threads else []
         status = _child("render", scene, reference, *threads)
         if status:
-            return status, {}
+            return status, {"error": "the reference could not be traced"}
         outputs = [word for flag in ("json", "report") if (to := getattr(options, flag)) for word in (f"--{flag}", str(to))]
         # The child has written the JSON: there is nothing to add.
         return _child("compare", reference, test, "--scene", scene, "--repeat", options.words, *threads, *outputs), {}
