@@ -1,6 +1,7 @@
 """Fixtures of the tests that need Blender: an empty file with one camera in it; both sides of a comparison."""
 
 import dataclasses
+import math
 import os
 import subprocess
 import sys
@@ -170,3 +171,61 @@ def _passes_of(path):
     subprocess.run([sys.executable, "-c", program, path, arrays], check=True, env=os.environ | {"PYTHONPATH": search_path})
     with np.load(arrays) as archive:
         return dict(archive)
+
+
+@pytest.fixture
+def camera(camera_object):
+    """Above and before the origin, looking at it: a few metres around it are in the picture."""
+    camera_object.location = (0.3, -7, 4)
+    camera_object.rotation_euler = (math.atan2(7, 4), 0.02, 0.04)
+    return camera_object
+
+
+@pytest.fixture
+def monkey(fresh_blender, camera):
+    """Suzanne, smooth, with a UV map."""
+    fresh_blender.ops.mesh.primitive_monkey_add(rotation=(-0.4, 0.1, 0.3))
+    fresh_blender.ops.object.shade_smooth()
+    return fresh_blender.context.object
+
+
+@pytest.fixture
+def add(fresh_blender, scene, camera):
+    """A function that adds an object with the given data, optionally to a collection, and returns it."""
+
+    def add_object(data, name=None, location=(0, 0, 0), collection=None, **properties):
+        block = fresh_blender.data.objects.new(name or (data.name if data else "Empty"), data)
+        (collection or scene.collection).objects.link(block)
+        block.location = location
+        for key, value in properties.items():
+            setattr(block, key, value)
+        return block
+
+    return add_object
+
+
+@pytest.fixture
+def mesh_from(fresh_blender):
+    """A function that makes a mesh datablock of one of Blender's primitives, without an object."""
+
+    def make(primitive, **options):
+        getattr(fresh_blender.ops.mesh, f"primitive_{primitive}_add")(**options)
+        block = fresh_blender.context.object
+        data = block.data
+        fresh_blender.data.objects.remove(block)
+        return data
+
+    return make
+
+
+@pytest.fixture
+def node_group(fresh_blender):
+    """A function that makes a geometry node tree with a geometry input and output: (tree, input node, output node)."""
+
+    def make(name="Nodes"):
+        tree = fresh_blender.data.node_groups.new(name, "GeometryNodeTree")
+        for direction in ("INPUT", "OUTPUT"):
+            tree.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+        return tree, tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+
+    return make

@@ -1,64 +1,12 @@
 """What Cycles sees is what the tracer gets: scenes of all kinds, each rendered by both and compared pass by pass."""
 
-import math
-
 import numpy as np
 import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from mathutils import Vector  # noqa: E402
-
 from viewcam_addon.errors import NotModelledError  # noqa: E402
-from viewcam_addon.tracer.scene import Mesh, Spheres  # noqa: E402
-
-
-@pytest.fixture
-def camera(camera_object):
-    """Above and before the origin, looking at it: a few metres around it are in the picture."""
-    camera_object.location = (0.3, -7, 4)
-    camera_object.rotation_euler = (math.atan2(7, 4), 0.02, 0.04)
-    return camera_object
-
-
-@pytest.fixture
-def add(fresh_blender, scene, camera):
-    """A function that adds an object with the given data, optionally to a collection, and returns it."""
-
-    def add(data, name=None, location=(0, 0, 0), collection=None, **properties):
-        block = bpy.data.objects.new(name or (data.name if data else "Empty"), data)
-        (collection or scene.collection).objects.link(block)
-        block.location = location
-        for key, value in properties.items():
-            setattr(block, key, value)
-        return block
-
-    return add
-
-
-@pytest.fixture
-def monkey(fresh_blender, camera):
-    """Suzanne, smooth, with a UV map."""
-    bpy.ops.mesh.primitive_monkey_add(rotation=(-0.4, 0.1, 0.3))
-    bpy.ops.object.shade_smooth()
-    return bpy.context.object
-
-
-def mesh_from(primitive, **options):
-    """A mesh datablock of one of Blender's primitives, without an object."""
-    getattr(bpy.ops.mesh, f"primitive_{primitive}_add")(**options)
-    block = bpy.context.object
-    data = block.data
-    bpy.data.objects.remove(block)
-    return data
-
-
-def node_group(name="Nodes"):
-    """A geometry node tree with a geometry input and output: (tree, input node, output node)."""
-    tree = bpy.data.node_groups.new(name, "GeometryNodeTree")
-    tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    return tree, tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+from viewcam_addon.tracer.scene import Mesh  # noqa: E402
 
 
 def entry(exported, name):
@@ -76,7 +24,7 @@ def test_render_settings_of_modifiers_count_and_not_those_of_the_viewport(monkey
     assert len(mesh.triangles) == 15744, f"{len(mesh.triangles)} triangles, Suzanne has 968 and 15744 at level 2"
 
 
-def test_what_is_hidden_in_the_viewport_only_is_rendered(add, both_sides):
+def test_what_is_hidden_in_the_viewport_only_is_rendered(add, both_sides, mesh_from):
     cube = mesh_from("cube")
     add(cube, "Here", location=(-1.5, 0, 0)).hide_viewport = True
     add(cube, "Gone", location=(1.5, 0, 0)).hide_render = True
@@ -95,7 +43,9 @@ def test_shape_keys_armatures_and_drivers_are_followed(monkey, scene, add, both_
     armature = bpy.context.object
     armature.pose.bones[0].rotation_mode = "XYZ"
     armature.pose.bones[0].rotation_euler = (0.2, 0.5, 0.1)
-    monkey.parent, monkey.parent_type, monkey.parent_bone = armature, "BONE", armature.data.bones[0].name
+    upper = monkey.vertex_groups.new(name=armature.data.bones[0].name)
+    upper.add([vertex.index for vertex in monkey.data.vertices if vertex.co.z > 0], 0.8, "REPLACE")
+    monkey.modifiers.new("Armature", "ARMATURE").object = armature
     monkey.driver_add("scale", 2).driver.expression = "frame / 2"
     scene.frame_set(3)
     sides = both_sides()
@@ -138,101 +88,7 @@ def test_text_curves_surfaces_and_metaballs_arrive_as_meshes(add, both_sides):
     assert len(np.unique(sides.cycles["Object Index"])) == 5
 
 
-def test_scales_that_mirror_stretch_and_shear_give_the_same_normals(add, both_sides):
-    monkey = mesh_from("monkey")
-    for polygon in monkey.polygons:
-        polygon.use_smooth = polygon.index % 3 > 0
-    add(monkey, "Mirrored", location=(-1.7, 0, 0), scale=(-1, 1, 1))
-    add(monkey, "Stretched", location=(1.7, 0, 0), scale=(0.5, 1.7, 0.9), rotation_euler=(0.3, 0.4, 0.5))
-    parent = add(None, "Parent", scale=(1, 0.4, 1), location=(0, 0.5, 1.6))
-    add(monkey, "Sheared", rotation_euler=(0.5, 0.5, 0.5), parent=parent)
-    sides = both_sides()
-    sides.check()
-    assert len(sides.exported.geometries) == 1
-
-
-def test_objects_with_a_mesh_of_their_own_have_normals_as_if_applied(add, both_sides):
-    """Cycles interpolates the normals of a mesh that one object uses in world space, of a shared one in object space."""
-    monkey = mesh_from("monkey")
-    monkey.polygons.foreach_set("use_smooth", [True] * len(monkey.polygons))
-    add(monkey, scale=(0.5, 2.0, -0.9), rotation_euler=(0.3, 0.4, 0.5))
-    both_sides().check()
-
-
-def test_materials_of_object_and_data_have_their_own_indices(add, scene, both_sides):
-    cube = mesh_from("cube")
-    red, green, blue = (bpy.data.materials.new(name) for name in ("Red", "Green", "Blue"))
-    red.pass_index, green.pass_index, blue.pass_index = 5, 7, 11
-    for material in (red, green, None):
-        cube.materials.append(material)
-    cube.polygons.foreach_set("material_index", [0, 1, 2, 1, 0, 9])
-    add(cube, "Data", location=(-1.5, 0, 0), rotation_euler=(0.5, 0.5, 0.5))
-    own = add(cube, "Own", location=(1.5, 0, 0), rotation_euler=(2.5, 0.5, 0.5))
-    own.material_slots[0].link, own.material_slots[0].material = "OBJECT", blue
-    sides = both_sides()
-    sides.check()
-    assert set(np.unique(sides.cycles["Material Index"])) == {0, 5, 7, 11}
-    assert {placed.name: placed.material_indices for placed in sides.exported.objects} == {"Data": (5, 7, 0), "Own": (11, 7, 0)}
-
-
-def test_a_material_override_of_the_view_layer_overrides_the_index(monkey, both_sides):
-    material = bpy.data.materials.new("Clay")
-    material.pass_index = 3
-    bpy.context.view_layer.material_override = material
-    sides = both_sides()
-    sides.check()
-    assert set(np.unique(sides.cycles["Material Index"])) == {0, 3}
-
-
-def test_custom_normals_count_but_on_sharp_faces(monkey, both_sides):
-    mesh = monkey.data
-    rng = np.random.default_rng(1)
-    normals = np.array([loop.normal for loop in mesh.corner_normals if False] or rng.normal(size=(len(mesh.loops), 3)))
-    normals = (
-        np.repeat([polygon.normal for polygon in mesh.polygons], [p.loop_total for p in mesh.polygons], axis=0) + 0.3 * normals
-    )
-    mesh.normals_split_custom_set((normals / np.linalg.norm(normals, axis=1, keepdims=True)).tolist())
-    mesh.polygons.foreach_set("use_smooth", [index % 4 > 0 for index in range(len(mesh.polygons))])
-    both_sides().check()
-
-
-def test_flat_faces_that_are_not_plane_show_each_triangles_normal(add, both_sides):
-    grid = mesh_from("grid", x_subdivisions=8, y_subdivisions=8, size=5)
-    heights = np.random.default_rng(2).normal(scale=0.3, size=len(grid.vertices))
-    for vertex, height in zip(grid.vertices, heights, strict=True):
-        vertex.co.z = height
-    grid.polygons[0].use_smooth = True
-    add(grid)
-    both_sides().check()
-
-
-def test_the_uv_map_is_the_one_active_for_rendering(monkey, both_sides):
-    mesh = monkey.data
-    mirrored = mesh.uv_layers.new(name="Render")
-    first = np.empty(2 * len(mesh.loops), np.float32)
-    mesh.uv_layers[0].uv.foreach_get("vector", first)
-    mirrored.uv.foreach_set("vector", 1 - first)
-    mirrored.active_render = True
-    mesh.uv_layers.active_index = 0
-    both_sides().check()
-    mesh.uv_layers[0].active_render = True
-    sides = both_sides()
-    sides.check()
-    seen = sides.cycles["UV"][sides.cycles["Object Index"][..., 0] > 0]
-    assert np.ptp(seen[:, 0]) > 0.1
-
-
-def test_a_mesh_without_uv_map_has_none_on_both_sides(add, both_sides):
-    mesh = mesh_from("ico_sphere", subdivisions=3)
-    while mesh.uv_layers:
-        mesh.uv_layers.remove(mesh.uv_layers[0])
-    add(mesh)
-    sides = both_sides()
-    sides.check()
-    assert not sides.cycles["UV"].any() and not sides.traced["UV"].any()
-
-
-def test_collection_instances_share_one_geometry(add, scene, both_sides):
+def test_collection_instances_share_one_geometry(add, scene, both_sides, mesh_from):
     leaf = bpy.data.collections.new("Leaf")
     add(mesh_from("cone", radius1=0.3, depth=0.8), "Cone", collection=leaf)
     add(mesh_from("cube", size=0.3), "Cube", location=(0, 0, 0.5), collection=leaf)
@@ -252,7 +108,7 @@ def test_collection_instances_share_one_geometry(add, scene, both_sides):
     assert entry(sides.exported, "Cone").reason == "placed 5 times"
 
 
-def test_instances_on_vertices_and_faces(add, both_sides):
+def test_instances_on_vertices_and_faces(add, both_sides, mesh_from):
     child = add(mesh_from("ico_sphere", radius=0.2), "Child")
     for kind, x in (("VERTS", -1.5), ("FACES", 1.5)):
         parent = add(mesh_from("cube", size=1.5), kind, location=(x, 0, 0), instance_type=kind)
@@ -266,7 +122,7 @@ def test_instances_on_vertices_and_faces(add, both_sides):
     assert len(sides.exported.objects) == 8 + 6 + 1
 
 
-def test_particles_are_instances(add, scene, both_sides):
+def test_particles_are_instances(add, scene, both_sides, mesh_from):
     stone = add(mesh_from("ico_sphere", radius=0.15), "Stone", location=(0, 0, -50))
     ground = add(mesh_from("grid", size=5), "Ground")
     ground.modifiers.new("Particles", "PARTICLE_SYSTEM")
@@ -281,7 +137,7 @@ def test_particles_are_instances(add, scene, both_sides):
     assert sum(placed.name == "Stone" for placed in sides.exported.objects) == 61
 
 
-def test_a_scatter_of_geometry_nodes(add, both_sides):
+def test_a_scatter_of_geometry_nodes(add, both_sides, mesh_from, node_group):
     """Points on a grid, each with an instance of a collection's objects, joined with the grid itself."""
     pebbles = bpy.data.collections.new("Pebbles")
     add(mesh_from("ico_sphere", radius=0.2), "Round", collection=pebbles)
@@ -308,7 +164,7 @@ def test_a_scatter_of_geometry_nodes(add, both_sides):
     assert len(sides.exported.geometries) == 3
 
 
-def test_geometry_nodes_know_that_this_is_a_render(add, both_sides):
+def test_geometry_nodes_know_that_this_is_a_render(add, both_sides, mesh_from, node_group):
     block = add(mesh_from("cube"), "Switched")
     tree, source, target = node_group()
     viewport, switch = tree.nodes.new("GeometryNodeIsViewport"), tree.nodes.new("GeometryNodeSwitch")
@@ -323,45 +179,7 @@ def test_geometry_nodes_know_that_this_is_a_render(add, both_sides):
     assert len(next(iter(sides.exported.geometries.values())).triangles) == 20
 
 
-@pytest.fixture
-def beads(add):
-    """36 points, radii from 0.1 to 0.45, of one material with index 4."""
-    block = add(mesh_from("grid", size=4, x_subdivisions=5, y_subdivisions=5), "Beads", rotation_euler=(0.5, 0.1, 0))
-    material = bpy.data.materials.new("Bead")
-    material.pass_index = 4
-    tree, source, target = node_group()
-    points, index = tree.nodes.new("GeometryNodeMeshToPoints"), tree.nodes.new("GeometryNodeInputIndex")
-    radius, paint = tree.nodes.new("ShaderNodeMath"), tree.nodes.new("GeometryNodeSetMaterial")
-    radius.operation, radius.inputs[1].default_value, radius.inputs[2].default_value = "MULTIPLY_ADD", 0.01, 0.1
-    paint.inputs["Material"].default_value = material
-    for output, target_input in (
-        (index.outputs[0], radius.inputs[0]),
-        (radius.outputs[0], points.inputs["Radius"]),
-        (source.outputs[0], points.inputs[0]),
-        (points.outputs[0], paint.inputs[0]),
-        (paint.outputs[0], target.inputs[0]),
-    ):
-        tree.links.new(output, target_input)
-    block.modifiers.new("Nodes", "NODES").node_group = tree
-    return block
-
-
-def test_point_clouds_are_spheres_of_their_radii(beads, both_sides):
-    sides = both_sides()
-    sides.check()
-    (spheres,) = sides.exported.geometries.values()
-    assert isinstance(spheres, Spheres) and np.allclose(spheres.radii, 0.1 + 0.01 * np.arange(36), atol=1e-6)
-    assert set(np.unique(sides.cycles["Material Index"])) == {0, 4}
-
-
-def test_stretched_point_clouds_are_ellipsoids(beads, both_sides):
-    """Cycles' Normal pass is not theirs: it is the direction from the centre, turned to the viewer."""
-    beads.scale = (0.5, 1.5, 1)
-    rows = {row.name: row.ok for row in both_sides().comparison.rows}
-    assert rows.pop("Position") and rows.pop("Depth") and rows.pop("Position depth"), rows
-
-
-def test_excluded_hidden_and_indirect_collections(add, scene, both_sides):
+def test_excluded_hidden_and_indirect_collections(add, scene, both_sides, mesh_from):
     cube = mesh_from("cube", size=0.8)
     layers = {}
     for i, name in enumerate(("Shown", "Excluded", "Hidden", "Disabled", "Indirect")):
@@ -379,7 +197,7 @@ def test_excluded_hidden_and_indirect_collections(add, scene, both_sides):
     assert entry(sides.exported, "Indirect").reason == "not visible to the camera"
 
 
-def test_ray_visibility_of_object_and_instancer(add, both_sides):
+def test_ray_visibility_of_object_and_instancer(add, both_sides, mesh_from):
     cube = mesh_from("cube", size=0.8)
     add(cube, "Shown", location=(-1.5, 0, 0))
     add(cube, "Shadow only", location=(0, 0, 0)).visible_camera = False
@@ -398,7 +216,7 @@ def test_ray_visibility_of_object_and_instancer(add, both_sides):
     assert [placed.name for placed in sides.exported.objects] == ["Shown"]
 
 
-def test_holdouts_and_shadow_catchers_are_plain_objects_on_both_sides(add, scene, both_sides):
+def test_holdouts_and_shadow_catchers_are_plain_objects_on_both_sides(add, scene, both_sides, mesh_from):
     cube = mesh_from("cube", size=0.8)
     add(cube, "Plain", location=(-2, 0, 0))
     add(cube, "Holdout", location=(-0.7, 0, 0)).is_holdout = True
@@ -416,7 +234,7 @@ def test_holdouts_and_shadow_catchers_are_plain_objects_on_both_sides(add, scene
 
 
 @pytest.fixture
-def two_layers(add, scene):
+def two_layers(add, scene, mesh_from):
     """View layers ViewLayer and Other, each with a cube of its own, First and Second."""
     cube = mesh_from("cube")
     first, second = bpy.data.collections.new("First"), bpy.data.collections.new("Second")
@@ -445,22 +263,7 @@ def test_a_view_layer_that_is_not_rendered_is_not_compared(two_layers, both_side
     assert not two_layers[0].use
 
 
-@pytest.mark.parametrize("name", ["spot", "stanford-bunny", "teapot"])
-def test_real_models(scene, camera, both_sides, models_folder, name):
-    bpy.ops.wm.obj_import(filepath=str(models_folder / f"{name}.obj"))
-    (model,) = bpy.context.selected_objects
-    model.data.polygons.foreach_set("use_smooth", [True] * len(model.data.polygons))
-    scene.render.resolution_x, scene.render.resolution_y = 640, 480
-    corners = np.array([model.matrix_world @ Vector(corner) for corner in model.bound_box])
-    centre, size = corners.mean(axis=0), np.ptp(corners, axis=0).max()
-    group = camera.virtual_pinhole
-    group.look_at, group.eye, group.distance = centre, centre + size * np.array((0.9, -1.8, 0.9)), 640
-    group.enabled = True
-    camera.data.clip_start, camera.data.clip_end = size / 100, size * 100
-    both_sides().check()
-
-
-def test_strict_names_what_can_not_be_modelled(add, both_sides):
+def test_strict_names_what_can_not_be_modelled(add, both_sides, mesh_from):
     add(mesh_from("cube"), "Ghost").is_holdout = True
     with pytest.raises(NotModelledError, match="'Ghost' can't be modelled, a holdout"):
         both_sides(strict=True)

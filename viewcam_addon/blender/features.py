@@ -17,6 +17,8 @@ _NO_SURFACE = {
     "GREASEPENCIL": "Grease Pencil is not modelled",
     "GPENCIL": "Grease Pencil is not modelled",
 }
+# Blender itself draws them into Cycles' picture, and into its Depth pass.
+_DRAWN_OVER_CYCLES = ("GREASEPENCIL", "GPENCIL")
 
 
 def note_render(
@@ -37,10 +39,6 @@ def note_render(
         if output and output.inputs["Volume"].is_linked:
             ledger.note(scene.world.name, "approximated", "the world's volume is left out, and its light with it")
             ledger.set_for_cycles(scene, "world", None)
-
-
-# Blender itself draws them into Cycles' picture, and into its Depth pass.
-_DRAWN_OVER_CYCLES = ("GREASEPENCIL", "GPENCIL")
 
 
 class Placed(NamedTuple):

@@ -105,5 +105,5 @@ def _sees_through(node: bpy.types.Node) -> bool:
 
 def _is_turned(node: bpy.types.Node) -> bool:
     """Whether a shader takes its normal from another node."""
-    normal = node.inputs.get("Normal")
-    return normal is not None and normal.is_linked and any(output.type == "SHADER" for output in node.outputs)
+    is_shader = any(output.type == "SHADER" for output in node.outputs)
+    return is_shader and any("Normal" in socket.name and socket.is_linked for socket in node.inputs)

@@ -57,8 +57,8 @@ def adaptive_subdivision(block: bpy.types.Object, scene: bpy.types.Scene) -> tup
 
 
 def literal_path(path: Path) -> str:
-    """A path as the render's output takes it. Since 5.0 braces in it name variables."""
-    return str(path).replace("{", "{{").replace("}", "}}") if bpy.app.version >= (5, 0) else str(path)
+    """A path as the render's output takes it. Since 4.5 braces in it name variables."""
+    return str(path).replace("{", "{{").replace("}", "}}") if bpy.app.version >= (4, 5) else str(path)
 
 
 def set_multilayer_file(settings: bpy.types.ImageFormatSettings) -> None:
