@@ -56,7 +56,7 @@ def test_a_material_override_of_the_view_layer_overrides_the_index(monkey, both_
     assert set(np.unique(sides.cycles["Material Index"])) == {0, 3}
 
 
-def test_custom_normals_count_but_on_sharp_faces(monkey, both_sides):
+def test_custom_normals_beside_flat_faces(monkey, both_sides):
     mesh = monkey.data
     normals = np.repeat([face.normal for face in mesh.polygons], [face.loop_total for face in mesh.polygons], axis=0)
     normals += np.random.default_rng(1).normal(scale=0.3, size=normals.shape)
@@ -65,7 +65,7 @@ def test_custom_normals_count_but_on_sharp_faces(monkey, both_sides):
     both_sides().check()
 
 
-def test_flat_faces_that_are_not_plane_show_each_triangles_normal(add, both_sides, mesh_from):
+def test_bent_flat_faces_beside_a_smooth_one(add, both_sides, mesh_from):
     grid = mesh_from("grid", x_subdivisions=8, y_subdivisions=8, size=5)
     heights = np.random.default_rng(2).normal(scale=0.3, size=len(grid.vertices))
     for vertex, height in zip(grid.vertices, heights, strict=True):
