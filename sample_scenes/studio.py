@@ -88,10 +88,10 @@ def bust(stone):
 def lettering(stone):
     """Two words on two steps, with two balls for company; returns what the meadow keeps clear of."""
     ochre, blush = b.matte("Ochre", "e0a030"), b.matte("Blush", "f3b7a0")
-    step = b.box("Step", (2.9, 0.62, 0.7), blush, (-1.6, 1.05, 0), bevel=0.03)
+    step = b.box("Step", (2.9, 0.62, 0.7), blush, (-1.6, 1.05, 0), bevel=0.03, pieces=40)
     b.text("Virtual", "Virtual", stone, 0.86, (-2.93, 1.05, 0.715))
     b.text("Pinhole", "Pinhole", stone, 0.86, (-2.66, 0.1, 0.19))
-    low = b.box("Low step", (3.1, 0.5, 0.16), b.matte("Rose", "d98a70"), (-1.3, 0.1, 0), bevel=0.03)
+    low = b.box("Low step", (3.1, 0.5, 0.16), b.matte("Rose", "d98a70"), (-1.3, 0.1, 0), bevel=0.03, pieces=40)
     b.ball("Ball", 0.2, ochre, (-0.42, 0.95, 0.9))
     small = b.ball("Small ball", 0.11, b.matte("Teal", "2f7f86"), (0.42, -0.35, 0.11))
     return [step, low, small]
