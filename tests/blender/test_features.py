@@ -269,3 +269,17 @@ def test_what_geometry_nodes_make_without_a_material(monkey, both_sides):
     (entry,) = sides.exported.ledger
     assert all(rows.values()), rows
     assert ("may bend its normals" in entry.reason) == bent == (bpy.app.version >= (5, 0))
+
+
+def test_an_empty_slot_that_no_face_uses_is_not_told(monkey, both_sides, node_group):
+    """Geometry nodes leave one before the slot of the material that they set."""
+    tree, source, target = node_group()
+    paint = tree.nodes.new("GeometryNodeSetMaterial")
+    paint.inputs["Material"].default_value = bpy.data.materials.new("Paint")
+    tree.links.new(source.outputs[0], paint.inputs["Geometry"])
+    tree.links.new(paint.outputs[0], target.inputs[0])
+    monkey.modifiers.new("Nodes", "NODES").node_group = tree
+    sides = both_sides()
+    sides.check()
+    (entry,) = sides.exported.ledger
+    assert entry.status == "exported", entry.reason

@@ -52,6 +52,11 @@ def spheres_of(points: bpy.types.PointCloud) -> Spheres:
     return Spheres(centers.astype(np.float64), radii.astype(np.float64), np.zeros(len(centers), np.int32))
 
 
+def used_slots(mesh: bpy.types.Mesh, slot_count: int) -> set[int]:
+    """The material slots that some face of a mesh uses; geometry nodes leave an unused first one."""
+    return set(np.unique(_materials(mesh, slot_count)).tolist())
+
+
 def _materials(mesh: bpy.types.Mesh, slot_count: int) -> Array:
     """(faces,) int32: each face's index among the material slots."""
     indices = _attribute(mesh, "material_index", "value", np.int32, domain="FACE")

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import bpy
 
-from . import datablocks, materials, versions
+from . import datablocks, export_geometry, materials, versions
 from .ledger import Ledger
 
 _NO_SURFACE = {
@@ -91,7 +91,7 @@ def note_object(placed: Placed, slots: list[bpy.types.Material | None], depsgrap
     if adaptive:
         ledger.note(name, "approximated", "adaptive subdivision is subdivision at the render level on both sides")
         ledger.set_for_cycles(*adaptive, False)
-    if None in slots and versions.DEFAULT_SURFACE_BENDS_NORMALS and isinstance(shown.data, bpy.types.Mesh):
+    if versions.DEFAULT_SURFACE_BENDS_NORMALS and _shows_empty_slot(shown.data, slots):
         ledger.call_for_cycles(real.original, materials.fill_empty_slots)
         if any(modifier.type == "NODES" and modifier.show_render for modifier in real.modifiers):
             ledger.note(name, "approximated", "has no material, and Cycles may bend its normals where they graze")
@@ -100,6 +100,11 @@ def note_object(placed: Placed, slots: list[bpy.types.Material | None], depsgrap
         for reason in materials.departures(material):
             ledger.note(name, "approximated", f"material {material.name!r} {reason}, and a plain one stands in")
             ledger.call_for_cycles(material.original, materials.make_plain)
+
+
+def _shows_empty_slot(data: bpy.types.ID, slots: list[bpy.types.Material | None]) -> bool:
+    is_mesh = isinstance(data, bpy.types.Mesh)
+    return is_mesh and None in slots and any(slots[i] is None for i in export_geometry.used_slots(data, len(slots)))
 
 
 def note_hair(instance: bpy.types.DepsgraphObjectInstance, ledger: Ledger) -> None:
