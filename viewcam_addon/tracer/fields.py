@@ -132,7 +132,7 @@ class Arrays:
         """The array of this key, of real numbers."""
         if self._archive is None:
             key.fail("names an array, and the scene has no key 'arrays': add it, with the name of the .npz file")
-        if key.text() not in self._archive:
+        if key.text() not in self._archive.files:  # `in` the archive itself would read the array, in NumPy before 1.25
             key.fail(f"is {key.value!r}, which {self._file} does not hold: export the scene again")
         try:
             array = self._archive[key.value]
