@@ -50,8 +50,6 @@ BACKGROUND_DEPTH = 1e10
 
 _LAYER = "ViewLayer"
 _CAMERA_ATTRIBUTE = "virtualPinhole"
-# Threads beyond a few wait for one another; -1 would share a pool sized for the machine, which File does not create.
-_THREADS = min(os.cpu_count() or 1, 8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +105,7 @@ def read(path: str | os.PathLike[str], only: Collection[str] | None = None) -> I
     try:
         with silent_libraries():
             promised = len(OpenEXR.File(str(path), header_only=True).parts)
-            parts = OpenEXR.File(str(path), separate_channels=True, num_threads=_THREADS).parts
+            parts = OpenEXR.File(str(path), separate_channels=True).parts
     except Exception as error:  # OpenEXR raises what its C++ raised, of no common class
         raise InputError(f"{path} can't be read as an EXR file ({_first_line(error)}): render it again") from error
     if len(parts) < promised:  # a part whose pixels fail is left out
@@ -151,7 +149,7 @@ def write(path: str | os.PathLike[str], image: Image) -> None:
     with written_whole(path) as temporary:
         try:
             with silent_libraries():
-                OpenEXR.File(header, channels, num_threads=_THREADS).write(str(temporary))
+                OpenEXR.File(header, channels).write(str(temporary))
         except RuntimeError as error:
             raise OSError(_first_line(error)) from error
 
@@ -171,11 +169,6 @@ def _passes(channels: dict[str, NDArray]) -> dict[str, list[NDArray]]:
         if complete:
             return complete
     return {}
-
-
-def camera_to_dict(camera: Pinhole) -> dict:
-    """A camera as JSON has it, in full precision; `Pinhole(**…)` reads it back."""
-    return dataclasses.asdict(camera)
 
 
 def _camera(text: str | None, path: Path) -> Pinhole | None:
@@ -200,7 +193,7 @@ def _camera_attributes(camera: Pinhole) -> dict:
     return {
         "worldToCamera": to_camera.astype(np.float32),
         "worldToNDC": (to_camera @ to_ndc).astype(np.float32),
-        _CAMERA_ATTRIBUTE: json.dumps(camera_to_dict(camera)),
+        _CAMERA_ATTRIBUTE: json.dumps(dataclasses.asdict(camera)),
     }
 
 
