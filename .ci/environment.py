@@ -13,8 +13,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-# What Linux's bpy wheels of 4.2 to 5.2 load and don't bring along, by Debian's package.
+# What Linux's bpy wheels of 4.2 to 5.2 load and don't bring along, by Debian's package. EGL is loaded only when Blender draws,
+# as it does for Grease Pencil, and ends the process where it is missing.
 LIBRARIES = {
+    "libEGL.so.1": "libegl1",
     "libGL.so.1": "libgl1",
     "libICE.so.6": "libice6",
     "libSM.so.6": "libsm6",
