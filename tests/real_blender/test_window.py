@@ -18,8 +18,12 @@ PARTS = (
 )
 
 
-def test_the_panel_moves_the_camera_and_undoes_it(real_blender):
-    outcome = subprocess.run(
+# A virtual screen on a busy machine may lose a click: one loss is no finding, two at different times are.
+ATTEMPTS = 2
+
+
+def use_the_panel(real_blender):
+    return subprocess.run(
         [
             *(ROOT / ".ci" / "blender-window", "--factory-startup", "--addons", "bl_ext.user_default.virtual_pinhole"),
             *("--enable-event-simulate", "-p", "0", "0", "1600", "1000", "--python", SCRIPT),
@@ -30,6 +34,13 @@ def test_the_panel_moves_the_camera_and_undoes_it(real_blender):
         text=True,
         timeout=180,
     )
+
+
+def test_the_panel_moves_the_camera_and_undoes_it(real_blender):
+    for _ in range(ATTEMPTS):
+        outcome = use_the_panel(real_blender)
+        if outcome.returncode == 0:
+            break
     said = outcome.stdout + outcome.stderr
     assert outcome.returncode == 0, said
     assert [part for part in PARTS if f"done: {part}" not in said] == []
