@@ -9,8 +9,8 @@ from viewcam_addon.cli import main
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import camera  # noqa: E402  only where there is Blender
-from viewcam_addon.pinhole import Pinhole  # noqa: E402
+from viewcam_addon.blender import camera
+from viewcam_addon.pinhole import Pinhole
 
 
 @pytest.mark.parametrize("name", ["spot", "teapot", "stanford-bunny"])

@@ -10,9 +10,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import camera as cameras  # noqa: E402 (needs bpy)
-from viewcam_addon.blender import job  # noqa: E402
-from viewcam_addon.tracer.scene import Spheres  # noqa: E402
+from viewcam_addon.blender import camera as cameras
+from viewcam_addon.blender import job
+from viewcam_addon.tracer.scene import Spheres
 
 FOLDER = Path(__file__).parent.parent / "sample_scenes"
 SCENES = ("studio", "spheres", "straight_down", "portrait", "wide", "telephoto", "flight")

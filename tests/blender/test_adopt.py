@@ -5,8 +5,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import camera as cameras  # noqa: E402
-from viewcam_addon.blender import findings  # noqa: E402
+from viewcam_addon.blender import camera as cameras
+from viewcam_addon.blender import findings
 
 
 def pose(camera_object):

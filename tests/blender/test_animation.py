@@ -5,8 +5,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import animation, findings  # noqa: E402
-from viewcam_addon.blender import camera as cameras  # noqa: E402
+from viewcam_addon.blender import animation, findings
+from viewcam_addon.blender import camera as cameras
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import camera as cameras  # noqa: E402
-from viewcam_addon.errors import InputError  # noqa: E402
-from viewcam_addon.pinhole import Pinhole  # noqa: E402
+from viewcam_addon.blender import camera as cameras
+from viewcam_addon.errors import InputError
+from viewcam_addon.pinhole import Pinhole
 
 FLOAT32 = 2.0**-24
 # Three angles or four numbers of a quaternion rounded to float32 (6), and the products of the rotation (3).

@@ -11,8 +11,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import camera as cameras  # noqa: E402
-from viewcam_addon.blender import datablocks  # noqa: E402
+from viewcam_addon.blender import camera as cameras
+from viewcam_addon.blender import datablocks
 
 SIZES = [(1920, 1080), (1080, 1920), (1001, 777), (333, 778), (512, 512)]
 FITS = ["AUTO", "HORIZONTAL", "VERTICAL"]

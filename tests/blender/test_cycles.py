@@ -4,9 +4,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import cycles, depsgraph, indices  # noqa: E402
-from viewcam_addon.blender.borrowing import borrowed  # noqa: E402
-from viewcam_addon.errors import InputError  # noqa: E402
+from viewcam_addon.blender import cycles, depsgraph, indices
+from viewcam_addon.blender.borrowing import borrowed
+from viewcam_addon.errors import InputError
 
 # What describes the settings, what follows from them, and brushes (reading some of them crashes 4.2).
 NO_SETTINGS = {"rna_type", "is_evaluated", "depsgraph", "tool_settings"}

@@ -5,8 +5,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.errors import NotModelledError  # noqa: E402
-from viewcam_addon.tracer.scene import Mesh  # noqa: E402
+from viewcam_addon.errors import NotModelledError
+from viewcam_addon.tracer.scene import Mesh
 
 
 def entry(exported, name):

@@ -5,9 +5,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from mathutils import Vector  # noqa: E402
+from mathutils import Vector
 
-from viewcam_addon.tracer.scene import Spheres  # noqa: E402
+from viewcam_addon.tracer.scene import Spheres
 
 
 def test_scales_that_mirror_stretch_and_shear_give_the_same_normals(add, both_sides, mesh_from):

@@ -4,7 +4,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import materials  # noqa: E402
+from viewcam_addon.blender import materials
 
 
 @pytest.fixture

@@ -7,8 +7,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import job  # noqa: E402
-from viewcam_addon.errors import InputError  # noqa: E402
+from viewcam_addon.blender import job
+from viewcam_addon.errors import InputError
 
 
 @pytest.fixture

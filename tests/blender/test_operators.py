@@ -2,7 +2,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import camera as cameras  # noqa: E402
+from viewcam_addon.blender import camera as cameras
 
 
 def test_apply_brings_a_moved_camera_back(posed_camera):

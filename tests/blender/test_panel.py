@@ -2,7 +2,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import datablocks, panel  # noqa: E402
+from viewcam_addon.blender import datablocks, panel
 
 
 def contents(camera_object, scene):

@@ -6,9 +6,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import camera as cameras  # noqa: E402
-from viewcam_addon.blender import findings  # noqa: E402
-from viewcam_addon.pinhole import Pinhole  # noqa: E402
+from viewcam_addon.blender import camera as cameras
+from viewcam_addon.blender import findings
+from viewcam_addon.pinhole import Pinhole
 
 
 def pose(camera_object):

@@ -4,7 +4,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import camera as cameras  # noqa: E402
+from viewcam_addon.blender import camera as cameras
 
 
 def findings_after_setting(camera_object, scene):

@@ -11,13 +11,13 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-import viewcam_addon  # noqa: E402
-from viewcam_addon.blender import camera as cameras  # noqa: E402
-from viewcam_addon.blender import job  # noqa: E402
-from viewcam_addon.compare.geometry import compare  # noqa: E402
-from viewcam_addon.image import Image  # noqa: E402
-from viewcam_addon.pinhole import Pinhole  # noqa: E402
-from viewcam_addon.tracer.render import Tracer  # noqa: E402
+import viewcam_addon
+from viewcam_addon.blender import camera as cameras
+from viewcam_addon.blender import job
+from viewcam_addon.compare.geometry import compare
+from viewcam_addon.image import Image
+from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.tracer.render import Tracer
 
 STATED = Pinhole((6.0, -7.5, 4.5), (0.2, 0.1, 0.8), (0.0, 0.0, 1.0), 300.0, 240, 150)
 
