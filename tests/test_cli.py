@@ -1,5 +1,6 @@
 """The command as its users type it: one sentence and an exit status for every bad input, and nothing half-written."""
 
+import importlib.util
 import json
 import os
 import resource
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 from viewcam_addon import image
-from viewcam_addon.cli import main
+from viewcam_addon.cli import DEMO_SCENE, main
 
 CAMERA = {"eye": [0, -5, 0], "look_at": [0, 0, 0], "up": [0, 0, 1], "distance": 100, "width": 64, "height": 48}
 SCENE = {
@@ -171,12 +172,17 @@ def viewcam(*words, **options):
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False, **options)
 
 
-def test_a_file_that_can_not_grow_leaves_nothing_behind(tmp_path):
-    scene, out = write_scene(tmp_path), tmp_path / "out"
-    done = viewcam("render", scene, out / "picture.exr", preexec_fn=limit_files_to_4_kilobytes)
-    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1), done.stderr
-    assert "picture.exr can't be written" in done.stderr
-    assert list(out.iterdir()) == []
+def test_a_picture_that_can_not_grow_leaves_nothing_behind(tmp_path):
+    """As on a full disk, where nobody may mount one: the tracer's and, where Blender is there, Cycles'."""
+    jobs = [("render", write_scene(tmp_path))]
+    if importlib.util.find_spec("bpy"):
+        jobs.append(("cycles", DEMO_SCENE, "--size", "160x90"))
+    out = tmp_path / "out"
+    for command, source, *rest in jobs:
+        done = viewcam(command, source, out / "picture.exr", *rest, preexec_fn=limit_files_to_4_kilobytes)
+        assert (done.returncode, len(done.stderr.splitlines())) == (2, 1), done.stderr
+        assert "picture.exr can't be written" in done.stderr
+        assert list(out.iterdir()) == []
 
 
 def mounted(options, script, *arguments):

@@ -100,7 +100,7 @@ def _cross_terms(a: Vector, b_high: Vector, b_low: Vector, j: int, k: int) -> li
 
 
 def cross_of_perpendicular(a_high: Vector, a_low: Vector, b_high: Vector, b_low: Vector) -> Vector:
-    """a × b for perpendicular a and b, each component within 2⁻⁵² of |a| |b| times its own size plus 2⁻¹⁰⁰ of |a| |b|.
+    """a × b for perpendicular a and b, each given as high + low: every component rounded once, give or take 2⁻¹⁰⁰ |a| |b|.
 
     Two perpendicular vectors lose nothing in their product as a whole, so the second-order terms need no care.
     """
@@ -116,7 +116,7 @@ def cross_of_perpendicular(a_high: Vector, a_low: Vector, b_high: Vector, b_low:
 
 
 def length(a: Vector) -> Number:
-    """|a|, correctly rounded but for 2⁻¹⁰⁰, of a vector whose largest component is about 1 (see `scaled_to_one`)."""
+    """|a| to within one unit in the last place, of a vector whose largest component is about 1 (see `scaled_to_one`)."""
     squares = [two_product(component, component) for component in a]
     total, error = squares[0]
     for square, square_error in squares[1:]:

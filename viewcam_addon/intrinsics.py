@@ -18,9 +18,8 @@ import numpy as np
 
 from .errors import InputError
 
-# Blender clamps a shorter lens and a smaller sensor, silently (rna_camera.cc).
+# Blender clamps a shorter lens, silently (rna_camera.cc).
 SHORTEST_LENS = 1.0
-SMALLEST_SENSOR = 1.0
 # Every number of a Blender camera is a float32: a smaller relative difference can't be stored.
 _FLOAT32_STEP = 2.0**-23
 

@@ -120,7 +120,7 @@ def _cause(comparison: "Comparison") -> str:
     zoom = max(s.zoom_x, s.zoom_y, key=abs)
     effects = {
         f"the picture is shifted by ({s.shift_x:+.3g}, {s.shift_y:+.3g}) px": np.hypot(s.shift_x, s.shift_y),
-        f"the picture is magnified by {1 + s.zoom_x:.6g} × {1 + s.zoom_y:.6g}": abs(zoom) * radius,
+        f"the picture is magnified by {1 + s.zoom_x:.8g} × {1 + s.zoom_y:.8g}": abs(zoom) * radius,
         f"the picture is rolled by {s.roll:+.3g} rad": abs(s.roll) * radius,
     }
     cause, effect = max(effects.items(), key=lambda pair: pair[1])
