@@ -6,10 +6,7 @@ sees exactly what Cycles sees, in `blender -b`, in a window and in the bpy modul
 render settings and back (drivers, GeometryNodes' "Is Viewport", particle percentages and more would still differ).
 """
 
-import contextlib
-import os
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import TypeVar
 
 import bpy
@@ -62,7 +59,7 @@ def visit(scene: bpy.types.Scene, work: Callable[[bpy.types.Depsgraph], Result])
 
 
 def render_still(scene: bpy.types.Scene, to_file: bool = False) -> None:
-    """Render the scene's current frame, without Blender's progress lines on the terminal.
+    """Render the scene's current frame.
 
     Raises
     ------
@@ -70,22 +67,7 @@ def render_still(scene: bpy.types.Scene, to_file: bool = False) -> None:
         with Blender's own reason, if it reports an error.
     """
     try:
-        with _silent_progress():
-            bpy.ops.render.render(scene=scene.name, write_still=to_file)
+        bpy.ops.render.render(scene=scene.name, write_still=to_file)
     except RuntimeError as error:
         reason = str(error).strip().splitlines()[0].removeprefix("Error: ").rstrip(".")
         raise InputError(f"Blender can't render scene {scene.name!r} ({reason}): make it render with F12 first") from error
-
-
-@contextlib.contextmanager
-def _silent_progress() -> Iterator[None]:
-    """Blender prints its progress from C, past sys.stdout."""
-    sys.stdout.flush()
-    kept = os.dup(1)
-    try:
-        with open(os.devnull, "w") as nowhere:
-            os.dup2(nowhere.fileno(), 1)
-            yield
-    finally:
-        os.dup2(kept, 1)
-        os.close(kept)
