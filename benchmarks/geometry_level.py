@@ -28,6 +28,7 @@ import numpy as np
 
 from viewcam_addon import image
 from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.terminal import silent_libraries
 from viewcam_addon.tracer import scene_file, visibility
 from viewcam_addon.tracer.render import TILE, Tracer, render
 from viewcam_addon.tracer.scene import Scene
@@ -105,8 +106,14 @@ def _bare_embree(scene: Scene, threads: int) -> Callable[[], object]:
     return work
 
 
-def _serve_cycles(asked: Connection, folder: Path, width: int, height: int, levels: int, threads: int) -> None:
-    """The process with Blender in it: writes the scene, renders when asked, and answers with the seconds."""
+def _serve_cycles(*arguments) -> None:
+    """The process with Blender in it, which keeps its progress to itself."""
+    with silent_libraries():
+        _answer_with_cycles(*arguments)
+
+
+def _answer_with_cycles(asked: Connection, folder: Path, width: int, height: int, levels: int, threads: int) -> None:
+    """Write the scene, render when asked, and answer with the seconds."""
     import bpy
 
     import viewcam_addon
