@@ -1,0 +1,188 @@
+"""Charts of measurements: what a chart holds, how it is drawn as SVG, and whether the method in use is the best on it.
+
+A sweep towards a failure gives one curve for each candidate method; the method in use is drawn bold. A method that gives no answer
+somewhere is drawn as a cross at the upper edge, an error of exactly 0 on the lower one. Every chart carries its caption with it: what to
+read off, the machine and the versions, and the command that draws it again.
+
+Drawn with matplotlib, the ecosystem's usual choice; letters become paths, so that a chart looks the same everywhere. The report of
+a check draws its own (compare/charts.py), since Blender has no matplotlib.
+"""
+
+import importlib.metadata
+import math
+import os
+import platform
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from viewcam_addon.files import written_whole
+
+# matplotlib's own colours for categories, without the grey that the grid has and the blue of the method in use.
+_COLOURS = ("tab:orange", "tab:green", "tab:red", "tab:purple", "tab:brown", "tab:pink", "tab:olive", "tab:cyan")
+_MARKERS = "osv^Dd<>"
+_OURS = "#0b3d91"
+# What a measurement stands on, as far as it is installed.
+_PACKAGES = ("numpy", "embreex", "bpy")
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One method on a chart.
+
+    x, y : as many numbers each. y = 0 lies on the lower edge; nan and inf mean that the method has no answer there.
+    ours : whether it is the method in use. league : curves compete with those of the same league only (a method that computes
+        in float64 does not compete with what Blender stores in float32).
+    """
+
+    name: str
+    x: Sequence[float]
+    y: Sequence[float]
+    ours: bool = False
+    league: str = ""
+
+    def __post_init__(self) -> None:
+        if len(self.x) != len(self.y):
+            raise ValueError(f"curve {self.name!r} has {len(self.x)} x and {len(self.y)} y")
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A sweep: one curve for each method.
+
+    name : of its file, without subject and extension. reading : a sentence that says what to read off.
+    tie : errors up to this count as equal. reverse : the failure lies at small x, and x falls to the right.
+    log_x, log_y : whether the axes are logarithmic.
+    """
+
+    name: str
+    title: str
+    x_label: str
+    y_label: str
+    curves: tuple[Curve, ...]
+    reading: str
+    tie: float
+    reverse: bool = False
+    log_x: bool = True
+    log_y: bool = True
+
+    def behind(self) -> list[str]:
+        """One sentence for each place where the method in use is worse than twice the best of its league, and beyond a tie."""
+        sentences = []
+        for ours in (curve for curve in self.curves if curve.ours):
+            rivals = [curve for curve in self.curves if curve.league == ours.league and not curve.ours]
+            for x, error in zip(ours.x, ours.y, strict=True):
+                best, name = min(_errors_at(x, rivals), default=(math.inf, ""))
+                if not _no_worse(error, max(self.tie, 2 * best)) and math.isfinite(best):
+                    sentences.append(f"{self.title}: at {x:.3g} {ours.name} is off by {error:.3g}, {name} by {best:.3g}")
+        return sentences
+
+    def figures(self) -> dict[str, dict[str, list[float | None]]]:
+        """What the chart shows, for JSON: null where a method has no answer."""
+        return {
+            curve.name: {axis: [_or_none(value) for value in getattr(curve, axis)] for axis in "xy"} for curve in self.curves
+        }
+
+
+def _errors_at(x: float, curves: Sequence[Curve]) -> list[tuple[float, str]]:
+    return [(y, curve.name) for curve in curves for where, y in zip(curve.x, curve.y, strict=True) if where == x and y == y]
+
+
+def _no_worse(error: float, limit: float) -> bool:
+    return error <= limit  # False for nan
+
+
+def _or_none(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def machine() -> str:
+    """The machine and the versions that a measurement was taken with, in a line."""
+    versions = []
+    for package in _PACKAGES:
+        try:
+            versions.append(f"{package} {importlib.metadata.version(package)}")
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return f"{_processor()}, {os.cpu_count()} cores, Python {platform.python_version()}, {', '.join(versions)}"
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        return next(line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor() or platform.machine()
+
+
+def draw(chart: Chart, path: Path, command: str) -> None:
+    """Write the chart as SVG, whole or not at all.
+
+    command : what draws it again, for the caption.
+
+    Raises
+    ------
+    InputError
+        if the file can't be written.
+    """
+    settings = {"svg.fonttype": "path", "svg.hashsalt": chart.name, "font.family": "DejaVu Sans", "font.size": 9}
+    with matplotlib.rc_context(settings), written_whole(path) as temporary:
+        figure = Figure(figsize=(9, 6.4))
+        axes = figure.add_axes((0.085, 0.265, 0.655, 0.665))
+        _draw_axes(chart, axes)
+        for curve, colour, marker in _styles(chart):
+            _draw_curve(curve, axes, colour, marker)
+        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1), frameon=False, labelspacing=0.8, fontsize=8.5)
+        figure.text(0.03, 0.165, textwrap.fill(chart.reading, 132), va="top", linespacing=1.35)
+        figure.text(0.03, 0.025, f"{command}\n{machine()}", color="0.4", fontsize=7.5, linespacing=1.4)
+        figure.savefig(temporary, format="svg", metadata={"Date": None, "Title": chart.title, "Description": chart.reading})
+
+
+def _draw_axes(chart: Chart, axes: Axes) -> None:
+    axes.set_title(chart.title, loc="left", fontsize=12, fontweight="bold")
+    axes.set_xlabel(chart.x_label)
+    axes.set_ylabel(chart.y_label)
+    axes.grid(color="0.9", linewidth=0.8)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    if chart.log_x:
+        axes.set_xscale("log")
+    if chart.log_y:
+        axes.set_yscale("log")
+        axes.set_ylim(*_decades(chart))
+    if chart.reverse:
+        axes.invert_xaxis()
+
+
+def _decades(chart: Chart) -> tuple[float, float]:
+    """The powers of ten about all that has a logarithm, and one more at each end for zeros and for crosses."""
+    values = np.concatenate([np.asarray(curve.y, float) for curve in chart.curves])
+    values = values[np.isfinite(values) & (values > 0)]
+    low, high = (values.min(), values.max()) if len(values) else (chart.tie, chart.tie)
+    return 10.0 ** (math.floor(math.log10(low)) - 1), 10.0 ** (math.ceil(math.log10(high)) + 1)
+
+
+def _styles(chart: Chart) -> list[tuple[Curve, str, str]]:
+    """Each curve with its colour and marker; those in use last, so that they lie on top."""
+    others = iter(zip(_COLOURS, _MARKERS, strict=True))
+    styled = [(curve, *((_OURS, "o") if curve.ours else next(others))) for curve in chart.curves]
+    return sorted(styled, key=lambda style: style[0].ours)
+
+
+def _draw_curve(curve: Curve, axes: Axes, colour: str, marker: str) -> None:
+    x, y = np.asarray(curve.x, float), np.asarray(curve.y, float)
+    low, high = axes.get_ylim()
+    answered = np.isfinite(y)
+    shown = np.where(answered, np.clip(y, low, high) if axes.get_yscale() == "log" else y, np.nan)
+    style = {"linewidth": 2.8, "markersize": 5} if curve.ours else {"linewidth": 1.2, "markersize": 4}
+    dash = {"linestyle": "--"} if curve.ours and any(line.get_color() == colour for line in axes.lines) else {}
+    name = textwrap.fill(curve.name, 34)
+    axes.plot(x, shown, color=colour, marker=marker, label=name, clip_on=False, **style, **dash)
+    if not answered.all():
+        axes.plot(x[~answered], np.full((~answered).sum(), high), "x", color=colour, markersize=6, clip_on=False)

@@ -1,0 +1,68 @@
+"""How stable each method is that the project uses or could have used: a chart for each way to fail.
+
+Every module is one sweep towards a failure, with all candidates on it, and offers `charts(quick)`. The candidates that lost live
+here and nowhere else; the method in use is called from viewcam_addon. `viewcam chart stability` measures and draws all of them.
+"""
+
+import importlib
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from viewcam_addon.errors import InputError
+from viewcam_addon.files import written_whole
+
+from .. import charts
+
+SWEEPS = (
+    "roll",
+    "separation",
+    "far_from_home",
+    "field_of_view",
+    "pose_storage",
+    "flight",
+    "spheres",
+    "triangles",
+    "secondary_rays",
+)
+COMMAND = "viewcam chart stability"
+
+
+def run(folder: Path, only: Sequence[str] = (), quick: bool = False) -> tuple[int, dict[str, Any]]:
+    """Measure the sweeps, draw their charts into `folder`, and write their figures beside them.
+
+    only : names of SWEEPS, all if it is empty. quick : few trials, in seconds.
+
+    Returns 0, or 1 if the method in use is behind another somewhere, and what `--json` shall say.
+
+    Raises
+    ------
+    InputError
+        if there is no such sweep, or the folder can't be written to.
+    """
+    unknown = set(only) - set(SWEEPS)
+    if unknown:
+        raise InputError(f"there is no sweep {min(unknown)!r}: choose from {', '.join(SWEEPS)}")
+    behind: list[str] = []
+    names: list[str] = []
+    for sweep in only or SWEEPS:
+        for chart in _measured(sweep, quick):
+            name = f"stability-{chart.name}"
+            charts.draw(chart, folder / f"{name}.svg", f"{COMMAND} --only {sweep}{' --quick' if quick else ''}")
+            _write_figures(folder / f"{name}.json", chart)
+            print(f"{name}: {chart.reading}", flush=True)
+            names.append(name)
+            behind += chart.behind()
+    print(*behind, sep="\n")
+    return (1 if behind else 0), {"charts": names, "behind": behind, "machine": charts.machine()}
+
+
+def _measured(sweep: str, quick: bool) -> Iterator[charts.Chart]:
+    yield from importlib.import_module(f".{sweep}", __package__).charts(quick)
+
+
+def _write_figures(path: Path, chart: charts.Chart) -> None:
+    figures = {"title": chart.title, "x": chart.x_label, "y": chart.y_label, "curves": chart.figures()}
+    with written_whole(path) as temporary:
+        temporary.write_text(json.dumps(figures, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
