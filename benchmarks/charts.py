@@ -38,7 +38,8 @@ class Curve:
 
     x, y : as many numbers each. y = 0 lies on the lower edge; nan and inf mean that the method has no answer there.
     ours : whether it is the method in use. league : curves compete with those of the same league only (a method that computes
-        in float64 does not compete with what Blender stores in float32).
+        in float64 does not compete with what Blender stores in float32). tie : errors up to this count as equal, the chart's own
+        tie if it is None.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Curve:
     y: Sequence[float]
     ours: bool = False
     league: str = ""
+    tie: float | None = None
 
     def __post_init__(self) -> None:
         if len(self.x) != len(self.y):
@@ -77,9 +79,10 @@ class Chart:
         sentences = []
         for ours in (curve for curve in self.curves if curve.ours):
             rivals = [curve for curve in self.curves if curve.league == ours.league and not curve.ours]
+            tie = self.tie if ours.tie is None else ours.tie
             for x, error in zip(ours.x, ours.y, strict=True):
                 best, name = min(_errors_at(x, rivals), default=(math.inf, ""))
-                if not _no_worse(error, max(self.tie, 2 * best)) and math.isfinite(best):
+                if not error <= max(tie, 2 * best):  # nan, no answer, is worse than any
                     sentences.append(f"{self.title}: at {x:.3g} {ours.name} is off by {error:.3g}, {name} by {best:.3g}")
         return sentences
 
@@ -91,11 +94,9 @@ class Chart:
 
 
 def _errors_at(x: float, curves: Sequence[Curve]) -> list[tuple[float, str]]:
-    return [(y, curve.name) for curve in curves for where, y in zip(curve.x, curve.y, strict=True) if where == x and y == y]
-
-
-def _no_worse(error: float, limit: float) -> bool:
-    return error <= limit  # False for nan
+    return [
+        (y, curve.name) for curve in curves for where, y in zip(curve.x, curve.y, strict=True) if where == x and math.isfinite(y)
+    ]
 
 
 def _or_none(value: float) -> float | None:

@@ -5,13 +5,11 @@ here and nowhere else; the method in use is called from viewcam_addon. `viewcam 
 """
 
 import importlib
-import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from viewcam_addon.errors import InputError
-from viewcam_addon.files import written_whole
 
 from .. import charts
 
@@ -30,11 +28,11 @@ COMMAND = "viewcam chart stability"
 
 
 def run(folder: Path, only: Sequence[str] = (), quick: bool = False) -> tuple[int, dict[str, Any]]:
-    """Measure the sweeps, draw their charts into `folder`, and write their figures beside them.
+    """Measure the sweeps and draw their charts into `folder`.
 
     only : names of SWEEPS, all if it is empty. quick : few trials, in seconds.
 
-    Returns 0, or 1 if the method in use is behind another somewhere, and what `--json` shall say.
+    Returns 0, or 1 if the method in use is behind another somewhere, and their figures.
 
     Raises
     ------
@@ -44,25 +42,19 @@ def run(folder: Path, only: Sequence[str] = (), quick: bool = False) -> tuple[in
     unknown = set(only) - set(SWEEPS)
     if unknown:
         raise InputError(f"there is no sweep {min(unknown)!r}: choose from {', '.join(SWEEPS)}")
+    measured: dict[str, Any] = {}
     behind: list[str] = []
-    names: list[str] = []
     for sweep in only or SWEEPS:
         for chart in _measured(sweep, quick):
             name = f"stability-{chart.name}"
             charts.draw(chart, folder / f"{name}.svg", f"{COMMAND} --only {sweep}{' --quick' if quick else ''}")
-            _write_figures(folder / f"{name}.json", chart)
             print(f"{name}: {chart.reading}", flush=True)
-            names.append(name)
+            measured[name] = chart.figures()
             behind += chart.behind()
     print(*behind, sep="\n")
-    return (1 if behind else 0), {"charts": names, "behind": behind, "machine": charts.machine()}
+    return (1 if behind else 0), {"machine": charts.machine(), "behind": behind, "charts": measured}
 
 
 def _measured(sweep: str, quick: bool) -> Iterator[charts.Chart]:
     yield from importlib.import_module(f".{sweep}", __package__).charts(quick)
 
-
-def _write_figures(path: Path, chart: charts.Chart) -> None:
-    figures = {"title": chart.title, "x": chart.x_label, "y": chart.y_label, "curves": chart.figures()}
-    with written_whole(path) as temporary:
-        temporary.write_text(json.dumps(figures, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

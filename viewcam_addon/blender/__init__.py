@@ -17,6 +17,14 @@ def register() -> None:
     animation.register()
 
 
+def ensure_registered() -> None:
+    """Register unless that is done: the bpy module knows no add-ons."""
+    import bpy
+
+    if not hasattr(bpy.types.Object, "virtual_pinhole"):
+        register()
+
+
 def unregister() -> None:
     """The same, in reverse."""
     import bpy

@@ -15,7 +15,7 @@ import bpy
 from .. import intrinsics
 from ..errors import InputError
 from ..tracer.scene import LedgerEntry, Scene
-from . import cycles, datablocks, indices, register
+from . import cycles, datablocks, ensure_registered, indices
 from .borrowing import Borrower, borrowed
 from .export import export_scene, survey
 from .ledger import Ledger
@@ -96,8 +96,7 @@ def _render(stage: _Stage, request: Request, path: str | os.PathLike[str]) -> No
 @contextlib.contextmanager
 def _stage(request: Request) -> Iterator[_Stage]:
     """Open the file, and set it to the request until the job is done."""
-    if not hasattr(bpy.types.Object, "virtual_pinhole"):  # the bpy module knows no add-ons
-        register()
+    ensure_registered()
     if request.blend is not None:
         open_blend(request.blend)
     scene = bpy.context.scene
