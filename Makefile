@@ -1,14 +1,16 @@
 # Each command sets up what it needs, and is quick the second time.
 #   make demo          the sample scene rendered by Cycles and by the tracer, compared; ends with the report
 #   make test          lint and the tests, with the newest bpy wheel for the Python found
+#   make test-exhaustive  the tests that take minutes: 10⁸ rays, millions of hostile numbers
 #   make test-matrix   the tests with Blender 4.2, 4.5 and 5.0 (and 5.2 where there is a Python 3.13) as wheels
 #   make test-blender  the extension in a real Blender 5.2: $BLENDER, or blender on the PATH, or Debian's in a folder of its own
 #   make extension     dist/virtual_pinhole-VERSION-PLATFORM.zip for artists, built by that Blender
 #   make scenes        sample_scenes/*.blend anew, by Blender 4.2
+#   make charts        docs/charts anew: every method up to where it fails
 #   make benchmark     the tracer against Cycles
 #   make clean         removes all that these made, but for ~/.cache/virtual-pinhole
 
-.PHONY: demo test lint test-matrix test-blender extension scenes benchmark clean
+.PHONY: demo test test-exhaustive lint test-matrix test-blender extension scenes charts benchmark clean
 .DELETE_ON_ERROR:
 
 # bpy has wheels for these two only.
@@ -24,6 +26,9 @@ demo: .venv/demo
 
 test: lint
 	$(call PYTEST,.venv)
+
+test-exhaustive: .venv/test
+	$(call PYTEST,.venv) -m exhaustive
 
 lint: .venv/test
 	.venv/bin/python -m ruff check .
@@ -74,6 +79,9 @@ extension: .venv/demo
 # Blender 4.2 writes them, so that every later one opens them.
 scenes: .venvs/4.2/ready
 	.venvs/4.2/bin/python sample_scenes/make.py
+
+charts: .venv/test
+	.venv/bin/viewcam chart stability --json docs/charts/stability.json
 
 benchmark: .venv/demo
 	.venv/bin/python benchmarks/geometry_level.py

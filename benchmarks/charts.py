@@ -1,11 +1,11 @@
 """Charts of measurements: what a chart holds, how it is drawn as SVG, and whether the method in use is the best on it.
 
-A sweep towards a failure gives one curve for each candidate method; the method in use is drawn bold. A method that gives no answer
-somewhere is drawn as a cross at the upper edge, an error of exactly 0 on the lower one. Every chart carries its caption with it: what to
-read off, the machine and the versions, and the command that draws it again.
+A sweep towards a failure gives one curve for each candidate method; the method in use is drawn bold. A method that gives no
+answer somewhere is drawn as a cross at the upper edge, an error of exactly 0 on the lower one. Every chart carries its caption
+with it: what to read off, the machine and the versions, and the command that draws it again.
 
-Drawn with matplotlib, the ecosystem's usual choice; letters become paths, so that a chart looks the same everywhere. The report of
-a check draws its own (compare/charts.py), since Blender has no matplotlib.
+Drawn with matplotlib, the ecosystem's usual choice. The report of a check draws its own (compare/charts.py), since Blender has
+no matplotlib.
 """
 
 import importlib.metadata
@@ -38,8 +38,8 @@ class Curve:
 
     x, y : as many numbers each. y = 0 lies on the lower edge; nan and inf mean that the method has no answer there.
     ours : whether it is the method in use. league : curves compete with those of the same league only (a method that computes
-        in float64 does not compete with what Blender stores in float32). tie : errors up to this count as equal, the chart's own
-        tie if it is None.
+        in float64 does not compete with what Blender stores in float32). tie : errors up to this count as equal, the chart's
+        own tie if it is None.
     """
 
     name: str
@@ -82,7 +82,7 @@ class Chart:
             tie = self.tie if ours.tie is None else ours.tie
             for x, error in zip(ours.x, ours.y, strict=True):
                 best, name = min(_errors_at(x, rivals), default=(math.inf, ""))
-                if not error <= max(tie, 2 * best):  # nan, no answer, is worse than any
+                if math.isfinite(best) and not error <= max(tie, 2 * best):  # nan is worse than any
                     sentences.append(f"{self.title}: at {x:.3g} {ours.name} is off by {error:.3g}, {name} by {best:.3g}")
         return sentences
 
@@ -95,7 +95,10 @@ class Chart:
 
 def _errors_at(x: float, curves: Sequence[Curve]) -> list[tuple[float, str]]:
     return [
-        (y, curve.name) for curve in curves for where, y in zip(curve.x, curve.y, strict=True) if where == x and math.isfinite(y)
+        (y, curve.name)
+        for curve in curves
+        for where, y in zip(curve.x, curve.y, strict=True)
+        if where == x and math.isfinite(y)
     ]
 
 
@@ -132,10 +135,11 @@ def draw(chart: Chart, path: Path, command: str) -> None:
     InputError
         if the file can't be written.
     """
-    settings = {"svg.fonttype": "path", "svg.hashsalt": chart.name, "font.family": "DejaVu Sans", "font.size": 9}
+    fonts = {"font.family": ["DejaVu Sans", "Verdana", "sans-serif"], "font.size": 9}
+    settings = {"svg.fonttype": "none", "svg.hashsalt": chart.name, **fonts}
     with matplotlib.rc_context(settings), written_whole(path) as temporary:
         figure = Figure(figsize=(9, 6.4))
-        axes = figure.add_axes((0.085, 0.265, 0.655, 0.665))
+        axes = figure.add_axes((0.085, 0.265, 0.655, 0.655))
         _draw_axes(chart, axes)
         for curve, colour, marker in _styles(chart):
             _draw_curve(curve, axes, colour, marker)
@@ -146,7 +150,7 @@ def draw(chart: Chart, path: Path, command: str) -> None:
 
 
 def _draw_axes(chart: Chart, axes: Axes) -> None:
-    axes.set_title(chart.title, loc="left", fontsize=12, fontweight="bold")
+    axes.set_title(chart.title, loc="left", fontsize=12, fontweight="bold", pad=12)
     axes.set_xlabel(chart.x_label)
     axes.set_ylabel(chart.y_label)
     axes.grid(color="0.9", linewidth=0.8)
@@ -183,7 +187,7 @@ def _draw_curve(curve: Curve, axes: Axes, colour: str, marker: str) -> None:
     shown = np.where(answered, np.clip(y, low, high) if axes.get_yscale() == "log" else y, np.nan)
     style = {"linewidth": 2.8, "markersize": 5} if curve.ours else {"linewidth": 1.2, "markersize": 4}
     dash = {"linestyle": "--"} if curve.ours and any(line.get_color() == colour for line in axes.lines) else {}
-    name = textwrap.fill(curve.name, 34)
+    name = textwrap.fill(curve.name, 27)
     axes.plot(x, shown, color=colour, marker=marker, label=name, clip_on=False, **style, **dash)
     if not answered.all():
         axes.plot(x[~answered], np.full((~answered).sum(), high), "x", color=colour, markersize=6, clip_on=False)

@@ -11,6 +11,7 @@ to test.
 
 import argparse
 import dataclasses
+import importlib
 import importlib.util
 import json
 import os
@@ -152,6 +153,14 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     added.add_argument(
         "--report", metavar="DIR", type=Path, default=Path("demo"), help="where the report goes (default: %(default)s)"
     )
+
+    added = command(_chart, "chart", "Measure the methods and draw how they compare, in a clone of the project.")
+    added.add_argument("subject", choices=["stability"], help="stability: every method up to where it fails")
+    added.add_argument(
+        "--output", metavar="DIR", type=Path, default=Path("docs", "charts"), help="where the SVGs go (default: %(default)s)"
+    )
+    added.add_argument("--only", metavar="NAME", nargs="+", default=[], help="these sweeps and no others")
+    added.add_argument("--quick", action="store_true", help="few trials: seconds instead of minutes")
     return parser
 
 
@@ -257,6 +266,16 @@ def _demo(options: argparse.Namespace) -> Result:
         raise InputError(f"{options.blend} is not here: run the demo in a clone of the project, where its sample scenes are")
     print(f"{options.blend.name}: a camera given by four values, rendered by Cycles and by the reference tracer")
     return _check(options)
+
+
+def _chart(options: argparse.Namespace) -> Result:
+    if not (PACKAGE.parent / "benchmarks").is_dir():
+        raise InputError("the charts are measured by benchmarks/, which is not here: run this in a clone of the project")
+    for package in ("bpy", "matplotlib", "mpmath"):
+        if importlib.util.find_spec(package) is None:
+            raise InputError(f"this needs {package}: pip install {package}")
+    sys.path.append(str(PACKAGE.parent))
+    return importlib.import_module(f"benchmarks.{options.subject}").run(options.output, options.only, options.quick)
 
 
 def _export_and_render(options: argparse.Namespace, scene_path: Path, image_path: Path) -> None:

@@ -1,15 +1,17 @@
 """How stable each method is that the project uses or could have used: a chart for each way to fail.
 
-Every module is one sweep towards a failure, with all candidates on it, and offers `charts(quick)`. The candidates that lost live
-here and nowhere else; the method in use is called from viewcam_addon. `viewcam chart stability` measures and draws all of them.
+Every module is one sweep towards a failure, with all candidates on it, and offers `charts(quick)`. The candidates that lost
+live here and nowhere else; the method in use is called from viewcam_addon. `viewcam chart stability` measures and draws all of
+them.
 """
 
 import importlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from viewcam_addon.errors import InputError
+from viewcam_addon.terminal import silent_libraries
 
 from .. import charts
 
@@ -55,6 +57,6 @@ def run(folder: Path, only: Sequence[str] = (), quick: bool = False) -> tuple[in
     return (1 if behind else 0), {"machine": charts.machine(), "behind": behind, "charts": measured}
 
 
-def _measured(sweep: str, quick: bool) -> Iterator[charts.Chart]:
-    yield from importlib.import_module(f".{sweep}", __package__).charts(quick)
-
+def _measured(sweep: str, quick: bool) -> tuple[charts.Chart, ...]:
+    with silent_libraries():  # Blender prints a line for each picture
+        return importlib.import_module(f".{sweep}", __package__).charts(quick)

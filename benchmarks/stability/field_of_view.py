@@ -1,11 +1,11 @@
 """The view-plane distance d that a camera really has, for the widest and the longest lenses.
 
-A picture of 1000 × 1000 pixels with a field of view from 1e-4° to 179.9999°. The relative error of d is how much too large or small
-the picture is: 500 times it is the displacement of the picture's edge in pixels.
+A picture of 1000 × 1000 pixels with a field of view from 1e-4° to 179.9999°. The relative error of d is how much too large or
+small the picture is: 500 times it is the displacement of the picture's edge in pixels.
 
-Candidates: the lens alone, which Blender clamps to 1 mm without a word; `camera.angle`; and ours, lens and sensor growing together. Their
-d is that of Blender's own projection matrix (Object.calc_matrix_camera), whose rounding is theirs. Cycles keeps the field of view
-itself in float32: what it makes of our camera is measured in its picture, and has a league of its own.
+Candidates: the lens alone, which Blender clamps to 1 mm without a word; `camera.angle`; and ours, lens and sensor growing
+together. Their d is that of Blender's own projection matrix (Object.calc_matrix_camera), whose rounding is theirs. Cycles keeps
+the field of view itself in float32: what it makes of our camera is measured in its picture, and has a league of its own.
 """
 
 import math
@@ -18,15 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewcam_addon.blender import camera as cameras
+from viewcam_addon.blender import cycles
 from viewcam_addon.pinhole import Pinhole
 
 from ..charts import Chart, Curve
-from .stage import empty_stage
+from .stage import empty_stage, read_elsewhere
 
 Array = NDArray[np.float64]
 Setter = Callable[[bpy.types.Scene, bpy.types.Object, float], None]
 
-SIZE = 1000
+SIZE, PIXELS = 1000, 32
 # Lens, sensor and their quotient, and three roundings in the matrix, each 2⁻²⁴.
 STORED = 6 * 2.0**-24
 
@@ -49,7 +50,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             reading.format(
                 how="wide",
                 others="the lens alone is clamped at 1 mm, and the picture stops growing wider.",
-                cycles="the error is 2⁻²⁴ · π over the angle that is missing to 180°.",
+                cycles="d is then off by up to 2⁻²⁴ · π over the angle that is missing to 180°.",
             ),
             quick,
         ),
@@ -108,4 +109,17 @@ def _matrix_distance(_scene: bpy.types.Scene, camera: bpy.types.Object) -> float
 
 
 def _cycles_distance(scene: bpy.types.Scene, camera: bpy.types.Object) -> float:
-    """d as it shows in a picture of 32 × 32 pixels: each tells where on a wall before the camera it looks."""
+    """d as Cycles' picture shows it: where on a wall at z = −1 each of 32 × 32 pixels looks."""
+    half = SIZE / 2 * camera.data.sensor_width / camera.data.lens / SIZE
+    mesh = bpy.data.meshes.new("Wall")
+    mesh.from_pydata([(x * half, y * half, -1) for x, y in ((-2, -2), (2, -2), (2, 2), (-2, 2))], [], [(0, 1, 2, 3)])
+    wall = bpy.data.objects.new("Wall", mesh)
+    scene.collection.objects.link(wall)
+    scene.render.resolution_x = scene.render.resolution_y = PIXELS
+    with TemporaryDirectory() as folder:
+        cycles.render(scene, bpy.context.view_layer, camera, Path(folder, "wall.exr"))
+        position = read_elsewhere(Path(folder, "wall.exr")).passes["Position"].astype(np.float64)
+    scene.render.resolution_x = scene.render.resolution_y = SIZE
+    bpy.data.objects.remove(wall)
+    from_centre = np.arange(PIXELS) + 0.5 - PIXELS / 2
+    return SIZE / PIXELS * float(np.mean(from_centre / (position[..., 0] / -position[..., 2])))

@@ -1,11 +1,11 @@
 """What Blender's float32 channels cost a pose, and what they cost it in gimbal lock.
 
-A camera rolled on its side looks along its own X axis, and the middle one of its three Euler angles comes near a right angle: cos β is
-the distance from gimbal lock. The error is that of the largest entry of the matrix that Blender evaluates, after it was set in
-each of the ways that Blender offers, and in ours: location and Euler angles or a quaternion, computed in float64.
+A camera rolled on its side looks along its own X axis, and the middle one of its three Euler angles comes near a right angle:
+cos β is the distance from gimbal lock. The error is that of the largest entry of the matrix that Blender evaluates, after it
+was set in each of the ways that Blender offers, and in ours: location and Euler angles or a quaternion, computed in float64.
 
-`matrix_parent_inverse` stores the matrix itself and is the most exact of all. It was rejected, and has a league of its own, because
-the location and rotation that the artist sees would then say nothing.
+`matrix_parent_inverse` stores the matrix itself and is the most exact of all. It was rejected, and has a league of its own,
+because the location and rotation that the artist sees would then say nothing.
 """
 
 from collections.abc import Callable
@@ -24,8 +24,8 @@ from .stage import empty_stage
 Array = NDArray[np.float64]
 Setter = Callable[[bpy.types.Scene, bpy.types.Object, Pinhole], None]
 
-# Three angles of up to π or four numbers of a quaternion stored in float32, and the three products that make the matrix of them:
-# 9 roundings (tests/blender/test_camera.py).
+# Three angles of up to π or four numbers of a quaternion stored in float32, and the three products that make the matrix of
+# them: 9 roundings (tests/blender/test_camera.py).
 STORED = 9 * 2.0**-24
 
 
@@ -47,9 +47,9 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
         curve("apply, quaternion (ours)", "QUATERNION", _apply, ours=True),
     )
     reading = (
-        "Read whether a curve rises to the right. Blender's own conversion turns the rounding of the matrix into the angles of an Euler "
-        "camera near gimbal lock; ours stays at a few roundings of float32. matrix_parent_inverse is better still, but leaves "
-        "the artist with channels that say nothing."
+        "Read whether a curve rises to the right. Blender's own conversion turns the rounding of a matrix into the angles of "
+        "an Euler camera near gimbal lock; ours stays at a few roundings of float32. matrix_parent_inverse is better still, "
+        "but leaves the artist with channels that say nothing."
     )
     return (
         Chart(
@@ -79,9 +79,7 @@ def _poses(distance: float, trials: int) -> list[Pinhole]:
     return poses
 
 
-def _largest_error(
-    scene: bpy.types.Scene, camera: bpy.types.Object, mode: str, setter: Setter, poses: list[Pinhole]
-) -> float:
+def _largest_error(scene: bpy.types.Scene, camera: bpy.types.Object, mode: str, setter: Setter, poses: list[Pinhole]) -> float:
     worst = 0.0
     for pinhole in poses:
         camera.rotation_mode = mode

@@ -1,11 +1,11 @@
 """The roll of the picture as the view comes near to up.
 
-The error of u about the true view axis, against the angle θ between the view and up. The eye is at θ · p and the look-at point at
-−up, p being perpendicular to up: so e − l is known to all digits, and θ may be smaller than float64's rounding of e − l.
+The error of u about the true view axis, against the angle θ between the view and up. The eye is at θ · p and the look-at point
+at −up, p being perpendicular to up: so e − l is known to all digits, and θ may be smaller than float64's rounding of e − l.
 
 Candidates, up in any direction: the text's formula in float32 and in float64, Gram–Schmidt (v = up − (up·w) w, u = v × w) in
-float64, and ours, compensated. Blender's own are told no up but the world's Z: Vector.to_track_quat and the constraint Track To. What
-Blender stores after `apply` is ours rounded to float32, and has a league of its own with them.
+float64, and ours, compensated. Blender's own are told no up but the world's Z: Vector.to_track_quat and the constraint Track
+To. What Blender stores after `apply` is ours rounded to float32, and has a league of its own with them.
 """
 
 from collections.abc import Callable
@@ -43,7 +43,14 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
         Curve("compensated (ours)", angles, _errors(lambda e, l, up: basis(e, l, up)[0], any_up), True),
         Curve("Vector.to_track_quat, up Z", angles, _errors(_each(_track_quat), z_up), league="Blender"),
         Curve("constraint Track To, up Z", angles, _errors(_each(_track_to(camera)), z_up), league="Blender"),
-        Curve("Blender's matrix after apply (ours)", angles, _errors(_each(_applied(scene, camera)), any_up), True, "Blender", STORED),
+        Curve(
+            "Blender's matrix after apply (ours)",
+            angles,
+            _errors(_each(_applied(scene, camera)), any_up),
+            True,
+            "Blender",
+            STORED,
+        ),
     )
     reading = (
         "Read how far to the right a curve stays low. Ours is flat: however close to vertical, the roll is right to the last "

@@ -1,7 +1,12 @@
-"""An empty Blender file with one camera in it, for the sweeps that ask Blender."""
+"""What the sweeps that ask Blender have in common: an empty file with one camera in it, and a reader of its pictures."""
+
+import multiprocessing
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
 
 import bpy
 
+from viewcam_addon import image
 from viewcam_addon.blender import ensure_registered
 
 
@@ -16,3 +21,9 @@ def empty_stage(width: int = 1000, height: int = 1000) -> tuple[bpy.types.Scene,
     scene.camera = camera
     bpy.context.view_layer.update()
     return scene, camera
+
+
+def read_elsewhere(path: Path) -> image.Image:
+    """An EXR, read in a process without Blender, which has an OpenEXR library of its own."""
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        return pool.submit(image.read, path).result()

@@ -1,0 +1,73 @@
+import math
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+
+from benchmarks import charts
+from benchmarks.charts import Chart, Curve
+from viewcam_addon.errors import InputError
+
+X = (1.0, 0.1, 0.01)
+
+
+def chart_of(*curves, **changes):
+    settings = {"reading": "Read this.", "tie": 1e-16, "reverse": True, **changes}
+    return Chart("name", "A title", "x", "y", curves, **settings)
+
+
+def test_a_method_in_use_that_is_best_everywhere_is_behind_nowhere():
+    assert chart_of(Curve("ours", X, (1e-9, 1e-9, 1e-9), ours=True), Curve("other", X, (1e-9, 6e-10, 1e-3))).behind() == []
+
+
+@pytest.mark.parametrize("error", [3e-9, math.inf, math.nan])
+def test_a_method_in_use_that_is_worse_somewhere_is_told_with_both_figures(error):
+    (sentence,) = chart_of(Curve("ours", X, (1e-9, error, 1e-9), ours=True), Curve("other", X, (1e-9, 1e-9, 1e-3))).behind()
+    assert "at 0.1" in sentence and f"{error:.3g}" in sentence and "other by 1e-09" in sentence
+
+
+def test_errors_within_a_tie_are_equal():
+    assert chart_of(Curve("ours", X, (1e-16, 9e-17, 0), ours=True), Curve("other", X, (0, 0, 0))).behind() == []
+    curve = Curve("ours", X, (3e-8, 0, 0), ours=True, tie=1e-7)
+    assert chart_of(curve, Curve("other", X, (0, 0, 0))).behind() == []
+
+
+def test_curves_compete_within_their_league_only():
+    ours = Curve("stored", X, (1e-7, 1e-7, 1e-7), ours=True, league="float32")
+    assert chart_of(ours, Curve("other", X, (0, 0, 0))).behind() == []
+    assert len(chart_of(ours, Curve("other", X, (0, 0, 0), league="float32")).behind()) == 3
+
+
+def test_a_rival_without_an_answer_beats_nobody():
+    assert chart_of(Curve("ours", X, (1, 1, math.nan), ours=True), Curve("other", X, (math.nan,) * 3)).behind() == []
+
+
+def test_a_curve_of_unequal_lengths_is_refused():
+    with pytest.raises(ValueError, match="3 x and 2 y"):
+        Curve("ours", X, (1, 1))
+
+
+def test_a_chart_is_drawn_with_its_caption_the_machine_and_the_command(tmp_path):
+    ours, other = Curve("ours", X, (0.0, 1e-16, 2e-16), ours=True), Curve("no answer", X, (1e-3, math.nan, math.inf))
+    charts.draw(chart_of(ours, other), tmp_path / "chart.svg", "viewcam chart something")
+    text = (tmp_path / "chart.svg").read_text(encoding="utf-8")
+    assert ElementTree.fromstring(text).tag.endswith("svg")
+    for said in ("A title", "Read this.", "ours", "no answer", "viewcam chart something", f"numpy {np.__version__}"):
+        assert said in text, f"{said!r} is not in the chart"
+
+
+def test_the_same_measurement_draws_the_same_file(tmp_path):
+    for name in ("one", "two"):
+        charts.draw(chart_of(Curve("ours", X, X, ours=True)), tmp_path / f"{name}.svg", "viewcam chart something")
+    assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "two.svg").read_bytes()
+
+
+def test_a_chart_in_a_place_that_is_none_is_an_error_in_one_sentence(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="can't be written"):
+        charts.draw(chart_of(Curve("ours", X, X, ours=True)), tmp_path / "file" / "chart.svg", "viewcam chart something")
+
+
+def test_figures_are_plain_numbers_and_null():
+    figures = chart_of(Curve("ours", np.array(X), (1.0, math.nan, math.inf), ours=True)).figures()
+    assert figures == {"ours": {"x": [1.0, 0.1, 0.01], "y": [1.0, None, None]}}
