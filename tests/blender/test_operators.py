@@ -3,6 +3,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as cameras
+from viewcam_addon.blender import readouts
 
 
 def test_apply_brings_a_moved_camera_back(posed_camera):
@@ -17,6 +18,17 @@ def test_adopt_takes_the_values_of_a_moved_camera(posed_camera):
     assert bpy.ops.viewcam.adopt_camera() == {"FINISHED"}
     assert tuple(posed_camera.virtual_pinhole.eye) == (1, 1, 1)
     assert tuple(posed_camera.location) == (1, 1, 1)
+
+
+def test_another_up_keeps_the_picture_and_makes_its_roll_certain(posed_camera, scene):
+    group = posed_camera.virtual_pinhole
+    group.eye, group.look_at, group.up = (0.5, 0.25, 5), (0.5, 0.25, 0), (0, 0, 1)
+    before, precision = cameras.stated(posed_camera, scene), 2.0**-24
+    assert "roll" in readouts.pose_warnings(before, precision)[0]
+    assert bpy.ops.viewcam.choose_up() == {"FINISHED"}
+    after = cameras.stated(posed_camera, scene)
+    assert after.up == (1, 0, 0) and after.basis()[0] == pytest.approx(before.basis()[0], abs=1e-15)
+    assert readouts.pose_warnings(after, precision) == []
 
 
 def test_adopt_enables_a_camera(camera_object):
@@ -36,6 +48,7 @@ def test_a_camera_can_be_named(posed_camera, add_camera):
     [
         (lambda: bpy.ops.viewcam.apply_camera(camera="Nobody"), "There is no camera 'Nobody'"),
         (lambda: bpy.ops.viewcam.apply_camera(), "is not enabled"),
+        (lambda: bpy.ops.viewcam.choose_up(), "is not enabled"),
         (lambda: bpy.ops.viewcam.adopt_camera(camera="Lamp"), "'Lamp' is no camera"),
     ],
 )

@@ -1,4 +1,8 @@
 import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
 
 from viewcam_addon.blender import readouts
 from viewcam_addon.pinhole import Pinhole
@@ -22,20 +26,62 @@ def test_a_camera_without_stated_values_has_no_distance_to_a_look_at_point():
     assert "To Look-At" not in [row[0] for row in readouts.readouts(LEVEL, 18.0, None)]
 
 
+def above(angle):
+    """Looks down within `angle` of an up that has no zeros, so that every number of the pose is rounded."""
+    up = np.array((0.48, 0.6, 0.64))
+    across = np.cross(up, (1, 0, 0))
+    eye = tuple(up + math.tan(angle) * across / np.linalg.norm(across))
+    return Pinhole(eye, (0, 0, 0), tuple(up), 1000.0, 1920, 1080)
+
+
 def test_a_singular_pose_is_said_to_be_so():
     (warning,) = readouts.pose_warnings(Pinhole((0, 0, 5), (0, 0, 0), (0, 0, 1), 50.0, 100, 60), 2.0**-24)
     assert "parallel to up" in warning
 
 
-def test_the_roll_is_called_uncertain_only_where_a_corner_moves_half_a_pixel():
-    def warnings(angle, precision=2.0**-24):
-        pinhole = Pinhole((math.sin(angle), 0, math.cos(angle)), (0, 0, 0), (0, 0, 1), 1000.0, 1920, 1080)
-        return readouts.pose_warnings(pinhole, precision)
+def test_the_roll_is_called_uncertain_where_a_corner_moves_a_tenth_of_a_pixel_and_not_before():
+    corner = math.hypot(960, 540)
+    for angle in (3e-2, 1e-2, 3e-3, 1e-3, 3e-4):
+        camera = above(angle)
+        moved = camera.roll_uncertainty() * corner
+        assert bool(readouts.pose_warnings(camera, 2.0**-24)) == (moved > 0.1), f"{angle:g} rad: {moved:.2g} px"
+    assert readouts.pose_warnings(above(3e-2), 2.0**-24) == []
+    assert readouts.pose_warnings(above(3e-4), 2.0**-24)
 
-    assert warnings(1e-3) == []  # 2⁻²⁴ · 2 / 1e-3 rad · 1101 px = 0.13 px
-    assert "0.0057° from up" in warnings(1e-4)[0]  # 1.3 px
-    assert "any roll" in warnings(1e-8)[0]
-    assert warnings(1e-8, precision=2.0**-53) == []
+
+def test_the_roll_warning_tells_the_angle_and_the_roll():
+    angle = math.radians(0.001)
+    (sentence,) = readouts.pose_warnings(above(angle), 2.0**-24)
+    roll = math.degrees(above(angle).roll_uncertainty())
+    assert sentence == f"The view is within 0.001° of up: the roll is uncertain by {float(f'{roll:.0e}'):g}°"
+    assert "any roll is possible" in readouts.pose_warnings(above(1e-8), 2.0**-24)[0]
+
+
+def test_values_known_in_float64_leave_the_roll_certain():
+    assert readouts.pose_warnings(above(1e-5), precision=2.0**-53) == []
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-4, 0.1])
+def test_the_proposed_up_gives_the_same_picture_and_is_certain(angle):
+    camera = above(angle) if angle else Pinhole((0.48, 0.6, 0.64), (0, 0, 0), (0.48, 0.6, 0.64), 1000.0, 1920, 1080)
+    proposed = replace(camera, up=readouts.certain_up(camera))
+    assert proposed.sine_to_up == pytest.approx(1, abs=1e-12)
+    assert np.abs(np.stack(proposed.basis()) - np.stack(camera.basis())).max() < 1e-15
+    assert not any("roll" in sentence for sentence in readouts.pose_warnings(proposed, 2.0**-24))
+
+
+def test_a_coordinate_axis_is_proposed_where_it_is_one():
+    assert readouts.certain_up(Pinhole((0, 0, 5), (0, 0, 0), (0, 0, 1), 50.0, 100, 60)) == (1, 0, 0)
+    assert readouts.certain_up(Pinhole((0, 1e-7, 5), (0, 0, 0), (0, 0, 1), 50.0, 100, 60)) == (0, -1, 0)
+
+
+def test_far_from_the_origin_the_rounding_is_told_in_pixels():
+    def warnings(far):
+        return readouts.pose_warnings(Pinhole((far, 0, 0), (far, 10, 0), (0, 0, 1), 1000.0, 1920, 1080), 2.0**-24)
+
+    assert warnings(1e4) == []  # 2⁻²⁴ · 1000 px · 1e4 / 10 = 0.06 px
+    assert "are 0.2 px off" in warnings(4e4)[-1]
+    assert "are 40 px off" in warnings(6.4e6)[-1]
 
 
 def test_long_sentences_are_wrapped_to_the_width_of_the_region():

@@ -1,15 +1,17 @@
-"""Two buttons: set the camera by its four values once more, and take the four values from the camera as it stands.
+"""The buttons: set the camera by its values again, take them from the camera as it stands, choose an up that is certain.
 
-Both work in any mode and on any camera: the one that is named, else the active one, else the scene's.
+They work in any mode and on any camera: the one that is named, else the active one, else the scene's.
 """
 
+import dataclasses
 from typing import ClassVar
 
 import bpy
 
 from ..errors import InputError
+from ..pinhole import Pinhole
 from . import camera as cameras
-from . import datablocks
+from . import datablocks, readouts
 
 
 class _CameraOperator:
@@ -46,12 +48,7 @@ class VIEWCAM_OT_apply_camera(_CameraOperator, bpy.types.Operator):
     bl_description = "Set the camera by its eye, look-at, up and distance"
 
     def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
-        pinhole = cameras.stated(camera_object, scene)
-        if pinhole is None:
-            raise InputError(
-                f"the Virtual Pinhole of camera {camera_object.name!r} is not enabled: enable it, or adopt the camera"
-            )
-        for finding in cameras.apply(camera_object, pinhole, scene):
+        for finding in cameras.apply(camera_object, _stated(camera_object, scene), scene):
             self.report({"WARNING"}, finding)
 
 
@@ -64,4 +61,23 @@ class VIEWCAM_OT_adopt_camera(_CameraOperator, bpy.types.Operator):
         cameras.adopt(camera_object, scene)
 
 
-CLASSES = (VIEWCAM_OT_apply_camera, VIEWCAM_OT_adopt_camera)
+class VIEWCAM_OT_choose_up(_CameraOperator, bpy.types.Operator):
+    bl_idname = "viewcam.choose_up"
+    bl_label = "Use a Certain Up"
+    bl_description = "Replace up by the one that gives the same picture and leaves no doubt about its roll"
+
+    def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
+        pinhole = _stated(camera_object, scene)
+        better = dataclasses.replace(pinhole, up=readouts.certain_up(pinhole))
+        for finding in cameras.apply(camera_object, better, scene):
+            self.report({"WARNING"}, finding)
+
+
+def _stated(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
+    pinhole = cameras.stated(camera_object, scene)
+    if pinhole is None:
+        raise InputError(f"the Virtual Pinhole of camera {camera_object.name!r} is not enabled: enable it, or adopt the camera")
+    return pinhole
+
+
+CLASSES = (VIEWCAM_OT_apply_camera, VIEWCAM_OT_adopt_camera, VIEWCAM_OT_choose_up)

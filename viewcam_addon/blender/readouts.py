@@ -2,8 +2,14 @@
 
 import math
 import textwrap
+from itertools import product
 
+from ..compare import law
 from ..pinhole import Pinhole, Triple
+from . import findings
+
+# A tenth of a pixel is a hundred times what the camera and Cycles agree to, and the least that shows at a picture's edges.
+VISIBLE = 0.1
 
 
 def readouts(camera: Pinhole, lens: float, look_at_distance: str | None) -> list[tuple[str, ...]]:
@@ -29,21 +35,60 @@ def _vector(vector: Triple) -> tuple[str, ...]:
 
 
 def pose_warnings(stated: Pinhole, precision: float) -> list[str]:
-    """Sentences on a pose that is singular, or so near that the rounding of the values turns the picture visibly.
+    """Sentences on what the rounding of numbers does to the picture, where that is visible.
 
-    precision : the relative rounding of the values. Visible is what moves a corner of the picture by more than half a pixel.
+    precision : the relative rounding of the values.
+    """
+    return [sentence for sentence in (roll_warning(stated, precision), distance_warning(stated)) if sentence]
+
+
+def roll_warning(stated: Pinhole, precision: float) -> str | None:
+    """A sentence on a pose that is singular, or so near that the rounding of the values turns the picture visibly, else None.
+
+    precision : the relative rounding of the values.
     """
     if stated.is_singular:
-        return ["The view is parallel to up, so that the roll is undefined: the axes are the canonical ones"]
-    roll = stated.roll_uncertainty(precision)
-    if roll * math.hypot(stated.width, stated.height) / 2 <= 0.5:
-        return []
+        return "The view is parallel to up, and the roll is undefined: the axes are the canonical ones"
+    roll, corner = stated.roll_uncertainty(precision), _corner(stated)
+    if roll * corner <= VISIBLE or roll * stated.sine_to_up * corner > VISIBLE:  # the latter is not up's fault
+        return None
     angle = math.degrees(math.asin(min(1.0, stated.sine_to_up)))
     if roll >= math.pi:
-        return [f"The view is only {angle:.2g}° from up: the rounding of the values leaves any roll possible"]
-    return [
-        f"The view is only {angle:.2g}° from up: the rounding of the values may turn the picture by {math.degrees(roll):.2g}°"
-    ]
+        return f"The view is within {_figure(angle)}° of up: with the rounding of the values any roll is possible"
+    return f"The view is within {_figure(angle)}° of up: the roll is uncertain by {_figure(math.degrees(roll))}°"
+
+
+def certain_up(stated: Pinhole) -> Triple:
+    """The up for which the roll is least uncertain, and which gives the same picture: v, being perpendicular to the view.
+
+    Where a coordinate axis is v but for the rounding of a float32 matrix, that axis.
+    """
+    v = stated.axes()[1]
+    axis = tuple(float(round(component)) for component in v)
+    return axis if max(abs(a - b) for a, b in zip(axis, v, strict=True)) <= findings.LARGEST_TURN else v
+
+
+def distance_warning(stated: Pinhole) -> str | None:
+    """A sentence on a camera so far from the origin that Blender's and Cycles' float32 is visible where it looks, else None.
+
+    One rounding of the largest coordinate, seen from as far as the look-at point is away (the law of compare/law.py).
+    """
+    largest = max(map(abs, (*stated.eye, *stated.look_at)))
+    pixels = law.FLOAT32 * max(stated.distance) * largest / math.dist(stated.eye, stated.look_at)
+    if pixels <= VISIBLE:
+        return None
+    return f"So far from the origin Blender and Cycles are {_figure(pixels)} px off in float32: bring the scene to the origin"
+
+
+def _figure(value: float) -> str:
+    """One significant digit: 0.001, 3, 40."""
+    return f"{float(f'{value:.0e}'):g}"
+
+
+def _corner(camera: Pinhole) -> float:
+    """How far the farthest corner of the picture is from the principal point, in pixels."""
+    x, y = camera.principal_point
+    return max(math.dist((x, y), corner) for corner in product((0, camera.width), (0, camera.height)))
 
 
 def wrapped(sentence: str, width: float) -> list[str]:
