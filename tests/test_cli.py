@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from viewcam_addon import image
+from viewcam_addon import cli, image
 from viewcam_addon.cli import DEMO_SCENE, main
 
 CAMERA = {"eye": [0, -5, 0], "look_at": [0, 0, 0], "up": [0, 0, 1], "distance": 100, "width": 64, "height": 48}
@@ -170,6 +170,27 @@ def viewcam(*words, **options):
     command = [sys.executable, "-m", "viewcam_addon.cli", *map(str, words)]
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent.parent)}
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False, **options)
+
+
+def test_a_chart_is_measured_and_drawn_where_it_is_wanted(tmp_path):
+    pytest.importorskip("bpy")
+    words = ["chart", "stability", "--only", "field_of_view", "--quick", "--output", tmp_path, "--json", tmp_path / "all.json"]
+    done = viewcam(*words)
+    assert (done.returncode, done.stderr) == (0, ""), done.stderr
+    assert "stability-field-of-view-wide: Read whether" in done.stdout
+    assert "viewcam chart stability" in (tmp_path / "stability-field-of-view-wide.svg").read_text(encoding="utf-8")
+    assert len(json.loads((tmp_path / "all.json").read_text())["charts"]) == 2
+
+
+def test_a_chart_that_there_is_not_is_refused_with_those_that_there_are(tmp_path):
+    pytest.importorskip("bpy")
+    done = viewcam("chart", "stability", "--only", "rolls", "--output", tmp_path)
+    assert done.returncode == 2 and "choose from roll" in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
+
+
+def test_charts_need_a_clone_of_the_project(tmp_path, capfd, monkeypatch):
+    monkeypatch.setattr(cli, "PACKAGE", tmp_path / "viewcam_addon")
+    assert "in a clone of the project" in fails(capfd, "chart", "stability")
 
 
 def test_a_picture_that_can_not_grow_leaves_nothing_behind(tmp_path):
