@@ -135,8 +135,8 @@ def draw(chart: Chart, path: Path, command: str) -> None:
     InputError
         if the file can't be written.
     """
-    fonts = {"font.family": ["DejaVu Sans", "Verdana", "sans-serif"], "font.size": 9}
-    settings = {"svg.fonttype": "none", "svg.hashsalt": chart.name, **fonts}
+    # Letters stay text. The font that matplotlib brings along is the widest of the usual ones, so that another fits as well.
+    settings = {"svg.fonttype": "none", "svg.hashsalt": chart.name, "font.family": "DejaVu Sans", "font.size": 9}
     with matplotlib.rc_context(settings), written_whole(path) as temporary:
         figure = Figure(figsize=(9, 6.4))
         axes = figure.add_axes((0.085, 0.265, 0.655, 0.655))
