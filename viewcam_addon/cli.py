@@ -105,6 +105,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         added.add_argument("--frame", type=int, metavar="N", help="the frame (default: the file's current one)")
         added.add_argument("--size", type=_size, metavar="WxH", help="pixels of the picture (default: the scene's)")
         added.add_argument("--strict", action="store_true", help="exit with 3 if anything can not be modelled")
+        added.add_argument("--recenter", action="store_true", help="put the origin at the eye: for scenes far from it")
         level(added)
 
     def level(added: argparse.ArgumentParser) -> None:
@@ -149,7 +150,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     report(added)
 
     added = command(_demo, "demo", "Check the studio still that comes with the project, and write the report.")
-    added.set_defaults(blend=DEMO_SCENE, camera=None, frame=None, size=None, strict=False, level="geometry")
+    added.set_defaults(blend=DEMO_SCENE, camera=None, frame=None, size=None, strict=False, recenter=False, level="geometry")
     added.add_argument(
         "--report", metavar="DIR", type=Path, default=Path("demo"), help="where the report goes (default: %(default)s)"
     )
@@ -240,11 +241,18 @@ def _compare(options: argparse.Namespace) -> Result:
     ledger = scene.ledger if scene else ()
     print(*_ledger_lines(ledger), *comparison.lines(), sep="\n")
     if options.report:
-        written = write_report(
-            comparison, reference, test, options.report, ledger, f"viewcam {options.repeat or options.words}"
-        )
+        words = f"viewcam {options.repeat or options.words}"
+        written = write_report(comparison, reference, test, options.report, ledger, words, _facts(scene))
         print(f"report: {written}")
     return 0 if comparison.passed else 1, {**comparison.to_json(), "ledger": _ledger_json(ledger)}
+
+
+def _facts(scene: Any) -> dict[str, str]:
+    """What the report says of a scene, beside its ledger."""
+    if scene is None or not any(scene.origin):
+        return {}
+    x, y, z = scene.origin
+    return {"Origin": f"the eye, which the file has at ({x:.12g}, {y:.12g}, {z:.12g}); all coordinates are relative to it"}
 
 
 def _check(options: argparse.Namespace) -> Result:
@@ -296,6 +304,7 @@ def _request(options: argparse.Namespace) -> Any:
         frame=options.frame,
         size=options.size,
         strict=options.strict,
+        recenter=options.recenter,
         threads=options.threads,
     )
 

@@ -30,14 +30,19 @@ Matrix = NDArray[np.float64]
 class Source:
     """A visible surface that stands in the world once or many times.
 
-    data : evaluated. key : the same for all that share a geometry in Cycles. materials : pass indices of the slots, at least 1.
+    data : evaluated. key : the same for all that share a geometry in Cycles. slots : the materials, evaluated, at least 1.
     """
 
     name: str
     data: bpy.types.Mesh | bpy.types.PointCloud
     key: tuple[int, int]
     object_index: int
-    materials: tuple[int, ...]
+    slots: tuple[bpy.types.Material | None, ...]
+
+    @property
+    def materials(self) -> tuple[int, ...]:
+        """The materials' pass indices."""
+        return tuple(material.pass_index if material else 0 for material in self.slots)
 
 
 def export_scene(
@@ -137,7 +142,7 @@ def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Led
         data=data,
         key=(data.as_pointer(), real.as_pointer() if own else 0),
         object_index=shown.pass_index,
-        materials=tuple(material.pass_index if material else 0 for material in slots),
+        slots=tuple(slots),
     )
 
 

@@ -7,7 +7,7 @@ Scripts of the file do not run.
 import contextlib
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import bpy
@@ -15,7 +15,7 @@ import bpy
 from .. import intrinsics
 from ..errors import InputError
 from ..tracer.scene import LedgerEntry, Scene
-from . import cycles, datablocks, ensure_registered, indices
+from . import cycles, datablocks, ensure_registered, indices, recentering
 from .borrowing import Borrower, borrowed
 from .export import export_scene, survey
 from .ledger import Ledger
@@ -27,24 +27,45 @@ _LAST_FRAME = 1048574
 
 @dataclass(frozen=True)
 class Request:
-    """blend : the file, or None for the one that is open. camera, frame, size : the scene's own where None."""
+    """blend : the file, or None for the one that is open. camera, frame, size : the scene's own where None.
+
+    recenter : whether both sides see the scene with its origin at the eye.
+    """
 
     blend: str | os.PathLike[str] | None = None
     camera: str | None = None
     frame: int | None = None
     size: tuple[int, int] | None = None
     strict: bool = False
+    recenter: bool = False
     threads: int | None = None
 
 
 @dataclass(frozen=True)
 class _Stage:
-    """What a job works on while it lasts."""
+    """What a job works on while it lasts.
+
+    ledger : of what is on this stage. origin, names, told : of the file that a recentred stage stands for, see
+    recentering.py; told is the file's ledger.
+    """
 
     scene: bpy.types.Scene
     view_layer: bpy.types.ViewLayer
     camera: bpy.types.Object
     ledger: Ledger = field(default_factory=Ledger)
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    names: dict[str, str] = field(default_factory=dict)
+    told: Ledger | None = None
+
+    def entries(self, strict: bool) -> tuple[LedgerEntry, ...]:
+        """What is told of the file; NotModelledError if `strict` and anything is approximated or left out."""
+        ledger = self.ledger
+        if self.told:
+            self.told.add(self.ledger, self.names)
+            ledger = self.told
+        if strict:
+            ledger.check_strict()
+        return ledger.entries()
 
 
 def export(request: Request) -> Scene:
@@ -57,7 +78,7 @@ def export(request: Request) -> Scene:
     NotModelledError
         if `strict` and anything is approximated or left out.
     """
-    with _stage(request) as stage:
+    with _stage(request) as stage, _seen_from(stage, request) as stage:
         return _export(stage, request)
 
 
@@ -66,17 +87,16 @@ def render(request: Request, path: str | os.PathLike[str]) -> tuple[LedgerEntry,
 
     Raises as `export` does, and InputError if the picture can't be written.
     """
-    with _stage(request) as stage:
+    with _stage(request) as stage, _seen_from(stage, request) as stage:
         survey(stage.scene, stage.view_layer, stage.camera, stage.ledger)
-        if request.strict:
-            stage.ledger.check_strict()
+        told = stage.entries(request.strict)
         _render(stage, request, path)
-        return stage.ledger.entries()
+        return told
 
 
 def export_and_render(request: Request, path: str | os.PathLike[str]) -> Scene:
     """Both sides of one state of the file, objects and materials numbered alike. Raises as `render` does."""
-    with _stage(request) as stage, indices.numbered():
+    with _stage(request) as stage, indices.numbered(), _seen_from(stage, request) as stage:
         scene = _export(stage, request)
         _render(stage, request, path)
         return scene
@@ -84,9 +104,19 @@ def export_and_render(request: Request, path: str | os.PathLike[str]) -> Scene:
 
 def _export(stage: _Stage, request: Request) -> Scene:
     scene = export_scene(stage.scene, stage.view_layer, stage.camera, stage.ledger)
-    if request.strict:
-        stage.ledger.check_strict()
-    return scene
+    objects = tuple(replace(placed, name=stage.names.get(placed.name, placed.name)) for placed in scene.objects)
+    return replace(scene, objects=objects, origin=stage.origin, ledger=stage.entries(request.strict))
+
+
+@contextlib.contextmanager
+def _seen_from(stage: _Stage, request: Request) -> Iterator[_Stage]:
+    """The stage itself or, where that is wanted, one whose origin is the camera's eye."""
+    if not request.recenter:
+        yield stage
+        return
+    with recentering.recentred(stage.scene, stage.view_layer, stage.camera, stage.ledger) as moved:
+        layer = moved.scene.view_layers[0]
+        yield _Stage(moved.scene, layer, moved.camera, origin=moved.origin, names=moved.names, told=stage.ledger)
 
 
 def _render(stage: _Stage, request: Request, path: str | os.PathLike[str]) -> None:
@@ -178,8 +208,9 @@ def _borrow_size(borrow: Borrower, scene: bpy.types.Scene, camera: bpy.types.Obj
         # Last borrowed, first given back: the values are stated anew, then their digits and their size as they were.
         borrow.afterwards(setattr, group, "size", tuple(group.size))
         borrow.afterwards(setattr, group, "exact", group.exact)
-        borrow.afterwards(group.state, *pose, distance, tuple(group.size))
-        group.state(*pose, distance * _distance_at_full_size(scene, camera) / before, size)
+        borrow.afterwards(setattr, group, "when_set", group.when_set)
+        borrow.afterwards(group.state, *pose, distance, tuple(group.size), group.roll)
+        group.state(*pose, distance * _distance_at_full_size(scene, camera) / before, size, group.roll)
 
 
 def _distance_at_full_size(scene: bpy.types.Scene, camera: bpy.types.Object) -> float:

@@ -4,7 +4,7 @@ One entry an object, however often it is placed; its worst finding decides the s
 Cycles' render, takes out of it what the tracer does not model, so that the rest can be compared.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import bpy
 
@@ -38,6 +38,12 @@ class Ledger:
     def call_for_cycles(self, owner: bpy.types.bpy_struct, remedy: Callable[[Borrower, bpy.types.bpy_struct], None]) -> None:
         """The remedy is a function."""
         self.remedies[owner.as_pointer(), remedy.__name__] = lambda borrow: remedy(borrow, owner)
+
+    def add(self, other: "Ledger", names: Mapping[str, str]) -> None:
+        """Note what another ledger found of objects that stand for these. names : object there → object here."""
+        for stand_in, name in names.items():
+            for reason, status in other._findings.get(stand_in, {}).items():
+                self.note(name, status, reason)
 
     def entries(self) -> tuple[LedgerEntry, ...]:
         """One entry an object: the skipped ones first, then those that are approximated."""

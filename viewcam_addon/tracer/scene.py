@@ -114,6 +114,8 @@ class Scene:
     camera : the camera to trace. For a scene from Blender, as read back from Blender's float32 matrix and lens.
     stated_camera : the camera as the four values state it, or None where nobody stated one.
     clip : nearest and farthest planar depth z = −w·(P − e) that is visible.
+    origin : the point of the world from which all coordinates of the scene are counted: (0, 0, 0), or that of a recentred
+        export.
     """
 
     camera: Pinhole
@@ -122,8 +124,11 @@ class Scene:
     stated_camera: Pinhole | None = None
     clip: tuple[float, float] = (0.0, float("inf"))
     ledger: tuple[LedgerEntry, ...] = field(default=())
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
+        if len(self.origin) != 3 or not np.isfinite(self.origin).all():
+            raise InputError(f"origin is {self.origin}: give three finite numbers")
         start, end = (float(depth) for depth in self.clip)
         if not 0 <= start < end:
             raise InputError(f"clip is {start:g} … {end:g}: give a nearest depth of at least 0 and a greater farthest depth")

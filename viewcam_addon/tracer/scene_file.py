@@ -66,7 +66,7 @@ def read(path: str | os.PathLike[str]) -> Scene:
     if header["version"].whole(0) != VERSION:
         header["version"].fail(f"is {header['version'].value}, and this program reads {VERSION}: write the scene again")
     fields = document.fields(
-        ("format", "version", "camera", "geometries", "objects"), ("stated_camera", "clip", "ledger", "arrays")
+        ("format", "version", "camera", "geometries", "objects"), ("stated_camera", "clip", "origin", "ledger", "arrays")
     )
     with arrays_beside(path, fields.get("arrays")) as arrays:
         geometries = {name: _geometry(field, arrays) for name, field in fields["geometries"].named("geometry").items()}
@@ -81,6 +81,7 @@ def read(path: str | os.PathLike[str]) -> Scene:
             ledger=tuple(_ledger_entry(field) for field in fields["ledger"].items("ledger entry"))
             if "ledger" in fields
             else (),
+            origin=fields["origin"].vector(3) if "origin" in fields else (0.0, 0.0, 0.0),
         )
     except InputError as error:
         document.hand_on(error)
@@ -93,6 +94,8 @@ def _document(scene: Scene, arrays: dict[str, NDArray]) -> dict:
         document["stated_camera"] = dataclasses.asdict(scene.stated_camera)
     start, end = scene.clip
     document["clip"] = [start, end if np.isfinite(end) else None]
+    if any(scene.origin):
+        document["origin"] = list(scene.origin)
     document["geometries"] = {
         name: _geometry_document(geometry, str(index), arrays)
         for index, (name, geometry) in enumerate(scene.geometries.items())
