@@ -16,13 +16,7 @@ from bpy.app.handlers import persistent
 
 from ..errors import InputError
 from . import camera as cameras
-from . import versions
-
-
-def is_animated(camera_object: bpy.types.Object) -> bool:
-    """Whether a keyframe, an NLA strip or a driver changes one of the four values."""
-    curves = [*versions.animation_curves(camera_object), *versions.drivers(camera_object)]
-    return any(curve.data_path.startswith("virtual_pinhole.") for curve in curves)
+from .hold import is_animated
 
 
 @persistent

@@ -1,10 +1,11 @@
 """Blender's camera from a Pinhole, and a Pinhole from Blender's camera.
 
 `apply` states a Pinhole on a camera object and moves the camera there; `read` says which Pinhole the camera is as Cycles
-renders it; `stated` says which Pinhole the four values of `object.virtual_pinhole` ask for. findings.py compares the last two.
+renders it; `stated` says which Pinhole the four values of `object.virtual_pinhole` ask for, and `follow` moves the camera
+there. findings.py compares `stated` with `read`.
 
 **How the pose is set.** As location and rotation, in whatever rotation mode the artist has, computed in float64 relative to the
-parent, with delta transforms taken off: within 1.3e-7 of a matrix entry, and without trouble in gimbal lock. Rejected:
+parent, with delta transforms taken off: within 1.6e-7 of a matrix entry, and without trouble in gimbal lock. Rejected:
 `matrix_parent_inverse` (3e-8, but the location and rotation in the sidebar would say nothing, and the camera would not be where
 its channels say), `matrix_world =` (4.9e-7; 2.5e-3 in gimbal lock; wrong by whole units under a non-uniformly scaled parent),
 `to_track_quat` (an arbitrary roll near vertical) and a TRACK_TO constraint (another object, and its own pole).
@@ -21,9 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import intrinsics
+from .. import roll as rolls
 from ..errors import InputError
 from ..pinhole import Pinhole
-from . import datablocks, findings, pose, rotation, suspects
+from . import datablocks, findings, hold, pose, rotation, suspects
 
 Array = NDArray[np.float64]
 
@@ -52,6 +54,24 @@ def apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Sc
     return check(camera_object, pinhole, scene)
 
 
+def follow(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
+    """Move an enabled camera to where its values, edited or not, say; a held roll is carried along (hold.py).
+
+    Raises
+    ------
+    InputError
+        as `stated` and `apply` do. Nothing has changed then.
+    """
+    group = camera_object.virtual_pinhole
+    level = _level(camera_object, scene)
+    roll, angle = group.roll, hold.roll(camera_object, scene)
+    if hold.is_written_by_edits(camera_object):
+        before = _stood_at(camera_object, scene)
+        roll = angle = hold.after_edit(before, level, roll, group.hold_within) if before else roll
+    place(camera_object, rolls.turned(level, angle), scene, datablocks.depsgraph_of(scene))
+    group.settle(datablocks.frame_of(scene).size, roll)
+
+
 def place(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Move the camera to `pinhole` without stating it and without reading back; otherwise as `apply`."""
     datablocks.check_perspective(camera_object)
@@ -63,14 +83,9 @@ def place(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Sc
     _check_storable(camera_object, distance=(data.lens, data.sensor_width), shift=(data.shift_x, data.shift_y), eye=location)
     # Nothing fails from here on.
     camera_object.location = location
-    if camera_object.rotation_mode == "QUATERNION":
-        camera_object.rotation_quaternion = rotation.quaternion(turn)
-    elif camera_object.rotation_mode == "AXIS_ANGLE":
-        camera_object.rotation_axis_angle = rotation.axis_angle(turn)
-    else:
-        camera_object.rotation_euler = rotation.euler(turn, camera_object.rotation_mode)
     if scale != tuple(camera_object.scale):
         camera_object.scale = scale
+    pose.set_rotation(camera_object, turn)
     camera.lens, camera.shift_x, camera.shift_y = data.lens, data.shift_x, data.shift_y
     if (camera.sensor_width, camera.sensor_height) != (data.sensor_width, data.sensor_height):
         camera.sensor_width, camera.sensor_height = data.sensor_width, data.sensor_height
@@ -119,9 +134,7 @@ def read(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
         raise InputError(f"camera {camera_object.name!r} is scaled to zero, or beyond all numbers: set its scale to 1")
     axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
     if rotation.skew(axes) > pose.LARGEST_SKEW:
-        raise InputError(
-            f"camera {camera_object.name!r} is oblique, {pose.who_shears(camera_object)}: apply the scale of the parent"
-        )
+        raise InputError(f"camera {camera_object.name!r} is oblique, {pose.who_shears(camera_object)}")
     mirrored = bool(np.linalg.det(axes) < 0)
     _, v, w = rotation.nearest(axes).T
     eye = matrix[:3, 3]
@@ -143,22 +156,27 @@ def read(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
 def stated(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole | None:
     """The Pinhole that `object.virtual_pinhole` asks for in the picture that `scene` renders, or None where it is not enabled.
 
-    The principal point is that of the camera's own shift, and mirroring that of its scale: the four values do not speak of
-    them.
+    The principal point is that of the camera's own shift, and mirroring that of its scale: the values do not speak of them.
+    Where the roll is held, up is turned by it. The evaluated object of another depsgraph may be given as well.
 
     Raises
     ------
     InputError
         if the values make no camera: eye = look-at, up = 0, distance ≤ 0, a number that is not finite.
     """
-    group = camera_object.virtual_pinhole
-    if not group.enabled:
+    if not camera_object.virtual_pinhole.enabled:
         return None
+    level = _level(camera_object, scene)
+    return rolls.turned(level, hold.roll(camera_object, scene))
+
+
+def _level(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
+    """What the four values ask for, whatever the roll is."""
     datablocks.check_perspective(camera_object)
     evaluated = camera_object if camera_object.is_evaluated else camera_object.evaluated_get(datablocks.depsgraph_of(scene))
     frame = datablocks.frame_of(scene)
     plane = intrinsics.view_plane(datablocks.camera_data_of(evaluated.data), frame)
-    eye, look_at, up, distance = group.numbers()
+    eye, look_at, up, distance = camera_object.virtual_pinhole.numbers()
     distance *= frame.size[0] / frame.resolution_x
     mirrored = np.linalg.det(np.array(evaluated.matrix_world)[:3, :3]) < 0
     return Pinhole(
@@ -171,6 +189,20 @@ def stated(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole |
         plane.principal_point,
         bool(mirrored),
     )
+
+
+def _stood_at(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole | None:
+    """The view before an edit, without its roll, or None if the camera does not stand where it was set (moved, constrained)."""
+    group = camera_object.virtual_pinhole
+    numbers = group.numbers_when_set()
+    if numbers is None:
+        return None
+    try:
+        before, found = Pinhole(*numbers, 1.0, 1, 1), read(camera_object, scene)
+    except InputError:
+        return None
+    off = np.subtract(rolls.turned(before, group.roll).basis(), found.basis())
+    return before if np.abs(off).max() <= findings.LARGEST_TURN else None
 
 
 def adopt(camera_object: bpy.types.Object, scene: bpy.types.Scene, keep: frozenset[str] = frozenset()) -> None:

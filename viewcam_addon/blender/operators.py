@@ -48,7 +48,9 @@ class VIEWCAM_OT_apply_camera(_CameraOperator, bpy.types.Operator):
     bl_description = "Set the camera by its eye, look-at, up and distance"
 
     def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
-        for finding in cameras.apply(camera_object, _stated(camera_object, scene), scene):
+        _stated(camera_object, scene)
+        cameras.follow(camera_object, scene)
+        for finding in cameras.check(camera_object, _stated(camera_object, scene), scene):
             self.report({"WARNING"}, finding)
 
 

@@ -6,7 +6,7 @@ import bpy
 
 from ..errors import InputError
 from . import camera as cameras
-from . import datablocks, readouts
+from . import datablocks, hold, readouts
 from .properties import VALUES
 
 
@@ -28,6 +28,10 @@ class _CameraPanel:
         column.active = group.enabled
         for name in VALUES:
             column.prop(group, name)
+        column.prop(group, "pole")
+        if group.pole == "HOLD":
+            column.prop(group, "hold_within")
+            column.prop(group, "roll")
         buttons = layout.row(align=True)
         for operator in ("viewcam.apply_camera", "viewcam.adopt_camera"):
             button = buttons.row(align=True)
@@ -64,6 +68,7 @@ def contents(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> tuple[l
         stated = cameras.stated(camera_object, scene)
         if stated:
             warnings += readouts.pose_warnings(stated, group.precision())
+            warnings += filter(None, [hold.obstacle(camera_object)])
             warnings += cameras.check(camera_object, stated, scene)
         found = cameras.read(camera_object, scene)
     except InputError as error:

@@ -4,12 +4,16 @@ Blender's properties are float32. What a script states in float64 would be lost 
 were given; each counts as long as it rounds to the property beside it, and an edit or a keyframe overrules it. Rejected: ID
 properties for the values themselves (float64, but without update callbacks, units, limits and library overrides).
 
+Where the roll is held through the pole (hold.py), an edit also writes the new roll. `when_set` remembers the view of the
+camera as it was last set, from which the next edit sets out: a callback hears of an edit only when the old value is gone.
+
 Undo, redo and opening a file bring values and camera back together and call nothing. Callbacks raise nothing: values that make
 no camera (eye = look-at) leave it where it was, and the panel says so.
 """
 
 import contextlib
 import json
+import math
 from collections.abc import Iterator
 
 import bpy
@@ -51,7 +55,14 @@ def _on_edited(group: "VirtualPinhole", _context: bpy.types.Context) -> None:
     camera_object = group.id_data
     scene = datablocks.scene_of(camera_object)
     with contextlib.suppress(InputError):  # the panel finds the same error and shows it
-        cameras.apply(camera_object, cameras.stated(camera_object, scene), scene)
+        cameras.follow(camera_object, scene)
+
+
+def _on_pole(group: "VirtualPinhole", context: bpy.types.Context) -> None:
+    if group.pole != "HOLD":
+        with _without_callbacks():
+            group.roll = 0.0
+    _on_edited(group, context)
 
 
 class VirtualPinhole(bpy.types.PropertyGroup):
@@ -100,7 +111,42 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         update=_on_edited,
         override={"LIBRARY_OVERRIDABLE"},
     )
+    pole: bpy.props.EnumProperty(
+        name="At the Pole",
+        description="What the picture does where the view comes close to up or down",
+        items=(
+            (
+                "CANONICAL",
+                "Canonical Axes",
+                "Up alone decides, and exactly along it fixed axes. The picture flips as the view passes by",
+            ),
+            ("HOLD", "Hold the Roll", "The picture is carried along from the pose before, or from the first frame on: no flip"),
+        ),
+        update=_on_pole,
+        options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    hold_within: bpy.props.FloatProperty(
+        name="Within",
+        description="How close to up or down the picture is carried along. At 90° it always is, and up says nothing any more",
+        subtype="ANGLE",
+        default=math.radians(10),
+        min=0.0,
+        max=math.pi / 2,
+        update=_on_edited,
+        options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    roll: bpy.props.FloatProperty(
+        name="Roll",
+        description="By how much the camera is turned about its view from what up says, in an animation at the first frame. "
+        "Type 0 to level the picture",
+        subtype="ANGLE",
+        update=_on_edited,
+        override={"LIBRARY_OVERRIDABLE"},
+    )
     exact: bpy.props.StringProperty(options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE"})
+    when_set: bpy.props.StringProperty(options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE"})
     size: bpy.props.IntVectorProperty(
         description="The picture's size in pixels when the camera was set",
         size=2,
@@ -108,13 +154,24 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         override={"LIBRARY_OVERRIDABLE"},
     )
 
-    def state(self, eye: tuple, look_at: tuple, up: tuple, distance: float, size: tuple[int, int]) -> None:
+    def state(self, eye: tuple, look_at: tuple, up: tuple, distance: float, size: tuple[int, int], roll: float = 0.0) -> None:
         """Set the four values in float64 and enable them; the camera stays where it is."""
         with _without_callbacks():
             self.eye, self.look_at, self.up, self.distance = eye, look_at, up, distance
             self.exact = json.dumps([*eye, *look_at, *up, distance])
-            self.size = size
             self.enabled = True
+        self.settle(size, roll)
+
+    def settle(self, size: tuple[int, int], roll: float) -> None:
+        """Take note that the camera has been set by the values as they are, for a picture of that size."""
+        eye, look_at, up, _ = self.numbers()
+        with _without_callbacks():
+            self.roll, self.size, self.when_set = roll, size, json.dumps([*eye, *look_at, *up])
+
+    def numbers_when_set(self) -> tuple[tuple, tuple, tuple] | None:
+        """Eye, look-at and up as they were when the camera was last set, or None if that is not known."""
+        numbers = _parsed(self.when_set, 9)
+        return (tuple(numbers[0:3]), tuple(numbers[3:6]), tuple(numbers[6:9])) if numbers else None
 
     def numbers(self) -> tuple[tuple, tuple, tuple, float]:
         """Eye, look-at, up and distance in float64."""
@@ -133,11 +190,16 @@ class VirtualPinhole(bpy.types.PropertyGroup):
 
     def _exact(self) -> list[float]:
         """Ten numbers in float64, NaN where none is known."""
-        with contextlib.suppress(ValueError, TypeError):
-            numbers = np.array(json.loads(self.exact), dtype=np.float64)
-            if numbers.shape == (10,):
-                return numbers.tolist()
-        return [float("nan")] * 10
+        return _parsed(self.exact, 10) or [math.nan] * 10
+
+
+def _parsed(text: str, count: int) -> list[float] | None:
+    """So many numbers from JSON, None if it holds anything else."""
+    with contextlib.suppress(ValueError, TypeError):
+        numbers = np.array(json.loads(text), dtype=np.float64)
+        if numbers.shape == (count,):
+            return numbers.tolist()
+    return None
 
 
 def register() -> None:

@@ -22,14 +22,27 @@ def drivers(block: bpy.types.ID) -> list[bpy.types.FCurve]:
 
 def animation_curves(block: bpy.types.ID) -> list[bpy.types.FCurve]:
     """The curves that animate a datablock: those of its action and of the actions on its NLA tracks that are not muted."""
+    return [*action_curves(block), *strip_curves(block)]
+
+
+def action_curves(block: bpy.types.ID) -> list[bpy.types.FCurve]:
+    """The curves of a datablock's own action."""
     data = block.animation_data
-    if not data:
+    return _curves_of(data) if data else []
+
+
+def strip_curves(block: bpy.types.ID) -> list[bpy.types.FCurve]:
+    """The curves of the actions on a datablock's NLA tracks, unless the strip, its track or all tracks are muted."""
+    data = block.animation_data
+    if not data or not data.use_nla:
         return []
     strips = [strip for track in data.nla_tracks if not track.mute for strip in track.strips if not strip.mute]
-    return [curve for source in (data, *strips) if source.action for curve in _curves_of(source)]
+    return [curve for strip in strips for curve in _curves_of(strip)]
 
 
 def _curves_of(source: bpy.types.AnimData | bpy.types.NlaStrip) -> list[bpy.types.FCurve]:
+    if not source.action:
+        return []
     # Actions have slots since 4.4. What 4.4 and 4.5 still call action.fcurves are the curves of the first slot only.
     if bpy.app.version < (4, 4):
         return list(source.action.fcurves)
