@@ -1,8 +1,11 @@
 """Where rays meet spheres and ellipsoids, against the quadric itself in many digits."""
 
+import warnings
+
 import mpmath
 import numpy as np
-from hypothesis import given, settings
+import pytest
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from viewcam_addon.pinhole import Pinhole
@@ -137,3 +140,90 @@ def test_a_spheres_shown_normal_is_its_normal(make_scene, make_spheres):
     rays = camera.ray_directions(*np.nonzero(hit)[::-1])
     cosine = -np.einsum("ij,ij->i", passes["Normal"][hit].astype(float), rays)
     assert np.abs(cosine - passes["Facing"][hit][:, 0]).max() <= 4 * FLOAT32
+
+
+def exact_depth(center, radius, x, y):
+    """Depth at which the ray (x, y, −1) from the origin meets a sphere, of these very numbers; inf if it does not."""
+    with mpmath.workdps(60):
+        center, ray = [mpmath.mpf(c) for c in center], [mpmath.mpf(x), mpmath.mpf(y), mpmath.mpf(-1)]
+        tangent = mpmath.fdot(center, center) - mpmath.mpf(radius) ** 2
+        along, square = mpmath.fdot(center, ray), mpmath.fdot(ray, ray)
+        discriminant = along * along - square * tangent
+        met = tangent > 0 and along > 0 and discriminant >= 0
+        return float(tangent / (along + mpmath.sqrt(discriminant))) if met else np.inf
+
+
+def found_depth(center, radius, x, y, spheres, matrix=None, eye=(0.0, 0.0, 0.0)):
+    camera = Pinhole(eye, (eye[0], eye[1], eye[2] - 1), (0, 1, 0), 1, 1, 1)
+    placed = Object("object", "spheres", np.eye(4) if matrix is None else matrix)
+    ellipsoids = ellipsoids_of([(placed, spheres([center], radius))], View(camera))
+    return ellipsoids.depth(np.zeros(1, np.intp), np.array([x]), np.array([y]))[0] if ellipsoids.count else np.inf
+
+
+@settings(max_examples=150)
+@given(seed=SEEDS, digits=st.integers(0, 16), side=st.sampled_from([-1, 1]))
+def test_an_eye_by_the_last_bit_outside_or_inside_a_sphere_knows_it_and_its_depth_keeps_all_digits(
+    make_spheres, seed, digits, side
+):
+    rng = np.random.default_rng(seed)
+    center = rng.normal(size=3) * (1, 1, 0.5) - (0, 0, 1)
+    radius = float(np.linalg.norm(center) * (1 - side * 10.0**-digits))
+    x, y = rng.normal(size=2)
+    exact, depth = exact_depth(center, radius, x, y), found_depth(center, radius, x, y, make_spheres)
+    cosine = abs(center @ (x, y, -1)) / np.linalg.norm(center) / np.linalg.norm((x, y, 1))
+    if cosine < 0.03 or (np.isinf(exact) and 10.0**-digits > cosine**2 / 4):
+        return  # the ray grazes: of that, the next test
+    assert np.isinf(exact) == np.isinf(depth), f"depth {depth} instead of {exact}"
+    if np.isfinite(exact):
+        # c·d loses 2⁻⁵³ |c| |d| with each term; the root of along² − tangent · square as much again, by what is left of along².
+        allowed = 32 * FLOAT64 / min(cosine, 1 - min(2 * 10.0**-digits / cosine**2, 0.999))
+        assert abs(depth / exact - 1) <= allowed, f"off by {abs(depth / exact - 1):.1e}, allowed {allowed:.1e}"
+
+
+def test_an_eye_exactly_on_a_sphere_sees_nothing_of_it(make_spheres):
+    assert found_depth((0.0, 3.0, -4.0), 5.0, 0.0, 0.75, make_spheres) == np.inf
+    assert found_depth((0.0, 3.0, -4.0), np.nextafter(5.0, 6), 0.0, 0.75, make_spheres) == np.inf
+    # From 5's last place outside, 2⁻⁵⁰, the ray (0, 3/4, −1) goes straight to the centre.
+    just_outside = found_depth((0.0, 3.0, -4.0), np.nextafter(5.0, 4), 0.0, 0.75, make_spheres)
+    assert just_outside == pytest.approx(2.0**-50 * 0.8, rel=8 * FLOAT64)
+
+
+@settings(max_examples=60)
+@given(seed=SEEDS, digits=st.integers(0, 12))
+@example(seed=0, digits=12)
+def test_a_turned_ellipsoid_far_from_the_origin_is_as_exact_as_one_at_home(make_spheres, random_matrix, seed, digits):
+    """Eye, centre and matrix are exact float64 numbers; only their difference is small."""
+    rng = np.random.default_rng(seed)
+    matrix = random_matrix(rng)
+    center = rng.normal(size=3) * 10.0**digits
+    middle = matrix[:3, :3] @ center + matrix[:3, 3]
+    eye = middle + np.array([0.5, -0.25, 8])
+    aim = matrix[:3, :3] @ (rng.normal(size=3) * 0.4) + middle - eye
+    x, y = aim[:2] / -aim[2]
+    depth = found_depth(center, 1.0, x, y, make_spheres, matrix, tuple(eye.tolist()))
+    with mpmath.workdps(60):
+        away = mpmath.matrix(matrix[:3, :3].tolist()) * mpmath.matrix(center.tolist())
+        away += mpmath.matrix(matrix[:3, 3].tolist()) - mpmath.matrix(eye.tolist())
+        inverse = mpmath.matrix(matrix[:3, :3].tolist()) ** -1
+        f, d = inverse * away, inverse * mpmath.matrix([mpmath.mpf(float(x)), mpmath.mpf(float(y)), -1])
+        along, square, tangent = mpmath.fdot(f, d), mpmath.fdot(d, d), mpmath.fdot(f, f) - 1
+        discriminant = along * along - square * tangent
+        if discriminant < 0.01 * square:
+            return  # it misses or grazes
+        exact = float(tangent / (along + mpmath.sqrt(discriminant)))
+    # As in the first test: the shape is rounded by the inverse, the foot of the perpendicular by 2⁻⁵³ |f|.
+    allowed = 64 * FLOAT64 * np.linalg.cond(matrix[:3, :3]) * (1 + 1 / 0.1)
+    assert abs(depth / exact - 1) <= allowed, f"off by {abs(depth / exact - 1):.1e}, allowed {allowed:.1e}"
+
+
+@pytest.mark.parametrize("exponent", [-320, -300, -160, -130, -40, 40, 130, 160, 300])
+@pytest.mark.parametrize("by_matrix", [False, True])
+def test_spheres_of_any_size_are_seen_or_left_out_without_a_warning(make_spheres, exponent, by_matrix):
+    size = 10.0**exponent
+    matrix = np.diag([size, size, size, 1.0]) if by_matrix else np.eye(4)
+    center, radius = ((0, 0, -5), 1.0) if by_matrix else ((0, 0, -5 * size), size)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        depth = found_depth(center, radius, 0.0, 0.0, make_spheres, matrix)
+    # Beyond 1e±135, squares leave float64; beyond 1e±38, a float32 pass could not show them anyway.
+    assert depth == (pytest.approx(4 * size, rel=8 * FLOAT64) if abs(exponent) < 135 else np.inf)
