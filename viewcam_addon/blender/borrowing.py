@@ -60,6 +60,10 @@ def still_of_one_layer(
     ):
         borrow.set(render, name, False)
     borrow.set(render, "use_crop_to_border", render.use_border)
-    borrow.set(scene, "camera", camera_object)
+    # Markers bound to cameras would choose among them: in a render, and while they are unbound and bound again.
+    borrow.afterwards(setattr, scene, "camera", scene.camera)
+    for marker in scene.timeline_markers:
+        borrow.set(marker, "camera", None)
+    scene.camera = camera_object
     for each in scene.view_layers:
         borrow.set(each, "use", each == view_layer)

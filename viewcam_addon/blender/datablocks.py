@@ -7,6 +7,8 @@ import bpy
 from .. import intrinsics
 from ..errors import InputError
 
+# Metres: what is shorter, Blender calls zero.
+_SHORTEST_WORD = 1e-6
 _KINDS = {"ORTHO": "orthographic", "PANO": "panoramic", "CUSTOM": "a custom camera"}
 
 
@@ -52,6 +54,29 @@ def own_sensor(camera: bpy.types.Camera) -> tuple[float, float]:
     growth = current[0] / before[0]
     grown_by_place = math.frexp(growth)[0] == 0.5 and growth > 1 and growth == current[1] / before[1]
     return before if grown_by_place else current
+
+
+def length(value: float, scene: bpy.types.Scene, digits: int = 6) -> str:
+    """A length in world units as the scene's units say it; as a bare number without them, and below what Blender's words reach."""
+    units = scene.unit_settings
+    metres = value * units.scale_length
+    if units.system == "NONE" or metres < _SHORTEST_WORD:
+        return f"{value:.{digits}g}"
+    return bpy.utils.units.to_string(units.system, "LENGTH", metres, precision=digits)
+
+
+def render_camera(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """The camera that a render of the current frame takes: where markers are bound to cameras, theirs and not the scene's."""
+    bound = [marker for marker in scene.timeline_markers if marker.camera and not marker.camera.hide_render]
+    if not bound:
+        return scene.camera
+    # As Blender has it: the last one before the frame, else the first of all.
+    before = [marker for marker in bound if marker.frame <= scene.frame_current]
+    return (max(before, key=_frame) if before else min(bound, key=_frame)).camera
+
+
+def _frame(marker: bpy.types.TimelineMarker) -> int:
+    return marker.frame
 
 
 def depsgraph_of(scene: bpy.types.Scene) -> bpy.types.Depsgraph:

@@ -7,7 +7,7 @@ remember what was set and when, which undo, linking and scripts would make stale
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +27,7 @@ _LENS_ROUNDINGS = 3
 _SHIFT_ROUNDINGS = 2
 
 EYE, VIEW, DISTANCE, CENTRE = "eye", "view", "distance", "centre"
-POSE = frozenset({EYE, VIEW})
+POSE, LENS = frozenset({EYE, VIEW}), frozenset({DISTANCE, CENTRE})
 REMEDY = "apply the values again, or adopt the camera as it stands"
 
 
@@ -45,15 +45,17 @@ class Suspect:
     always: bool = False
 
 
-def differences(wanted: Pinhole, found: Pinhole, reach: float) -> dict[str, str]:
+def differences(
+    wanted: Pinhole, found: Pinhole, reach: float, length: Callable[[float], str] = "{:.3g}".format
+) -> dict[str, str]:
     """What differs by more than Blender's float32 storage explains: its name → the figures, in words. Pure.
 
-    reach : the largest coordinate that went into the camera's location, world units.
+    reach : the largest coordinate that went into the camera's location, world units. length : a length in words, with its unit.
     """
     result = {}
     apart = math.dist(wanted.eye, found.eye)
     if apart > _LOCATION_ROUNDINGS * _FLOAT32 * reach:
-        result[EYE] = f"the eye is {apart:.3g} away"
+        result[EYE] = f"the eye is {length(apart)} away"
     turn = np.column_stack(wanted.basis()) - np.column_stack(found.basis())
     if wanted.mirrored != found.mirrored:
         result[VIEW] = "the picture is mirrored"

@@ -1,7 +1,16 @@
 """The camera object's pose: where it stands among its parent and delta transforms, and which channels bring it elsewhere.
 
 Everything is float64 from Blender's float32 matrices on, each (4, 4) or (3, 3), for column vectors.
+
+**Rotations in float32.** Of the two Euler triples `rotation.euler` takes the one whose sum is at most 3π/2: two of its angles may
+lie above 2 and be rounded by 2⁻²³ each, and the third, below 1 then, by 2⁻²⁵. Rounding the matrix turns it by √3 · 2⁻²⁵ at most.
+That is 3.2e-7 rad. Quaternions, and axis and angle, are worse: Blender normalises them in float32, which costs as much as
+storing them, and up to 4.6e-7 rad were found. So `set_rotation` tries the neighbouring float32 numbers and asks Blender which
+make the right matrix: 1.6e-7 rad at most in every mode. Rejected: Blender's float32 arithmetic done here once more (its rounding
+differs from one processor to another).
 """
+
+from collections.abc import Iterator
 
 import bpy
 import numpy as np
@@ -27,14 +36,38 @@ def channels(
         raise InputError(f"the parent of camera {camera_object.name!r} is scaled to zero: give it a scale")
     u, v, w = pinhole.basis()
     wanted = np.column_stack([-u if pinhole.mirrored else u, v, w])
-    scale = np.array(camera_object.scale)
-    signs = np.where(scale * np.array(camera_object.delta_scale) < 0, -1.0, 1.0)
+    scale, signs = np.array(camera_object.scale), _signs(camera_object)
     local = np.linalg.solve(parent[:3, :3], wanted)
     if np.linalg.det(local) * signs.prod() < 0:
         scale[0], signs[0] = -scale[0], -signs[0]
     turn = rotation.nearest(local / np.linalg.norm(local, axis=0) * signs)
     location = np.linalg.solve(parent[:3, :3], np.array(pinhole.eye) - parent[:3, 3]) - np.array(camera_object.delta_location)
     return tuple(location.tolist()), _delta_rotation(camera_object).T @ turn, tuple(scale.tolist())
+
+
+def set_rotation(camera_object: bpy.types.Object, turn: Array) -> None:
+    """Rotate the camera, in its own mode, by the (3, 3) rotation that `channels` gives; its scale is set already."""
+    mode = camera_object.rotation_mode
+    if mode == "QUATERNION":
+        name, numbers = "rotation_quaternion", rotation.quaternion(turn)
+    elif mode == "AXIS_ANGLE":
+        name, numbers = "rotation_axis_angle", rotation.axis_angle(turn)
+    else:
+        name, numbers = "rotation_euler", rotation.euler(turn, mode)
+    wanted = _delta_rotation(camera_object) @ turn * _signs(camera_object)
+    candidates = rotation.neighbours(numbers)
+    made = []
+    for candidate in candidates:
+        setattr(camera_object, name, candidate)
+        made.append(np.array(camera_object.matrix_basis)[:3, :3])
+    sizes = np.linalg.norm(made, axis=1, keepdims=True)
+    errors = np.abs(made / np.where(sizes, sizes, 1.0) - wanted).max(axis=(1, 2))
+    setattr(camera_object, name, candidates[np.argmin(errors)])
+
+
+def _signs(camera_object: bpy.types.Object) -> Array:
+    """(3,): −1 for each axis that the camera's own scale turns round."""
+    return np.where(np.array(camera_object.scale) * np.array(camera_object.delta_scale) < 0, -1.0, 1.0)
 
 
 def _delta_rotation(camera_object: bpy.types.Object) -> Array:
@@ -46,36 +79,80 @@ def _delta_rotation(camera_object: bpy.types.Object) -> Array:
 
 
 def parent_matrix(camera_object: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Array:
-    """(4, 4) float64: the matrix that takes the camera's own location, rotation and scale to world space."""
+    """(4, 4) float64: the matrix that takes the camera's own location, rotation and scale to world space.
+
+    It is that of the parent and of the constraints, as long as all of these carry the camera as a parent does.
+
+    Raises
+    ------
+    InputError
+        if it can't be told, since the camera is scaled to zero.
+    """
     parent = camera_object.parent
-    if parent is None:
+    constraints = list(active_constraints(camera_object))
+    is_carried = bool(constraints) and all(map(_carries, constraints))
+    if not is_carried and parent is None:
         return np.eye(4)
     inverse = np.array(camera_object.matrix_parent_inverse)
-    if camera_object.parent_type == "OBJECT" and parent.type != "CURVE":
+    if not is_carried and camera_object.parent_type == "OBJECT" and parent.type != "CURVE":
         return np.array(parent.evaluated_get(depsgraph).matrix_world) @ inverse
-    # Bones, vertices and paths: what Blender itself takes for the parent's matrix.
+    # Bones, vertices, paths and constraints: what Blender itself takes for the parent's matrix.
     evaluated = camera_object.evaluated_get(depsgraph)
-    return np.array(evaluated.matrix_world) @ np.linalg.inv(np.array(evaluated.matrix_local)) @ inverse
+    own = np.array(evaluated.matrix_basis) if is_carried else np.linalg.inv(inverse) @ np.array(evaluated.matrix_local)
+    if np.linalg.det(own) == 0:
+        raise InputError(f"camera {camera_object.name!r} is scaled to zero: set its scale to 1")
+    return np.array(evaluated.matrix_world) @ np.linalg.inv(own)
+
+
+def active_constraints(block: bpy.types.Object) -> Iterator[bpy.types.Constraint]:
+    """The constraints that are neither muted nor without influence."""
+    return (constraint for constraint in block.constraints if constraint.enabled and constraint.influence > 0)
+
+
+def _carries(constraint: bpy.types.Constraint) -> bool:
+    """Whether a constraint moves an object as a parent does: it multiplies its matrix by one that does not depend on it."""
+    if constraint.type == "COPY_LOCATION":
+        return constraint.use_offset and constraint.owner_space == "WORLD"
+    if constraint.type == "ARMATURE" and constraint.use_current_location:
+        return False
+    return constraint.type in ("CHILD_OF", "ARMATURE", "FOLLOW_PATH") and constraint.influence == 1
 
 
 def who_shears(camera_object: bpy.types.Object) -> str:
-    parent = camera_object.parent
-    while parent:
-        sizes = np.linalg.norm(np.array(parent.matrix_world)[:3, :3], axis=0)
-        if sizes.max() > sizes.min() * (1 + LARGEST_SKEW):
-            return f"its parent {parent.name!r} is scaled non-uniformly"
-        parent = parent.parent
-    return "its parents or constraints shear it"
+    """Why the camera's axes are not perpendicular, and what to do about it: the end of a sentence."""
+    for child in (camera_object, *ancestors(camera_object)):
+        parent = child.parent
+        if parent and parent.type == "ARMATURE" and child.parent_type == "BONE":
+            bone = parent.pose.bones.get(child.parent_bone)
+            if bone and not _is_uniform(bone.scale):
+                return f"the bone {bone.name!r} above it is scaled non-uniformly: give the bone a uniform scale"
+        if parent and not _is_uniform(np.array(parent.scale) * np.array(parent.delta_scale)):
+            relation = "parent" if child == camera_object else "ancestor"
+            return f"its {relation} {parent.name!r} is scaled non-uniformly: apply the scale of {parent.name!r}"
+    for constraint in active_constraints(camera_object):
+        return f"its constraint {constraint.name!r} shears it: disable it, or give its target a uniform scale"
+    return "its parents shear it: clear its parent"
+
+
+def _is_uniform(scale: Array) -> bool:
+    sizes = np.abs(np.array(scale))
+    return bool(sizes.max() <= sizes.min() * (1 + LARGEST_SKEW))
+
+
+def ancestors(block: bpy.types.Object) -> Iterator[bpy.types.Object]:
+    """Its parent, the parent's parent, and so on."""
+    while block := block.parent:
+        yield block
 
 
 def reach(camera_object: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> float:
     """The lengths that go into the camera's location, summed: its own, the parent's, and that of the parent's inverse."""
     matrix = parent_matrix(camera_object, depsgraph)
     own = np.linalg.norm(matrix[:3, :3], 2) * (camera_object.location + camera_object.delta_location).length
+    own += np.linalg.norm(matrix[:3, 3])
     parent = camera_object.parent
     if parent is None:
         return own
     world = np.array(parent.evaluated_get(depsgraph).matrix_world)
     inverse = np.array(camera_object.matrix_parent_inverse)
-    offset = np.linalg.norm(world[:3, :3], 2) * np.linalg.norm(inverse[:3, 3]) + np.linalg.norm(world[:3, 3])
-    return own + offset + np.linalg.norm(matrix[:3, 3])
+    return own + np.linalg.norm(world[:3, :3], 2) * np.linalg.norm(inverse[:3, 3]) + np.linalg.norm(world[:3, 3])

@@ -8,6 +8,7 @@ rotations", Computers & Graphics 17, 1993). What remains is the rounding of thre
 Every matrix is (3, 3) float64 and takes column vectors: its columns are the images of the axes.
 """
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -93,6 +94,13 @@ def axis_angle(rotation: Array) -> tuple[float, float, float, float]:
     if sine == 0:
         return 0.0, 0.0, 1.0, 0.0
     return 2 * math.atan2(sine, w), *(component / sine for component in axis)
+
+
+def neighbours(numbers: Sequence[float]) -> NDArray[np.float32]:
+    """(3ⁿ, n): the n numbers rounded to float32, then all that differ from these by one step of float32 in some of the numbers."""
+    rounded = np.array(numbers, dtype=np.float32)
+    below, above = (np.nextafter(rounded, np.float32(limit)) for limit in (-np.inf, np.inf))
+    return np.array(list(itertools.product(*zip(rounded, below, above, strict=True))))
 
 
 def nearest(matrix: Array) -> Array:

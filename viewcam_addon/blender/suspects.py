@@ -4,8 +4,9 @@ from collections.abc import Iterator
 
 import bpy
 
-from . import datablocks, versions
-from .findings import CENTRE, DISTANCE, EYE, POSE, REMEDY, VIEW, Suspect
+from . import datablocks, pose, versions
+from .findings import CENTRE, DISTANCE, EYE, LENS, POSE, REMEDY, VIEW, Suspect
+from .hold import is_animated
 
 
 def suspects(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[Suspect]:
@@ -13,18 +14,27 @@ def suspects(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterato
     for block in (camera_object, camera_object.data):
         yield from _drivers(block)
         yield from _animation(block)
-        yield from _libraries(block)
+    yield from _ancestors(camera_object)
+    yield from _libraries(camera_object)
     yield from _locks(camera_object)
     yield from _sensor(camera_object.data)
     yield from _render_size(camera_object, scene)
     yield from _sharers(camera_object)
 
 
+# Constraints that leave the eye or the view alone; all others act on both.
+_CONSTRAINTS = {
+    **dict.fromkeys(("COPY_LOCATION", "LIMIT_LOCATION", "LIMIT_DISTANCE", "FLOOR", "SHRINKWRAP"), {EYE}),
+    **dict.fromkeys(("TRACK_TO", "DAMPED_TRACK", "LOCKED_TRACK", "COPY_ROTATION", "LIMIT_ROTATION"), {VIEW}),
+    **dict.fromkeys(("COPY_SCALE", "LIMIT_SCALE", "MAINTAIN_VOLUME"), {VIEW}),
+}
+
+
 def _constraints(camera_object: bpy.types.Object) -> Iterator[Suspect]:
-    for constraint in camera_object.constraints:
-        if constraint.enabled and constraint.influence > 0:
-            culprit = f"The constraint {constraint.name!r} moves {camera_object.name!r}"
-            yield Suspect(culprit, POSE, "disable it, or the Virtual Pinhole")
+    for constraint in pose.active_constraints(camera_object):
+        culprit = f"The constraint {constraint.name!r} moves {camera_object.name!r}"
+        acts_on = frozenset(_CONSTRAINTS.get(constraint.type, POSE))
+        yield Suspect(culprit, acts_on, "disable it, or the Virtual Pinhole")
 
 
 # What a channel acts on, by the start of its data path.
@@ -45,28 +55,53 @@ def _acts_on(data_path: str) -> str | None:
     return next((quantity for start, quantity in _CHANNELS.items() if data_path.startswith(start)), None)
 
 
+def _paths(curves: list[bpy.types.FCurve]) -> list[str]:
+    """What the curves that are not muted set."""
+    return sorted({curve.data_path for curve in curves if not (curve.mute or curve.group and curve.group.mute)})
+
+
 def _drivers(block: bpy.types.ID) -> Iterator[Suspect]:
-    for curve in versions.drivers(block):
-        if quantity := _acts_on(curve.data_path):
-            yield Suspect(
-                f"A driver sets {curve.data_path!r} of {block.name!r}",
-                frozenset({quantity}),
-                "remove it, or the Virtual Pinhole",
-            )
+    for path in _paths(versions.drivers(block)):
+        if quantity := _acts_on(path):
+            culprit = f"A driver sets {path!r} of {block.name!r}"
+            yield Suspect(culprit, frozenset({quantity}), "remove it, or disable the Virtual Pinhole")
 
 
 def _animation(block: bpy.types.ID) -> Iterator[Suspect]:
-    for path in sorted({curve.data_path for curve in versions.animation_curves(block)}):
+    for path in _paths(versions.animation_curves(block)):
         quantity = _acts_on(path)
         if quantity and quantity != CENTRE:
-            culprit = f"{path!r} of {block.name!r} is animated and will change with the frame"
-            yield Suspect(culprit, frozenset({quantity}), "animate the four values instead", always=True)
+            culprit = f"{path!r} of {block.name!r} is animated, and in a render its keyframes win over the four values"
+            yield Suspect(culprit, frozenset({quantity}), "delete them, and animate the four values instead", always=True)
 
 
-def _libraries(block: bpy.types.ID) -> Iterator[Suspect]:
-    if block.library:
-        culprit = f"{block.name!r} is linked from {block.library.name!r}, where nothing that is set here is saved"
-        yield Suspect(culprit, frozenset(), "make a library override of it", always=True)
+def _ancestors(camera_object: bpy.types.Object) -> Iterator[Suspect]:
+    """Who carries the camera away. Where the four values are animated they are set anew at every frame, and nobody can."""
+    if is_animated(camera_object):
+        return
+    remedy = "animate the four values instead, or disable the Virtual Pinhole"
+    for ancestor in pose.ancestors(camera_object):
+        if _is_moved_by_animation(ancestor):
+            culprit = f"{ancestor.name!r} is animated and carries {camera_object.name!r} along"
+            yield Suspect(culprit, POSE, remedy, always=True)
+        elif any(pose.active_constraints(ancestor)):
+            culprit = f"{ancestor.name!r} is moved by its constraints and carries {camera_object.name!r} along"
+            yield Suspect(culprit, POSE, remedy)
+
+
+def _is_moved_by_animation(block: bpy.types.Object) -> bool:
+    """Its own channels, the bones of an armature, or the time on a path."""
+    blocks = filter(None, (block, block.data))
+    paths = [path for each in blocks for path in _paths([*versions.animation_curves(each), *versions.drivers(each)])]
+    return any(_acts_on(path) in POSE or path.startswith("pose.bones") or path == "eval_time" for path in paths)
+
+
+def _libraries(camera_object: bpy.types.Object) -> Iterator[Suspect]:
+    blocks = ((camera_object, "Camera", POSE), (camera_object.data, "The camera data", LENS))
+    for block, kind, acts_on in blocks:
+        if block.library:
+            culprit = f"{kind} {block.name!r} is linked from {block.library.name!r}, and what is set here is not saved"
+            yield Suspect(culprit, acts_on, "make a library override of it", always=True)
 
 
 def _locks(camera_object: bpy.types.Object) -> Iterator[Suspect]:
@@ -91,16 +126,25 @@ def _sensor(camera: bpy.types.Camera) -> Iterator[Suspect]:
 
 def _render_size(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[Suspect]:
     before, now = tuple(camera_object.virtual_pinhole.size), datablocks.frame_of(scene).size
-    if all(before) and before != now:
+    if not all(before) or before == now:
+        return
+    others = [other for other in camera_object.users_scene if other != scene and datablocks.frame_of(other).size == before]
+    if others:
+        culprit = (
+            f"The camera is set for the {before[0]} × {before[1]} px of scene {others[0].name!r}, "
+            f"and scene {scene.name!r} renders {now[0]} × {now[1]}"
+        )
+        yield Suspect(culprit, LENS, "give both scenes the same resolution, or each a camera of its own")
+    else:
         culprit = f"The picture was {before[0]} × {before[1]} px and is {now[0]} × {now[1]} now"
-        yield Suspect(culprit, frozenset({DISTANCE}), REMEDY)
+        yield Suspect(culprit, LENS, REMEDY)
 
 
 def _sharers(camera_object: bpy.types.Object) -> Iterator[Suspect]:
     camera = camera_object.data
     if camera.users < 2:
         return
-    others = sorted(other.name for other in bpy.data.objects if other.data == camera and other != camera_object)
+    others = [other.name for other in bpy.data.objects if other.data == camera and other.name != camera_object.name]
     if others:
-        culprit = f"The camera data {camera.name!r} is shared with {', '.join(map(repr, others))}"
-        yield Suspect(culprit, frozenset({DISTANCE, CENTRE}), "make the data single-user, or give both the same distance")
+        culprit = f"The camera data {camera.name!r} is shared with {', '.join(map(repr, sorted(others)))}"
+        yield Suspect(culprit, LENS, "make the data single-user, or give both the same distance")
