@@ -13,7 +13,21 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "viewcam_addon"
 
 # From the ground to the roof: a room imports from those before it. The package's __init__ and __main__ only open doors.
-FLOORS = ["errors", "files", "terminal", "exact", "pinhole", "image", "intrinsics", "compare", "tracer", "blender", "cli"]
+FLOORS = [
+    "errors",
+    "checks",
+    "files",
+    "terminal",
+    "exact",
+    "pinhole",
+    "roll",
+    "image",
+    "intrinsics",
+    "compare",
+    "tracer",
+    "blender",
+    "cli",
+]
 ROOF = {"__init__", "__main__"}
 
 # What exists inside Blender only.

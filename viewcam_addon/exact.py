@@ -4,6 +4,8 @@ The direction "right" of a camera is up × (e − l). Close to vertical this cro
 the rounding of e − l and of each product becomes the roll of the picture. Here e − l is kept as an unevaluated pair
 high + low, each product as the pair of its rounded value and its error, and their sum is rounded once, at the end.
 
+Beside them stand quotients beyond float64's range, as fraction · 2^exponent, for cameras and points of any size.
+
 Every function takes floats or float64 arrays and runs the same formulas on both. Vectors are triples of such numbers, so that a
 single pose costs no array at all.
 
@@ -14,6 +16,7 @@ serves the rare inputs whose products would leave float64's range), and numpy.lo
 53 on others).
 """
 
+import functools
 import math
 from collections.abc import Sequence
 from fractions import Fraction
@@ -23,12 +26,15 @@ from numpy.typing import NDArray
 
 Number = float | NDArray[np.float64]
 Vector = tuple[Number, Number, Number]
+Exponent = int | NDArray[np.intc]
 
 # Terms of a sum settle in as many passes as there are terms or fewer; what has not settled by then is reported.
 _DISTILLATION_PASSES = 12
 _SPLITTER = 2.0**27 + 1
 # Of vectors whose largest component is about 1: the product of two components this small still has an exact error term.
 SMALLEST_FACTOR = 2.0**-400
+# The difference of two numbers below this can't overflow, nor can the splitting of its parts.
+LARGEST_PART = 2.0**1000
 
 
 def two_sum(a: Number, b: Number) -> tuple[Number, Number]:
@@ -54,9 +60,9 @@ def _split(a: Number) -> tuple[Number, Number]:
 
 
 def sum_terms(terms: Sequence[Number]) -> tuple[Number, Number, bool | NDArray[np.bool_]]:
-    """The sum of `terms` as a pair high + low, high correctly rounded but for ties, whatever cancels.
+    """The sum of `terms`, at least four, as a pair high + low, high correctly rounded, whatever cancels.
 
-    The third value says where the sum has settled (always, for floats).
+    The third value says where the sum has settled (always, for floats): there floats and arrays give the same bits.
     """
     if isinstance(terms[0], float):
         high = math.fsum(terms)
@@ -70,7 +76,13 @@ def sum_terms(terms: Sequence[Number]) -> tuple[Number, Number, bool | NDArray[n
         settled = np.logical_and.reduce([new == old for new, old in zip(parts, before, strict=True)])
         if settled.all():
             break
-    return parts[-1], parts[-2], settled
+    *_, fourth, third, low, high = parts
+    return high, low, settled & ~_misrounded(high, low, third) & ~_misrounded(low, third, fourth)
+
+
+def _misrounded(high: NDArray[np.float64], low: NDArray[np.float64], rest: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Where high may be a step off: low is half a step, and so was rounded to even with no regard to what comes after."""
+    return (rest != 0) & ((high + 2 * low) - high == 2 * low)
 
 
 def difference(a: Vector, b: Vector) -> tuple[Vector, Vector]:
@@ -146,6 +158,28 @@ def are_factors(vector: Vector, scaled: Vector) -> bool | NDArray[np.bool_]:
     """Whether every component of `scaled`, which was `vector` before, is 0 or large enough for `cross`."""
     x, y, z = ((before == 0) | (abs(after) >= SMALLEST_FACTOR) for before, after in zip(vector, scaled, strict=True))
     return x & y & z
+
+
+def quotient(a: Number, b: float, divisor: float) -> tuple[Number, Exponent]:
+    """(a − b) / divisor of any size, as fraction · 2^exponent with |fraction| < 2: of two roundings, whatever its size."""
+    if isinstance(a, float):
+        quartered = 2 * (max(abs(a), abs(b)) > LARGEST_PART)
+        fraction, exponent = math.frexp(math.ldexp(a, -quartered) - math.ldexp(b, -quartered))
+    else:
+        quartered = 2 * (np.maximum(np.abs(a), abs(b)) > LARGEST_PART)
+        fraction, exponent = np.frexp(np.ldexp(a, -quartered) - np.ldexp(b, -quartered))
+    divisor, below = math.frexp(divisor)
+    return fraction / divisor, exponent - below + quartered
+
+
+def of_one_scale(*numbers: tuple[Number, Exponent]) -> list[Number]:
+    """Numbers of any size, each fraction · 2^exponent and not all 0, times the power of two that makes the largest about 1."""
+    if isinstance(numbers[0][0], float):
+        largest = max(exponent for fraction, exponent in numbers if fraction)
+        return [math.ldexp(fraction, exponent - largest) for fraction, exponent in numbers]
+    absent = np.iinfo(np.intc).min // 2  # the exponent of zero is below all others
+    largest = functools.reduce(np.maximum, (np.where(fraction == 0, absent, exponent) for fraction, exponent in numbers))
+    return [np.ldexp(fraction, exponent - largest) for fraction, exponent in numbers]
 
 
 def rational_cross(a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...]) -> tuple[tuple, tuple, float]:

@@ -181,20 +181,20 @@ def _camera(text: str | None, path: Path) -> Pinhole | None:
 
 
 def _camera_attributes(camera: Pinhole) -> dict:
+    """The exact camera, and its matrices unless they are beyond float32."""
     u, v, w = camera.basis()
-    to_camera = np.eye(4)
+    to_camera, to_ndc = np.eye(4), np.zeros((4, 4))
     to_camera[:3, :3] = np.stack([-u if camera.mirrored else u, v, w], axis=1)
-    to_camera[3, :3] = -np.array(camera.eye) @ to_camera[:3, :3]
-    # x and y of normalised device coordinates run over [−1, 1] across the picture, z is −1 at infinity as in OpenGL's limit.
     (d_x, d_y), (c_x, c_y) = camera.distance, camera.principal_point
-    to_ndc = np.zeros((4, 4))
-    to_ndc[0, 0], to_ndc[1, 1] = 2 * d_x / camera.width, 2 * d_y / camera.height
-    to_ndc[2] = [1 - 2 * c_x / camera.width, 1 - 2 * c_y / camera.height, -1, -1]
-    return {
-        "worldToCamera": to_camera.astype(np.float32),
-        "worldToNDC": (to_camera @ to_ndc).astype(np.float32),
-        _CAMERA_ATTRIBUTE: json.dumps(dataclasses.asdict(camera)),
-    }
+    with np.errstate(all="ignore"):
+        to_camera[3, :3] = -np.array(camera.eye) @ to_camera[:3, :3]
+        # x and y of normalised device coordinates run over [−1, 1] across the picture; z is −1 at infinity, as OpenGL has it.
+        to_ndc[0, 0], to_ndc[1, 1] = 2 * d_x / camera.width, 2 * d_y / camera.height
+        to_ndc[2] = [1 - 2 * c_x / camera.width, 1 - 2 * c_y / camera.height, -1, -1]
+        matrices = {"worldToCamera": to_camera, "worldToNDC": to_camera @ to_ndc}
+        matrices = {name: matrix.astype(np.float32) for name, matrix in matrices.items()}
+    finite = {name: matrix for name, matrix in matrices.items() if np.isfinite(matrix).all()}
+    return {**finite, _CAMERA_ATTRIBUTE: json.dumps(dataclasses.asdict(camera))}
 
 
 def _first_line(error: Exception) -> str:

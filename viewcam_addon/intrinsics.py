@@ -12,21 +12,31 @@ is limited to one axis.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from . import checks
 from .errors import InputError
 
 # Blender clamps a shorter lens, silently (rna_camera.cc).
 SHORTEST_LENS = 1.0
-# Every number of a Blender camera is a float32: a smaller relative difference can't be stored.
+FITS = ("AUTO", "HORIZONTAL", "VERTICAL")
+# Every number of a Blender camera is a float32, and within its range nothing below leaves float64's. A smaller relative
+# difference can't be stored.
+_SMALLEST, _LARGEST = 2.0**-149, (2.0 - 2.0**-23) * 2.0**127
 _FLOAT32_STEP = 2.0**-23
 
 
 @dataclass(frozen=True)
 class CameraData:
-    """A perspective camera's data as Blender stores it. Lengths in millimetres, shift in units of the fitted side."""
+    """A perspective camera's data as Blender stores it. Lengths in millimetres, shift in units of the fitted side.
+
+    Raises
+    ------
+    InputError
+        if a length is not positive, if the fit is unknown, or if a number is beyond float32, which is what Blender stores.
+    """
 
     lens: float
     sensor_width: float = 36.0
@@ -35,15 +45,28 @@ class CameraData:
     shift_x: float = 0.0
     shift_y: float = 0.0
 
+    def __post_init__(self) -> None:
+        for name in ("lens", "sensor_width", "sensor_height"):
+            _set(self, name, checks.number(name, getattr(self, name), _SMALLEST, _LARGEST))
+        for name in ("shift_x", "shift_y"):
+            _set(self, name, checks.number(name, getattr(self, name), -_LARGEST, _LARGEST))
+        if not isinstance(self.sensor_fit, str) or self.sensor_fit not in FITS:
+            raise InputError(f"sensor_fit is {checks.shown(self.sensor_fit)}: give one of {', '.join(FITS)}")
+
 
 @dataclass(frozen=True)
 class Frame:
     """The picture that a Blender scene renders.
 
     resolution_x, resolution_y : pixels at 100 %. percentage : whole per cent.
-    pixel_aspect_x, pixel_aspect_y : width and height of a pixel, each ≥ 1.
+    pixel_aspect_x, pixel_aspect_y : width and height of a pixel, of which only the ratio counts.
     border : (left, bottom, right, top) as fractions of the picture, or None for the whole. crop : whether only the border is
     kept.
+
+    Raises
+    ------
+    InputError
+        if a number is not whole and ≥ 1, an aspect not positive or beyond float32, or a border not between 0 and 1 or reversed.
     """
 
     resolution_x: int
@@ -53,6 +76,18 @@ class Frame:
     pixel_aspect_y: float = 1.0
     border: tuple[float, float, float, float] | None = None
     crop: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("resolution_x", "resolution_y", "percentage"):
+            _set(self, name, checks.whole(name, getattr(self, name)))
+        for name in ("pixel_aspect_x", "pixel_aspect_y"):
+            _set(self, name, checks.number(name, getattr(self, name), _SMALLEST, _LARGEST))
+        _set(self, "crop", checks.truth("crop", self.crop))
+        if self.border is not None:
+            _set(self, "border", checks.vector("border", self.border, 4))
+            left, bottom, right, top = self.border
+            if not (0 <= left <= right <= 1 and 0 <= bottom <= top <= 1):
+                raise InputError(f"border is {self.border}: give left, bottom, right and top between 0 and 1, in this order")
 
     @property
     def size(self) -> tuple[int, int]:
@@ -80,13 +115,31 @@ class Frame:
 class ViewPlane:
     """The part of a `Pinhole` that is not its pose.
 
-    distance : (d_x, d_y) in pixels. principal_point : (c_x, c_y) in pixels from the left and the bottom edge.
+    distance : (d_x, d_y) in pixels, > 0. principal_point : (c_x, c_y) in pixels from the left and the bottom edge.
+    width, height : pixels of the picture.
+
+    Raises
+    ------
+    InputError
+        if a distance is not positive, a size not whole and ≥ 1, or a number not finite.
     """
 
     distance: tuple[float, float]
     principal_point: tuple[float, float]
     width: int
     height: int
+
+    def __post_init__(self) -> None:
+        _set(self, "distance", checks.vector("distance", self.distance, 2))
+        if min(self.distance) <= 0:
+            raise InputError(f"distance is {min(self.distance):g} pixels: the view plane must lie before the eye, give d > 0")
+        _set(self, "principal_point", checks.vector("principal_point", self.principal_point, 2))
+        for name in ("width", "height"):
+            _set(self, name, checks.whole(name, getattr(self, name)))
+
+
+def _set(instance: object, name: str, value: object) -> None:
+    object.__setattr__(instance, name, value)
 
 
 def view_plane(camera: CameraData, frame: Frame) -> ViewPlane:
@@ -104,7 +157,7 @@ def view_plane(camera: CameraData, frame: Frame) -> ViewPlane:
             f"the picture is {window_width} × {window_height} pixels: enlarge the resolution, percentage or border"
         )
     fitted_x, fitted_y = _fitted_pixels(camera.sensor_fit, frame)
-    magnification = camera.lens / _fitted_sensor(camera.sensor_fit, camera.sensor_width, camera.sensor_height)
+    magnification = camera.lens / _fitted_sensor(camera)
     return ViewPlane(
         distance=(magnification * fitted_x, magnification * fitted_y),
         principal_point=(width / 2 - camera.shift_x * fitted_x - column, height / 2 - camera.shift_y * fitted_y - row),
@@ -121,9 +174,10 @@ def camera_data(plane: ViewPlane, frame: Frame, sensor_width: float, sensor_heig
     Raises
     ------
     InputError
-        if the view plane has another size than the picture, if its two distances ask for another pixel aspect, or if they are
-        too small for float32.
+        if the view plane has another size than the picture, if its two distances ask for another pixel aspect, or if the lens,
+        the sensor or the shift would be beyond float32.
     """
+    sensor = CameraData(SHORTEST_LENS, sensor_width, sensor_height, sensor_fit)
     column, row, *window_size = frame.window
     if [plane.width, plane.height] != window_size:
         raise InputError(
@@ -139,28 +193,41 @@ def camera_data(plane: ViewPlane, frame: Frame, sensor_width: float, sensor_heig
             f"{plane.distance[1] / plane.distance[0]:g} and the scene's have {fitted_y / fitted_x:g}: "
             "set the scene's pixel aspect"
         )
-    lens = magnification * _fitted_sensor(sensor_fit, sensor_width, sensor_height)
-    if not np.float32(lens):
-        raise InputError(f"the distance is {plane.distance[0]:g} pixels, too small for Blender's lens: enlarge it")
+    lens = magnification * _fitted_sensor(sensor)
+    if not _SMALLEST <= lens <= _LARGEST:
+        raise InputError(_beyond_blender("distance", plane.distance[0], "lens", lens))
     growth = 2.0 ** max(0, math.ceil(math.log2(SHORTEST_LENS / np.float32(lens))))  # as Blender will round it
-    return CameraData(
+    largest_sensor = max(sensor.sensor_width, sensor.sensor_height) * growth
+    if largest_sensor > _LARGEST:
+        raise InputError(_beyond_blender("distance", plane.distance[0], "sensor", largest_sensor))
+    shift_x = (width / 2 - plane.principal_point[0] - column) / fitted_x
+    shift_y = (height / 2 - plane.principal_point[1] - row) / fitted_y
+    for place, shift in zip(plane.principal_point, (shift_x, shift_y), strict=True):
+        if abs(shift) > _LARGEST:
+            raise InputError(_beyond_blender("principal point", place, "shift", shift))
+    return replace(
+        sensor,
         lens=lens * growth,
-        sensor_width=sensor_width * growth,
-        sensor_height=sensor_height * growth,
-        sensor_fit=sensor_fit,
-        shift_x=(width / 2 - plane.principal_point[0] - column) / fitted_x,
-        shift_y=(height / 2 - plane.principal_point[1] - row) / fitted_y,
+        sensor_width=sensor.sensor_width * growth,
+        sensor_height=sensor.sensor_height * growth,
+        shift_x=shift_x,
+        shift_y=shift_y,
     )
+
+
+def _beyond_blender(name: str, pixels: float, of_blender: str, value: float) -> str:
+    problem = "too small" if abs(value) < 1 else "too large"
+    return f"the {name} of {pixels:g} pixels needs a {of_blender} of {value:g}, {problem} for Blender's numbers: choose another"
 
 
 def _fitted_pixels(sensor_fit: str, frame: Frame) -> tuple[float, float]:
     """n / pixel_aspect_x and n / pixel_aspect_y: the fitted side, in pixel widths and in pixel heights."""
     width, height = frame.size
-    across, upright = width * frame.pixel_aspect_x, height * frame.pixel_aspect_y
-    fitted = {"HORIZONTAL": across, "VERTICAL": upright, "AUTO": max(across, upright)}[sensor_fit]
-    return fitted / frame.pixel_aspect_x, fitted / frame.pixel_aspect_y
+    aspect = frame.pixel_aspect_x / frame.pixel_aspect_y
+    across = sensor_fit == "HORIZONTAL" or (sensor_fit == "AUTO" and width * aspect >= height)
+    return (float(width), width * aspect) if across else (height / aspect, float(height))
 
 
-def _fitted_sensor(sensor_fit: str, sensor_width: float, sensor_height: float) -> float:
+def _fitted_sensor(camera: CameraData) -> float:
     """The sensor's side that the lens refers to; with AUTO always its width, even of an upright picture."""
-    return sensor_height if sensor_fit == "VERTICAL" else sensor_width
+    return camera.sensor_height if camera.sensor_fit == "VERTICAL" else camera.sensor_width

@@ -24,15 +24,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import exact
+from . import checks, exact
 from .errors import InputError
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 Pair = tuple[exact.Vector, exact.Vector]  # of vectors: high + low, unevaluated
 
-# A difference of two coordinates below this can't overflow, nor can the splitting of its parts.
-_LARGEST_COORDINATE = 2.0**1000
+# Numbers between these two can be squared, or multiplied by an axis, without care.
+_SMALLEST_SAFE, _LARGEST_SAFE = 2.0**-500, 2.0**500
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Pinhole:
     Raises
     ------
     InputError
-        if eye = look_at, up = 0, distance ≤ 0, a size is below 1 or no whole number, or anything is not finite.
+        if eye = look_at, up = 0, distance ≤ 0, a size is no whole number from 1 to 2³¹ − 1, or anything is no finite number.
     """
 
     eye: Triple
@@ -66,18 +66,18 @@ class Pinhole:
 
     def __post_init__(self) -> None:
         for name in ("eye", "look_at", "up"):
-            self._set(name, _finite_tuple(name, getattr(self, name), 3))
+            self._set(name, checks.vector(name, getattr(self, name), 3))
         _check_pose(self.eye, self.look_at, self.up)
         for name in ("width", "height"):
-            self._set(name, _whole_size(name, getattr(self, name)))
-        distance = self.distance if np.ndim(self.distance) else (self.distance, self.distance)
-        self._set("distance", _finite_tuple("distance", distance, 2))
+            self._set(name, checks.whole(name, getattr(self, name)))
+        distance = self.distance if np.iterable(self.distance) else (self.distance,) * 2
+        self._set("distance", checks.vector("distance", distance, 2))
         if min(self.distance) <= 0:
             raise InputError(f"distance is {min(self.distance):g} pixels: the view plane must lie before the eye, give d > 0")
         centre = (self.width / 2, self.height / 2)
         point = centre if self.principal_point is None else self.principal_point
-        self._set("principal_point", _finite_tuple("principal_point", point, 2))
-        self._set("mirrored", bool(self.mirrored))
+        self._set("principal_point", checks.vector("principal_point", point, 2))
+        self._set("mirrored", checks.truth("mirrored", self.mirrored))
 
     def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
@@ -108,74 +108,122 @@ class Pinhole:
 
     @cached_property
     def sine_to_up(self) -> float:
-        """sin θ of the angle θ between the view and up, to full precision however small it is; 0 if singular
+        """sin θ of the angle θ between the view and up, at most 1, to full precision however small it is; 0 if singular
         or below float64's range.
         """
-        return _view_of_one(self.eye, self.look_at, self.up)[2]
+        return min(1.0, _view_of_one(self.eye, self.look_at, self.up)[2])
 
     def roll_uncertainty(self, precision: float = 2.0**-24) -> float:
         """The roll that rounding the inputs can cause, in radians, at most π.
 
-        precision : relative rounding of each input, by default that of Blender's float32 properties. It turns the view by
-            precision · (|e| + |l|) / |e − l| and up by precision; the roll turns by their sum over sin θ.
+        precision : relative rounding of each input, ≥ 0, by default that of Blender's float32 properties. It turns the view
+            by precision · (|e| + |l|) / |e − l| and up by precision; the roll turns by their sum over sin θ.
         """
-        apart = math.dist(self.eye, self.look_at)
-        turn = precision * ((math.hypot(*self.eye) + math.hypot(*self.look_at)) / apart + 1)
-        return min(turn / self.sine_to_up, math.pi) if self.sine_to_up else math.pi
+        precision = checks.number("precision", precision)
+        if precision < 0:
+            raise InputError(f"precision is {precision:g}: give a relative rounding of at least 0")
+        if precision == 0 or self.sine_to_up == 0:
+            return 0.0 if self.sine_to_up else math.pi
+        scale = 0.125 if max(map(abs, self.eye + self.look_at)) > exact.LARGEST_PART else 1.0  # no length overflows
+        e, l = (tuple(scale * x for x in point) for point in (self.eye, self.look_at))
+        apart = math.dist(e, l)
+        turn = precision * ((math.hypot(*e) + math.hypot(*l)) / apart + 1) if apart else math.inf
+        return min(turn / self.sine_to_up, math.pi)
 
     def field_of_view(self) -> Triple:
-        """(horizontal, vertical, diagonal) in radians: between opposite edges and, diagonal, between opposite corners."""
-        left, right = self.view_plane(0, 0)[0], self.view_plane(self.width, 0)[0]
-        bottom, top = self.view_plane(0, 0)[1], self.view_plane(0, self.height)[1]
+        """(horizontal, vertical, diagonal) in radians, to 1e-15: between opposite edges and, diagonal, between corners."""
+        (c_x, c_y), width, height = self.principal_point, float(self.width), float(self.height)
         return (
-            math.atan(right) - math.atan(left),
-            math.atan(top) - math.atan(bottom),
-            _angle_between((left, bottom, -1.0), (right, top, -1.0)),
+            _angle_between(self._towards(0.0, c_y), self._towards(width, c_y)),
+            _angle_between(self._towards(c_x, 0.0), self._towards(c_x, height)),
+            _angle_between(self._towards(0.0, 0.0), self._towards(width, height)),
         )
 
     def ray_directions(self, columns: ArrayLike, rows: ArrayLike, px: ArrayLike = 0.5, py: ArrayLike = 0.5) -> Array:
         """Directions from the eye through sample points of pixels.
 
         columns, rows : pixels from the left and from the bottom; px, py : the sample point in [0, 1)² of each pixel. All
-        broadcast.
+        finite, and broadcast.
 
-        Returns (..., 3) float64 unit vectors, world space.
+        Returns (..., 3) float64 unit vectors, world space, to 1e-15 of the sample point that columns + px and rows + py round
+        to.
         """
-        x, y = np.broadcast_arrays(*self.view_plane(np.add(columns, px), np.add(rows, py)))
-        u, v, w = self._basis
-        if self.mirrored:
-            u = -u
-        directions = x[..., None] * u
-        directions += y[..., None] * v
-        directions -= w
-        directions /= np.sqrt(x * x + y * y + 1.0)[..., None]
+        given = {"columns": columns, "rows": rows, "px": px, "py": py}
+        columns, rows, px, py = checks.broadcast(**{name: checks.array(name, values) for name, values in given.items()})
+        with np.errstate(all="ignore"):
+            x, y = self.view_plane(columns + px, rows + py)
+            z = np.float64(1.0)
+            if max(np.abs(x).max(initial=0.0), np.abs(y).max(initial=0.0)) > _LARGEST_SAFE:
+                x, y, z = map(np.asarray, self._towards(columns + px, rows + py))
+            u, v, w = self._basis
+            if self.mirrored:
+                u = -u
+            directions = x[..., None] * u
+            directions += y[..., None] * v
+            directions -= z[..., None] * w
+            directions /= np.sqrt(x * x + y * y + z * z)[..., None]
         return directions
 
-    def view_plane(self, column: ArrayLike, row: ArrayLike) -> tuple:
-        """Continuous picture coordinates to (x, y) in the view plane at distance 1: the ray is (±x) u + y v − w."""
-        return (column - self.principal_point[0]) / self.distance[0], (row - self.principal_point[1]) / self.distance[1]
+    def view_plane(self, column: ArrayLike, row: ArrayLike) -> tuple[Array, Array]:
+        """Continuous picture coordinates to (x, y) in the view plane at distance 1: the ray is (±x) u + y v − w.
+
+        What lies beyond float64's range, as it may for a distance below 1e-290, is ±inf.
+        """
+        column, row = checks.array("column", column), checks.array("row", row)
+        with np.errstate(all="ignore"):
+            x = (column - self.principal_point[0]) / self.distance[0]
+            y = (row - self.principal_point[1]) / self.distance[1]
+            if not (np.isfinite(x).all() and np.isfinite(y).all()):
+                checks.finite("column", column)
+                checks.finite("row", row)
+                x, y = (np.ldexp(*self._slope(axis, values)) for axis, values in enumerate((column, row)))
+        return x, y
+
+    def _slope(self, axis: int, place: float | Array) -> tuple[float | Array, exact.Exponent]:
+        """x (axis 0) or y (1) of `view_plane`, of any size: fraction · 2^exponent."""
+        return exact.quotient(place, self.principal_point[axis], self.distance[axis])
+
+    def _towards(self, column: float | Array, row: float | Array) -> list[float | Array]:
+        """(x, y, 1) of the ray through a place in the picture, scaled so that the largest is about 1."""
+        one = (0.0 * column + 1.0, 0)
+        return exact.of_one_scale(self._slope(0, column), self._slope(1, row), one)
 
     def project(self, points: ArrayLike) -> tuple[Array, Array, Array]:
         """Where points appear in the picture.
 
-        points : (..., 3), world space.
+        points : (..., 3), world space, finite.
 
         Returns (column, row, depth), each (...) float64: continuous pixels from the left and from the bottom edge, the centre
         of the first pixel at (0.5, 0.5), and the planar depth −w·(P − e) in world units. What does not lie before the eye
-        (depth ≤ 0) has no picture: its column and row are nan.
+        (depth ≤ 0) has no picture: its column and row are nan. What exceeds float64's range is ±inf.
         """
+        points = checks.array("points", points)
+        if points.shape[-1:] != (3,):
+            raise InputError(f"points have the shape {points.shape}: give three coordinates for each")
         u, v, w = self._basis
-        relative = np.asarray(points, dtype=np.float64) - np.array(self.eye)
-        depth = -(relative @ w)
-        visible = np.where(depth > 0, depth, np.nan)
-        x = (relative @ u) / visible
-        column = self.principal_point[0] + self.distance[0] * (-x if self.mirrored else x)
-        row = self.principal_point[1] + self.distance[1] * ((relative @ v) / visible)
+        with np.errstate(all="ignore"):
+            relative, exponent = points - np.array(self.eye), 0
+            depth = z = -(relative @ w)
+            if not ((np.abs(z) > _SMALLEST_SAFE).all() and np.abs(relative).max(initial=0.0) < _LARGEST_SAFE):
+                checks.finite("points", points)
+                relative, exponent = _scaled_difference(points, np.array(self.eye))
+                z = -(relative @ w)
+                depth = np.ldexp(z, exponent)
+            forward = np.frexp(np.where(depth > 0, z, np.nan))
+            x = relative @ u
+            column = self._place(0, -x if self.mirrored else x, *forward)
+            row = self._place(1, relative @ v, *forward)
         return column, row, depth
+
+    def _place(self, axis: int, across: Array, forward: Array, exponent: Array) -> Array:
+        """The principal point + d · across / (forward · 2^exponent), of which only the sum may overflow."""
+        distance, below = math.frexp(self.distance[axis])
+        half = np.ldexp(across / forward * distance, below - exponent - 1)
+        return (half + self.principal_point[axis] / 2) * 2
 
     def resized(self, width: int, height: int) -> "Pinhole":
         """The same picture in another number of pixels."""
-        scale_x, scale_y = width / self.width, height / self.height
+        scale_x, scale_y = checks.whole("width", width) / self.width, checks.whole("height", height) / self.height
         return replace(
             self,
             width=width,
@@ -186,8 +234,17 @@ class Pinhole:
 
     def cropped(self, column: int, row: int, width: int, height: int) -> "Pinhole":
         """The camera of the part of the picture whose lower left pixel is (column, row)."""
+        column, row = checks.number("column", column), checks.number("row", row)
         point = (self.principal_point[0] - column, self.principal_point[1] - row)
         return replace(self, width=width, height=height, principal_point=point)
+
+
+def _scaled_difference(a: Array, b: Array) -> tuple[Array, Array]:
+    """a − b, (..., 3), each as a vector whose largest component is about 1, and the exponent of its power of two."""
+    quartered = 2 * (np.maximum(np.abs(a), np.abs(b)).max(axis=-1, keepdims=True) > exact.LARGEST_PART)
+    apart = np.ldexp(a, -quartered) - np.ldexp(b, -quartered)
+    exponent = np.frexp(np.abs(apart).max(axis=-1, keepdims=True))[1]
+    return np.ldexp(apart, -exponent), (exponent + quartered)[..., 0]
 
 
 def basis(eye: ArrayLike, look_at: ArrayLike, up: ArrayLike) -> tuple[Array, Array, Array]:
@@ -200,11 +257,14 @@ def basis(eye: ArrayLike, look_at: ArrayLike, up: ArrayLike) -> tuple[Array, Arr
     Raises
     ------
     InputError
-        where eye = look_at, up = 0 or something is not finite; it names the first such pose.
+        where eye = look_at, up = 0 or something is no finite number; it names the first such pose.
     """
-    e, l, up = np.broadcast_arrays(*(np.asarray(vector, dtype=np.float64) for vector in (eye, look_at, up)))
+    given = {"eye": eye, "look_at": look_at, "up": up}
+    e, l, up = checks.broadcast(**{name: checks.array(name, values) for name, values in given.items()})
+    if e.shape[-1:] != (3,):
+        raise InputError(f"eye, look_at and up have the shape {e.shape}: give three numbers for each")
     if e.ndim == 1:
-        pose = [_finite_tuple(name, vector, 3) for name, vector in (("eye", e), ("look_at", l), ("up", up))]
+        pose = [checks.vector(name, vector, 3) for name, vector in (("eye", e), ("look_at", l), ("up", up))]
         _check_pose(*pose)
         return tuple(np.array(axis) for axis in _basis_of_one(*pose))
     leading, (e, l, up) = e.shape[:-1], (vector.reshape(-1, 3) for vector in (e, l, up))
@@ -224,7 +284,15 @@ def canonical_axes(up: Triple, looking_down: bool) -> tuple[Triple, Triple, Trip
     w = (0, −1, 0). For any other up they are the text's, carried by the smallest rotation that takes (0, 1, 0) to up (for an up
     in the lower half-space, after half a turn about the x axis). With up = (0, 0, 1) that is (x, y, z) → (x, −z, y), Blender's
     world.
+
+    Raises
+    ------
+    InputError
+        if up = 0 or is not finite.
     """
+    up = checks.vector("up", up, 3)
+    _check_up(up)
+    looking_down = checks.truth("looking_down", looking_down)
     (unit,) = exact.scaled_to_one(up)
     size = exact.length(unit)
     x, y, z = (component / size for component in unit)
@@ -277,7 +345,7 @@ def _view(e: tuple, l: tuple, up: tuple) -> tuple[tuple, Pair, Pair, bool | Arra
     *across, settled = exact.cross(unit_up, *apart)
     safe = exact.are_factors(high, apart[0]) & exact.are_factors(low, apart[1]) & exact.are_factors(up, unit_up)
     for vector in (e, l):
-        safe = safe & (exact.largest_component(vector) < _LARGEST_COORDINATE)
+        safe = safe & (exact.largest_component(vector) < exact.LARGEST_PART)
     return unit_up, apart, tuple(across), safe & settled
 
 
@@ -292,27 +360,13 @@ def _normalised(vector: tuple) -> tuple:
     return tuple(component / size for component in vector)
 
 
-def _finite_tuple(name: str, values: object, count: int) -> tuple[float, ...]:
-    try:
-        numbers = tuple(float(value) for value in values)
-    except (TypeError, ValueError):
-        numbers = ()
-    if len(numbers) != count:
-        raise InputError(f"{name} is {values!r}: give {count} numbers")
-    if not all(map(math.isfinite, numbers)):
-        raise InputError(f"{name} is {numbers}: every number of it must be finite")
-    return numbers
-
-
-def _whole_size(name: str, value: object) -> int:
-    if not isinstance(value, (int, np.integer)) or isinstance(value, bool) or value < 1:
-        raise InputError(f"{name} is {value!r} pixels: give a whole number, at least 1")
-    return int(value)
-
-
 def _check_pose(e: Triple, l: Triple, up: Triple) -> None:
     if e == l:
         raise InputError(f"eye and look_at are the same point {e}: the view has no direction, move one of them")
+    _check_up(up)
+
+
+def _check_up(up: Triple) -> None:
     if not any(up):
         raise InputError("up is (0, 0, 0): it has no direction, give the vector that shall point up in the picture")
 
@@ -321,11 +375,12 @@ def _check_poses(e: Array, l: Array, up: Array) -> None:
     finite = np.isfinite(e).all(-1) & np.isfinite(l).all(-1) & np.isfinite(up).all(-1)
     for i in np.flatnonzero(~finite | (e == l).all(-1) | ~up.any(-1)):
         try:
-            pose = [_finite_tuple(name, vector[i], 3) for name, vector in (("eye", e), ("look_at", l), ("up", up))]
+            pose = [checks.vector(name, vector[i], 3) for name, vector in (("eye", e), ("look_at", l), ("up", up))]
             _check_pose(*pose)
         except InputError as error:
             raise InputError(f"pose {i}: {error}") from None
 
 
 def _angle_between(a: Triple, b: Triple) -> float:
-    return math.atan2(math.hypot(*np.cross(a, b)), sum(x * y for x, y in zip(a, b, strict=True)))
+    across = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+    return math.atan2(math.hypot(*across), sum(x * y for x, y in zip(a, b, strict=True)))
