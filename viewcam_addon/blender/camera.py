@@ -109,7 +109,8 @@ def check(camera_object: bpy.types.Object, wanted: Pinhole, scene: bpy.types.Sce
     except InputError as error:
         return [datablocks.sentence(error), *findings.blame({}, culprits)]
     reach = pose.reach(camera_object, datablocks.depsgraph_of(scene))
-    return findings.blame(findings.differences(wanted, found, reach), culprits)
+    differing = findings.differences(wanted, found, reach, lambda value: datablocks.length(value, scene, digits=3))
+    return findings.blame(differing, culprits)
 
 
 def read(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:

@@ -57,7 +57,7 @@ def own_sensor(camera: bpy.types.Camera) -> tuple[float, float]:
 
 
 def length(value: float, scene: bpy.types.Scene, digits: int = 6) -> str:
-    """A length in world units as the scene's units say it; as a bare number without them, and below what Blender's words reach."""
+    """A length in world units as the scene's units say it; a bare number without them, and where Blender would say zero."""
     units = scene.unit_settings
     metres = value * units.scale_length
     if units.system == "NONE" or metres < _SHORTEST_WORD:

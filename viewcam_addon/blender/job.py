@@ -133,7 +133,7 @@ def _stage(request: Request) -> Iterator[_Stage]:
     with borrowed() as borrow:
         if request.frame is not None:
             _borrow_frame(borrow, scene, request.frame)
-        camera = _camera(scene, request.camera)  # a marker may have changed it
+        camera = _camera(scene, request.camera)
         if request.size:
             _borrow_size(borrow, scene, camera, request.size)
         yield _Stage(scene, _view_layer(scene), camera)
@@ -167,9 +167,9 @@ def open_blend(path: str | os.PathLike[str]) -> None:
 def _camera(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object:
     """The camera object that is meant, checked to be a perspective one."""
     if name is None:
-        if scene.camera is None:
+        camera = datablocks.render_camera(scene)
+        if camera is None:
             raise InputError(f"scene {scene.name!r} has no camera: add one, or name one with --camera")
-        camera = scene.camera
     else:
         camera = scene.objects.get(name)
         if camera is None:
@@ -191,6 +191,7 @@ def _borrow_frame(borrow: Borrower, scene: bpy.types.Scene, frame: int) -> None:
         return
     if abs(frame) > _LAST_FRAME:
         raise InputError(f"frame {frame} is beyond Blender's last, {_LAST_FRAME}: give another")
+    borrow.afterwards(setattr, scene, "camera", scene.camera)  # a marker may change it, here and on the way back
     borrow.afterwards(scene.frame_set, before[0], subframe=before[1])
     scene.frame_set(frame)
 

@@ -75,15 +75,8 @@ def contents(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> tuple[l
         sentence = datablocks.sentence(error)
         return [], [*warnings, *([] if sentence in warnings else [sentence])]
     warnings += datablocks.beyond_pinhole(camera_object, scene)
-    length = _length(math.dist(stated.eye, stated.look_at), scene) if stated else None
+    length = datablocks.length(math.dist(stated.eye, stated.look_at), scene) if stated else None
     return readouts.readouts(found, camera_object.data.lens, length), warnings
-
-
-def _length(length: float, scene: bpy.types.Scene) -> str:
-    units = scene.unit_settings
-    if units.system == "NONE":
-        return f"{length:.6g}"
-    return bpy.utils.units.to_string(units.system, "LENGTH", length * units.scale_length, precision=6)
 
 
 class VIEWCAM_PT_data(_CameraPanel, bpy.types.Panel):

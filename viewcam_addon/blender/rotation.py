@@ -97,7 +97,7 @@ def axis_angle(rotation: Array) -> tuple[float, float, float, float]:
 
 
 def neighbours(numbers: Sequence[float]) -> NDArray[np.float32]:
-    """(3ⁿ, n): the n numbers rounded to float32, then all that differ from these by one step of float32 in some of the numbers."""
+    """(3ⁿ, n): the n numbers rounded to float32, then all that differ from these by a step of float32 in some of them."""
     rounded = np.array(numbers, dtype=np.float32)
     below, above = (np.nextafter(rounded, np.float32(limit)) for limit in (-np.inf, np.inf))
     return np.array(list(itertools.product(*zip(rounded, below, above, strict=True))))

@@ -23,18 +23,15 @@ def suspects(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterato
 
 
 # Constraints that leave the eye or the view alone; all others act on both.
-_CONSTRAINTS = {
-    **dict.fromkeys(("COPY_LOCATION", "LIMIT_LOCATION", "LIMIT_DISTANCE", "FLOOR", "SHRINKWRAP"), {EYE}),
-    **dict.fromkeys(("TRACK_TO", "DAMPED_TRACK", "LOCKED_TRACK", "COPY_ROTATION", "LIMIT_ROTATION"), {VIEW}),
-    **dict.fromkeys(("COPY_SCALE", "LIMIT_SCALE", "MAINTAIN_VOLUME"), {VIEW}),
-}
+_MOVING = ("COPY_LOCATION", "LIMIT_LOCATION", "LIMIT_DISTANCE", "FLOOR")
+_TURNING = ("TRACK_TO", "DAMPED_TRACK", "LOCKED_TRACK", "COPY_ROTATION", "LIMIT_ROTATION", "COPY_SCALE", "LIMIT_SCALE")
+_CONSTRAINTS = dict.fromkeys(_MOVING, frozenset({EYE})) | dict.fromkeys(_TURNING, frozenset({VIEW}))
 
 
 def _constraints(camera_object: bpy.types.Object) -> Iterator[Suspect]:
     for constraint in pose.active_constraints(camera_object):
         culprit = f"The constraint {constraint.name!r} moves {camera_object.name!r}"
-        acts_on = frozenset(_CONSTRAINTS.get(constraint.type, POSE))
-        yield Suspect(culprit, acts_on, "disable it, or the Virtual Pinhole")
+        yield Suspect(culprit, _CONSTRAINTS.get(constraint.type, POSE), "disable it, or the Virtual Pinhole")
 
 
 # What a channel acts on, by the start of its data path.
@@ -57,7 +54,7 @@ def _acts_on(data_path: str) -> str | None:
 
 def _paths(curves: list[bpy.types.FCurve]) -> list[str]:
     """What the curves that are not muted set."""
-    return sorted({curve.data_path for curve in curves if not (curve.mute or curve.group and curve.group.mute)})
+    return sorted({curve.data_path for curve in curves if not (curve.mute or (curve.group and curve.group.mute))})
 
 
 def _drivers(block: bpy.types.ID) -> Iterator[Suspect]:
