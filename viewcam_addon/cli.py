@@ -237,22 +237,14 @@ def _compare(options: argparse.Namespace) -> Result:
         # The picture may be of another size than the scene says, or of the stated camera.
         surface_at = Tracer(dataclasses.replace(scene, camera=camera), options.threads).surface_at
         stated = scene.stated_camera if camera == scene.camera else None
-    comparison = compare(reference, test, camera, surface_at, stated)
+    comparison = compare(reference, test, camera, surface_at, stated, scene.origin if scene else (0.0, 0.0, 0.0))
     ledger = scene.ledger if scene else ()
     print(*_ledger_lines(ledger), *comparison.lines(), sep="\n")
     if options.report:
         words = f"viewcam {options.repeat or options.words}"
-        written = write_report(comparison, reference, test, options.report, ledger, words, _facts(scene))
+        written = write_report(comparison, reference, test, options.report, ledger, words)
         print(f"report: {written}")
     return 0 if comparison.passed else 1, {**comparison.to_json(), "ledger": _ledger_json(ledger)}
-
-
-def _facts(scene: Any) -> dict[str, str]:
-    """What the report says of a scene, beside its ledger."""
-    if scene is None or not any(scene.origin):
-        return {}
-    x, y, z = scene.origin
-    return {"Origin": f"the eye, which the file has at ({x:.12g}, {y:.12g}, {z:.12g}); all coordinates are relative to it"}
 
 
 def _check(options: argparse.Namespace) -> Result:

@@ -7,6 +7,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from viewcam_addon.compare.far_from_home import FarFromHome
 from viewcam_addon.compare.geometry import compare
 from viewcam_addon.compare.report import write_report
 from viewcam_addon.errors import InputError
@@ -132,3 +133,14 @@ def test_a_folder_that_is_a_file_is_refused(compared, tmp_path):
     (tmp_path / "taken").write_text("here")
     with pytest.raises(InputError, match="taken is a file"):
         write_report(*compared, tmp_path / "taken")
+
+
+def test_the_report_tells_what_mends_it_and_where_its_origin_is(compared, tmp_path):
+    comparison, reference, test = compared
+    far = FarFromHome(1.2, True, 6.4e6)
+    path = write_report(replace(comparison, far_from_home=far), reference, test, tmp_path / "far")
+    page = Page(path.read_text(encoding="utf-8"))
+    assert "Cycles is 1.2 px off here, because the camera stands 6.4·10⁶ from the origin: check with --recenter." in page.text
+    path = write_report(replace(comparison, origin=(4600000.25, 0.0, -1.0)), reference, test, tmp_path / "recentred")
+    page = Page(path.read_text(encoding="utf-8"))
+    assert "origin 4600000.25 0 -1" in page.text and "--recenter" not in page.text

@@ -16,6 +16,7 @@ from ..image import Image
 from ..pinhole import Pinhole
 from . import law, verdict
 from .cameras import ConversionError, Systematic, conversion_error, systematic_error
+from .far_from_home import FarFromHome, far_from_home
 from .law import Array, Seen
 from .mismatches import (
     KINDS,
@@ -52,6 +53,8 @@ class Comparison:
     nan
         where it was not compared.
     roundings : (n,) float64, the error of each compared position over what one rounding of float32 causes there.
+    far_from_home : what the distance from the origin costs, None where that is nothing to speak of.
+    origin : the point of the world from which the coordinates of both pictures are counted.
     """
 
     pinhole: Pinhole
@@ -63,6 +66,8 @@ class Comparison:
     conversion: ConversionError | None
     maps: dict[str, NDArray[np.float32]]
     roundings: Array
+    far_from_home: FarFromHome | None = None
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
     def pixels(self) -> int:
@@ -109,17 +114,24 @@ class Comparison:
             },
             "systematic": self.systematic and self.systematic.to_json(),
             "conversion": self.conversion and self.conversion.to_json(),
+            "far_from_home": self.far_from_home and self.far_from_home.to_json(),
+            "origin": list(self.origin),
         }
 
 
 def compare(
-    reference: Image, test: Image, pinhole: Pinhole, surface_at: SurfaceAt | None = None, stated: Pinhole | None = None
+    reference: Image,
+    test: Image,
+    pinhole: Pinhole,
+    surface_at: SurfaceAt | None = None,
+    stated: Pinhole | None = None,
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Comparison:
     """Compare two pictures of one camera.
 
     pinhole : the camera that traced the reference. surface_at : re-traces sub-pixel positions of the reference's scene;
     without it no mismatch can be explained. stated : the camera as the four values state it; with it the conversion's error
-    is measured too.
+    is measured too. origin : that of both pictures, in the world.
 
     Raises
     ------
@@ -158,7 +170,8 @@ def compare(
         conversion = conversion_error(stated, pinhole, np.percentile(depths, (0, 50, 100)))
     hits = (int(hit.sum()), int(law.is_hit(seen).sum()))
     roundings = errors["Position"][0] / errors["Position"][1]
-    return Comparison(pinhole, stated, hits, rows, mismatches, systematic, conversion, maps, roundings)
+    far = far_from_home(pinhole, expected, chosen, rows[0])
+    return Comparison(pinhole, stated, hits, rows, mismatches, systematic, conversion, maps, roundings, far, origin)
 
 
 def _allowed_unexplained(pinhole: Pinhole) -> int:
@@ -205,8 +218,9 @@ def _mismatches(kinds: NDArray, seen: Seen, reach: Array, agreement: Agreement, 
 def _displacement(pinhole: Pinhole, seen: Seen) -> tuple[Array, Array, Array]:
     """How far the positions, projected, lie from the centres of their pixels, to the right and upwards; and their depths."""
     row, column = np.divmod(np.arange(pinhole.width * pinhole.height), pinhole.width)
-    seen_column, seen_row, along = pinhole.project(seen["Position"])
-    # A position behind the eye has no picture: it counts as far off as the picture is large.
+    # A position that is no number, like one behind the eye, has no picture: it counts as far off as the picture is large.
+    numbers = np.isfinite(seen["Position"]).all(axis=-1, keepdims=True)
+    seen_column, seen_row, along = pinhole.project(np.where(numbers, seen["Position"], pinhole.eye))
     diagonal = float(np.hypot(pinhole.width, pinhole.height))
     off_x, off_y = (np.nan_to_num(off, nan=diagonal) for off in (seen_column - column - 0.5, seen_row - row - 0.5))
     return off_x, off_y, along

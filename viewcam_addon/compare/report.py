@@ -77,6 +77,7 @@ def _parts(
         "icon": _ICONS[comparison.passed],
         "headline": escape(headline) + ".",
         "lede": escape(_with_powers(rest[:1].upper() + rest[1:])),
+        "hint": _hint(comparison),
         "tiles": _tiles(comparison),
         "width": width,
         "height": height,
@@ -87,7 +88,7 @@ def _parts(
         "histogram": charts.histogram(comparison.roundings),
         "errors": _errors(comparison),
         "loupe": _loupe(comparison, shades),
-        "camera": _camera(comparison.stated or comparison.pinhole),
+        "camera": _camera(comparison.stated or comparison.pinhole, comparison.origin),
         "view": _view(comparison.stated or comparison.pinhole),
         "ledger": _ledger(ledger),
         "facts": _facts(reference, test, facts),
@@ -95,6 +96,12 @@ def _parts(
         "reference_name": _script_text(f"reference · {names[0]}"),
         "test_name": _script_text(f"test · {names[1]}"),
     }
+
+
+def _hint(comparison: Comparison) -> str:
+    """What would mend the picture, if there is such a thing."""
+    far = comparison.far_from_home
+    return f'<p class="hint">{escape(_with_powers(far.sentence))}</p>' if far else ""
 
 
 def _tiles(comparison: Comparison) -> str:
@@ -253,8 +260,10 @@ def _loupe(comparison: Comparison, shades: tuple) -> str:
     )
 
 
-def _camera(pinhole: Pinhole) -> str:
+def _camera(pinhole: Pinhole, origin: Sequence[float]) -> str:
     rows = {"e, eye": pinhole.eye, "l, look-at": pinhole.look_at, "up": pinhole.up}
+    if any(origin):
+        rows = {"origin": origin, **rows}
     body = "".join(_vector_row(name, vector) for name, vector in rows.items())
     distance = " × ".join(f"{d:.9g}" for d in dict.fromkeys(pinhole.distance))
     centre = ", ".join(f"{c:.9g}" for c in pinhole.principal_point)
@@ -279,7 +288,7 @@ def _view(pinhole: Pinhole) -> str:
 
 
 def _vector_row(name: str, vector: Sequence[float]) -> str:
-    return f"<tr><th scope=row>{name}</th>{''.join(f'<td>{value:.9g}</td>' for value in vector)}</tr>"
+    return f"<tr><th scope=row>{name}</th>{''.join(f'<td>{value:.12g}</td>' for value in vector)}</tr>"
 
 
 def _ledger(ledger: Sequence[Any]) -> str:

@@ -55,6 +55,8 @@ def lines(comparison: "Comparison") -> list[str]:
             f"{'Conversion':<16}{'':>11}  stated camera against the one read back: {c.largest:.1e} px, {c.share:.0%} of what "
             f"float32 storage allows  {_mark(c.ok)}"
         )
+    if comparison.far_from_home:
+        table.append(comparison.far_from_home.sentence)
     return [*table, comparison.sentence]
 
 

@@ -32,11 +32,12 @@ class View:
 
         matrix : (4, 4), object space to world space. points : (n, 3), object space.
 
-        Returns (3, n) camera space and (n,) the largest |coordinate| in world space.
+        Returns (3, n) camera space and (n,) the largest |coordinate| in world space, of the points or of their object: what is
+        far from its object's own origin is the small difference of large numbers.
         """
         relative = matrix[:3, :3] @ points.T
         relative += (matrix[:3, 3] - self.eye)[:, None]
-        return self.axes @ relative, np.abs(relative + self.eye[:, None]).max(axis=0, initial=0.0)
+        return self.axes @ relative, np.abs(relative + self.eye[:, None]).max(axis=0, initial=np.abs(matrix[:3, 3]).max())
 
     def world_position(self, depth: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
         """World coordinates, each (n,), of the points at (n,) planar depths on the rays (x, y, 1)."""
