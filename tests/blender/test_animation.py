@@ -99,3 +99,35 @@ def test_what_hangs_on_the_camera_follows_in_a_render(flying_camera, scene, rend
     # 2 before the eye, in the pixel right and above of the middle: half a pixel off the axis.
     middle = positions[16, 16] - (np.array(pinhole.eye) - 2 * pinhole.basis()[2])
     assert np.abs(middle).max() <= 2 / min(pinhole.distance)
+
+
+def test_it_follows_what_a_driver_reads_between_frames(posed_camera, scene):
+    handle = bpy.data.objects.new("Handle", None)
+    scene.collection.objects.link(handle)
+    handle.location.z = 5
+    driver = posed_camera.virtual_pinhole.driver_add("eye", 2).driver
+    driver.type = "SUM"
+    target = driver.variables.new().targets[0]
+    target.id, target.data_path = handle, "location.z"
+    scene.frame_set(1)
+    for height in (8, 3):
+        handle.location.z = height
+        for _ in range(3):
+            bpy.context.view_layer.update()
+        assert posed_camera.matrix_world.translation.z == pytest.approx(height)
+
+
+def test_between_frames_it_sets_a_driven_camera_once_and_not_for_ever(posed_camera, scene):
+    """With a constraint in the way the camera is never where it belongs, and setting it again would not help."""
+    posed_camera.virtual_pinhole.driver_add("eye", 2).driver.expression = "2.0 + 3.0"
+    posed_camera.constraints.new("LIMIT_LOCATION").use_min_x = True
+    posed_camera.constraints[0].min_x = 9
+    updates = []
+    bpy.app.handlers.depsgraph_update_post.append(lambda *_: updates.append(None))
+    try:
+        scene.frame_set(1)
+        for _ in range(10):
+            bpy.context.view_layer.update()
+    finally:
+        bpy.app.handlers.depsgraph_update_post.pop()
+    assert len(updates) < 5
