@@ -120,9 +120,12 @@ def recentred(
     """
     features.note_render(scene, view_layer, camera_object, ledger)
     with borrowed() as borrow:
+        keys = set(bpy.data.shape_keys)
+        borrow.afterwards(_remove_keys_but, keys)
         view, placed, copies = _visit(
             scene, view_layer, camera_object, lambda depsgraph: _seen(depsgraph, camera_object, ledger, borrow)
         )
+        _remove_keys_but(keys)
         temporary = _empty_scene(borrow, scene)
         shown = _place(borrow, temporary, placed)
         camera = _camera(borrow, temporary, view)
@@ -154,6 +157,11 @@ def _seen(
         matrix[:3, 3] += matrix[:3, :3] @ copy.anchor
         placed.append(_Placed(source.name, copy.data, matrix, source.object_index))
     return view, [*placed, *_lights(depsgraph, eye)], {copy.data: copy for copy in copies.values()}
+
+
+def _remove_keys_but(keys: set[bpy.types.Key]) -> None:
+    """Shape keys come along when a mesh is copied, although its points are evaluated ones; 4.2 does not say whose they are."""
+    bpy.data.batch_remove([key for key in bpy.data.shape_keys if key not in keys])
 
 
 def _lights(depsgraph: bpy.types.Depsgraph, eye: Array) -> Iterator[_Placed]:
@@ -188,8 +196,6 @@ def _moved(data: Geometry, matrix: Array, slots: tuple[bpy.types.Material | None
         if index == len(data.materials):
             data.materials.append(None)
         data.materials[index] = material and material.original
-    if isinstance(data, bpy.types.Mesh) and data.shape_keys:  # its points are evaluated ones already
-        bpy.data.batch_remove([data.shape_keys])
     elements = data.vertices if isinstance(data, bpy.types.Mesh) else data.points
     points = np.empty((len(elements), 3), np.float32)
     elements.foreach_get("co", points.ravel())
