@@ -79,6 +79,28 @@ def test_the_size_and_the_stated_camera_can_be_chosen(tmp_path, capfd):
     assert "stated_camera" in fails(capfd, "render", write_scene(tmp_path), tmp_path / "c.exr", "--stated")
 
 
+def test_the_origin_of_a_recentred_scene_is_told(tmp_path, capfd):
+    scene, picture = write_scene(tmp_path, origin=[4200952.125, 0, -2]), tmp_path / "out.exr"
+    assert main(["render", str(scene), str(picture)]) == 0
+    report, result = tmp_path / "report", tmp_path / "result.json"
+    words = ["compare", picture, picture, "--scene", scene, "--report", report, "--json", result]
+    assert main([str(word) for word in words]) == 0
+    assert json.loads(result.read_text())["origin"] == [4200952.125, 0, -2]
+    assert "<td>4200952.125</td>" in (report / "index.html").read_text(encoding="utf-8")
+
+
+def test_a_camera_far_from_the_origin_is_told_to_recenter(tmp_path, capfd):
+    """Positions in float32 are half a unit apart at 5e6: so much of the tracer's own picture is rounded away."""
+    camera = CAMERA | {"eye": [5e6, -5, 0], "look_at": [5e6, 0, 0]}
+    scene = write_scene(tmp_path, camera=camera, objects=[{"name": "Ball", "geometry": "ball", "location": [5e6, 0, 0]}])
+    picture, result = tmp_path / "out.exr", tmp_path / "result.json"
+    assert main(["render", str(scene), str(picture)]) == 0
+    main(["compare", str(picture), str(picture), "--scene", str(scene), "--json", str(result)])
+    far = json.loads(result.read_text())["far_from_home"]
+    assert far["error"] > 0.1 and far["away"] == pytest.approx(5e6)
+    assert far["sentence"] in capfd.readouterr().out and "--recenter" in far["sentence"]
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -152,6 +174,7 @@ def test_pictures_that_can_not_be_compared_are_refused(tmp_path, capfd):
         (["render", "a", "b", "--threads", "none"], "'none'"),
         (["render", "a", "b", "--level", "magic"], "magic"),
         (["check", "a.blend", "--frame", "1.5"], "1.5"),
+        (["render", "a", "b", "--recenter"], "--recenter"),  # a scene file has its origin already
     ],
 )
 def test_wrong_usage_is_one_line_that_says_where_help_is(capfd, words, expected):

@@ -4,6 +4,7 @@ What is rendered is compared with the plain export of the same file, less the ey
 vertex, it must have moved along.
 """
 
+import json
 import math
 
 import numpy as np
@@ -15,8 +16,10 @@ from mathutils import Vector
 
 from viewcam_addon.blender import cycles, job, recentering
 from viewcam_addon.blender.camera import apply
+from viewcam_addon.cli import main
 from viewcam_addon.errors import InputError, NotModelledError
 from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.tracer import scene_file
 from viewcam_addon.tracer.scene import Mesh
 
 UTM = (448262.25, 5411932.5, 42.0)
@@ -430,6 +433,26 @@ def test_a_vertex_that_did_not_follow_and_an_object_that_is_gone_are_named(look,
     spoil(lambda block: setattr(block, "hide_render", True))
     with pytest.raises(InputError, match="object 'Map' is missing"):
         job.export(job.Request(recenter=True))
+
+
+def test_the_command_as_its_users_type_it(look, scene, tmp_path, capfd):
+    look(ECEF)
+    add_map(scene, ECEF)
+    path, result = tmp_path / "far.blend", tmp_path / "result.json"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    words = ["check", str(path), "--threads", "2", "--json", str(result)]
+    main(words)
+    plain = json.loads(result.read_text())
+    told = capfd.readouterr().out
+    assert plain["far_from_home"]["error"] > 0.5 and plain["far_from_home"]["sentence"] in told
+    assert main([*words, "--recenter"]) == 0
+    recentred = json.loads(result.read_text())
+    assert recentred["far_from_home"] is None and recentred["origin"] == np.add(ECEF, (6.2, -7.3, 4.123456789)).tolist()
+    assert recentred["passes"][0]["percentiles"]["p99"]["value"] < 1e-3
+    scene_path = tmp_path / "scene.json"
+    assert main(["export", str(path), str(scene_path), "--recenter"]) == 0
+    assert list(scene_file.read(scene_path).origin) == recentred["origin"]
+    assert main(["cycles", str(path), str(tmp_path / "picture.exr"), "--recenter"]) == 0
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])

@@ -124,6 +124,24 @@ def test_a_scene_a_million_metres_off_the_origin_shows_the_same_picture(random_s
     assert (there["Magnitude"][here["Depth"] < image.BACKGROUND_DEPTH] >= far - 20).all()
 
 
+def test_the_magnitude_of_what_is_far_from_its_own_origin_is_that_distance(make_mesh, make_spheres, make_scene):
+    """The vertices lie 1e6 away in object space, the object −1e6 in the world: their sum is rounded like the terms."""
+    camera = Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 100, 60, 20)
+    square = [[-2, -1, 0], [2, -1, 0], [2, 1, 0], [-2, 1, 0]]
+    for make in (
+        lambda away: make_mesh(np.add(square, (away, 0, 0)), [[0, 1, 2], [0, 2, 3]]),
+        lambda away: make_spheres([(away, 0, 0)], 1),
+    ):
+        near, far = make_scene(camera, make(0)), make_scene(camera, make(1e6))
+        matrix = np.eye(4)
+        matrix[0, 3] = -1e6
+        far = replace(far, objects=tuple(replace(placed, matrix=matrix) for placed in far.objects))
+        near, far = render(near), render(far)
+        hit = near["Depth"] < image.BACKGROUND_DEPTH
+        assert hit.any() and np.array_equal(near["Depth"], far["Depth"])
+        assert (near["Magnitude"][hit] < 100).all() and (np.abs(far["Magnitude"][hit] / 1e6 - 1) < 1e-4).all()
+
+
 def test_what_shows_nothing_is_written_as_cycles_writes_it(make_scene):
     passes = render(make_scene(Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 10, 5, 3)))
     for name, values in passes.items():

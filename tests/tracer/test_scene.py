@@ -50,6 +50,8 @@ def placed(**changes):
         (lambda: Scene(CAMERA, {}, (), clip=(2, 1)), ["clip", "2 … 1"]),
         (lambda: Scene(CAMERA, {}, (), clip=(-1, 1)), ["clip"]),
         (lambda: Scene(CAMERA, {}, (), clip=(0, float("nan"))), ["clip"]),
+        (lambda: Scene(CAMERA, {}, (), origin=(0.0, float("inf"), 0.0)), ["origin"]),
+        (lambda: Scene(CAMERA, {}, (), origin=(0.0, 0.0)), ["origin", "three"]),
     ],
 )
 def test_what_is_wrong_is_named_in_one_sentence(build, words):

@@ -41,7 +41,7 @@ def read_document(tmp_path):
 
 def assert_same_scene(first, second):
     assert first.camera == second.camera and first.stated_camera == second.stated_camera
-    assert first.clip == second.clip and first.ledger == second.ledger
+    assert first.clip == second.clip and first.ledger == second.ledger and first.origin == second.origin
     assert first.geometries.keys() == second.geometries.keys()
     for name, geometry in first.geometries.items():
         other = second.geometries[name]
@@ -68,6 +68,7 @@ def test_a_scene_that_is_written_is_read_back_to_the_last_bit(random_scene, tmp_
     scene = replace(
         scene,
         stated_camera=scene.camera.resized(50, 60),
+        origin=(4200952.123456789, 780362.0, -1e-300),
         ledger=(LedgerEntry("Hair [ 1, 2 ]", "skipped", 'curls, "quotes",\n[\n1\n]'), LedgerEntry("Bälle", "exported")),
     )
     path = tmp_path_factory.mktemp("scene") / "name.with.dots.json"
@@ -150,6 +151,8 @@ def changed(document, path, value):
         (["clip"], [1], ["'clip'", "2"]),
         (["clip"], [None, 1], ["bound 0 of 'clip'"]),
         (["clip"], [5, 1], ["clip"]),
+        (["origin"], [1, 2], ["'origin'", "3"]),
+        (["origin"], [1, 2, 1e999], ["finite"]),
         (["geometries"], [], ["'geometries'"]),
         (["geometries", "beads", "type"], None, ["geometry 'beads'", "'type'"]),
         (["geometries", "beads", "type"], "cube", ["geometry 'beads'", "'cube'", "mesh"]),
