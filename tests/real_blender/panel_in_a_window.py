@@ -3,7 +3,8 @@
 blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python panel_in_a_window.py
 
 A timer takes one step at a time, so that Blender handles the events and draws in between. Buttons are found by moving the mouse
-over them and asking Blender which property it is on: no coordinate is assumed but that the buttons stand below the distance.
+over them and asking Blender which property it is on: no coordinate is assumed but that the buttons stand below the choice of
+what happens at the pole.
 Leaves with status 0, or 5 and a traceback.
 """
 
@@ -14,10 +15,10 @@ import traceback
 import bpy
 import numpy as np
 
-KEYS = {"0": "ZERO", "3": "THREE", "5": "FIVE", "7": "SEVEN", ".": "PERIOD"}
+KEYS = {"-": "MINUS", "0": "ZERO", "1": "ONE", "3": "THREE", "5": "FIVE", "7": "SEVEN", ".": "PERIOD"}
 NOWHERE = (600, 500)  # a place in the 3D viewport
 ROW = 9  # pixels between two looks for a button, less than half its height
-BELOW = 27  # pixels from the middle of the distance to the middle of the buttons
+BELOW = 27  # pixels from the middle of the choice at the pole to the middle of the buttons
 
 
 def window():
@@ -146,9 +147,36 @@ def zoom():
     is_at_its_values()
 
 
+def fly_over_the_top():
+    """The eye crosses the zenith in one step, typed, with the roll held: the picture hangs upside down, until roll is typed."""
+    stated = tuple(values().eye), tuple(values().look_at)
+    values().eye, values().look_at, values().up = (1, 0, 5), (0, 0, 0), (0, 0, 1)
+    values().pole = "HOLD"
+    with bpy.context.temp_override(window=window()):
+        bpy.ops.ed.undo_push(message="Stated by the script")
+    yield
+    before = state()
+    yield from type_into("eye", 0, "-1")
+    after = state()
+    assert abs(abs(values().roll) - np.pi) < 1e-6, f"the roll is {values().roll}"
+    assert np.abs(after[1] - before[1])[:3, 1].max() < 0.5, "v flipped"
+    press("Z", *NOWHERE, ctrl=True)
+    yield
+    yield
+    assert same(state(), before) and values().roll == 0, "undo did not bring values, roll and camera back"
+    press("Z", *NOWHERE, ctrl=True, shift=True)
+    yield
+    yield
+    assert same(state(), after), "redo did not bring values, roll and camera back"
+    yield from type_into("roll", -1, "0")
+    assert values().roll == 0 and np.abs(state()[1] - before[1])[:3, 1].max() > 1.5, "typing 0 did not level the picture"
+    values().pole, values().eye, values().look_at = "CANONICAL", *stated
+    yield
+
+
 def press_the_buttons():
     _, sidebar = region("VIEW_3D", "UI")
-    _, y = yield from find("distance", -1)
+    _, y = yield from find("pole", -1)
     stated = values().numbers()
     camera().location = (1, 2, 3)
     yield
@@ -206,6 +234,7 @@ def steps():
         enable,
         edit_undo_redo,
         zoom,
+        fly_over_the_top,
         press_the_buttons,
         play_keyframes,
         draw_a_warning,

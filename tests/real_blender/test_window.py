@@ -11,6 +11,7 @@ PARTS = (
     "enable",
     "edit_undo_redo",
     "zoom",
+    "fly_over_the_top",
     "press_the_buttons",
     "play_keyframes",
     "draw_a_warning",
