@@ -19,8 +19,8 @@ from . import camera as cameras
 from . import versions
 from .hold import is_animated
 
-# What driven values were when their camera was last set between frames, by the camera's name.
-_followed: dict[str, tuple] = {}
+# What driven values were when their camera was last set between frames, by what no two objects of a session have in common.
+_followed: dict[int, tuple] = {}
 
 
 @persistent
@@ -37,9 +37,9 @@ def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     for update in depsgraph.updates:
         evaluated = update.id
         if isinstance(evaluated, bpy.types.Object) and evaluated.type == "CAMERA" and _is_driven(evaluated.original):
-            name, numbers = evaluated.original.name_full, evaluated.virtual_pinhole.numbers()
-            if _followed.get(name) != numbers:  # setting the camera is an update, too
-                _followed[name] = numbers
+            numbers = evaluated.virtual_pinhole.numbers()
+            if _followed.get(evaluated.original.session_uid) != numbers:  # setting the camera is an update, too
+                _followed[evaluated.original.session_uid] = numbers
                 _follow(evaluated.original, scene, depsgraph)
 
 

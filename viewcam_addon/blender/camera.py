@@ -131,9 +131,12 @@ def read(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
             "enable it and its collection in the viewport, or make it the scene's camera"
         )
     matrix = np.array(evaluated.matrix_world)
-    if not np.isfinite(matrix).all() or not np.linalg.norm(matrix[:3, :3], axis=0).all():
-        raise InputError(f"camera {camera_object.name!r} is scaled to zero, or beyond all numbers: set its scale to 1")
-    axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
+    sizes = np.linalg.norm(matrix[:3, :3], axis=0)
+    if not np.isfinite(matrix).all() or not sizes.all():
+        raise pose.no_size(camera_object)
+    axes = matrix[:3, :3] / sizes
+    if abs(np.linalg.det(axes)) <= pose.LARGEST_SKEW:  # flat, but for rounding
+        raise pose.no_size(camera_object)
     if rotation.skew(axes) > pose.LARGEST_SKEW:
         raise InputError(f"camera {camera_object.name!r} is oblique, {pose.who_shears(camera_object)}")
     mirrored = bool(np.linalg.det(axes) < 0)

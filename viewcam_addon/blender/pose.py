@@ -33,7 +33,7 @@ def channels(
     """Location, (3, 3) rotation and scale that bring the camera to the pose, relative to its parent and its delta transform."""
     parent = parent_matrix(camera_object, depsgraph)
     if np.linalg.det(parent[:3, :3]) == 0:
-        raise InputError(f"the parent of camera {camera_object.name!r} is scaled to zero: give it a scale")
+        raise no_size(camera_object)
     u, v, w = pinhole.basis()
     wanted = np.column_stack([-u if pinhole.mirrored else u, v, w])
     scale, signs = np.array(camera_object.scale), _signs(camera_object)
@@ -67,7 +67,12 @@ def set_rotation(camera_object: bpy.types.Object, turn: Array) -> None:
 
 def _signs(camera_object: bpy.types.Object) -> Array:
     """(3,): −1 for each axis that the camera's own scale turns round."""
-    return np.where(np.array(camera_object.scale) * np.array(camera_object.delta_scale) < 0, -1.0, 1.0)
+    return np.where(_full_scale(camera_object) < 0, -1.0, 1.0)
+
+
+def _full_scale(block: bpy.types.Object) -> Array:
+    """(3,): an object's own scale, delta included."""
+    return np.array(block.scale) * np.array(block.delta_scale)
 
 
 def _delta_rotation(camera_object: bpy.types.Object) -> Array:
@@ -100,7 +105,7 @@ def parent_matrix(camera_object: bpy.types.Object, depsgraph: bpy.types.Depsgrap
     evaluated = camera_object.evaluated_get(depsgraph)
     own = np.array(evaluated.matrix_basis) if is_carried else np.linalg.inv(inverse) @ np.array(evaluated.matrix_local)
     if np.linalg.det(own) == 0:
-        raise InputError(f"camera {camera_object.name!r} is scaled to zero: set its scale to 1")
+        raise no_size(camera_object)
     return np.array(evaluated.matrix_world) @ np.linalg.inv(own)
 
 
@@ -118,6 +123,15 @@ def _carries(constraint: bpy.types.Constraint) -> bool:
     return constraint.type in ("CHILD_OF", "ARMATURE", "FOLLOW_PATH") and constraint.influence == 1
 
 
+def no_size(camera_object: bpy.types.Object) -> InputError:
+    """The error of a camera whose matrix is singular or not finite, naming whose scale it is."""
+    for block in (camera_object, *ancestors(camera_object)):
+        if not all(_full_scale(block)):
+            who = "" if block == camera_object else f" by {block.name!r} above it"
+            return InputError(f"camera {camera_object.name!r} is scaled to zero{who}: give {block.name!r} a scale of 1")
+    return InputError(f"camera {camera_object.name!r} is scaled to zero, or beyond all numbers: set its scale to 1")
+
+
 def who_shears(camera_object: bpy.types.Object) -> str:
     """Why the camera's axes are not perpendicular, and what to do about it: the end of a sentence."""
     for child in (camera_object, *ancestors(camera_object)):
@@ -126,7 +140,7 @@ def who_shears(camera_object: bpy.types.Object) -> str:
             bone = parent.pose.bones.get(child.parent_bone)
             if bone and not _is_uniform(bone.scale):
                 return f"the bone {bone.name!r} above it is scaled non-uniformly: give the bone a uniform scale"
-        if parent and not _is_uniform(np.array(parent.scale) * np.array(parent.delta_scale)):
+        if parent and not _is_uniform(_full_scale(parent)):
             relation = "parent" if child == camera_object else "ancestor"
             return f"its {relation} {parent.name!r} is scaled non-uniformly: apply the scale of {parent.name!r}"
     for constraint in active_constraints(camera_object):
@@ -135,7 +149,7 @@ def who_shears(camera_object: bpy.types.Object) -> str:
 
 
 def _is_uniform(scale: Array) -> bool:
-    sizes = np.abs(np.array(scale))
+    sizes = np.abs(scale)
     return bool(sizes.max() <= sizes.min() * (1 + LARGEST_SKEW))
 
 
