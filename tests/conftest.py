@@ -6,9 +6,11 @@ this session is one with Blender. Rejected: registering through `addon_utils.ena
 
 import os
 import sys
+import warnings
 from pathlib import Path
 
 import hypothesis
+import numpy as np
 import pytest
 
 # tests/real_blender drives a Blender that is installed beside: make test-blender says which.
@@ -40,6 +42,14 @@ def fresh_blender(registered_addon):
     bpy = pytest.importorskip("bpy")
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     return bpy
+
+
+@pytest.fixture
+def no_warnings():
+    """NumPy raises where it would warn, and so does Python."""
+    with np.errstate(all="raise"), warnings.catch_warnings():
+        warnings.simplefilter("error")
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -11,15 +11,14 @@ single pose costs no array at all.
 
 Sources: two_sum is Knuth's (TAOCP 2, 4.2.2), two_product Dekker's (Numer. Math. 18, 1971), the array sum is Kahan's
 distillation as analysed by Ogita, Rump and Oishi (SIAM J. Sci. Comput. 26, 2005). math.fma would replace Dekker's
-splitting, but Python has it from 3.13 only. Rejected: mpmath or Fraction for every pose (a hundred times slower; Fraction
-serves the rare inputs whose products would leave float64's range), and numpy.longdouble (64 bits of mantissa on some machines,
-53 on others).
+splitting, but Python has it from 3.13 only. Rejected: mpmath or Fraction for every pose (a hundred times slower; Python's
+whole numbers serve the rare inputs whose products would leave float64's range), and numpy.longdouble (64 bits of mantissa on
+some machines, 53 on others).
 """
 
 import functools
 import math
 from collections.abc import Sequence
-from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
@@ -163,7 +162,7 @@ def are_factors(vector: Vector, scaled: Vector) -> bool | NDArray[np.bool_]:
 def quotient(a: Number, b: float, divisor: float) -> tuple[Number, Exponent]:
     """(a − b) / divisor of any size, as fraction · 2^exponent with |fraction| < 2: of two roundings, whatever its size."""
     if isinstance(a, float):
-        quartered = 2 * (max(abs(a), abs(b)) > LARGEST_PART)
+        quartered = 2 if max(abs(a), abs(b)) > LARGEST_PART else 0
         fraction, exponent = math.frexp(math.ldexp(a, -quartered) - math.ldexp(b, -quartered))
     else:
         quartered = 2 * (np.maximum(np.abs(a), abs(b)) > LARGEST_PART)
@@ -182,24 +181,36 @@ def of_one_scale(*numbers: tuple[Number, Exponent]) -> list[Number]:
     return [np.ldexp(fraction, exponent - largest) for fraction, exponent in numbers]
 
 
-def rational_cross(a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...]) -> tuple[tuple, tuple, float]:
-    """b − c and a × (b − c) by rational arithmetic, for floats of any size.
+def whole_number_cross(
+    a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...]
+) -> tuple[tuple[Vector, Vector], tuple[Vector, Vector], float]:
+    """b − c and a × (b − c) for floats of any size: every float64 is a whole number of 2⁻¹⁰⁷⁴, and Python's have no end.
 
     Returns two pairs of vectors high + low, each scaled so that its largest component is ±1 (what is smaller than float64's
     range beside it becomes 0), and the largest component that the product would have if a and b − c were so scaled before.
     """
-    a, b, c = (tuple(map(Fraction, vector)) for vector in (a, b, c))
+    a, b, c = (tuple(map(_in_smallest_units, vector)) for vector in (a, b, c))
     apart = tuple(x - y for x, y in zip(b, c, strict=True))
     product = tuple(a[j] * apart[k] - a[k] * apart[j] for j, k in ((1, 2), (2, 0), (0, 1)))
     largest_a, largest_apart, largest_product = (max(map(abs, vector)) for vector in (a, apart, product))
     return (
         _pair_of_floats(apart, largest_apart),
-        _pair_of_floats(product, largest_product or Fraction(1)),
-        float(largest_product / (largest_a * largest_apart)),
+        _pair_of_floats(product, largest_product or 1),
+        largest_product / (largest_a * largest_apart),
     )
 
 
-def _pair_of_floats(vector: tuple[Fraction, ...], unit: Fraction) -> tuple[Vector, Vector]:
-    scaled = [component / unit for component in vector]
-    high = tuple(float(component) for component in scaled)
-    return high, tuple(float(component - Fraction(rounded)) for component, rounded in zip(scaled, high, strict=True))
+def _in_smallest_units(number: float) -> int:
+    numerator, denominator = number.as_integer_ratio()
+    return numerator * (2**1074 // denominator)
+
+
+def _pair_of_floats(vector: tuple[int, ...], unit: int) -> tuple[Vector, Vector]:
+    """The vector / unit; Python rounds the quotient of two whole numbers once, whatever their size."""
+    high = tuple(component / unit for component in vector)
+    ratios = (rounded.as_integer_ratio() for rounded in high)
+    low = (
+        (component * denominator - numerator * unit) / (unit * denominator)
+        for component, (numerator, denominator) in zip(vector, ratios, strict=True)
+    )
+    return high, tuple(low)

@@ -101,8 +101,10 @@ class Frame:
         if self.border is None:
             return 0, 0, width, height
         # Blender multiplies in float32 before it rounds down.
-        edges = np.float32(self.border) * np.float32((width, height, width, height))
-        left, bottom, right, top = (int(edge) for edge in np.floor(edges))
+        size = (width, height, width, height)
+        with np.errstate(under="ignore"):
+            edges = np.floor(np.float32(self.border) * np.float32(size))
+        left, bottom, right, top = (min(int(edge), most) for edge, most in zip(edges, size, strict=True))
         return left, bottom, right - left, top - bottom
 
     @property

@@ -83,8 +83,12 @@ class Pinhole:
         object.__setattr__(self, name, value)
 
     @cached_property
+    def _view(self) -> tuple[Pair, Pair, float]:
+        return _view_of_one(self.eye, self.look_at, self.up)
+
+    @cached_property
     def _axes(self) -> tuple[Triple, Triple, Triple]:
-        return _basis_of_one(self.eye, self.look_at, self.up)
+        return _axes_of_one(self.up, *self._view)
 
     @cached_property
     def _basis(self) -> tuple[Array, Array, Array]:
@@ -104,14 +108,14 @@ class Pinhole:
     @property
     def is_singular(self) -> bool:
         """Whether the view is exactly parallel to up, so that the axes are the canonical ones."""
-        return not any(_view_of_one(self.eye, self.look_at, self.up)[1][0])
+        return not any(self._view[1][0])
 
-    @cached_property
+    @property
     def sine_to_up(self) -> float:
         """sin θ of the angle θ between the view and up, at most 1, to full precision however small it is; 0 if singular
         or below float64's range.
         """
-        return min(1.0, _view_of_one(self.eye, self.look_at, self.up)[2])
+        return self._view[2]
 
     def roll_uncertainty(self, precision: float = 2.0**-24) -> float:
         """The roll that rounding the inputs can cause, in radians, at most π.
@@ -266,14 +270,15 @@ def basis(eye: ArrayLike, look_at: ArrayLike, up: ArrayLike) -> tuple[Array, Arr
     if e.ndim == 1:
         pose = [checks.vector(name, vector, 3) for name, vector in (("eye", e), ("look_at", l), ("up", up))]
         _check_pose(*pose)
-        return tuple(np.array(axis) for axis in _basis_of_one(*pose))
+        return tuple(np.array(axis) for axis in _axes_of_one(pose[2], *_view_of_one(*pose)))
     leading, (e, l, up) = e.shape[:-1], (vector.reshape(-1, 3) for vector in (e, l, up))
     _check_poses(e, l, up)
     with np.errstate(all="ignore"):  # what leaves float64's range here is done again, one by one, below
         axes, safe = _basis_of_many(*(tuple(vector.T) for vector in (e, l, up)))
     u, v, w = (np.stack(axis, axis=-1) for axis in axes)
     for i in np.flatnonzero(~safe):
-        u[i], v[i], w[i] = _basis_of_one(*(tuple(vector[i].tolist()) for vector in (e, l, up)))
+        pose = [tuple(vector[i].tolist()) for vector in (e, l, up)]
+        u[i], v[i], w[i] = _axes_of_one(pose[2], *_view_of_one(*pose))
     return tuple(axis.reshape(*leading, 3) for axis in (u, v, w))
 
 
@@ -307,8 +312,7 @@ def canonical_axes(up: Triple, looking_down: bool) -> tuple[Triple, Triple, Trip
     return tuple(tuple(component + 0.0 for component in axis) for axis in axes)  # + 0.0 makes −0.0 a plain zero
 
 
-def _basis_of_one(e: Triple, l: Triple, up: Triple) -> tuple[Triple, Triple, Triple]:
-    apart, across, _ = _view_of_one(e, l, up)
+def _axes_of_one(up: Triple, apart: Pair, across: Pair, _sine: float) -> tuple[Triple, Triple, Triple]:
     if any(across[0]):
         return _orthonormal(apart, across)
     (unit_up,) = exact.scaled_to_one(up)
@@ -322,12 +326,13 @@ def _view_of_one(e: Triple, l: Triple, up: Triple) -> tuple[Pair, Pair, float]:
         largest = exact.largest_component(across[0])
         largest /= exact.largest_component(unit_up) * exact.largest_component(apart[0])
     else:
-        apart, across, largest = exact.rational_cross(up, e, l)
+        apart, across, largest = exact.whole_number_cross(up, e, l)
     if not largest:
         return apart, across, 0.0
     across = tuple(exact.scaled_to_one(*across))
     relative_lengths = [exact.length(vector) / exact.largest_component(vector) for vector in (across[0], unit_up, apart[0])]
-    return apart, across, largest * relative_lengths[0] / (relative_lengths[1] * relative_lengths[2])
+    sine = largest * relative_lengths[0] / (relative_lengths[1] * relative_lengths[2])
+    return apart, across, min(sine, 1.0)
 
 
 def _basis_of_many(e: tuple, l: tuple, up: tuple) -> tuple[tuple, Array]:

@@ -1,0 +1,354 @@
+"""Hostile numbers against every public function of pinhole.py and intrinsics.py: a right answer or one sentence, nothing else.
+
+Each function has an attack below: it calls the function with what a `Source` gives it and looks at the answer. Hypothesis is
+one source; the exhaustive tests draw a million times from a fast one. A public function without an attack fails a test.
+"""
+
+import inspect
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from viewcam_addon import checks, intrinsics, pinhole
+from viewcam_addon.errors import InputError
+from viewcam_addon.intrinsics import CameraData, Frame, ViewPlane
+from viewcam_addon.pinhole import Pinhole
+
+pytestmark = pytest.mark.usefixtures("no_warnings")
+
+EXTREMES = (
+    *(0.0, -0.0, 5e-324, -5e-324, 2.2250738585072014e-308, 1e-308, -1e-308, 1e-200, 1e-162, 1e-45, 1.4e-45, 1e-16, 0.5),
+    *(1.0, -1.0, 1.0 + 2.0**-52, 500.0, 2.0**31 - 1, 2.0**53, 1e16, 3.4028234663852886e38, 3.41e38, 1e154, 1e162, 1e200),
+    *(8.9e307, 1e308, -1e308, 1.7976931348623157e308, -1.7976931348623157e308),
+)
+NOT_FINITE = (math.nan, math.inf, -math.inf)
+NO_NUMBERS = (
+    *(None, True, False, "1", "nan", "", b"1", 1j, [], {}, {1, 2, 3}, object(), float, 10**400, -(10**5000), Fraction(10**400)),
+    *(np.ma.masked, np.array([]), np.array("1"), np.array([[1.0, 2.0, 3.0]]), np.complex128(1), np.datetime64("2026-01-01")),
+    *(
+        np.timedelta64(1, "s"),
+        np.bool_(True),
+        np.longdouble("1e4000"),
+        [1.0, [2.0]],
+        [[1], [2, 3]],
+        "abc",
+        b"abc",
+        [1.0, None, 2],
+    ),
+    *(np.ma.array([1.0, 2.0, 3.0], mask=[0, 1, 0]), [1.0, np.ma.masked, 3.0], np.array([1, 2, 3j]), [True, False, True]),
+    *(["1", "2", "3"], [10**400, 0, 1], {1: 2, 2: 3, 3: 4}, bytearray(b"abc"), np.float32("nan"), np.array(np.inf)),
+)
+NUMBERS_IN_DISGUISE = (
+    np.float32(3.4e38),
+    np.float16(2),
+    np.int8(3),
+    np.uint64(2**64 - 1),
+    np.array(2.5),
+    Fraction(1, 3),
+    2**70,
+)
+WHOLES = (1, 2, 64, 1920, 65536, 2**31 - 1, 2**31, 2**63, 10**30, 10**400, 0, -1, 2.5, 1.0, np.int32(7), np.array(5))
+
+
+finite_floats = st.sampled_from(EXTREMES) | st.floats(allow_nan=False, allow_infinity=False) | st.floats(-1e4, 1e4)
+
+
+class Hypothesis:
+    """Draws from Hypothesis, so that a failure shrinks."""
+
+    def __init__(self, data):
+        self._data = data
+        self._number = st.one_of(
+            st.sampled_from(EXTREMES),
+            st.floats(allow_nan=False, allow_infinity=False),
+            st.floats(-1e4, 1e4),
+            st.sampled_from((*NOT_FINITE, *NO_NUMBERS, *NUMBERS_IN_DISGUISE)),
+        )
+
+    def number(self):
+        return self._data.draw(self._number)
+
+    def finite(self):
+        return self._data.draw(finite_floats)
+
+    def choice(self, values):
+        return self._data.draw(st.sampled_from(values))
+
+
+class Random:
+    """A million draws a second or so, seeded. One in thirty is no finite number, one in three is ordinary."""
+
+    def __init__(self, seed, count=1 << 16):
+        random = np.random.default_rng(seed)
+        sized = np.ldexp(random.uniform(-1, 1, count), random.integers(-1022, 1024, count))
+        kinds = random.random(count)
+        usual = random.normal(size=count) * 10
+        numbers = np.where(kinds < 0.33, usual, np.where(kinds < 0.66, sized, random.choice(EXTREMES, count))).tolist()
+        self._finite = numbers
+        hostile = (*NOT_FINITE, *NO_NUMBERS, *NUMBERS_IN_DISGUISE)
+        self._numbers = [
+            hostile[i % len(hostile)] if kind > 0.966 else x for i, (x, kind) in enumerate(zip(numbers, kinds, strict=True))
+        ]
+        self._count, self._at, self._random = count, 0, random
+
+    def _next(self):
+        # A stride that shares no factor with the count walks through all, and each round begins elsewhere.
+        self._at += 40503
+        if self._at % 9973 == 0:
+            self._at += int(self._random.integers(self._count))
+        return self._at % self._count
+
+    def number(self):
+        return self._numbers[self._next()]
+
+    def finite(self):
+        return self._finite[self._next()]
+
+    def choice(self, values):
+        return values[self._next() % len(values)]
+
+
+REFUSED = object()
+
+
+def answer(function, *arguments):
+    """What the function gives, or REFUSED where it raises InputError with one good sentence. Nothing else may be raised."""
+    try:
+        return function(*arguments)
+    except InputError as error:
+        sentence = str(error)
+        assert "\n" not in sentence and 20 < len(sentence) < 400 and ": " in sentence, f"no good sentence: {sentence!r}"
+        return REFUSED
+
+
+ATTACKS = {}
+
+
+def attacks(*names):
+    """Registers a function of a source as an attack on the public functions of these names."""
+
+    def register(attack):
+        ATTACKS.update(dict.fromkeys(names, attack))
+        return attack
+
+    return register
+
+
+def assert_numbers(*values):
+    for value in values:
+        assert value is REFUSED or not np.isnan(value).any(), f"nan in {values}"
+
+
+def assert_unit(vectors):
+    """Ten roundings of 2⁻⁵³: the axes' 4e-16, sums of three products, a division."""
+    with np.errstate(under="ignore"):
+        lengths = np.sqrt((np.asarray(vectors) ** 2).sum(axis=-1))
+    assert abs(lengths - 1).max(initial=0) <= 10 * 2.0**-53, vectors
+
+
+@attacks("pinhole.Pinhole")
+def a_camera(source):
+    # Of every argument in turn: one hostile beside good ones, or all at once.
+    numbers = [source.number() for _ in range(15)]
+    good = [(1.0, 2.0, 3.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 500.0, 64, 48, None, False]
+    hostile = [
+        *(tuple(numbers[i : i + 3]) for i in (0, 3, 6)),
+        source.choice((numbers[9], (numbers[9], numbers[10]), numbers[10:14])),
+        *(source.choice(WHOLES) for _ in range(2)),
+        source.choice(((numbers[11], numbers[12]), numbers[13], None)),
+        source.choice((False, True, numbers[14])),
+    ]
+    if source.choice((True, False)):
+        i = source.choice(range(8))
+        good[i] = hostile[i]
+        hostile = good
+    camera = answer(Pinhole, *hostile)
+    if camera is not REFUSED:
+        numbers = [*camera.eye, *camera.look_at, *camera.up, *camera.distance, *camera.principal_point]
+        assert all(type(x) is float and math.isfinite(x) for x in numbers) and min(camera.distance) > 0, camera
+        assert type(camera.width) is type(camera.height) is int and min(camera.width, camera.height) >= 1
+        assert type(camera.mirrored) is bool
+    return camera
+
+
+def some_camera(source):
+    """A camera of any size that is none of the refused."""
+    eye, look_at, up = ([source.finite() for _ in range(3)] for _ in range(3))
+    if source.choice((True, False, False)):
+        eye, look_at, up = (1.5, -2.5, 3.0), (0.1, 0.2, 0.3), (0.0, 0.0, 1.0)  # where other things shall be hostile
+    distance = [abs(source.finite()) or 1.0 for _ in range(2)]
+    point = (source.finite(), source.finite()) if source.choice((True, False)) else None
+    if list(eye) == list(look_at) or not any(up):
+        return some_camera(source)
+    return Pinhole(eye, look_at, up, distance, source.choice((1, 64, 4095)), 48, point, source.choice((True, False)))
+
+
+@attacks(
+    *(f"pinhole.Pinhole.{name}" for name in ("basis", "axes", "is_singular", "sine_to_up", "roll_uncertainty")),
+    *(f"pinhole.Pinhole.{name}" for name in ("field_of_view", "resized", "cropped")),
+)
+def what_a_camera_says(source):
+    camera = some_camera(source)
+    u, v, w = camera.axes()
+    for axis in (u, v, w):
+        assert abs(math.hypot(*axis) - 1) <= 1e-15, camera
+    assert abs(u[0] * v[0] + u[1] * v[1] + u[2] * v[2]) <= 1e-15 >= abs(u[0] * w[0] + u[1] * w[1] + u[2] * w[2]), camera
+    assert [axis.tolist() for axis in camera.basis()] == list(map(list, (u, v, w)))
+    sine = camera.sine_to_up
+    assert 0 <= sine <= 1 and not (camera.is_singular and sine), camera
+    assert 0 <= camera.roll_uncertainty() <= math.pi, camera
+    roll = answer(camera.roll_uncertainty, source.number())
+    assert roll is REFUSED or 0 <= roll <= math.pi, camera
+    assert all(0 <= angle <= math.pi + 1e-15 for angle in camera.field_of_view()), camera
+    answer(camera.resized, source.choice(WHOLES), source.choice(WHOLES))  # a Pinhole, if anything: attacked above
+    answer(camera.cropped, source.number(), source.number(), source.choice(WHOLES), 48)
+
+
+@attacks("pinhole.Pinhole.ray_directions", "pinhole.Pinhole.view_plane", "pinhole.Pinhole.project", "pinhole.basis")
+def what_many_numbers_give(source):
+    camera = some_camera(source)
+    shapes = (lambda: source.number(), lambda: [source.number(), source.number()], lambda: [[source.finite()]] * 3)
+    column, row, px, py = (source.choice(shapes)() for _ in range(4))
+    directions = answer(camera.ray_directions, column, row, px, py)
+    if directions is not REFUSED:
+        assert_unit(directions)
+    result = answer(camera.view_plane, column, row)
+    assert_numbers(*([] if result is REFUSED else result))
+    points = (source.number(), [source.number() for _ in range(3)], [[source.finite() for _ in range(3)]] * 2)
+    result = answer(camera.project, source.choice(points))
+    if result is not REFUSED:
+        column, row, depth = result
+        assert_numbers(depth)
+        behind = ~(np.asarray(depth) > 0)
+        assert np.array_equal(np.isnan(column), behind) and np.array_equal(np.isnan(row), behind), camera
+    axes = answer(pinhole.basis, *(source.choice(points) for _ in range(3)))
+    if axes is not REFUSED:
+        assert_unit(axes)
+
+
+@attacks("pinhole.canonical_axes")
+def the_canonical_axes(source):
+    up = source.choice(([source.number() for _ in range(3)], [source.finite() for _ in range(3)]))
+    axes = answer(pinhole.canonical_axes, up, source.choice((True, False, None, 1.0)))
+    if axes is not REFUSED:
+        assert all(abs(math.hypot(*axis) - 1) <= 1e-15 for axis in axes), up
+
+
+def float32(source):
+    """A number that Blender can hold, positive."""
+    return min(max(abs(source.finite()), 2.0**-149), 3.4028234663852886e38)
+
+
+@attacks("intrinsics.CameraData", "intrinsics.Frame", "intrinsics.ViewPlane", "intrinsics.Frame.size")
+def the_classes_of_intrinsics(source):
+    numbers = [source.number() for _ in range(5)]
+    fit = source.choice((*intrinsics.FITS, "auto", "", None, 1, ["AUTO"]))
+    camera = answer(CameraData, *numbers[:3], fit, *numbers[3:])
+    if camera is not REFUSED:
+        assert all(map(math.isfinite, (camera.lens, camera.sensor_width, camera.sensor_height, camera.shift_x, camera.shift_y)))
+        assert min(camera.lens, camera.sensor_width, camera.sensor_height) > 0
+    border = source.choice((None, numbers[:4], [0.1, 0.2, source.number(), 1.0], [0.9, 0.0, 0.1, 1.0], numbers[0]))
+    wholes = [source.choice(WHOLES) for _ in range(3)]
+    frame = answer(Frame, *wholes, *numbers[1:3], border, source.choice((True, False, None, numbers[4])))
+    if frame is not REFUSED:
+        assert min(frame.size) >= 0
+    plane = answer(ViewPlane, source.choice((numbers[:2], numbers[0])), source.choice((numbers[2:4], None)), *wholes[:2])
+    if plane is not REFUSED:
+        assert all(map(math.isfinite, (*plane.distance, *plane.principal_point))) and min(plane.distance) > 0
+
+
+@attacks("intrinsics.view_plane", "intrinsics.camera_data", "intrinsics.Frame.window", "intrinsics.Frame.border_window")
+def blenders_camera_and_the_view_plane(source):
+    lens, width, height, *aspects = (float32(source) for _ in range(5))
+    fit = source.choice(intrinsics.FITS)
+    camera = CameraData(lens, width, height, fit, *(math.copysign(float32(source), source.finite()) for _ in range(2)))
+    border = source.choice((None, (0.0, 0.25, 0.5, 1.0), (0.3, 0.3, 0.3, 0.3), (0.1, 5e-324, 0.9, 1.0)))
+    sizes = [source.choice((1, 3, 1920, 65536, 2**31 - 1)) for _ in range(2)]
+    frame = Frame(*sizes, source.choice((1, 33, 100, 32767)), *aspects, border, source.choice((True, False)))
+    whole, window = (0, 0, *frame.size), frame.border_window
+    assert min(window) >= 0 and window[0] + window[2] <= whole[2] and window[1] + window[3] <= whole[3], frame
+    assert frame.window == (window if frame.crop else whole)
+    plane = answer(intrinsics.view_plane, camera, frame)
+    if plane is REFUSED:
+        numbers = [abs(source.finite()) or 1.0 for _ in range(4)]
+        plane = ViewPlane(numbers[:2], numbers[2:], max(frame.window[2], 1) % 2**31 or 1, max(frame.window[3], 1) % 2**31 or 1)
+    sensor = source.choice(((width, height, fit), (source.number(), height, fit), (width, height, source.number())))
+    back = answer(intrinsics.camera_data, plane, frame, *sensor)
+    if back is not REFUSED:
+        stored = np.array([back.lens, back.sensor_width, back.sensor_height, back.shift_x, back.shift_y])
+        assert np.isfinite(stored).all() and np.float32(back.lens) >= 1 and (np.abs(stored) <= np.finfo(np.float32).max).all()
+
+
+def public_functions():
+    """Every public function, class, method and property of the two modules, by name."""
+    for module in (pinhole, intrinsics):
+        name = module.__name__.rpartition(".")[2]
+        for key, thing in vars(module).items():
+            if key.startswith("_") or getattr(thing, "__module__", None) != module.__name__ or not callable(thing):
+                continue
+            yield f"{name}.{key}"
+            if inspect.isclass(thing):
+                members = [member for member, value in vars(thing).items() if callable(value) or hasattr(value, "__get__")]
+                yield from (f"{name}.{key}.{member}" for member in members if not member.startswith("_"))
+
+
+def test_every_public_function_is_attacked():
+    assert sorted(public_functions()) == sorted(ATTACKS)
+
+
+@pytest.mark.parametrize("attack", dict.fromkeys(ATTACKS.values()), ids=lambda attack: attack.__name__)
+@given(data=st.data())
+def test_hostile_numbers_get_a_right_answer_or_one_sentence(attack, data):
+    attack(Hypothesis(data))
+
+
+@pytest.mark.parametrize("attack", dict.fromkeys(ATTACKS.values()), ids=lambda attack: attack.__name__)
+def test_some_hundred_random_attacks(attack):
+    source = Random(seed=1)
+    for _ in range(400):
+        attack(source)
+
+
+def test_what_is_no_number_is_shown_in_one_short_line():
+    for value in NO_NUMBERS:
+        text = checks.shown(value)
+        assert "\n" not in text and len(text) < 70, text
+    with pytest.raises(InputError, match=r"eye is array\(\[\[1., 2., 3.\]\]\): give 3 numbers"):
+        Pinhole(np.array([[1.0, 2.0, 3.0]]), (0, 0, 0), (0, 0, 1), 500, 64, 48)
+
+
+MILLION = 1_000_000
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize(
+    "attack",
+    [attack for attack in dict.fromkeys(ATTACKS.values()) if attack is not what_many_numbers_give],
+    ids=lambda attack: attack.__name__,
+)
+def test_a_million_random_and_hostile_inputs_to_each_function(attack):
+    source = Random(seed=2)
+    for _ in range(MILLION):
+        attack(source)
+
+
+@pytest.mark.exhaustive
+def test_a_million_random_and_hostile_rays_points_and_poses_at_once():
+    source, many = Random(seed=3), 10_000
+    for _ in range(MILLION // many):
+        camera = some_camera(source)
+        column, row = (np.array([source.finite() for _ in range(many)]) for _ in range(2))
+        points, eye, look_at, up = (np.array([source.finite() for _ in range(3 * many)]).reshape(-1, 3) for _ in range(4))
+        assert_numbers(*camera.view_plane(column, row))
+        assert_unit(camera.ray_directions(column, row, 0.25, 0.75))
+        column, row, depth = camera.project(points)
+        assert_numbers(depth)
+        assert np.array_equal(np.isnan(column), ~(depth > 0)) and np.array_equal(np.isnan(row), ~(depth > 0))
+        eye[::2] = [source.finite() for _ in range(3)]  # one eye for half of them, as in an animation
+        good = (eye != look_at).any(axis=-1) & up.any(axis=-1)
+        assert_unit(pinhole.basis(eye[good], look_at[good], up[good]))
+        answer(pinhole.basis, eye, look_at, up)
