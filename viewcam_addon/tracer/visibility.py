@@ -11,14 +11,19 @@ rounding, the entries of others. Spheres that reach behind the eye's plane have 
 that they touch.
 
 embreex knows no nearest distance, so a ray starts where the clip range does, or behind the last card.
+
+**Corners** of triangles may let a ray slip through where it passes close by (corners.py). Then four rays round it are traced too,
+and where three of them meet something before what the ray itself met, the nearest of that is what it meets.
 """
 
+import math
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Floats, Indices, cross, dot, gather, linear
+from .corners import REACH, Corners
 from .ellipsoids import Ellipsoids
 from .triangles import Planes, Triangles
 
@@ -33,6 +38,12 @@ except ImportError:  # no wheel for this machine: `Plain` gives the same answers
 _MARGIN = 2.0**-20
 _CARD_SPACING = 2.0**-20
 _FAR = 1e37
+
+# Embree multiplies three coordinates: with none larger than this, and those of what is seen not less than its 10⁻²⁰ part, no
+# product leaves float32's range.
+_LARGEST = 2.0**30
+
+_AROUND = np.array([[-1.0, -1.0, 1.0, 1.0], [-1.0, 1.0, -1.0, 1.0]])[:, :, None]
 
 _EDGES = ((1, 2), (2, 0), (0, 1))
 # The side of an edge V, W that a ray d passes on is the sign of d·(V × W). Its nine products and eight sums are rounded by less
@@ -57,24 +68,52 @@ class Embree:
         self._planes, self._ellipsoids = planes, ellipsoids
         self._start, self._end = clip
         self._triangle_count = triangles.count
-        self._triangles = embree_scene(triangles.vertices.T, triangles.corners.T) if triangles.count else None
+        self._unit = _embree_unit(triangles, ellipsoids)
+        self._corners = Corners(triangles.vertices)
+        self._triangles = embree_scene(triangles.vertices.T * self._unit, triangles.corners.T) if triangles.count else None
         self._without_card = int(np.count_nonzero(np.isinf(ellipsoids.bounds[0])))
         if ellipsoids.count > self._without_card:
-            self._cards, self._card_depth = _cards(ellipsoids, self._without_card)
+            self._cards, self._card_depth = _cards(ellipsoids, self._without_card, self._unit)
         else:
             self._cards = None
 
     def first(self, x: Floats, y: Floats) -> Indices:
-        directions = np.empty((len(x), 3), np.float32)
-        directions[:, 0], directions[:, 1], directions[:, 2] = x, y, 1
+        directions = _directions(x, y)
         if self._triangles is None:
             found = np.full(len(x), -1, np.intp)
         else:
-            length = min(self._end - self._start, _FAR)
-            found = self._triangles.run(directions * np.float32(self._start), directions, dists=length).astype(np.intp)
+            found = self._first_triangle(directions)
+            close = self._corners.near(directions[:, 0], directions[:, 1])
+            if len(close):
+                found[close] = self._without_slips(found[close], x[close], y[close])
         if self._ellipsoids.count:
             self._spheres_before(found, directions, x, y)
         return found
+
+    def _first_triangle(self, directions: NDArray[np.float32]) -> Indices:
+        length = min((self._end - self._start) * self._unit, _FAR)
+        return self._triangles.run(directions * np.float32(self._start * self._unit), directions, dists=length).astype(np.intp)
+
+    def _without_slips(self, found: Indices, x: Floats, y: Floats) -> Indices:
+        """What rays that pass close by a corner meet, from what they found and what four rays round each of them find.
+
+        A ray slipped through if what it found lies farther behind three of the four than they do behind one another.
+        """
+        distance = np.maximum(np.abs(x), np.abs(y))
+        reach = REACH * distance * np.maximum(distance, 1.0)
+        around = (x + _AROUND[0] * reach).ravel(), (y + _AROUND[1] * reach).ravel()
+        beside = self._first_triangle(_directions(*around))
+        depths = self._depth(beside, *around).reshape(4, -1)
+        nearest, _, third, _ = np.sort(depths, axis=0)
+        with np.errstate(invalid="ignore"):  # where three see nothing, it is no slip
+            slips = np.flatnonzero(self._depth(found, x, y) > third + (third - nearest))
+        if len(slips):
+            found[slips] = beside.reshape(4, -1)[depths[:, slips].argmin(axis=0), slips]
+        return found
+
+    def _depth(self, found: Indices, x: Floats, y: Floats) -> Floats:
+        """Depths of the triangles that were found, inf where none was."""
+        return np.where(found >= 0, self._planes.depth(found, x, y), np.inf)
 
     def _spheres_before(self, found: Indices, directions: NDArray[np.float32], x: Floats, y: Floats) -> None:
         """Put spheres into `found` where they stand before the triangle there."""
@@ -87,10 +126,10 @@ class Embree:
             nearest[nearer], found[nearer] = depth[nearer], self._triangle_count + sphere
         if self._cards is None:
             return
-        rays, origin = np.arange(len(x)), np.zeros(len(x), np.float32)
+        rays, origin = np.arange(len(x)), np.zeros(len(x), np.float32)  # origins in Embree's unit
         while len(rays):
             ahead = directions[rays]
-            limits = np.minimum(nearest[rays] - origin, _FAR).astype(np.float32)
+            limits = np.minimum(nearest[rays] * self._unit - origin, _FAR).astype(np.float32)
             card = self._cards.run(ahead * origin[:, None], ahead, dists=limits) >> 1
             behind = np.flatnonzero(card >= 0)
             rays, card = rays[behind], card[behind].astype(np.intp)
@@ -99,8 +138,21 @@ class Embree:
             nearer = (depth < nearest[rays]) & (depth >= self._start)
             nearest[rays[nearer]], found[rays[nearer]] = depth[nearer], self._triangle_count + sphere[nearer]
             origin = self._card_depth[card] * np.float32(1 + _CARD_SPACING / 2)
-            onwards = np.flatnonzero(origin < nearest[rays])
+            onwards = np.flatnonzero(origin < nearest[rays] * self._unit)
             rays, origin = rays[onwards], origin[onwards]
+
+
+def _directions(x: Floats, y: Floats) -> NDArray[np.float32]:
+    directions = np.empty((len(x), 3), np.float32)
+    directions[:, 0], directions[:, 1], directions[:, 2] = x, y, 1
+    return directions
+
+
+def _embree_unit(triangles: Triangles, ellipsoids: Ellipsoids) -> float:
+    """Embree's units in one of the world: the power of two that makes the largest coordinate about `_LARGEST`."""
+    extents = np.abs(ellipsoids.positions).max(axis=0, initial=0.0) + ellipsoids.reach
+    largest = max(np.abs(triangles.vertices).max(initial=0.0), extents.max(initial=0.0)) or 1.0
+    return math.ldexp(_LARGEST, -math.frexp(largest)[1])
 
 
 def embree_scene(vertices: Floats, triangles: NDArray[np.int32]) -> "EmbreeScene":
@@ -110,9 +162,9 @@ def embree_scene(vertices: Floats, triangles: NDArray[np.int32]) -> "EmbreeScene
     return scene
 
 
-def _cards(ellipsoids: Ellipsoids, first: int) -> tuple["EmbreeScene", NDArray[np.float32]]:
-    """A card of two triangles before each sphere from `first` on, and the cards' depths."""
-    nearest = ellipsoids.nearest[first:]
+def _cards(ellipsoids: Ellipsoids, first: int, unit: float) -> tuple["EmbreeScene", NDArray[np.float32]]:
+    """A card of two triangles before each sphere from `first` on, and the cards' depths, in Embree's unit."""
+    nearest = ellipsoids.nearest[first:] * unit
     place = np.arange(len(nearest)) * _CARD_SPACING
     # The greatest depths that are not behind the spheres and grow by the spacing from card to card.
     depth = np.exp(np.minimum.accumulate((np.log(nearest) - place)[::-1])[::-1] + place) * (1 - _CARD_SPACING)
