@@ -191,6 +191,11 @@ def test_up_that_sweeps_through_the_view_is_as_near_as_a_view_that_sweeps_throug
     assert abs(abs(turns.item()) - math.pi) <= TURN
 
 
+def test_up_that_is_reversed_at_once_turns_the_picture_as_it_says():
+    _, near = roll.steps([(0, -1.0, 0.3), (0, -1.0, 0.3)], np.zeros(3), [(0, 0, 1.0), (0, 0, -1.0)], 0.5)
+    assert not near.any()
+
+
 def test_a_view_that_turns_with_up_is_not_near():
     up = np.array([(0, 0, 1.0), (0, 1.0, 0)])
     _, near = roll.steps([(0, -1.0, 0), (0, 0, 1.0)], np.zeros(3), up, 0.5)

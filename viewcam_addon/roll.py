@@ -59,10 +59,10 @@ def steps(eye: ArrayLike, look_at: ArrayLike, up: ArrayLike, within: float) -> t
     """
     u, v, w = basis(eye, look_at, up)
     pole = _normalised(np.broadcast_to(np.asarray(up, dtype=np.float64), w.shape))
-    carried = _rotated(u[:-1], w[:-1], w[1:], u[:-1])
+    carried = _rotated(u[:-1], w[:-1], w[1:])
     turns = np.arctan2(_dot(carried, v[1:]), _dot(carried, u[1:]))
     # Up may move as well: then the view's own start is where it would stand had it moved along with up.
-    start = _rotated(w[:-1], pole[:-1], pole[1:], u[:-1])
+    start = _rotated(w[:-1], pole[:-1], pole[1:])
     return turns, _passes_near(start, w[1:], pole[1:], within)
 
 
@@ -72,18 +72,15 @@ def carried(eye: ArrayLike, look_at: ArrayLike, up: ArrayLike, within: float) ->
     return np.concatenate([[0.0], np.cumsum(np.where(near, turns, 0.0))])
 
 
-def _rotated(vectors: Array, start: Array, end: Array, axis: Array) -> Array:
+def _rotated(vectors: Array, start: Array, end: Array) -> Array:
     """`vectors` under the smallest rotation that takes the unit vector `start` to `end`, all (n, 3).
 
-    For opposite ones half a turn about the unit vector `axis`, which is perpendicular to them.
+    Where these are opposite it is half a turn about what the vector has in the plane perpendicular to them.
     """
     total = start + end
     squared = _dot(total, total)
-    opposite = squared == 0
-    across = 2 * _dot(total, vectors) / np.where(opposite, 1.0, squared)
-    smallest = vectors - across[:, None] * total + 2 * _dot(start, vectors)[:, None] * end
-    half_turn = 2 * _dot(axis, vectors)[:, None] * axis - vectors
-    return np.where(opposite[:, None], half_turn, smallest)
+    across = 2 * _dot(total, vectors) / np.where(squared == 0, 1.0, squared)
+    return vectors - across[:, None] * total + 2 * _dot(start, vectors)[:, None] * end
 
 
 def _passes_near(start: Array, end: Array, pole: Array, within: float) -> NDArray[np.bool_]:

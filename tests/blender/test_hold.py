@@ -42,14 +42,18 @@ def held_camera(posed_camera):
     return posed_camera
 
 
+def key_a_loop(camera_object, miss=0.0, **options):
+    group = camera_object.virtual_pinhole
+    for frame in range(1, 42):
+        group.eye = over_the_top(frame - 21, miss)
+        group.keyframe_insert("eye", frame=frame, **options)
+    group.roll = 0.0
+
+
 @pytest.fixture
 def looping_camera(held_camera, scene):
     """The same, keyframed: exactly over the top at frame 21, from 20° before it at frame 1 to 20° behind it at frame 41."""
-    group = held_camera.virtual_pinhole
-    for frame in range(1, 42):
-        group.eye = over_the_top(frame - 21)
-        group.keyframe_insert("eye", frame=frame)
-    group.roll = 0.0
+    key_a_loop(held_camera)
     scene.frame_start, scene.frame_end = 1, 41
     scene.frame_set(1)
     return held_camera
@@ -327,9 +331,7 @@ def test_between_frames_the_picture_moves_on_evenly(looping_camera, scene):
     """Into and out of the reach of the pole too, which begins within a frame."""
     looping_camera.virtual_pinhole.hold_within = math.radians(7.3)
     for degree in (0.2, 5.0):
-        for frame in range(1, 42):
-            looping_camera.virtual_pinhole.eye = over_the_top(frame - 21, degree)
-            looping_camera.virtual_pinhole.keyframe_insert("eye", frame=frame)
+        key_a_loop(looping_camera, degree)
         before = None
         for tenth in range(120, 300):
             scene.frame_set(tenth // 10, subframe=tenth % 10 / 10)
@@ -350,6 +352,16 @@ def test_an_edit_that_is_not_keyed_yet_is_one_step_more(looping_camera, scene):
     assert findings.differences(cameras.stated(looping_camera, scene), cameras.read(looping_camera, scene), reach=10) == {}
     group.eye = over_the_top(-2)
     np.testing.assert_allclose(axes(looping_camera), before, atol=TURN)
+
+
+def test_an_edit_beside_the_reach_of_the_pole_carries_nothing_though_the_next_frame_will(looping_camera, scene):
+    scene.frame_set(10)  # 11° before the pole, and the next frame is 10° before it
+    looping_camera.virtual_pinhole.hold_within = math.radians(10.5)
+    x, _, z = over_the_top(-11)
+    looping_camera.virtual_pinhole.eye = (x * math.cos(0.2), x * math.sin(0.2), z)
+    assert hold.roll(looping_camera, scene) == 0
+    scene.frame_set(10)
+    assert hold.roll(looping_camera, scene) == 0
 
 
 def test_a_keyframed_roll_is_added(looping_camera, scene):
@@ -386,7 +398,20 @@ def test_a_frame_whose_values_make_no_camera_is_flown_across(looping_camera, sce
 def test_a_muted_curve_is_not_read(looping_camera, scene):
     for curve in hold.versions.action_curves(looping_camera):
         curve.mute = True
+    scene.frame_set(41)
+    assert tuple(looping_camera.virtual_pinhole.eye) == pytest.approx(over_the_top(-20))
     assert hold.roll(looping_camera, scene) == 0
+
+
+def test_a_muted_group_of_curves_is_read_where_blender_plays_it(looping_camera, scene):
+    looping_camera.animation_data_clear()
+    key_a_loop(looping_camera, group="Flight")
+    scene.frame_set(1)
+    for curve in hold.versions.action_curves(looping_camera):
+        curve.group.mute = True
+    scene.frame_set(41)
+    has_flown = looping_camera.virtual_pinhole.eye[0] > 0
+    assert (abs(hold.roll(looping_camera, scene)) > 3) == has_flown
 
 
 def test_time_that_is_stretched_is_followed(looping_camera, scene):

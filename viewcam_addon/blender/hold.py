@@ -90,9 +90,7 @@ def _numbers(pinhole: Pinhole) -> tuple[float, ...]:
 
 
 def _view_curves(curves: list[bpy.types.FCurve]) -> list[bpy.types.FCurve]:
-    return [
-        curve for curve in curves if curve.data_path in _COLUMNS and not curve.mute and not (curve.group and curve.group.mute)
-    ]
+    return [curve for curve in curves if curve.data_path in _COLUMNS and not versions.is_muted(curve)]
 
 
 def _carried_since_first_frame(group: bpy.types.PropertyGroup, curves: list[bpy.types.FCurve], scene: bpy.types.Scene) -> float:
