@@ -74,15 +74,21 @@ def keep_normals(borrow: Borrower, material: bpy.types.Material) -> None:
 
 def fill_empty_slots(borrow: Borrower, block: bpy.types.Object) -> None:
     """Give an object a material where it has none, until the loan ends: Cycles' own default bends normals."""
-    plain = bpy.data.materials.new("Virtual Pinhole")
-    borrow.afterwards(bpy.data.materials.remove, plain)
-    plain.cycles.use_bump_map_correction = False
+    material = plain(borrow)
     if not block.material_slots:
         borrow.afterwards(block.data.materials.clear)  # pop would leave a slot behind on the object
-        block.data.materials.append(plain)
+        block.data.materials.append(material)
     for slot in block.material_slots:
         if slot.material is None:
-            borrow.set(slot, "material", plain)
+            borrow.set(slot, "material", material)
+
+
+def plain(borrow: Borrower) -> bpy.types.Material:
+    """A material that leaves all passes alone, gone when the loan ends."""
+    material = bpy.data.materials.new("Virtual Pinhole")
+    borrow.afterwards(bpy.data.materials.remove, material)
+    material.cycles.use_bump_map_correction = False
+    return material
 
 
 def _nodes(tree: bpy.types.NodeTree, seen: set[bpy.types.NodeTree]) -> Iterator[bpy.types.Node]:

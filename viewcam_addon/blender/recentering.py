@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..pinhole import Pinhole
 from . import camera as cameras
-from . import datablocks, features, findings, pose
+from . import datablocks, features, findings, materials, pose
 from .borrowing import Borrower, borrowed, still_of_one_layer
 from .depsgraph import visit
 from .export import placements
@@ -127,8 +127,8 @@ def recentred(
         )
         _remove_keys_but(keys)
         temporary = _empty_scene(borrow, scene)
+        camera = _camera(borrow, temporary, view)  # before all others: it asks for a depsgraph
         shown = _place(borrow, temporary, placed)
-        camera = _camera(borrow, temporary, view)
         _visit(temporary, temporary.view_layers[0], camera, lambda depsgraph: _verify(depsgraph, shown, copies))
         yield Recentred(temporary, camera, view.shown.eye, {each.name: source.name for each, source in shown.items()})
 
@@ -145,6 +145,7 @@ def _seen(
     """What of the file is rendered; geometries are copied, and the copies gone when the loan ends."""
     view = _view(depsgraph, camera_object)
     eye = np.array(view.shown.eye)
+    plain = materials.plain(borrow)
     copies: dict[tuple[int, int], _Copy] = {}
     placed = []
     for source, matrix in placements(depsgraph, ledger):
@@ -152,7 +153,8 @@ def _seen(
         if source.key not in copies:
             data = source.data.copy()
             borrow.afterwards(bpy.data.batch_remove, [data])
-            copies[source.key] = _moved(data, matrix, source.slots)
+            _set_materials(data, [(material and material.original) or plain for material in source.slots])
+            copies[source.key] = _moved(data, matrix)
         copy = copies[source.key]
         matrix[:3, 3] += matrix[:3, :3] @ copy.anchor
         placed.append(_Placed(source.name, copy.data, matrix, source.object_index))
@@ -187,15 +189,20 @@ def _view(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) -> _V
     )
 
 
-def _moved(data: Geometry, matrix: Array, slots: tuple[bpy.types.Material | None, ...]) -> _Copy:
-    """Take off a copied geometry the point of its bounding box that is nearest to the eye, and give it its object's materials.
+def _set_materials(data: Geometry, slots: list[bpy.types.Material]) -> None:
+    """Give a geometry the materials that its object's slots have."""
+    for index, material in enumerate(slots):
+        if index == len(data.materials):
+            data.materials.append(material)
+        else:
+            data.materials[index] = material
+
+
+def _moved(data: Geometry, matrix: Array) -> _Copy:
+    """Take off a copied geometry the point of its bounding box that is nearest to the eye.
 
     matrix : (4, 4), of the first object that shows it, relative to the eye.
     """
-    for index, material in enumerate(slots):
-        if index == len(data.materials):
-            data.materials.append(None)
-        data.materials[index] = material and material.original
     elements = data.vertices if isinstance(data, bpy.types.Mesh) else data.points
     points = np.empty((len(elements), 3), np.float32)
     elements.foreach_get("co", points.ravel())
