@@ -81,3 +81,12 @@ def test_the_panel_means_the_active_camera_else_the_scenes(posed_camera, add_cam
     assert datablocks.camera_in(bpy.context) == posed_camera
     bpy.context.view_layer.objects.active = other
     assert datablocks.camera_in(bpy.context) == other
+
+
+def test_an_up_in_doubt_comes_with_a_better_one_and_a_certain_one_does_not(posed_camera, scene):
+    assert panel.better_up(posed_camera, scene) is None
+    group = posed_camera.virtual_pinhole
+    group.eye, group.look_at = (0.5, 0.25, 5), (0.5, 0.25, 0)
+    assert panel.better_up(posed_camera, scene) == (1, 0, 0)
+    group.look_at = group.eye
+    assert panel.better_up(posed_camera, scene) is None

@@ -5,6 +5,7 @@ import math
 import bpy
 
 from ..errors import InputError
+from ..pinhole import Triple
 from . import camera as cameras
 from . import datablocks, hold, readouts
 from .properties import VALUES
@@ -39,6 +40,9 @@ class _CameraPanel:
             button.operator(operator).camera = camera_object.name
         rows, warnings = contents(camera_object, scene)
         self._draw_warnings(warnings, context)
+        up = better_up(camera_object, scene)
+        if up:
+            layout.operator("viewcam.choose_up", text=f"Use Up {readouts.vector(up)}").camera = camera_object.name
         _draw_rows(rows, layout)
 
     def _draw_warnings(self, warnings: list[str], context: bpy.types.Context) -> None:
@@ -77,6 +81,17 @@ def contents(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> tuple[l
     warnings += datablocks.beyond_pinhole(camera_object, scene)
     length = datablocks.length(math.dist(stated.eye, stated.look_at), scene) if stated else None
     return readouts.readouts(found, camera_object.data.lens, length), warnings
+
+
+def better_up(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Triple | None:
+    """The up that the panel offers where the stated one leaves the roll in doubt."""
+    try:
+        stated = cameras.stated(camera_object, scene)
+    except InputError:
+        return None
+    if stated and readouts.roll_warning(stated, camera_object.virtual_pinhole.precision()):
+        return readouts.certain_up(stated)
+    return None
 
 
 class VIEWCAM_PT_data(_CameraPanel, bpy.types.Panel):

@@ -24,14 +24,14 @@ def readouts(camera: Pinhole, lens: float, look_at_distance: str | None) -> list
         ("Vertical FOV", f"{upright:.4f}°"),
         ("Diagonal FOV", f"{diagonal:.4f}°"),
     ]
-    rows += [(name, *_vector(axis)) for name, axis in zip("uvw", camera.axes(), strict=True)]
+    rows += [(name, *_components(axis)) for name, axis in zip("uvw", camera.axes(), strict=True)]
     if look_at_distance is not None:
         rows.append(("To Look-At", look_at_distance))
     return rows
 
 
-def _vector(vector: Triple) -> tuple[str, ...]:
-    return tuple(f"{round(component, 5) + 0.0:+.5f}" for component in vector)
+def _components(axis: Triple) -> tuple[str, ...]:
+    return tuple(f"{round(component, 5) + 0.0:+.5f}" for component in axis)
 
 
 def pose_warnings(stated: Pinhole, precision: float) -> list[str]:
@@ -66,6 +66,11 @@ def certain_up(stated: Pinhole) -> Triple:
     v = stated.axes()[1]
     axis = tuple(float(round(component)) for component in v)
     return axis if max(abs(a - b) for a, b in zip(axis, v, strict=True)) <= findings.LARGEST_TURN else v
+
+
+def vector(numbers: Triple) -> str:
+    """As one writes it: (1, 0, 0), (0.70711, -0.70711, 0)."""
+    return f"({', '.join(f'{round(number, 5) + 0.0:g}' for number in numbers)})"
 
 
 def distance_warning(stated: Pinhole) -> str | None:
