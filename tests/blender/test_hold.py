@@ -505,6 +505,19 @@ def test_what_cycles_is_compared_with_is_the_held_camera(looping_camera, scene, 
     found.check()
 
 
+def test_a_check_at_another_size_sees_the_held_camera_and_leaves_it_as_it_was(held_camera, scene, both_sides):
+    bpy.ops.mesh.primitive_monkey_add(size=8)
+    group = held_camera.virtual_pinhole
+    group.eye = over_the_top(-5)
+    group.roll = 1.0
+    group.when_set = group.when_set.replace("[", "[ ")  # as nobody but this test would write it
+    expected, before = cameras.stated(held_camera, scene).basis(), (group.roll, group.when_set, axes(held_camera).tolist())
+    found = both_sides(size=(120, 90))
+    np.testing.assert_array_equal(found.exported.stated_camera.basis(), expected)
+    found.check()
+    assert (group.roll, group.when_set, axes(held_camera).tolist()) == before
+
+
 def test_a_frame_change_stays_fast_after_ten_thousand_frames(held_camera, scene):
     """All nine values, keyed every hundred frames."""
     random, group = np.random.default_rng(4), held_camera.virtual_pinhole
