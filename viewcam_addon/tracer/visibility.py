@@ -12,8 +12,8 @@ that they touch.
 
 embreex knows no nearest distance, so a ray starts where the clip range does, or behind the last card.
 
-**Corners** of triangles may let a ray slip through that passes close by (corners.py). Then four rays round it are traced too, and
-where three of them meet something before what the ray itself met, the nearest of that is what it meets.
+**Corners** of triangles may let a ray slip through that passes close by (corners.py). Then four rays round it are traced
+too, and where three of them meet something before what the ray itself met, the nearest of that is what it meets.
 """
 
 import math
