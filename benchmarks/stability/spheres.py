@@ -31,8 +31,9 @@ Formula = Callable[[Array, Array, Array], Array]
 
 # Half a dozen roundings of float64 in a depth.
 TIE = 6 * 2.0**-53
-# Rays that meet a surface at a cosine of 0.1, as flat as one in a hundred does, slide ten times as far along it.
+# Rays that meet a surface at a cosine of 0.1 slide ten times as far along it; flatter ones have a chart of their own.
 SLANTED_TIE = 10 * TIE
+_FLATTEST = 0.1
 # Shares of rays that differ by less than this are the same share of a few hundred.
 SHARE_TIE = 0.01
 _FORWARD = np.array([0.0, 0.0, -1.0])
@@ -58,11 +59,11 @@ class Shots:
 def charts(quick: bool = False) -> tuple[Chart, ...]:
     rays = 60 if quick else 2000
     distance, decisions = _measured(_far_away, 10.0 ** np.arange(0.5, 17.5), rays)
-    grazing_depth, grazing = _measured(_grazed, 10.0 ** -np.arange(0.0, 18), rays)
+    grazing_depth, grazing = _measured(_grazed, 10.0 ** -np.arange(0.0, 18), rays, flattest=0.0)
     near, near_decisions = _measured(_from_nearby, 10.0 ** -np.arange(0.0, 17), rays)
     stretched, _ = _measured(_stretched, 10.0 ** np.arange(-6.0, 7), rays)
     homeless, _ = _measured(_far_from_home, 10.0 ** np.arange(0.0, 13), rays)
-    depth, share = "relative error of the depth, 99 % are within", "share of rays for which hit or miss is decided wrongly"
+    depth, share = "largest relative error of the depth", "share of rays for which hit or miss is decided wrongly"
     return (
         Chart(
             "spheres-distance",
@@ -206,31 +207,31 @@ def _aimed(matrix: Array, centers: Array, radii: Array, offset: Array, random: n
     return Shots(matrix, centers, radii, np.zeros(3), -x / z, -y / z)
 
 
-def _measured(shots: Callable[..., Shots], sweep: Array, rays: int) -> tuple[tuple[Curve, ...], tuple[Curve, ...]]:
-    """The curves of the depth's errors and of the wrong decisions."""
+def _measured(
+    shots: Callable[..., Shots], sweep: Array, rays: int, flattest: float = _FLATTEST
+) -> tuple[tuple[Curve, ...], tuple[Curve, ...]]:
+    """The curves of the depth's errors, of rays that meet the surface at this cosine or more, and of the wrong decisions."""
     found: dict[str, list[tuple[float, float]]] = {}
     for x in sweep:
         aimed = shots(x, rays, np.random.default_rng(3))
-        truth = np.array(list(_true_depths(aimed)))
+        truth, cosine = np.array(list(_true_depths(aimed))).T
         for name, depths in _found_depths(aimed):
-            found.setdefault(name, []).append(_errors(depths, truth))
+            found.setdefault(name, []).append(_errors(depths, truth, cosine >= flattest))
     return tuple(
         tuple(Curve(name, sweep, [errors[kind] for errors in values], name == "ours") for name, values in found.items())
         for kind in range(2)
     )
 
 
-def _errors(depths: Array, truth: Array) -> tuple[float, float]:
-    """Relative error of the depth where both hit, of all but the worst percent, nan if none does; share of wrong decisions.
-
-    The worst percent are rays that happen to graze, which have a chart of their own.
-    """
-    both = np.isfinite(depths) & np.isfinite(truth)
-    error = np.quantile(np.abs(depths[both] / truth[both] - 1), 0.99) if both.any() else np.nan
-    return error, np.mean(np.isfinite(depths) != np.isfinite(truth))
+def _errors(depths: Array, truth: Array, counted: NDArray[np.bool_]) -> tuple[float, float]:
+    """Largest relative error of the depth where it counts and both hit, nan if none does; share of wrong decisions."""
+    both = np.isfinite(depths) & np.isfinite(truth) & counted
+    largest = np.abs(depths[both] / truth[both] - 1).max() if both.any() else np.nan
+    return largest, np.mean(np.isfinite(depths) != np.isfinite(truth))
 
 
-def _true_depths(shots: Shots) -> Iterator[float]:
+def _true_depths(shots: Shots) -> Iterator[tuple[float, float]]:
+    """The depth of each ray, inf where it misses, and the cosine at which it meets the unit sphere that the ellipsoid was."""
     with mpmath.workdps(_DIGITS):
         matrix = mpmath.matrix(shots.matrix.tolist())
         linear = matrix[:3, :3]
@@ -246,7 +247,11 @@ def _true_depths(shots: Shots) -> Iterator[float]:
             tangent = mpmath.fdot(f, f) - mpmath.mpf(radius) ** 2
             discriminant = along * along - square * tangent
             seen = tangent > 0 and along > 0 and discriminant >= 0
-            yield float(tangent / (along + mpmath.sqrt(discriminant))) if seen else np.inf
+            if seen:
+                root = mpmath.sqrt(discriminant)
+                yield float(tangent / (along + root)), float(root / mpmath.sqrt(square) / mpmath.mpf(radius))
+            else:
+                yield np.inf, 0.0
 
 
 def _found_depths(shots: Shots) -> Iterator[tuple[str, Array]]:
