@@ -133,6 +133,21 @@ def test_follow_path_carries_the_camera_and_the_pose_sticks(
     odd.check(posed_camera)
 
 
+def test_follow_path_along_a_scaled_curve_moves_the_camera(posed_camera, constrain, path, odd):
+    path.scale = (2, 2, 2)
+    constrain("FOLLOW_PATH", target=False, offset=20).target = path
+    odd.check(posed_camera)
+
+
+def test_what_carries_the_camera_is_told_exactly_though_it_stood_far_away(posed_camera, constrain, scene):
+    constrain("CHILD_OF")
+    bpy.data.objects["Target"].location = (2, 3, 4)
+    group = posed_camera.virtual_pinhole
+    for height in (1e6, 5):
+        group.eye = (7, -6, height)
+        assert cameras.check(posed_camera, cameras.stated(posed_camera, scene), scene) == []
+
+
 def test_follow_path_with_an_animated_offset_takes_the_camera_along(posed_camera, constrain, path, scene, odd):
     constraint = constrain("FOLLOW_PATH", target=False)
     constraint.target = path

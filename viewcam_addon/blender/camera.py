@@ -46,7 +46,7 @@ def apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Sc
         a number is too large for Blender. Nothing has changed then.
     """
     _check_storable(camera_object, look_at=pinhole.look_at, up=pinhole.up, distance=pinhole.distance)
-    place(camera_object, pinhole, scene, datablocks.depsgraph_of(scene))
+    _place_closely(camera_object, pinhole, scene)
     frame = datablocks.frame_of(scene)
     camera_object.virtual_pinhole.state(
         pinhole.eye, pinhole.look_at, pinhole.up, pinhole.distance[0] * frame.resolution_x / frame.size[0], frame.size
@@ -68,7 +68,7 @@ def follow(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
     if hold.is_written_by_edits(camera_object):
         before = _stood_at(camera_object, scene)
         roll = angle = hold.after_edit(before, level, roll, group.hold_within) if before else roll
-    place(camera_object, rolls.turned(level, angle), scene, datablocks.depsgraph_of(scene))
+    _place_closely(camera_object, rolls.turned(level, angle), scene)
     group.settle(datablocks.frame_of(scene).size, roll)
 
 
@@ -90,6 +90,12 @@ def place(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Sc
     if (camera.sensor_width, camera.sensor_height) != (data.sensor_width, data.sensor_height):
         camera.sensor_width, camera.sensor_height = data.sensor_width, data.sensor_height
     camera.virtual_pinhole_sensor = sensor if data.sensor_width != sensor[0] else (0.0, 0.0)
+
+
+def _place_closely(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene) -> None:
+    """`place`, and once more from there if what carries the camera is told by its pose, which may have been far away."""
+    for _ in range(2 if pose.is_told_by_its_pose(camera_object) else 1):
+        place(camera_object, pinhole, scene, datablocks.depsgraph_of(scene))
 
 
 def _check_storable(camera_object: bpy.types.Object, **numbers: tuple[float, ...]) -> None:
@@ -130,7 +136,7 @@ def read(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
             f"camera {camera_object.name!r} takes no part in scene {scene.name!r}: "
             "enable it and its collection in the viewport, or make it the scene's camera"
         )
-    matrix = np.array(evaluated.matrix_world)
+    matrix = pose.float64(evaluated.matrix_world)
     sizes = np.linalg.norm(matrix[:3, :3], axis=0)
     if not np.isfinite(matrix).all() or not sizes.all():
         raise pose.no_size(camera_object)
@@ -182,7 +188,6 @@ def _level(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
     plane = intrinsics.view_plane(datablocks.camera_data_of(evaluated.data), frame)
     eye, look_at, up, distance = camera_object.virtual_pinhole.numbers()
     distance *= frame.size[0] / frame.resolution_x
-    mirrored = np.linalg.det(np.array(evaluated.matrix_world)[:3, :3]) < 0
     return Pinhole(
         eye,
         look_at,
@@ -191,7 +196,7 @@ def _level(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
         plane.width,
         plane.height,
         plane.principal_point,
-        bool(mirrored),
+        pose.mirrors(evaluated.matrix_world),
     )
 
 
@@ -254,7 +259,7 @@ def _simplest_up(eye: tuple, look_at: tuple, v: Array) -> tuple[float, float, fl
 def _focus_distance(camera_object: bpy.types.Object, pinhole: Pinhole, depsgraph: bpy.types.Depsgraph) -> float:
     focus = camera_object.data.dof
     if focus.focus_object:
-        depth = float(pinhole.project(np.array(focus.focus_object.evaluated_get(depsgraph).matrix_world.translation))[2])
+        depth = float(pinhole.project(pose.float64(focus.focus_object.evaluated_get(depsgraph).matrix_world.translation))[2])
         if depth > 0:
             return depth
     return focus.focus_distance or 10.0

@@ -6,11 +6,11 @@ Everything is float64 from Blender's float32 matrices on, each (4, 4) or (3, 3),
 may lie above 2 and be rounded by 2⁻²³ each, and the third, below 1 then, by 2⁻²⁵. Rounding the matrix turns it by √3 · 2⁻²⁵ at
 most. That is 3.2e-7 rad. Quaternions, and axis and angle, are worse: Blender normalises them in float32, which costs as much as
 storing them, and up to 5.3e-7 rad were found. So `set_rotation` tries the neighbouring float32 numbers and asks Blender which
-make the right matrix: 1.6e-7 rad at most in every mode. Rejected: Blender's float32 arithmetic done here once more (its
+make the right matrix: 1.8e-7 rad at most in every mode. Rejected: Blender's float32 arithmetic done here once more (its
 rounding differs from one processor to another).
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import bpy
 import numpy as np
@@ -27,21 +27,26 @@ Array = NDArray[np.float64]
 LARGEST_SKEW = 32 * 4 * 2.0**-24
 
 
+def float64(numbers: Iterable) -> Array:
+    """The numbers of a Blender matrix or vector. From 5.0 on NumPy takes these for float32, and would compute in it."""
+    return np.array(numbers, dtype=np.float64)
+
+
 def channels(
     camera_object: bpy.types.Object, pinhole: Pinhole, depsgraph: bpy.types.Depsgraph
 ) -> tuple[tuple[float, ...], Array, tuple[float, ...]]:
     """Location, (3, 3) rotation and scale that bring the camera to the pose, relative to its parent and its delta transform."""
     parent = parent_matrix(camera_object, depsgraph)
-    if np.linalg.det(parent[:3, :3]) == 0:
+    if not np.isfinite(parent).all() or np.linalg.det(parent[:3, :3]) == 0:
         raise no_size(camera_object)
     u, v, w = pinhole.basis()
     wanted = np.column_stack([-u if pinhole.mirrored else u, v, w])
-    scale, signs = np.array(camera_object.scale), _signs(camera_object)
+    scale, signs = float64(camera_object.scale), _signs(camera_object)
     local = np.linalg.solve(parent[:3, :3], wanted)
     if np.linalg.det(local) * signs.prod() < 0:
         scale[0], signs[0] = -scale[0], -signs[0]
     turn = rotation.nearest(local / np.linalg.norm(local, axis=0) * signs)
-    location = np.linalg.solve(parent[:3, :3], np.array(pinhole.eye) - parent[:3, 3]) - np.array(camera_object.delta_location)
+    location = np.linalg.solve(parent[:3, :3], np.array(pinhole.eye) - parent[:3, 3]) - float64(camera_object.delta_location)
     return tuple(location.tolist()), _delta_rotation(camera_object).T @ turn, tuple(scale.tolist())
 
 
@@ -59,9 +64,10 @@ def set_rotation(camera_object: bpy.types.Object, turn: Array) -> None:
     made = []
     for candidate in candidates:
         setattr(camera_object, name, candidate)
-        made.append(np.array(camera_object.matrix_basis)[:3, :3])
+        made.append(float64(camera_object.matrix_basis)[:3, :3])
     sizes = np.linalg.norm(made, axis=1, keepdims=True)
-    errors = np.abs(made / np.where(sizes, sizes, 1.0) - wanted).max(axis=(1, 2))
+    with np.errstate(invalid="ignore"):  # a scale beyond all numbers
+        errors = np.abs(made / np.where(sizes, sizes, 1.0) - wanted).max(axis=(1, 2))
     setattr(camera_object, name, candidates[np.argmin(errors)])
 
 
@@ -72,15 +78,18 @@ def _signs(camera_object: bpy.types.Object) -> Array:
 
 def _full_scale(block: bpy.types.Object) -> Array:
     """(3,): an object's own scale, delta included."""
-    return np.array(block.scale) * np.array(block.delta_scale)
+    return float64(block.scale) * float64(block.delta_scale)
 
 
 def _delta_rotation(camera_object: bpy.types.Object) -> Array:
     """The (3, 3) rotation that Blender applies after the object's own; for the mode AXIS_ANGLE Blender shows none."""
     mode = camera_object.rotation_mode
-    if mode == "QUATERNION":
-        return rotation.from_quaternion(camera_object.delta_rotation_quaternion)
-    return np.eye(3) if mode == "AXIS_ANGLE" else rotation.from_euler(camera_object.delta_rotation_euler, mode)
+    if mode == "AXIS_ANGLE":
+        return np.eye(3)
+    numbers = camera_object.delta_rotation_quaternion if mode == "QUATERNION" else camera_object.delta_rotation_euler
+    if not np.isfinite(numbers).all():
+        raise no_size(camera_object)
+    return rotation.from_quaternion(numbers) if mode == "QUATERNION" else rotation.from_euler(numbers, mode)
 
 
 def parent_matrix(camera_object: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Array:
@@ -94,19 +103,33 @@ def parent_matrix(camera_object: bpy.types.Object, depsgraph: bpy.types.Depsgrap
         if it can't be told, since the camera is scaled to zero.
     """
     parent = camera_object.parent
-    constraints = list(active_constraints(camera_object))
-    is_carried = bool(constraints) and all(map(_carries, constraints))
-    if not is_carried and parent is None:
-        return np.eye(4)
-    inverse = np.array(camera_object.matrix_parent_inverse)
-    if not is_carried and camera_object.parent_type == "OBJECT" and parent.type != "CURVE":
-        return np.array(parent.evaluated_get(depsgraph).matrix_world) @ inverse
-    # Bones, vertices, paths and constraints: what Blender itself takes for the parent's matrix.
+    inverse = float64(camera_object.matrix_parent_inverse)
+    if not is_told_by_its_pose(camera_object):
+        return float64(parent.evaluated_get(depsgraph).matrix_world) @ inverse if parent else np.eye(4)
     evaluated = camera_object.evaluated_get(depsgraph)
-    own = np.array(evaluated.matrix_basis) if is_carried else np.linalg.inv(inverse) @ np.array(evaluated.matrix_local)
+    if _is_carried_by_constraints(camera_object):
+        own = float64(evaluated.matrix_basis)
+    else:  # Blender's local matrix is relative to the bone, the vertices or the place on the path
+        own = np.linalg.inv(inverse) @ float64(evaluated.matrix_local)
     if np.linalg.det(own) == 0:
         raise no_size(camera_object)
-    return np.array(evaluated.matrix_world) @ np.linalg.inv(own)
+    return float64(evaluated.matrix_world) @ np.linalg.inv(own)
+
+
+def is_told_by_its_pose(camera_object: bpy.types.Object) -> bool:
+    """Whether only Blender knows the matrix that carries the camera, so that it is told from how the camera stands.
+
+    It is told with the rounding of this pose: best from one close to that which is wanted.
+    """
+    parent = camera_object.parent
+    is_plain = parent is None or (camera_object.parent_type == "OBJECT" and parent.type != "CURVE")
+    return not is_plain or _is_carried_by_constraints(camera_object)
+
+
+def mirrors(matrix: Iterable) -> bool:
+    """Whether a (4, 4) matrix of Blender's mirrors; one that is not finite does nothing."""
+    matrix = float64(matrix)
+    return bool(np.isfinite(matrix).all() and np.linalg.det(matrix[:3, :3]) < 0)
 
 
 def active_constraints(block: bpy.types.Object) -> Iterator[bpy.types.Constraint]:
@@ -114,18 +137,31 @@ def active_constraints(block: bpy.types.Object) -> Iterator[bpy.types.Constraint
     return (constraint for constraint in block.constraints if constraint.enabled and constraint.influence > 0)
 
 
+def _is_carried_by_constraints(camera_object: bpy.types.Object) -> bool:
+    constraints = list(active_constraints(camera_object))
+    return bool(constraints) and all(map(_carries, constraints))
+
+
 def _carries(constraint: bpy.types.Constraint) -> bool:
     """Whether a constraint moves an object as a parent does: it multiplies its matrix by one that does not depend on it."""
     if constraint.type == "COPY_LOCATION":
         return constraint.use_offset and constraint.owner_space == "WORLD"
-    if constraint.type == "ARMATURE" and constraint.use_current_location:
+    if constraint.influence < 1:
         return False
-    return constraint.type in ("CHILD_OF", "ARMATURE", "FOLLOW_PATH") and constraint.influence == 1
+    if constraint.type == "ARMATURE":
+        return not constraint.use_current_location
+    if constraint.type == "FOLLOW_PATH" and constraint.target:
+        # The path's scale acts on the location alone.
+        sizes = np.linalg.norm(float64(constraint.target.matrix_world)[:3, :3], axis=0)
+        return bool(np.abs(sizes - 1).max() <= LARGEST_SKEW)
+    return constraint.type == "CHILD_OF"
 
 
 def no_size(camera_object: bpy.types.Object) -> InputError:
-    """The error of a camera whose matrix is singular or not finite, naming whose scale it is."""
+    """The error of a camera whose matrix is singular or not finite, naming whose transform it is."""
     for block in (camera_object, *ancestors(camera_object)):
+        if not np.isfinite(float64(block.matrix_basis)).all():
+            return InputError(f"the transform of {block.name!r} holds a number that is not finite: clear it, deltas included")
         if not all(_full_scale(block)):
             who = "" if block == camera_object else f" by {block.name!r} above it"
             return InputError(f"camera {camera_object.name!r} is scaled to zero{who}: give {block.name!r} a scale of 1")
@@ -167,6 +203,6 @@ def reach(camera_object: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> fl
     parent = camera_object.parent
     if parent is None:
         return own
-    world = np.array(parent.evaluated_get(depsgraph).matrix_world)
-    inverse = np.array(camera_object.matrix_parent_inverse)
+    world = float64(parent.evaluated_get(depsgraph).matrix_world)
+    inverse = float64(camera_object.matrix_parent_inverse)
     return own + np.linalg.norm(world[:3, :3], 2) * np.linalg.norm(inverse[:3, 3]) + np.linalg.norm(world[:3, 3])
