@@ -153,3 +153,25 @@ def test_a_triangle_seen_nearly_edge_on_is_met_within_its_own_depths(make_mesh):
         depth, first, second = planes.hit(np.zeros(3, np.intp), np.array([0, 0, 0.1]), np.array([0, 1e-9, -1e-9]))
         assert ((depth >= 2) & (depth <= 9)).all(), f"lift {lift}: {depth}"
         assert ((first >= 0) & (second >= 0) & (first + second <= 1 + FLOAT64)).all(), f"lift {lift}: {first}, {second}"
+
+
+@pytest.mark.parametrize("slenderness", [1e2, 1e6, 1e12])
+def test_the_depth_of_a_sliver_does_not_know_how_slender_it_is(make_mesh, slenderness):
+    rng = np.random.default_rng(2)
+    camera = Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 1, 1, 1)
+    for _ in range(20):
+        along = rng.normal(size=3)
+        across = np.cross(along, rng.normal(size=3))
+        across /= np.linalg.norm(across) * slenderness / np.linalg.norm(along)
+        corners = np.array([along, -along, 0.2 * along + across]) * 0.3 - (0, 0, 3.0)
+        planes = in_camera_space(camera, make_mesh(corners, [[0, 1, 2]]))
+        point = np.array([0.3, 0.3, 0.4]) @ (corners * (1, 1, -1))
+        x, y = point[:2] / point[2]
+        depth = float(planes.depth(np.zeros(1, np.intp), np.array([x]), np.array([y]))[0])
+        a, b, c = ([Fraction(value) for value in corner] for corner in corners * (1, 1, -1))
+        p, q = ([end - start for start, end in zip(a, other, strict=True)] for other in (b, c))
+        ray = [Fraction(x), Fraction(y), Fraction(1)]
+        exact_depth = float(determinant(a, p, q) / determinant(ray, p, q))
+        cosine = abs(np.dot(np.cross(along, across), (x, y, -1))) / np.linalg.norm(np.cross(along, across))
+        # As for any triangle: some eight products and sums of 2⁻⁵³, over the cosine between the plane and the ray.
+        assert abs(depth / exact_depth - 1) <= 16 * FLOAT64 / cosine, f"{depth / exact_depth - 1:.1e}"
