@@ -131,6 +131,13 @@ def test_a_roll_that_is_typed_turns_the_picture_and_zero_levels_it(held_camera, 
     np.testing.assert_allclose(axes(held_camera), level, atol=TURN)
 
 
+def test_a_roll_that_is_no_number_leaves_the_camera_where_it_is_and_the_panel_says_so(held_camera, scene):
+    before = axes(held_camera)
+    held_camera.virtual_pinhole.roll = math.nan
+    np.testing.assert_array_equal(axes(held_camera), before)
+    assert panel.contents(held_camera, scene)[1] == ["Roll is nan: give a finite angle"]
+
+
 def test_canonical_axes_level_the_picture_at_once(held_camera):
     group = held_camera.virtual_pinhole
     level = axes(held_camera)
@@ -444,6 +451,8 @@ def test_an_nla_strip_can_not_be_held_and_the_panel_says_so(looping_camera, scen
     assert hold.roll(looping_camera, scene) == 0
     assert sum(warning.startswith("An NLA strip sets the eye, ") for warning in panel.contents(looping_camera, scene)[1]) == 1
     track.mute = True
+    assert hold.obstacle(looping_camera) is None
+    track.mute, data.use_nla = False, False
     assert hold.obstacle(looping_camera) is None
 
 
