@@ -5,8 +5,8 @@ meets none of them has leaked; one that more than one of them reports is a doubl
 ray that counts what it passes through does. Depths are measured on single triangles, against rational arithmetic on the very
 float64 numbers that the methods are given.
 
-Candidates, given the corners relative to the eye: Möller and Trumbore (Fast, minimum storage ray/triangle intersection, 1997) in
-float32 and float64; Woop, Benthin and Wald (Watertight ray/triangle intersection, 2013) in both, in float32 with its way out to
+Candidates, given the corners relative to the eye: Möller and Trumbore (Fast, minimum storage ray/triangle intersection, 1997)
+in float32 and float64; Woop, Benthin and Wald (Watertight ray/triangle intersection, 2013) in both, in float32 with its way out to
 float64; Embree, robust and not, with its own float32 depth. Ours is Embree, robust, with an eye on corners (tracer/corners.py)
 and the depth in float64 (tracer/triangles.py); without Embree it is Plain in tracer/visibility.py.
 """
@@ -57,8 +57,8 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             "leaks per million rays",
             leaks,
             "Möller and Trumbore's test leaks one ray in ten to twenty at any distance, in float64 as in float32, and so does "
-            "Embree outside of its robust mode; within, at vertices. Ours leaks nowhere, with Embree and without. The sweep ends "
-            "where a triangle is as small as some fifty roundings of float32.",
+            "Embree outside of its robust mode; within, at vertices. Ours leaks nowhere, with Embree and without. The sweep "
+            "ends where a triangle is as small as some fifty roundings of float32.",
             tie=RARE,
         ),
         Chart(

@@ -106,8 +106,8 @@ def aims(vertices: np.ndarray, edges: np.ndarray, count: int, rng) -> np.ndarray
 def is_leak(passes, x, y, depth) -> np.ndarray:
     distance = np.maximum(np.abs(x), np.abs(y))
     # What is met lies beside the ray by the reach of a corner at most, in each coordinate, and as much farther as it slants.
-    # And Embree orders depths in float32: corners are off by 2⁻²⁴, the products and sums of a depth by as much each, which is no
-    # more than a corner's reach again.
+    # And Embree orders depths in float32: corners are off by 2⁻²⁴, the products and sums of a depth by as much each, which is
+    # no more than a corner's reach again.
     aside = corners.REACH * (1 + np.sqrt(2) * distance * np.maximum(distance, 1))
     behind = passes["Depth"][:, 0] / depth - 1
     allowed = aside / np.maximum(passes["Facing"][:, 0], 2.0**-24)
