@@ -41,6 +41,8 @@ FLATTEST = 2.0**-18
 
 _FLOAT32 = 2.0**-24
 _ROUNDING, _ARITHMETIC = 3.5, 8.0
+# Flatter caps are lower than u σ L, and no surface to speak of.
+_FLATTEST_CAP = 2.0**11
 # Seen from the start, L is the distance: σ is taken as 1, and direction and length are rounded as well, by √3 and by 1.
 _ENDING = 4.0
 
@@ -50,8 +52,8 @@ def triangle_offsets(triangles: Triangles) -> Floats:
     a, b, c = gather(triangles.vertices, triangles.corners).transpose(1, 0, 2)
     sides = np.sort([_length(b - a), _length(c - b), _length(a - c)], axis=0)
     doubled_area = _length(cross(b - a, c - a))
-    with np.errstate(all="ignore"):  # a triangle without area is no surface
-        cap = np.nan_to_num(sides[0] * sides[2] / doubled_area, posinf=1.0)
+    with np.errstate(all="ignore"):
+        cap = np.fmin(sides[0] * sides[2] / doubled_area, _FLATTEST_CAP)
     largest = np.abs([a, b, c]).max(axis=(0, 1))
     return _FLOAT32 * (_ROUNDING * largest + (_ARITHMETIC + cap) * sides[2])
 
