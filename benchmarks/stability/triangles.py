@@ -6,9 +6,9 @@ ray that counts what it passes through does. Depths are measured on single trian
 float64 numbers that the methods are given.
 
 Candidates, given the corners relative to the eye: Möller and Trumbore (Fast, minimum storage ray/triangle intersection, 1997)
-in float32 and float64; Woop, Benthin and Wald (Watertight ray/triangle intersection, 2013) in both, in float32 with its way out to
-float64; Embree, robust and not, with its own float32 depth. Ours is Embree, robust, with an eye on corners (tracer/corners.py)
-and the depth in float64 (tracer/triangles.py); without Embree it is Plain in tracer/visibility.py.
+in float32 and float64; Woop, Benthin and Wald (Watertight ray/triangle intersection, 2013) in both, in float32 with its way out
+to float64; Embree, robust and not, with its own float32 depth. Ours is Embree, robust, with an eye on corners
+(tracer/corners.py) and the depth in float64 (tracer/triangles.py); without Embree it is Plain in tracer/visibility.py.
 """
 
 from collections.abc import Callable, Iterator
