@@ -323,6 +323,41 @@ def test_a_camera_that_is_not_where_it_was_stated_is_still_told(look, camera_obj
     assert comparison.conversion.largest > 5
 
 
+def test_a_held_roll_is_held(look, camera_object, scene, both_sides):
+    look(UTM)
+    add_map(scene, UTM)
+    group = camera_object.virtual_pinhole
+    group.pole, group.roll = "HOLD", 0.4
+    sides = check(both_sides)
+    tilt = sides.exported.camera.basis()[0][2]  # u of a level camera is horizontal
+    assert abs(tilt) > 0.2 and sides.comparison.conversion.largest < 1e-3
+
+
+def test_objects_of_a_library_are_shown_and_stay_linked(look, add, mesh_from, scene, both_sides, tmp_path):
+    look(UTM)
+    block = add(mesh_from("monkey"), "Linked", UTM)
+    block.shape_key_add(name="Basis")
+    block.data.materials.append(bpy.data.materials.new("Linked too"))
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"), copy=True)
+    for blocks, each in ((bpy.data.objects, block), (bpy.data.meshes, block.data)):
+        blocks.remove(each)
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, target):
+        target.objects = ["Linked"]
+    scene.collection.objects.link(target.objects[0])
+    check(both_sides)
+    before = file_state()
+    check(both_sides)
+    assert file_state() == before and bpy.data.objects["Linked"].library
+
+
+def test_an_object_that_is_nowhere_is_one_sentence(look, add, mesh_from):
+    look(UTM)
+    add(mesh_from("cube"), "Lost", UTM).scale.x = float("nan")
+    for recenter in (False, True):
+        with pytest.raises(InputError, match="'Lost' holds a number that is not finite"):
+            job.export(job.Request(recenter=recenter))
+
+
 def test_the_ledger_is_that_of_the_file(crowd, scene, add, mesh_from, both_sides):
     crowd(UTM)
     glass = bpy.data.materials.new("Glass")

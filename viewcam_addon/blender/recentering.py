@@ -149,6 +149,8 @@ def _seen(
     copies: dict[tuple[int, int], _Copy] = {}
     placed = []
     for source, matrix in placements(depsgraph, ledger):
+        if not np.isfinite(matrix).all():
+            raise InputError(f"the matrix of object {source.name!r} holds a number that is not finite: check its transform")
         matrix[:3, 3] -= eye
         if source.key not in copies:
             data = source.data.copy()

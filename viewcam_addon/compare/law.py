@@ -1,10 +1,11 @@
 """What two exact pictures may differ by: tolerances in closed form, for every pixel of every pass.
 
 Cycles computes in float32, with a relative rounding of 2⁻²⁴. Three things are rounded on the way to a hit at the distance t
-along the ray and the planar depth z: the world coordinates, of the size of the largest; the barycentric coordinates, computed
-from the eye, which move the hit along the triangle by the distance times the triangle's slenderness; and the ray's direction,
-which moves the hit by the distance. With M the sum of the first two (the tracer's Magnitude pass) a hit moves by 2⁻²⁴ · (M +
-t), and the picture, seen through a view plane at the distance d, by
+along the ray and the planar depth z: the world coordinates, of the size of the largest, that of the object's origin included
+(a vertex is multiplied and added to it); the barycentric coordinates, computed from the eye, which move the hit along the
+triangle by the distance times the triangle's slenderness; and the ray's direction, which moves the hit by the distance. With M
+the sum of the first two (the tracer's Magnitude pass) a hit moves by 2⁻²⁴ · (M + t), and the picture, seen through a view
+plane at the distance d, by
 
     s = 2⁻²⁴ · d · (M + t) / z · t / z    pixels,
 

@@ -262,9 +262,8 @@ def _loupe(comparison: Comparison, shades: tuple) -> str:
 
 def _camera(pinhole: Pinhole, origin: Sequence[float]) -> str:
     rows = {"e, eye": pinhole.eye, "l, look-at": pinhole.look_at, "up": pinhole.up}
-    if any(origin):
-        rows = {"origin": origin, **rows}
-    body = "".join(_vector_row(name, vector) for name, vector in rows.items())
+    body = _vector_row("origin", origin, digits=12) if any(origin) else ""
+    body += "".join(_vector_row(name, vector) for name, vector in rows.items())
     distance = " × ".join(f"{d:.9g}" for d in dict.fromkeys(pinhole.distance))
     centre = ", ".join(f"{c:.9g}" for c in pinhole.principal_point)
     body += f'<tr><th scope=row>d</th><td colspan="3">{distance} px</td></tr>'
@@ -287,8 +286,8 @@ def _view(pinhole: Pinhole) -> str:
     return f"<table class=vector><tbody>{body}</tbody></table>"
 
 
-def _vector_row(name: str, vector: Sequence[float]) -> str:
-    return f"<tr><th scope=row>{name}</th>{''.join(f'<td>{value:.12g}</td>' for value in vector)}</tr>"
+def _vector_row(name: str, vector: Sequence[float], digits: int = 9) -> str:
+    return f"<tr><th scope=row>{name}</th>{''.join(f'<td>{value:.{digits}g}</td>' for value in vector)}</tr>"
 
 
 def _ledger(ledger: Sequence[Any]) -> str:
