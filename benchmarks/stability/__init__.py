@@ -53,7 +53,8 @@ def run(folder: Path, only: Sequence[str] = (), quick: bool = False) -> tuple[in
             print(f"{name}: {chart.reading}", flush=True)
             measured[name] = chart.figures()
             behind += chart.behind()
-    print(*behind, sep="\n")
+    for sentence in behind:
+        print(sentence)
     return (1 if behind else 0), {"machine": charts.machine(), "behind": behind, "charts": measured}
 
 
