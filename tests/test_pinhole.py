@@ -101,6 +101,7 @@ def test_basis_keeps_its_roll_down_to_1e_16_radians_from_vertical(eye, up, direc
 @example((1.0, 1e-300, 0.0), (0.0, 0.0, 0.0), (1e300, 1.0, 1e-320))
 @example((5e-324, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 @example((1.7e308, 1.0, 0.0), (1.7e308, 0.0, 5e-324), (0.0, 1.0, 0.0))
+@example((1.7e308, 1.7e308, 0.0), (-1.7e308, -1.7e308, 0.0), (1.0, 1.0, 1.0))
 def test_basis_neither_over_nor_underflows_at_any_scale(eye, look_at, up):
     assume(eye != look_at and any(up))
     with warnings.catch_warnings():

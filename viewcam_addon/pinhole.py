@@ -321,11 +321,14 @@ def _axes_of_one(up: Triple, apart: Pair, across: Pair, _sine: float) -> tuple[T
 
 def _view_of_one(e: Triple, l: Triple, up: Triple) -> tuple[Pair, Pair, float]:
     """e − l and up × (e − l) as pairs high + low whose largest component is about 1, and sin θ of the view and up."""
-    unit_up, apart, across, safe = _view(e, l, up)
+    safe = _is_moderate(e, l)
+    if safe:
+        unit_up, apart, across, safe = _view(e, l, up)
     if safe:
         largest = exact.largest_component(across[0])
         largest /= exact.largest_component(unit_up) * exact.largest_component(apart[0])
     else:
+        (unit_up,) = exact.scaled_to_one(up)
         apart, across, largest = exact.whole_number_cross(up, e, l)
     if not largest:
         return apart, across, 0.0
@@ -339,7 +342,7 @@ def _basis_of_many(e: tuple, l: tuple, up: tuple) -> tuple[tuple, Array]:
     """(u, v, w), each a triple of (n,) arrays, and (n,) bool: where they can be relied on."""
     _, apart, across, safe = _view(e, l, up)
     across = tuple(exact.scaled_to_one(*across))
-    return _orthonormal(apart, across), safe & (exact.largest_component(across[0]) > 0)
+    return _orthonormal(apart, across), _is_moderate(e, l) & safe & (exact.largest_component(across[0]) > 0)
 
 
 def _view(e: tuple, l: tuple, up: tuple) -> tuple[tuple, Pair, Pair, bool | Array]:
@@ -349,9 +352,12 @@ def _view(e: tuple, l: tuple, up: tuple) -> tuple[tuple, Pair, Pair, bool | Arra
     (unit_up,) = exact.scaled_to_one(up)
     *across, settled = exact.cross(unit_up, *apart)
     safe = exact.are_factors(high, apart[0]) & exact.are_factors(low, apart[1]) & exact.are_factors(up, unit_up)
-    for vector in (e, l):
-        safe = safe & (exact.largest_component(vector) < exact.LARGEST_PART)
     return unit_up, apart, tuple(across), safe & settled
+
+
+def _is_moderate(e: tuple, l: tuple) -> bool | Array:
+    """Whether e − l can't overflow."""
+    return (exact.largest_component(e) < exact.LARGEST_PART) & (exact.largest_component(l) < exact.LARGEST_PART)
 
 
 def _orthonormal(apart: Pair, across: Pair) -> tuple[tuple, tuple, tuple]:

@@ -259,7 +259,7 @@ def _simplest_up(eye: tuple, look_at: tuple, v: Array) -> tuple[float, float, fl
 def _focus_distance(camera_object: bpy.types.Object, pinhole: Pinhole, depsgraph: bpy.types.Depsgraph) -> float:
     focus = camera_object.data.dof
     if focus.focus_object:
-        depth = float(pinhole.project(pose.float64(focus.focus_object.evaluated_get(depsgraph).matrix_world.translation))[2])
-        if depth > 0:
+        place = pose.float64(focus.focus_object.evaluated_get(depsgraph).matrix_world.translation)
+        if np.isfinite(place).all() and (depth := float(pinhole.project(place)[2])) > 0:
             return depth
-    return focus.focus_distance or 10.0
+    return focus.focus_distance if focus.focus_distance > 0 else 10.0  # which nan is not

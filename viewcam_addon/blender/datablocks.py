@@ -39,10 +39,19 @@ def frame_of(scene: bpy.types.Scene) -> intrinsics.Frame:
 
 
 def camera_data_of(camera: bpy.types.Camera) -> intrinsics.CameraData:
-    """The intrinsics that Blender stores, as plain numbers."""
-    return intrinsics.CameraData(
-        camera.lens, camera.sensor_width, camera.sensor_height, camera.sensor_fit, camera.shift_x, camera.shift_y
-    )
+    """The intrinsics that Blender stores, as plain numbers.
+
+    Raises
+    ------
+    InputError
+        if a script has stored what is no number of a camera.
+    """
+    try:
+        return intrinsics.CameraData(
+            camera.lens, camera.sensor_width, camera.sensor_height, camera.sensor_fit, camera.shift_x, camera.shift_y
+        )
+    except InputError as error:
+        raise InputError(f"camera data {camera.name!r}: {error}") from error
 
 
 def own_sensor(camera: bpy.types.Camera) -> tuple[float, float]:
@@ -60,7 +69,7 @@ def length(value: float, scene: bpy.types.Scene, digits: int = 6) -> str:
     """A length in world units as the scene's units say it; a bare number without them, and where Blender would say zero."""
     units = scene.unit_settings
     metres = value * units.scale_length
-    if units.system == "NONE" or metres < _SHORTEST_WORD:
+    if units.system == "NONE" or not _SHORTEST_WORD <= metres < math.inf:
         return f"{value:.{digits}g}"
     return bpy.utils.units.to_string(units.system, "LENGTH", metres, precision=digits)
 

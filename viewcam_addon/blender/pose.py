@@ -37,7 +37,7 @@ def channels(
 ) -> tuple[tuple[float, ...], Array, tuple[float, ...]]:
     """Location, (3, 3) rotation and scale that bring the camera to the pose, relative to its parent and its delta transform."""
     parent = parent_matrix(camera_object, depsgraph)
-    if not np.isfinite(parent).all() or np.linalg.det(parent[:3, :3]) == 0:
+    if not _has_inverse(parent):
         raise no_size(camera_object)
     u, v, w = pinhole.basis()
     wanted = np.column_stack([-u if pinhole.mirrored else u, v, w])
@@ -109,9 +109,11 @@ def parent_matrix(camera_object: bpy.types.Object, depsgraph: bpy.types.Depsgrap
     evaluated = camera_object.evaluated_get(depsgraph)
     if _is_carried_by_constraints(camera_object):
         own = float64(evaluated.matrix_basis)
+    elif not _has_inverse(inverse):
+        raise no_size(camera_object)
     else:  # Blender's local matrix is relative to the bone, the vertices or the place on the path
         own = np.linalg.inv(inverse) @ float64(evaluated.matrix_local)
-    if np.linalg.det(own) == 0:
+    if not _has_inverse(own):
         raise no_size(camera_object)
     return float64(evaluated.matrix_world) @ np.linalg.inv(own)
 
@@ -124,6 +126,10 @@ def is_told_by_its_pose(camera_object: bpy.types.Object) -> bool:
     parent = camera_object.parent
     is_plain = parent is None or (camera_object.parent_type == "OBJECT" and parent.type != "CURVE")
     return not is_plain or _is_carried_by_constraints(camera_object)
+
+
+def _has_inverse(matrix: Array) -> bool:
+    return bool(np.isfinite(matrix).all() and np.linalg.det(matrix) != 0)
 
 
 def mirrors(matrix: Iterable) -> bool:
@@ -160,8 +166,10 @@ def _carries(constraint: bpy.types.Constraint) -> bool:
 def no_size(camera_object: bpy.types.Object) -> InputError:
     """The error of a camera whose matrix is singular or not finite, naming whose transform it is."""
     for block in (camera_object, *ancestors(camera_object)):
-        if not np.isfinite(float64(block.matrix_basis)).all():
-            return InputError(f"the transform of {block.name!r} holds a number that is not finite: clear it, deltas included")
+        if not np.isfinite(float64([block.matrix_basis, block.matrix_parent_inverse])).all():
+            return InputError(
+                f"the transform of {block.name!r} holds a number that is not finite: clear it, with its deltas and parent"
+            )
         if not all(_full_scale(block)):
             who = "" if block == camera_object else f" by {block.name!r} above it"
             return InputError(f"camera {camera_object.name!r} is scaled to zero{who}: give {block.name!r} a scale of 1")
@@ -181,7 +189,7 @@ def who_shears(camera_object: bpy.types.Object) -> str:
             return f"its {relation} {parent.name!r} is scaled non-uniformly: apply the scale of {parent.name!r}"
     for constraint in active_constraints(camera_object):
         return f"its constraint {constraint.name!r} shears it: disable it, or give its target a uniform scale"
-    return "its parents shear it: clear its parent"
+    return "its parent inverse or a constraint above it shears it: clear the parent inverse, or the parent"
 
 
 def _is_uniform(scale: Array) -> bool:

@@ -19,6 +19,7 @@ from collections.abc import Iterator
 import bpy
 import numpy as np
 
+from .. import checks
 from ..errors import InputError
 from . import camera as cameras
 from . import datablocks
@@ -194,11 +195,9 @@ class VirtualPinhole(bpy.types.PropertyGroup):
 
 
 def _parsed(text: str, count: int) -> list[float] | None:
-    """So many numbers from JSON, None if it holds anything else."""
-    with contextlib.suppress(ValueError, TypeError):
-        numbers = np.array(json.loads(text), dtype=np.float64)
-        if numbers.shape == (count,):
-            return numbers.tolist()
+    """So many finite numbers from JSON, None if it holds anything else."""
+    with contextlib.suppress(ValueError, RecursionError):  # InputError is a ValueError
+        return list(checks.vector("the text", json.loads(text), count))
     return None
 
 

@@ -76,8 +76,11 @@ def quaternion(rotation: Array) -> tuple[float, float, float, float]:
 
 
 def from_quaternion(numbers: Sequence[float]) -> Array:
-    """The rotation matrix of (w, x, y, z) of any length but zero."""
-    w, x, y, z = np.array(numbers) / np.linalg.norm(numbers)
+    """The rotation matrix of (w, x, y, z) of any length; of zero, as float32 measures it, Blender's half turn about x."""
+    numbers = np.array(numbers, dtype=np.float64)
+    if numbers @ numbers <= 2.0**-150:
+        numbers = np.array([0.0, 1.0, 0.0, 0.0])
+    w, x, y, z = numbers / np.linalg.norm(numbers)
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],

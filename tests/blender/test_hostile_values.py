@@ -1,0 +1,276 @@
+"""Numbers that no artist types and any script can set: the camera stays finite, the panel and the operators say a sentence.
+
+Blender clamps infinity to the largest float32, and lets NaN pass everywhere.
+"""
+
+import json
+import math
+import warnings
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from viewcam_addon.blender import camera as cameras
+from viewcam_addon.blender import panel, pose, rotation
+from viewcam_addon.errors import InputError
+
+HOSTILE = (math.nan, math.inf, -math.inf, 3.4e38, -3.4e38, 1e20, 1e-38, 1e-45, 0.0)
+TEXTS = (
+    *("", "x", "[]", "null", "1", "{}", '"NaN"', "[1, 2, 3]", "[1, 2, [3]]", '{"a": 1}', "[" * 5000, "1" * 5000, "é\n"),
+    *(json.dumps([item] * count) for item in (None, True, "1", [1], math.nan, math.inf) for count in (9, 10)),
+    *("[" + ", ".join([number] * count) + "]" for number in ("1e400", "1" + "0" * 400, "9" * 5000) for count in (9, 10)),
+)
+
+
+@pytest.fixture(autouse=True)
+def numpy_raises():
+    """What NumPy would warn of is an error; underflow is nothing that it warns of."""
+    with np.errstate(divide="raise", over="raise", invalid="raise"), warnings.catch_warnings():
+        warnings.simplefilter("error")
+        yield
+
+
+def numbers_of(camera_object):
+    """Everything of the camera that makes the picture."""
+    channels = (
+        *(camera_object.location, camera_object.rotation_euler, camera_object.rotation_quaternion, camera_object.scale),
+        *camera_object.matrix_world,
+    )
+    camera = camera_object.data
+    return [
+        *(number for vector in channels for number in vector),
+        *(camera.lens, camera.sensor_width, camera.sensor_height, camera.shift_x, camera.shift_y),
+    ]
+
+
+def assert_sentence(text):
+    assert text[:1].isupper() and ": " in text and "\n" not in text and 20 < len(text) < 300, text
+
+
+def operate(operator, camera_object):
+    """Press a button: whatever it reports as an error is a sentence."""
+    try:
+        operator(camera=camera_object.name)
+    except RuntimeError as error:
+        assert_sentence(str(error).removeprefix("Error: ").rstrip("\n"))
+
+
+def use(camera_object, scene, capfd):
+    """Everything that an artist may do next. Returns what the panel says first."""
+    bpy.context.view_layer.update()
+    rows, said = panel.contents(camera_object, scene)
+    for sentence in said:
+        assert_sentence(sentence)
+    assert said or not any("nan" in text for row in rows for text in row), rows
+    operate(bpy.ops.viewcam.apply_camera, camera_object)
+    scene.frame_set(scene.frame_current + 1)
+    operate(bpy.ops.viewcam.adopt_camera, camera_object)
+    for enabled in (False, True):
+        camera_object.virtual_pinhole.enabled = enabled
+    bpy.context.view_layer.update()
+    panel.contents(camera_object, scene)
+    printed = "".join(capfd.readouterr())
+    assert "Traceback" not in printed and "RuntimeWarning" not in printed, printed
+    return said
+
+
+@pytest.mark.parametrize("pole", ["CANONICAL", "HOLD"])
+@pytest.mark.parametrize("value", HOSTILE)
+@pytest.mark.parametrize("name", ["eye", "look_at", "up", "distance", "roll", "hold_within"])
+def test_a_hostile_value_never_makes_a_camera_of_nans(posed_camera, scene, capfd, name, value, pole):
+    group = posed_camera.virtual_pinhole
+    group.pole = pole
+    for values in ((value, 1.0, 2.0), (value,) * 3) if name in ("eye", "look_at", "up") else (value,):
+        setattr(group, name, values)
+        said = use(posed_camera, scene, capfd)
+        assert np.isfinite(numbers_of(posed_camera)).all(), numbers_of(posed_camera)
+        if math.isnan(value) and (name != "roll" or pole == "HOLD") and name != "hold_within":
+            assert any("finite" in sentence for sentence in said), said
+
+
+@pytest.mark.parametrize("pole", ["CANONICAL", "HOLD"])
+@pytest.mark.parametrize("name", ["exact", "when_set"])
+@pytest.mark.parametrize("text", TEXTS, ids=lambda text: text[:12])
+def test_hostile_text_in_a_hidden_property_changes_nothing(posed_camera, scene, capfd, name, text, pole):
+    posed_camera.virtual_pinhole.pole = pole
+    before = cameras.stated(posed_camera, scene)
+    setattr(posed_camera.virtual_pinhole, name, text)
+    assert cameras.stated(posed_camera, scene) == before
+    assert use(posed_camera, scene, capfd) == []
+    setattr(posed_camera.virtual_pinhole, name, text)
+    posed_camera.virtual_pinhole.eye = (3, 4, 5)
+    assert use(posed_camera, scene, capfd) == []
+    assert np.isfinite(numbers_of(posed_camera)).all()
+
+
+@pytest.mark.parametrize("size", [(0, 0), (-5, 2**31 - 1), (1, -(2**31))])
+def test_a_hostile_size_when_set_is_borne(posed_camera, scene, capfd, size):
+    posed_camera.virtual_pinhole.size = size
+    use(posed_camera, scene, capfd)
+
+
+@pytest.mark.parametrize("value", HOSTILE)
+@pytest.mark.parametrize("other", [None, 1.0])
+def test_a_hostile_sensor_before_growth_is_no_sensor(posed_camera, scene, capfd, value, other):
+    posed_camera.data.virtual_pinhole_sensor = (value, value if other is None else other)
+    posed_camera.virtual_pinhole.distance = 1200
+    assert use(posed_camera, scene, capfd) == []
+    assert np.isfinite(numbers_of(posed_camera)).all()
+
+
+def set_location(camera_object, parent, value):
+    camera_object.location = (value, 0, 0)
+
+
+def set_scale(camera_object, parent, value):
+    camera_object.scale = (value, 1, 1)
+
+
+def set_uniform_scale(camera_object, parent, value):
+    camera_object.scale = (value,) * 3
+
+
+def set_euler(camera_object, parent, value):
+    camera_object.rotation_euler = (value, 0, value)
+
+
+def set_quaternion(camera_object, parent, value):
+    camera_object.rotation_mode, camera_object.rotation_quaternion = "QUATERNION", (value,) * 4
+
+
+def set_axis_angle(camera_object, parent, value):
+    camera_object.rotation_mode, camera_object.rotation_axis_angle = "AXIS_ANGLE", (1, value, 0, 0)
+
+
+def set_deltas(camera_object, parent, value):
+    camera_object.delta_location, camera_object.delta_scale = (value, 0, 0), (1, value, 1)
+
+
+def set_delta_euler(camera_object, parent, value):
+    camera_object.delta_rotation_euler = (value, 0, 0)
+
+
+def set_delta_quaternion(camera_object, parent, value):
+    camera_object.rotation_mode, camera_object.delta_rotation_quaternion = "QUATERNION", (value, 0, 0, 0)
+
+
+def set_parent(camera_object, parent, value):
+    camera_object.parent = parent
+    parent.location, parent.scale = (value, 0, 0), (1, 1, value)
+
+
+def set_parent_scale(camera_object, parent, value):
+    camera_object.parent = parent
+    parent.scale = (value,) * 3
+
+
+def set_parent_inverse(camera_object, parent, value):
+    camera_object.parent = parent
+    camera_object.matrix_parent_inverse = [[value] * 4] * 4
+
+
+def set_vertex_parent(camera_object, parent, value):
+    mesh = bpy.data.meshes.new("Vertex")
+    mesh.from_pydata([(0, 0, 0)], [], [])
+    camera_object.parent = bpy.data.objects.new("Vertex", mesh)
+    bpy.context.scene.collection.objects.link(camera_object.parent)
+    camera_object.parent_type = "VERTEX"
+    camera_object.matrix_parent_inverse = [[value] * 4] * 4
+
+
+def set_matrix(camera_object, parent, value):
+    camera_object.matrix_world = [[value] * 4] * 4
+
+
+def set_lens(camera_object, parent, value):
+    camera_object.data.lens = value
+
+
+def set_sensor(camera_object, parent, value):
+    camera_object.data.sensor_width = camera_object.data.sensor_height = value
+
+
+def set_shift(camera_object, parent, value):
+    camera_object.data.shift_x, camera_object.data.shift_y = value, -value
+
+
+def set_focus(camera_object, parent, value):
+    camera_object.data.dof.focus_distance = value
+
+
+def set_focus_object(camera_object, parent, value):
+    camera_object.data.dof.focus_object, parent.location = parent, (value,) * 3
+
+
+def set_pixel_aspect(camera_object, parent, value):
+    bpy.context.scene.render.pixel_aspect_x = value
+
+
+def set_border(camera_object, parent, value):
+    render = bpy.context.scene.render
+    render.use_border = render.use_crop_to_border = True
+    render.border_min_x = value
+
+
+def set_reversed_border(camera_object, parent, value):
+    render = bpy.context.scene.render
+    render.use_border = True
+    render.border_min_x, render.border_max_x = 0.9, value
+
+
+def set_unit_scale(camera_object, parent, value):
+    bpy.context.scene.unit_settings.scale_length = value
+
+
+SETTERS = [function for name, function in sorted(globals().items()) if name.startswith("set_")]
+
+
+@pytest.mark.parametrize("enabled", [True, False])
+@pytest.mark.parametrize("setter", SETTERS, ids=lambda setter: setter.__name__[4:])
+def test_a_hostile_blender_camera_is_read_or_refused_in_a_sentence(posed_camera, empty, scene, capfd, setter, enabled):
+    posed_camera.virtual_pinhole.enabled = enabled
+    parent = empty("Parent")
+    for value in HOSTILE:
+        setter(posed_camera, parent, value)
+        bpy.context.view_layer.update()
+        try:
+            found = cameras.read(posed_camera, scene)
+        except InputError as error:
+            assert ": " in str(error) and "\n" not in str(error), error
+            if math.isnan(value):
+                assert "not finite" in str(error) or "nan" in str(error), error
+        else:
+            # Nothing has been lost on the way: Pinhole refuses what is not finite.
+            assert np.isfinite(np.concatenate(found.basis())).all()
+        use(posed_camera, scene, capfd)
+
+
+def test_applying_the_values_mends_a_camera_whose_own_channels_are_not_finite(posed_camera, scene):
+    wanted = cameras.stated(posed_camera, scene)
+    posed_camera.location, posed_camera.rotation_euler = (math.nan,) * 3, (math.nan,) * 3
+    assert "'Camera' holds a number that is not finite" in panel.contents(posed_camera, scene)[1][0]
+    assert cameras.apply(posed_camera, wanted, scene) == []
+    assert cameras.read(posed_camera, scene).eye == wanted.eye
+
+
+def test_blenders_matrices_are_computed_with_in_float64(posed_camera, empty, scene):
+    # From 5.0 on NumPy takes them for float32: a million metres away the location would be 0.06 m off.
+    assert pose.float64(posed_camera.matrix_world).dtype == np.float64
+    parent = empty("Parent", location=(1e6 / 3, -1e6 / 7, 1e5))
+    posed_camera.parent = parent
+    bpy.context.view_layer.update()
+    cameras.apply(posed_camera, cameras.stated(posed_camera, scene), scene)
+    for have, at, want in zip(posed_camera.location, parent.location, posed_camera.virtual_pinhole.eye, strict=True):
+        # Both numbers are float32; their difference is exact in float64 and rounded once.
+        assert have == np.float32(np.float64(want) - np.float64(at))
+
+
+def test_a_rotation_by_no_quaternion_is_that_of_blender(camera_object):
+    camera_object.rotation_mode = "QUATERNION"
+    for numbers in ((0, 0, 0, 0), (1e-30, 0, 0, 0), (1e-20, 0, 1e-20, 0)):
+        camera_object.rotation_quaternion = numbers
+        blenders = pose.float64(camera_object.matrix_basis)[:3, :3]
+        # The square of 1e-20 is a denormal float32 of 17 bits.
+        np.testing.assert_allclose(rotation.from_quaternion(numbers), blenders, atol=2.0**-16)
