@@ -54,7 +54,7 @@ def _acts_on(data_path: str) -> str | None:
 
 def _paths(curves: list[bpy.types.FCurve]) -> list[str]:
     """What the curves that are not muted set."""
-    return sorted({curve.data_path for curve in curves if not (curve.mute or (curve.group and curve.group.mute))})
+    return sorted({curve.data_path for curve in curves if not versions.is_muted(curve)})
 
 
 def _drivers(block: bpy.types.ID) -> Iterator[Suspect]:

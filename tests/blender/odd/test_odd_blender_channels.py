@@ -129,9 +129,21 @@ def test_keyframes_that_are_muted_do_no_harm(posed_camera, odd):
     odd.check(posed_camera)
 
 
-def test_keyframes_on_location_and_values_alike_win_in_the_render_only(posed_camera, odd):
+def test_keyframes_on_location_and_values_alike_win_in_the_render_only(
+    posed_camera, scene, odd, render_positions, picture_error
+):
     animate(posed_camera, "location", (7, -6, 5), (7, -6, 9))
     animate(posed_camera.virtual_pinhole, "eye", (7, -6, 5), (7, -6, 6))
+    scene.frame_start = scene.frame_end = 5
+    positions = render_positions(animation=True)[5]
+    scene.frame_set(5)
+    stated = cameras.stated(posed_camera, scene)
+    error, tolerance = picture_error(stated, positions)
+    assert error > 100 * tolerance, "the render follows the four values"
+    _, v, w = stated.basis()
+    rendered = Pinhole((7, -6, 9), tuple((7, -6, 9) - w), tuple(v), stated.distance, stated.width, stated.height)
+    error, tolerance = picture_error(rendered, positions)
+    assert error <= tolerance, f"{error:.1e} px, and {tolerance:.1e} are rounding"
     odd.check(posed_camera, reopened=False)
 
 

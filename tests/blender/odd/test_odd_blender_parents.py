@@ -4,6 +4,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from mathutils import Matrix
+
 from viewcam_addon.blender import camera as cameras
 
 TURNED = (0.3, 0.4, 0.5)
@@ -89,6 +91,14 @@ def test_applying_the_scale_of_the_parent_helps_as_the_sentence_says(posed_camer
     assert set_again(posed_camera, scene) == []
 
 
+def test_clearing_the_parent_inverse_helps_as_the_sentence_says(posed_camera, empty, scene):
+    posed_camera.parent = empty("Dolly")
+    posed_camera.matrix_parent_inverse = Matrix.Diagonal((1, 1, 3, 1))
+    assert "clear the parent inverse" in set_again(posed_camera, scene)[0]
+    posed_camera.matrix_parent_inverse = Matrix.Identity(4)
+    assert set_again(posed_camera, scene) == []
+
+
 def test_a_parents_stretching_along_the_cameras_own_axes_does_no_harm(posed_camera, empty, odd):
     group = posed_camera.virtual_pinhole
     group.eye, group.look_at, group.up = (0, 0, 5), (0, 0, 0), (0, 1, 0)
@@ -98,6 +108,13 @@ def test_a_parents_stretching_along_the_cameras_own_axes_does_no_harm(posed_came
 
 def test_under_a_parent_that_is_scaled_to_zero_there_is_no_camera(posed_camera, empty, odd):
     posed_camera.parent = empty("Flat", scale=(1, 0, 1))
+    odd.check(posed_camera)
+
+
+def test_under_a_parent_inverse_with_a_non_uniform_scale_the_camera_is_oblique(posed_camera, empty, odd):
+    posed_camera.parent = parent = empty("Stretched", rotation_euler=TURNED, scale=(1, 1, 3))
+    posed_camera.matrix_parent_inverse = parent.matrix_world.inverted()
+    parent.rotation_euler, parent.scale = (0, 0, 0), (1, 1, 1)
     odd.check(posed_camera)
 
 
