@@ -6,7 +6,7 @@ Everything is float64 from Blender's float32 matrices on, each (4, 4) or (3, 3),
 may lie above 2 and be rounded by 2⁻²³ each, and the third, below 1 then, by 2⁻²⁵. Rounding the matrix turns it by √3 · 2⁻²⁵ at
 most. That is 3.2e-7 rad. Quaternions, and axis and angle, are worse: Blender normalises them in float32, which costs as much as
 storing them, and up to 5.3e-7 rad were found. So `set_rotation` tries the neighbouring float32 numbers and asks Blender which
-make the right matrix: 1.8e-7 rad at most in every mode. Rejected: Blender's float32 arithmetic done here once more (its
+make the right matrix: 1.9e-7 rad at most in every mode. Rejected: Blender's float32 arithmetic done here once more (its
 rounding differs from one processor to another).
 """
 
