@@ -19,9 +19,6 @@ from . import camera as cameras
 from . import versions
 from .hold import is_animated
 
-# What driven values were when their camera was last set between frames, by what no two objects of a session have in common.
-_followed: dict[int, tuple] = {}
-
 
 @persistent
 def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
@@ -33,14 +30,14 @@ def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | Non
 
 @persistent
 def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """Values with a driver change between frames too, as what the driver reads is moved."""
+    """Values with a driver change between frames too, as what the driver reads is moved.
+
+    Blender evaluates what this sets without calling it again, so that a constraint in the way makes no endless loop.
+    """
     for update in depsgraph.updates:
         evaluated = update.id
         if isinstance(evaluated, bpy.types.Object) and evaluated.type == "CAMERA" and _is_driven(evaluated.original):
-            numbers = evaluated.virtual_pinhole.numbers()
-            if _followed.get(evaluated.original.session_uid) != numbers:  # setting the camera is an update, too
-                _followed[evaluated.original.session_uid] = numbers
-                _follow(evaluated.original, scene, depsgraph)
+            _follow(evaluated.original, scene, depsgraph)
 
 
 def _is_driven(camera_object: bpy.types.Object) -> bool:
