@@ -24,6 +24,9 @@ from .view import View
 _MOST_SLENDER = 2.0**24
 # The magnitude of so slender a triangle is the largest number that a pass must hold.
 _LARGEST_COORDINATE = np.finfo(np.float32).max / _MOST_SLENDER / 4
+# How many times its distance from the eye a triangle may reach before float32 rounds that distance with its corners' too much:
+# what lies on it by 2⁻²⁴ · 8 · 128 = 6e-5 of that distance is still told from it.
+WIDE = 2.0**7
 # A triangle this many times as long as high costs a depth six bits of its 53, if its normal is not taken with care.
 _SLENDER = 2.0**6
 
@@ -145,6 +148,7 @@ class Planes:
         distance of the farthest corner from the eye times the triangle's slenderness, its longest side over its height:
         barycentric coordinates that are computed from the eye are off by a rounding of that distance over the height, and
         move the hit along the longest side.
+    wide : (k,) indices of triangles whose corners are more than `WIDE` times as far from the eye as they themselves.
     """
 
     def __init__(self, triangles: Triangles, view: View) -> None:
@@ -155,12 +159,15 @@ class Planes:
         self.distance: Floats = np.empty(count)
         self.side: Float32s = np.empty(count, np.float32)
         self.magnitude: Float32s = np.empty(count, np.float32)
+        wide = []
         step = 16384
         with np.errstate(all="ignore"):  # a triangle without area, or one seen edge-on, has no forms: depth() sees to it
             for first in range(0, count, step):
-                self._fill(slice(first, first + step), triangles, view)
+                wide.append(first + self._fill(slice(first, first + step), triangles, view))
+        self.wide: Indices = np.concatenate([np.empty(0, np.intp), *wide])
 
-    def _fill(self, part: slice, triangles: Triangles, view: View) -> None:
+    def _fill(self, part: slice, triangles: Triangles, view: View) -> Indices:
+        """Fill the tables for a part of the triangles; which of the part are wide."""
         a, b, c = gather(triangles.vertices, triangles.corners[:, part]).transpose(1, 0, 2)
         self.span[0, part] = np.minimum(np.minimum(a[2], b[2]), c[2])
         self.span[1, part] = np.maximum(np.maximum(a[2], b[2]), c[2])
@@ -181,6 +188,9 @@ class Planes:
         farthest = np.sqrt(np.maximum(np.maximum(dot(a, a), dot(b, b)), dot(c, c)))
         reach = farthest * np.minimum(longest / length, _MOST_SLENDER)
         self.magnitude[part] = triangles.largest_coordinate[part] + reach
+        # One whose plane comes near the eye, but not itself, has no side that is nearly as long as it is far.
+        near = (np.sqrt(longest) > 0.9 * farthest) & (farthest > WIDE * self.distance[part]) & (self.distance[part] > 0)
+        return np.flatnonzero(near)
 
     def depth(self, triangle: Indices, x: Floats, y: Floats) -> Floats:
         """Planar depth at which rays (x, y, 1) meet the triangles that were found for them; all broadcast.

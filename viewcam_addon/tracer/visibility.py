@@ -10,6 +10,10 @@ and step over none. Rejected: closed boxes round the spheres, where a ray that c
 rounding, the entries of others. Spheres that reach behind the eye's plane have no card and are tested by all rays of a tile
 that they touch.
 
+**Wide triangles**, which reach a hundred times as far as they come near to the eye, as a ground plane does, are tested by all
+rays in float64: Embree would round their distance with that of their corners, and show what stands behind them, or hides what
+lies on them.
+
 embreex knows no nearest distance, so a ray starts where the clip range does, or behind the last card.
 
 **Corners** of triangles may let a ray slip through that passes close by (corners.py). Then four rays round it are traced
@@ -22,8 +26,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Floats, Indices, cross, dot, gather, linear
+from .arrays import Floats, Indices, gather
 from .corners import REACH, Corners
+from .edges import Edges
 from .ellipsoids import Ellipsoids
 from .triangles import Planes, Triangles
 
@@ -45,10 +50,8 @@ _LARGEST = 2.0**30
 
 _AROUND = np.array([[-1.0, -1.0, 1.0, 1.0], [-1.0, 1.0, -1.0, 1.0]])[:, :, None]
 
-_EDGES = ((1, 2), (2, 0), (0, 1))
-# The side of an edge V, W that a ray d passes on is the sign of d·(V × W). Its nine products and eight sums are rounded by less
-# than 2⁻⁵⁰ |V| |W| |d| in all, and what is closer to the edge than that counts as inside on both sides of it.
-_EDGE_ROUNDING = 2.0**-50
+# By how much wide triangles overlap those beside them, whose edges Embree sees rounded by 8 · 2⁻²⁴ of their corners' distances.
+_OVERLAP = 2.0**-21
 
 
 class Visibility(Protocol):
@@ -70,7 +73,11 @@ class Embree:
         self._triangle_count = triangles.count
         self._unit = _embree_unit(triangles, ellipsoids)
         self._corners = Corners(triangles.vertices)
-        self._triangles = embree_scene(triangles.vertices.T * self._unit, triangles.corners.T) if triangles.count else None
+        self._wide = Edges(triangles, planes.wide)
+        self._wide.overlap(_OVERLAP)
+        corners = triangles.corners.T.copy()
+        corners[planes.wide] = 0  # for Embree they are points, which are never met
+        self._triangles = embree_scene(triangles.vertices.T * self._unit, corners) if triangles.count else None
         self._without_card = int(np.count_nonzero(np.isinf(ellipsoids.bounds[0])))
         if ellipsoids.count > self._without_card:
             self._cards, self._card_depth = _cards(ellipsoids, self._without_card, self._unit)
@@ -86,6 +93,8 @@ class Embree:
             close = self._corners.near(directions[:, 0], directions[:, 1])
             if len(close):
                 found[close] = self._without_slips(found[close], x[close], y[close])
+            if len(self._planes.wide):
+                self._wide_before(found, x, y)
         if self._ellipsoids.count:
             self._spheres_before(found, directions, x, y)
         return found
@@ -110,6 +119,15 @@ class Embree:
         if len(slips):
             found[slips] = beside.reshape(4, -1)[depths[:, slips].argmin(axis=0), slips]
         return found
+
+    def _wide_before(self, found: Indices, x: Floats, y: Floats) -> None:
+        """Put wide triangles into `found` where they stand before the triangle there."""
+        nearest = self._depth(found, x, y)
+        for number, triangle in enumerate(self._planes.wide):
+            met = np.flatnonzero(self._wide.inside(np.array([number]), x, y))
+            depth = self._planes.depth(np.array([triangle]), x[met], y[met])
+            nearer = (depth < nearest[met]) & (depth > 0) & (depth >= self._start) & (depth <= self._end)
+            nearest[met[nearer]], found[met[nearer]] = depth[nearer], triangle
 
     def _depth(self, found: Indices, x: Floats, y: Floats) -> Floats:
         """Depths of the triangles that were found, inf where none was."""
@@ -189,11 +207,8 @@ class Plain:
         self._planes, self._ellipsoids = planes, ellipsoids
         self._start, self._end = clip
         self._triangle_count = triangles.count
-        corners = gather(triangles.vertices, triangles.corners).transpose(1, 0, 2)
-        length = np.sqrt(dot(corners.swapaxes(0, 1), corners.swapaxes(0, 1)))
-        self._edges = np.stack([cross(corners[j], corners[k]) for j, k in _EDGES])
-        self._edge_rounding = np.stack([length[j] * length[k] * _EDGE_ROUNDING for j, k in _EDGES])
-        self._bounds = np.concatenate([_triangle_bounds(corners, planes), ellipsoids.bounds], axis=1)
+        self._edges = Edges(triangles)
+        self._bounds = np.concatenate([_triangle_bounds(self._edges.corners, planes), ellipsoids.bounds], axis=1)
         self._bounds += np.array([[-1], [1], [-1], [1]]) * _MARGIN * (1 + np.nan_to_num(np.abs(self._bounds), posinf=0.0))
 
     def first(self, x: Floats, y: Floats) -> Indices:
@@ -223,11 +238,7 @@ class Plain:
         """(n, k) depths at which n rays meet k primitives, inf where they don't or where the depth is clipped."""
         split = np.searchsorted(primitives, self._triangle_count)
         triangles, spheres = primitives[:split], primitives[split:] - self._triangle_count
-        sides = [linear(edge, x, y) for edge in gather(self._edges, triangles)]
-        length = np.sqrt(x * x + y * y + 1.0)
-        rounding = [edge * length for edge in gather(self._edge_rounding, triangles)]
-        inside = np.logical_and.reduce([side >= -error for side, error in zip(sides, rounding, strict=True)])
-        inside |= np.logical_and.reduce([side <= error for side, error in zip(sides, rounding, strict=True)])
+        inside = self._edges.inside(triangles, x, y)
         depth = np.concatenate(
             [np.where(inside, self._planes.depth(triangles, x, y), np.inf), self._ellipsoids.depth(spheres, x, y)], axis=1
         )
