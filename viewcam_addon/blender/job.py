@@ -198,11 +198,11 @@ def _borrow_frame(borrow: Borrower, scene: bpy.types.Scene, frame: int) -> None:
 
 def _borrow_size(borrow: Borrower, scene: bpy.types.Scene, camera: bpy.types.Object, size: tuple[int, int]) -> None:
     """Another number of pixels for the same lens; the stated distance counts pixels and goes with the lens."""
+    if not all(4 <= number <= 65536 for number in size):
+        raise InputError(f"Blender can't render {size[0]} × {size[1]} pixels: choose from 4 to 65536 each way")
     before = _distance_at_full_size(scene, camera)
     for name, value in zip(("resolution_x", "resolution_y", "resolution_percentage"), (*size, 100), strict=True):
         borrow.set(scene.render, name, value)
-    if (scene.render.resolution_x, scene.render.resolution_y) != size:
-        raise InputError(f"Blender can't render {size[0]} × {size[1]} pixels: choose from 4 to 65536 each way")
     group = camera.virtual_pinhole
     if group.enabled:
         *pose, distance = group.numbers()

@@ -15,6 +15,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import checks
 from ..errors import InputError
 
 _LARGEST_WHOLE = 2**31 - 1
@@ -194,4 +195,4 @@ def _is_number(value: object) -> bool:
 def _shown(value: object) -> str:
     if isinstance(value, list | dict):
         return "a list" if isinstance(value, list) else "an object"
-    return repr(value) if value is not None else "null"
+    return checks.shown(value) if value is not None else "null"

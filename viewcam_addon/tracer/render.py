@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..errors import InputError
 from .ellipsoids import ellipsoids_of
 from .scene import Mesh, Scene, Spheres
 from .surface import Passes, Surface, background
@@ -41,7 +42,12 @@ class Tracer:
     def render(self) -> Passes:
         """Pass name → (height, width, channels) float32, rows from the bottom: the surfaces at the pixel centres."""
         width, height = self._camera.width, self._camera.height
-        passes = background((height, width))
+        try:
+            passes = background((height, width))
+        except (MemoryError, ValueError) as error:
+            raise InputError(
+                f"a picture of {width} × {height} pixels needs more memory than there is: choose a size"
+            ) from error
         flat = {name: values.reshape(width * height, -1) for name, values in passes.items()}
 
         def trace(first: int) -> None:

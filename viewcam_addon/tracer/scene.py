@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..pinhole import Pinhole
 
+# Visibility is found in float32, which holds the square of nothing larger.
+LARGEST = 1e18
+
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
@@ -134,17 +137,48 @@ class Scene:
             raise InputError(f"clip is {start:g} … {end:g}: give a nearest depth of at least 0 and a greater farthest depth")
         object.__setattr__(self, "clip", (start, end))
         materials = {name: _material_range(geometry.materials) for name, geometry in self.geometries.items()}
+        _check_camera(self.camera)
+        reaches = {name: _reach(geometry) for name, geometry in self.geometries.items()}
         for placed in self.objects:
             if placed.geometry not in materials:
                 raise InputError(
                     f"object {placed.name!r} names the geometry {placed.geometry!r}, which the scene does not have"
                 )
+            _check_reach(placed, reaches[placed.geometry])
             least, greatest = materials[placed.geometry]
             if least < 0 or greatest >= len(placed.material_indices):
                 raise InputError(
                     f"object {placed.name!r} has {len(placed.material_indices)} material_indices and its geometry "
                     f"{placed.geometry!r} uses materials {least} … {greatest}: give one for each"
                 )
+
+
+def _check_camera(camera: Pinhole) -> None:
+    if max(map(abs, camera.eye)) > LARGEST:
+        raise InputError(f"the camera's eye is {camera.eye}: give coordinates below {LARGEST:g}")
+    slopes = np.abs(camera.view_plane([0.0, camera.width], [0.0, camera.height]))
+    if slopes.max() > LARGEST:
+        raise InputError(
+            f"the camera's distance of {min(camera.distance):g} pixels is {slopes.max():.3g} times smaller than its picture: "
+            f"give one, and a principal point, that make it less than {LARGEST:g}"
+        )
+
+
+def _reach(geometry: Mesh | Spheres) -> float:
+    """The largest |coordinate| of a geometry in its object's space, or what is no less."""
+    if isinstance(geometry, Mesh):
+        return float(np.abs(geometry.vertices).max(initial=0.0))
+    return float(np.abs(geometry.centers).max(initial=0.0)) + float(geometry.radii.max(initial=0.0))
+
+
+def _check_reach(placed: Object, reach: float) -> None:
+    largest = max(reach, float(np.abs(placed.matrix).max()))
+    if largest <= LARGEST:  # no product overflows
+        largest = max(
+            largest, 3 * reach * float(np.abs(placed.matrix[:3, :3]).max()) + float(np.abs(placed.matrix[:3, 3]).max())
+        )
+    if largest > LARGEST:
+        raise InputError(f"object {placed.name!r} reaches as far as {largest:.3g}: give it coordinates below {LARGEST:g}")
 
 
 def _material_range(materials: NDArray[np.int32]) -> tuple[int, int]:
