@@ -178,7 +178,7 @@ def a_camera(source):
 def some_camera(source):
     """A camera of any size that is none of the refused."""
     eye, look_at, up = ([source.finite() for _ in range(3)] for _ in range(3))
-    if source.choice((True, False, False)):
+    if source.choice((True, False)):
         eye, look_at, up = (1.5, -2.5, 3.0), (0.1, 0.2, 0.3), (0.0, 0.0, 1.0)  # where other things shall be hostile
     distance = [abs(source.finite()) or 1.0 for _ in range(2)]
     point = (source.finite(), source.finite()) if source.choice((True, False)) else None
@@ -300,13 +300,13 @@ def test_every_public_function_is_attacked():
     assert sorted(public_functions()) == sorted(ATTACKS)
 
 
-@pytest.mark.parametrize("attack", dict.fromkeys(ATTACKS.values()), ids=lambda attack: attack.__name__)
+@pytest.mark.parametrize("attack", list(dict.fromkeys(ATTACKS.values())), ids=lambda attack: attack.__name__)
 @given(data=st.data())
 def test_hostile_numbers_get_a_right_answer_or_one_sentence(attack, data):
     attack(Hypothesis(data))
 
 
-@pytest.mark.parametrize("attack", dict.fromkeys(ATTACKS.values()), ids=lambda attack: attack.__name__)
+@pytest.mark.parametrize("attack", list(dict.fromkeys(ATTACKS.values())), ids=lambda attack: attack.__name__)
 def test_some_hundred_random_attacks(attack):
     source = Random(seed=1)
     for _ in range(400):
@@ -351,4 +351,4 @@ def test_a_million_random_and_hostile_rays_points_and_poses_at_once():
         eye[::2] = [source.finite() for _ in range(3)]  # one eye for half of them, as in an animation
         good = (eye != look_at).any(axis=-1) & up.any(axis=-1)
         assert_unit(pinhole.basis(eye[good], look_at[good], up[good]))
-        answer(pinhole.basis, eye, look_at, up)
+        answer(pinhole.basis, eye[:100], look_at[:100], up[:100])

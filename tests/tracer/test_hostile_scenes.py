@@ -53,7 +53,7 @@ def numbers_in(document, path=()):
         yield path
 
 
-@pytest.mark.parametrize("path", numbers_in(SCENE), ids=lambda path: ".".join(map(str, path)))
+@pytest.mark.parametrize("path", list(numbers_in(SCENE)), ids=lambda path: ".".join(map(str, path)))
 def test_a_hostile_number_in_a_scene_file_gives_a_finite_picture_or_a_sentence(path, tmp_path):
     file = tmp_path / "scene.json"
     for value in HOSTILE:
