@@ -255,3 +255,20 @@ def node_group(fresh_blender):
         return tree, tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
 
     return make
+
+
+@pytest.fixture
+def empty(scene):
+    """A function that adds an empty."""
+    import bpy
+
+    def add(name, location=(0, 0, 0), **properties):
+        block = bpy.data.objects.new(name, None)
+        scene.collection.objects.link(block)
+        block.location = location
+        for key, value in properties.items():
+            setattr(block, key, value)
+        bpy.context.view_layer.update()
+        return block
+
+    return add

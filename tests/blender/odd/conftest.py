@@ -130,20 +130,3 @@ def odd_rows(tmp_path):
 def odd(request, odd_rows):
     """The row of docs/odd-blender.md that names the test."""
     return odd_rows[request.node.originalname]
-
-
-@pytest.fixture
-def empty(scene):
-    """A function that adds an empty."""
-    import bpy
-
-    def add(name, location=(0, 0, 0), **properties):
-        block = bpy.data.objects.new(name, None)
-        scene.collection.objects.link(block)
-        block.location = location
-        for key, value in properties.items():
-            setattr(block, key, value)
-        bpy.context.view_layer.update()
-        return block
-
-    return add
