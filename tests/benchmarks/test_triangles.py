@@ -45,3 +45,10 @@ def test_ours_keeps_its_digits_on_triangles_a_million_million_times_as_long_as_h
 def test_float32_loses_its_digits(measured, name, method):
     errors = curve(measured[name], method).y
     assert max(errors) > 1e7 * triangles.TIE, errors
+
+
+def test_only_ours_and_float64_see_a_mat_on_a_ground_that_reaches_far(measured):
+    chart = measured["triangles-ground"]
+    assert max(curve(chart, "ours").y) == 0
+    for method in ("Embree, robust", "watertight, float32"):
+        assert max(curve(chart, method).y) > 0.2, f"{method} loses {max(curve(chart, method).y):.0%} at most"

@@ -15,15 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import exact
-from ..errors import InputError
 from .arrays import Float32s, Floats, Indices, cross, dot, gather, linear
 from .scene import Mesh, Object
 from .view import View
 
 # Thinner triangles than float32 can tell from a line are no surface.
 _MOST_SLENDER = 2.0**24
-# The magnitude of so slender a triangle is the largest number that a pass must hold.
-_LARGEST_COORDINATE = np.finfo(np.float32).max / _MOST_SLENDER / 4
 # How many times its distance from the eye a triangle may reach before float32 rounds that distance with its corners' too much:
 # what lies on it by 2⁻²⁴ · 8 · 128 = 6e-5 of that distance is still told from it.
 WIDE = 2.0**7
@@ -66,13 +63,7 @@ def triangles_of(pairs: list[tuple[Object, Mesh]], view: View) -> Triangles:
     vertices, corners, normals, uvs, objects, materials, largest = [], [], [], [], [], [], []
     vertex_count = 0
     for placed, mesh in pairs:
-        with np.errstate(over="ignore", invalid="ignore"):
-            points, coordinate = view.points(placed.matrix, mesh.vertices)
-        if not coordinate.max(initial=0.0) + np.abs(points).max(initial=0.0) <= _LARGEST_COORDINATE:
-            raise InputError(
-                f"object {placed.name!r} reaches farther than {_LARGEST_COORDINATE:.0e} units, more than passes in float32 can "
-                "show: scale the scene down"
-            )
+        points, coordinate = view.points(placed.matrix, mesh.vertices)
         vertices.append(points)
         corners.append(mesh.triangles.T + np.int32(vertex_count))
         vertex_count += points.shape[1]

@@ -48,7 +48,9 @@ _FAR = 1e37
 # product leaves float32's range.
 _LARGEST = 2.0**30
 
-_AROUND = np.array([[-1.0, -1.0, 1.0, 1.0], [-1.0, 1.0, -1.0, 1.0]])[:, :, None]
+# Where rays beside one that passes close by a corner go: eleven units of float32's last place away, twice as far as Embree was
+# ever seen to err, and no farther than must be, since the mesh may be fine.
+_AROUND = np.array([[-0.5, -0.5, 0.5, 0.5], [-0.5, 0.5, -0.5, 0.5]])[:, :, None] * REACH
 
 # By how much wide triangles overlap those beside them, whose edges Embree sees rounded by 8 · 2⁻²⁴ of their corners' distances.
 _OVERLAP = 2.0**-21
@@ -109,8 +111,8 @@ class Embree:
         A ray slipped through if what it found lies farther behind three of the four than they do behind one another.
         """
         distance = np.maximum(np.abs(x), np.abs(y))
-        reach = REACH * distance * np.maximum(distance, 1.0)
-        around = (x + _AROUND[0] * reach).ravel(), (y + _AROUND[1] * reach).ravel()
+        aside = distance * np.maximum(distance, 1.0)
+        around = (x + _AROUND[0] * aside).ravel(), (y + _AROUND[1] * aside).ravel()
         beside = self._first_triangle(_directions(*around))
         depths = self._depth(beside, *around).reshape(4, -1)
         nearest, _, third, _ = np.sort(depths, axis=0)
