@@ -107,7 +107,7 @@ def parent_matrix(camera_object: bpy.types.Object, depsgraph: bpy.types.Depsgrap
     if not is_told_by_its_pose(camera_object):
         return float64(parent.evaluated_get(depsgraph).matrix_world) @ inverse if parent else np.eye(4)
     evaluated = camera_object.evaluated_get(depsgraph)
-    if _is_carried_by_constraints(camera_object):
+    if is_carried_by_constraints(camera_object):
         own = float64(evaluated.matrix_basis)
     elif not _has_inverse(inverse):
         raise no_size(camera_object)
@@ -125,7 +125,7 @@ def is_told_by_its_pose(camera_object: bpy.types.Object) -> bool:
     """
     parent = camera_object.parent
     is_plain = parent is None or (camera_object.parent_type == "OBJECT" and parent.type != "CURVE")
-    return not is_plain or _is_carried_by_constraints(camera_object)
+    return not is_plain or is_carried_by_constraints(camera_object)
 
 
 def _has_inverse(matrix: Array) -> bool:
@@ -143,7 +143,8 @@ def active_constraints(block: bpy.types.Object) -> Iterator[bpy.types.Constraint
     return (constraint for constraint in block.constraints if constraint.enabled and constraint.influence > 0)
 
 
-def _is_carried_by_constraints(camera_object: bpy.types.Object) -> bool:
+def is_carried_by_constraints(camera_object: bpy.types.Object) -> bool:
+    """Whether it has constraints, and each of them moves it as a parent does."""
     constraints = list(active_constraints(camera_object))
     return bool(constraints) and all(map(_carries, constraints))
 

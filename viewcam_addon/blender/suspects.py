@@ -29,9 +29,14 @@ _CONSTRAINTS = dict.fromkeys(_MOVING, frozenset({EYE})) | dict.fromkeys(_TURNING
 
 
 def _constraints(camera_object: bpy.types.Object) -> Iterator[Suspect]:
+    is_carried = pose.is_carried_by_constraints(camera_object)
     for constraint in pose.active_constraints(camera_object):
-        culprit = f"The constraint {constraint.name!r} moves {camera_object.name!r}"
-        yield Suspect(culprit, _CONSTRAINTS.get(constraint.type, POSE), "disable it, or the Virtual Pinhole")
+        name, camera = repr(constraint.name), repr(camera_object.name)
+        if is_carried:  # what is set now takes it into account
+            yield Suspect(f"The constraint {name} has carried {camera} along", POSE, "apply the values again, or animate them")
+        else:
+            acts_on = _CONSTRAINTS.get(constraint.type, POSE)
+            yield Suspect(f"The constraint {name} moves {camera}", acts_on, "disable it, or the Virtual Pinhole")
 
 
 # What a channel acts on, by the start of its data path.
