@@ -352,3 +352,49 @@ def test_a_million_random_and_hostile_rays_points_and_poses_at_once():
         good = (eye != look_at).any(axis=-1) & up.any(axis=-1)
         assert_unit(pinhole.basis(eye[good], look_at[good], up[good]))
         answer(pinhole.basis, eye[:100], look_at[:100], up[:100])
+
+
+def naive_rays(camera, columns, rows, px=0.5, py=0.5):
+    x, y = (np.add(columns, px) - camera.principal_point[0]) / camera.distance[0], np.add(rows, py) / camera.distance[1]
+    u, v, w = camera.basis()
+    directions = x[..., None] * u + y[..., None] * v - w
+    return directions / np.linalg.norm(directions, axis=-1)[..., None]
+
+
+def naive_projection(camera, points):
+    u, v, w = camera.basis()
+    relative = np.asarray(points, dtype=float) - camera.eye
+    depth = -(relative @ w)
+    return relative @ u / depth, relative @ v / depth, depth
+
+
+def naive_field_of_view(camera):
+    return tuple(
+        2 * math.atan(size / 2 / d) if d > 1e-300 else math.nan for size, d in zip((64, 48), camera.distance, strict=True)
+    )
+
+
+@pytest.mark.parametrize(
+    ("attack", "name", "naive"),
+    [
+        (what_many_numbers_give, "ray_directions", naive_rays),
+        (what_many_numbers_give, "project", naive_projection),
+        (what_a_camera_says, "field_of_view", naive_field_of_view),
+        (what_a_camera_says, "roll_uncertainty", lambda camera, precision=0.0: precision / camera.sine_to_up),
+    ],
+)
+def test_the_attacks_find_the_edges_of_naive_formulas(attack, name, naive, monkeypatch):
+    monkeypatch.setattr(Pinhole, name, naive)
+    source = Random(seed=4)
+    with pytest.raises((AssertionError, ArithmeticError, TypeError, ValueError)):
+        for _ in range(1000):
+            attack(source)
+
+
+def test_a_function_that_is_not_attacked_is_found(monkeypatch):
+    def new(number):
+        return number
+
+    new.__module__ = intrinsics.__name__
+    monkeypatch.setattr(intrinsics, "new", new, raising=False)
+    assert set(public_functions()) - set(ATTACKS) == {"intrinsics.new"}

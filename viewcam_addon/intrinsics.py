@@ -198,7 +198,9 @@ def camera_data(plane: ViewPlane, frame: Frame, sensor_width: float, sensor_heig
     lens = magnification * _fitted_sensor(sensor)
     if not _SMALLEST <= lens <= _LARGEST:
         raise InputError(_beyond_blender("distance", plane.distance[0], "lens", lens))
-    growth = 2.0 ** max(0, math.ceil(math.log2(SHORTEST_LENS / np.float32(lens))))  # as Blender will round it
+    with np.errstate(under="ignore"):
+        stored = float(np.float32(lens))  # as Blender will round it
+    growth = 2.0 ** max(0, math.ceil(math.log2(SHORTEST_LENS / stored)))
     largest_sensor = max(sensor.sensor_width, sensor.sensor_height) * growth
     if largest_sensor > _LARGEST:
         raise InputError(_beyond_blender("distance", plane.distance[0], "sensor", largest_sensor))
