@@ -205,3 +205,10 @@ def test_embree_alone_leaks_at_vertices(monkeypatch, small_ball):
     monkeypatch.setattr(corners.Corners, "near", lambda self, x, y: np.empty(0, np.intp))
     leaks = shoot(*small_ball, 1.0, 0.0, INSIDE, 60_000, 0)
     assert leaks > 60, f"only {leaks} of 60,000 rays leak"
+
+
+@pytest.mark.skipif(visibility.EmbreeScene is None, reason="there is no Embree that could leak")
+def test_embree_in_units_of_the_world_loses_small_scenes(monkeypatch, small_ball):
+    monkeypatch.setattr(visibility, "_embree_unit", lambda triangles, ellipsoids: 1.0)
+    leaks = shoot(*small_ball, 1e-25, 0.0, INSIDE, 10_000, 0)
+    assert leaks > 5_000, f"only {leaks} of 10,000 rays leak"
