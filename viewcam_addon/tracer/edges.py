@@ -12,8 +12,8 @@ from .triangles import WIDE, Triangles
 
 _EDGES = ((1, 2), (2, 0), (0, 1))
 
-ROUNDING = 2.0**-50
-"""The nine products and eight sums of d·(V × W) are rounded by less than this times |V| |W| |d| in all."""
+# The nine products and eight sums of d·(V × W) are rounded by less than this times |V| |W| |d| in all.
+_ROUNDING = 2.0**-50
 
 
 class Edges:
@@ -28,7 +28,7 @@ class Edges:
         self._normals = np.stack([cross(self.corners[j], self.corners[k]) for j, k in _EDGES])
         length = np.sqrt(dot(self.corners.swapaxes(0, 1), self.corners.swapaxes(0, 1)))
         self._size = np.stack([length[j] * length[k] for j, k in _EDGES])
-        self._rounding = ROUNDING * self._size
+        self._rounding = _ROUNDING * self._size
 
     def overlap(self, rounding: float) -> None:
         """Let rays pass beside edges by this times |V| |W|: those at which other, not so wide triangles may stand.
