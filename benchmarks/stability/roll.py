@@ -20,6 +20,7 @@ from viewcam_addon.blender import camera as cameras
 from viewcam_addon.pinhole import Pinhole, basis
 
 from ..charts import Chart, Curve
+from . import oracle
 from .stage import empty_stage
 
 Array = NDArray[np.float64]
@@ -28,7 +29,6 @@ Method = Callable[[Array, Array, Array], Array]
 # Both bounds hold at every angle: the basis (pinhole.py), and three angles stored as float32 (tests/blender/test_camera.py).
 COMPUTED, STORED = 4e-16, 4e-7
 _Z = np.array([0.0, 0.0, 1.0])
-_DIGITS = 80
 
 
 def charts(quick: bool = False) -> tuple[Chart, ...]:
@@ -72,32 +72,15 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
 
 
 def _poses(angles: Array, trials: int, up: Array | None) -> list[tuple[Array, Array, Array, list]]:
-    """For each angle e, l and up, (n, 3), and the true axes (u, v) of each pose, in many digits. up : any direction if None."""
+    """For each angle e, l and up, (n, 3), and the true axes of each pose, in many digits. up : any direction if None."""
     random = np.random.default_rng(1)
     poses = []
     for angle in angles:
         ups = random.normal(size=(trials, 3)) if up is None else np.tile(up, (trials, 1))
         across = np.cross(ups, random.normal(size=(trials, 3)))
         eyes = angle * across / np.linalg.norm(across, axis=1)[:, None]
-        poses.append((eyes, -ups, ups, [_true_axes(*pose) for pose in zip(eyes, -ups, ups, strict=True)]))
+        poses.append((eyes, -ups, ups, [oracle.axes(*pose) for pose in zip(eyes, -ups, ups, strict=True)]))
     return poses
-
-
-def _true_axes(eye: Array, look_at: Array, up: Array) -> tuple[list, list]:
-    with mpmath.workdps(_DIGITS):
-        e, l, up = ([mpmath.mpf(float(number)) for number in vector] for vector in (eye, look_at, up))
-        w = _unit([a - b for a, b in zip(e, l, strict=True)])
-        u = _unit(_cross(up, w))
-        return u, _cross(w, u)
-
-
-def _cross(a: list, b: list) -> list:
-    return [a[j] * b[k] - a[k] * b[j] for j, k in ((1, 2), (2, 0), (0, 1))]
-
-
-def _unit(vector: list) -> list:
-    length = mpmath.sqrt(sum(number * number for number in vector))
-    return [number / length for number in vector]
 
 
 def _errors(method: Method, poses: list) -> list[float]:
@@ -110,8 +93,8 @@ def _errors(method: Method, poses: list) -> list[float]:
     ]
 
 
-def _roll_error(u: Array, true_u: list, true_v: list) -> float:
-    with mpmath.workdps(_DIGITS):
+def _roll_error(u: Array, true_u: oracle.Axis, true_v: oracle.Axis, _true_w: oracle.Axis) -> float:
+    with mpmath.workdps(oracle.DIGITS):
         across, upward = (sum(float(a) * b for a, b in zip(u, axis, strict=True)) for axis in (true_u, true_v))
         return float(abs(mpmath.atan2(upward, across)))
 

@@ -12,7 +12,6 @@ in float64 after a division by the largest component, the usual remedy; Blender'
 from collections.abc import Callable
 
 import bpy  # noqa: F401  (brings mathutils along)
-import mpmath
 import numpy as np
 from mathutils import Vector
 from numpy.typing import NDArray
@@ -20,26 +19,25 @@ from numpy.typing import NDArray
 from viewcam_addon.pinhole import basis
 
 from ..charts import Chart, Curve
+from . import oracle
 
 Array = NDArray[np.float64]
 Basis = tuple[Array, Array, Array]
 Method = Callable[[Array, Array, Array], Basis]
 
 COMPUTED = 4e-16  # the bound of pinhole.py, at any scale
-_DIGITS = 60
 
 
 def charts(quick: bool = False) -> tuple[Chart, ...]:
     exponents = np.arange(-300, 301, 50 if quick else 10)
     trials = 5 if quick else 60
     poses = [_poses(10.0**exponent, trials) for exponent in exponents]
-    separations = 10.0**exponents
     curves = (
-        Curve("text's formula, float32", separations, _errors(_naive(np.float32), poses)),
-        Curve("text's formula, float64", separations, _errors(_naive(np.float64), poses)),
-        Curve("largest component first, float64", separations, _errors(_scaled, poses)),
-        Curve("mathutils, Vector.normalized", separations, _errors(_mathutils, poses)),
-        Curve("power of two, compensated (ours)", separations, _errors(basis, poses), ours=True),
+        Curve("text's formula, float32", exponents, _errors(_naive(np.float32), poses)),
+        Curve("text's formula, float64", exponents, _errors(_naive(np.float64), poses)),
+        Curve("largest component first, float64", exponents, _errors(_scaled, poses)),
+        Curve("mathutils, Vector.normalized", exponents, _errors(_mathutils, poses)),
+        Curve("power of two, compensated (ours)", exponents, _errors(basis, poses), ours=True),
     )
     reading = (
         "Read where a curve leaves the floor: squares leave float32's range beyond 1e±19 and float64's beyond 1e±154, and the "
@@ -49,11 +47,12 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
         Chart(
             "separation",
             "Eye and look-at close together and far apart",
-            "|e − l| [world units]",
+            "log₁₀ |e − l|",
             f"largest error of an axis' component in {trials} poses",
             curves,
             reading,
             tie=COMPUTED,
+            log_x=False,  # no axis of matplotlib's reaches from 1e-300 to 1e300
         ),
     )
 
@@ -63,24 +62,8 @@ def _poses(separation: float, trials: int) -> tuple[Array, Array, Array, Array]:
     random = np.random.default_rng(1)
     eye, look_at, up = random.normal(size=(3, trials, 3))
     eye, look_at = eye * separation, look_at * separation
-    return eye, look_at, up, np.array([_true_axes(*pose) for pose in zip(eye, look_at, up, strict=True)])
-
-
-def _true_axes(eye: Array, look_at: Array, up: Array) -> list[list[float]]:
-    with mpmath.workdps(_DIGITS):
-        e, l, up = ([mpmath.mpf(float(number)) for number in vector] for vector in (eye, look_at, up))
-        w = _unit([a - b for a, b in zip(e, l, strict=True)])
-        u = _unit(_cross(up, w))
-        return [[float(number) for number in axis] for axis in (u, _cross(w, u), w)]
-
-
-def _cross(a: list, b: list) -> list:
-    return [a[j] * b[k] - a[k] * b[j] for j, k in ((1, 2), (2, 0), (0, 1))]
-
-
-def _unit(vector: list) -> list:
-    length = mpmath.sqrt(sum(number * number for number in vector))
-    return [number / length for number in vector]
+    axes = [oracle.axes(*pose) for pose in zip(eye, look_at, up, strict=True)]
+    return eye, look_at, up, np.array(axes, dtype=np.float64)
 
 
 def _errors(method: Method, poses: list) -> list[float]:
