@@ -190,6 +190,25 @@ def press_the_buttons():
     is_at_its_values()
 
 
+def use_another_up():
+    """Close to up the panel offers another one, in a button below the warning. It leaves the picture as it is."""
+    stated = tuple(values().eye), tuple(values().look_at), tuple(values().up)
+    values().look_at, values().up, values().eye = (0.3, 0.2, 0), (0.1, 0.2, 1), (0.8, 1.2, 5.0001)
+    _, y = yield from find("pole", -1)
+    before, doubtful = state(), tuple(values().up)
+    _, sidebar = region("VIEW_3D", "UI")
+    for below in range(2 * BELOW, 6 * BELOW, ROW):  # how many lines the warning takes is not known
+        yield from click(sidebar.x + sidebar.width * 0.5, y - below)
+        if tuple(values().up) != doubtful:
+            break
+    else:
+        raise AssertionError("no button offers another up")
+    assert abs(np.dot(state()[1][:3, 2], values().up)) < 1e-6, f"up {tuple(values().up)} is not perpendicular to the view"
+    assert np.abs(state()[1] - before[1]).max() < 1e-6, "the picture has turned"
+    values().eye, values().look_at, values().up = stated
+    yield
+
+
 def play_keyframes():
     for frame, height in ((1, 3), (40, 9)):
         values().eye[2] = height
@@ -236,6 +255,7 @@ def steps():
         zoom,
         fly_over_the_top,
         press_the_buttons,
+        use_another_up,
         play_keyframes,
         draw_a_warning,
         look_into_the_properties_editor,

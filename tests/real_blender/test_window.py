@@ -13,6 +13,7 @@ PARTS = (
     "zoom",
     "fly_over_the_top",
     "press_the_buttons",
+    "use_another_up",
     "play_keyframes",
     "draw_a_warning",
     "look_into_the_properties_editor",
