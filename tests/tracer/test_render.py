@@ -36,6 +36,7 @@ def test_pictures_are_the_same_bit_for_bit_for_any_number_of_threads_and_any_til
         assert_same(reference, render(scene, threads=threads))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(render_module, "TILE", 777)
+        patch.setattr(render_module, "SMALLEST_TILE", 1)
         assert_same(reference, render(scene, threads=2))
 
 
@@ -182,7 +183,7 @@ def test_memory_beside_the_passes_does_not_grow_with_the_picture(ball, make_scen
         tracemalloc.stop()
         return peak - sum(values.nbytes for values in passes.values())
 
-    small, large = beside(320, 180), beside(1280, 720)
+    small, large = beside(640, 480), beside(1920, 1080)  # both are cut into tiles of full size
     # Some hundred arrays of a tile's pixels, whatever the picture.
     assert large <= render_module.TILE * 8 * 100, f"{large / 1e6:.1f} MB"
     assert large <= 1.5 * small + 1e6, f"{small / 1e6:.1f} MB for the small picture, {large / 1e6:.1f} MB for the large one"

@@ -1,8 +1,7 @@
 """A picture of a scene at level `geometry`: tiles over threads.
 
-A tile is a run of pixels, row after row, whose temporary arrays stay in a core's cache: the memory that a render takes beside
-the passes does not depend on the size of the picture. Every pixel is computed alone, so that the result is the same, bit for
-bit, for any number of threads.
+A tile is a run of pixels, row after row: the memory that a render takes beside the passes does not depend on the size of the
+picture. Every pixel is computed alone, so that the result is the same, bit for bit, for any number of threads.
 """
 
 import os
@@ -19,7 +18,9 @@ from .triangles import Planes, triangles_of
 from .view import View
 from .visibility import visibility
 
-TILE = 16384  # pixels: smaller ones spend their time in Python, larger ones leave the cache
+# Pixels. Small tiles make threads wait for one another's Python: with two, 16384 take a seventh longer than 65536, although
+# their arrays stay in a core's cache. A small picture is cut into several tiles for each thread.
+TILE, SMALLEST_TILE, TILES_PER_THREAD = 65536, 4096, 4
 
 
 class Tracer:
@@ -49,15 +50,16 @@ class Tracer:
                 f"a picture of {width} × {height} pixels needs more memory than there is: choose a size"
             ) from error
         flat = {name: values.reshape(width * height, -1) for name, values in passes.items()}
+        size = max(SMALLEST_TILE, min(TILE, width * height // (TILES_PER_THREAD * self._threads)))
 
         def trace(first: int) -> None:
-            tile = slice(first, min(first + TILE, width * height))
+            tile = slice(first, min(first + size, width * height))
             pixels = np.arange(tile.start, tile.stop)
             rows = pixels // width
             self._trace({name: values[tile] for name, values in flat.items()}, pixels - rows * width + 0.5, rows + 0.5)
 
         with ThreadPoolExecutor(self._threads) as pool:
-            list(pool.map(trace, range(0, width * height, TILE)))  # the list hands on what a tile raised
+            list(pool.map(trace, range(0, width * height, size)))  # the list hands on what a tile raised
         return passes
 
     def surface_at(self, columns: ArrayLike, rows: ArrayLike, px: ArrayLike = 0.5, py: ArrayLike = 0.5) -> Passes:
