@@ -59,7 +59,8 @@ class Chart:
     """A sweep: one curve for each method.
 
     name : of its file, without subject and extension. reading : a sentence that says what to read off.
-    tie : errors up to this count as equal. reverse : the failure lies at small x, and x falls to the right.
+    tie : errors up to this count as equal, inf where nothing is judged.
+    reverse : the failure lies at small x, and x falls to the right.
     log_x, log_y : whether the axes are logarithmic.
     """
 

@@ -1,6 +1,6 @@
 """How far off in the picture a point is when camera and scene stand far from the origin, from 1 to 1e9 units.
 
-A place at (K, K, K); the camera stands some ten units beside it, d = 300 px. Two leagues, in pixels, the median.
+A place at (K, K, K); the camera stands some ten units beside it, d = 150 px. Two leagues, in pixels, the median.
 
 Arithmetic: 200 points of an object are projected, against 60 digits of mpmath on the same float64 numbers. Candidates: the
 object's vertices taken to world space and then projected, in float32 (as a renderer does) and in float64; and ours, the

@@ -11,6 +11,7 @@ to float64; Embree, robust and not, with its own float32 depth. Ours is Embree, 
 (tracer/corners.py) and the depth in float64 (tracer/triangles.py); without Embree it is Plain in tracer/visibility.py.
 """
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from fractions import Fraction
@@ -72,9 +73,9 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             "distance / size of the triangles",
             "double hits per million rays",
             double,
-            "What does not leak reports some edges twice: counted, since transparency would have to know, and no failure here, "
-            "where the nearest surface is asked for.",
-            tie=1e6,
+            "Counted and not judged: transparency would have to know, but here only the nearest surface is asked for. What "
+            "does not leak reports edges twice; ours has the double hits of Embree's robust mode, up to all of the rays.",
+            tie=math.inf,
         ),
         Chart(
             "triangles-slivers",

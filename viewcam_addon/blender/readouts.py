@@ -8,9 +8,6 @@ from ..compare import law
 from ..pinhole import Pinhole, Triple
 from . import findings
 
-# A tenth of a pixel is a hundred times what the camera and Cycles agree to, and the least that shows at a picture's edges.
-VISIBLE = 0.1
-
 
 def readouts(camera: Pinhole, lens: float, look_at_distance: str | None) -> list[tuple[str, ...]]:
     """(label, text) of the camera as Blender has it; three texts for the vectors u, v and w.
@@ -50,7 +47,7 @@ def roll_warning(stated: Pinhole, precision: float) -> str | None:
     if stated.is_singular:
         return "The view is parallel to up, and the roll is undefined: the axes are the canonical ones"
     roll, corner = stated.roll_uncertainty(precision), _corner(stated)
-    if roll * corner <= VISIBLE or roll * stated.sine_to_up * corner > VISIBLE:  # the latter is not up's fault
+    if roll * corner <= law.VISIBLE or roll * stated.sine_to_up * corner > law.VISIBLE:  # the latter is not up's fault
         return None
     angle = math.degrees(math.asin(min(1.0, stated.sine_to_up)))
     if roll >= math.pi:
@@ -80,9 +77,11 @@ def distance_warning(stated: Pinhole) -> str | None:
     """
     largest = max(map(abs, (*stated.eye, *stated.look_at)))
     pixels = law.FLOAT32 * max(stated.distance) * largest / math.dist(stated.eye, stated.look_at)
-    if pixels <= VISIBLE:
+    if pixels <= law.VISIBLE:
         return None
-    return f"So far from the origin Blender and Cycles are {_figure(pixels)} px off in float32: bring the scene to the origin"
+    return (
+        f"So far from the origin Blender and Cycles may be {_figure(pixels)} px off in float32: bring the scene to the origin"
+    )
 
 
 def _figure(value: float) -> str:

@@ -16,9 +16,6 @@ from . import law
 from .law import ROUNDINGS, Array, Seen
 from .statistics import Row
 
-# Nobody sees a tenth of a pixel: less is not worth a word.
-_VISIBLE = 0.1
-
 
 @dataclass(frozen=True)
 class FarFromHome:
@@ -55,7 +52,7 @@ def far_from_home(pinhole: Pinhole, expected: Seen, compared: NDArray, position:
     error = position.values[0] if position.count else ROUNDINGS[0] * cost
     # An error beyond the law has another cause, whatever the coordinates cost beside it.
     is_lawful = not position.count or position.shares[0] <= 1
-    if error <= _VISIBLE or not is_lawful or cost <= allowed / 2:
+    if error <= law.VISIBLE or not is_lawful or cost <= allowed / 2:
         return None
     return FarFromHome(error, bool(position.count), math.hypot(*pinhole.eye))
 

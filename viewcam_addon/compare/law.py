@@ -40,6 +40,9 @@ ROUNDINGS = (0.7, 1.4, 3.0, 5.0, 20.0)
 
 FLOAT32 = 2.0**-24
 
+# Pixels. What is less is told in figures, and no sentence warns of it.
+VISIBLE = 0.1
+
 # Below this cosine between ray and surface the error grows with its inverse, since the barycentric coordinates are divided by
 # it. Measured: k · cosine / 0.2 has its 99th percentile between 0.5 and 1.7 all the way from 0.1 down to 0.001.
 GRAZING = 0.2
