@@ -1,7 +1,8 @@
-"""What the tracer traces: meshes and spheres, the objects that place them in the world, and the camera.
+"""What the tracer traces: meshes and spheres, the objects that place them in the world, the camera, and what gives light.
 
 A geometry is stored once, in its object's space, and placed by any number of objects. Nothing here knows files (scene_file.py)
-or rays (visibility.py, surface.py); the classes hold arrays and check their shapes.
+or rays (visibility.py, surface.py); the classes hold arrays and check their shapes. Materials, images, lamps, world, film and
+bounces matter from level `direct` on; a scene of level `geometry` leaves them out.
 """
 
 from dataclasses import dataclass, field
@@ -11,6 +12,9 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..pinhole import Pinhole
+from .film import Bounces, Film
+from .lights import Lamp, World, hidden_from
+from .materials import Material, Picture
 
 # Visibility is found in float32, which holds the square of nothing larger.
 LARGEST = 1e18
@@ -25,6 +29,7 @@ class Mesh:
     corner_normals : (m, 3, 3) float32, object space, unit length, or None where every face is flat. On a flat face of a mesh
         that has smooth ones, the three corners hold the face's own normal.
     corner_uvs : (m, 3, 2) float32, or None where the mesh has no UV map.
+    corner_colours : (m, 3, 3) float32, linear, what `Colour.vertex` stands for, or None.
     materials : (m,) int32, the index of each triangle's material in `Object.material_indices`.
     """
 
@@ -33,6 +38,7 @@ class Mesh:
     materials: NDArray[np.int32]
     corner_normals: NDArray[np.float32] | None = None
     corner_uvs: NDArray[np.float32] | None = None
+    corner_colours: NDArray[np.float32] | None = None
 
     def __post_init__(self) -> None:
         count = len(self.triangles)
@@ -43,6 +49,8 @@ class Mesh:
             _check_shape("corner_normals", self.corner_normals, (count, 3, 3))
         if self.corner_uvs is not None:
             _check_shape("corner_uvs", self.corner_uvs, (count, 3, 2))
+        if self.corner_colours is not None:
+            _check_shape("corner_colours", self.corner_colours, (count, 3, 3))
         if count and not 0 <= self.triangles.min() <= self.triangles.max() < len(self.vertices):
             raise InputError(f"triangles name a vertex outside 0 … {len(self.vertices) - 1}: check the mesh")
         if not np.isfinite(self.vertices).all():
@@ -78,6 +86,8 @@ class Object:
     matrix : (4, 4) float64, object space to world space, affine; negative and non-uniform scale are welcome.
     object_index : what the Object Index pass shows.
     material_indices : what the Material Index pass shows, for each material of the geometry; at least one.
+    materials : keys in `Scene.materials`, for each material of the geometry; "", and all that are missing, are `PLAIN`.
+    hidden_from : which rays don't see it (lights.RAYS).
     """
 
     name: str
@@ -85,6 +95,8 @@ class Object:
     matrix: NDArray[np.float64]
     object_index: int = 0
     material_indices: tuple[int, ...] = (0,)
+    materials: tuple[str, ...] = ()
+    hidden_from: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         _check_shape(f"the matrix of object {self.name!r}", self.matrix, (4, 4))
@@ -94,6 +106,7 @@ class Object:
             raise InputError(f"the matrix of object {self.name!r} is not affine: its last row must be 0, 0, 0, 1")
         if not self.material_indices:
             raise InputError(f"object {self.name!r} has no material_indices: give at least one, 0 where it has no material")
+        object.__setattr__(self, "hidden_from", hidden_from(f"object {self.name!r}", self.hidden_from))
 
 
 @dataclass(frozen=True)
@@ -119,6 +132,7 @@ class Scene:
     clip : nearest and farthest planar depth z = −w·(P − e) that is visible.
     origin : the point of the world from which all coordinates of the scene are counted: (0, 0, 0), or that of a recentred
         export.
+    images : what `Colour.image` names.
     """
 
     camera: Pinhole
@@ -128,6 +142,12 @@ class Scene:
     clip: tuple[float, float] = (0.0, float("inf"))
     ledger: tuple[LedgerEntry, ...] = field(default=())
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    materials: dict[str, Material] = field(default_factory=dict)
+    images: dict[str, Picture] = field(default_factory=dict)
+    lamps: tuple[Lamp, ...] = ()
+    world: World = field(default_factory=World)
+    film: Film = field(default_factory=Film)
+    bounces: Bounces = field(default_factory=Bounces)
 
     def __post_init__(self) -> None:
         if len(self.origin) != 3 or not np.isfinite(self.origin).all():
@@ -151,6 +171,15 @@ class Scene:
                     f"object {placed.name!r} has {len(placed.material_indices)} material_indices and its geometry "
                     f"{placed.geometry!r} uses materials {least} … {greatest}: give one for each"
                 )
+            for name in placed.materials:
+                if name and name not in self.materials:
+                    raise InputError(f"object {placed.name!r} names the material {name!r}, which the scene does not have")
+        for name, material in self.materials.items():
+            for component, colour in material.colours.items():
+                if colour.image is not None and colour.image not in self.images:
+                    raise InputError(
+                        f"{component} of material {name!r} names the image {colour.image!r}, which the scene does not have"
+                    )
 
 
 def _check_camera(camera: Pinhole) -> None:
