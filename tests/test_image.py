@@ -66,6 +66,19 @@ def test_names_of_blender_4_and_parts_of_blender_5_mean_the_same_passes(tmp_path
         assert (back["Object Index"] == 7).all() and (back["Depth"] == 9).all()
 
 
+def test_the_light_passes_of_blender_4_and_5_are_the_same(tmp_path):
+    """The names that Cycles 4.2, 4.5, 5.0 and 5.2 write, read off their files."""
+    light = np.full((2, 3), 7, dtype=np.float32)
+    older = ("Combined", "Emit", "Env", "DiffDir", "DiffInd", "DiffCol")
+    newer = ("Combined", "Emission", "Environment", "Diffuse Direct", "Diffuse Indirect", "Diffuse Color")
+    for file, names in (("4.exr", older), ("5.exr", newer)):
+        channels = {f"ViewLayer.{name}.{letter}": light for name in (*names, "Noisy Image") for letter in "RGBA"}
+        OpenEXR.File({}, channels).write(str(tmp_path / file))
+        back = image.read(tmp_path / file)
+        assert tuple(back.passes) == newer
+        assert [back[name].shape[2] for name in newer] == [4, 3, 3, 3, 3, 3]
+
+
 def test_of_two_view_layers_the_first_is_read(tmp_path):
     values = {f"{layer}.Depth.Z": np.full((1, 1), depth, dtype=np.float32) for layer, depth in (("A", 1), ("B", 2))}
     OpenEXR.File({}, values).write(str(tmp_path / "a.exr"))

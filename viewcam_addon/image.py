@@ -28,11 +28,10 @@ from .files import written_whole
 from .pinhole import Pinhole
 from .terminal import silent_libraries
 
-# The channels of each pass, in the order of its last axis, as Cycles names them. The last two are the tracer's own, by which
-# a tolerance can be derived: the magnitude that float32's relative rounding applies to at a hit, in world units (its largest
-# coordinate, plus the distance times the slenderness of the triangle), and the cosine between ray and true normal.
-CHANNELS = {
-    "Combined": "RGBA",
+# The channels of each pass, in the order of its last axis, as Cycles names them. Two are the tracer's own, by which
+# a tolerance can be derived: Magnitude, that float32's relative rounding applies to at a hit, in world units (its largest
+# coordinate, plus the distance times the slenderness of the triangle), and Facing, the cosine between ray and true normal.
+_GEOMETRY = {
     "Depth": "Z",
     "Position": "XYZ",
     "Normal": "XYZ",
@@ -42,8 +41,31 @@ CHANNELS = {
     "Magnitude": "X",
     "Facing": "X",
 }
+# Variance is the tracer's own: the estimated variance of Combined's colour, which is a mean of samples.
+_LIGHT = {
+    "Combined": "RGBA",
+    "Emission": "RGB",
+    "Environment": "RGB",
+    "Diffuse Direct": "RGB",
+    "Diffuse Indirect": "RGB",
+    "Diffuse Color": "RGB",
+    "Variance": "RGB",
+}
+CHANNELS = _LIGHT | _GEOMETRY
 # What Blender 4 calls some of them in a file.
-_OLDER_NAMES = {"IndexOB": "Object Index", "IndexMA": "Material Index"}
+_OLDER_NAMES = {
+    "IndexOB": "Object Index",
+    "IndexMA": "Material Index",
+    "Emit": "Emission",
+    "Env": "Environment",
+    "DiffDir": "Diffuse Direct",
+    "DiffInd": "Diffuse Indirect",
+    "DiffCol": "Diffuse Color",
+}
+
+GEOMETRY_PASSES = tuple(_GEOMETRY)
+LIGHT_PASSES = tuple(_LIGHT)
+"""What a picture shows: where things are, and what light comes from them."""
 
 BACKGROUND_DEPTH = 1e10
 """The Depth pass where there is nothing: Cycles' value."""

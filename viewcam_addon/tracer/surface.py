@@ -8,13 +8,13 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ..image import BACKGROUND_DEPTH, CHANNELS
+from ..image import BACKGROUND_DEPTH, CHANNELS, GEOMETRY_PASSES
 from .arrays import Float32s, Floats, Indices, dot, gather
 from .ellipsoids import Ellipsoids
 from .triangles import Planes, Triangles
 from .view import View
 
-PASSES = {name: len(channels) for name, channels in CHANNELS.items() if name != "Combined"}
+PASSES = {name: len(CHANNELS[name]) for name in GEOMETRY_PASSES}
 """The passes of level `geometry` and their numbers of channels."""
 
 Passes = dict[str, Float32s]
