@@ -46,6 +46,27 @@ def glowing(name: str, code: str, strength: float = 1.0):
     return material
 
 
+def mirror(name: str, code: str):
+    """A perfect mirror."""
+    material, tree, output = _empty_material(name, code)
+    shader = tree.nodes.new("ShaderNodeBsdfAnisotropic")  # as Blender calls its Glossy BSDF
+    shader.inputs["Color"].default_value = colour(code)
+    shader.inputs["Roughness"].default_value = 0.0
+    tree.links.new(shader.outputs[0], output.inputs["Surface"])
+    return material
+
+
+def clear_glass(name: str, code: str, ior: float = 1.5):
+    """Clear glass."""
+    material, tree, output = _empty_material(name, code)
+    shader = tree.nodes.new("ShaderNodeBsdfGlass")
+    shader.inputs["Color"].default_value = colour(code)
+    shader.inputs["Roughness"].default_value = 0.0
+    shader.inputs["IOR"].default_value = ior
+    tree.links.new(shader.outputs[0], output.inputs["Surface"])
+    return material
+
+
 def _empty_material(name: str, code: str):
     material = bpy.data.materials.new(name)
     material.use_nodes = True

@@ -13,7 +13,7 @@ import staging
 
 import viewcam_addon
 
-SCENES = ("studio", "spheres", "straight_down", "portrait", "wide", "telephoto", "flight")
+SCENES = ("studio", "spheres", "straight_down", "portrait", "wide", "telephoto", "flight", "cornell")
 
 
 def main() -> None:

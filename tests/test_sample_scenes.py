@@ -15,7 +15,7 @@ from viewcam_addon.blender import job
 from viewcam_addon.tracer.scene import Spheres
 
 FOLDER = Path(__file__).parent.parent / "sample_scenes"
-SCENES = ("studio", "spheres", "straight_down", "portrait", "wide", "telephoto", "flight")
+SCENES = ("studio", "spheres", "straight_down", "portrait", "wide", "telephoto", "flight", "cornell")
 LARGEST_FILE = 300_000  # bytes
 FLOAT32 = 2.0**-24  # relative rounding of what Blender stores
 
