@@ -8,6 +8,7 @@ Drawn with matplotlib, the ecosystem's usual choice. The report of a check draws
 no matplotlib.
 """
 
+import importlib
 import importlib.metadata
 import math
 import os
@@ -16,13 +17,16 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from viewcam_addon.errors import InputError
 from viewcam_addon.files import written_whole
+from viewcam_addon.terminal import silent_libraries
 
 # matplotlib's own colours for categories, without the grey that the grid has and the blue of the method in use.
 _COLOURS = ("tab:orange", "tab:green", "tab:red", "tab:purple", "tab:brown", "tab:pink", "tab:olive", "tab:cyan")
@@ -192,3 +196,37 @@ def _draw_curve(curve: Curve, axes: Axes, colour: str, marker: str) -> None:
     axes.plot(x, shown, color=colour, marker=marker, label=name, clip_on=False, **style, **dash)
     if not answered.all():
         axes.plot(x[~answered], np.full((~answered).sum(), high), "x", color=colour, markersize=6, clip_on=False)
+
+
+def run(
+    package: str, sweeps: Sequence[str], folder: Path, only: Sequence[str] = (), quick: bool = False
+) -> tuple[int, dict[str, Any]]:
+    """Measure the sweeps of a package of benchmarks and draw their charts into `folder`.
+
+    sweeps : the package's modules, each with a `charts(quick)`. only : some of them, all if it is empty. quick : few trials.
+
+    Returns 0, or 1 if the method in use is behind another somewhere, and their figures.
+
+    Raises
+    ------
+    InputError
+        if there is no such sweep, or the folder can't be written to.
+    """
+    subject = package.rpartition(".")[2]
+    unknown = set(only) - set(sweeps)
+    if unknown:
+        raise InputError(f"there is no sweep {min(unknown)!r}: choose from {', '.join(sweeps)}")
+    measured: dict[str, Any] = {}
+    behind: list[str] = []
+    for sweep in only or sweeps:
+        with silent_libraries():  # Blender prints a line for each picture
+            charts = importlib.import_module(f".{sweep}", package).charts(quick)
+        for chart in charts:
+            name = f"{subject}-{chart.name}"
+            draw(chart, folder / f"{name}.svg", f"viewcam chart {subject} --only {sweep}{' --quick' if quick else ''}")
+            print(f"{name}: {chart.reading}", flush=True)
+            measured[name] = chart.figures()
+            behind += chart.behind()
+    for sentence in behind:
+        print(sentence)
+    return (1 if behind else 0), {"machine": machine(), "behind": behind, "charts": measured}

@@ -1,0 +1,12 @@
+"""How light converges: error against samples, for each method that the tracer uses or could have used.
+
+Every module is one sweep, as in benchmarks/stability. `viewcam chart light` measures and draws all of them.
+"""
+
+import functools
+
+from .. import charts
+
+SWEEPS = ("convergence",)
+
+run = functools.partial(charts.run, __package__, SWEEPS)
