@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..files import written_whole
 from ..pinhole import Pinhole
-from .fields import Arrays, Field, arrays_beside
-from .scene import LedgerEntry, Mesh, Object, Scene, Spheres
+from . import light_fields, placing
+from .fields import Field, arrays_beside
+from .geometry_fields import geometry, geometry_document
+from .scene import LedgerEntry, Object, Scene
 
 FORMAT = "virtual-pinhole-scene"
 VERSION = 1
 
-_LARGEST_INLINE = 48  # numbers: a plane or a few spheres stay readable in the JSON
 _LIST_OF_NUMBERS = re.compile(r"\[\n([-+.,\deE\s]*?)\n\s*\]")  # no text is met: in JSON it can't hold a line feed
 
 
@@ -66,10 +67,12 @@ def read(path: str | os.PathLike[str]) -> Scene:
     if header["version"].whole(0) != VERSION:
         header["version"].fail(f"is {header['version'].value}, and this program reads {VERSION}: write the scene again")
     fields = document.fields(
-        ("format", "version", "camera", "geometries", "objects"), ("stated_camera", "clip", "origin", "ledger", "arrays")
+        ("format", "version", "camera", "geometries", "objects"),
+        ("stated_camera", "clip", "origin", *light_fields.KEYS, "ledger", "arrays"),
     )
     with arrays_beside(path, fields.get("arrays")) as arrays:
-        geometries = {name: _geometry(field, arrays) for name, field in fields["geometries"].named("geometry").items()}
+        geometries = {name: geometry(field, arrays) for name, field in fields["geometries"].named("geometry").items()}
+        light = light_fields.light(fields, arrays)
     objects = tuple(_object(field) for field in fields["objects"].items("object"))
     try:
         return Scene(
@@ -82,6 +85,7 @@ def read(path: str | os.PathLike[str]) -> Scene:
             if "ledger" in fields
             else (),
             origin=fields["origin"].vector(3) if "origin" in fields else (0.0, 0.0, 0.0),
+            **light,
         )
     except InputError as error:
         document.hand_on(error)
@@ -97,35 +101,26 @@ def _document(scene: Scene, arrays: dict[str, NDArray]) -> dict:
     if any(scene.origin):
         document["origin"] = list(scene.origin)
     document["geometries"] = {
-        name: _geometry_document(geometry, str(index), arrays)
-        for index, (name, geometry) in enumerate(scene.geometries.items())
+        name: geometry_document(each, str(index), arrays) for index, (name, each) in enumerate(scene.geometries.items())
     }
-    document["objects"] = [
-        {
-            "name": placed.name,
-            "geometry": placed.geometry,
-            "matrix": placed.matrix.tolist(),
-            "object_index": int(placed.object_index),
-            "material_indices": [int(index) for index in placed.material_indices],
-        }
-        for placed in scene.objects
-    ]
+    document["objects"] = [_object_document(placed) for placed in scene.objects]
+    document.update(light_fields.light_document(scene, arrays))
     document["ledger"] = [dataclasses.asdict(entry) for entry in scene.ledger]
     return document
 
 
-def _geometry_document(geometry: Mesh | Spheres, prefix: str, arrays: dict[str, NDArray]) -> dict:
-    document: dict = {"type": "mesh" if isinstance(geometry, Mesh) else "spheres"}
-    for field in dataclasses.fields(geometry):
-        array = getattr(geometry, field.name)
-        if array is None:
-            continue
-        if array.size <= _LARGEST_INLINE:
-            document[field.name] = array.tolist()
-        else:
-            key = f"{prefix}.{field.name}"
-            arrays[key] = array
-            document[field.name] = {"npz": key}
+def _object_document(placed: Object) -> dict:
+    document = {
+        "name": placed.name,
+        "geometry": placed.geometry,
+        "matrix": placed.matrix.tolist(),
+        "object_index": int(placed.object_index),
+        "material_indices": [int(index) for index in placed.material_indices],
+    }
+    if any(placed.materials):
+        document["materials"] = list(placed.materials)
+    if placed.hidden_from:
+        document["hidden_from"] = sorted(placed.hidden_from)
     return document
 
 
@@ -177,62 +172,10 @@ def _clip(field: Field) -> tuple[float, float]:
     return start.number(), float("inf") if end.value is None else end.number()
 
 
-def _geometry(field: Field, arrays: Arrays) -> Mesh | Spheres:
-    kind = field.fields(("type",), others=True)["type"]
-    readers = {"mesh": _mesh, "spheres": _spheres, "plane": _plane}
-    if kind.text() not in readers:
-        kind.fail(f"is {kind.value!r}: give one of {', '.join(readers)}")
-    try:
-        return readers[kind.value](field, arrays)
-    except InputError as error:
-        field.hand_on(error)
-
-
-def _mesh(field: Field, arrays: Arrays) -> Mesh:
-    keys = field.fields(("type", "vertices", "triangles"), ("materials", "corner_normals", "corner_uvs"))
-    triangles = keys["triangles"].array(arrays, np.int32, (None, 3))
-    count = len(triangles)
-    return Mesh(
-        vertices=keys["vertices"].array(arrays, np.float64, (None, 3)),
-        triangles=triangles,
-        materials=_materials(keys, arrays, count),
-        corner_normals=keys["corner_normals"].array(arrays, np.float32, (count, 3, 3)) if "corner_normals" in keys else None,
-        corner_uvs=keys["corner_uvs"].array(arrays, np.float32, (count, 3, 2)) if "corner_uvs" in keys else None,
-    )
-
-
-def _spheres(field: Field, arrays: Arrays) -> Spheres:
-    keys = field.fields(("type", "centers", "radii"), ("materials",))
-    centers = keys["centers"].array(arrays, np.float64, (None, 3))
-    radii = keys["radii"].array(arrays, np.float64, (len(centers),))
-    return Spheres(centers, radii, _materials(keys, arrays, len(centers)))
-
-
-def _plane(field: Field, arrays: Arrays) -> Mesh:
-    """The parallelogram from a corner along two edges, with a UV map that runs from 0 to 1 along them."""
-    keys = field.fields(("type", "corner", "edges"))
-    corner = np.array(keys["corner"].vector(3))
-    first, second = keys["edges"].array(arrays, np.float64, (2, 3))
-    triangles = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
-    uvs = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
-    return Mesh(
-        vertices=np.stack([corner, corner + first, corner + first + second, corner + second]),
-        triangles=triangles,
-        materials=np.zeros(2, np.int32),
-        corner_uvs=uvs[triangles],
-    )
-
-
-def _materials(keys: dict[str, Field], arrays: Arrays, count: int) -> NDArray[np.int32]:
-    return keys["materials"].array(arrays, np.int32, (count,)) if "materials" in keys else np.zeros(count, np.int32)
-
-
 def _object(field: Field) -> Object:
-    placing = ("location", "rotation", "scale")
-    keys = field.fields(("name", "geometry"), ("matrix", *placing, "object_index", "material_indices"))
-    if "matrix" in keys and any(key in keys for key in placing):
-        field.fail("has a matrix beside a location, rotation or scale: give one or the other")
-    matrix = keys["matrix"].array(None, np.float64, (4, 4)) if "matrix" in keys else _placed(keys)
+    optional = ("object_index", "material_indices", "materials", "hidden_from")
+    keys = field.fields(("name", "geometry"), (*placing.KEYS, *optional))
+    matrix = placing.matrix(field, keys)
     indices = keys["material_indices"].items("material index") if "material_indices" in keys else None
     try:
         return Object(
@@ -241,24 +184,11 @@ def _object(field: Field) -> Object:
             matrix=matrix,
             object_index=keys["object_index"].whole(0) if "object_index" in keys else 0,
             material_indices=(0,) if indices is None else tuple(index.whole(0) for index in indices),
+            materials=tuple(each.text() for each in keys["materials"].items("material")) if "materials" in keys else (),
+            hidden_from=light_fields.hidden_from(keys["hidden_from"]) if "hidden_from" in keys else frozenset(),
         )
     except InputError as error:
         field.hand_on(error)
-
-
-def _placed(keys: dict[str, Field]) -> NDArray[np.float64]:
-    """The matrix of a location, a rotation (degrees about x, then y, then z) and a scale (one number, or one for each axis)."""
-    x, y, z = np.radians(keys["rotation"].vector(3) if "rotation" in keys else (0.0, 0.0, 0.0))
-    about_x = np.array([[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]])
-    about_y = np.array([[np.cos(y), 0, np.sin(y)], [0, 1, 0], [-np.sin(y), 0, np.cos(y)]])
-    about_z = np.array([[np.cos(z), -np.sin(z), 0], [np.sin(z), np.cos(z), 0], [0, 0, 1]])
-    scale = 1.0
-    if "scale" in keys:
-        scale = keys["scale"].vector(3) if isinstance(keys["scale"].value, list) else keys["scale"].number()
-    matrix = np.eye(4)
-    matrix[:3, :3] = about_z @ about_y @ about_x * scale
-    matrix[:3, 3] = keys["location"].vector(3) if "location" in keys else 0.0
-    return matrix
 
 
 def _ledger_entry(field: Field) -> LedgerEntry:
