@@ -5,6 +5,9 @@ can show `str(error)` as it stands and need no knowledge of what went wrong. A r
 and the like travel up and be translated at the top, where the object and the key are no longer known.
 """
 
+import traceback
+from pathlib import Path
+
 
 class InputError(ValueError):
     """What was given can't be used. The message is one sentence: what is wrong (object, key, value), what to do."""
@@ -16,3 +19,10 @@ class NotModelledError(InputError):
     """Something in the scene has no counterpart in the model, and `--strict` does not let it pass."""
 
     exit_status = 3
+
+
+def bug(error: Exception) -> str:
+    """One sentence for an error that no input should have caused, and where in the code it came from."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    what = f"{type(error).__name__} at {Path(place.filename).name}:{place.lineno}: {error}".splitlines()[0]
+    return f"this is a bug, please report it ({what})"

@@ -53,7 +53,7 @@ _LIGHT = {
 }
 CHANNELS = _LIGHT | _GEOMETRY
 # What Blender 4 calls some of them in a file.
-_OLDER_NAMES = {
+OLDER_NAMES = {
     "IndexOB": "Object Index",
     "IndexMA": "Material Index",
     "Emit": "Emission",
@@ -181,7 +181,7 @@ def _passes(channels: dict[str, NDArray]) -> dict[str, list[NDArray]]:
     found: dict[str, dict[str, dict[str, NDArray]]] = defaultdict(lambda: defaultdict(dict))
     for full_name, pixels in channels.items():
         layer, _, rest = full_name.rpartition(".")[0].rpartition(".")
-        found[layer][_OLDER_NAMES.get(rest, rest)][full_name.rpartition(".")[2]] = pixels
+        found[layer][OLDER_NAMES.get(rest, rest)][full_name.rpartition(".")[2]] = pixels
     for passes in found.values():
         complete = {
             name: [passes[name][letter] for letter in letters]

@@ -9,11 +9,13 @@ def register() -> None:
     """Classes, properties and handlers, in this order: a panel needs its operators, an operator its properties."""
     import bpy
 
-    from . import animation, operators, panel, properties
+    from . import animation, engine, operators, panel, properties, render_panels, render_settings
 
     properties.register()
-    for each in (*operators.CLASSES, *panel.CLASSES):
+    render_settings.register()
+    for each in (*operators.CLASSES, *panel.CLASSES, *engine.CLASSES):
         bpy.utils.register_class(each)
+    render_panels.register()
     animation.register()
 
 
@@ -29,11 +31,13 @@ def unregister() -> None:
     """The same, in reverse."""
     import bpy
 
-    from . import animation, operators, panel, properties
+    from . import animation, engine, operators, panel, properties, render_panels, render_settings
 
     animation.unregister()
-    for each in reversed((*operators.CLASSES, *panel.CLASSES)):
+    render_panels.unregister()
+    for each in reversed((*operators.CLASSES, *panel.CLASSES, *engine.CLASSES)):
         bpy.utils.unregister_class(each)
+    render_settings.unregister()
     properties.unregister()
 
 

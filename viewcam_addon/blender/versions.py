@@ -4,6 +4,8 @@ from pathlib import Path
 
 import bpy
 
+from ..image import OLDER_NAMES
+
 # What Cycles draws without a material: a diffuse surface, and since 5.0 a Principled one, which bends grazing smooth normals.
 DEFAULT_SURFACE_BENDS_NORMALS = bpy.app.version >= (5, 0)
 # How Cycles reads a mesh in which flat faces stand beside smooth ones (export_geometry.py). Measured: 4.2, 4.5, 5.0 and 5.2.
@@ -89,3 +91,9 @@ def set_multilayer_file(settings: bpy.types.ImageFormatSettings) -> None:
     settings.exr_codec = "ZIP"
     if hasattr(settings, "use_exr_interleave"):
         settings.use_exr_interleave = True
+
+
+def pass_name(name: str) -> str:
+    """What Blender calls a pass in a render's result. Since 5.0 as we do."""
+    older = {new: old for old, new in OLDER_NAMES.items()} if bpy.app.version < (5, 0) else {}
+    return older.get(name, name)

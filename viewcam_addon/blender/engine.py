@@ -1,0 +1,115 @@
+"""The render engine "Virtual Pinhole Reference": F12 and `blender -b FILE -E VIEWCAM -f 1` show what the tracer computes.
+
+The scene is what the depsgraph holds that Blender hands to an engine, read as `viewcam export` reads it; nothing in it changes.
+What goes wrong is reported, which ends `blender -b` with status 1 and without a file.
+
+Level `geometry` knows no light: its Combined shows surfaces as a lamp at the eye would, by the cosine between ray and normal.
+
+Rejected: drawing in the viewport, which wants a quick preview where this engine is a reference; a result that is begun once and
+updated, which Blender would copy whole for each band of rows.
+"""
+
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import errors
+from ..errors import InputError
+from ..image import BACKGROUND_DEPTH, CHANNELS
+from ..tracer.scene import Scene
+from ..tracer.surface import Passes
+from . import datablocks, export, tracing, versions
+from .ledger import Ledger
+
+# The property of a view layer that asks for each pass. Combined is always there.
+ASKED_BY = {
+    "Depth": "use_pass_z",
+    "Position": "use_pass_position",
+    "Normal": "use_pass_normal",
+    "UV": "use_pass_uv",
+    "Object Index": "use_pass_object_index",
+    "Material Index": "use_pass_material_index",
+    "Diffuse Direct": "use_pass_diffuse_direct",
+    "Diffuse Indirect": "use_pass_diffuse_indirect",
+    "Diffuse Color": "use_pass_diffuse_color",
+    "Emission": "use_pass_emit",
+    "Environment": "use_pass_environment",
+}
+
+
+class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
+    bl_idname = "VIEWCAM"
+    bl_label = "Virtual Pinhole Reference"
+    bl_use_preview = False
+    bl_use_eevee_viewport = True
+    bl_use_shading_nodes_custom = False
+
+    def update_render_passes(self, scene: bpy.types.Scene, renderlayer: bpy.types.ViewLayer) -> None:
+        for name in _asked_for(scene, renderlayer):
+            letters = CHANNELS[name]
+            kind = "COLOR" if letters.startswith("RGB") else "VALUE" if len(letters) == 1 else "VECTOR"
+            self.register_pass(scene, renderlayer, versions.pass_name(name), len(letters), letters, kind)
+
+    def render(self, depsgraph: bpy.types.Depsgraph) -> None:
+        try:
+            self._render(depsgraph)
+        except InputError as error:
+            self.report({"ERROR"}, datablocks.sentence(error))
+        except Exception as error:  # Blender would print a traceback and call the render finished
+            self.report({"ERROR"}, f"Virtual Pinhole: {errors.bug(error)}")
+
+    def _render(self, depsgraph: bpy.types.Depsgraph) -> None:
+        self.update_stats("", "Reading the scene")
+        scene, level = self._exported(depsgraph)
+        settings, threads = depsgraph.scene_eval.virtual_pinhole_reference, depsgraph.scene.render.threads
+        words = "Level geometry" if level == "geometry" else f"Level {level}, {settings.samples} samples"
+        work = scene, level, settings.samples, settings.seed, threads
+        started, rows_done = time.perf_counter(), 0
+        for passes, rows in tracing.bands(*work, self.test_break):
+            rows_done += len(rows)
+            self._show(depsgraph, passes, rows)
+            self.update_progress(rows_done / scene.camera.height)
+            remaining = round((time.perf_counter() - started) * (scene.camera.height / rows_done - 1))
+            self.update_stats("", f"{words} | Remaining {remaining // 60}:{remaining % 60:02}")
+
+    def _exported(self, depsgraph: bpy.types.Depsgraph) -> tuple[Scene, str]:
+        """What is seen through the camera and the render border, and the level to trace it at."""
+        ledger = Ledger()
+        scene = export.scene_in(depsgraph, self.camera_override.original, ledger)
+        frame = datablocks.frame_of(depsgraph.scene)
+        if frame.border and not frame.crop:
+            scene = replace(scene, camera=scene.camera.cropped(*replace(frame, crop=True).window))
+        return scene, "geometry"
+
+    def _show(self, depsgraph: bpy.types.Depsgraph, passes: Passes, rows: range) -> None:
+        """Hand over a band of rows."""
+        _, width, _ = passes["Depth"].shape
+        band = {name: values[rows.start : rows.stop] for name, values in passes.items()}
+        if "Combined" not in band:
+            band["Combined"] = lit_from_the_eye(band)
+        result = self.begin_result(0, rows.start, width, len(rows), layer=depsgraph.view_layer.name)
+        passes_there = result.layers[0].passes
+        for name in _asked_for(depsgraph.scene_eval, depsgraph.view_layer):
+            if name in band:
+                passes_there[versions.pass_name(name)].rect.foreach_set(band[name].ravel())
+        self.end_result(result)
+
+
+def lit_from_the_eye(passes: Passes) -> NDArray[np.float32]:
+    """The Combined pass of level `geometry`, (height, width, 4): transparent where nothing is."""
+    hit = (passes["Depth"] < BACKGROUND_DEPTH).astype(np.float32)
+    return np.concatenate([passes["Facing"]] * 3 + [hit], axis=-1)
+
+
+def _asked_for(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Iterator[str]:
+    yield "Combined"
+    yield from (name for name, asked_by in ASKED_BY.items() if getattr(view_layer, asked_by))
+    if scene.virtual_pinhole_reference.use_pass_variance:
+        yield "Variance"
+
+
+CLASSES = (VIEWCAM_RenderEngine,)

@@ -1,0 +1,67 @@
+"""Tracing in a thread of its own, its finished bands of rows handed over in the thread that asked.
+
+Blender may be spoken to only in the thread in which it calls an engine: here that thread looks every few milliseconds whether
+the artist cancelled, while the tracer's threads know nothing of Blender. Rejected: tracing in Blender's own thread, which can't
+ask for Escape before a band is finished.
+"""
+
+import contextlib
+import queue
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+
+from ..tracer.render import Passes, render
+from ..tracer.scene import Scene
+
+_PATIENCE = 0.05
+"""Seconds between two looks at whether it is cancelled."""
+
+
+class _Watcher:
+    """What the tracer tells and asks, from its threads."""
+
+    def __init__(self) -> None:
+        self.bands: queue.SimpleQueue[tuple[Passes, range] | None] = queue.SimpleQueue()
+        self.cancelled = threading.Event()
+
+    def tile(self, passes: Passes, rows: range) -> None:
+        self.bands.put((passes, rows))
+
+    def stop(self) -> bool:
+        return self.cancelled.is_set()
+
+
+def bands(
+    scene: Scene, level: str, samples: int, seed: int, threads: int, is_cancelled: Callable[[], bool]
+) -> Iterator[tuple[Passes, range]]:
+    """Trace a scene, and give what is finished: the passes of the whole picture, and the rows of them that are new.
+
+    is_cancelled : asked in the caller's thread. When it says so, or when the caller takes no more, tracing ends at once.
+
+    Raises
+    ------
+    InputError
+        as tracer.render.render does.
+    """
+    watcher = _Watcher()
+    with ThreadPoolExecutor(1, "viewcam") as pool:
+        tracing = pool.submit(_render, scene, level, samples, seed, threads, watcher)
+        tracing.add_done_callback(lambda _: watcher.bands.put(None))
+        try:
+            while not is_cancelled():
+                with contextlib.suppress(queue.Empty):
+                    band = watcher.bands.get(timeout=_PATIENCE)
+                    if band is None:
+                        break
+                    yield band
+            else:
+                return
+        finally:
+            watcher.cancelled.set()
+    tracing.result()  # raises what was raised there
+
+
+def _render(scene, level, samples, seed, threads, watcher):
+    passes = render(scene, threads)
+    watcher.tile(passes, range(scene.camera.height))
