@@ -11,8 +11,8 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 
-from ..tracer.render import Passes, render
 from ..tracer.scene import Scene
+from ..tracer.surface import Passes
 
 _PATIENCE = 0.05
 """Seconds between two looks at whether it is cancelled."""
@@ -63,5 +63,7 @@ def bands(
 
 
 def _render(scene, level, samples, seed, threads, watcher):
+    from ..tracer.render import render  # brings Embree, which Blender's start need not wait for
+
     passes = render(scene, threads)
     watcher.tile(passes, range(scene.camera.height))
