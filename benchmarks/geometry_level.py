@@ -77,10 +77,10 @@ def _race(blender: Connection, scene: Scene, folder: Path, options: argparse.Nam
         for name in ("Cycles", "Cycles and its file"):
             blender.send(name)
             times[name].append(blender.recv())
-        timed("tracer", lambda: render(scene, options.threads))
+        timed("tracer", lambda: render(scene, threads=options.threads))
         timed(
             "tracer and its file",
-            lambda: image.write(folder / "tracer.exr", image.Image(render(scene, options.threads), scene.camera)),
+            lambda: image.write(folder / "tracer.exr", image.Image(render(scene, threads=options.threads), scene.camera)),
         )
         timed("tracing and refining", tracer.render)
         timed("bare Embree", bare)

@@ -182,7 +182,7 @@ def both_sides(fresh_blender, scene, tmp_path):
 
         exported = job.export_and_render(job.Request(threads=2, **request), tmp_path / "cycles.exr")
         tracer = render.Tracer(exported, 2)
-        traced, cycles = render.render(exported, 2), _passes_of(tmp_path / "cycles.exr")
+        traced, cycles = render.render(exported, threads=2), _passes_of(tmp_path / "cycles.exr")
         comparison = geometry.compare(Image(traced), Image(cycles), exported.camera, tracer.surface_at, exported.stated_camera)
         return BothSides(exported, traced, cycles, comparison)
 

@@ -1,26 +1,32 @@
-"""A picture of a scene at level `geometry`: tiles over threads.
+"""Pictures of a scene, at level `geometry` and at the levels of light: what to compute, in tiles over threads.
 
-A tile is a run of pixels, row after row: the memory that a render takes beside the passes does not depend on the size of the
-picture. Every pixel is computed alone, so that the result is the same, bit for bit, for any number of threads.
+At level `geometry` a pixel is one ray. At the others it is many paths, some samples at a time for all pixels of a tile, and
+one ray more that tells what is at its centre. Every pixel is computed alone and its samples are summed in order, so that the
+result is the same, bit for bit, for any number of threads.
 """
 
 import os
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
+from .arrays import Floats, Indices
 from .ellipsoids import ellipsoids_of
+from .film import LEVELS
 from .scene import Mesh, Scene, Spheres
 from .surface import Passes, Surface, background
+from .tiles import Stopped, Watcher, over_threads, tiles
 from .triangles import Planes, triangles_of
 from .view import View
 from .visibility import visibility
 
+__all__ = ["Passes", "Stopped", "Tracer", "Watcher", "render"]
+
 # Pixels. Small tiles make threads wait for one another's Python: with two, 16384 take a seventh longer than 65536, although
 # their arrays stay in a core's cache. A small picture is cut into several tiles for each thread.
-TILE, SMALLEST_TILE, TILES_PER_THREAD = 65536, 4096, 4
+TILE, SMALLEST_TILE = 65536, 4096
 
 
 class Tracer:
@@ -30,37 +36,45 @@ class Tracer:
     """
 
     def __init__(self, scene: Scene, threads: int | None = None) -> None:
-        self._camera = scene.camera
+        self._scene, self._camera = scene, scene.camera
         self._threads = threads or os.cpu_count() or 1
         self._view = View(scene.camera)
         placed = [(placed, scene.geometries[placed.geometry]) for placed in scene.objects]
-        triangles = triangles_of([pair for pair in placed if isinstance(pair[1], Mesh)], self._view)
-        ellipsoids = ellipsoids_of([pair for pair in placed if isinstance(pair[1], Spheres)], self._view)
-        planes = Planes(triangles, self._view)
-        self._visibility = visibility(triangles, planes, ellipsoids, scene.clip)
-        self._surface = Surface(self._view, triangles, planes, ellipsoids)
+        self._triangles = triangles_of([pair for pair in placed if isinstance(pair[1], Mesh)], self._view)
+        self._ellipsoids = ellipsoids_of([pair for pair in placed if isinstance(pair[1], Spheres)], self._view)
+        self._planes = Planes(self._triangles, self._view)
+        self._visibility = visibility(self._triangles, self._planes, self._ellipsoids, scene.clip)
+        self._surface = Surface(self._view, self._triangles, self._planes, self._ellipsoids)
 
-    def render(self) -> Passes:
+    def render(self, watcher: Watcher | None = None) -> Passes:
         """Pass name → (height, width, channels) float32, rows from the bottom: the surfaces at the pixel centres."""
-        width, height = self._camera.width, self._camera.height
-        try:
-            passes = background((height, width))
-        except (MemoryError, ValueError) as error:
-            raise InputError(
-                f"a picture of {width} × {height} pixels needs more memory than there is: choose a size"
-            ) from error
-        flat = {name: values.reshape(width * height, -1) for name, values in passes.items()}
-        size = max(SMALLEST_TILE, min(TILE, width * height // (TILES_PER_THREAD * self._threads)))
 
-        def trace(first: int) -> None:
-            tile = slice(first, min(first + size, width * height))
-            pixels = np.arange(tile.start, tile.stop)
-            rows = pixels // width
-            self._trace({name: values[tile] for name, values in flat.items()}, pixels - rows * width + 0.5, rows + 0.5)
+        def trace(passes: Passes, tile: range) -> None:
+            columns, rows = self._corners(tile)
+            x, y, primitives = self._eye(columns + 0.5, rows + 0.5)
+            self._surface.write(passes, primitives, x, y)
 
-        with ThreadPoolExecutor(self._threads) as pool:
-            list(pool.map(trace, range(0, width * height, size)))  # the list hands on what a tile raised
-        return passes
+        return self._picture(background, trace, SMALLEST_TILE, TILE, watcher)
+
+    def render_light(self, level: str, samples: int, seed: int, watcher: Watcher | None = None) -> Passes:
+        """The same of light, and what is at the pixel centres: Depth and Object Index."""
+        from .illumination import CENTRES, Illumination, dark
+        from .points import Surfaces
+
+        surfaces = Surfaces(self._scene, self._view, self._triangles, self._planes, self._ellipsoids)
+        illumination = Illumination(self._scene, self._view, surfaces, self._eye, level, samples, seed)
+
+        def trace(passes: Passes, tile: range) -> None:
+            columns, rows = self._corners(tile)
+            x, y, primitives = self._eye(columns + 0.5, rows + 0.5)
+            centres = background((len(tile),))
+            self._surface.write(centres, primitives, x, y)
+            for name in CENTRES:
+                passes[name][:] = centres[name]
+            illumination.trace(passes, np.array(tile), columns, rows, lambda: _stop_if_asked(watcher))
+
+        largest = illumination.largest_tile
+        return self._picture(dark, trace, min(largest, SMALLEST_TILE), largest, watcher)
 
     def surface_at(self, columns: ArrayLike, rows: ArrayLike, px: ArrayLike = 0.5, py: ArrayLike = 0.5) -> Passes:
         """The surfaces at sample points of pixels.
@@ -73,14 +87,79 @@ class Tracer:
         passes = background(column.shape)
         for first in range(0, len(column), TILE):
             tile = slice(first, first + TILE)
-            self._trace({name: values[tile] for name, values in passes.items()}, column[tile], row[tile])
+            x, y, primitives = self._eye(column[tile], row[tile])
+            self._surface.write({name: values[tile] for name, values in passes.items()}, primitives, x, y)
         return passes
 
-    def _trace(self, passes: Passes, column: np.ndarray, row: np.ndarray) -> None:
+    def _eye(self, column: Floats, row: Floats) -> tuple[Floats, Floats, Indices]:
+        """The rays (x, y, 1) through points of the film, and the primitives that they meet."""
         x, y = self._camera.view_plane(column, row)
-        self._surface.write(passes, self._visibility.first(x, y), x, y)
+        return x, y, self._visibility.first(x, y)
+
+    def _picture(
+        self,
+        blank: Callable[[tuple[int, int]], Passes],
+        trace: Callable[[Passes, range], None],
+        smallest: int,
+        largest: int,
+        watcher: Watcher | None,
+    ) -> Passes:
+        """Passes that `trace` has written into, tile by tile."""
+        width, height = self._camera.width, self._camera.height
+        try:
+            passes = blank((height, width))
+        except (MemoryError, ValueError) as error:
+            raise InputError(
+                f"a picture of {width} × {height} pixels needs more memory than there is: choose a size"
+            ) from error
+        flat = {name: values.reshape(width * height, -1) for name, values in passes.items()}
+
+        def work(tile: range) -> None:
+            _stop_if_asked(watcher)
+            trace({name: values[tile.start : tile.stop] for name, values in flat.items()}, tile)
+
+        runs = tiles(width * height, width, self._threads, smallest, largest)
+        for tile in over_threads(work, runs, self._threads):
+            if watcher is not None:
+                watcher.tile(passes, range(tile.start // width, (tile.stop - 1) // width + 1))
+        return passes
+
+    def _corners(self, tile: range) -> tuple[Indices, Indices]:
+        """Columns and rows of a tile's pixels, which are their lower left corners as well."""
+        rows, columns = np.divmod(np.arange(tile.start, tile.stop), self._camera.width)
+        return columns, rows
 
 
-def render(scene: Scene, threads: int | None = None) -> Passes:
-    """Trace the scene: pass name → (height, width, channels) float32, rows from the bottom."""
-    return Tracer(scene, threads).render()
+def render(
+    scene: Scene,
+    level: str = "geometry",
+    samples: int = 64,
+    seed: int = 0,
+    threads: int | None = None,
+    watcher: Watcher | None = None,
+) -> Passes:
+    """Trace the scene: pass name → (height, width, channels) float32, rows from the bottom.
+
+    level : one of film.LEVELS. samples : of each pixel, at the levels of light; the only one is at its centre.
+    seed : another for other noise.
+
+    Raises
+    ------
+    InputError
+        if there is no such level, or not enough memory.
+    Stopped
+        when the watcher says so.
+    """
+    if level not in LEVELS:
+        raise InputError(f"the level is {level!r}: give one of {', '.join(LEVELS)}")
+    if samples < 1:
+        raise InputError(f"the number of samples is {samples}: give at least 1")
+    tracer = Tracer(scene, threads)
+    if level == "geometry":
+        return tracer.render(watcher)
+    return tracer.render_light(level, samples, seed, watcher)
+
+
+def _stop_if_asked(watcher: Watcher | None) -> None:
+    if watcher is not None and watcher.stop():
+        raise Stopped
