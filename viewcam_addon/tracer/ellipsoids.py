@@ -17,6 +17,7 @@ perpendicular by as much as the arithmetic that they would save.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..exact import difference, sum_terms, two_product, two_sum
 from .arrays import Float32s, Floats, Indices, dot, gather, linear
@@ -39,6 +40,7 @@ class Ellipsoids:
     nearest : (n,) float64, least depth z. The spheres without bounds come first, then the others, nearest first.
     bounds : (4, n) float64: least x, greatest x, least y, greatest y in the view plane at distance 1, −inf and inf where the
         sphere reaches behind the eye's plane.
+    number : (n,) int32, which of the scene's spheres they are, counted from object to object.
     object_index, material_index, magnitude : (n,) float32, as in `Triangles`; magnitude is that of the sphere's extent, and
         a sphere is as slender as an equilateral triangle: not at all.
     """
@@ -50,6 +52,7 @@ class Ellipsoids:
     reach: Floats
     nearest: Floats
     bounds: Floats
+    number: NDArray[np.int32]
     object_index: Float32s
     material_index: Float32s
     magnitude: Float32s
@@ -103,7 +106,10 @@ def _unit(vector: list[Floats]) -> list[Floats]:
 
 
 def ellipsoids_of(pairs: list[tuple[Object, Spheres]], view: View) -> Ellipsoids:
-    """The spheres of all objects that are spheres, without those that are points, are flat, lie behind the eye or hold it."""
+    """The spheres of all objects that are spheres, without those that the eye does not see.
+
+    It does not see those that are points, are flat, lie behind it, hold it, or are hidden from the camera.
+    """
     owner = np.repeat(np.arange(len(pairs)), [len(spheres.radii) for _, spheres in pairs])
     centers = np.concatenate([np.empty((0, 3)), *(spheres.centers for _, spheres in pairs)]).T
     radii = np.concatenate([np.empty(0), *(spheres.radii for _, spheres in pairs)])
@@ -126,7 +132,8 @@ def ellipsoids_of(pairs: list[tuple[Object, Spheres]], view: View) -> Ellipsoids
         largest = np.maximum(world.max(axis=0), np.abs(matrices[:, :3, 3]).max(axis=1)[owner])  # as in View.points
         magnitude = (largest + np.sqrt(dot(positions, positions))).astype(np.float32)
     held = (squares > 1 / _MOST) & (squares < _MOST) & (tangent < _MOST)
-    seen = np.flatnonzero(solid[owner] & held & (tangent > 0) & (positions[2] + reach > 0))
+    shown = np.array(["camera" not in placed.hidden_from for placed, _ in pairs], bool)
+    seen = np.flatnonzero((solid & shown)[owner] & held & (tangent > 0) & (positions[2] + reach > 0))
     seen = seen[np.lexsort((nearest[seen], np.isfinite(bounds[0, seen])))]
     objects = np.array([placed.object_index for placed, _ in pairs], np.float32)
     materials = [np.array(placed.material_indices, np.float32)[spheres.materials] for placed, spheres in pairs]
@@ -138,6 +145,7 @@ def ellipsoids_of(pairs: list[tuple[Object, Spheres]], view: View) -> Ellipsoids
         reach=gather(reach, seen),
         nearest=gather(nearest, seen),
         bounds=gather(bounds, seen),
+        number=seen.astype(np.int32),
         object_index=gather(gather(objects, owner), seen),
         material_index=gather(np.concatenate([np.empty(0, np.float32), *materials]), seen),
         magnitude=gather(magnitude, seen),

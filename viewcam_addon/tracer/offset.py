@@ -34,7 +34,7 @@ benchmarks/stability/secondary_rays.py.
 import numpy as np
 
 from .arrays import Float32s, Floats, cross, dot, gather
-from .triangles import Triangles
+from .triangles import Planes, Triangles
 
 FLATTEST = 2.0**-18
 """|cos| between a ray and its surface's normal below which it counts as blocked."""
@@ -58,6 +58,11 @@ def triangle_offsets(triangles: Triangles) -> Floats:
     return _FLOAT32 * (_ROUNDING * largest + (_ARITHMETIC + cap) * sides[2])
 
 
+def wide_offsets(planes: Planes) -> Floats:
+    """(k,) float64, camera space: the same of `planes.wide`, which are tested in float64: that of a small triangle near the eye."""
+    return _FLOAT32 * _ROUNDING * gather(planes.distance, planes.wide)
+
+
 def start(points: Floats, normals: Floats, directions: Floats, offsets: Floats) -> Floats:
     """(3, n) float64, camera space: where rays that leave points of surfaces start, on the side that they go to.
 
@@ -77,12 +82,12 @@ def shadow_rays(starts: Floats, lights: Floats) -> tuple[Float32s, Float32s, Flo
 
     Returns origins (n, 3), directions (n, 3), lengths (n,) in directions: all float32.
     """
-    origins = starts.T.astype(np.float32)
-    apart = lights.T - origins
-    distance = _length(apart.T)
+    origins = np.ascontiguousarray(starts.T, np.float32)
+    apart = lights - origins.T
+    distance = _length(apart)
     slack = _FLOAT32 * (_ROUNDING * np.abs(lights).max(axis=0) + (_ARITHMETIC + _ENDING) * distance)
     lengths = np.maximum(distance - slack, 0.0) / np.where(distance > 0, distance, 1.0)
-    return origins, apart.astype(np.float32), lengths.astype(np.float32)
+    return origins, np.ascontiguousarray(apart.T, np.float32), lengths.astype(np.float32)
 
 
 def _length(vectors: Floats) -> Floats:

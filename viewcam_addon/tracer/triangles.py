@@ -40,6 +40,7 @@ class Triangles:
         where no mesh has a UV map.
     object_index, material_index : (m,) float32, what the passes show.
     largest_coordinate : (m,) float32, of the three vertices in world space, without its sign.
+    placed : the objects with their meshes, whose triangles follow one another.
     """
 
     vertices: Floats
@@ -49,10 +50,16 @@ class Triangles:
     object_index: Float32s
     material_index: Float32s
     largest_coordinate: Float32s
+    placed: tuple[tuple[Object, Mesh], ...]
 
     @property
     def count(self) -> int:
         return self.corners.shape[1]
+
+    def hidden_from(self, ray: str) -> NDArray[np.bool_]:
+        """(m,): which triangles a kind of rays does not see (lights.RAYS)."""
+        hidden = np.array([ray in placed.hidden_from for placed, _ in self.placed], bool)
+        return np.repeat(hidden, [len(mesh.triangles) for _, mesh in self.placed])
 
 
 def triangles_of(pairs: list[tuple[Object, Mesh]], view: View) -> Triangles:
@@ -82,6 +89,7 @@ def triangles_of(pairs: list[tuple[Object, Mesh]], view: View) -> Triangles:
         object_index=_joined(objects, (0,), np.float32),
         material_index=_joined(materials, (0,), np.float32),
         largest_coordinate=_joined(largest, (0,), np.float32),
+        placed=tuple(pairs),
     )
 
 

@@ -75,10 +75,12 @@ class Embree:
         self._triangle_count = triangles.count
         self._unit = _embree_unit(triangles, ellipsoids)
         self._corners = Corners(triangles.vertices)
-        self._wide = Edges(triangles, planes.wide)
-        self._wide.overlap(_OVERLAP)
+        hidden = triangles.hidden_from("camera")
+        self._wide = planes.wide[~hidden[planes.wide]]
+        self._wide_edges = Edges(triangles, self._wide)
+        self._wide_edges.overlap(_OVERLAP)
         corners = triangles.corners.T.copy()
-        corners[planes.wide] = 0  # for Embree they are points, which are never met
+        corners[planes.wide] = corners[hidden] = 0  # for Embree they are points, which are never met
         self._triangles = embree_scene(triangles.vertices.T * self._unit, corners) if triangles.count else None
         self._without_card = int(np.count_nonzero(np.isinf(ellipsoids.bounds[0])))
         if ellipsoids.count > self._without_card:
@@ -95,7 +97,7 @@ class Embree:
             close = self._corners.near(directions[:, 0], directions[:, 1])
             if len(close):
                 found[close] = self._without_slips(found[close], x[close], y[close])
-            if len(self._planes.wide):
+            if len(self._wide):
                 self._wide_before(found, x, y)
         if self._ellipsoids.count:
             self._spheres_before(found, directions, x, y)
@@ -125,8 +127,8 @@ class Embree:
     def _wide_before(self, found: Indices, x: Floats, y: Floats) -> None:
         """Put wide triangles into `found` where they stand before the triangle there."""
         nearest = self._depth(found, x, y)
-        for number, triangle in enumerate(self._planes.wide):
-            met = np.flatnonzero(self._wide.inside(np.array([number]), x, y))
+        for number, triangle in enumerate(self._wide):
+            met = np.flatnonzero(self._wide_edges.inside(np.array([number]), x, y))
             depth = self._planes.depth(np.array([triangle]), x[met], y[met])
             nearer = (depth < nearest[met]) & (depth > 0) & (depth >= self._start) & (depth <= self._end)
             nearest[met[nearer]], found[met[nearer]] = depth[nearer], triangle
@@ -169,10 +171,14 @@ def _directions(x: Floats, y: Floats) -> NDArray[np.float32]:
 
 
 def _embree_unit(triangles: Triangles, ellipsoids: Ellipsoids) -> float:
-    """Embree's units in one of the world: the power of two that makes the largest coordinate about `_LARGEST`."""
+    """Embree's units in one of the world."""
     extents = np.abs(ellipsoids.positions).max(axis=0, initial=0.0) + ellipsoids.reach
-    largest = max(np.abs(triangles.vertices).max(initial=0.0), extents.max(initial=0.0)) or 1.0
-    return math.ldexp(_LARGEST, -math.frexp(largest)[1])
+    return unit_of(max(np.abs(triangles.vertices).max(initial=0.0), extents.max(initial=0.0)))
+
+
+def unit_of(largest: float) -> float:
+    """The power of two that makes the largest |coordinate| about `_LARGEST`."""
+    return math.ldexp(_LARGEST, -math.frexp(largest or 1.0)[1])
 
 
 def embree_scene(vertices: Floats, triangles: NDArray[np.int32]) -> "EmbreeScene":
@@ -211,6 +217,8 @@ class Plain:
         self._triangle_count = triangles.count
         self._edges = Edges(triangles)
         self._bounds = np.concatenate([_triangle_bounds(self._edges.corners, planes), ellipsoids.bounds], axis=1)
+        hidden = np.flatnonzero(triangles.hidden_from("camera"))
+        self._bounds[0::2, hidden], self._bounds[1::2, hidden] = np.inf, -np.inf
         self._bounds += np.array([[-1], [1], [-1], [1]]) * _MARGIN * (1 + np.nan_to_num(np.abs(self._bounds), posinf=0.0))
 
     def first(self, x: Floats, y: Floats) -> Indices:
