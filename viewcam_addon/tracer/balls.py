@@ -24,8 +24,9 @@ _SMALLEST, _LARGEST = 2.0**-450, 2.0**450
 class Balls:
     """n spheres that are not flat.
 
-    centres : (3, n) float64, camera space. radii : (n,) float64, in their objects' spaces. inverse : (9, k) float64, from camera
-        space to the objects' spaces: [3 · column + row, object]. owner : (n,) int32, which of the k objects.
+    centres : (3, n) float64, camera space. radii : (n,) float64, in their objects' spaces.
+    inverse : (9, k) float64, from camera space to the objects' spaces: [3 · column + row, object].
+    owner : (n,) int32, which of the k objects.
     axes : (3, 3, n) float64: [axis, component, sphere], the principal half axes, camera space.
     number : (n,) int32, which of the scene's spheres they are, counted from object to object.
     placed : all objects with their spheres.

@@ -54,12 +54,6 @@ class Points:
 
     @staticmethod
     def joined(parts: "list[Points]") -> "Points":
-        """The points of one scene's surfaces, one part after the other."""
-        values = {field.name: [getattr(part, field.name) for part in parts] for field in fields(Points)}
-        return Points(**{name: None if some[0] is None else np.concatenate(some, axis=-1) for name, some in values.items()})
-
-    @staticmethod
-    def joined(parts: "list[Points]") -> "Points":
         """Several, one after the other; all of one scene."""
         values = {field.name: [getattr(part, field.name) for part in parts] for field in fields(Points)}
         return Points(**{name: None if some[0] is None else np.concatenate(some, axis=-1) for name, some in values.items()})
@@ -96,7 +90,7 @@ class Surfaces:
         self._colours = _corner_colours(triangles) if any(colour.vertex for colour in colours) else None
 
     def seen(self, primitives: Indices, x: Floats, y: Floats) -> Points:
-        """The points where n rays from the eye, (x, y, 1), meet the primitives that visibility.py found for them; none is −1."""
+        """The points where n rays from the eye, (x, y, 1), meet what visibility.py found for them; no primitive is −1."""
         directions = np.stack([x, y, np.ones_like(x)])
 
         def triangle_points(triangle: Indices, which: Indices | slice) -> Points:
