@@ -1,0 +1,156 @@
+"""The numbers that choose: where a sample lies on the film, which lamp, which direction.
+
+A sample of a pixel is a point in a cube of many dimensions: two for the film and eight for each scattering. The points of a
+pixel are Sobol's, of which any 2ᵐ that follow one another fill the cube evenly, scrambled for each pixel and dimension: every
+number is uniform, pixels are independent, and the error of what is smooth falls as N^−3/2.
+
+**Scrambling.** X holds a number's binary digits in reverse, the first in the lowest bit. With any s and any odd a of 32 bits,
+Y = a X + s mod 2³², reversed again, is the number scrambled. Of two numbers that agree in k digits and differ in the next, Y
+does the same, since carries go upwards and a is odd; all further digits are independent, since a (X − X′)/2ᵏ takes every
+odd value equally often, and s every value. That is the joint distribution of two numbers under Owen's nested permutations
+(Annals of Statistics 25, 1997), and the variance of a mean depends on pairs only: it is Owen's, for a product and a sum.
+
+**Dimensions.** Film and first scattering have dimensions of their own: those that belong together, both axes of the film, of a
+lamp, and of a direction, are Sobol's first two in an order of points that Sobol's other dimensions give. So each such pair is
+as good as two dimensions can be, and no two depend on one another. Later scatterings have the first one's dimensions, each in
+an order of its own, by a nested permutation of the points' indices (padding: Burley, JCGT 9, 2020).
+
+Any number of samples may be taken. Beside a power of two the last points lack their partners: what is smooth is then off as
+1/N; edges, off as N^−3/4, lose nothing.
+
+Rejected: hashes that resemble Owen's permutations (Laine and Karras 2011; Burley), three or four multiplications instead of
+one; his own, a tree of random bits for each dimension; an order of points for each pixel, which costs a matrix for each number;
+padding from the start, as Cycles does, which converges as N^−1/2 where film and lamp matter together; one shift for all points
+of a pixel (Cranley and Patterson 1976), off as 1/N; blue noise over the picture, which makes pixels depend on one another.
+benchmarks/light/convergence.py compares them.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arrays import Floats
+
+Words = NDArray[np.uint32]
+Samples = int | NDArray[np.integer]
+
+FILM, SCATTERING = 2, 8
+"""How many dimensions the film has, and each scattering."""
+
+# Sobol's dimensions after the first: the degree of a primitive polynomial, its coefficients as bits, and the first direction
+# numbers (Joe and Kuo, SIAM J. Sci. Comput. 30, 2008, new-joe-kuo-6).
+_SECOND = (1, 0, (1,))
+_LAMP = (3, 2, (1, 1, 1))
+_DIRECTION = (4, 4, (1, 3, 5, 13))
+_SINGLE = ((3, 1, (1, 3, 1)), (4, 1, (1, 1, 3, 3)), (5, 2, (1, 1, 5, 5, 17)), (5, 4, (1, 1, 5, 5, 5)))
+
+_BITS = 24
+_LOW = 16  # bits of a sample's number that its scattering's order changes, and for which there are tables
+_ORDER = 0xFFFFFFFF  # the key of a scattering's order of points, as no dimension's
+
+
+class Sampler:
+    """Numbers for any pixel, sample and dimension: the same bits on every machine.
+
+    seed : a whole number. samples : how many samples are taken of a pixel, 1 to 2²⁴.
+    """
+
+    def __init__(self, seed: int, samples: int) -> None:
+        self._seeds = _mixed(np.array([seed & 0xFFFFFFFF, ~seed & 0xFFFFFFFF], np.uint32))
+        self._first = np.arange(min(samples, 1 << _LOW), dtype=np.uint32)
+        self._tables: dict[int, Words] = {}
+
+    def numbers(self, pixels: NDArray[np.integer], samples: Samples, first: int, count: int) -> Floats:
+        """(count, n) float64 in [0, 1): the dimensions from `first` on of samples of n pixels.
+
+        pixels : (n,) from 0 to 2³² − 1. samples : (n,), or one for all, from 0.
+        """
+        dimensions = range(first, first + count)
+        digits, shift = self._hashed(pixels, np.array(dimensions, np.uint32))
+        which = np.atleast_1d(samples)
+        for row, dimension in zip(digits, dimensions, strict=True):
+            row *= self._points(dimension, which)
+        digits += shift
+        return _reversed(digits) * 2.0**-32
+
+    def _hashed(self, pixels: NDArray[np.integer], keys: Words) -> tuple[Words, Words]:
+        """Two random words for each key and pixel, (k, n) each; the first odd."""
+        shift = _mixed(_mixed(pixels.astype(np.uint32) ^ self._seeds[0]) ^ _mixed(keys + self._seeds[1])[:, None])
+        factor = shift * np.uint32(0x9E3779B1)
+        factor ^= factor >> np.uint32(15)
+        factor |= np.uint32(1)
+        return factor, shift
+
+    def _points(self, dimension: int, samples: NDArray[np.integer]) -> Words:
+        """(n,): the digits of Sobol's points in a dimension, before they are scrambled."""
+        scattering, place = divmod(dimension - FILM, SCATTERING) if dimension >= FILM else (0, dimension - FILM)
+        table = self._tables.get(scattering)
+        if table is None:
+            table = self._tables[scattering] = _transformed(self._order(scattering), _MATRICES[:, :_LOW])
+        digits = np.take(table[FILM + place], samples & (1 << _LOW) - 1, mode="clip")
+        if len(self._first) == 1 << _LOW:
+            digits ^= _transformed((samples >> _LOW).astype(np.uint32), _MATRICES[None, FILM + place, _LOW:])[0]
+        return digits
+
+    def _order(self, scattering: int) -> Words:
+        """Which of Sobol's points each of the first samples has at a scattering."""
+        if scattering == 0:
+            return self._first
+        factor, shift = self._hashed(np.array([scattering]), np.array([_ORDER], np.uint32))
+        return _reversed(_reversed(self._first << np.uint32(32 - _LOW)) * factor[0] + shift[0]) >> np.uint32(32 - _LOW)
+
+
+def _mixed(words: Words) -> Words:
+    """A permutation of all words that looks random (Wellons, Prospecting for Hash Functions, 2018: lowbias32)."""
+    words = words ^ (words >> np.uint32(16))
+    words *= np.uint32(0x7FEB352D)
+    words ^= words >> np.uint32(15)
+    words *= np.uint32(0x846CA68B)
+    words ^= words >> np.uint32(16)
+    return words
+
+
+def _reversed(words: Words) -> Words:
+    """The bits of contiguous words in reverse order; `words` is used up. Bytes are turned by NumPy, the bits in each here."""
+    for shift, mask in ((1, 0x55555555), (2, 0x33333333), (4, 0x0F0F0F0F)):
+        higher = words >> np.uint32(shift)
+        higher &= np.uint32(mask)
+        words &= np.uint32(mask)
+        words <<= np.uint32(shift)
+        words |= higher
+    return words.byteswap(inplace=True)
+
+
+def _transformed(numbers: Words, matrices: Words) -> Words:
+    """(d, n) products of d matrices and n vectors of bits. numbers : (n,). matrices : (d, bits), their columns."""
+    products = np.zeros((len(matrices), len(numbers)), np.uint32)
+    for bit, columns in enumerate(matrices.T):
+        products ^= columns[:, None] * (numbers >> np.uint32(bit) & np.uint32(1))
+    return products
+
+
+def _sobol(degree: int, coefficients: int, start: tuple[int, ...]) -> Words:
+    """(_BITS,): the columns of the matrix of one of Sobol's dimensions, their digits in reverse order.
+
+    Its direction numbers follow from the first ones by the polynomial's recurrence (Bratley and Fox, ACM TOMS 14, 1988).
+    """
+    numbers = list(start)
+    for k in range(degree, _BITS):
+        number = numbers[k - degree] ^ numbers[k - degree] << degree
+        for i in range(1, degree):
+            if coefficients >> degree - 1 - i & 1:
+                number ^= numbers[k - i] << i
+        numbers.append(number)
+    left = np.array([number << 31 - k for k, number in enumerate(numbers)], np.uint32)
+    return _reversed(left)
+
+
+def _matrices() -> Words:
+    """(FILM + SCATTERING, _BITS): the columns of the matrices of all dimensions, their digits in reverse order."""
+    first, second = np.uint32(1) << np.arange(_BITS, dtype=np.uint32), _sobol(*_SECOND)
+    lamp, direction = _sobol(*_LAMP), _sobol(*_DIRECTION)
+    emitter, component, roulette, spare = (_sobol(*single) for single in _SINGLE)
+    lamps, directions = (_transformed(columns, second[None])[0] for columns in (lamp, direction))
+    return np.stack([first, second, emitter, lamp, lamps, direction, directions, component, roulette, spare])
+
+
+_MATRICES = _matrices()
