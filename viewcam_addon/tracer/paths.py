@@ -16,7 +16,7 @@ and splitting a path at glass, which makes work where light is faint.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,12 +28,11 @@ from .film import Bounces
 from .light import BACKGROUND, DIRECT, INDIRECT, OTHER, Light
 from .lobes import DIFFUSE, KINDS, Lobes, lobes_at
 from .points import Points, Surfaces
-from .sampler import Sampler
+from .sampler import FILM, SCATTERING, Sampler
 from .space import Space
 from .textures import Palette
 
-# Which of a path's random numbers are for what: two for the place on the film, and then so many for each scattering.
-_FILM, _PER_SCATTERING = 2, 8
+# Which of a scattering's random numbers are for what.
 _EMITTER, _DIRECTION, _WAY, _SURVIVAL = 0, 3, 5, 6
 Numbers = Callable[[Indices, int, int], Floats]
 """Random numbers (count, k) for some of the paths: which, the first dimension, how many dimensions."""
@@ -87,6 +86,16 @@ class Paths:
         self._most = bounces.total + 1
         self._most_of = {kind: getattr(bounces, kind) + 1 for kind in KINDS}
 
+    @property
+    def random(self) -> bool:
+        """Whether paths through the same point of the film may bring different light."""
+        emitters, palette = self._emitters, self._palette
+        if not emitters.lit:
+            return False
+        scattered = any(self._most_of[kind] > 1 and self._most > 1 or emitters.meets(kind) for kind in ("diffuse",))
+        glass = palette.has("glass")
+        return glass or palette.has("diffuse") and (emitters.random or scattered)
+
     def trace(self, pixels: Indices, samples: Indices, primitives: Indices, x: Floats, y: Floats) -> Light:
         """The light of n paths whose rays from the eye, (x, y, 1), meet primitives, −1 for none.
 
@@ -95,7 +104,7 @@ class Paths:
         light = Light(len(pixels))
         arrivals = self._from_eye(light, primitives, x, y)
         depth = 0
-        while self._emitters.lit and len(arrivals.path):
+        while self._emitters.lit and arrivals is not None:
             depth += 1
             rays = self._scattered(light, arrivals, depth, pixels, samples)
             arrivals = _joined([self._arrived(light, some) for some in rays])
@@ -170,7 +179,7 @@ class Paths:
 
     def _scattered(self, light: Light, arrivals: Arrivals, depth: int, pixels: Indices, samples: Indices) -> list[Rays]:
         """Scatter paths for the depth-th time, and add the light of emitters on the way; the rays, by kind."""
-        first = _FILM + _PER_SCATTERING * (depth - 1)
+        first = FILM + SCATTERING * (depth - 1)
 
         def numbers(which: Indices, dimension: int, count: int) -> Floats:
             path = arrivals.path[which]
@@ -178,13 +187,11 @@ class Paths:
 
         lobes = lobes_at(self._palette, arrivals.points, arrivals.direction)
         places = _places(arrivals, depth, light.count)
-        if DIFFUSE in lobes.ways and self._emitters.sampled("diffuse"):
+        if DIFFUSE in lobes and self._emitters.sampled("diffuse"):
             self._add_emitters(light, arrivals, lobes, places["diffuse"], numbers)
-        if len(lobes.ways) > 1:
-            way = lobes.chosen(numbers(np.arange(len(arrivals.path)), _WAY, 1)[0])
-        else:
-            way = lobes.chosen(np.zeros(len(arrivals.path)))
-        made = (self._rays(arrivals, lobes, way, kind, depth, places[kind], numbers) for kind in KINDS)
+        everyone = np.arange(len(arrivals.path))
+        chosen = lobes.chosen(numbers(everyone, _WAY, 1)[0] if len(lobes.ways) > 1 else np.zeros(len(everyone)))
+        made = (self._rays(arrivals, lobes, chosen, kind, depth, places[kind], numbers) for kind in KINDS)
         return [rays for rays in made if rays is not None]
 
     def _add_emitters(self, light: Light, arrivals: Arrivals, lobes: Lobes, places: Indices, numbers: Numbers) -> None:
@@ -203,43 +210,40 @@ class Paths:
         light.add(places[which[bright]], radiance[:, bright])
 
     def _rays(
-        self, arrivals: Arrivals, lobes: Lobes, way: Indices, kind: str, depth: int, places: Indices, numbers: Numbers
+        self, arrivals: Arrivals, lobes: Lobes, chosen: Indices, kind: str, depth: int, places: Indices, numbers: Numbers
     ) -> Rays | None:
-        """The rays of one kind that leave where paths have come to; None where none brings anything."""
-        which = np.flatnonzero(np.isin(way, KINDS[kind]))
-        if not len(which):
-            return None
+        """The rays of one kind that leave where paths have come to; None where none can bring anything."""
+        which = lobes.of_kind(chosen, kind)
         counts = arrivals.counts[:, which]
         count = counts[list(KINDS).index(kind)]
         count += 1
         last = (count >= self._most_of[kind]) | (depth >= self._most)
-        weights = arrivals.weight[:, which] * lobes.weight(way[which], which)
-        kept = np.ones(len(which), bool) if self._emitters.meets(kind) else ~last
-        if depth > _CERTAIN:
-            survival = np.minimum(np.sqrt(weights.max(axis=0)), 1.0)
-            kept &= last | (numbers(which, _SURVIVAL, 1)[0] < survival)
-            weights /= np.where(last | (survival == 0), 1.0, survival)
+        if not self._emitters.meets(kind):
+            kept = np.flatnonzero(~last)
+            which, counts, last = which[kept], counts[:, kept], last[kept]
+        if not len(which):
+            return None
+        weights = arrivals.weight[:, which] * lobes.weights(chosen, which)
+        points, direction = arrivals.points.at(which), arrivals.direction[:, which]
+        density = np.full(len(which), np.inf)
         if kind == "diffuse":
-            normal = arrivals.points.shading[:, which]
-            direction, density = scattering.cosine_direction(normal, numbers(which, _DIRECTION, 2))
+            direction, density = scattering.cosine_direction(points.shading, numbers(which, _DIRECTION, 2))
             density *= lobes.share(DIFFUSE)[which]
-            kept &= dot(direction, arrivals.points.normal[:, which]) > 0
+        elif kind == "glossy":
+            direction = scattering.reflected(direction, points.shading)
         else:
-            direction = lobes.turned(kind, way, which)
-            density = np.full(len(which), np.inf)
-        kept = np.flatnonzero(kept)
-        which = which[kept]
-        return Rays(
-            kind,
-            arrivals.path[which],
-            places[which],
-            weights[:, kept],
-            counts[:, kept],
-            direction[:, kept],
-            arrivals.points.at(which),
-            density[kept],
-            last[kept],
-        )
+            direction, _ = scattering.refracted(direction, points.shading, lobes.ratio[which])
+        # A smooth normal may send rays to the wrong side of the true surface: that light is lost, as in Cycles.
+        kept = (dot(direction, points.normal) > 0) != (kind == "transmission")
+        if depth > _CERTAIN:
+            survival = np.where(last, 1.0, np.minimum(np.sqrt(weights.max(axis=0)), 1.0))
+            kept &= numbers(which, _SURVIVAL, 1)[0] < survival
+            weights /= np.where(survival > 0, survival, 1.0)
+        if not kept.all():
+            kept = np.flatnonzero(kept)
+            which, weights, counts, last = which[kept], weights[:, kept], counts[:, kept], last[kept]
+            points, direction, density = points.at(kept), direction[:, kept], density[kept]
+        return Rays(kind, arrivals.path[which], places[which], weights, counts, direction, points, density, last)
 
 
 def _places(arrivals: Arrivals, depth: int, count: int) -> dict[str, Indices]:
@@ -250,5 +254,14 @@ def _places(arrivals: Arrivals, depth: int, count: int) -> dict[str, Indices]:
     return dict.fromkeys(KINDS, arrivals.place + count * (INDIRECT - DIRECT) * was_direct)
 
 
-def _joined(parts: list[Arrivals]) -> Arrivals:
-    parts = [part for part in parts if len(part.path)] or parts[:1]
+def _joined(parts: list[Arrivals]) -> Arrivals | None:
+    """All paths that go on, in one; None where none does."""
+    parts = [part for part in parts if len(part.path)]
+    if len(parts) < 2:
+        return parts[0] if parts else None
+    arrays = (
+        np.concatenate([getattr(part, field.name) for part in parts], axis=-1)
+        for field in fields(Arrivals)
+        if field.name != "points"
+    )
+    return Arrivals(*arrays, Points.joined([part.points for part in parts]))

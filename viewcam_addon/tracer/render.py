@@ -71,7 +71,7 @@ class Tracer:
             self._surface.write(centres, primitives, x, y)
             for name in CENTRES:
                 passes[name][:] = centres[name]
-            illumination.trace(passes, np.array(tile), columns, rows, lambda: _stop_if_asked(watcher))
+            illumination.trace(passes, np.arange(tile.start, tile.stop), columns, rows, lambda: _stop_if_asked(watcher))
 
         largest = illumination.largest_tile
         return self._picture(dark, trace, min(largest, SMALLEST_TILE), largest, watcher)
