@@ -59,7 +59,7 @@ def triangle_offsets(triangles: Triangles) -> Floats:
 
 
 def wide_offsets(planes: Planes) -> Floats:
-    """(k,) float64, camera space: the same of `planes.wide`, which are tested in float64: as of a small triangle near the eye."""
+    """(k,) float64, camera space: that of `planes.wide`, which are tested in float64: as of a small triangle near the eye."""
     return _FLOAT32 * _ROUNDING * gather(planes.distance, planes.wide)
 
 
