@@ -92,9 +92,8 @@ class Paths:
         emitters, palette = self._emitters, self._palette
         if not emitters.lit:
             return False
-        scattered = any(self._most_of[kind] > 1 and self._most > 1 or emitters.meets(kind) for kind in ("diffuse",))
-        glass = palette.has("glass")
-        return glass or palette.has("diffuse") and (emitters.random or scattered)
+        onwards = min(self._most, self._most_of["diffuse"]) > 1 or emitters.meets("diffuse")
+        return palette.has("glass") or (palette.has("diffuse") and (emitters.random or onwards))
 
     def trace(self, pixels: Indices, samples: Indices, primitives: Indices, x: Floats, y: Floats) -> Light:
         """The light of n paths whose rays from the eye, (x, y, 1), meet primitives, −1 for none.
