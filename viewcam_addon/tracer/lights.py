@@ -1,8 +1,9 @@
 """Lamps and the world, as data. What they do to a surface is computed in emitters.py.
 
-All quantities are what Cycles makes of Blender's settings (intern/cycles/blender/light.cpp), colour, strength, exposure and the
-lamp's size multiplied out: a power in watts for each of red, green and blue, with 1/π of it where Blender's watts have it. A
-lamp of the radiant power Φ and the area A has the radiance Φ/(π A); a point has the irradiance Φ/(4π r²).
+All quantities are what Cycles makes of Blender's settings, colour, strength, exposure and temperature multiplied out: for each
+of red, green and blue the irradiance of a sun on what faces it, and the power P of any other lamp. One with the area A has the
+radiance P/(π A), to one side if it is flat, and a sphere's area is 4π R²; one of no size has the irradiance P/(4π r²). Scaling
+the object scales an area lamp, shapes the cone of a spot, and does not change a radius.
 
 hidden_from : which rays don't see the lamp itself, of "camera", "diffuse", "glossy", "transmission"; what a lamp hides from, it
     does not light.
@@ -33,6 +34,11 @@ class Lamp:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "hidden_from", hidden_from(f"light {self.name!r}", self.hidden_from))
+
+    @property
+    def is_dark(self) -> bool:
+        """Whether it gives no light at all."""
+        raise NotImplementedError
 
     def _check(self, what: str, value: object, least: float = 0.0, most: float = 1e18) -> None:
         object.__setattr__(self, what, checks.number(f"{what} of light {self.name!r}", value, least, most))
@@ -69,13 +75,17 @@ class Sun(Lamp):
         towards /= largest
         object.__setattr__(self, "towards", tuple((towards / np.sqrt(towards @ towards)).tolist()))
 
+    @property
+    def is_dark(self) -> bool:
+        return not any(self.irradiance)
+
 
 @dataclass(frozen=True, eq=False)
 class Point(Lamp):
     """A point, or a sphere that shines evenly.
 
-    position : world space. power : (3,). radius : world units. soft_falloff : Blender's setting of that name, which matters
-    inside and close to the sphere only.
+    position : world space. power : (3,). radius : world units. soft_falloff : instead of a sphere, a disc that turns towards
+    whatever it lights, as Blender's setting of that name makes it: close by, it lights less.
     """
 
     kind: ClassVar[str] = "point"
@@ -90,6 +100,10 @@ class Point(Lamp):
         self._check_colour("power")
         self._check("radius", self.radius)
 
+    @property
+    def is_dark(self) -> bool:
+        return not any(self.power)
+
 
 @dataclass(frozen=True, eq=False)
 class Spot(Lamp):
@@ -97,7 +111,7 @@ class Spot(Lamp):
 
     matrix : (4, 4) float64, the lamp's space to world space; angles are measured in the lamp's space. power : (3,), of a point
     that would shine everywhere as in the middle of the cone. radius : world units. angle : of the whole cone, radians, 0 to π.
-    blend : 0 to 1, the part of the cone over which the light falls off.
+    blend : 0 to 1, the part of the cone over which the light falls off. soft_falloff : as of points.
     """
 
     kind: ClassVar[str] = "spot"
@@ -116,10 +130,14 @@ class Spot(Lamp):
         self._check("angle", self.angle, 0.0, np.pi)
         self._check("blend", self.blend, 0.0, 1.0)
 
+    @property
+    def is_dark(self) -> bool:
+        return not any(self.power) or np.linalg.det(self.matrix[:3, :3]) == 0
+
 
 @dataclass(frozen=True, eq=False)
 class Area(Lamp):
-    """A rectangle or an ellipse that shines evenly towards its local −z axis.
+    """A rectangle or an ellipse that shines evenly to one side, towards its local −z axis; one without an area is dark.
 
     matrix : (4, 4) float64, the lamp's space to world space. size : along its local x and y axes, before the matrix. power :
     (3,). ellipse : instead of a rectangle.
@@ -139,6 +157,16 @@ class Area(Lamp):
         if min(size) < 0:
             raise InputError(f"size of light {self.name!r} is {size}: give two numbers that are not negative")
         object.__setattr__(self, "size", size)
+
+    @property
+    def area(self) -> float:
+        """In world space."""
+        across, along = self.matrix[:3, :2].T * np.array(self.size)[:, None]
+        return float(np.linalg.norm(np.cross(across, along))) * (np.pi / 4 if self.ellipse else 1.0)
+
+    @property
+    def is_dark(self) -> bool:
+        return not any(self.power) or self.area == 0 or not self.matrix[:3, 2].any()
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,185 @@
+"""What gives light, and which of it a point is lit by: lamps, surfaces that shine, and the world.
+
+A point gets the light of one emitter, chosen at random, divided by the chance that it had. Of a few emitters the chance is in
+proportion to what each may bring to that point; of many it is the same everywhere, half of it by power and half alike for all,
+so that what is weak but near gets its share.
+
+Lamps are sampled by solid angle (bulbs.py, plates.py), which is bounded, so that rays scattered by diffuse surfaces need not
+look for them. Surfaces that shine are found both ways, weighted by Veach's power heuristic. The world, the same everywhere, is
+found best by rays that are scattered: none are aimed at it.
+
+Rejected: a tree of lights (Conty and Kulla, 2018), whose every level is a random choice in Python, and shadow rays to several
+emitters, which is the same as more samples.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arrays import Floats, Indices, gather
+from .glowing import Glowing
+from .lamps import Lamps
+from .lights import Lamp
+from .points import Points, Surfaces
+from .scene import Scene
+from .textures import Palette
+from .view import View
+
+# For so many the chances are computed at each point, at a tenth of a shadow ray for each.
+_FEW = 8
+# More light than any picture holds, less than makes products overflow.
+_MOST = 1e200
+_BELOW_1 = 1 - 2.0**-53
+
+
+@dataclass(frozen=True, slots=True)
+class Aimed:
+    """Where n points look for light, and what they get from there if nothing is in between.
+
+    direction : (3, n), unit. distance : (n,), inf for suns. light : (3, n), radiance over density. pdf : (n,), the density by
+    solid angle, inf for lamps, which scattered rays do not find. shadowed : (n,) bool, whether things can be in between.
+    """
+
+    direction: Floats
+    distance: Floats
+    light: Floats
+    pdf: Floats
+    shadowed: NDArray[np.bool_]
+
+
+def weight(pdf: Floats, other: Floats) -> Floats:
+    """The part that counts of a sample whose direction was picked with the density `pdf`, where another way of picking has the
+    density `other`. An infinite pdf counts whole."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.nan_to_num(other / pdf, nan=0.0, posinf=1e100)
+    return 1.0 / (1.0 + ratio * ratio)
+
+
+class Emitters:
+    """All that gives light in a scene, in camera space.
+
+    lit : whether anything does.
+    """
+
+    def __init__(self, scene: Scene, view: View, surfaces: Surfaces, palette: Palette) -> None:
+        lamps = [lamp for lamp in scene.lamps if not lamp.is_dark]
+        self._world = scene.world
+        self._shines = palette.has("emission")
+        self.lit = bool(lamps) or self._shines or any(scene.world.radiance)
+        self._met = {kind: Lamps(_seen_by(kind, lamps), view) for kind in ("camera", "glossy", "transmission")}
+        self._lamps = Lamps(_seen_by("diffuse", lamps), view)
+        self._glowing = Glowing(scene, surfaces, palette)
+        self._count = self._lamps.count + self._glowing.count
+        self._chances = self._fixed_chances(_extent(surfaces)) if self._count > _FEW else None
+
+    def sampled(self, kind: str) -> bool:
+        """Whether there is anything that `sample` finds for surfaces that scatter this kind of rays: diffuse ones only."""
+        return kind == "diffuse" and self._count > 0
+
+    def meets(self, kind: str) -> bool:
+        """Whether rays of this kind can run into light."""
+        return self._shines or bool(self.world(kind).any()) or (kind in self._met and self._met[kind].sized)
+
+    def sample(self, points: Points, u: Floats) -> Aimed:
+        """One emitter for each of n points, and a direction to it. u : (3, n) in [0, 1): which emitter, and where on it."""
+        count = u.shape[1]
+        which, chance, part = self._choose(points, u[0])
+        first = self._lamps.count
+        if not self._glowing.count:
+            direction, distance, light = self._lamps.sample(which, points, u[1:])
+            pdf = np.full(count, np.inf)
+        elif not first:
+            direction, distance, light, pdf = self._glowing.sample(which, points.position, part, u[1:])
+        else:
+            direction, distance, light = np.empty((3, count)), np.empty(count), np.empty((3, count))
+            pdf = np.full(count, np.inf)
+            lamps, glowing = np.flatnonzero(which < first), np.flatnonzero(which >= first)
+            direction[:, lamps], distance[lamps], light[:, lamps] = self._lamps.sample(
+                which[lamps], points.at(lamps), u[1:, lamps]
+            )
+            direction[:, glowing], distance[glowing], light[:, glowing], pdf[glowing] = self._glowing.sample(
+                which[glowing] - first, points.position[:, glowing], part[glowing], u[1:, glowing]
+            )
+        light = np.minimum(light * np.where(chance > 0, 1 / np.where(chance > 0, chance, 1.0), 0.0), _MOST)
+        shadowed = np.ones(count, bool)
+        if first and not self._lamps.shadowed.all():
+            shadowed = gather(np.append(self._lamps.shadowed, np.ones(self._glowing.count, bool)), which)
+        return Aimed(direction, distance, light, pdf * chance, shadowed)
+
+    def _choose(self, points: Points, u: Floats) -> tuple[Indices, Floats, Floats]:
+        """Which emitter each point gets, the chance that it had, 0 where none lights the point, and what is left of u."""
+        if self._count == 1:
+            return np.zeros(len(u), np.intp), np.ones(len(u)), u
+        if self._chances is not None:
+            reached = self._chances.cumsum()
+            reached /= reached[-1]
+            which = np.searchsorted(reached, u, side="right")
+            chance = gather(self._chances, which)
+            return which, chance, np.clip((u - (gather(reached, which) - chance)) / chance, 0.0, _BELOW_1)
+        reached = self._estimates(points).cumsum(axis=0)
+        total = reached[-1]
+        wanted = u * total
+        which = np.minimum((wanted >= reached).sum(axis=0), self._count - 1)
+        rays = np.arange(len(u))
+        before = np.where(which > 0, reached[which - 1, rays], 0.0)
+        share = reached[which, rays] - before
+        with np.errstate(divide="ignore", invalid="ignore"):
+            part = np.nan_to_num((wanted - before) / share)
+            return which, np.nan_to_num(share / total), np.clip(part, 0.0, _BELOW_1)
+
+    def _estimates(self, points: Points) -> Floats:
+        """(k, n): about how much each emitter brings to points."""
+        at = points.position, points.normal
+        lamps = [self._lamps.estimate(lamp, *at) for lamp in range(self._lamps.count)]
+        return np.stack([*lamps, *(self._glowing.estimate(number, *at) for number in range(self._glowing.count))])
+
+    def _fixed_chances(self, extent: float) -> Floats:
+        """(k,) chances of the emitters."""
+        powers = np.concatenate([self._lamps.powers(extent), self._glowing.powers()])
+        return 0.5 * powers / powers.sum() + 0.5 / self._count
+
+    def lamps_met(self, starts: Floats, directions: Floats, nearest: Floats, farthest: Floats, kind: str) -> Floats:
+        """(3, n), the radiance of all lamps that have a size, without suns, and that rays run through.
+
+        starts, directions : (3, n), camera space, directions of unit length. nearest, farthest : distances, (n,) or one.
+        """
+        return self._met[kind].met(starts, directions, nearest, farthest) if kind in self._met else np.zeros_like(directions)
+
+    def suns_met(self, directions: Floats, kind: str) -> Floats:
+        """(3, n), the radiance of suns that rays see which meet nothing."""
+        return self._met[kind].suns_met(directions) if kind in self._met else np.zeros_like(directions)
+
+    def world(self, kind: str) -> Floats:
+        """(3,), the radiance that rays see which meet nothing."""
+        return np.zeros(3) if kind in self._world.hidden_from else np.array(self._world.radiance)
+
+    def surface_weight(
+        self, starts: Points, met: Points, directions: Floats, distance: Floats, scattered_pdf: Floats, kind: str
+    ) -> Floats:
+        """(n,), the part that counts of the light of surfaces that scattered rays run into.
+
+        starts, met : from where to where. directions, distance : of the way. scattered_pdf : the rays' density.
+        """
+        if kind != "diffuse" or not self._glowing.count:
+            return np.ones(met.count)
+        density = self._glowing.density(met, directions, distance)
+        owner = self._lamps.count + gather(self._glowing.owner, met.primitive)
+        if self._chances is not None:
+            density *= gather(self._chances, owner)
+        elif self._count > 1:
+            estimates = self._estimates(starts)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                density *= np.nan_to_num(estimates[owner, np.arange(met.count)] / estimates.sum(axis=0))
+        return weight(scattered_pdf, density)
+
+
+def _extent(surfaces: Surfaces) -> float:
+    """Half the length of the box round all surfaces, camera space."""
+    places = np.concatenate([surfaces.triangles.vertices, surfaces.balls.centres], axis=1)
+    return float(np.linalg.norm(np.ptp(places, axis=1))) / 2 if places.shape[1] else 0.0
+
+
+def _seen_by(kind: str, lamps: Sequence[Lamp]) -> list[Lamp]:
+    return [lamp for lamp in lamps if kind not in lamp.hidden_from]

@@ -1,0 +1,92 @@
+"""The lamps of a scene, numbered kind after kind: how they light points, and what rays see that run into them.
+
+Lamps block no ray, as in Cycles: a ray sees all that it runs through.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .arrays import Floats, Indices
+from .bulbs import Bulbs, Suns, entries
+from .lights import Area, Lamp, Point, Spot, Sun
+from .plates import Ellipses, Rectangles
+from .points import Points
+from .view import View
+
+# More light than any picture holds, less than makes products overflow.
+_MOST = 1e100
+
+Table = Suns | Bulbs | Rectangles | Ellipses
+_KINDS = (
+    (Suns, lambda lamp: isinstance(lamp, Sun)),
+    (Bulbs, lambda lamp: isinstance(lamp, Point | Spot)),
+    (Rectangles, lambda lamp: isinstance(lamp, Area) and not lamp.ellipse),
+    (Ellipses, lambda lamp: isinstance(lamp, Area) and lamp.ellipse),
+)
+
+
+class Lamps:
+    """Lamps of all kinds, numbered kind after kind.
+
+    shadowed : (k,) bool, whether they cast shadows. sized : whether rays can run into any.
+    """
+
+    def __init__(self, lamps: Sequence[Lamp], view: View) -> None:
+        self._tables, self._firsts, shadowed = [], [], []
+        for table, belongs in _KINDS:
+            some = [lamp for lamp in lamps if belongs(lamp)]
+            if some:
+                self._tables.append(table(some, view))
+                self._firsts.append(len(shadowed))
+                shadowed += [lamp.casts_shadow for lamp in some]
+        self.shadowed = np.array(shadowed, bool)
+        self.count = len(shadowed)
+        self.sized = any(table.sized.any() for table in self._tables)
+
+    def sample(self, which: Indices, points: Points, u: Floats) -> tuple[Floats, Floats, Floats]:
+        """Directions, distances, and radiances over densities, of one lamp for each point."""
+        if len(self._tables) == 1:
+            return self._sample(self._tables[0], which, points.position, points.shading, u)
+        direction, distance, light = np.empty((3, len(which))), np.empty(len(which)), np.empty((3, len(which)))
+        for table, first in zip(self._tables, self._firsts, strict=True):
+            some = np.flatnonzero((which >= first) & (which < first + len(table.sized)))
+            direction[:, some], distance[some], light[:, some] = self._sample(
+                table, which[some] - first, points.position[:, some], points.shading[:, some], u[:, some]
+            )
+        return direction, distance, light
+
+    @staticmethod
+    def _sample(table: Table, which: Indices, position: Floats, shading: Floats, u: Floats) -> tuple[Floats, Floats, Floats]:
+        direction, distance, factor = table.sample(which, position, shading, u)
+        return direction, distance, entries(table.colours, which) * np.minimum(factor, _MOST)
+
+    def estimate(self, lamp: int, position: Floats, normal: Floats) -> Floats:
+        """(n,): about how much a lamp brings to points, 0 only where it brings nothing."""
+        kind = np.searchsorted(self._firsts, lamp, side="right") - 1
+        return self._tables[kind].estimate(lamp - self._firsts[kind], position, normal)
+
+    def powers(self, extent: float) -> Floats:
+        """(k,), of suns what falls on a scene as large as this."""
+        powers = [
+            table.colours.mean(axis=0) * (4 * np.pi * extent**2 if isinstance(table, Suns) else 1.0) for table in self._tables
+        ]
+        return np.concatenate([np.empty(0), *powers])
+
+    def met(self, starts: Floats, directions: Floats, nearest: Floats, farthest: Floats) -> Floats:
+        """As `Emitters.lamps_met`."""
+        light = np.zeros_like(directions)
+        for table in self._tables:
+            if not isinstance(table, Suns):
+                for lamp in np.flatnonzero(table.sized):
+                    light += table.colours[:, lamp, None] * table.met(lamp, starts, directions, nearest, farthest)
+        return light
+
+    def suns_met(self, directions: Floats) -> Floats:
+        """As `Emitters.suns_met`."""
+        light = np.zeros_like(directions)
+        for table in self._tables:
+            if isinstance(table, Suns):
+                for lamp in np.flatnonzero(table.sized):
+                    light += table.colours[:, lamp, None] * table.met(lamp, directions)
+        return light
