@@ -84,7 +84,7 @@ charts: .venv/test
 	.venv/bin/viewcam chart stability --json docs/charts/stability.json
 
 benchmark: .venv/demo
-	.venv/bin/python benchmarks/geometry_level.py
+	.venv/bin/python -m benchmarks.geometry_level
 
 clean:
 	rm -rf .venv .venvs .pytest_cache .ruff_cache .hypothesis wheels dist build demo

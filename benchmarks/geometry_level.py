@@ -1,34 +1,27 @@
 """How fast the tracer's geometry level is: beside Cycles on the same picture, and as a share of bare Embree on the same rays.
 
-    python benchmarks/geometry_level.py [--size 1920x1080] [--rounds 7] [--threads N] [--levels 3]
+    python -m benchmarks.geometry_level [--size 1920x1080] [--rounds 7] [--threads N] [--levels 3]
 
-Three subdivided Suzannes (190k triangles), one sample, the same passes on both sides. The rounds are interleaved, since a
-machine's speed drifts: each runs Cycles without and with its file, then the tracer without and with its file, and the ratios
-are those of the medians. Cycles runs in a process of its own, because OpenEXR must not be loaded beside Blender's own; its time
-is that of the render call, the tracer's that of render() with all of its preparation.
+Three subdivided Suzannes (190k triangles), one sample, the same passes on both sides. Each round runs Cycles without and with
+its file, then the tracer without and with its file. Cycles' time is that of the render call, the tracer's that of render() with
+all of its preparation.
 
 Needs bpy, embreex and OpenEXR.
 """
 
 import argparse
-import multiprocessing
 import os
-import resource
-import statistics
 import sys
 import tempfile
-import time
-from collections import defaultdict
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks import race
 from viewcam_addon import image
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.terminal import silent_libraries
 from viewcam_addon.tracer import scene_file, visibility
 from viewcam_addon.tracer.render import TILE, Tracer, render
 from viewcam_addon.tracer.scene import Scene
@@ -44,47 +37,29 @@ def main() -> int:
     parser.add_argument("--levels", type=int, default=3, help="of subdivision")
     options = parser.parse_args()
     width, height = map(int, options.size.split("x"))
-    context = multiprocessing.get_context("spawn")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        here, there = context.Pipe()
-        blender = context.Process(target=_serve_cycles, args=(there, folder, width, height, options.levels, options.threads))
-        blender.start()
-        there.close()
-        here.recv()
-        scene = scene_file.read(folder / "scene.json")
-        times = _race(here, scene, folder, options)
+        with race.Blender(prepare_cycles, folder, width, height, options.levels, options.threads) as blender:
+            scene = scene_file.read(folder / "scene.json")
+            times = race.run(blender.runners() | _tracer_runners(scene, folder, options.threads), options.rounds)
         megabytes = {side: (folder / f"{side}.exr").stat().st_size / 1e6 for side in ("cycles", "tracer")}
-        here.send("stop")
-        memory = {"tracer": _peak_memory(), "Cycles": here.recv()}
-        blender.join()
+    memory = {"tracer": race.peak_memory(), "Cycles": blender.peak_memory}
     _report(times, megabytes, memory, scene, options)
     return 0
 
 
-def _race(blender: Connection, scene: Scene, folder: Path, options: argparse.Namespace) -> dict[str, list[float]]:
-    """Seconds of each contestant in each round, after one to warm up."""
-    tracer = Tracer(scene, options.threads)
-    bare = _bare_embree(scene, options.threads)
-    times = defaultdict(list)
+def _tracer_runners(scene: Scene, folder: Path, threads: int) -> dict[str, race.Runner]:
+    tracer = Tracer(scene, threads)
 
-    def timed(name: str, work: Callable[[], object]) -> None:
-        start = time.perf_counter()
-        work()
-        times[name].append(time.perf_counter() - start)
+    def with_file() -> None:
+        image.write(folder / "tracer.exr", image.Image(render(scene, threads=threads), scene.camera))
 
-    for _ in range(options.rounds + 1):
-        for name in ("Cycles", "Cycles and its file"):
-            blender.send(name)
-            times[name].append(blender.recv())
-        timed("tracer", lambda: render(scene, threads=options.threads))
-        timed(
-            "tracer and its file",
-            lambda: image.write(folder / "tracer.exr", image.Image(render(scene, threads=options.threads), scene.camera)),
-        )
-        timed("tracing and refining", tracer.render)
-        timed("bare Embree", bare)
-    return {name: seconds[1:] for name, seconds in times.items()}
+    return {
+        "tracer": race.timed(lambda: render(scene, threads=threads)),
+        "tracer and its file": race.timed(with_file),
+        "tracing and refining": race.timed(tracer.render),
+        "bare Embree": race.timed(_bare_embree(scene, threads)),
+    }
 
 
 def _bare_embree(scene: Scene, threads: int) -> Callable[[], object]:
@@ -106,16 +81,8 @@ def _bare_embree(scene: Scene, threads: int) -> Callable[[], object]:
     return work
 
 
-def _serve_cycles(*arguments) -> None:
-    """The process with Blender in it, which keeps its progress to itself."""
-    with silent_libraries():
-        _answer_with_cycles(*arguments)
-
-
-def _answer_with_cycles(asked: Connection, folder: Path, width: int, height: int, levels: int, threads: int) -> None:
-    """Write the scene, render when asked, and answer with the seconds."""
-    import bpy
-
+def prepare_cycles(folder: Path, width: int, height: int, levels: int, threads: int) -> dict[str, race.Runner]:
+    """In Blender's process: write the scene, and offer Cycles' renders."""
     import viewcam_addon
     from viewcam_addon.blender import cycles
     from viewcam_addon.blender.borrowing import borrowed, still_of_one_layer
@@ -129,25 +96,21 @@ def _answer_with_cycles(asked: Connection, folder: Path, width: int, height: int
     ledger = Ledger()
     scene_file.write(export_scene(scene, view_layer, camera_object, ledger), folder / "scene.json")
     remedies = list(ledger.remedies.values())
-    asked.send(bpy.app.version_string)
-    while (name := asked.recv()) != "stop":
-        start = time.perf_counter()
-        if name == "Cycles":
-            with borrowed() as borrow:
-                still_of_one_layer(borrow, scene, view_layer, camera_object)
-                cycles.borrow_settings(borrow, scene, view_layer)
-                borrow.set(scene.render, "threads_mode", "FIXED")
-                borrow.set(scene.render, "threads", threads)
-                for remedy in remedies:
-                    remedy(borrow)
-                start = time.perf_counter()
-                render_still(scene)
-        else:
-            cycles.render(scene, view_layer, camera_object, folder / "cycles.exr", remedies, threads)
-        asked.send(time.perf_counter() - start)
-    asked.send(_peak_memory())
-    sys.stdout.flush()
-    os._exit(0)  # bpy's own clean-up crashes in some versions
+
+    def picture() -> float:
+        with borrowed() as borrow:
+            still_of_one_layer(borrow, scene, view_layer, camera_object)
+            cycles.borrow_settings(borrow, scene, view_layer)
+            borrow.set(scene.render, "threads_mode", "FIXED")
+            borrow.set(scene.render, "threads", threads)
+            for remedy in remedies:
+                remedy(borrow)
+            return race.timed(lambda: render_still(scene))()
+
+    def with_file() -> None:
+        cycles.render(scene, view_layer, camera_object, folder / "cycles.exr", remedies, threads)
+
+    return {"Cycles": picture, "Cycles and its file": race.timed(with_file)}
 
 
 def _suzannes(width: int, height: int, levels: int):
@@ -174,13 +137,8 @@ def _suzannes(width: int, height: int, levels: int):
     return scene, camera_object
 
 
-def _peak_memory() -> float:
-    """Megabytes; the operating system counts them in kilobytes, macOS in bytes."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
-
-
 def _report(times: dict, megabytes: dict, memory: dict, scene: Scene, options: argparse.Namespace) -> None:
-    median = {name: statistics.median(seconds) for name, seconds in times.items()}
+    median = race.medians(times)
     triangles = sum(len(scene.geometries[placed.geometry].triangles) for placed in scene.objects)
     rays = scene.camera.width * scene.camera.height
     print(f"{triangles} triangles, {options.size}, {options.threads} threads, {options.rounds} rounds\n")
