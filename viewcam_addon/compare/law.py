@@ -40,6 +40,14 @@ ROUNDINGS = (0.7, 1.4, 3.0, 5.0, 20.0)
 
 FLOAT32 = 2.0**-24
 
+# A radiance is the product and quotient of some fourteen rounded figures (strength, colour, 1/π, the square of a distance, a
+# normal's length, a cosine, the exposure, the division by the number of samples): as many roundings at most, and about half of
+# them where their signs differ. Counted in units of ROUNDINGS, whose median is below one.
+RADIANCE_ROUNDINGS = 8.0
+# Cycles adds its samples up in float32. The sum is rounded by half a unit of its last place at most, N times, and half of the
+# samples are added while it has its last exponent: N / 4 roundings if all of them go the same way, 20 (ROUNDINGS' maximum) · N / 80.
+SAMPLES_PER_ROUNDING = 80.0
+
 # Pixels. What is less is told in figures, and no sentence warns of it.
 VISIBLE = 0.1
 
@@ -123,6 +131,18 @@ def uv_error(pinhole: Pinhole, seen: Seen, slope: Array) -> Array:
 def uv_storage(seen: Seen) -> Array:
     """(n,) error of a texture coordinate by its own rounding: of three products and two sums, each at most half the largest."""
     return 2.5 * FLOAT32 * np.maximum(np.abs(seen["UV"][..., :2]).max(axis=-1), 1.0)
+
+
+def radiance_error(shift: Array, slope: Array, value: Array, brightest: Array | float, samples: int) -> Array:
+    """Error of a radiance that one rounding causes, in its own unit.
+
+    The picture's shift (`shift`, pixels) times the slope of the radiance in the picture (`slope`, per pixel); the roundings of
+    the value itself (RADIANCE_ROUNDINGS, and those of adding up the samples); and that of the cosine between the surface and
+    the lamp, which is absolute: on a surface that the light grazes it is a rounding of what the light would be from straight
+    above (`brightest`).
+    """
+    roundings = RADIANCE_ROUNDINGS + samples / SAMPLES_PER_ROUNDING
+    return shift * slope + FLOAT32 * (roundings * value + brightest)
 
 
 def slopes(values: NDArray, belongs: NDArray) -> Array:

@@ -77,11 +77,23 @@ def shaded(image: Image) -> Picture:
     return _to_screen(np.where(hit[..., None], linear, sky))
 
 
-def tone_mapped(image: Image) -> Picture:
-    """The Combined pass, its 98th percentile of luminance just below white."""
-    colour = np.maximum(np.nan_to_num(image["Combined"][..., :3].astype(np.float64)), 0.0)
-    bright = max(float(np.percentile(colour.max(axis=-1), 98)), 1e-12)
-    return _to_screen(np.minimum(colour / bright * 0.9, 1.0))
+def brightness(colour: NDArray) -> float:
+    """What is shown just below white: the 98th percentile of the largest of each pixel's channels."""
+    return max(float(np.percentile(np.nan_to_num(colour.astype(np.float64)).max(axis=-1), 98)), 1e-12)
+
+
+def on_screen(colour: NDArray, bright: float) -> NDArray[np.float64]:
+    """Light (height, width, 3) as sRGB from 0 to 1, `bright` just below white."""
+    return _encoded(_exposed(colour, bright))
+
+
+def tone_mapped(colour: NDArray, bright: float | None = None) -> Picture:
+    """Light (height, width, 3), rows from the bottom, as a screen shows it; bright : by default the picture's own `brightness`."""
+    return _to_screen(_exposed(colour, bright or brightness(colour)))
+
+
+def _exposed(colour: NDArray, bright: float) -> NDArray[np.float64]:
+    return np.clip(np.nan_to_num(colour.astype(np.float64)) / bright * 0.9, 0.0, 1.0)
 
 
 def on_scale(errors: NDArray[np.float32], low: float, high: float) -> Picture:

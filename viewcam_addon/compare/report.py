@@ -138,13 +138,19 @@ def _views(comparison: Comparison, shades: tuple, reference: Image, test: Image)
         test=shades[1],
     )
     if "Combined" in reference.passes and "Combined" in test.passes:
-        add("combined", "Combined", swap, reference=pictures.tone_mapped(reference), test=pictures.tone_mapped(test))
+        add(
+            "combined",
+            "Combined",
+            swap,
+            reference=pictures.tone_mapped(reference["Combined"][..., :3]),
+            test=pictures.tone_mapped(test["Combined"][..., :3]),
+        )
     elif "Combined" in test.passes:
         add(
             "combined",
             "As rendered",
             "What the renderer made of it; the tracer has no light at this level.",
-            image=pictures.tone_mapped(test),
+            image=pictures.tone_mapped(test["Combined"][..., :3]),
         )
     for row in comparison.rows:
         if row.count:

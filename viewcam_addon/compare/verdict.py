@@ -36,7 +36,7 @@ def lines(comparison: "Comparison") -> list[str]:
     table.append(
         f"{'Mismatches':<16}{len(mismatches.kinds):>11,}  {_explained(comparison)}; "
         f"unexplained {mismatches.unexplained_count} of "
-        f"{comparison.allowed_unexplained} allowed  {_mark(comparison.mismatches_ok)}"
+        f"{comparison.allowed_unexplained} allowed  {mark(comparison.mismatches_ok)}"
     )
     table += [
         f"  {kind:<14}{count:>11,}  {explained:,} explained"
@@ -47,13 +47,13 @@ def lines(comparison: "Comparison") -> list[str]:
         s = comparison.systematic
         table.append(
             f"{'Systematic':<16}{'':>11}  shift {s.shift_x:+.1e}, {s.shift_y:+.1e} px; zoom {s.zoom_x:+.1e}, {s.zoom_y:+.1e}; "
-            f"roll {s.roll:+.1e} rad; mean {s.mean:.1e} of {s.tolerance:.1e} px  {_mark(s.ok)}"
+            f"roll {s.roll:+.1e} rad; mean {s.mean:.1e} of {s.tolerance:.1e} px  {mark(s.ok)}"
         )
     if comparison.conversion:
         c = comparison.conversion
         table.append(
             f"{'Conversion':<16}{'':>11}  stated camera against the one read back: {c.largest:.1e} px, {c.share:.0%} of what "
-            f"float32 storage allows  {_mark(c.ok)}"
+            f"float32 storage allows  {mark(c.ok)}"
         )
     if comparison.far_from_home:
         table.append(comparison.far_from_home.sentence)
@@ -62,11 +62,11 @@ def lines(comparison: "Comparison") -> list[str]:
 
 def _row_line(row: Row) -> str:
     if not row.count:
-        return f"{row.name:<16}{0:>11}  nothing was compared  {_mark(False)}"
+        return f"{row.name:<16}{0:>11}  nothing was compared  {mark(False)}"
     figures = "".join(f"{value:>10.1e}" for value in row.values)
     percentile, share = row.worst
-    used = f"{_percent(share):>7} at {percentile_name(percentile):<6}"
-    return f"{row.name:<16}{row.count:>11,}{figures}  {row.unit:<10}{used}{_mark(row.ok)}"
+    used = f"{percent(share):>7} at {percentile_name(percentile):<6}"
+    return f"{row.name:<16}{row.count:>11,}{figures}  {row.unit:<10}{used}{mark(row.ok)}"
 
 
 def _praise(comparison: "Comparison") -> str:
@@ -76,7 +76,7 @@ def _praise(comparison: "Comparison") -> str:
     median, nearly_all = (position.values[PERCENTILES.index(p)] for p in (50.0, 99.9))
     return (
         f"The same picture: over {position.count:,} pixels the median is {median:.1e} px off and 99.9 % are within "
-        f"{nearly_all:.1e} px; every one stays within {_percent(position.worst[1])} of what float32 allows there{edges}."
+        f"{nearly_all:.1e} px; every one stays within {percent(position.worst[1])} of what float32 allows there{edges}."
     )
 
 
@@ -143,13 +143,15 @@ def _why_unexplained(comparison: "Comparison") -> str:
     return "and no shift within tolerance explains it"
 
 
-def _percent(share: float) -> str:
+def percent(share: float) -> str:
+    """87%; 12 times."""
     return f"{share:.0%}" if share < 10 else f"{share:.3g} times"
 
 
 def _share(share: float) -> str:
-    return f"{_percent(share)} of" if share < 10 else _percent(share)
+    return f"{percent(share)} of" if share < 10 else percent(share)
 
 
-def _mark(ok: bool) -> str:
+def mark(ok: bool) -> str:
+    """The last word of a line."""
     return "ok" if ok else "FAILED"

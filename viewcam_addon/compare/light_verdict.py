@@ -1,0 +1,165 @@
+"""The comparison of light in words: one sentence, and aligned lines for the shell."""
+
+import math
+from typing import TYPE_CHECKING
+
+from .law import PERCENTILES
+from .statistics import percentile_name
+from .verdict import mark, percent
+
+if TYPE_CHECKING:
+    from .radiance import LightRow, Place, Question, RadianceComparison
+
+# Factors that tell what went wrong, and how well a factor has to fit one: a picture without noise tells it to some digits.
+_TELLING = {
+    "π": math.pi,
+    "1/π": 1.0 / math.pi,
+    "2": 2.0,
+    "1/2": 0.5,
+    "4": 4.0,
+    "1/4": 0.25,
+    "2π": 2.0 * math.pi,
+    "4π": 4.0 * math.pi,
+}
+_FIT = 1e-4
+# Where so many of the tiles differ, the place of the worst tells nothing.
+_EVERYWHERE = 0.5
+
+
+def sentence(comparison: "RadianceComparison") -> str:
+    """The verdict in one sentence, which says where and by how much where there is a difference."""
+    combined = comparison.rows[0]
+    if not comparison.passed:
+        worst = [row for row in comparison.rows if not row.ok]
+        others = f"; {_listed([row.name for row in worst[1:]])} too" if len(worst) > 1 else ""
+        return f"Different here: {_difference(worst[0])}{_hint(worst[0])}{others}."
+    if not comparison.is_noisy:
+        row = combined.steady
+        return (
+            f"The same picture: over {row.count:,} pixels without noise the light differs by {row.values[0]:.1e} of its value in "
+            f"the median and by at most {row.values[-1]:.1e}, {percent(row.worst[1])} of what float32 allows there{_edges(combined)}."
+        )
+    return (
+        f"The same within noise at {samples_words(comparison)}: no pixel and no tile differs by more than chance; "
+        f"{_mean_words(combined)}."
+    )
+
+
+def lines(comparison: "RadianceComparison") -> list[str]:
+    """A line for each quantity, aligned, what an eye sees, and the verdict last."""
+    table = _noisy_lines(comparison) if comparison.is_noisy else _steady_lines(comparison)
+    if comparison.black:
+        table.append(f"{'Black':<17}{', '.join(comparison.black)}: on both sides")
+    seen = comparison.appearance
+    expected = "" if seen.expected_relmse is None else f", of which noise explains {seen.expected_relmse:.2e}"
+    flip = "needs the package flip-evaluator" if seen.flip is None else f"{seen.flip:.4f}"
+    table.append(f"{'To the eye':<17}relMSE {seen.relmse:.2e}{expected}; FLIP {flip}")
+    return [*table, comparison.sentence]
+
+
+def samples_words(comparison: "RadianceComparison") -> str:
+    """At how many samples: 1,024 samples; or 1,024 and 512 samples."""
+    reference, test = comparison.samples
+    if reference is None or test is None:
+        return "unknown samples"
+    return f"{reference:,} samples" if reference == test else f"{reference:,} and {test:,} samples"
+
+
+def place_words(place: "Place", size: int) -> str:
+    """Where: in columns 32 to 63, rows 0 to 31."""
+    if size == 0:
+        return "over the whole picture"
+    (left, right), (bottom, top) = place.columns, place.rows
+    return f"in column {left}, row {bottom}" if size == 1 else f"in columns {left} to {right}, rows {bottom} to {top}"
+
+
+def change_words(reference: float, test: float) -> str:
+    """4.1 % darker; 3.1 times as bright; 0.12 instead of 0."""
+    if reference <= 0.0 or test <= 0.0:
+        return f"{test:.3g} instead of {reference:.3g}"
+    ratio = test / reference
+    if not 0.5 < ratio < 2.0:
+        return f"{ratio:.4g} times as bright"
+    return f"{abs(ratio - 1.0):.2%} {'brighter' if ratio > 1.0 else 'darker'}".replace("%", " %")
+
+
+def worst_question(row: "LightRow") -> "Question | None":
+    """The one that tells most: the smallest tiles of those that fail, unless half of the picture does."""
+    failing = [question for question in row.questions if question.failing]
+    if not failing:
+        return None
+    local = [question for question in failing if question.size > 1 and question.spread_out <= _EVERYWHERE]
+    whole = next((question for question in failing if question.size == 0), None)
+    if whole and (row.factor or any(question.spread_out > _EVERYWHERE for question in failing if question.size)):
+        return whole
+    return max(local, key=lambda question: question.size, default=None) or failing[-1]
+
+
+def _noisy_lines(comparison: "RadianceComparison") -> list[str]:
+    names = [question.name for question in comparison.rows[0].questions]
+    table = [f"{'standard errors':<17}{'ratio':>20}" + "".join(f"{name:>18}" for name in names)]
+    for row in comparison.rows:
+        cells = "".join(f"{f'{abs(q.worst.errors):.1f} of {q.allowed:.1f}':>18}" for q in row.questions)
+        table.append(f"{row.name:<17}{f'{row.ratio:.5f} ± {row.ratio_error:.5f}':>20}{cells}  {mark(row.ok)}")
+    return table
+
+
+def _steady_lines(comparison: "RadianceComparison") -> list[str]:
+    head = "".join(f"{percentile_name(p):>10}" for p in PERCENTILES)
+    table = [f"{'relative':<17}{'pixels':>11}{head}  of tolerance"]
+    for row in comparison.rows:
+        figures = "".join(f"{value:>10.1e}" for value in row.steady.values)
+        percentile, share = row.steady.worst
+        used = f"{percent(share):>7} at {percentile_name(percentile):<6}{mark(row.ok)}"
+        table.append(f"{row.name:<17}{row.steady.count:>11,}{figures}  {used}{_edges(row)}")
+    return table
+
+
+def _edges(row: "LightRow") -> str:
+    edges = row.edges
+    if not edges.count:
+        return ""
+    return f"; {edges.count:,} pixels differ at edges ({edges.explained:,} show what is beside them, {edges.allowed:,} may)"
+
+
+def _difference(row: "LightRow") -> str:
+    if row.broken:
+        return f"{row.name} has {row.broken:,} pixels that are no numbers"
+    question = worst_question(row)
+    if question is None:
+        steady, edges = row.steady, row.edges
+        if not edges.ok:
+            return (
+                f"{row.name} differs in {edges.count:,} pixels by more than float32 allows, {edges.explained:,} of them show what "
+                f"is beside them, as {edges.allowed:,} may"
+            )
+        percentile, share = steady.worst
+        return f"{row.name} is off by {share:.3g} times its tolerance at {percentile_name(percentile)}"
+    place = question.worst
+    many = f" and {question.failing - 1:,} more of {question.count:,}" if question.failing > 1 else ""
+    channel = f" ({place.channel})" if place.channel else ""
+    return (
+        f"{place_words(place, question.size)}{many} {row.name}{channel} is {change_words(place.reference, place.test)}, "
+        f"{abs(place.errors):.3g} standard errors where chance allows {question.allowed:.3g}"
+    )
+
+
+def _hint(row: "LightRow") -> str:
+    if row.factor is None:
+        return ""
+    tolerance = max(_FIT, 4.0 * row.ratio_error / row.ratio)
+    known = next((name for name, value in _TELLING.items() if abs(row.factor / value - 1.0) < tolerance), None)
+    return f" (all of it is a factor of {row.factor:.5g}{f', which is {known}' if known else ''})"
+
+
+def _mean_words(row: "LightRow") -> str:
+    if not row.reference:
+        return "both are black in the mean"
+    return (
+        f"the mean differs by {100.0 * (row.ratio - 1.0):+.3f} % ± {100.0 * row.ratio_error:.3f} %, and a difference of "
+        f"{100.0 * row.visible:.2f} % would have been found"
+    )
+
+
+def _listed(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -1,0 +1,99 @@
+"""Light without noise: two exact pictures, which may differ by what float32 rounds, and by what lies on the other side of an edge.
+
+A pixel on the edge of a shadow or a silhouette is one or the other, and the smallest shift of a ray decides. Such a pixel shows
+what one of its neighbours shows, and is rare: an edge lies within δ of the centre of a pixel beside it with the probability δ.
+So as many pixels as a shift by the law's 99th percentile would turn may differ, and those must show what is near them.
+
+Rejected: accepting every pixel that shows what a neighbour shows; a picture shifted by a tenth of a pixel would pass.
+"""
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..image import Image
+from ..pinhole import Pinhole
+from . import law
+from .law import Array
+from .mismatches import largest_around
+from .noise import poisson_allowance
+from .sides import Sides
+from .statistics import Row, measure
+
+# Pixels on edges are independent events; their number exceeds what is allowed once in a thousand pictures.
+_EDGE_LEVEL = 1e-3
+# An edge between a pixel and each of its neighbours to the left, right, top and bottom.
+_SIDES_OF_A_PIXEL = 4
+# Errors are told relative to the value, or to this share of the mean where the value is less.
+_DARK = 1e-3
+
+
+@dataclass(frozen=True)
+class Edges:
+    """Pixels that differ by more than rounding. explained : of those, how many show what is near them. allowed : how many may."""
+
+    count: int
+    explained: int
+    allowed: int
+
+    @property
+    def ok(self) -> bool:
+        return self.explained == self.count <= self.allowed
+
+    def to_json(self) -> dict:
+        return {**asdict(self), "ok": self.ok}
+
+
+def ray_shift(pinhole: Pinhole, reference: Image) -> Array:
+    """(height, width) pixels: law.ray_shift from the picture's depths; beside what was hit, the median."""
+    depth = reference["Depth"].reshape(-1, 1)
+    row, column = np.divmod(np.arange(len(depth)), pinhole.width)
+    rays = pinhole.ray_directions(column, row)
+    hit = depth[:, 0] < law.BACKGROUND_DEPTH
+    along = -(rays @ pinhole.basis()[2])
+    seen = {"Depth": depth, "Position": np.asarray(pinhole.eye) + rays * (depth[:, 0] / along)[:, None]}
+    seen |= {"Magnitude": reference["Magnitude"].reshape(-1, 1)} if "Magnitude" in reference.passes else {}
+    shift = law.ray_shift(pinhole, seen)
+    typical = np.median(shift[hit]) if hit.any() else law.FLOAT32 * max(pinhole.distance)
+    return np.where(hit, shift, typical).reshape(pinhole.height, pinhole.width)
+
+
+def one_rounding(sides: Sides, shift: Array, belongs: NDArray, brightest: Array | float, samples: int) -> Array:
+    """(height, width) what one rounding of float32 causes in a quantity, the largest of its channels.
+
+    shift : pixels, `ray_shift`. belongs : the object of each pixel. brightest : what the light would be from straight above.
+    """
+    slope = law.slopes(sides.reference, belongs)
+    value = np.abs(sides.reference).max(axis=-1)
+    return law.radiance_error(shift, slope, value, brightest, samples)
+
+
+def compare(sides: Sides, one: Array, shift: Array) -> tuple[Row, Edges, Array]:
+    """The figures of all pixels, those on edges, and the error of each pixel in roundings.
+
+    one : (height, width) `one_rounding`. shift : pixels.
+
+    Returns the row, relative errors; the edges; (height, width) float64.
+    """
+    error = np.abs(sides.difference).max(axis=-1)
+    most = law.ROUNDINGS[-1] * one
+    apart = error > most
+    largest, smallest = (
+        np.stack([sign * largest_around(sign * channel) for channel in np.moveaxis(sides.reference, -1, 0)], axis=-1)
+        for sign in (1.0, -1.0)
+    )
+    allowance = largest_around(most)
+    margin = allowance[..., None]
+    near = ((sides.test <= largest + margin) & (sides.test >= smallest - margin)).all(axis=-1)
+    on_edge = (largest - smallest).max(axis=-1) > allowance
+    turned = _SIDES_OF_A_PIXEL * law.ROUNDINGS[law.PERCENTILES.index(99.0)] * shift[on_edge]
+    edges = Edges(
+        int(apart.sum()), int((apart & near).sum()), poisson_allowance(float(np.minimum(turned, 1.0).sum()), _EDGE_LEVEL)
+    )
+    judged = ~(apart & near) if edges.explained <= edges.allowed else np.full(apart.shape, True)
+    judged &= ~sides.broken
+    size = np.abs(sides.reference).max(axis=-1)
+    scale = np.maximum(size, max(_DARK * float(size.mean()), np.finfo(float).tiny))
+    row = measure(sides.name, "relative", (error / scale)[judged], (one / scale)[judged])
+    return row, edges, error / np.maximum(one, np.finfo(float).tiny)
