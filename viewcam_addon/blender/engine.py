@@ -68,12 +68,12 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
         settings, threads = depsgraph.scene_eval.virtual_pinhole_reference, depsgraph.scene.render.threads
         words = "Level geometry" if level == "geometry" else f"Level {level}, {settings.samples} samples"
         work = scene, level, settings.samples, settings.seed, threads
-        started, rows_done = time.perf_counter(), 0
+        started, done = time.perf_counter(), np.zeros(scene.camera.height, bool)
         for passes, rows in tracing.bands(*work, self.test_break):
-            rows_done += len(rows)
             self._show(depsgraph, passes, rows)
-            self.update_progress(rows_done / scene.camera.height)
-            remaining = round((time.perf_counter() - started) * (scene.camera.height / rows_done - 1))
+            done[rows.start : rows.stop] = True
+            self.update_progress(done.mean())
+            remaining = round((time.perf_counter() - started) * (1 / done.mean() - 1))
             self.update_stats("", f"{words} | Remaining {remaining // 60}:{remaining % 60:02}")
 
     def _exported(self, depsgraph: bpy.types.Depsgraph) -> tuple[Scene, str]:

@@ -99,6 +99,10 @@ class VIEWCAM_PT_data(_CameraPanel, bpy.types.Panel):
     bl_region_type = "WINDOW"
     bl_context = "data"
 
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.camera is not None  # the data may be a lamp's or a mesh's
+
 
 class VIEWCAM_PT_sidebar(_CameraPanel, bpy.types.Panel):
     bl_space_type = "VIEW_3D"

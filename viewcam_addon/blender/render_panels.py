@@ -11,6 +11,7 @@ from typing import ClassVar
 
 import bpy
 
+from ..image import GEOMETRY_PASSES, LIGHT_PASSES
 from .engine import ASKED_BY, VIEWCAM_RenderEngine
 
 ENGINE = VIEWCAM_RenderEngine.bl_idname
@@ -44,6 +45,7 @@ class _Panel:
 
 class VIEWCAM_RENDER_PT_sampling(_Panel, bpy.types.Panel):
     bl_label = "Sampling"
+    bl_order = -1
 
     def draw(self, context: bpy.types.Context) -> None:
         settings, column = context.scene.virtual_pinhole_reference, self.column()
@@ -92,9 +94,10 @@ class VIEWCAM_VIEWLAYER_PT_passes(_Panel, bpy.types.Panel):
     bl_context = "view_layer"
 
     def draw(self, context: bpy.types.Context) -> None:
-        column = self.column(heading="Include")
-        for name, asked_by in ASKED_BY.items():
-            column.prop(context.view_layer, asked_by, text=name)
+        for heading, passes in (("Data", GEOMETRY_PASSES), ("Light", LIGHT_PASSES)):
+            column = self.column(heading=heading)
+            for name in filter(ASKED_BY.get, passes):
+                column.prop(context.view_layer, ASKED_BY[name], text=name)
         column.prop(context.scene.virtual_pinhole_reference, "use_pass_variance")
 
 
@@ -116,7 +119,8 @@ class VIEWCAM_LIGHT_PT_light(_Panel, bpy.types.Panel):
 def _lamp_settings(lamp: bpy.types.Light) -> Iterator[str]:
     """Those that count in the picture; some versions know fewer of them."""
     yield "color"
-    yield from (name for name in ("use_temperature", "temperature") if hasattr(lamp, name))
+    if hasattr(lamp, "use_temperature"):
+        yield from ("use_temperature", "temperature") if lamp.use_temperature else ("use_temperature",)
     yield "energy"
     yield from (name for name in ("exposure", "normalize") if hasattr(lamp, name))
     if lamp.type == "SUN":
@@ -167,8 +171,12 @@ def unregister() -> None:
 
 
 def _blenders_panels() -> Iterator[type[bpy.types.Panel]]:
-    """The panels that are shared. Where classes share the set itself (Freestyle's), they stay as they are."""
+    """The panels that are shared."""
     for each in bpy.types.Panel.__subclasses__():
         engines = vars(each).get("COMPAT_ENGINES", ())
-        if each.__name__ in _SHARED or ("BLENDER_RENDER" in engines and each.__name__ not in _NOT_SHARED):
+        if each.__name__ in _SHARED or ("BLENDER_RENDER" in engines and not _is_left_out(each.__name__)):
             yield each
+
+
+def _is_left_out(name: str) -> bool:
+    return "freestyle" in name or name in _NOT_SHARED

@@ -44,9 +44,11 @@ def bands(
     InputError
         as tracer.render.render does.
     """
+    from ..tracer.render import render  # brings Embree, which Blender's start need not wait for
+
     watcher = _Watcher()
     with ThreadPoolExecutor(1, "viewcam") as pool:
-        tracing = pool.submit(_render, scene, level, samples, seed, threads, watcher)
+        tracing = pool.submit(render, scene, level, samples, seed, threads, watcher)
         tracing.add_done_callback(lambda _: watcher.bands.put(None))
         try:
             while not is_cancelled():
@@ -60,10 +62,3 @@ def bands(
         finally:
             watcher.cancelled.set()
     tracing.result()  # raises what was raised there
-
-
-def _render(scene, level, samples, seed, threads, watcher):
-    from ..tracer.render import render  # brings Embree, which Blender's start need not wait for
-
-    passes = render(scene, threads)
-    watcher.tile(passes, range(scene.camera.height))
