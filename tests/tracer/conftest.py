@@ -77,6 +77,32 @@ def make_scene():
 
 
 @pytest.fixture(scope="session")
+def make_lit():
+    """make_lit(camera, (geometry, material), …, lamps=…, world=…, film=…, bounces=…) → Scene; no material is the plain one."""
+
+    def build(camera: Pinhole, *things, **light) -> Scene:
+        materials = {f"material {number}": material for number, (_, material) in enumerate(things) if material is not None}
+        return Scene(
+            camera=camera,
+            geometries={f"geometry {number}": geometry for number, (geometry, _) in enumerate(things)},
+            objects=tuple(
+                Object(
+                    f"object {number}",
+                    f"geometry {number}",
+                    np.eye(4),
+                    number + 1,
+                    materials=() if material is None else (f"material {number}",),
+                )
+                for number, (_, material) in enumerate(things)
+            ),
+            materials=materials,
+            **light,
+        )
+
+    return build
+
+
+@pytest.fixture(scope="session")
 def random_matrix():
     """random_matrix(rng, spread) → (4, 4): rotated, scaled by axis from 0.3 to 2, often mirrored, sheared, moved."""
 

@@ -78,6 +78,11 @@ class Emitters:
         """Whether there is anything that `sample` finds for surfaces that scatter this kind of rays: diffuse ones only."""
         return kind == "diffuse" and self._count > 0
 
+    @property
+    def random(self) -> bool:
+        """Whether what `sample` finds depends on its numbers: there are several emitters, or one that has a size."""
+        return self._count > 1 or self._lamps.sized or self._glowing.count > 0
+
     def meets(self, kind: str) -> bool:
         """Whether rays of this kind can run into light."""
         return self._shines or bool(self.world(kind).any()) or (kind in self._met and self._met[kind].sized)
