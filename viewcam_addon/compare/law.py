@@ -45,7 +45,8 @@ FLOAT32 = 2.0**-24
 # them where their signs differ. Counted in units of ROUNDINGS, whose median is below one.
 RADIANCE_ROUNDINGS = 8.0
 # Cycles adds its samples up in float32. The sum is rounded by half a unit of its last place at most, N times, and half of the
-# samples are added while it has its last exponent: N / 4 roundings if all of them go the same way, 20 (ROUNDINGS' maximum) · N / 80.
+# samples are added while it has its last exponent: N / 4 roundings if all of them go the same way, which is N / 80 times the
+# maximum of ROUNDINGS.
 SAMPLES_PER_ROUNDING = 80.0
 
 # Pixels. What is less is told in figures, and no sentence warns of it.

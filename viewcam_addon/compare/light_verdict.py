@@ -4,6 +4,7 @@ import math
 from typing import TYPE_CHECKING
 
 from .law import PERCENTILES
+from .questions import PIXELS, WHOLE
 from .statistics import percentile_name
 from .verdict import mark, percent
 
@@ -22,8 +23,6 @@ _TELLING = {
     "4π": 4.0 * math.pi,
 }
 _FIT = 1e-4
-# Where so many of the tiles differ, the place of the worst tells nothing.
-_EVERYWHERE = 0.5
 
 
 def sentence(comparison: "RadianceComparison") -> str:
@@ -36,8 +35,9 @@ def sentence(comparison: "RadianceComparison") -> str:
     if not comparison.is_noisy:
         row = combined.steady
         return (
-            f"The same picture: over {row.count:,} pixels without noise the light differs by {row.values[0]:.1e} of its value in "
-            f"the median and by at most {row.values[-1]:.1e}, {percent(row.worst[1])} of what float32 allows there{_edges(combined)}."
+            f"The same picture: over {row.count:,} pixels without noise the light differs by {row.values[0]:.1e} of its value "
+            f"in the median and by at most {row.values[-1]:.1e}, {percent(row.worst[1])} of what float32 allows"
+            f"{_edges(combined)}."
         )
     return (
         f"The same within noise at {samples_words(comparison)}: no pixel and no tile differs by more than chance; "
@@ -67,10 +67,10 @@ def samples_words(comparison: "RadianceComparison") -> str:
 
 def place_words(place: "Place", size: int) -> str:
     """Where: in columns 32 to 63, rows 0 to 31."""
-    if size == 0:
+    if size == WHOLE:
         return "over the whole picture"
     (left, right), (bottom, top) = place.columns, place.rows
-    return f"in column {left}, row {bottom}" if size == 1 else f"in columns {left} to {right}, rows {bottom} to {top}"
+    return f"in column {left}, row {bottom}" if size == PIXELS else f"in columns {left} to {right}, rows {bottom} to {top}"
 
 
 def change_words(reference: float, test: float) -> str:
@@ -84,22 +84,21 @@ def change_words(reference: float, test: float) -> str:
 
 
 def worst_question(row: "LightRow") -> "Question | None":
-    """The one that tells most: the smallest tiles of those that fail, unless half of the picture does."""
-    failing = [question for question in row.questions if question.failing]
+    """Of those that fail, the one that tells where: the whole picture where most of it differs, else the largest tiles."""
+    failing = [question for question in row.questions if not question.ok]
     if not failing:
         return None
-    local = [question for question in failing if question.size > 1 and question.spread_out <= _EVERYWHERE]
-    whole = next((question for question in failing if question.size == 0), None)
-    if whole and (row.factor or any(question.spread_out > _EVERYWHERE for question in failing if question.size)):
-        return whole
-    return max(local, key=lambda question: question.size, default=None) or failing[-1]
+    whole, tiles = failing[-1].size == WHOLE, [question for question in failing if question.size != WHOLE]
+    if whole and (row.factor is not None or any(question.is_everywhere for question in tiles)):
+        return failing[-1]
+    return tiles[-1] if tiles else failing[-1]
 
 
 def _noisy_lines(comparison: "RadianceComparison") -> list[str]:
     names = [question.name for question in comparison.rows[0].questions]
     table = [f"{'standard errors':<17}{'ratio':>20}" + "".join(f"{name:>18}" for name in names)]
     for row in comparison.rows:
-        cells = "".join(f"{f'{abs(q.worst.errors):.1f} of {q.allowed:.1f}':>18}" for q in row.questions)
+        cells = "".join(f"{f'{abs(q.worst.errors):.1f} of {q.limit:.1f}':>18}" for q in row.questions)
         table.append(f"{row.name:<17}{f'{row.ratio:.5f} ± {row.ratio_error:.5f}':>20}{cells}  {mark(row.ok)}")
     return table
 
@@ -130,17 +129,18 @@ def _difference(row: "LightRow") -> str:
         steady, edges = row.steady, row.edges
         if not edges.ok:
             return (
-                f"{row.name} differs in {edges.count:,} pixels by more than float32 allows, {edges.explained:,} of them show what "
-                f"is beside them, as {edges.allowed:,} may"
+                f"{row.name} differs in {edges.count:,} pixels by more than float32 allows, {edges.explained:,} of them show "
+                f"what is beside them, as {edges.allowed:,} may"
             )
         percentile, share = steady.worst
         return f"{row.name} is off by {share:.3g} times its tolerance at {percentile_name(percentile)}"
     place = question.worst
-    many = f" and {question.failing - 1:,} more of {question.count:,}" if question.failing > 1 else ""
+    failing, of = int(question.failing.sum()), question.failing.size
+    many = f" and {failing - 1:,} more of {of:,}" if failing > 1 else ""
     channel = f" ({place.channel})" if place.channel else ""
     return (
         f"{place_words(place, question.size)}{many} {row.name}{channel} is {change_words(place.reference, place.test)}, "
-        f"{abs(place.errors):.3g} standard errors where chance allows {question.allowed:.3g}"
+        f"{abs(place.errors):.3g} standard errors where chance allows {question.limit:.3g}"
     )
 
 

@@ -1,9 +1,9 @@
 """What an eye sees of the difference: figures that are told, and judge nothing.
 
 relMSE is what papers on rendering compare noise by: the mean of (test − reference)² / (reference² + ε), here with an ε of a
-hundredth of the mean square, so that it does not depend on the exposure. FLIP (Andersson et al., FLIP: A Difference Evaluator for
-Alternating Images, 2020) is an estimate of what is noticed when the two pictures are swapped on a screen, as the report does, so
-it is given what the report shows: one exposure for both, and sRGB. Rejected: its HDR variant, whose library ends the process at a
+hundredth of the mean square, so that it does not depend on the exposure. FLIP (Andersson et al., FLIP: A Difference Evaluator
+for Alternating Images, 2020) estimates what is noticed when two pictures are swapped on a screen, as the report does: so it is
+given what the report shows, one exposure for both, in sRGB. Rejected: its HDR variant, whose library ends the process at a
 black picture.
 """
 

@@ -88,7 +88,7 @@ def on_screen(colour: NDArray, bright: float) -> NDArray[np.float64]:
 
 
 def tone_mapped(colour: NDArray, bright: float | None = None) -> Picture:
-    """Light (height, width, 3), rows from the bottom, as a screen shows it; bright : by default the picture's own `brightness`."""
+    """Light (height, width, 3), rows from the bottom, as a screen shows it. bright : its own `brightness` by default."""
     return _to_screen(_exposed(colour, bright or brightness(colour)))
 
 

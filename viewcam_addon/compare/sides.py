@@ -4,8 +4,8 @@ Several test pictures are one picture rendered with several seeds: their mean is
 reference brings the variance of its Combined pass along. Of the other passes only the spread is known, and that the reference
 has none where its Combined has none: a sum of light that never changes has no part that does.
 
-Cycles divides Diffuse Direct and Diffuse Indirect by the surface's colour, each a mean over the pixel: a quotient of means, which
-on edges depends on the number of samples. So their products with Diffuse Color are compared, the light itself.
+Cycles divides Diffuse Direct and Diffuse Indirect by the surface's colour, each a mean over the pixel: a quotient of means,
+which on edges depends on the number of samples. So their products with Diffuse Color are compared, the light itself.
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""Light without noise: two exact pictures, which may differ by what float32 rounds, and by what lies on the other side of an edge.
+"""Light without noise: exact pictures, which may differ by what float32 rounds, and by what lies on the other side of an edge.
 
 A pixel on the edge of a shadow or a silhouette is one or the other, and the smallest shift of a ray decides. Such a pixel shows
 what one of its neighbours shows, and is rare: an edge lies within δ of the centre of a pixel beside it with the probability δ.
@@ -10,7 +10,6 @@ Rejected: accepting every pixel that shows what a neighbour shows; a picture shi
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..image import Image
 from ..pinhole import Pinhole
@@ -31,7 +30,7 @@ _DARK = 1e-3
 
 @dataclass(frozen=True)
 class Edges:
-    """Pixels that differ by more than rounding. explained : of those, how many show what is near them. allowed : how many may."""
+    """Pixels that differ by more than rounding. explained : how many show what is near them. allowed : how many may."""
 
     count: int
     explained: int
@@ -45,34 +44,35 @@ class Edges:
         return {**asdict(self), "ok": self.ok}
 
 
-def ray_shift(pinhole: Pinhole, reference: Image) -> Array:
-    """(height, width) pixels: law.ray_shift from the picture's depths; beside what was hit, the median."""
-    depth = reference["Depth"].reshape(-1, 1)
-    row, column = np.divmod(np.arange(len(depth)), pinhole.width)
-    rays = pinhole.ray_directions(column, row)
-    hit = depth[:, 0] < law.BACKGROUND_DEPTH
-    along = -(rays @ pinhole.basis()[2])
-    seen = {"Depth": depth, "Position": np.asarray(pinhole.eye) + rays * (depth[:, 0] / along)[:, None]}
-    seen |= {"Magnitude": reference["Magnitude"].reshape(-1, 1)} if "Magnitude" in reference.passes else {}
-    shift = law.ray_shift(pinhole, seen)
-    typical = np.median(shift[hit]) if hit.any() else law.FLOAT32 * max(pinhole.distance)
-    return np.where(hit, shift, typical).reshape(pinhole.height, pinhole.width)
+class Rounding:
+    """What one rounding of float32 causes in the light of a picture.
 
-
-def one_rounding(sides: Sides, shift: Array, belongs: NDArray, brightest: Array | float, samples: int) -> Array:
-    """(height, width) what one rounding of float32 causes in a quantity, the largest of its channels.
-
-    shift : pixels, `ray_shift`. belongs : the object of each pixel. brightest : what the light would be from straight above.
+    shift : (height, width) pixels, law.ray_shift from the reference's depths; where nothing was hit the median.
     """
-    slope = law.slopes(sides.reference, belongs)
-    value = np.abs(sides.reference).max(axis=-1)
-    return law.radiance_error(shift, slope, value, brightest, samples)
+
+    def __init__(self, pinhole: Pinhole, reference: Image, samples: int) -> None:
+        self.shift = _ray_shift(pinhole, reference)
+        self._samples = samples
+        self._belongs = np.zeros(self.shift.shape)
+        if "Object Index" in reference.passes:
+            self._belongs = reference["Object Index"][..., 0]
+        # What the light on a surface would be if it came from straight above, as far as the picture tells: the largest
+        # Diffuse Direct anywhere, in the surface's colour.
+        self._brightest = 0.0
+        if "Diffuse Direct" in reference.passes and "Diffuse Color" in reference.passes:
+            self._brightest = np.nan_to_num(reference["Diffuse Direct"]).max() * reference["Diffuse Color"].max(axis=-1)
+
+    def of(self, sides: Sides) -> Array:
+        """(height, width) the error of a quantity, the largest of its channels."""
+        slope = law.slopes(sides.reference, self._belongs)
+        value = np.abs(sides.reference).max(axis=-1)
+        return law.radiance_error(self.shift, slope, value, self._brightest, self._samples)
 
 
 def compare(sides: Sides, one: Array, shift: Array) -> tuple[Row, Edges, Array]:
     """The figures of all pixels, those on edges, and the error of each pixel in roundings.
 
-    one : (height, width) `one_rounding`. shift : pixels.
+    one : (height, width) `Rounding.of` these sides. shift : that of the same.
 
     Returns the row, relative errors; the edges; (height, width) float64.
     """
@@ -97,3 +97,16 @@ def compare(sides: Sides, one: Array, shift: Array) -> tuple[Row, Edges, Array]:
     scale = np.maximum(size, max(_DARK * float(size.mean()), np.finfo(float).tiny))
     row = measure(sides.name, "relative", (error / scale)[judged], (one / scale)[judged])
     return row, edges, error / np.maximum(one, np.finfo(float).tiny)
+
+
+def _ray_shift(pinhole: Pinhole, reference: Image) -> Array:
+    depth = reference["Depth"].reshape(-1, 1)
+    row, column = np.divmod(np.arange(len(depth)), pinhole.width)
+    rays = pinhole.ray_directions(column, row)
+    hit = depth[:, 0] < law.BACKGROUND_DEPTH
+    along = -(rays @ pinhole.basis()[2])
+    seen = {"Depth": depth, "Position": np.asarray(pinhole.eye) + rays * (depth[:, 0] / along)[:, None]}
+    seen |= {"Magnitude": reference["Magnitude"].reshape(-1, 1)} if "Magnitude" in reference.passes else {}
+    shift = law.ray_shift(pinhole, seen)
+    typical = np.median(shift[hit]) if hit.any() else law.FLOAT32 * max(pinhole.distance)
+    return np.where(hit, shift, typical).reshape(pinhole.height, pinhole.width)

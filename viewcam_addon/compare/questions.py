@@ -1,0 +1,154 @@
+"""The questions that noisy light is asked: is a difference more than chance, in each pixel, each tile, the whole picture?
+
+The noise that a difference is held against is the larger of what a pixel or tile shows itself and what its 3 × 3 neighbourhood
+shows in the mean. By itself, a place that rare light has missed so far looks both darker and quieter than it is, and an edge
+that crosses the corner of a pixel may have been missed by all of its samples.
+
+What is within rounding is no difference: a pixel's is taken beyond the law's maximum, a tile's sum beyond the law's 99th
+percentile of each pixel, since a mean of rounding errors can't exceed what nearly all of them stay below.
+"""
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import law, noise
+from .law import Array
+from .sides import CHANNEL_NAMES, Sides
+
+PIXELS, WHOLE = 1, 0
+SIZES = (PIXELS, 8, 32, WHOLE)
+"""Sides of the tiles, in pixels; 0 is one tile over all."""
+
+_NEARLY_ALL = law.ROUNDINGS[law.PERCENTILES.index(99.0)]
+_TINY = np.finfo(float).tiny
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a difference is.
+
+    columns, rows : first and last, rows from the bottom. channel : its name, empty where there is one only.
+    reference, test : means there, in that channel. errors : the difference in standard errors, signed.
+    """
+
+    columns: tuple[int, int]
+    rows: tuple[int, int]
+    channel: str
+    reference: float
+    test: float
+    errors: float
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """One size of tiles, asked in one quantity.
+
+    size : one of SIZES. errors : (rows, columns, channels), each tile's difference in standard errors, signed.
+    allowed : (rows, columns, channels) what chance allows. limit : that at the worst place.
+    worst : the place that is farthest beyond it, or closest to it.
+    """
+
+    size: int
+    errors: Array
+    allowed: Array
+    limit: float
+    worst: Place
+
+    @property
+    def name(self) -> str:
+        return {WHOLE: "whole picture", PIXELS: "pixels"}.get(self.size, f"tiles of {self.size} × {self.size}")
+
+    @property
+    def failing(self) -> NDArray[np.bool_]:
+        """(rows, columns) bool: tiles that differ in some channel."""
+        return (np.abs(self.errors) > self.allowed).any(axis=-1)
+
+    @property
+    def ok(self) -> bool:
+        return not self.failing.any()
+
+    @property
+    def is_everywhere(self) -> bool:
+        """Whether half of the tiles differ, so that the place of the worst tells nothing."""
+        return bool(self.failing.mean() > 0.5)
+
+    def to_json(self) -> dict:
+        return {
+            "name": self.name,
+            "size": self.size,
+            "count": self.errors.size,
+            "failing": int(self.failing.sum()),
+            "allowed": self.limit,
+            "worst": asdict(self.worst),
+            "ok": self.ok,
+        }
+
+
+def ask(sides: Sides, one_rounding: Array, freedom: tuple[int, int], level: float) -> tuple[Question, ...]:
+    """All sizes, asked so that chance makes any of them fail with the probability `level` at most.
+
+    one_rounding : (height, width) what one rounding of float32 causes. freedom : the degrees of freedom of both sides'
+    variances. level : shared out evenly over the sizes, and over the tiles and channels of each after Šidák.
+    """
+    share = level / len(SIZES)
+    return tuple(_question(sides, *answer) for answer in _answers(sides, one_rounding[..., None], freedom, share))
+
+
+def worst_channel(errors: Array) -> Array:
+    """(rows, columns): of each tile's channels the one that differs most, with its sign."""
+    return np.take_along_axis(errors, np.abs(errors).argmax(axis=-1)[..., None], axis=-1)[..., 0]
+
+
+def over_pixels(tiles: Array, shape: tuple[int, int], size: int) -> Array:
+    """(height, width): each tile's value in all of its pixels."""
+    for axis, length in enumerate(shape):
+        tiles = np.repeat(tiles, np.diff([*noise.tile_starts(length, size), length]), axis=axis)
+    return tiles
+
+
+def _answers(sides: Sides, one: Array, freedom: tuple[int, int], level: float) -> Iterator[tuple[int, Array, Array]]:
+    """For each size: (size, errors, what is allowed)."""
+    difference = sides.difference
+    errors, both = _pixel_errors(sides, law.ROUNDINGS[-1] * one, freedom)
+    yield PIXELS, errors, noise.student_critical(both, noise.sidak(level, errors.size))
+    rounding = np.broadcast_to(_NEARLY_ALL * one, difference.shape)
+    for size in SIZES[1:]:
+        total, square, allowance = (noise.tile_sums(values, size) for values in (difference, difference**2, rounding))
+        errors = _beyond(total, allowance) / np.sqrt(np.maximum(np.maximum(square, noise.mean_around(square)), _TINY))
+        yield size, errors, np.full(errors.shape, noise.sign_critical(noise.sidak(level, errors.size)))
+
+
+def _pixel_errors(sides: Sides, rounding: Array, freedom: tuple[int, int]) -> tuple[Array, Array]:
+    """Each pixel's difference in standard errors, 0 where they are not known, and Welch's degrees of freedom."""
+    variances = [np.maximum(variance, noise.mean_around(variance)) for variance in (sides.variance, sides.spread)]
+    total = np.maximum(variances[0] + variances[1], _TINY)
+    share = np.where(np.isfinite(total), variances[0] / np.where(np.isfinite(total), total, 1.0), 0.5)
+    both = 1.0 / (share**2 / freedom[0] + (1.0 - share) ** 2 / freedom[1])
+    return _beyond(sides.difference, rounding) / np.sqrt(total), both
+
+
+def _beyond(values: Array, allowance: Array) -> Array:
+    """What of the values is beyond ± the allowance."""
+    return np.sign(values) * np.maximum(np.abs(values) - allowance, 0.0)
+
+
+def _question(sides: Sides, size: int, errors: Array, allowed: Array) -> Question:
+    index = np.unravel_index(np.argmax(np.abs(errors) / allowed), errors.shape)
+    row, column, channel = (int(i) for i in index)
+    (bottom, top), (left, right) = (
+        _extent(length, size, i) for length, i in zip(sides.reference.shape[:2], (row, column), strict=True)
+    )
+    there = (slice(bottom, top + 1), slice(left, right + 1), channel)
+    means = (float(side[there].mean()) for side in (sides.reference, sides.test))
+    name = CHANNEL_NAMES[channel] if errors.shape[2] == len(CHANNEL_NAMES) else ""
+    return Question(
+        size, errors, allowed, float(allowed[index]), Place((left, right), (bottom, top), name, *means, float(errors[index]))
+    )
+
+
+def _extent(length: int, size: int, i: int) -> tuple[int, int]:
+    starts = [*noise.tile_starts(length, size), length]
+    return int(starts[i]), int(starts[i + 1]) - 1
