@@ -149,7 +149,7 @@ def _cycles(places: Array) -> list[Curve]:
             _set_stage(place)
             for method, recenter in methods.items():
                 path = Path(name, f"{number}-{recenter}.exr")
-                exported[method, place] = path, job.export_and_render(job.Request(recenter=recenter), path)
+                exported[method, place] = path, job.export_and_render(job.Request(recenter=recenter), [path])
         with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:  # where there is no Blender
             pictures = list(pool.map(image.read, [path for path, _ in exported.values()]))
     errors: dict[str, list[float]] = {method: [] for method in methods}

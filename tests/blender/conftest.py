@@ -180,7 +180,7 @@ def both_sides(fresh_blender, scene, tmp_path):
     def make(**request):
         from viewcam_addon.blender import job
 
-        exported = job.export_and_render(job.Request(threads=2, **request), tmp_path / "cycles.exr")
+        exported = job.export_and_render(job.Request(threads=2, **request), [tmp_path / "cycles.exr"])
         tracer = render.Tracer(exported, 2)
         traced, cycles = render.render(exported, threads=2), _passes_of(tmp_path / "cycles.exr")
         comparison = geometry.compare(Image(traced), Image(cycles), exported.camera, tracer.surface_at, exported.stated_camera)

@@ -1,20 +1,23 @@
-"""Cycles' side of a comparison: one sample through each pixel's centre, and the passes of geometry, in 32 bits.
+"""Cycles' side of a comparison, in 32 bits: the passes of geometry through each pixel's centre, or those of light.
 
 The settings are those under which Cycles follows a pinhole best. Its first sample stands in the middle of the pixel but for a
 bias of the filter table, 3e-6 px at the narrowest Blackman-Harris filter; adaptive sampling, denoising and light thresholds
-would make of it something else. Everything is borrowed and given back.
+would make of it something else. A picture of light is what the scene's own film and bounces make of it, without all that trades
+truth for less noise: clamping, filtered gloss, culled lights, guesses of indirect light. Everything is borrowed and given back.
 """
 
 import errno
 import os
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
 
 from ..errors import InputError
 from ..files import written_whole
-from . import versions
+from ..tracer.film import Bounces, Film
+from . import film, versions
 from .borrowing import Borrower, borrowed, still_of_one_layer
 from .depsgraph import render_still
 from .exr import is_whole
@@ -38,6 +41,39 @@ _SAMPLING = {
     "use_distance_cull": False,
 }
 _PASSES = ("combined", "z", "position", "normal", "uv", "object_index", "material_index")
+_PASSES_OF_LIGHT = ("combined", "emit", "environment", "diffuse_direct", "diffuse_indirect", "diffuse_color")
+_PASSES_OF_CENTRES = ("z", "object_index")
+
+# Pixels independent of each other, and nothing left out or guessed.
+_LIGHT = {
+    "use_animated_seed": False,
+    "sampling_pattern": "TABULATED_SOBOL",
+    "scrambling_distance": 1.0,
+    "auto_scrambling_distance": False,
+    "min_light_bounces": 0,
+    "min_transparent_bounces": 0,
+    "transparent_max_bounces": 1024,
+    "volume_bounces": 0,
+    "sample_clamp_direct": 0.0,
+    "sample_clamp_indirect": 0.0,
+    "blur_glossy": 0.0,
+    "caustics_reflective": True,
+    "caustics_refractive": True,
+    "direct_light_sampling_type": "MULTIPLE_IMPORTANCE_SAMPLING",
+    "use_fast_gi": False,
+    "use_guiding": False,
+    "film_transparent_glass": False,
+}
+
+
+@dataclass(frozen=True)
+class Light:
+    """A picture of light. samples : a pixel, in all; one is the pixel's centre."""
+
+    film: Film
+    bounces: Bounces
+    samples: int
+    seed: int = 0
 
 
 def render(
@@ -47,10 +83,12 @@ def render(
     path: str | os.PathLike[str],
     remedies: Iterable[Remedy] = (),
     threads: int | None = None,
+    light: Light | None = None,
 ) -> None:
     """Render one view layer at the current frame to a multilayer EXR, whole or not at all.
 
-    remedies : what to take out for the time of the render (ledger.py). threads : all by default.
+    remedies : what to take out for the time of the render (ledger.py). threads : all by default. light : for a picture of
+        light in place of the passes of geometry.
 
     Raises
     ------
@@ -61,7 +99,7 @@ def render(
         raise InputError("Cycles is disabled: enable the add-on Cycles Render Engine in Blender's preferences")
     with written_whole(path) as temporary, borrowed() as borrow:
         still_of_one_layer(borrow, scene, view_layer, camera_object)
-        borrow_settings(borrow, scene, view_layer)
+        borrow_settings(borrow, scene, view_layer, light)
         _borrow_file(borrow, scene, temporary)
         if threads:
             borrow.set(scene.render, "threads_mode", "FIXED")
@@ -73,22 +111,38 @@ def render(
             raise OSError(errno.EIO, "Blender did not finish the file")
 
 
-def borrow_settings(borrow: Borrower, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
+def borrow_settings(
+    borrow: Borrower, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, light: Light | None = None
+) -> None:
     """Everything but the file; benchmarks render without one."""
-    _borrow_sampling(borrow, scene)
-    _borrow_passes(borrow, view_layer)
-
-
-def _borrow_sampling(borrow: Borrower, scene: bpy.types.Scene) -> None:
     borrow.set(scene.render, "engine", "CYCLES")
-    for name, value in _SAMPLING.items():
-        if hasattr(scene.cycles, name):  # versions know fewer of them
-            borrow.set(scene.cycles, name, value)
+    _borrow_all(borrow, scene.cycles, _SAMPLING)
+    passes = _PASSES
+    if light:
+        borrow.set(scene.render, "film_transparent", light.film.transparent)
+        _borrow_all(borrow, scene.cycles, _LIGHT | _settings_of(light))
+        passes = _PASSES_OF_LIGHT + (_PASSES_OF_CENTRES if light.samples == 1 else ())
+    _borrow_passes(borrow, view_layer, passes)
 
 
-def _borrow_passes(borrow: Borrower, view_layer: bpy.types.ViewLayer) -> None:
-    """The passes of geometry beside those that are on; surfaces, without hair and volumes."""
-    for name in _PASSES:
+def _settings_of(light: Light) -> dict[str, object]:
+    settings = {name: getattr(light.bounces, ours) for ours, name in film.BOUNCES.items()}
+    settings |= {"samples": light.samples, "seed": light.seed % 2**31, "film_exposure": light.film.exposure}
+    if light.samples > 1:
+        settings |= {"pixel_filter_type": light.film.filter, "filter_width": light.film.filter_width}
+        settings |= versions.without_first_sample(light.samples)
+    return settings
+
+
+def _borrow_all(borrow: Borrower, owner: bpy.types.bpy_struct, settings: dict[str, object]) -> None:
+    for name, value in settings.items():
+        if hasattr(owner, name):  # versions know fewer of them
+            borrow.set(owner, name, value)
+
+
+def _borrow_passes(borrow: Borrower, view_layer: bpy.types.ViewLayer, passes: Iterable[str]) -> None:
+    """Passes beside those that are on; surfaces, without hair and volumes."""
+    for name in passes:
         borrow.set(view_layer, f"use_pass_{name}", True)
     borrow.set(view_layer, "use_strand", False)
     borrow.set(view_layer, "use_volumes", False)

@@ -16,12 +16,15 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..tracer.film import Bounces, Film
+from ..tracer.lights import RAYS, Lamp, World
 from ..tracer.scene import Mesh, Object, Scene, Spheres
 from . import camera as cameras
-from . import export_geometry, features
+from . import export_geometry, features, film, lamps, world
 from .borrowing import borrowed, still_of_one_layer
 from .depsgraph import visit
 from .ledger import Ledger
+from .shading import Shading
 
 Matrix = NDArray[np.float64]
 
@@ -31,6 +34,7 @@ class Source:
     """A visible surface that stands in the world once or many times.
 
     data : evaluated. key : the same for all that share a geometry in Cycles. slots : the materials, evaluated, at least 1.
+    hidden_from : the kinds of rays that don't see it.
     """
 
     name: str
@@ -38,6 +42,7 @@ class Source:
     key: tuple[int, int]
     object_index: int
     slots: tuple[bpy.types.Material | None, ...]
+    hidden_from: frozenset[str]
 
     @property
     def materials(self) -> tuple[int, ...]:
@@ -45,43 +50,85 @@ class Source:
         return tuple(material.pass_index if material else 0 for material in self.slots)
 
 
+@dataclass(frozen=True)
+class Light:
+    """What of a Scene gives light, and makes a picture of it."""
+
+    lamps: tuple[Lamp, ...]
+    world: World
+    film: Film
+    bounces: Bounces
+
+
 def export_scene(
-    scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_object: bpy.types.Object, ledger: Ledger
+    scene: bpy.types.Scene,
+    view_layer: bpy.types.ViewLayer,
+    camera_object: bpy.types.Object,
+    ledger: Ledger,
+    lit: bool = False,
 ) -> Scene:
     """The scene as a render of this view layer through this camera sees it, at the scene's current frame.
 
-    ledger : notes what could not come; afterwards it holds the remedies for Cycles' side.
+    ledger : notes what could not come; afterwards it holds the remedies for Cycles' side. lit : whether materials, lamps,
+    world, film and bounces come along, for the levels above geometry.
 
     Raises
     ------
     InputError
         if the camera is no pinhole (orthographic, panoramic, sheared), or if Blender can't render the scene.
     """
-    features.note_render(scene, view_layer, camera_object, ledger)
+    features.note_render(scene, view_layer, camera_object, ledger, lit)
     with borrowed() as borrow:
         still_of_one_layer(borrow, scene, view_layer, camera_object)
-        return visit(scene, lambda depsgraph: scene_in(depsgraph, camera_object, ledger))
+        return visit(scene, lambda depsgraph: scene_in(depsgraph, camera_object, ledger, lit))
 
 
-def survey(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_object: bpy.types.Object, ledger: Ledger) -> None:
-    """Fill the ledger as `export_scene` does, without reading any geometry."""
-    features.note_render(scene, view_layer, camera_object, ledger)
+def survey(
+    scene: bpy.types.Scene,
+    view_layer: bpy.types.ViewLayer,
+    camera_object: bpy.types.Object,
+    ledger: Ledger,
+    lit: bool = False,
+) -> Light | None:
+    """Fill the ledger as `export_scene` does, without reading any geometry; returns the light of the scene, if wanted."""
+
+    def look(depsgraph: bpy.types.Depsgraph) -> Light | None:
+        for _ in placements(depsgraph, ledger, Shading() if lit else None):
+            pass
+        return light_in(depsgraph, ledger) if lit else None
+
+    features.note_render(scene, view_layer, camera_object, ledger, lit)
     with borrowed() as borrow:
         still_of_one_layer(borrow, scene, view_layer, camera_object)
-        visit(scene, lambda depsgraph: [None for _ in placements(depsgraph, ledger)])
+        return visit(scene, look)
 
 
-def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, ledger: Ledger) -> Scene:
-    """The scene in the depsgraph that a render engine is given."""
+def light_in(depsgraph: bpy.types.Depsgraph, ledger: Ledger) -> Light:
+    """What gives light in a depsgraph, and how it becomes a picture."""
+    scene = depsgraph.scene
+    bounces = film.bounces_of(scene, ledger)
+    return Light(
+        lamps=tuple(lamps.lamps_in(depsgraph, bounces, ledger)),
+        world=world.world_of(world.shown_world(scene, depsgraph.view_layer_eval), ledger),
+        film=film.film_of(scene, ledger),
+        bounces=bounces,
+    )
+
+
+def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, ledger: Ledger, lit: bool = False) -> Scene:
+    """The scene in the depsgraph that a render engine is given. lit : as in `export_scene`."""
+    shading = Shading() if lit else None
     names: dict[tuple[int, int], str] = {}
     geometries: dict[str, Mesh | Spheres] = {}
     objects = []
-    for source, matrix in placements(depsgraph, ledger):
+    for source, matrix in placements(depsgraph, ledger, shading):
         if source.key not in names:
-            geometry = _geometry(source, ledger)
+            geometry = _geometry(source, ledger, shading)
             names[source.key] = _free_name(source.data.name, geometries)
             geometries[names[source.key]] = geometry
-        objects.append(Object(source.name, names[source.key], matrix, source.object_index, source.materials))
+        materials = shading.names(source.slots) if shading else ()
+        placed = (source.object_index, source.materials, materials, source.hidden_from)
+        objects.append(Object(source.name, names[source.key], matrix, *placed))
     camera = camera_object.evaluated_get(depsgraph)
     return Scene(
         camera=cameras.read(camera, depsgraph.scene),
@@ -89,40 +136,45 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
         objects=tuple(_drawn(objects, geometries, ledger)),
         stated_camera=cameras.stated(camera, depsgraph.scene),
         clip=(camera.data.clip_start, camera.data.clip_end),
+        **(vars(light_in(depsgraph, ledger)) | {"materials": shading.materials, "images": shading.images} if shading else {}),
         ledger=ledger.entries(),
     )
 
 
-def placements(depsgraph: bpy.types.Depsgraph, ledger: Ledger) -> Iterator[tuple[Source, Matrix]]:
-    """Each surface that the camera may see, and its (4, 4) matrix to world space, one for each instance."""
+def placements(
+    depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading | None = None
+) -> Iterator[tuple[Source, Matrix]]:
+    """Each surface that the camera may see, and its (4, 4) matrix to world space, one for each instance.
+
+    shading : reads the materials, where there shall be light; then other rays than the camera's may see a surface.
+    """
     known: dict[tuple[int, ...], Source | None] = {}
     for instance in depsgraph.object_instances:
         features.note_hair(instance, ledger)
         shown = instance.object
         if not instance.show_self or shown.data is None:
             continue
-        real, parent = (instance.instance_object, instance.parent) if instance.is_instance else (shown, shown)
-        identity = (real.as_pointer(), parent.as_pointer(), shown.data.as_pointer())
+        placed = features.placed_by(instance)
+        identity = tuple(each.as_pointer() for each in (placed.real, placed.parent, shown.data))
         if identity not in known:
-            known[identity] = _source(features.Placed(shown, real, parent), depsgraph, ledger)
+            known[identity] = _source(placed, depsgraph, ledger, shading)
         source = known[identity]
         if source:
             ledger.placed(source.name)
             yield source, np.array(instance.matrix_world, dtype=np.float64)
 
 
-def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Ledger) -> Source | None:
-    """What one object shows, or None if the camera sees nothing of it."""
-    if not features.is_surface(placed, ledger):
+def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading | None) -> Source | None:
+    """What one object shows, or None if nothing of it is seen."""
+    if not features.is_surface(placed, ledger, shading):
         return None
-    shown, real, parent = placed
+    shown, real, _ = placed
     layer = depsgraph.view_layer_eval
-    hidden = not (shown.visible_camera and parent.visible_camera) or (
-        parent.indirect_only_get(view_layer=layer) and not parent.holdout_get(view_layer=layer)
-    )
-    if hidden:
+    hidden_from = features.hidden_from(placed, layer)
+    if "camera" in hidden_from:
         ledger.note(placed.name, "exported", "not visible to the camera")
-        return None
+        if not shading or len(hidden_from) == len(RAYS):
+            return None
     data = shown.data
     if isinstance(data, bpy.types.Mesh):
         if data.is_editmode:  # the file is in edit mode: what is edited must be made a mesh first
@@ -134,7 +186,7 @@ def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Led
             return None
     override = layer.material_override
     slots = [override or slot.material for slot in shown.material_slots] or [override]
-    features.note_object(placed, slots, depsgraph, ledger)
+    features.note_object(placed, slots, depsgraph, ledger, shading)
     # Cycles shares a geometry among objects unless a slot belongs to the object (BlenderSync::BKE_object_is_modified).
     own = any(slot.link == "OBJECT" for slot in shown.material_slots)
     return Source(
@@ -143,13 +195,15 @@ def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Led
         key=(data.as_pointer(), real.as_pointer() if own else 0),
         object_index=shown.pass_index,
         slots=tuple(slots),
+        hidden_from=hidden_from if shading else frozenset(),
     )
 
 
-def _geometry(source: Source, ledger: Ledger) -> Mesh | Spheres:
+def _geometry(source: Source, ledger: Ledger, shading: Shading | None) -> Mesh | Spheres:
     if not isinstance(source.data, bpy.types.Mesh):
         return export_geometry.spheres_of(source.data)
-    mesh = export_geometry.mesh_of(source.data, len(source.materials))
+    colours = shading.vertex_colours(source.slots) if shading else None
+    mesh = export_geometry.mesh_of(source.data, len(source.materials), colours)
     if nowhere := len(source.data.loop_triangles) - len(mesh.triangles):
         ledger.note(
             source.name, "exported", f"{nowhere} triangles have vertices that are not finite, and Cycles draws none of them"

@@ -19,10 +19,11 @@ DEFAULT_RADIUS = 0.01
 Array = NDArray[np.generic]
 
 
-def mesh_of(mesh: bpy.types.Mesh, slot_count: int) -> Mesh:
+def mesh_of(mesh: bpy.types.Mesh, slot_count: int, colours: str | None = None) -> Mesh:
     """The triangles of an evaluated mesh, object space.
 
-    slot_count : the object's material slots, which material indices are clamped to.
+    slot_count : the object's material slots, which material indices are clamped to. colours : the colour attribute to bring
+    along, "" being the one that is active for rendering, or None.
     """
     mesh.calc_loop_triangles()
     vertices = _read(mesh.vertices, "co", np.float32, 3).astype(np.float64)
@@ -40,6 +41,7 @@ def mesh_of(mesh: bpy.types.Mesh, slot_count: int) -> Mesh:
         materials=_materials(mesh, slot_count)[faces],
         corner_normals=_corner_normals(mesh, vertices, triangles, corners, faces),
         corner_uvs=_corner_uvs(mesh, corners),
+        corner_colours=None if colours is None else _corner_colours(mesh, colours, triangles, corners),
     )
 
 
@@ -92,6 +94,18 @@ def _corner_uvs(mesh: bpy.types.Mesh, corners: Array) -> Array | None:
     """(triangles, 3, 2) float32: the UV map that is active for rendering, or None where there is none."""
     layer = next((layer for layer in mesh.uv_layers if layer.active_render), None)
     return None if layer is None else _read(layer.uv, "vector", np.float32, 2)[corners]
+
+
+def _corner_colours(mesh: bpy.types.Mesh, name: str, triangles: Array, corners: Array) -> Array:
+    """(triangles, 3, 3) float32, linear: those of a colour attribute; black, as in Cycles, where there is none of this name."""
+    attributes = mesh.color_attributes
+    if not name and attributes.render_color_index >= 0:
+        name = attributes[attributes.render_color_index].name
+    attribute = attributes.get(name)
+    if attribute is None:
+        return np.zeros((*corners.shape, 3), np.float32)
+    colours = np.ascontiguousarray(_read(attribute.data, "color", np.float32, 4)[:, :3])
+    return colours[corners if attribute.domain == "CORNER" else triangles]
 
 
 def _attribute(owner: bpy.types.ID, name: str, field: str, dtype: type, width: int = 1, domain: str = "POINT") -> Array | None:

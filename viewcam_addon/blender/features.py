@@ -8,8 +8,10 @@ from typing import NamedTuple
 
 import bpy
 
+from ..tracer.lights import RAYS
 from . import datablocks, export_geometry, materials, versions
 from .ledger import Ledger
+from .shading import Shading
 
 _NO_SURFACE = {
     "VOLUME": "volumes are not modelled",
@@ -22,7 +24,11 @@ _DRAWN_OVER_CYCLES = ("GREASEPENCIL", "GPENCIL")
 
 
 def note_render(
-    scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_object: bpy.types.Object, ledger: Ledger
+    scene: bpy.types.Scene,
+    view_layer: bpy.types.ViewLayer,
+    camera_object: bpy.types.Object,
+    ledger: Ledger,
+    light: bool = False,
 ) -> None:
     """What the camera and the render settings do beyond a pinhole. To be asked before the settings are borrowed."""
     for sentence in datablocks.beyond_pinhole(camera_object, scene):
@@ -34,7 +40,7 @@ def note_render(
     for library in bpy.data.libraries:
         if not Path(bpy.path.abspath(library.filepath)).is_file():
             ledger.note(library.name, "skipped", f"the library {library.filepath} is missing, and all that is linked from it")
-    if scene.world and (tree := versions.node_tree(scene.world)):
+    if not light and scene.world and (tree := versions.node_tree(scene.world)):
         output = tree.get_output_node("CYCLES")
         if output and output.inputs["Volume"].is_linked:
             ledger.note(scene.world.name, "approximated", "the world's volume is left out, and its light with it")
@@ -57,7 +63,23 @@ class Placed(NamedTuple):
         return self.real.original.name
 
 
-def is_surface(placed: Placed, ledger: Ledger) -> bool:
+def placed_by(instance: bpy.types.DepsgraphObjectInstance) -> Placed:
+    """What a depsgraph's instance is."""
+    shown = instance.object
+    real, parent = (instance.instance_object, instance.parent) if instance.is_instance else (shown, shown)
+    return Placed(shown, real, parent)
+
+
+def hidden_from(placed: Placed, layer: bpy.types.ViewLayer) -> frozenset[str]:
+    """The kinds of rays (lights.RAYS) that don't see an object, be it by its own flags or by those of what places it."""
+    shown, _, parent = placed
+    hidden = {ray for ray in RAYS if not all(getattr(each, f"visible_{ray}") for each in (shown, parent))}
+    if parent.indirect_only_get(view_layer=layer) and not parent.holdout_get(view_layer=layer):
+        hidden.add("camera")
+    return frozenset(hidden)
+
+
+def is_surface(placed: Placed, ledger: Ledger, shading: Shading | None) -> bool:
     """Whether this is a mesh or a point cloud; what is drawn but is neither is noted."""
     shown, real, _ = placed
     name = placed.name
@@ -66,7 +88,8 @@ def is_surface(placed: Placed, ledger: Ledger) -> bool:
         if shown.type in _DRAWN_OVER_CYCLES:
             ledger.set_for_cycles(real.original, "hide_render", True)
     elif shown.type == "LIGHT":
-        ledger.note(name, "exported", "a light, which leaves no mark in the passes of level geometry")
+        if not shading:
+            ledger.note(name, "exported", "a light, which leaves no mark in the passes of level geometry")
     elif _holds_gas(real) and shown.data == real.data:
         ledger.note(name, "skipped", _NO_SURFACE["VOLUME"])
     else:
@@ -74,7 +97,13 @@ def is_surface(placed: Placed, ledger: Ledger) -> bool:
     return False
 
 
-def note_object(placed: Placed, slots: list[bpy.types.Material | None], depsgraph: bpy.types.Depsgraph, ledger: Ledger) -> None:
+def note_object(
+    placed: Placed,
+    slots: list[bpy.types.Material | None],
+    depsgraph: bpy.types.Depsgraph,
+    ledger: Ledger,
+    shading: Shading | None,
+) -> None:
     """What a visible surface is beyond its geometry. slots : its materials."""
     shown, real, parent = placed
     name = placed.name
@@ -97,9 +126,41 @@ def note_object(placed: Placed, slots: list[bpy.types.Material | None], depsgrap
             ledger.note(name, "approximated", "has no material, and Cycles may bend its normals where they graze")
     for material in filter(None, slots):
         ledger.call_for_cycles(material.original, materials.keep_normals)
-        for reason in materials.departures(material):
+        reasons = materials.departures(material)
+        if shading:
+            reasons += shading.reading(material).reasons
+        for reason in reasons:
             ledger.note(name, "approximated", f"material {material.name!r} {reason}, and a plain one stands in")
+        if reasons and shading:
+            ledger.call_for_cycles(material.original, materials.stand_in, shading.reading(material))
+        elif reasons:
             ledger.call_for_cycles(material.original, materials.make_plain)
+    if shading:
+        _note_light(placed, slots, ledger, shading)
+
+
+def _note_light(placed: Placed, slots: list[bpy.types.Material | None], ledger: Ledger, shading: Shading) -> None:
+    """What matters as soon as there is light."""
+    shown, real, parent = placed
+    data = shown.data
+    readings = [shading.reading(material) for material in filter(None, slots)]
+    if len({reading.vertex for reading in readings} - {None}) > 1:
+        ledger.note(placed.name, "approximated", "shows two colour attributes, and only the first comes along")
+    active = next((layer.name for layer in data.uv_layers if layer.active_render), None) if hasattr(data, "uv_layers") else None
+    for material, reading in zip(filter(None, slots), readings, strict=True):
+        if reading.uv not in (None, active):
+            reason = f"material {material.name!r} uses the UV map {reading.uv!r}, and the active one stands in"
+            ledger.note(placed.name, "approximated", reason)
+            ledger.call_for_cycles(material.original, materials.stand_in, reading)
+    for each in (real.original, parent.original):
+        for collection in ("receiver_collection", "blocker_collection"):
+            if getattr(each.light_linking, collection):
+                ledger.note(placed.name, "approximated", "light linking is off on both sides")
+                ledger.set_for_cycles(each.light_linking, collection, None)
+        for owner, name in versions.shadow_terminator(each):
+            ledger.set_for_cycles(owner, name, 0.0)
+        ledger.set_for_cycles(each.cycles, "is_caustics_caster", False)
+        ledger.set_for_cycles(each.cycles, "is_caustics_receiver", False)
 
 
 def _shows_empty_slot(data: bpy.types.ID, slots: list[bpy.types.Material | None]) -> bool:

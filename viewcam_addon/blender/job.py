@@ -6,7 +6,7 @@ Scripts of the file do not run.
 
 import contextlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -14,11 +14,16 @@ import bpy
 
 from .. import intrinsics
 from ..errors import InputError
+from ..tracer.film import LEVELS, NO_BOUNCES
+from ..tracer.levels import least_level
 from ..tracer.scene import LedgerEntry, Scene
-from . import cycles, datablocks, ensure_registered, indices, recentering
+from . import cycles, datablocks, ensure_registered, indices, materials, recentering
 from .borrowing import Borrower, borrowed
-from .export import export_scene, survey
+from .export import Light, export_scene, survey
 from .ledger import Ledger
+
+SAMPLES = 64
+AUTO = "auto"
 
 # What a .blend starts with: itself, or a gzip or Zstandard stream.
 _MAGIC = (b"BLENDER", b"\x1f\x8b", b"\x28\xb5\x2f\xfd")
@@ -29,7 +34,9 @@ _LAST_FRAME = 1048574
 class Request:
     """blend : the file, or None for the one that is open. camera, frame, size : the scene's own where None.
 
-    recenter : whether both sides see the scene with its origin at the eye.
+    recenter : whether both sides see the scene with its origin at the eye. level : one of film.LEVELS, or "auto" for the least
+    that models all light of the scene (levels.py). samples : a pixel, of all of Cycles' pictures together, from level `direct`
+    on; SAMPLES where None. clay : whether one and the same material covers all surfaces.
     """
 
     blend: str | os.PathLike[str] | None = None
@@ -39,23 +46,32 @@ class Request:
     strict: bool = False
     recenter: bool = False
     threads: int | None = None
+    level: str = "geometry"
+    samples: int | None = None
+    seed: int = 0
+    clay: bool = False
 
 
 @dataclass(frozen=True)
 class _Stage:
     """What a job works on while it lasts.
 
-    ledger : of what is on this stage. origin, names, told : of the file that a recentred stage stands for, see
-    recentering.py; told is the file's ledger.
+    level : what is modelled, never "auto". ledger : of what is on this stage. origin, names, told : of the file that a
+    recentred stage stands for, see recentering.py; told is the file's ledger.
     """
 
     scene: bpy.types.Scene
     view_layer: bpy.types.ViewLayer
     camera: bpy.types.Object
+    level: str = LEVELS[0]
     ledger: Ledger = field(default_factory=Ledger)
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     names: dict[str, str] = field(default_factory=dict)
     told: Ledger | None = None
+
+    @property
+    def is_lit(self) -> bool:
+        return self.level != LEVELS[0]
 
     def entries(self, strict: bool) -> tuple[LedgerEntry, ...]:
         """What is told of the file; NotModelledError if `strict` and anything is approximated or left out."""
@@ -88,22 +104,25 @@ def render(request: Request, path: str | os.PathLike[str]) -> tuple[LedgerEntry,
     Raises as `export` does, and InputError if the picture can't be written.
     """
     with _stage(request) as stage, _seen_from(stage, request) as stage:
-        survey(stage.scene, stage.view_layer, stage.camera, stage.ledger)
+        light = survey(stage.scene, stage.view_layer, stage.camera, stage.ledger, stage.is_lit)
         told = stage.entries(request.strict)
-        _render(stage, request, path)
+        _render(stage, request, [path], light)
         return told
 
 
-def export_and_render(request: Request, path: str | os.PathLike[str]) -> Scene:
-    """Both sides of one state of the file, objects and materials numbered alike. Raises as `render` does."""
+def export_and_render(request: Request, paths: Sequence[str | os.PathLike[str]]) -> Scene:
+    """Both sides of one state of the file, objects and materials numbered alike. Raises as `render` does.
+
+    paths : for several pictures of Cycles, which share the samples; their seeds count from that of the request.
+    """
     with _stage(request) as stage, indices.numbered(), _seen_from(stage, request) as stage:
         scene = _export(stage, request)
-        _render(stage, request, path)
+        _render(stage, request, paths, Light(scene.lamps, scene.world, scene.film, scene.bounces))
         return scene
 
 
 def _export(stage: _Stage, request: Request) -> Scene:
-    scene = export_scene(stage.scene, stage.view_layer, stage.camera, stage.ledger)
+    scene = export_scene(stage.scene, stage.view_layer, stage.camera, stage.ledger, stage.is_lit)
     objects = tuple(replace(placed, name=stage.names.get(placed.name, placed.name)) for placed in scene.objects)
     return replace(scene, objects=objects, origin=stage.origin, ledger=stage.entries(request.strict))
 
@@ -114,13 +133,22 @@ def _seen_from(stage: _Stage, request: Request) -> Iterator[_Stage]:
     if not request.recenter:
         yield stage
         return
-    with recentering.recentred(stage.scene, stage.view_layer, stage.camera, stage.ledger) as moved:
+    with recentering.recentred(stage.scene, stage.view_layer, stage.camera, stage.ledger, stage.is_lit) as moved:
         layer = moved.scene.view_layers[0]
-        yield _Stage(moved.scene, layer, moved.camera, origin=moved.origin, names=moved.names, told=stage.ledger)
+        yield _Stage(moved.scene, layer, moved.camera, stage.level, origin=moved.origin, names=moved.names, told=stage.ledger)
 
 
-def _render(stage: _Stage, request: Request, path: str | os.PathLike[str]) -> None:
-    cycles.render(stage.scene, stage.view_layer, stage.camera, path, stage.ledger.remedies.values(), request.threads)
+def _render(stage: _Stage, request: Request, paths: Sequence[str | os.PathLike[str]], light: Light | None) -> None:
+    """Cycles' pictures. light : as exported, of a stage that is lit."""
+    share = max((request.samples or SAMPLES) // len(paths), 1)
+    for number, path in enumerate(paths):
+        picture = None
+        if stage.is_lit:
+            bounces = NO_BOUNCES if stage.level == "direct" else light.bounces
+            picture = cycles.Light(light.film, bounces, share, request.seed + number)
+        cycles.render(
+            stage.scene, stage.view_layer, stage.camera, path, stage.ledger.remedies.values(), request.threads, picture
+        )
 
 
 @contextlib.contextmanager
@@ -136,7 +164,13 @@ def _stage(request: Request) -> Iterator[_Stage]:
         camera = _camera(scene, request.camera)
         if request.size:
             _borrow_size(borrow, scene, camera, request.size)
-        yield _Stage(scene, _view_layer(scene), camera)
+        layer = _view_layer(scene)
+        if request.clay:
+            borrow.set(layer, "material_override", materials.plain(borrow))
+        level = request.level
+        if level == AUTO:
+            level, _ = least_level(export_scene(scene, layer, camera, Ledger(), lit=True))
+        yield _Stage(scene, layer, camera, level)
 
 
 def open_blend(path: str | os.PathLike[str]) -> None:

@@ -35,9 +35,9 @@ class Ledger:
         """The remedy is a property of an original datablock."""
         self.remedies[owner.as_pointer(), attribute] = lambda borrow: borrow.set(owner, attribute, value)
 
-    def call_for_cycles(self, owner: bpy.types.bpy_struct, remedy: Callable[[Borrower, bpy.types.bpy_struct], None]) -> None:
-        """The remedy is a function."""
-        self.remedies[owner.as_pointer(), remedy.__name__] = lambda borrow: remedy(borrow, owner)
+    def call_for_cycles(self, owner: bpy.types.bpy_struct, remedy: Callable[..., None], *arguments: object) -> None:
+        """The remedy is a function (borrow, owner, *arguments)."""
+        self.remedies[owner.as_pointer(), remedy.__name__] = lambda borrow: remedy(borrow, owner, *arguments)
 
     def add(self, other: "Ledger", names: Mapping[str, str]) -> None:
         """Note what another ledger found of objects that stand for these. names : object there → object here."""

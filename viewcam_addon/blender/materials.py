@@ -3,20 +3,30 @@
 Level geometry models no material. Most leave the passes of geometry alone; some do not: displacement moves the surface, bump
 and normal maps turn the Normal pass, and where a surface is transparent Cycles writes what lies behind. For the time of a
 comparison such a material gets a second output for Cycles, a diffuse surface of its viewport colour; its own nodes stay as
-they are.
+they are. At the levels of light the same is done to every material that the tracer only approximates, with the components that
+shaders.py has found.
 """
 
 from collections.abc import Iterator
 
 import bpy
 
-from . import versions
+from ..tracer.materials import PLAIN, Colour
+from . import nodes, shaders, versions
 from .borrowing import Borrower
 
 # Node types that let something else than the surface's own geometry into the passes.
 _TRANSPARENT = {"BSDF_TRANSPARENT", "HOLDOUT"}
 _TURNING = {"BUMP", "NORMAL_MAP", "BEVEL"}
 _UNKNOWN = {"SCRIPT"}
+# The shaders of the tracer's components.
+_SHADERS = {
+    "diffuse": "ShaderNodeBsdfDiffuse",
+    "emission": "ShaderNodeEmission",
+    "mirror": "ShaderNodeBsdfGlossy",
+    "glass": "ShaderNodeBsdfGlass",
+    "refraction": "ShaderNodeBsdfRefraction",
+}
 
 
 def departures(material: bpy.types.Material) -> list[str]:
@@ -32,12 +42,12 @@ def departures(material: bpy.types.Material) -> list[str]:
         reasons.append("is displaced")
     if output.inputs["Volume"].is_linked:
         reasons.append("has a volume")
-    nodes = list(_nodes(tree, set()))
-    if any(node.type in _TRANSPARENT or _sees_through(node) for node in nodes):
+    all_nodes = list(_nodes(tree, set()))
+    if any(node.type in _TRANSPARENT or _sees_through(node) for node in all_nodes):
         reasons.append("is transparent")
-    if any(node.type in _TURNING or _is_turned(node) for node in nodes):
+    if any(node.type in _TURNING or _is_turned(node) for node in all_nodes):
         reasons.append("turns the normals")
-    if any(node.type in _UNKNOWN for node in nodes):
+    if any(node.type in _UNKNOWN for node in all_nodes):
         reasons.append("runs a script")
     if not output.inputs["Surface"].is_linked:
         reasons.append("has no surface")
@@ -45,26 +55,53 @@ def departures(material: bpy.types.Material) -> list[str]:
 
 
 def make_plain(borrow: Borrower, material: bpy.types.Material) -> None:
-    """Let Cycles see a diffuse surface until the loan ends."""
-    nodes = material.node_tree.nodes
-    active = nodes.active
-    outputs = [(node, node.is_active_output) for node in nodes if node.type == "OUTPUT_MATERIAL"]
-    output, surface = nodes.new("ShaderNodeOutputMaterial"), nodes.new("ShaderNodeBsdfDiffuse")
+    """Let Cycles see a diffuse surface of the viewport colour until the loan ends."""
+    stand_in(borrow, material, shaders.in_the_viewport(material))
 
-    def undo() -> None:
-        nodes.remove(output)
-        nodes.remove(surface)
-        for node, was_active in outputs:
-            node.is_active_output = was_active
-        nodes.active = active
 
-    borrow.afterwards(undo)
-    output.target = "CYCLES"
-    surface.inputs["Color"].default_value = material.diffuse_color
-    material.node_tree.links.new(surface.outputs["BSDF"], output.inputs["Surface"])
-    for node, _ in outputs:
-        node.is_active_output = False
-    output.is_active_output = True
+def stand_in(borrow: Borrower, material: bpy.types.Material, reading: shaders.Reading) -> None:
+    """Let Cycles see the components of a tracer's material until the loan ends."""
+    output, adder = nodes.borrow_output(borrow, material.node_tree, "ShaderNodeOutputMaterial")
+    made = reading.material
+    total = None
+    for component, colour in made.colours.items():
+        shader = adder.add(_SHADERS[component])
+        _set(shader, "Roughness", 0.0)
+        _set(shader, "IOR", made.ior)
+        _colour(adder, shader.inputs["Color"], colour, reading)
+        total = shader if total is None else adder.add("ShaderNodeAddShader", total.outputs[0], shader.outputs[0])
+    # Without any light Cycles would draw nothing: not even the depth.
+    total = total or adder.add("ShaderNodeBsdfDiffuse", Color=(0.0, 0.0, 0.0, 1.0))
+    adder.link(total.outputs[0], output.inputs["Surface"])
+
+
+def _colour(adder: nodes.Adder, socket: bpy.types.NodeSocket, colour: Colour, reading: shaders.Reading) -> None:
+    """The product that a colour is."""
+    if colour.image is None and not colour.vertex:
+        socket.default_value = (*colour.rgb, 1.0)
+        return
+    factor = adder.add("ShaderNodeCombineXYZ", X=colour.rgb[0], Y=colour.rgb[1], Z=colour.rgb[2])
+    factors = [factor.outputs[0]]
+    if colour.image is not None:
+        texture = adder.add("ShaderNodeTexImage")
+        texture.image = reading.images[colour.image]
+        texture.interpolation = "Closest" if colour.closest else "Linear"
+        factors.append(texture.outputs["Color"])
+    if colour.vertex:
+        attribute = adder.add("ShaderNodeVertexColor")
+        attribute.layer_name = reading.vertex
+        factors.append(attribute.outputs["Color"])
+    product = factors[0]
+    for other in factors[1:]:
+        multiply = adder.add("ShaderNodeVectorMath", product, other)
+        multiply.operation = "MULTIPLY"
+        product = multiply.outputs[0]
+    adder.link(product, socket)
+
+
+def _set(node: bpy.types.Node, name: str, value: float) -> None:
+    if name in node.inputs:
+        node.inputs[name].default_value = value
 
 
 def keep_normals(borrow: Borrower, material: bpy.types.Material) -> None:
@@ -84,10 +121,13 @@ def fill_empty_slots(borrow: Borrower, block: bpy.types.Object) -> None:
 
 
 def plain(borrow: Borrower) -> bpy.types.Material:
-    """A material that leaves all passes alone, gone when the loan ends."""
+    """The tracer's own plain material, which leaves all passes of geometry alone, gone when the loan ends."""
     material = bpy.data.materials.new("Virtual Pinhole")
     borrow.afterwards(bpy.data.materials.remove, material)
     material.cycles.use_bump_map_correction = False
+    if not material.node_tree:  # from 5.0 on new materials have one
+        material.use_nodes = True
+    stand_in(borrow, material, shaders.Reading(PLAIN))
     return material
 
 

@@ -37,7 +37,10 @@ from . import datablocks, features, findings, materials, pose
 from .borrowing import Borrower, borrowed, still_of_one_layer
 from .depsgraph import visit
 from .export import placements
+from .film import CYCLES_SETTINGS
 from .ledger import Ledger
+from .shading import Shading
+from .world import shown_world
 
 Array = NDArray[np.float64]
 Geometry = bpy.types.Mesh | bpy.types.PointCloud
@@ -59,6 +62,7 @@ _FRAME = (
     "border_max_x",
     "border_min_y",
     "border_max_y",
+    "film_transparent",
 )
 
 
@@ -92,6 +96,7 @@ class _Placed:
     data: bpy.types.ID
     matrix: Array
     object_index: int = 0
+    hidden_from: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,26 +112,27 @@ class _View:
 
 @contextlib.contextmanager
 def recentred(
-    scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_object: bpy.types.Object, ledger: Ledger
+    scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_object: bpy.types.Object, ledger: Ledger, lit: bool = False
 ) -> Iterator[Recentred]:
     """Give what a render of this view layer shows, as a scene whose origin is the eye; it is gone at the end of the block.
 
-    ledger : notes what could not come, as `export.survey` does.
+    ledger : notes what could not come, as `export.survey` does. lit : whether what only other rays than the camera's see comes
+        along, for the levels above geometry.
 
     Raises
     ------
     InputError
         as `export.export_scene` does, and if something does not stand where it should.
     """
-    features.note_render(scene, view_layer, camera_object, ledger)
+    features.note_render(scene, view_layer, camera_object, ledger, lit)
     with borrowed() as borrow:
         keys = set(bpy.data.shape_keys)
         borrow.afterwards(_remove_keys_but, keys)
         view, placed, copies = _visit(
-            scene, view_layer, camera_object, lambda depsgraph: _seen(depsgraph, camera_object, ledger, borrow)
+            scene, view_layer, camera_object, lambda depsgraph: _seen(depsgraph, camera_object, ledger, borrow, lit)
         )
         _remove_keys_but(keys)
-        temporary = _empty_scene(borrow, scene)
+        temporary = _empty_scene(borrow, scene, view_layer)
         camera = _camera(borrow, temporary, view)  # before all others: it asks for a depsgraph
         shown = _place(borrow, temporary, placed)
         _visit(temporary, temporary.view_layers[0], camera, lambda depsgraph: _verify(depsgraph, shown, copies))
@@ -140,7 +146,7 @@ def _visit(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_objec
 
 
 def _seen(
-    depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, ledger: Ledger, borrow: Borrower
+    depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, ledger: Ledger, borrow: Borrower, lit: bool
 ) -> tuple[_View, list[_Placed], dict[bpy.types.ID, _Copy]]:
     """What of the file is rendered; geometries are copied, and the copies gone when the loan ends."""
     view = _view(depsgraph, camera_object)
@@ -148,7 +154,7 @@ def _seen(
     plain = materials.plain(borrow)
     copies: dict[tuple[int, int], _Copy] = {}
     placed = []
-    for source, matrix in placements(depsgraph, ledger):
+    for source, matrix in placements(depsgraph, ledger, Shading() if lit else None):
         if not np.isfinite(matrix).all():
             raise InputError(f"the matrix of object {source.name!r} holds a number that is not finite: check its transform")
         matrix[:3, 3] -= eye
@@ -159,7 +165,7 @@ def _seen(
             copies[source.key] = _moved(data, matrix)
         copy = copies[source.key]
         matrix[:3, 3] += matrix[:3, :3] @ copy.anchor
-        placed.append(_Placed(source.name, copy.data, matrix, source.object_index))
+        placed.append(_Placed(source.name, copy.data, matrix, source.object_index, source.hidden_from))
     return view, [*placed, *_lights(depsgraph, eye)], {copy.data: copy for copy in copies.values()}
 
 
@@ -174,7 +180,8 @@ def _lights(depsgraph: bpy.types.Depsgraph, eye: Array) -> Iterator[_Placed]:
         if instance.object.type == "LIGHT" and instance.show_self:
             matrix = np.array(instance.matrix_world, dtype=np.float64)
             matrix[:3, 3] -= eye
-            yield _Placed(instance.object.original.name, instance.object.data.original, matrix)
+            hidden_from = features.hidden_from(features.placed_by(instance), depsgraph.view_layer_eval)
+            yield _Placed(instance.object.original.name, instance.object.data.original, matrix, hidden_from=hidden_from)
 
 
 def _view(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) -> _View:
@@ -218,13 +225,16 @@ def _moved(data: Geometry, matrix: Array) -> _Copy:
     return _Copy(data, points, anchor)
 
 
-def _empty_scene(borrow: Borrower, scene: bpy.types.Scene) -> bpy.types.Scene:
-    """A scene that renders pictures of the same frame, with the same world."""
+def _empty_scene(borrow: Borrower, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> bpy.types.Scene:
+    """A scene that renders pictures of the same frame and film, with the same world."""
     temporary = bpy.data.scenes.new("Virtual Pinhole")
     borrow.afterwards(bpy.data.scenes.remove, temporary)
     for name in _FRAME:
         setattr(temporary.render, name, getattr(scene.render, name))
-    temporary.world = scene.world
+    if hasattr(scene, "cycles"):
+        for name in CYCLES_SETTINGS:
+            setattr(temporary.cycles, name, getattr(scene.cycles, name))
+    temporary.world = shown_world(scene, view_layer)
     temporary.frame_current = scene.frame_current
     return temporary
 
@@ -242,6 +252,8 @@ def _place(borrow: Borrower, temporary: bpy.types.Scene, placed: list[_Placed]) 
         block.parent = root
         block.matrix_parent_inverse = Matrix(each.matrix)
         block.pass_index = each.object_index
+        for ray in each.hidden_from:
+            setattr(block, f"visible_{ray}", False)
         temporary.collection.objects.link(block)
         shown[block] = each
     return shown

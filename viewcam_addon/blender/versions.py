@@ -17,6 +17,28 @@ def node_tree(block: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree
     return block.node_tree if bpy.app.version >= (5, 0) or block.use_nodes else None
 
 
+def light_tree(light: bpy.types.Light) -> bpy.types.NodeTree | None:
+    """The nodes of a light that count in the render. Lights lost their switch later than materials: in 5.2 at the latest."""
+    return light.node_tree if bpy.app.version >= (5, 2) or light.use_nodes else None
+
+
+def shadow_terminator(block: bpy.types.Object) -> tuple[tuple[bpy.types.bpy_struct, str], ...]:
+    """The properties by which Cycles lights what lies in the shadow of its own facets. In 4.2 and 4.3 they are the add-on's."""
+    if bpy.app.version >= (4, 5):
+        return (block, "shadow_terminator_geometry_offset"), (block, "shadow_terminator_shading_offset")
+    return (block.cycles, "shadow_terminator_geometry_offset"), (block.cycles, "shadow_terminator_offset")
+
+
+def without_first_sample(samples: int) -> dict[str, object]:
+    """Settings of Cycles for that many samples without the first, which goes through the pixel's centre whatever the filter.
+
+    It draws edges towards what stands at the centre, by 0.22/samples of their contrast. Measured: 4.2, 4.5, 5.0 and 5.2.
+    """
+    if bpy.app.version < (4, 4):
+        return {"sample_offset": 1, "samples": samples}
+    return {"use_sample_subset": True, "sample_offset": 1, "sample_subset_length": samples, "samples": samples + 1}
+
+
 def drivers(block: bpy.types.ID) -> list[bpy.types.FCurve]:
     """The drivers on a datablock's own properties."""
     return list(block.animation_data.drivers) if block.animation_data else []

@@ -26,7 +26,7 @@ class Film:
     def __post_init__(self) -> None:
         if self.filter not in FILTERS:
             raise InputError(f"the pixel filter is {checks.shown(self.filter)}: give one of {', '.join(FILTERS)}")
-        object.__setattr__(self, "filter_width", checks.number("filter_width", self.filter_width, 0.01, 10.0))
+        object.__setattr__(self, "filter_width", checks.number("filter_width", self.filter_width, 0.001, 10.0))
         object.__setattr__(self, "transparent", checks.truth("transparent", self.transparent))
         object.__setattr__(self, "exposure", checks.number("exposure", self.exposure, 0.0, 1e6))
 

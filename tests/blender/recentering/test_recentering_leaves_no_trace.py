@@ -77,7 +77,7 @@ def test_the_file_is_as_it_was_after_a_failure(crowd, monkeypatch, tmp_path, roo
 
     monkeypatch.setattr(room, name, fails)
     with pytest.raises(InputError, match="out of luck"):
-        job.export_and_render(job.Request(recenter=True), tmp_path / "picture.exr")
+        job.export_and_render(job.Request(recenter=True), [tmp_path / "picture.exr"])
     assert file_state() == before
 
 
