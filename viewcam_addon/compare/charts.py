@@ -6,6 +6,7 @@ Rejected: matplotlib, whose pictures know one background only and which Blender 
 import math
 from collections.abc import Callable
 from html import escape
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +68,49 @@ def _lane(y: float, place: Callable[[float], float], percentile: float, measured
         f'<line class="limit" x1="{end:.1f}" x2="{end:.1f}" y1="{y - 5}" y2="{y + 5}"/><circle cx="{dot:.1f}" cy="{y}" r="4"/>'
         f'<text class="name" x="{_LEFT - 8}" y="{y + 4}" text-anchor="end">{name}</text>'
         f'<text x="{end + 8:.1f}" y="{y + 4}">{figure(measured)} of {figure(limit)}</text></g>'
+    )
+
+
+def bell(errors: NDArray[np.float64], limit: float) -> str:
+    """How the tiles' differences are distributed, in standard errors, below the curve that chance alone makes.
+
+    errors : (n,). limit : standard errors, what is allowed.
+    """
+    reach = max(math.ceil(1.2 * limit), 4)
+
+    def place(value: float) -> float:
+        return _LEFT + (_WIDTH - _LEFT - _RIGHT) * (min(max(value, -reach), reach) + reach) / (2 * reach)
+
+    bins = 6 * reach
+    counts, edges = np.histogram(np.clip(errors, -reach, reach), bins=bins, range=(-reach, reach))
+    chance = [len(errors) * (math.erf(b / math.sqrt(2)) - math.erf(a / math.sqrt(2))) / 2 for a, b in pairwise(edges)]
+    tall = (_BASE - 8) / math.sqrt(max(*counts, *chance, 1.0))
+    bars = "".join(
+        f'<rect x="{place(start):.1f}" y="{_BASE - tall * math.sqrt(count):.1f}" '
+        f'width="{place(stop) - place(start) - 1:.1f}" height="{tall * math.sqrt(count):.1f}"/>'
+        for count, (start, stop) in zip(counts, pairwise(edges), strict=True)
+        if count
+    )
+    curve = " ".join(
+        f"{place((a + b) / 2):.1f},{_BASE - tall * math.sqrt(count):.1f}"
+        for count, (a, b) in zip(chance, pairwise(edges), strict=True)
+    )
+    ticks = "".join(
+        f'<line x1="{place(x):.1f}" x2="{place(x):.1f}" y1="{_BASE}" y2="{_BASE + 5}"/>'
+        f'<text x="{place(x):.1f}" y="{_BASE + 19}" text-anchor="middle">{x:+d}</text>'
+        for x in range(-reach, reach + 1, max(reach // 4, 1))
+    )
+    limits = "".join(
+        f'<line class="rule" x1="{place(x):.1f}" x2="{place(x):.1f}" y1="8" y2="{_BASE}"/>'
+        f'<text x="{place(x):.1f}" y="{_BASE + 38}" text-anchor="middle">allowed</text>'
+        for x in (-limit, limit)
+    )
+    label = "Histogram of the tiles' differences in standard errors, with the curve of chance and what is allowed"
+    return (
+        f'<svg class="chart" viewBox="0 0 {_WIDTH} {_BASE + 48}" role="img" aria-label="{label}"><g class="bars">{bars}</g>'
+        f'<polyline class="curve" points="{curve}"/>'
+        f'<line class="axis" x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{_BASE}" y2="{_BASE}"/>'
+        f'<g class="ticks">{ticks}</g>{limits}</svg>'
     )
 
 

@@ -18,6 +18,7 @@ from string import Template
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import written_whole
@@ -40,17 +41,19 @@ class Viewer:
         self._images: list[str] = []
         self._captions: list[str] = []
 
-    def add(self, view: str, words: str, caption: str, **sides: pictures.Picture) -> None:
+    def add(
+        self, view: str, words: str, caption: str, scale: NDArray[np.uint8] | None = None, **sides: pictures.Picture
+    ) -> None:
         """Add a view.
 
         view : its name in the page. words : what it shows. caption : HTML below it.
-        sides : pictures, named "image", or "reference" and "test".
+        scale : what levels are painted with (pictures.png). sides : pictures, named "image", or "reference" and "test".
         """
         checked = "" if self._tabs else " checked"
         radio = f'<input type="radio" name="view" value="{view}" data-words="{words}"{checked}>'
         self._tabs.append(f"<label>{radio} {words.removesuffix(' error')}</label>")
         self._images.extend(
-            f'<img class="{side}" data-view="{view}" alt="{words}, {side}" src="{pictures.png_uri(picture)}">'
+            f'<img class="{side}" data-view="{view}" alt="{words}, {side}" src="{pictures.png_uri(picture, scale)}">'
             for side, picture in sides.items()
         )
         self._captions.append(f'<div data-caption="{view}"{"" if self._captions else " class=shown"}>{caption}</div>')
@@ -119,6 +122,18 @@ def logarithmic_legend(low: float, high: float, limits: Mapping[str, float], uni
     strip = pictures.png_uri(np.arange(1, pictures.LEVELS + 1, dtype=np.uint8)[None])
     return (
         f'<div class="legend"><img src="{strip}" alt="Colour scale from {figure(low)} to {figure(high)} {unit}">'
+        f'<div class="scale">{scale}</div><div class="limits">{ticks}</div></div>'
+    )
+
+
+def signed_legend(limit: float, unit: str, allowed: float | None = None) -> str:
+    """The signed colour scale, with ticks at what is allowed on both sides."""
+    scale = "".join(f'<span style="left:{100 * i / 4:.0f}%">{figure(limit * (i - 2) / 2)}</span>' for i in range(5))
+    places = [] if allowed is None else [(1 + sign * allowed / limit) / 2 for sign in (-1, 1)]
+    ticks = "".join(f'<span style="left:{100 * place:.2f}%">allowed</span>' for place in places if 0 <= place <= 1)
+    strip = pictures.png_uri(np.arange(1, pictures.LEVELS + 1, dtype=np.uint8)[None], pictures.signed_scale())
+    return (
+        f'<div class="legend"><img src="{strip}" alt="Colour scale from {figure(-limit)} to {figure(limit)} {unit}">'
         f'<div class="scale">{scale}</div><div class="limits">{ticks}</div></div>'
     )
 

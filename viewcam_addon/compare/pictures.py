@@ -39,17 +39,21 @@ _CONES_TO_RGB = np.array(
 )
 
 
-def png_uri(picture: Picture) -> str:
+def png_uri(picture: Picture, scale: NDArray[np.uint8] | None = None) -> str:
     """The picture as a data: URI of a PNG."""
-    return "data:image/png;base64," + base64.b64encode(png(picture)).decode("ascii")
+    return "data:image/png;base64," + base64.b64encode(png(picture, scale)).decode("ascii")
 
 
-def png(picture: Picture) -> bytes:
-    """The picture as a PNG file; a (height, width) one holds levels of the colour scale, 0 for none."""
+def png(picture: Picture, scale: NDArray[np.uint8] | None = None) -> bytes:
+    """The picture as a PNG file; a (height, width) one holds levels of a scale (colour_scale by default), 0 for none."""
     height, width = picture.shape[:2]
     lines = picture.reshape(height, -1)
     if picture.ndim == 2:
-        kind, filtered, palette = 3, 0, ((b"PLTE", b"\0\0\0" + colour_scale().tobytes()), (b"tRNS", b"\0"))
+        kind, filtered, palette = (
+            3,
+            0,
+            ((b"PLTE", b"\0\0\0" + (colour_scale() if scale is None else scale).tobytes()), (b"tRNS", b"\0")),
+        )
     else:
         # Each row is stored as its difference to the one above (filter 2), which compresses well.
         kind, filtered, palette = {3: 2, 4: 6}[picture.shape[2]], 2, ()
@@ -111,6 +115,17 @@ def on_scale(errors: NDArray[np.float32], low: float, high: float) -> Picture:
     return np.where(worst < 0, 0, 1 + np.round(position * (LEVELS - 1))).astype(np.uint8)
 
 
+def signed(values: NDArray[np.float32], limit: float) -> Picture:
+    """Values as levels of the signed scale, linear from −limit to limit; as `on_scale`, the farthest from 0 shows."""
+    step = _step(values.shape[1])
+    height, width = (size // step * step for size in values.shape)
+    blocks = values[:height, :width].reshape(height // step, step, width // step, step).transpose(0, 2, 1, 3)
+    blocks = blocks.reshape(height // step, width // step, step * step)
+    farthest = np.take_along_axis(blocks, np.abs(np.nan_to_num(blocks)).argmax(axis=-1)[..., None], axis=-1)[::-1, :, 0]
+    position = (np.clip(np.nan_to_num(farthest) / limit, -1.0, 1.0) + 1.0) / 2.0
+    return np.where(np.isnan(farthest), 0, 1 + np.round(position * (LEVELS - 1))).astype(np.uint8)
+
+
 def stain(mismatches: Mismatches, size: tuple[int, int]) -> Picture:
     """Every mismatch as a coloured pixel, for pictures that have more of them than marks can show: red where unexplained."""
     step = _step(size[0])
@@ -126,6 +141,13 @@ def colour_scale() -> NDArray[np.uint8]:
     hue = np.radians(280.0 + 185.0 * t)
     chroma = 0.16 * np.sin(np.pi * np.minimum(t * 0.9 + 0.08, 1.0)) ** 0.7
     return np.round(255 * _encoded(_in_gamut(0.14 + 0.82 * t, chroma, hue))).astype(np.uint8)
+
+
+def signed_scale() -> NDArray[np.uint8]:
+    """(LEVELS, 3) uint8 sRGB for signed values: blue below 0, orange above, near black at 0; lightness tells the size."""
+    t = np.linspace(-1.0, 1.0, LEVELS)
+    hue = np.radians(np.where(t < 0, 250.0, 62.0))
+    return np.round(255 * _encoded(_in_gamut(0.16 + 0.72 * np.abs(t), 0.15 * np.abs(t) ** 0.6, hue))).astype(np.uint8)
 
 
 def crop(picture: Picture, full_size: tuple[int, int], column: int, row: int, size: int = 15) -> Picture:
