@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 
 from .. import errors
 from ..errors import InputError
-from ..image import BACKGROUND_DEPTH, CHANNELS
+from ..image import BACKGROUND_DEPTH, CHANNELS, GEOMETRY_PASSES
+from ..tracer.film import LEVELS
+from ..tracer.levels import least_level
 from ..tracer.scene import Scene
 from ..tracer.surface import Passes
 from . import datablocks, export, tracing, versions
@@ -39,6 +41,8 @@ ASKED_BY = {
     "Emission": "use_pass_emit",
     "Environment": "use_pass_environment",
 }
+
+_GEOMETRY = LEVELS[0]
 
 
 class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
@@ -64,43 +68,62 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
 
     def _render(self, depsgraph: bpy.types.Depsgraph) -> None:
         self.update_stats("", "Reading the scene")
-        scene, level = self._exported(depsgraph)
-        settings, threads = depsgraph.scene_eval.virtual_pinhole_reference, depsgraph.scene.render.threads
-        words = "Level geometry" if level == "geometry" else f"Level {level}, {settings.samples} samples"
-        work = scene, level, settings.samples, settings.seed, threads
+        settings = depsgraph.scene_eval.virtual_pinhole_reference
+        scene = self._exported(depsgraph)
+        level = least_level(scene)[0] if settings.level == "AUTO" else settings.level.lower()
+        asked_for = set(_asked_for(depsgraph.scene_eval, depsgraph.view_layer))
+        geometry: Passes = {}
+        if level != _GEOMETRY and asked_for & set(GEOMETRY_PASSES):
+            for passes, _ in self._bands(depsgraph, scene, _GEOMETRY):
+                geometry = passes
+        words = f"Level {level}" if level == _GEOMETRY else f"Level {level}, {settings.samples} samples"
         started, done = time.perf_counter(), np.zeros(scene.camera.height, bool)
-        for passes, rows in tracing.bands(*work, self.test_break):
-            self._show(depsgraph, passes, rows)
+        for passes, rows in self._bands(depsgraph, scene, level):
+            self._show(depsgraph.view_layer.name, geometry | passes, rows, asked_for)
             done[rows.start : rows.stop] = True
             self.update_progress(done.mean())
             remaining = round((time.perf_counter() - started) * (1 / done.mean() - 1))
             self.update_stats("", f"{words} | Remaining {remaining // 60}:{remaining % 60:02}")
 
-    def _exported(self, depsgraph: bpy.types.Depsgraph) -> tuple[Scene, str]:
-        """What is seen through the camera and the render border, and the level to trace it at."""
-        ledger = Ledger()
-        scene = export.scene_in(depsgraph, self.camera_override.original, ledger)
+    def _exported(self, depsgraph: bpy.types.Depsgraph) -> Scene:
+        """What is seen through the camera and the render border."""
+        if depsgraph.scene.render.use_multiview:
+            raise InputError("stereoscopy is on, and each eye has another camera: turn it off among the output properties")
+        settings = depsgraph.scene_eval.virtual_pinhole_reference
+        ledger, camera_object = Ledger(), self.camera_override.original
+        for sentence in datablocks.beyond_pinhole(camera_object, depsgraph.scene):
+            ledger.note(camera_object.name, "approximated", sentence)
+        scene = export.scene_in(depsgraph, camera_object, ledger, lit=settings.level != "GEOMETRY")
+        if settings.clay:
+            scene = replace(scene, objects=tuple(replace(placed, materials=()) for placed in scene.objects))
         frame = datablocks.frame_of(depsgraph.scene)
         if frame.border and not frame.crop:
             scene = replace(scene, camera=scene.camera.cropped(*replace(frame, crop=True).window))
-        return scene, "geometry"
+        lacking = [entry for entry in ledger.entries() if entry.status != "exported"]
+        if lacking:
+            others = f" (and {len(lacking) - 1} more, which viewcam export lists)" if len(lacking) > 1 else ""
+            self.report({"WARNING"}, f"Not modelled as it is: {lacking[0].object!r}, {lacking[0].reason}{others}")
+        return scene
 
-    def _show(self, depsgraph: bpy.types.Depsgraph, passes: Passes, rows: range) -> None:
+    def _bands(self, depsgraph: bpy.types.Depsgraph, scene: Scene, level: str) -> Iterator[tuple[Passes, range]]:
+        settings, threads = depsgraph.scene_eval.virtual_pinhole_reference, depsgraph.scene.render.threads
+        return tracing.bands(scene, level, settings.samples, settings.seed, threads, self.test_break)
+
+    def _show(self, layer: str, passes: Passes, rows: range, asked_for: set[str]) -> None:
         """Hand over a band of rows."""
         _, width, _ = passes["Depth"].shape
         band = {name: values[rows.start : rows.stop] for name, values in passes.items()}
         if "Combined" not in band:
-            band["Combined"] = lit_from_the_eye(band)
-        result = self.begin_result(0, rows.start, width, len(rows), layer=depsgraph.view_layer.name)
-        passes_there = result.layers[0].passes
-        for name in _asked_for(depsgraph.scene_eval, depsgraph.view_layer):
-            if name in band:
-                passes_there[versions.pass_name(name)].rect.foreach_set(band[name].ravel())
+            band["Combined"] = _lit_from_the_eye(band)
+        result = self.begin_result(0, rows.start, width, len(rows), layer=layer)
+        there = result.layers[0].passes
+        for name in asked_for & band.keys():
+            there[versions.pass_name(name)].rect.foreach_set(band[name].ravel())
         self.end_result(result)
 
 
-def lit_from_the_eye(passes: Passes) -> NDArray[np.float32]:
-    """The Combined pass of level `geometry`, (height, width, 4): transparent where nothing is."""
+def _lit_from_the_eye(passes: Passes) -> NDArray[np.float32]:
+    """The Combined pass of level geometry, (height, width, 4): transparent where nothing is."""
     hit = (passes["Depth"] < BACKGROUND_DEPTH).astype(np.float32)
     return np.concatenate([passes["Facing"]] * 3 + [hit], axis=-1)
 
