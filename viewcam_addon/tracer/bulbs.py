@@ -33,9 +33,9 @@ def entries(table: Floats, which: Indices) -> Floats:
     return table if table.shape[-1] == 1 else gather(table, which)
 
 
-def some(values: Floats, which: Indices) -> Floats:
-    """Values of (n,) points, or (1,) for all of them, at some of the points."""
-    return values if len(values) == 1 else values[which]
+def replace(sampled: Sampled, which: Indices, instead: Sampled) -> None:
+    for whole, part in zip(sampled, instead, strict=True):
+        whole[..., which] = part
 
 
 def columns(vectors: Sequence[Sequence[float]]) -> Floats:
@@ -109,13 +109,15 @@ class Bulbs:
 
     At the distance d a sphere of the radius R fills a cone of sin θ = R/d, a disc one of tan θ = R/d. Both have the radiance
     P/(4π² R²) and the solid angle 2π (1 − cos θ): R cancels. Inside a sphere light comes evenly from everywhere.
+
+    centres : (3, k). reach : (k,), how far lamps reach round them.
     """
 
     def __init__(self, lamps: Sequence[Point | Spot], view: View) -> None:
         places = [lamp.matrix[:3, 3] if isinstance(lamp, Spot) else lamp.position for lamp in lamps]
         self.colours = columns([lamp.power for lamp in lamps])
-        self._centres = view.axes @ (columns(places) - view.eye[:, None])
-        self._radii = np.array([lamp.radius for lamp in lamps])
+        self.centres = view.axes @ (columns(places) - view.eye[:, None])
+        self._radii = self.reach = np.array([lamp.radius for lamp in lamps])
         self.sized = self._radii > 0
         self._soft = np.array([lamp.soft_falloff for lamp in lamps])
         self._cones = _Cones(lamps, view) if any(isinstance(lamp, Spot) for lamp in lamps) else None
@@ -123,44 +125,56 @@ class Bulbs:
             self._radiance = np.where(self.sized, 1 / (_QUARTER_SPHERE * np.pi * self._radii**2), 0.0)
 
     def sample(self, which: Indices, position: Floats, shading: Floats, u: Floats) -> Sampled:
-        way = entries(self._centres, which) - position
+        way = entries(self.centres, which) - position
         squared = dot(way, way)
         distance = np.sqrt(squared)
         with np.errstate(divide="ignore", invalid="ignore"):
             axis = np.where(distance > 0, way / distance, [[0.0], [0.0], [1.0]])
             if not entries(self._radii, which).any():
-                ahead, factor = axis, np.where(distance > 0, 1 / (_QUARTER_SPHERE * squared), 0.0)
-                return ahead, distance, self._attenuated(factor, which, ahead)
+                factor = np.where(distance > 0, 1 / (_QUARTER_SPHERE * squared), 0.0)
+                return axis, distance, factor if self._cones is None else factor * self._cones.attenuation(which, axis)
         return self._sample_sized(which, way, axis, distance, shading, u)
 
     def _sample_sized(self, which: Indices, way: Floats, axis: Floats, distance: Floats, shading: Floats, u: Floats) -> Sampled:
         radius, soft = entries(self._radii, which), entries(self._soft, which)
-        radius_squared = radius * radius
-        squared = distance * distance
-        inside = np.flatnonzero((distance <= radius) & ~soft & (radius > 0))
+        radius_squared, squared = radius * radius, distance * distance
         to_edge = squared + np.where(soft, radius_squared, 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            squared_sine = np.where(to_edge > 0, np.minimum(radius_squared / to_edge, 1.0), 0.0)
-            spread = one_minus_cosine(squared_sine)
-            factor = np.where(to_edge > 0, (2 - spread) ** -1 / (2 * np.pi * to_edge), 0.0)
+            spread = one_minus_cosine(np.where(to_edge > 0, np.minimum(radius_squared / to_edge, 1.0), 0.0))
+            factor = np.where(to_edge > 0, 1 / ((2 - spread) * (2 * np.pi * to_edge)), 0.0)
             ahead, short = within_cone(axis, spread, u)
             along = distance * (1 - short)
             root = np.sqrt(np.maximum(radius_squared - squared * short * (2 - short), 0.0))
-            met = np.where(soft, squared / along, along - root)
-        factor = self._attenuated(factor, which, ahead)
+            reached = np.where(soft, np.nan_to_num(squared / along), along - root)
+        sampled = ahead, reached, factor
+        inside = ~soft & (distance <= radius) & (radius > 0)
+        if self._cones is not None:
+            narrow = np.flatnonzero(~soft & ~inside & (entries(self._cones.spread, which) < spread))
+            if len(narrow):
+                replace(sampled, narrow, self._along_the_beam(which[narrow], way[:, narrow], u[:, narrow]))
+            factor *= np.where(inside, 1.0, self._cones.attenuation(which, ahead))
+        inside = np.flatnonzero(inside)
         if len(inside):
-            ahead[:, inside], density = cosine_direction(shading[:, inside], u[:, inside])
-            along = dot(way[:, inside], ahead[:, inside])
-            aside = squared[inside] - along * along
-            met[inside] = along + np.sqrt(np.maximum(some(radius_squared, inside) - aside, 0.0))
-            factor[inside] = some(entries(self._radiance, which), inside) / np.maximum(density, _LEAST_DENSITY)
-        return ahead, met, factor
+            replace(sampled, inside, self._from_inside(which[inside], way[:, inside], shading[:, inside], u[:, inside]))
+        return sampled
 
-    def _attenuated(self, factor: Floats, which: Indices, ahead: Floats) -> Floats:
-        return factor if self._cones is None else factor * self._cones.attenuation(which, ahead)
+    def _along_the_beam(self, which: Indices, way: Floats, u: Floats) -> Sampled:
+        """Samples of spheres so large, or near, that the cones of their spots are narrower than they look."""
+        spread, radius = entries(self._cones.spread, which), entries(self._radii, which)
+        ahead, _ = within_cone(entries(self._cones.axes, which), spread, u)
+        along = dot(way, ahead)
+        root = radius * radius - (dot(way, way) - along * along)
+        hit = (root >= 0) & (along > 0)
+        return ahead, along - np.sqrt(np.maximum(root, 0.0)), hit * entries(self._radiance, which) * (2 * np.pi * spread)
+
+    def _from_inside(self, which: Indices, way: Floats, shading: Floats, u: Floats) -> Sampled:
+        ahead, density = cosine_direction(shading, u)
+        along, radius = dot(way, ahead), entries(self._radii, which)
+        reached = along + np.sqrt(np.maximum(radius * radius - dot(way, way) + along * along, 0.0))
+        return ahead, reached, entries(self._radiance, which) / np.maximum(density, _LEAST_DENSITY)
 
     def estimate(self, lamp: int, position: Floats, normal: Floats) -> Floats:
-        way = self._centres[:, lamp, None] - position
+        way = self.centres[:, lamp, None] - position
         radius = self._radii[lamp]
         distance = np.sqrt(dot(way, way))
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -174,7 +188,7 @@ class Bulbs:
     def met(self, lamp: int, starts: Floats, ahead: Floats, nearest: Floats, farthest: Floats) -> Floats:
         """(n,) factors, 0 where rays (3, n), unit, pass the lamp by between `nearest` and `farthest`, distances."""
         radius_squared = self._radii[lamp] ** 2
-        way = self._centres[:, lamp, None] - starts
+        way = self.centres[:, lamp, None] - starts
         along, squared = dot(way, ahead), dot(way, way)
         if self._soft[lamp]:
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -200,12 +214,14 @@ _LEAST_OF_A_WIDE_SPOT = 0.05
 
 _HARD_EDGE = 1e-30
 _LEAST_DENSITY = 1e-30
+_SHEARED = 1e-9
 
 
 class _Cones:
-    """The cones of spots, measured in their own space; points have none, and light is not weakened.
+    """The cones of spots, measured in their own space; points have none, and nothing of their light is lost.
 
-    is_spot : (k,).
+    is_spot : (k,). axes : (3, k), against the beam. spread : (k,), 1 − cos of half the opening of a cone about them that holds
+    all light; more than any sphere fills where that is not known.
     """
 
     def __init__(self, lamps: Sequence[Point | Spot], view: View) -> None:
@@ -217,6 +233,13 @@ class _Cones:
         edge = np.cos(angles / 2)
         self._edge = np.where(self.is_spot, edge, -2.0)
         self._slope = 1 / np.maximum((1 - edge) * blends, _HARD_EDGE)
+        linear = np.array([lamp.matrix[:3, :3] if isinstance(lamp, Spot) else np.eye(3) for lamp in lamps])
+        squares = linear.transpose(0, 2, 1) @ linear
+        lengths = np.diagonal(squares, axis1=1, axis2=2)
+        self.axes = view.axes @ (linear[:, :, 2] / np.sqrt(lengths[:, 2:])).T
+        sheared = np.abs(squares - lengths[:, None] * np.eye(3)).max(axis=(1, 2)) > _SHEARED * lengths.max(axis=1)
+        wider = np.maximum(lengths[:, 0], lengths[:, 1]) / lengths[:, 2]
+        self.spread = np.where(self.is_spot & ~sheared, 1 - 1 / np.sqrt(1 + np.tan(angles / 2) ** 2 * wider), 2.0)
 
     def attenuation(self, which: Indices, ahead: Floats) -> Floats:
         """(n,) for rays (3, n), unit, towards the lamps."""

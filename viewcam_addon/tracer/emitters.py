@@ -13,7 +13,7 @@ emitters, which is the same as more samples.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,11 +31,12 @@ from .view import View
 _FEW = 8
 # More light than any picture holds, less than makes products overflow.
 _MOST = 1e200
+# Points at a time: their arrays stay in a core's cache.
+_POINTS = 8192
 _BELOW_1 = 1 - 2.0**-53
 
 
-@dataclass(frozen=True, slots=True)
-class Aimed:
+class Aimed(NamedTuple):
     """Where n points look for light, and what they get from there if nothing is in between.
 
     direction : (3, n), unit. distance : (n,), inf for suns. light : (3, n), radiance over density. pdf : (n,), the density by
@@ -72,7 +73,9 @@ class Emitters:
         self._lamps = Lamps(_seen_by("diffuse", lamps), view)
         self._glowing = Glowing(scene, surfaces, palette)
         self._count = self._lamps.count + self._glowing.count
+        self._shadowed = np.append(self._lamps.shadowed, np.ones(self._glowing.count, bool))
         self._chances = self._fixed_chances(_extent(surfaces)) if self._count > _FEW else None
+        self._reached = None if self._chances is None else np.append(self._chances.cumsum()[:-1], 1.0)
 
     def sampled(self, kind: str) -> bool:
         """Whether there is anything that `sample` finds for surfaces that scatter this kind of rays: diffuse ones only."""
@@ -89,50 +92,48 @@ class Emitters:
 
     def sample(self, points: Points, u: Floats) -> Aimed:
         """One emitter for each of n points, and a direction to it. u : (3, n) in [0, 1): which emitter, and where on it."""
-        count = u.shape[1]
-        which, chance, part = self._choose(points, u[0])
-        first = self._lamps.count
+        parts = [slice(first, first + _POINTS) for first in range(0, max(points.count, 1), _POINTS)]
+        aimed = [self._aim(points.at(part), u[:, part]) for part in parts]
+        return aimed[0] if len(aimed) == 1 else Aimed(*(np.concatenate(values, axis=-1) for values in zip(*aimed, strict=True)))
+
+    def _aim(self, points: Points, u: Floats) -> Aimed:
+        which, chance, rest = self._choose(points, u[0])
+        first, count = self._lamps.count, points.count
+        pdf = np.full(count, np.inf)
         if not self._glowing.count:
             direction, distance, light = self._lamps.sample(which, points, u[1:])
-            pdf = np.full(count, np.inf)
         elif not first:
-            direction, distance, light, pdf = self._glowing.sample(which, points.position, part, u[1:])
+            direction, distance, light, pdf = self._glowing.sample(which, points.position, rest, u[1:])
         else:
             direction, distance, light = np.empty((3, count)), np.empty(count), np.empty((3, count))
-            pdf = np.full(count, np.inf)
-            lamps, glowing = np.flatnonzero(which < first), np.flatnonzero(which >= first)
-            direction[:, lamps], distance[lamps], light[:, lamps] = self._lamps.sample(
-                which[lamps], points.at(lamps), u[1:, lamps]
+            some = np.flatnonzero(which < first)
+            direction[:, some], distance[some], light[:, some] = self._lamps.sample(which[some], points.at(some), u[1:, some])
+            some = np.flatnonzero(which >= first)
+            direction[:, some], distance[some], light[:, some], pdf[some] = self._glowing.sample(
+                which[some] - first, points.position[:, some], rest[some], u[1:, some]
             )
-            direction[:, glowing], distance[glowing], light[:, glowing], pdf[glowing] = self._glowing.sample(
-                which[glowing] - first, points.position[:, glowing], part[glowing], u[1:, glowing]
-            )
-        light = np.minimum(light * np.where(chance > 0, 1 / np.where(chance > 0, chance, 1.0), 0.0), _MOST)
-        shadowed = np.ones(count, bool)
-        if first and not self._lamps.shadowed.all():
-            shadowed = gather(np.append(self._lamps.shadowed, np.ones(self._glowing.count, bool)), which)
-        return Aimed(direction, distance, light, pdf * chance, shadowed)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            light = np.where(chance > 0, np.minimum(light / chance, _MOST), 0.0)
+        return Aimed(direction, distance, light, pdf * chance, gather(self._shadowed, which))
 
     def _choose(self, points: Points, u: Floats) -> tuple[Indices, Floats, Floats]:
         """Which emitter each point gets, the chance that it had, 0 where none lights the point, and what is left of u."""
+        rays = np.arange(len(u))
         if self._count == 1:
             return np.zeros(len(u), np.intp), np.ones(len(u)), u
         if self._chances is not None:
-            reached = self._chances.cumsum()
-            reached /= reached[-1]
-            which = np.searchsorted(reached, u, side="right")
+            which = np.searchsorted(self._reached, u, side="right")
             chance = gather(self._chances, which)
-            return which, chance, np.clip((u - (gather(reached, which) - chance)) / chance, 0.0, _BELOW_1)
+            before = gather(self._reached, which) - chance
+            return which, chance, np.clip((u - before) / chance, 0.0, _BELOW_1)
         reached = self._estimates(points).cumsum(axis=0)
         total = reached[-1]
         wanted = u * total
         which = np.minimum((wanted >= reached).sum(axis=0), self._count - 1)
-        rays = np.arange(len(u))
         before = np.where(which > 0, reached[which - 1, rays], 0.0)
         share = reached[which, rays] - before
         with np.errstate(divide="ignore", invalid="ignore"):
-            part = np.nan_to_num((wanted - before) / share)
-            return which, np.nan_to_num(share / total), np.clip(part, 0.0, _BELOW_1)
+            return which, np.nan_to_num(share / total), np.clip(np.nan_to_num((wanted - before) / share), 0.0, _BELOW_1)
 
     def _estimates(self, points: Points) -> Floats:
         """(k, n): about how much each emitter brings to points."""

@@ -2,8 +2,8 @@
 
 A triangle is picked by its area times the mean emission of its material, and a point of it evenly. What that brings is
 unbounded close by, so it is weighted against rays that are scattered by chance and run into the triangle (emitters.weight).
-Spheres are only met by such rays. Rejected: sampling triangles by solid angle, which costs more than the rays that are scattered
-anyway.
+Spheres are only met by such rays. Rejected: sampling triangles by solid angle, which costs more than those rays, and they are
+needed anyway.
 """
 
 import numpy as np
@@ -99,7 +99,9 @@ class Glowing:
         """(n,): about how much an object brings to points, 0 only where it brings nothing."""
         way = self._centres[:, number, None] - position
         distance, reach = np.sqrt(dot(way, way)), self._reach[number]
-        return self._brightness[number] / (distance + reach) ** 2 * risen(dot(normal, way), distance, reach)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            light = self._brightness[number] / (distance**2 + reach**2 / 2)
+        return light * risen(dot(normal, way), distance, reach)
 
     def powers(self) -> Floats:
         """(k,), of both sides."""

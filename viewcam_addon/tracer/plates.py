@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Floats, Indices, dot
-from .bulbs import Sampled, columns, entries, risen
+from .bulbs import Sampled, columns, entries, replace, risen
 from .lights import Area
 from .view import View
 
@@ -23,12 +23,15 @@ _ASKEW = 1e-9  # |cos| between the sides of a parallelogram that is no rectangle
 
 
 class _Plates:
-    """Flat lamps with their centres, half sides and normals, which point to where they shine. colours : powers."""
+    """Flat lamps with their half sides and normals, which point to where they shine. colours : powers.
+
+    centres : (3, k). reach : (k,), how far lamps reach round them.
+    """
 
     def __init__(self, lamps: Sequence[Area], view: View) -> None:
         self.colours = columns([lamp.power for lamp in lamps])
         self.sized = np.ones(len(lamps), bool)
-        self._centres = view.axes @ (columns([lamp.matrix[:3, 3] for lamp in lamps]) - view.eye[:, None])
+        self.centres = view.axes @ (columns([lamp.matrix[:3, 3] for lamp in lamps]) - view.eye[:, None])
         sides = [self._half_sides(lamp) for lamp in lamps]
         first, second = (view.axes @ columns([side[number] for side in sides]) for number in (0, 1))
         self._lengths = np.stack([np.sqrt(dot(first, first)), np.sqrt(dot(second, second))])
@@ -38,7 +41,7 @@ class _Plates:
         shine = view.axes @ columns([-lamp.matrix[:3, 2] for lamp in lamps])
         self._normals = normals * np.copysign(1 / self._sines, dot(normals, shine))
         self._radiance = 1 / (np.pi * np.array([lamp.area for lamp in lamps]))
-        self._reach = np.hypot(*self._lengths)
+        self.reach = np.hypot(*self._lengths)
 
     @staticmethod
     def _half_sides(lamp: Area) -> tuple[Floats, Floats]:
@@ -49,18 +52,18 @@ class _Plates:
         raise NotImplementedError
 
     def estimate(self, lamp: int, position: Floats, normal: Floats) -> Floats:
-        way = self._centres[:, lamp, None] - position
-        reach = self._reach[lamp]
+        way = self.centres[:, lamp, None] - position
+        reach = self.reach[lamp]
         before = -dot(way, self._normals[:, lamp])
         distance = np.sqrt(dot(way, way))
-        light = self.colours[:, lamp].mean() / (np.pi * (distance + reach) ** 2)
+        light = self.colours[:, lamp].mean() / (np.pi * (distance**2 + reach**2 / 2))
         light *= risen(dot(normal, way), distance, reach) * risen(before, distance, reach)
         return np.where(before > 0, light, 0.0)
 
     def met(self, lamp: int, starts: Floats, ahead: Floats, nearest: Floats, farthest: Floats) -> Floats:
         """(n,) factors, 0 where rays (3, n), unit, pass the lamp by between `nearest` and `farthest`, distances."""
         normal, first, second = self._normals[:, lamp], self._first[:, lamp], self._second[:, lamp]
-        way = self._centres[:, lamp, None] - starts
+        way = self.centres[:, lamp, None] - starts
         facing = dot(normal, ahead)
         with np.errstate(divide="ignore", invalid="ignore"):
             distance = dot(normal, way) / facing
@@ -113,15 +116,13 @@ class Rectangles(_Plates):
         return (np.abs(across) <= 1) & (np.abs(along) <= 1)
 
     def sample(self, which: Indices, position: Floats, shading: Floats, u: Floats) -> Sampled:
-        way = entries(self._centres, which) - position
+        way = entries(self.centres, which) - position
         sampled, _, _ = self._by_angle(which, way, u)
         small = sampled[2] < _SMALLEST_ANGLE * entries(self._radiance, which)
         by_area = np.flatnonzero(small | entries(self._askew, which))
         if len(by_area):
             u = u[:, by_area]
-            instead = self._by_area(which[by_area], way[:, by_area], 2 * u[0] - 1, 2 * u[1] - 1)
-            for whole, part in zip(sampled, instead, strict=True):
-                whole[..., by_area] = part
+            replace(sampled, by_area, self._by_area(which[by_area], way[:, by_area], 2 * u[0] - 1, 2 * u[1] - 1))
         return sampled
 
 
@@ -137,15 +138,20 @@ class Ellipses(_Plates):
         return across * across + along * along <= 1
 
     def sample(self, which: Indices, position: Floats, shading: Floats, u: Floats) -> Sampled:
-        way = entries(self._centres, which) - position
+        way = entries(self.centres, which) - position
+        near = dot(way, way) < (_FAR * entries(self._lengths, which)[0]) ** 2
+        if near.all():
+            return self._as_rectangle(which, way, u)
         radius, turn = np.sqrt(u[0]), 2 * np.pi * u[1]
         sampled = self._by_area(which, way, radius * np.cos(turn), radius * np.sin(turn))
-        near = np.flatnonzero(dot(way, way) < (_FAR * entries(self._lengths, which)[0]) ** 2)
+        near = np.flatnonzero(near)
         if len(near):
-            instead, across, along = self._by_angle(which[near], way[:, near], u[:, near])
-            instead[2][~self._covers(across, along)] = 0.0
-            for whole, part in zip(sampled, instead, strict=True):
-                whole[..., near] = part
+            replace(sampled, near, self._as_rectangle(which[near], way[:, near], u[:, near]))
+        return sampled
+
+    def _as_rectangle(self, which: Indices, way: Floats, u: Floats) -> Sampled:
+        sampled, across, along = self._by_angle(which, way, u)
+        sampled[2][~self._covers(across, along)] = 0.0
         return sampled
 
 
