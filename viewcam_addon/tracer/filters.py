@@ -1,8 +1,8 @@
 """Where in and around its pixel a sample lies: the film's filter, by importance sampling.
 
-Every sample has weight 1 and belongs to one pixel; how often a place is chosen is what the filter weighs it with. A number
-u in [0, 1) on each axis becomes the place up to which the filter's mass is u, so that numbers that are spread evenly give places
-that are spread evenly over the filter's mass.
+Every sample has weight 1 and belongs to one pixel; how often a place is chosen is what the filter weighs it with. On each axis
+a number u in [0, 1) becomes the place up to which the filter's mass is u: numbers that are spread evenly become places that are
+spread evenly over the mass.
 
 BOX is one pixel wide, whatever its width, as in Cycles. BLACKMAN_HARRIS of width f reaches f pixels to either side of the
 centre: 0.35875 − 0.48829 cos θ + 0.14128 cos 2θ − 0.01168 cos 3θ, θ = π (x/f + 1) (Harris, Proceedings of the IEEE 66, 1978).

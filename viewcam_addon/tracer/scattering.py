@@ -1,12 +1,17 @@
 """Which way light goes on from a surface: Lambert's reflection, the mirror, refraction, and Fresnel's share of both.
 
-Pure functions of arrays (3, n) float64, in any space. A direction is the way that a ray travels, a unit vector; a normal is unit
-length and stands on the side that the ray comes from.
+Pure functions of arrays (3, n) float64, in any space. A direction is the way that a ray travels, a unit vector; a normal is
+of unit length and stands on the side that the ray comes from. What Cycles makes of smooth, perfectly specular surfaces
+(measured with 4.2, 5.0 and 5.2) is this: Fresnel's equations as they are, no factor for the narrower cone in which light travels
+inside glass, and normals bent as in `specular_normal`.
 """
 
 import numpy as np
 
 from .arrays import Floats, dot
+
+# Cycles': how far a mirror's ray rises above the surface at least, or this part of how far the ray rises that comes.
+_LEAST_RISE, _RISE_SHARE = 0.01, 0.9
 
 
 def axes_about(normal: Floats) -> tuple[Floats, Floats]:
@@ -26,19 +31,19 @@ def cosine_direction(normal: Floats, u: Floats) -> tuple[Floats, Floats]:
 
     normal : (3, n). u : (2, n), in [0, 1).
 
-    Returns directions (3, n), unit, and their density per solid angle (n,), the cosine over π. Squares of equal size are mapped
-    to pieces of a disc of equal size, concentric (Shirley and Chiu 1997), and the disc lifted to the hemisphere (Malley).
+    Returns directions (3, n), unit, and their density per solid angle (n,), the cosine over π. The square is mapped to a disc,
+    its squares to pieces of equal area that are about as wide as long (Shirley and Chiu, 1997), and the disc lifted to the
+    hemisphere (Malley).
     """
     right, up = axes_about(normal)
     a, b = 2.0 * u - 1.0
     wide = np.abs(a) > np.abs(b)
     radius = np.where(wide, a, b)
-    with np.errstate(invalid="ignore"):
-        turn = np.pi / 4 * (np.where(wide, b, a) / radius)
-    turn = np.where(radius == 0.0, 0.0, turn)
+    turn = np.where(wide, b, a)
+    turn *= np.pi / 4 / np.where(radius == 0.0, 1.0, radius)
     far, aside = radius * np.cos(turn), radius * np.sin(turn)
     x, y = np.where(wide, far, aside), np.where(wide, aside, far)
-    cosine = np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))
+    cosine = np.sqrt(np.maximum(1.0 - radius * radius, 0.0))
     return x * right + y * up + cosine * normal, cosine / np.pi
 
 
@@ -54,8 +59,7 @@ def refracted(direction: Floats, normal: Floats, ratio: Floats) -> tuple[Floats,
 
     Returns directions (3, n), unit, and (n,) bool, True where no light goes through; there the direction is along the surface.
     """
-    cosine = -dot(direction, normal)
-    across = (direction + cosine * normal) / ratio
+    across = (direction - dot(direction, normal) * normal) / ratio
     squared = dot(across, across)
     total = squared >= 1.0
     length = np.where(total, np.sqrt(squared), 1.0)
@@ -67,9 +71,39 @@ def fresnel(cosine: Floats, ratio: Floats) -> Floats:
 
     cosine : (n,), of the angle between the ray and the normal, 0 to 1. ratio : as in `refracted`.
     """
-    inside = ratio * ratio - 1.0 + cosine * cosine
-    g = np.sqrt(np.maximum(inside, 0.0))  # the ratio times the cosine on the far side
-    # g − cosine and g − ratio² cosine, without cancellation where the ratio is near 1
-    perpendicular = (ratio * ratio - 1.0) / np.square(g + cosine)
-    parallel = (g - ratio * ratio * cosine) / (g + ratio * ratio * cosine)
-    return np.where(inside > 0.0, 0.5 * (perpendicular * perpendicular + parallel * parallel), 1.0)
+    excess = ratio * ratio - 1.0
+    squared = excess + cosine * cosine
+    far = np.sqrt(np.maximum(squared, 0.0))  # the cosine on the far side, times the ratio
+    slowed = ratio * ratio * cosine
+    with np.errstate(invalid="ignore"):  # a ray along a surface between two sides that are alike
+        perpendicular = excess / np.square(far + cosine)  # (far − cosine) / (far + cosine) without cancellation
+        parallel = (far - slowed) / (far + slowed)
+    return np.where(squared > 0.0, 0.5 * (perpendicular * perpendicular + parallel * parallel), 1.0)
+
+
+def specular_normal(direction: Floats, normal: Floats, shading: Floats) -> Floats:
+    """(3, n): the smooth normals of a mirror or of glass, bent towards the true ones where their mirror's ray would go below.
+
+    normal : of the true geometry. shading : smooth. `shading` itself is returned where none is bent.
+
+    As in Cycles, a mirror's ray rises by a hundredth above the surface or, where the ray that comes is flatter still, by nine
+    tenths of that one's rise, and the normal stays in the plane of the two. There the way back to the eye has the length r and
+    the angle φ from the true normal, counted towards the smooth one, and a mirror whose normal is turned by α sends the ray off
+    at 2α − φ. Its rise, r cos(2α − φ), is the least where α = (φ + arccos(rise / r)) / 2.
+    """
+    if shading is normal:
+        return shading
+    rise = np.minimum(_RISE_SHARE * np.maximum(-dot(direction, normal), 0.0), _LEAST_RISE)
+    below = np.flatnonzero(dot(reflected(direction, shading), normal) < rise)
+    if not len(below):
+        return shading
+    back, true, smooth, rise = -direction[:, below], normal[:, below], shading[:, below], rise[below]
+    aside = smooth - dot(smooth, true) * true
+    length = np.sqrt(dot(aside, aside))
+    aside /= np.where(length > 0, length, 1.0)
+    up, along = dot(back, true), dot(back, aside)
+    reach = np.hypot(up, along)
+    turn = (np.arctan2(along, up) + np.arccos(np.minimum(rise / np.where(reach > 0, reach, 1.0), 1.0))) / 2
+    bent = shading.copy()
+    bent[:, below] = np.sin(turn) * aside + np.cos(turn) * true
+    return bent

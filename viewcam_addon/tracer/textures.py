@@ -1,9 +1,8 @@
 """What colours materials have at points of surfaces: constants, images and the mesh's own colours.
 
-As in Cycles, of all versions from 4.2 on: pixel i of n covers i/n to (i + 1)/n of UV, so that its centre is at (i + ½)/n; images
-repeat, and are interpolated across their borders with what repeats there; sRGB is decoded after the interpolation, which makes
-blends of light and dark darker than half-way. Cycles interpolates in float32: 1e-5 of the contrast where a picture has
-64 pixels.
+As in Cycles (measured with 4.2, 5.0 and 5.2): of n pixels, that of number i has its centre at (i + ½)/n of UV; images repeat,
+and at their border pixels are blended with those on the other side; sRGB is decoded after blending, which makes blends of
+light and dark darker than half-way. Cycles has UV in float32: at 64 pixels, its colours are off by up to 2e-5 of the contrast.
 
 Rejected: decoding images when they are loaded (not what Cycles does), and mip maps, which it has not.
 """
