@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from viewcam_addon import cli, image
-from viewcam_addon.cli import DEMO_SCENE, main
+from viewcam_addon import commands, image
+from viewcam_addon.cli import main
+from viewcam_addon.commands import DEMO_SCENE
 
 CAMERA = {"eye": [0, -5, 0], "look_at": [0, 0, 0], "up": [0, 0, 1], "distance": 100, "width": 64, "height": 48}
 SCENE = {
@@ -212,7 +213,7 @@ def test_a_chart_that_there_is_not_is_refused_with_those_that_there_are(tmp_path
 
 
 def test_charts_need_a_clone_of_the_project(tmp_path, capfd, monkeypatch):
-    monkeypatch.setattr(cli, "PACKAGE", tmp_path / "viewcam_addon")
+    monkeypatch.setattr(commands, "PACKAGE", tmp_path / "viewcam_addon")
     assert "in a clone of the project" in fails(capfd, "chart", "stability")
 
 

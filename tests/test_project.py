@@ -26,6 +26,7 @@ FLOORS = [
     "compare",
     "tracer",
     "blender",
+    "commands",
     "cli",
 ]
 ROOF = {"__init__", "__main__"}

@@ -3,36 +3,22 @@
 Exit status: 0 all well; 1 the comparison failed; 2 bad input or usage, with one line on stderr; 3 something could not be
 modelled under --strict. No traceback reaches a user.
 
-What Blender does (export, Cycles) and what OpenEXR does (the tracer's pictures, the comparison) never share a process, because
-Blender brings a copy of OpenEXR of its own: `check` does the first in its own process and the second in child processes, in the
-shell and inside Blender alike. Rejected: one process in the shell and several inside Blender, since that would be two programs
-to test.
+Here are the words; what they do is in commands.py.
 """
 
 import argparse
-import dataclasses
-import importlib
-import importlib.util
 import json
 import os
 import shlex
-import subprocess
 import sys
-import tempfile
-import time
 import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
+from . import commands
 from .errors import InputError
 from .files import written_whole
-from .terminal import silent_libraries
-
-PACKAGE = Path(__file__).parent
-DEMO_SCENE = PACKAGE.parent / "sample_scenes" / "studio.blend"
-
-Result = tuple[int, dict[str, Any]]
 
 
 def main(arguments: Sequence[str] | None = None, blend_is_open: bool = False) -> int:
@@ -85,10 +71,10 @@ class _OneLineParser(argparse.ArgumentParser):
 
 def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     parser = _OneLineParser(prog="viewcam", description="A camera from eye, look-at, up and distance, proven against Cycles.")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
-    def command(run: Callable[[argparse.Namespace], Result], name: str, text: str) -> argparse.ArgumentParser:
-        added = commands.add_parser(name, help=text, description=text)
+    def command(run: Callable[[argparse.Namespace], commands.Result], name: str, text: str) -> argparse.ArgumentParser:
+        added = subparsers.add_parser(name, help=text, description=text)
         added.set_defaults(run=run)
         added.add_argument("--threads", type=_positive, metavar="N", help="threads to use (default: all)")
         added.add_argument("--json", metavar="FILE", type=Path, help="write the result as JSON")
@@ -106,57 +92,72 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         added.add_argument("--size", type=_size, metavar="WxH", help="pixels of the picture (default: the scene's)")
         added.add_argument("--strict", action="store_true", help="exit with 3 if anything can not be modelled")
         added.add_argument("--recenter", action="store_true", help="put the origin at the eye: for scenes far from it")
-        level(added)
+        added.add_argument("--clay", action="store_true", help="the same matte material on everything, on both sides")
+        light(added)
 
-    def level(added: argparse.ArgumentParser) -> None:
+    def light(added: argparse.ArgumentParser) -> None:
         added.add_argument(
-            "--level", choices=["geometry"], default="geometry", help="how much is modelled (default: %(default)s)"
+            "--level",
+            choices=["geometry", "direct", "path", "auto"],
+            default="geometry",
+            help="how much is modelled; auto is the least that shows the scene's light (default: %(default)s)",
         )
+        added.add_argument(
+            "--samples", type=_positive, metavar="N", default=256, help="samples a pixel, for light (default: %(default)s)"
+        )
+        added.add_argument("--seed", type=_seed, metavar="N", default=0, help="another noise for another number (default: 0)")
 
     def report(added: argparse.ArgumentParser) -> None:
         added.add_argument("--report", metavar="DIR", type=Path, help="write an HTML report there")
 
-    added = command(_export, "export", "Write the scene of a .blend as the tracer reads it.")
+    added = command(commands.export, "export", "Write the scene of a .blend as the tracer reads it.")
     blend(added)
     added.add_argument("scene", metavar="SCENE.json", type=Path)
     scene_choices(added)
 
-    added = command(_render, "render", "Trace a scene file into an EXR.")
+    added = command(commands.render, "render", "Trace a scene file into an EXR.")
     added.add_argument("scene", metavar="SCENE.json", type=Path)
     added.add_argument("image", metavar="OUT.exr", type=Path)
     added.add_argument("--size", type=_size, metavar="WxH", help="pixels of the picture (default: the scene's)")
     added.add_argument("--stated", action="store_true", help="trace the four values as stated, not as Blender stored them")
-    level(added)
+    light(added)
 
     added = command(
-        _cycles, "cycles", "Render a .blend with Cycles so that it can be compared: one sample at each pixel's centre."
+        commands.cycles, "cycles", "Render a .blend with Cycles so that it can be compared, and give every setting back."
     )
     blend(added)
     added.add_argument("image", metavar="OUT.exr", type=Path)
     scene_choices(added)
 
-    added = command(_compare, "compare", "Compare two EXRs of one camera, pass by pass, against the derived tolerances.")
+    added = command(commands.compare, "compare", "Compare EXRs of one camera against derived tolerances and noise.")
     added.add_argument("reference", metavar="REFERENCE.exr", type=Path)
-    added.add_argument("test", metavar="TEST.exr", type=Path)
+    added.add_argument(
+        "tests", metavar="TEST.exr", type=Path, nargs="+", help="several are one picture, rendered with several seeds"
+    )
     added.add_argument(
         "--scene", metavar="SCENE.json", type=Path, help="the reference's scene: explains silhouettes, brings the ledger"
     )
     added.add_argument("--repeat", help=argparse.SUPPRESS)  # what the report shall name as its command
     report(added)
 
-    added = command(_check, "check", "Export, trace, render with Cycles and compare, all in one go.")
+    added = command(commands.check, "check", "Export, trace, render with Cycles and compare, all in one go.")
     blend(added)
     scene_choices(added)
     report(added)
 
-    added = command(_demo, "demo", "Check the studio still that comes with the project, and write the report.")
-    added.set_defaults(blend=DEMO_SCENE, camera=None, frame=None, size=None, strict=False, recenter=False, level="geometry")
+    added = command(commands.demo, "demo", "Check the studio still that comes with the project, and write the report.")
+    added.set_defaults(blend=commands.DEMO_SCENE, camera=None, frame=None, size=None, strict=False, recenter=False, clay=False)
+    light(added)
     added.add_argument(
         "--report", metavar="DIR", type=Path, default=Path("demo"), help="where the report goes (default: %(default)s)"
     )
 
-    added = command(_chart, "chart", "Measure the methods and draw how they compare, in a clone of the project.")
-    added.add_argument("subject", choices=["stability"], help="stability: every method up to where it fails")
+    added = command(commands.chart, "chart", "Measure the methods and draw how they compare, in a clone of the project.")
+    added.add_argument(
+        "subject",
+        choices=["stability", "light"],
+        help="stability: every method up to where it fails; light: error against samples",
+    )
     added.add_argument(
         "--output", metavar="DIR", type=Path, default=Path("docs", "charts"), help="where the SVGs go (default: %(default)s)"
     )
@@ -171,163 +172,17 @@ def _positive(text: str) -> int:
     return int(text)
 
 
+def _seed(text: str) -> int:
+    if not text.isdecimal() or int(text) >= 2**31:
+        raise argparse.ArgumentTypeError(f"{text!r} is no whole number from 0 to {2**31 - 1}")
+    return int(text)
+
+
 def _size(text: str) -> tuple[int, int]:
     width, x, height = text.partition("x")
     if not x:
         raise argparse.ArgumentTypeError(f"{text!r} is no size: write 1920x1080")
     return _positive(width), _positive(height)
-
-
-def _export(options: argparse.Namespace) -> Result:
-    from .tracer import scene_file
-
-    with silent_libraries():
-        scene = _job().export(_request(options))
-    scene_file.write(scene, options.scene)
-    lines = _ledger_lines(scene.ledger)
-    print(*lines, sep="\n")
-    return 0, {"scene": str(options.scene), "ledger": _ledger_json(scene.ledger)}
-
-
-def _render(options: argparse.Namespace) -> Result:
-    from . import image
-    from .tracer import scene_file
-    from .tracer.render import render
-
-    scene = scene_file.read(options.scene)
-    if options.stated:
-        if scene.stated_camera is None:
-            raise InputError(
-                f"{options.scene} has no stated_camera: leave --stated out, or enable the Virtual Pinhole in Blender"
-            )
-        scene = dataclasses.replace(scene, camera=scene.stated_camera)
-    if options.size:
-        scene = dataclasses.replace(scene, camera=scene.camera.resized(*options.size))
-    started = time.perf_counter()
-    passes = render(scene, options.threads)
-    seconds = time.perf_counter() - started
-    image.write(options.image, image.Image(passes, scene.camera, {"software": "Virtual Pinhole"}))
-    print(f"traced {scene.camera.width} × {scene.camera.height} pixels in {seconds:.2f} s")
-    return 0, {"image": str(options.image), "seconds": seconds}
-
-
-def _cycles(options: argparse.Namespace) -> Result:
-    with silent_libraries():
-        ledger = _job().render(_request(options), options.image)
-    print(*_ledger_lines(ledger), sep="\n")
-    return 0, {"image": str(options.image), "ledger": _ledger_json(ledger)}
-
-
-def _compare(options: argparse.Namespace) -> Result:
-    from . import image
-    from .compare.geometry import compare
-    from .compare.report import write_report
-    from .tracer import scene_file
-    from .tracer.render import Tracer
-
-    reference, test = image.read(options.reference), image.read(options.test)
-    scene = scene_file.read(options.scene) if options.scene else None
-    camera = reference.camera or (scene and scene.camera)
-    if camera is None:
-        raise InputError(
-            f"{options.reference} does not tell its camera: give its scene with --scene, or trace it with viewcam render"
-        )
-    surface_at = stated = None
-    if scene:
-        # The picture may be of another size than the scene says, or of the stated camera.
-        surface_at = Tracer(dataclasses.replace(scene, camera=camera), options.threads).surface_at
-        stated = scene.stated_camera if camera == scene.camera else None
-    comparison = compare(reference, test, camera, surface_at, stated, scene.origin if scene else (0.0, 0.0, 0.0))
-    ledger = scene.ledger if scene else ()
-    print(*_ledger_lines(ledger), *comparison.lines(), sep="\n")
-    if options.report:
-        words = f"viewcam {options.repeat or options.words}"
-        written = write_report(comparison, reference, test, options.report, ledger, words)
-        print(f"report: {written}")
-    return 0 if comparison.passed else 1, {**comparison.to_json(), "ledger": _ledger_json(ledger)}
-
-
-def _check(options: argparse.Namespace) -> Result:
-    with tempfile.TemporaryDirectory(prefix="viewcam-") as temporary:
-        folder = options.report or Path(temporary)
-        scene, reference, test = folder / "scene.json", folder / "reference.exr", folder / "cycles.exr"
-        _export_and_render(options, scene, test)
-        threads = ["--threads", str(options.threads)] if options.threads else []
-        status = _child("render", scene, reference, *threads)
-        if status:
-            return status, {"error": "the reference could not be traced"}
-        outputs = [word for flag in ("json", "report") if (to := getattr(options, flag)) for word in (f"--{flag}", str(to))]
-        # The child has written the JSON: there is nothing to add.
-        return _child("compare", reference, test, "--scene", scene, "--repeat", options.words, *threads, *outputs), {}
-
-
-def _demo(options: argparse.Namespace) -> Result:
-    if not options.blend.is_file():
-        raise InputError(f"{options.blend} is not here: run the demo in a clone of the project, where its sample scenes are")
-    print(f"{options.blend.name}: a camera given by four values, rendered by Cycles and by the reference tracer")
-    return _check(options)
-
-
-def _chart(options: argparse.Namespace) -> Result:
-    if not (PACKAGE.parent / "benchmarks").is_dir():
-        raise InputError("the charts are measured by benchmarks/, which is not here: run this in a clone of the project")
-    for package in ("bpy", "matplotlib", "mpmath"):
-        if importlib.util.find_spec(package) is None:
-            raise InputError(f"this needs {package}: pip install {package}")
-    sys.path.append(str(PACKAGE.parent))
-    return importlib.import_module(f"benchmarks.{options.subject}").run(options.output, options.only, options.quick)
-
-
-def _export_and_render(options: argparse.Namespace, scene_path: Path, image_path: Path) -> None:
-    """What of a check needs Blender: both sides from one evaluated state, under one numbering of the indices."""
-    from .tracer import scene_file
-
-    started = time.perf_counter()
-    with silent_libraries():
-        scene = _job().export_and_render(_request(options), image_path)
-    scene_file.write(scene, scene_path)
-    print(f"exported and rendered with Cycles in {time.perf_counter() - started:.1f} s", flush=True)
-
-
-def _request(options: argparse.Namespace) -> Any:
-    return _job().Request(
-        blend=options.blend,
-        camera=options.camera,
-        frame=options.frame,
-        size=options.size,
-        strict=options.strict,
-        recenter=options.recenter,
-        threads=options.threads,
-    )
-
-
-def _job() -> Any:
-    """blender/job.py, where there is Blender."""
-    if importlib.util.find_spec("bpy") is None:
-        raise InputError(
-            "this needs Blender: install it as a module (pip install bpy), or run blender -b FILE.blend --command viewcam"
-        )
-    from .blender import job
-
-    return job
-
-
-def _child(*arguments: str | Path) -> int:
-    """Run a sub-command in a Python process of its own, with the same modules in reach as here."""
-    search_path = os.pathsep.join([str(PACKAGE.parent), *filter(None, sys.path)])
-    command = [sys.executable, "-m", f"{PACKAGE.name}.cli", *map(str, arguments)]
-    sys.stdout.flush()
-    return subprocess.run(command, env=os.environ | {"PYTHONPATH": search_path}, check=False).returncode
-
-
-def _ledger_lines(ledger: Sequence[Any]) -> list[str]:
-    exported = sum(entry.status == "exported" for entry in ledger)
-    rest = [f"  {entry.status}: {entry.object}: {entry.reason}" for entry in ledger if entry.status != "exported"]
-    return [f"{exported} of {len(ledger)} objects exported whole", *rest] if ledger else []
-
-
-def _ledger_json(ledger: Sequence[Any]) -> list[dict[str, str]]:
-    return [{"object": entry.object, "status": entry.status, "reason": entry.reason} for entry in ledger]
 
 
 def _write_json(path: Path, result: dict[str, Any]) -> int:

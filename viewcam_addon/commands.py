@@ -1,0 +1,224 @@
+"""What each sub-command of `viewcam` does; cli.py knows its words. Each returns the exit status and what --json writes.
+
+What Blender does (export, Cycles) and what OpenEXR does (the tracer's pictures, the comparison) never share a process, because
+Blender brings a copy of OpenEXR of its own: `check` does the first in its own process and the second in child processes, in the
+shell and inside Blender alike. Rejected: one process in the shell and several inside Blender, since that would be two programs
+to test.
+"""
+
+import argparse
+import dataclasses
+import importlib
+import importlib.util
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from .errors import InputError
+from .terminal import silent_libraries
+
+PACKAGE = Path(__file__).parent
+DEMO_SCENE = PACKAGE.parent / "sample_scenes" / "studio.blend"
+
+# Cycles' noise is measured by rendering with several seeds: eight have a spread that tells it within a third or so, and cost
+# little beside their samples.
+SEEDS = 8
+
+Result = tuple[int, dict[str, Any]]
+
+
+def export(options: argparse.Namespace) -> Result:
+    from .tracer import scene_file
+
+    with silent_libraries():
+        scene = _job().export(_request(options))
+    scene_file.write(scene, options.scene)
+    print(*_ledger_lines(scene.ledger), sep="\n")
+    result = {"scene": str(options.scene), "ledger": _ledger_json(scene.ledger)}
+    return 0, result | (_told_level(scene) if options.level != "geometry" else {})
+
+
+def render(options: argparse.Namespace) -> Result:
+    from . import image
+    from .tracer import scene_file
+    from .tracer.render import render as trace
+
+    scene = scene_file.read(options.scene)
+    if options.stated:
+        if scene.stated_camera is None:
+            raise InputError(
+                f"{options.scene} has no stated_camera: leave --stated out, or enable the Virtual Pinhole in Blender"
+            )
+        scene = dataclasses.replace(scene, camera=scene.stated_camera)
+    if options.size:
+        scene = dataclasses.replace(scene, camera=scene.camera.resized(*options.size))
+    told = _told_level(scene) if options.level == "auto" else {}
+    level = told.get("level", options.level)
+    started = time.perf_counter()
+    passes = trace(scene, level, options.samples, options.seed, options.threads)
+    seconds = time.perf_counter() - started
+    attributes = {"software": "Virtual Pinhole", "level": level}
+    if level != "geometry":
+        attributes |= {"samples": str(options.samples), "seed": str(options.seed)}
+    image.write(options.image, image.Image(passes, scene.camera, attributes))
+    print(f"traced {scene.camera.width} × {scene.camera.height} pixels in {seconds:.2f} s")
+    return 0, {"image": str(options.image), "seconds": seconds} | told
+
+
+def cycles(options: argparse.Namespace) -> Result:
+    with silent_libraries():
+        ledger = _job().render(_request(options), options.image)
+    print(*_ledger_lines(ledger), sep="\n")
+    return 0, {"image": str(options.image), "ledger": _ledger_json(ledger)}
+
+
+def compare(options: argparse.Namespace) -> Result:
+    from . import image
+    from .compare import light_report, radiance, report
+    from .tracer import scene_file
+
+    reference, tests = image.read(options.reference), [image.read(path) for path in options.tests]
+    scene = scene_file.read(options.scene) if options.scene else None
+    camera = reference.camera or (scene and scene.camera)
+    if camera is None:
+        raise InputError(
+            f"{options.reference} does not tell its camera: give its scene with --scene, or trace it with viewcam render"
+        )
+    ledger = scene.ledger if scene else ()
+    words = f"viewcam {options.repeat or options.words}"
+    if radiance.carries_light(reference):
+        comparison = radiance.compare(reference, tests, camera)
+        write_report = light_report.write_report
+    elif len(tests) == 1:
+        (tests,) = tests
+        comparison = _compare_geometry(reference, tests, camera, scene, options.threads)
+        write_report = report.write_report
+    else:
+        raise InputError(f"{options.reference} has no noise that several pictures could tell: compare it with one")
+    print(*_ledger_lines(ledger), *comparison.lines(), sep="\n")
+    if options.report:
+        print(f"report: {write_report(comparison, reference, tests, options.report, ledger, words)}")
+    return 0 if comparison.passed else 1, {**comparison.to_json(), "ledger": _ledger_json(ledger)}
+
+
+def _compare_geometry(reference: Any, test: Any, camera: Any, scene: Any, threads: int | None) -> Any:
+    from .compare import geometry
+    from .tracer.render import Tracer
+
+    if scene is None:
+        return geometry.compare(reference, test, camera)
+    # The picture may be of another size than the scene says, or of the stated camera.
+    surface_at = Tracer(dataclasses.replace(scene, camera=camera), threads).surface_at
+    stated = scene.stated_camera if camera == scene.camera else None
+    return geometry.compare(reference, test, camera, surface_at, stated, scene.origin)
+
+
+def check(options: argparse.Namespace) -> Result:
+    with tempfile.TemporaryDirectory(prefix="viewcam-") as temporary:
+        folder = options.report or Path(temporary)
+        scene, reference = folder / "scene.json", folder / "reference.exr"
+        # A picture of a single sample would be that of the pixels' centres.
+        count = 1 if options.level == "geometry" else max(min(SEEDS, options.samples // 2), 1)
+        tests = [folder / f"cycles-{i + 1}.exr" for i in range(count)] if count > 1 else [folder / "cycles.exr"]
+        level = _export_and_render(options, scene, tests)
+        threads = ["--threads", str(options.threads)] if options.threads else []
+        light = ["--level", level, "--samples", str(options.samples), "--seed", str(options.seed)]
+        status = _child("render", scene, reference, *light, *threads)
+        if status:
+            return status, {"error": "the reference could not be traced"}
+        outputs = [word for flag in ("json", "report") if (to := getattr(options, flag)) for word in (f"--{flag}", str(to))]
+        if level == "geometry":
+            tests = tests[:1]
+        # The child has written the JSON: there is nothing to add.
+        return _child("compare", reference, *tests, "--scene", scene, "--repeat", options.words, *threads, *outputs), {}
+
+
+def demo(options: argparse.Namespace) -> Result:
+    if not options.blend.is_file():
+        raise InputError(f"{options.blend} is not here: run the demo in a clone of the project, where its sample scenes are")
+    print(f"{options.blend.name}: a camera given by four values, rendered by Cycles and by the reference tracer")
+    return check(options)
+
+
+def chart(options: argparse.Namespace) -> Result:
+    if not (PACKAGE.parent / "benchmarks").is_dir():
+        raise InputError("the charts are measured by benchmarks/, which is not here: run this in a clone of the project")
+    for package in ("bpy", "matplotlib", "mpmath"):
+        if importlib.util.find_spec(package) is None:
+            raise InputError(f"this needs {package}: pip install {package}")
+    sys.path.append(str(PACKAGE.parent))
+    return importlib.import_module(f"benchmarks.{options.subject}").run(options.output, options.only, options.quick)
+
+
+def _export_and_render(options: argparse.Namespace, scene_path: Path, image_paths: Sequence[Path]) -> str:
+    """What of a check needs Blender: both sides from one evaluated state, under one numbering of the indices.
+
+    Returns the level, the least one where that is asked for.
+    """
+    from .tracer import scene_file
+
+    started = time.perf_counter()
+    with silent_libraries():
+        scene = _job().export_and_render(_request(options), image_paths)
+    scene_file.write(scene, scene_path)
+    print(f"exported and rendered with Cycles in {time.perf_counter() - started:.1f} s", flush=True)
+    return _told_level(scene)["level"] if options.level == "auto" else options.level
+
+
+def _told_level(scene: Any) -> dict[str, str]:
+    """The least level that models all of a scene's light, and why; said on the way."""
+    from .tracer.levels import least_level
+
+    level, reason = least_level(scene)
+    print(f"level {level} is enough. {reason}", flush=True)
+    return {"level": level, "reason": reason}
+
+
+def _request(options: argparse.Namespace) -> Any:
+    return _job().Request(
+        blend=options.blend,
+        camera=options.camera,
+        frame=options.frame,
+        size=options.size,
+        strict=options.strict,
+        recenter=options.recenter,
+        threads=options.threads,
+        level=options.level,
+        samples=options.samples,
+        seed=options.seed,
+        clay=options.clay,
+    )
+
+
+def _job() -> Any:
+    """blender/job.py, where there is Blender."""
+    if importlib.util.find_spec("bpy") is None:
+        raise InputError(
+            "this needs Blender: install it as a module (pip install bpy), or run blender -b FILE.blend --command viewcam"
+        )
+    from .blender import job
+
+    return job
+
+
+def _child(*arguments: str | Path) -> int:
+    """Run a sub-command in a Python process of its own, with the same modules in reach as here."""
+    search_path = os.pathsep.join([str(PACKAGE.parent), *filter(None, sys.path)])
+    command = [sys.executable, "-m", f"{PACKAGE.name}.cli", *map(str, arguments)]
+    sys.stdout.flush()
+    return subprocess.run(command, env=os.environ | {"PYTHONPATH": search_path}, check=False).returncode
+
+
+def _ledger_lines(ledger: Sequence[Any]) -> list[str]:
+    exported = sum(entry.status == "exported" for entry in ledger)
+    rest = [f"  {entry.status}: {entry.object}: {entry.reason}" for entry in ledger if entry.status != "exported"]
+    return [f"{exported} of {len(ledger)} objects exported whole", *rest] if ledger else []
+
+
+def _ledger_json(ledger: Sequence[Any]) -> list[dict[str, str]]:
+    return [{"object": entry.object, "status": entry.status, "reason": entry.reason} for entry in ledger]
