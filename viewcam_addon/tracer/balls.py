@@ -28,6 +28,7 @@ class Balls:
     inverse : (9, k) float64, from camera space to the objects' spaces: [3 · column + row, object].
     owner : (n,) int32, which of the k objects.
     axes : (3, 3, n) float64: [axis, component, sphere], the principal half axes, camera space.
+    reach : (n,) float64, the longest of them.
     number : (n,) int32, which of the scene's spheres they are, counted from object to object.
     placed : all objects with their spheres.
     """
@@ -37,6 +38,7 @@ class Balls:
     inverse: Floats
     owner: NDArray[np.int32]
     axes: Floats
+    reach: Floats
     number: NDArray[np.int32]
     placed: tuple[tuple[Object, Spheres], ...]
 
@@ -49,11 +51,23 @@ class Balls:
         hidden = np.array([ray in placed.hidden_from for placed, _ in self.placed], bool)
         return gather(hidden, self.owner)
 
+    def near(self, ball: int, origins: Floats, directions: Floats, limits: Floats) -> Indices:
+        """Which of n rays may meet one sphere nearer than their limits. As in `distance`, with directions of unit length."""
+        relative = self.centres[:, ball, None] - origins
+        along = dot(relative, directions)
+        reach = self.reach[ball] * (1 + 1e-9)
+        apart = dot(relative, relative)
+        apart *= 1 - 2.0**-48  # less its rounding
+        apart -= along * along
+        return np.flatnonzero((apart <= reach * reach) & (along > -reach) & (along < limits + reach))
+
     def distance(self, ball: Indices, origins: Floats, directions: Floats) -> Floats:
         """Where rays from outside first meet spheres, in lengths of their directions; inf where they don't. All broadcast.
 
-        ball : (n,). origins, directions : (3, n), camera space.
+        ball : (n,), or one for all. origins, directions : (3, n), camera space.
         """
+        if np.ndim(ball) == 0:
+            ball = np.array([ball])
         inverse = gather(self.inverse, gather(self.owner, ball))
         scale = 1.0 / gather(self.radii, ball)
         relative = (gather(self.centres, ball) - origins) * scale
@@ -95,6 +109,7 @@ def balls_of(pairs: list[tuple[Object, Spheres]], view: View) -> Balls:
         inverse=np.array(inverses).reshape(-1, 9).T.copy(),
         owner=gather(owner, chosen).astype(np.int32),
         axes=gather(half_axes, chosen),
+        reach=gather(extent.max(axis=0, initial=0.0), chosen),
         number=chosen.astype(np.int32),
         placed=tuple(pairs),
     )

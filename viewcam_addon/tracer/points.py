@@ -96,7 +96,11 @@ class Surfaces:
         def triangle_points(triangle: Indices, which: Indices | slice) -> Points:
             depth, first, second = self.planes.hit(triangle, x[which], y[which])
             ways = directions[:, which]
-            return self._on_triangles(triangle, self._sides(triangle)[1:], first, second, ways * depth, ways)
+            normal = gather(self.planes.forms[:3], triangle)
+            side = gather(self.planes.side, triangle) * self._view.handedness
+            with np.errstate(all="ignore"):
+                normal /= -np.sqrt(dot(normal, normal))
+            return self._on_triangles(triangle, normal, side, first, second, ways * depth, ways)
 
         def sphere_points(sphere: Indices, which: Indices | slice) -> Points:
             depth = self._ellipsoids.depth(sphere, x[which], y[which])
@@ -116,10 +120,14 @@ class Surfaces:
         def triangle_points(triangle: Indices, which: Indices | slice) -> Points:
             corner, *sides = self._sides(triangle)
             ways = directions[:, which]
-            distances[which], first, second = _crossing(corner, sides, origins[:, which], ways)
+            normal = cross(*sides)
+            first, second = _barycentric(corner, sides, normal, origins[:, which], ways)
             position = corner + first * sides[0] + second * sides[1]
             distances[which] = dot(position - origins[:, which], ways)
-            return self._on_triangles(triangle, sides, first, second, position, ways)
+            side = np.where(dot(normal, ways) > 0, -1.0, 1.0)
+            with np.errstate(all="ignore"):
+                normal *= side / np.sqrt(dot(normal, normal))
+            return self._on_triangles(triangle, normal, side, first, second, position, ways)
 
         def sphere_points(ball: Indices, which: Indices | slice) -> Points:
             ways = directions[:, which]
@@ -153,16 +161,16 @@ class Surfaces:
         return _merged(len(primitives), parts)
 
     def _on_triangles(
-        self, triangle: Indices, sides: tuple[Floats, Floats], first: Floats, second: Floats, position: Floats, ways: Floats
+        self, triangle: Indices, normal: Floats, side: Floats, first: Floats, second: Floats, position: Floats, ways: Floats
     ) -> Points:
-        normal = cross(*sides)
-        length = np.sqrt(dot(normal, normal))
-        side = np.where(dot(normal, ways) > 0, -1.0, 1.0)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            normal *= side / length
-        if not length.all():  # no surface, but what was found there looks at the ray
-            away = -ways / np.sqrt(dot(ways, ways))
-            normal = np.where(length > 0, normal, away)
+        """Points at barycentric coordinates of triangles.
+
+        normal : (3, n), towards where rays come from along `ways`. side : (n,), 1 where it is that of the cross product of the
+        triangle's sides, −1 where it is the other's.
+        """
+        lost = ~np.isfinite(normal[0] + normal[1] + normal[2])
+        if lost.any():  # no surface, but what was found there looks at the ray
+            normal = np.where(lost, -ways / np.sqrt(dot(ways, ways)), normal)
         return Points(
             position=position,
             normal=normal,
@@ -242,9 +250,10 @@ def _plane_distance(corner: Floats, normal: Floats, origins: Floats, directions:
         return dot(normal, corner - origins) / dot(normal, directions)
 
 
-def _crossing(corner: Floats, sides: list[Floats], origins: Floats, directions: Floats) -> tuple[Floats, Floats, Floats]:
-    """How far along rays triangles are, and the barycentric coordinates b₁, b₂ there, within the triangle."""
-    normal = cross(*sides)
+def _barycentric(
+    corner: Floats, sides: list[Floats], normal: Floats, origins: Floats, directions: Floats
+) -> tuple[Floats, Floats]:
+    """The barycentric coordinates b₁, b₂ where rays meet triangles that were found for them, within the triangles."""
     distance = _plane_distance(corner, normal, origins, directions)
     with np.errstate(all="ignore"):
         inside = origins + distance * directions - corner
@@ -252,7 +261,7 @@ def _crossing(corner: Floats, sides: list[Floats], origins: Floats, directions: 
         first = dot(cross(inside, sides[1]), scaled)
         second = dot(cross(sides[0], inside), scaled)
     first = np.fmax(np.fmin(first, 1.0), 0.0)
-    return distance, first, np.fmax(np.fmin(second, 1.0 - first), 0.0)
+    return first, np.fmax(np.fmin(second, 1.0 - first), 0.0)
 
 
 def _merged(count: int, parts: list[tuple[Indices, Points]]) -> Points:

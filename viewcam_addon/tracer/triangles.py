@@ -9,7 +9,7 @@ Embree's own t, u, v (float32).
 """
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,7 @@ class Triangles:
     object_index, material_index : (m,) float32, what the passes show.
     largest_coordinate : (m,) float32, of the three vertices in world space, without its sign.
     placed : the objects with their meshes, whose triangles follow one another.
+    embree_scenes : what embree.py made of them.
     """
 
     vertices: Floats
@@ -51,6 +52,7 @@ class Triangles:
     material_index: Float32s
     largest_coordinate: Float32s
     placed: tuple[tuple[Object, Mesh], ...]
+    embree_scenes: dict = field(default_factory=dict)
 
     @property
     def count(self) -> int:

@@ -20,7 +20,6 @@ embreex knows no nearest distance, so a ray starts where the clip range does, or
 too, and where three of them meet something before what the ray itself met, the nearest of that is what it meets.
 """
 
-import math
 from typing import Protocol
 
 import numpy as np
@@ -30,23 +29,14 @@ from .arrays import Floats, Indices, gather
 from .corners import REACH, Corners
 from .edges import Edges
 from .ellipsoids import Ellipsoids
+from .embree import EmbreeScene, embree_scene, scene_of, unit_of
 from .triangles import Planes, Triangles
-
-try:
-    from embreex.mesh_construction import TriangleMesh
-    from embreex.rtcore_scene import EmbreeScene
-except ImportError:  # no wheel for this machine: `Plain` gives the same answers, slowly
-    EmbreeScene = None
 
 # Cards overlap the outline by 16 units of float32's last place, more than card and ray are rounded by, and follow one another
 # as far apart in depth, so that a ray that starts half-way between two has one surely behind it and the other before it.
 _MARGIN = 2.0**-20
 _CARD_SPACING = 2.0**-20
 _FAR = 1e37
-
-# Embree multiplies three coordinates: with none larger than this, and those of what is seen not less than its 10⁻²⁰ part, no
-# product leaves float32's range.
-_LARGEST = 2.0**30
 
 # Where rays beside one that passes close by a corner go: eleven units of float32's last place away, twice as far as Embree was
 # ever seen to err, and no farther than must be, since the mesh may be fine.
@@ -79,9 +69,8 @@ class Embree:
         self._wide = planes.wide[~hidden[planes.wide]]
         self._wide_edges = Edges(triangles, self._wide)
         self._wide_edges.overlap(_OVERLAP)
-        corners = triangles.corners.T.copy()
-        corners[planes.wide] = corners[hidden] = 0  # for Embree they are points, which are never met
-        self._triangles = embree_scene(triangles.vertices.T * self._unit, corners) if triangles.count else None
+        hidden[planes.wide] = True  # from Embree
+        self._triangles = scene_of(triangles, hidden, self._unit)
         self._without_card = int(np.count_nonzero(np.isinf(ellipsoids.bounds[0])))
         if ellipsoids.count > self._without_card:
             self._cards, self._card_depth = _cards(ellipsoids, self._without_card, self._unit)
@@ -97,8 +86,8 @@ class Embree:
             close = self._corners.near(directions[:, 0], directions[:, 1])
             if len(close):
                 found[close] = self._without_slips(found[close], x[close], y[close])
-            if len(self._wide):
-                self._wide_before(found, x, y)
+        if len(self._wide):
+            self._wide_before(found, x, y)
         if self._ellipsoids.count:
             self._spheres_before(found, directions, x, y)
         return found
@@ -174,18 +163,6 @@ def _embree_unit(triangles: Triangles, ellipsoids: Ellipsoids) -> float:
     """Embree's units in one of the world."""
     extents = np.abs(ellipsoids.positions).max(axis=0, initial=0.0) + ellipsoids.reach
     return unit_of(max(np.abs(triangles.vertices).max(initial=0.0), extents.max(initial=0.0)))
-
-
-def unit_of(largest: float) -> float:
-    """The power of two that makes the largest |coordinate| about `_LARGEST`."""
-    return math.ldexp(_LARGEST, -math.frexp(largest or 1.0)[1])
-
-
-def embree_scene(vertices: Floats, triangles: NDArray[np.int32]) -> "EmbreeScene":
-    scene = EmbreeScene(robust=True)
-    TriangleMesh(scene, np.ascontiguousarray(vertices, dtype=np.float32), np.ascontiguousarray(triangles))
-    scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))  # builds the hierarchy, once, before threads come
-    return scene
 
 
 def _cards(ellipsoids: Ellipsoids, first: int, unit: float) -> tuple["EmbreeScene", NDArray[np.float32]]:
