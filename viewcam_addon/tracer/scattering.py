@@ -2,8 +2,8 @@
 
 Pure functions of arrays (3, n) float64, in any space. A direction is the way that a ray travels, a unit vector; a normal is
 of unit length and stands on the side that the ray comes from. What Cycles makes of smooth, perfectly specular surfaces
-(measured with 4.2, 5.0 and 5.2) is this: Fresnel's equations as they are, no factor for the narrower cone in which light travels
-inside glass, and normals bent as in `specular_normal`.
+(measured with 4.2, 5.0 and 5.2) is this: Fresnel's equations as they are, no factor for the narrower cone of light
+in glass, and normals bent as in `specular_normal`.
 """
 
 import numpy as np
@@ -75,10 +75,11 @@ def fresnel(cosine: Floats, ratio: Floats) -> Floats:
     squared = excess + cosine * cosine
     far = np.sqrt(np.maximum(squared, 0.0))  # the cosine on the far side, times the ratio
     slowed = ratio * ratio * cosine
-    with np.errstate(invalid="ignore"):  # a ray along a surface between two sides that are alike
+    with np.errstate(invalid="ignore", divide="ignore"):  # total reflection, and a ray along the surface
         perpendicular = excess / np.square(far + cosine)  # (far − cosine) / (far + cosine) without cancellation
         parallel = (far - slowed) / (far + slowed)
-    return np.where(squared > 0.0, 0.5 * (perpendicular * perpendicular + parallel * parallel), 1.0)
+    share = 0.5 * (perpendicular * perpendicular + parallel * parallel)
+    return np.where(squared > 0.0, np.minimum(share, 1.0), 1.0)
 
 
 def specular_normal(direction: Floats, normal: Floats, shading: Floats) -> Floats:
