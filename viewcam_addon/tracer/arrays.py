@@ -13,6 +13,20 @@ def gather(table: NDArray, index: Indices) -> NDArray:
     return np.take(table, index, axis=-1, mode="clip")
 
 
+Some = slice | Indices
+"""Some entries of the last axis; all of them as a slice, which copies nothing."""
+
+
+def some(chosen: NDArray[np.bool_]) -> Some:
+    """Those that were chosen."""
+    return slice(None) if chosen.all() else np.flatnonzero(chosen)
+
+
+def pick(table: NDArray, which: Some) -> NDArray:
+    """Some entries of the last axis of `table`."""
+    return table[..., which] if isinstance(which, slice) else gather(table, which)
+
+
 def dot(a: NDArray, b: NDArray) -> NDArray:
     """a · b along the first axis, of three components."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

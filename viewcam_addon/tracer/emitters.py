@@ -86,9 +86,18 @@ class Emitters:
         """Whether what `sample` finds depends on its numbers: there are several emitters, or one that has a size."""
         return self._count > 1 or self._lamps.sized or self._glowing.count > 0
 
+    @property
+    def weighed(self) -> bool:
+        """Whether rays that are scattered may find what `sample` finds, too, so that each counts in part."""
+        return self._glowing.count > 0
+
+    def lamps_met_by(self, kind: str) -> bool:
+        """Whether rays of this kind can run into lamps."""
+        return kind in self._met and self._met[kind].sized
+
     def meets(self, kind: str) -> bool:
         """Whether rays of this kind can run into light."""
-        return self._shines or bool(self.world(kind).any()) or (kind in self._met and self._met[kind].sized)
+        return self._shines or bool(self.world(kind).any()) or self.lamps_met_by(kind)
 
     def sample(self, points: Points, u: Floats) -> Aimed:
         """One emitter for each of n points, and a direction to it. u : (3, n) in [0, 1): which emitter, and where on it."""

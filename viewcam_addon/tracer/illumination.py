@@ -23,8 +23,8 @@ from .surface import Passes
 from .textures import Palette
 from .view import View
 
-# Paths that are traced at a time, and of how many samples of a pixel if there are as many.
-PATHS, SAMPLES_AT_A_TIME = 65536, 16
+# Paths that are traced at a time, few enough for a core's cache, and of how many samples of a pixel if there are as many.
+PATHS, SAMPLES_AT_A_TIME = 16384, 16
 
 CENTRES = ("Depth", "Object Index")
 """The passes that tell what is at the pixels' centres."""
@@ -65,7 +65,7 @@ class Illumination:
         columns, rows : (n,) of the pixels' lower left corners. check : called between samples; what it raises ends the work.
         """
         count = len(pixels)
-        sums = Sums(count, self._film)
+        sums = Sums(count, self._paths.categories, self._film)
         at_a_time = max(1, PATHS // count)
         for first in range(0, self._samples, at_a_time):
             check()

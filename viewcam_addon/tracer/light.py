@@ -1,8 +1,10 @@
 """What paths bring to the eye, sorted by the pass that shows it, and the passes that become of all samples of a tile.
 
-Samples are added one after the other, in order, so that a sum is the same, bit for bit, however many are computed at a time.
+The samples of a tile are added one after the other, in order, so that a sum is the same, bit for bit, whatever the tile.
 Colours are summed as differences from the pixel's first sample: where all are equal the variance is 0, and not a rounding.
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -10,10 +12,9 @@ from .arrays import Floats, Indices
 from .film import Film
 from .surface import Passes
 
-EMITTED, BACKGROUND, DIRECT, INDIRECT, OTHER = range(5)
-"""What the eye sees of lights; of the world behind all; after one diffuse scattering; after more, the first of them diffuse;
-and what mirrors and glass show. Their sum is the picture."""
-_CATEGORIES = 5
+COLOUR, EMITTED, BACKGROUND, DIRECT, INDIRECT, OTHER = "Diffuse Color", "Emission", "Environment", "Direct", "Indirect", "Other"
+"""The colour of diffuse surfaces that the eye sees, and what it sees of lights; of the world behind all; after one diffuse
+scattering; after more, the first of them diffuse; and what mirrors and glass show. All light is the picture."""
 
 # The largest float32, so that no pixel is infinite.
 _MOST = float(np.finfo(np.float32).max)
@@ -22,51 +23,64 @@ _MOST = float(np.finfo(np.float32).max)
 class Light:
     """The light of n paths.
 
-    A place is category · n + path, so that what a path brings next finds its place by one number.
-    colour : (3, n), of the diffuse surface that the eye sees. covered : (n,) whether there is any surface.
+    A place is a category's `place` + path, so that one number tells where what a path brings next belongs.
+    categories : those that the scene can have. covered : (n,) whether the eye sees any surface.
     """
 
-    def __init__(self, count: int) -> None:
+    def __init__(self, count: int, categories: Sequence[str]) -> None:
         self.count = count
-        self.radiance = np.zeros((3, _CATEGORIES * count))
-        self.colour = np.zeros((3, count))
+        self._rows = {category: row for row, category in enumerate(categories)}
+        self.values = np.zeros((3, len(categories), count))
+        self._flat = self.values.reshape(3, -1)
         self.covered = np.zeros(count, bool)
 
+    def __contains__(self, category: str) -> bool:
+        return category in self._rows
+
+    def place(self, category: str) -> int:
+        return self._rows[category] * self.count
+
     def add(self, places: Indices, radiance: Floats) -> None:
-        """Add (3, k) to k different places."""
-        for total, component in zip(self.radiance, radiance, strict=True):
+        """Add (3, k) or (3, 1) to k different places."""
+        for total, component in zip(self._flat, radiance, strict=True):
             total[places] += component
+
+    def put(self, category: str, paths: Indices | slice, radiance: Floats) -> None:
+        """What some paths bring, (3, k) or (3, 1), and nothing else does."""
+        for total, component in zip(self.values[:, self._rows[category]], radiance, strict=True):
+            total[paths] = component
 
 
 class Sums:
     """The sums over the samples of `count` pixels."""
 
-    def __init__(self, count: int, film: Film) -> None:
+    def __init__(self, count: int, categories: Sequence[str], film: Film) -> None:
         self._film, self._count, self._samples = film, count, 0
-        self._categories = np.zeros((3, _CATEGORIES, count))
-        self._colour = np.zeros((3, count))
+        self._categories = list(categories)
+        hidden = (COLOUR, BACKGROUND) if film.transparent else (COLOUR,)
+        self._shown = [row for row, category in enumerate(categories) if category not in hidden]
+        self._totals = np.zeros((3, len(categories), count))
         self._covered = np.zeros(count)
         self._first = np.zeros((3, count))
-        self._difference = np.zeros((3, count))
-        self._square = np.zeros((3, count))
+        # Of the differences from the first sample, and of their squares.
+        self._differences, self._squares = np.zeros((3, count)), np.zeros((3, count))
 
     def add(self, light: Light) -> None:
         """Add some samples of every pixel: the paths are those of all pixels, sample after sample."""
-        radiance = light.radiance.reshape(3, _CATEGORIES, -1, self._count)
-        colour, covered = light.colour.reshape(3, -1, self._count), light.covered.reshape(-1, self._count)
-        shown = [category for category in range(_CATEGORIES) if category != BACKGROUND or not self._film.transparent]
-        for sample in range(len(covered)):
-            value = radiance[:, :, sample]
-            combined = value[:, shown].sum(axis=1)
-            self._categories += value
-            self._colour += colour[:, sample]
-            self._covered += covered[sample]
-            if self._samples == 0:
-                self._first = combined.copy()
-            combined -= self._first
-            self._difference += combined
-            self._square += combined * combined
-            self._samples += 1
+        values = light.values.reshape(3, len(self._categories), -1, self._count)
+        combined = np.zeros((3, values.shape[2], self._count))
+        for row in self._shown:
+            combined += values[:, row]
+        if self._samples == 0:
+            self._first = combined[:, 0].copy()
+        combined -= self._first[:, None]
+        squares = combined * combined
+        for sample in range(values.shape[2]):
+            self._totals += values[:, :, sample]
+            self._differences += combined[:, sample]
+            self._squares += squares[:, sample]
+        self._covered += light.covered.reshape(-1, self._count).sum(axis=0)
+        self._samples += values.shape[2]
 
     def write(self, passes: Passes, random: bool) -> None:
         """Write the means into passes, name → (count, channels).
@@ -74,24 +88,29 @@ class Sums:
         random : whether another seed would give another picture; if so, the variance of a single sample is infinite.
         """
         number, exposure = self._samples, self._film.exposure
-        mean = self._categories * (exposure / number)
-        colour = self._colour / number
-        _store(passes["Combined"], self._first * exposure + self._difference * (exposure / number))
+        colour = self._mean(COLOUR)
+        _store(passes["Combined"], (self._first + self._differences / number) * exposure)
         passes["Combined"][:, 3] = self._covered / number if self._film.transparent else 1.0
-        _store(passes["Emission"], mean[:, EMITTED])
-        _store(passes["Environment"], mean[:, BACKGROUND])
-        _store(passes["Diffuse Direct"], _without_colour(mean[:, DIRECT], colour))
-        _store(passes["Diffuse Indirect"], _without_colour(mean[:, INDIRECT], colour))
+        _store(passes["Emission"], self._mean(EMITTED) * exposure)
+        _store(passes["Environment"], self._mean(BACKGROUND) * exposure)
+        _store(passes["Diffuse Direct"], _without_colour(self._mean(DIRECT) * exposure, colour))
+        _store(passes["Diffuse Indirect"], _without_colour(self._mean(INDIRECT) * exposure, colour))
         _store(passes["Diffuse Color"], colour)
         if number > 1:
             _store(passes["Variance"], self._variance() * exposure**2)
         else:
             passes["Variance"][:] = np.inf if random else 0.0
 
+    def _mean(self, category: str) -> Floats:
+        """(3, count)."""
+        if category not in self._categories:
+            return np.zeros((3, self._count))
+        return self._totals[:, self._categories.index(category)] / self._samples
+
     def _variance(self) -> Floats:
         """Of the mean: the samples' own over their number."""
         number = self._samples
-        of_samples = (self._square - self._difference * self._difference / number) / (number - 1)
+        of_samples = (self._squares - self._differences * self._differences / number) / (number - 1)
         return np.maximum(of_samples, 0.0) / number
 
 

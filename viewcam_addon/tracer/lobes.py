@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import scattering
-from .arrays import Floats, Indices, dot
+from .arrays import Floats, Indices, Some, dot, pick, some
 from .points import Points
 from .textures import Palette
 
@@ -23,15 +23,16 @@ KINDS = {"diffuse": (DIFFUSE,), "glossy": (MIRROR, REFLECTED), "transmission": (
 class Lobes:
     """The ways at n points.
 
-    ways : which of them the scene has. colours : (ways, 3, n) the part of the light that takes each. shares : (ways, n)
+    ways : which of them the scene has. colours : for each, (3, n) the part of the light that takes it. shares : for each, (n,)
     how often a path does; their sum is 1, or 0 where none leads on. ratio : (n,) the index of refraction beyond the surface
-    over that before it, or None where the scene has no glass.
+    over that before it, or None where the scene has no glass. normal : (3, n) of mirrors and glass, or None.
     """
 
     ways: list[int]
-    colours: Floats
-    shares: Floats
+    colours: list[Floats]
+    shares: list[Floats]
     ratio: Floats | None
+    normal: Floats | None
 
     def __contains__(self, way: int) -> bool:
         return way in self.ways
@@ -44,43 +45,61 @@ class Lobes:
 
     def chosen(self, u: Floats) -> Indices:
         """(n,) the place in `ways` of the way that each path takes, −1 where none leads on. u : (n,) in [0, 1), or 0."""
-        reached = self.shares.cumsum(axis=0)
-        # The last way that has a share, where the sum is rounded to less than u.
-        chosen = (u >= reached).sum(axis=0)
-        last = len(self.ways) - 1 - (self.shares[::-1] > 0).argmax(axis=0)
-        return np.where(reached[-1] > 0, np.minimum(chosen, last), -1)
+        if len(self.ways) == 1:
+            return np.where(self.shares[0] > 0, 0, -1)
+        chosen, reached = np.full(len(u), -1), np.zeros(len(u))
+        for place, share in enumerate(self.shares):
+            # The last that has a share is taken even where the sum is rounded to less than u.
+            chosen = np.where((share > 0) & (u >= reached), place, chosen)
+            reached += share
+        return chosen
 
-    def of_kind(self, chosen: Indices, kind: str) -> Indices:
+    def of_kind(self, chosen: Indices, kind: str) -> Some:
         """Which of the points are left by rays of a kind."""
         places = [place for place, way in enumerate(self.ways) if way in KINDS[kind]]
-        return np.flatnonzero(np.isin(chosen, places)) if places else np.empty(0, np.intp)
+        leaving = np.zeros(len(chosen), bool)
+        for place in places:
+            leaving |= chosen == place
+        return some(leaving)
 
-    def weights(self, chosen: Indices, which: Indices) -> Floats:
-        """(3, k): what becomes of the light that comes to some of the points by the ways that were chosen."""
-        places = chosen[which]
-        return self.colours[places, :, which].T / self.shares[places, which]
+    def weights(self, chosen: Indices, which: Some, kind: str) -> Floats:
+        """(3, k): what becomes of the light that comes to some of the points by the ways of one kind that were chosen."""
+        weights: Floats | None = None
+        for place, way in enumerate(self.ways):
+            if way in KINDS[kind]:
+                share = pick(self.shares[place], which)
+                part = pick(self.colours[place], which)
+                if len(self.ways) > 1:
+                    part = part / np.where(share > 0, share, 1.0)
+                weights = part if weights is None else np.where(pick(chosen, which) == place, part, weights)
+        return weights
 
 
-def lobes_at(palette: Palette, points: Points, direction: Floats) -> Lobes:
-    """The ways of paths that come to points along (3, n) unit directions."""
+def lobes_at(palette: Palette, points: Points, direction: Floats | None) -> Lobes:
+    """The ways of paths that come to points along (3, n) unit directions, which only mirrors and glass need."""
     found: dict[int, Floats] = {}
-    ratio = None
+    ratio = normal = None
     if palette.has("diffuse"):
         found[DIFFUSE] = palette.colour("diffuse", points)
+    if direction is not None:
+        normal = scattering.specular_normal(direction, points.normal, points.shading)
     if palette.has("mirror"):
         found[MIRROR] = palette.colour("mirror", points)
     if palette.has("glass") or palette.has("refraction"):
         ior = palette.ior(points)
         ratio = np.where(points.backside, 1.0 / ior, ior)
-        cosine = -dot(points.shading, direction)
-        reflectance = scattering.fresnel(cosine, ratio)
+        reflectance = scattering.fresnel(-dot(normal, direction), ratio)
         if palette.has("glass"):
             colour = palette.colour("glass", points)
             found[REFLECTED], found[GLASS] = colour * reflectance, colour * (1.0 - reflectance)
         if palette.has("refraction"):
             found[REFRACTED] = palette.colour("refraction", points) * (reflectance < 1.0)
-    colours = np.stack(list(found.values())) if found else np.empty((0, 3, len(direction[0])))
-    shares = colours.sum(axis=1)
-    total = shares.sum(axis=0)
-    shares /= np.where(total > 0, total, 1.0)
-    return Lobes(list(found), colours, shares, ratio)
+    colours = list(found.values())
+    shares = [colour[0] + colour[1] + colour[2] for colour in colours]
+    if len(shares) == 1:
+        shares = [(shares[0] > 0).astype(np.float64)]
+    else:
+        total = sum(shares)
+        total = np.where(total > 0, total, 1.0)
+        shares = [share / total for share in shares]
+    return Lobes(list(found), colours, shares, ratio, normal)

@@ -22,10 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import scattering
-from .arrays import Floats, Indices, dot
+from .arrays import Floats, Indices, Some, dot, gather, pick, some
 from .emitters import Emitters, weight
 from .film import Bounces
-from .light import BACKGROUND, DIRECT, INDIRECT, OTHER, Light
+from .light import BACKGROUND, COLOUR, DIRECT, EMITTED, INDIRECT, OTHER, Light
 from .lobes import DIFFUSE, KINDS, Lobes, lobes_at
 from .points import Points, Surfaces
 from .sampler import FILM, SCATTERING, Sampler
@@ -34,7 +34,7 @@ from .textures import Palette
 
 # Which of a scattering's random numbers are for what.
 _EMITTER, _DIRECTION, _WAY, _SURVIVAL = 0, 3, 5, 6
-Numbers = Callable[[Indices, int, int], Floats]
+Numbers = Callable[[Some, int, int], Floats]
 """Random numbers (count, k) for some of the paths: which, the first dimension, how many dimensions."""
 
 # Scatterings before a path may be ended by chance. Sooner, it costs more noise than it saves time.
@@ -45,15 +45,16 @@ _CERTAIN = 3
 class Arrivals:
     """Where k paths have come to.
 
-    path : which of the batch's paths. place : where in `Light` that which they bring belongs. weight : (3, k) how much of the
-    light from there reaches the eye. counts : (kinds, k) scatterings so far. direction : (3, k), unit, in which they came.
+    path : which of the batch's paths. place : where in `Light` that which they bring belongs, or None for the eye's own rays.
+    weight : (3, k) how much of the light from there reaches the eye, or None where all does. counts : (kinds, k) scatterings
+    so far, or None where there is but one kind. direction : (3, k), unit, in which they came, or None where nobody asks.
     """
 
     path: Indices
-    place: Indices
-    weight: Floats
-    counts: NDArray[np.int16]
-    direction: Floats
+    place: Indices | None
+    weight: Floats | None
+    counts: NDArray[np.int16] | None
+    direction: Floats | None
     points: Points
 
 
@@ -68,7 +69,7 @@ class Rays:
     path: Indices
     place: Indices
     weight: Floats
-    counts: NDArray[np.int16]
+    counts: NDArray[np.int16] | None
     direction: Floats
     points: Points
     density: Floats
@@ -76,15 +77,36 @@ class Rays:
 
 
 class Paths:
-    """Traces paths through one scene; any thread may."""
+    """Traces paths through one scene; any thread may.
+
+    categories : of the light that they can bring.
+    """
 
     def __init__(
         self, surfaces: Surfaces, space: Space, emitters: Emitters, palette: Palette, bounces: Bounces, sampler: Sampler
     ) -> None:
         self._surfaces, self._space, self._emitters, self._palette = surfaces, space, emitters, palette
         self._sampler = sampler
+        specular = palette.has("mirror") or palette.has("glass") or palette.has("refraction")
+        self._kinds = [*(["diffuse"] if palette.has("diffuse") else []), *(["glossy", "transmission"] if specular else [])]
+        self._specular = specular
         self._most = bounces.total + 1
         self._most_of = {kind: getattr(bounces, kind) + 1 for kind in KINDS}
+        self.categories = self._found()
+
+    def _found(self) -> list[str]:
+        emitters, palette = self._emitters, self._palette
+        diffuse = palette.has("diffuse")
+        onwards = self._most > 1
+        found = {
+            COLOUR: diffuse,
+            EMITTED: emitters.meets("camera"),
+            BACKGROUND: emitters.world("camera").any(),
+            DIRECT: diffuse and emitters.lit,
+            INDIRECT: diffuse and emitters.lit and onwards,
+            OTHER: self._specular and emitters.lit,
+        }
+        return [category for category, there in found.items() if there]
 
     @property
     def random(self) -> bool:
@@ -100,162 +122,206 @@ class Paths:
 
         pixels, samples : (n,) which random numbers each path has.
         """
-        light = Light(len(pixels))
+        light = Light(len(pixels), self.categories)
         arrivals = self._from_eye(light, primitives, x, y)
         depth = 0
-        while self._emitters.lit and arrivals is not None:
+        while arrivals is not None and self._emitters.lit:
             depth += 1
             rays = self._scattered(light, arrivals, depth, pixels, samples)
             arrivals = _joined([self._arrived(light, some) for some in rays])
         return light
 
-    def _from_eye(self, light: Light, primitives: Indices, x: Floats, y: Floats) -> Arrivals:
+    def _from_eye(self, light: Light, primitives: Indices, x: Floats, y: Floats) -> Arrivals | None:
         """What the eye's rays come to, and the passes that are of this alone."""
-        count = len(primitives)
-        direction = np.stack([x, y, np.ones(count)])
-        direction /= np.sqrt(dot(direction, direction))
-        path = np.arange(count)
-        met = np.flatnonzero(primitives >= 0)
-        points = self._surfaces.seen(primitives[met], x[met], y[met])
-        light.covered[met] = True
-        if self._palette.has("diffuse"):
-            light.colour[:, met] = self._palette.colour("diffuse", points)
-        reach = np.full(count, np.inf)
-        reach[met] = np.sqrt(dot(points.position, points.position))
-        ones, start = np.ones((3, count)), np.zeros((3, count))
-        self._add_lamps(light, "camera", path, ones, start, direction, reach, path + BACKGROUND * count)
-        if self._palette.has("emission"):
-            light.add(path[met], self._palette.colour("emission", points))
-        counts = np.zeros((len(KINDS), len(met)), np.int16)
-        return Arrivals(met, path[met], ones[:, met], counts, direction[:, met], points)
-
-    def _arrived(self, light: Light, rays: Rays) -> Arrivals:
-        """Where rays come to, but the last; adds what shines there."""
-        met, points, distance = self._space.first(rays.points, rays.direction, rays.kind)
-        if self._emitters.meets(rays.kind):
-            reach = np.full(len(rays.path), np.inf)
-            reach[met] = distance
-            start = rays.points.position
-            self._add_lamps(light, rays.kind, rays.place, rays.weight, start, rays.direction, reach, rays.place)
-            if self._palette.has("emission"):
-                self._add_emission(light, rays, met, points, distance)
-        if rays.last.any():
-            onwards = np.flatnonzero(~rays.last[met])
-            met, points = met[onwards], points.at(onwards)
-        return Arrivals(
-            rays.path[met], rays.place[met], rays.weight[:, met], rays.counts[:, met], rays.direction[:, met], points
-        )
-
-    def _add_lamps(
-        self,
-        light: Light,
-        kind: str,
-        places: Indices,
-        weights: Floats,
-        starts: Floats,
-        directions: Floats,
-        reach: Floats,
-        beyond: Indices,
-    ) -> None:
-        """Add the lamps that rays run through on their way, and what they see where they meet nothing.
-
-        reach : (n,) distance of what they meet, or inf. beyond : the places for the world's light.
-        """
-        light.add(places, weights * self._emitters.lamps_met(starts, directions, 0.0, reach, kind))
-        missed = np.flatnonzero(np.isinf(reach))
-        if len(missed):
-            light.add(places[missed], weights[:, missed] * self._emitters.suns_met(directions[:, missed], kind))
-            light.add(beyond[missed], weights[:, missed] * self._emitters.world(kind)[:, None])
-
-    def _add_emission(self, light: Light, rays: Rays, met: Indices, points: Points, distance: Floats) -> None:
-        radiance = self._palette.colour("emission", points)
-        bright = np.flatnonzero(radiance.any(axis=0))
-        met, points, distance = met[bright], points.at(bright), distance[bright]
-        shared = self._emitters.surface_weight(
-            rays.points.at(met), points, rays.direction[:, met], distance, rays.density[met], rays.kind
-        )
-        light.add(rays.place[met], rays.weight[:, met] * radiance[:, bright] * shared)
+        np.greater_equal(primitives, 0, out=light.covered)
+        met, emitters, palette = some(light.covered), self._emitters, self._palette
+        points = self._surfaces.seen(pick(primitives, met), pick(x, met), pick(y, met))
+        direction = None
+        if self._specular or emitters.lamps_met_by("camera"):
+            direction = np.stack([x, y, np.ones(len(x))])
+            direction /= np.sqrt(dot(direction, direction))
+        if palette.has("diffuse"):
+            light.put(COLOUR, met, palette.colour("diffuse", points))
+        if palette.has("emission"):
+            light.put(EMITTED, met, palette.colour("emission", points))
+        missed = np.flatnonzero(~light.covered)
+        if BACKGROUND in light:
+            light.put(BACKGROUND, missed, emitters.world("camera")[:, None])
+        path = np.arange(light.count)
+        if emitters.lamps_met_by("camera"):
+            reach = np.full(light.count, np.inf)
+            reach[met] = np.sqrt(dot(points.position, points.position))
+            place = light.place(EMITTED) + path
+            light.add(place, emitters.lamps_met(np.zeros_like(direction), direction, 0.0, reach, "camera"))
+            light.add(place[missed], emitters.suns_met(direction[:, missed], "camera"))
+        if not points.count:
+            return None
+        counts = np.zeros((len(KINDS), points.count), np.int16) if len(self._kinds) > 1 else None
+        return Arrivals(path[met], None, None, counts, pick(direction, met) if self._specular else None, points)
 
     def _scattered(self, light: Light, arrivals: Arrivals, depth: int, pixels: Indices, samples: Indices) -> list[Rays]:
         """Scatter paths for the depth-th time, and add the light of emitters on the way; the rays, by kind."""
         first = FILM + SCATTERING * (depth - 1)
 
-        def numbers(which: Indices, dimension: int, count: int) -> Floats:
-            path = arrivals.path[which]
-            return self._sampler.numbers(pixels[path], samples[path], first + dimension, count)
+        def numbers(which: Some, dimension: int, count: int) -> Floats:
+            path = pick(arrivals.path, which)
+            return self._sampler.numbers(gather(pixels, path), gather(samples, path), first + dimension, count)
 
         lobes = lobes_at(self._palette, arrivals.points, arrivals.direction)
-        places = _places(arrivals, depth, light.count)
+        places = _places(light, arrivals, depth)
         if DIFFUSE in lobes and self._emitters.sampled("diffuse"):
             self._add_emitters(light, arrivals, lobes, places["diffuse"], numbers)
-        everyone = np.arange(len(arrivals.path))
-        chosen = lobes.chosen(numbers(everyone, _WAY, 1)[0] if len(lobes.ways) > 1 else np.zeros(len(everyone)))
-        made = (self._rays(arrivals, lobes, chosen, kind, depth, places[kind], numbers) for kind in KINDS)
+        leading = [kind for kind in self._kinds if self._leads_on(kind, depth)]
+        if not leading:
+            return []
+        everyone = len(arrivals.path)
+        chosen = lobes.chosen(numbers(slice(None), _WAY, 1)[0] if len(lobes.ways) > 1 else np.zeros(everyone))
+        made = (self._rays(arrivals, lobes, chosen, kind, depth, places[kind], numbers) for kind in leading)
         return [rays for rays in made if rays is not None]
+
+    def _leads_on(self, kind: str, depth: int) -> bool:
+        """Whether rays of a kind can bring anything after so many scatterings."""
+        return depth < self._most or self._emitters.meets(kind)
 
     def _add_emitters(self, light: Light, arrivals: Arrivals, lobes: Lobes, places: Indices, numbers: Numbers) -> None:
         """Add the light that diffuse surfaces get from one emitter for each path."""
-        which = np.flatnonzero(lobes.share(DIFFUSE) > 0)
+        share = lobes.share(DIFFUSE)
+        which = some(share > 0)
         points = arrivals.points.at(which)
-        aimed = self._emitters.sample(points, numbers(which, _EMITTER, 3))
-        factor = np.maximum(dot(points.shading, aimed.direction), 0.0) / np.pi
-        factor[dot(points.normal, aimed.direction) <= 0] = 0.0
-        shared = weight(aimed.pdf, lobes.share(DIFFUSE)[which] * factor)
-        radiance = arrivals.weight[:, which] * lobes.colour(DIFFUSE)[:, which] * aimed.light * (factor * shared)
-        bright = np.flatnonzero(radiance.any(axis=0))
-        shadowed = bright[aimed.shadowed[bright]]
-        blocked = self._space.blocked(points.at(shadowed), aimed.direction[:, shadowed], aimed.distance[shadowed])
-        radiance[:, shadowed[blocked]] = 0.0
-        light.add(places[which[bright]], radiance[:, bright])
+        u = numbers(which, _EMITTER, 3) if self._emitters.random else np.zeros((3, points.count))
+        aimed = self._emitters.sample(points, u)
+        factor = dot(points.shading, aimed.direction) / np.pi
+        up = factor > 0
+        if points.shading is not points.normal:
+            up &= dot(points.normal, aimed.direction) > 0
+        if self._emitters.weighed:
+            factor *= weight(aimed.pdf, pick(share, which) * factor)
+        bright = some(up)
+        shadowed = points.at(bright), pick(aimed.direction, bright), pick(aimed.distance, bright)
+        reached = ~(self._space.blocked(*shadowed) & pick(aimed.shadowed, bright))
+        bright = np.flatnonzero(up)[reached]
+        radiance = gather(aimed.light, bright)
+        radiance *= gather(factor, bright)
+        which = np.flatnonzero(share > 0)[bright] if isinstance(which, np.ndarray) else bright
+        radiance *= gather(lobes.colour(DIFFUSE), which)
+        if arrivals.weight is not None:
+            radiance *= gather(arrivals.weight, which)
+        light.add(gather(places, which), radiance)
 
     def _rays(
         self, arrivals: Arrivals, lobes: Lobes, chosen: Indices, kind: str, depth: int, places: Indices, numbers: Numbers
     ) -> Rays | None:
         """The rays of one kind that leave where paths have come to; None where none can bring anything."""
         which = lobes.of_kind(chosen, kind)
-        counts = arrivals.counts[:, which]
-        count = counts[list(KINDS).index(kind)]
-        count += 1
-        last = (count >= self._most_of[kind]) | (depth >= self._most)
-        if not self._emitters.meets(kind):
-            kept = np.flatnonzero(~last)
-            which, counts, last = which[kept], counts[:, kept], last[kept]
-        if not len(which):
+        counts, last = self._counted(arrivals, which, kind, depth)
+        if not self._emitters.meets(kind) and last.any():
+            which = np.arange(len(chosen))[which][~last]
+            counts, last = self._counted(arrivals, which, kind, depth)
+        points = arrivals.points.at(which)
+        if not points.count:
             return None
-        weights = arrivals.weight[:, which] * lobes.weights(chosen, which)
-        points, direction = arrivals.points.at(which), arrivals.direction[:, which]
-        density = np.full(len(which), np.inf)
+        weights = lobes.weights(chosen, which, kind)
+        if arrivals.weight is not None:
+            weights = weights * pick(arrivals.weight, which)
         if kind == "diffuse":
             direction, density = scattering.cosine_direction(points.shading, numbers(which, _DIRECTION, 2))
-            density *= lobes.share(DIFFUSE)[which]
-        elif kind == "glossy":
-            direction = scattering.reflected(direction, points.shading)
+            density *= pick(lobes.share(DIFFUSE), which)
         else:
-            direction, _ = scattering.refracted(direction, points.shading, lobes.ratio[which])
+            normal, density = pick(lobes.normal, which), np.full(points.count, np.inf)
+            incoming = pick(arrivals.direction, which)
+            if kind == "glossy":
+                direction = scattering.reflected(incoming, normal)
+            else:
+                direction, _ = scattering.refracted(incoming, normal, pick(lobes.ratio, which))
         # A smooth normal may send rays to the wrong side of the true surface: that light is lost, as in Cycles.
         kept = (dot(direction, points.normal) > 0) != (kind == "transmission")
         if depth > _CERTAIN:
             survival = np.where(last, 1.0, np.minimum(np.sqrt(weights.max(axis=0)), 1.0))
             kept &= numbers(which, _SURVIVAL, 1)[0] < survival
-            weights /= np.where(survival > 0, survival, 1.0)
-        if not kept.all():
-            kept = np.flatnonzero(kept)
-            which, weights, counts, last = which[kept], weights[:, kept], counts[:, kept], last[kept]
-            points, direction, density = points.at(kept), direction[:, kept], density[kept]
-        return Rays(kind, arrivals.path[which], places[which], weights, counts, direction, points, density, last)
+            weights = weights / np.where(survival > 0, survival, 1.0)
+        which_kept = some(kept)
+        return Rays(
+            kind,
+            pick(pick(arrivals.path, which), which_kept),
+            pick(pick(places, which), which_kept),
+            pick(weights, which_kept),
+            None if counts is None else pick(counts, which_kept),
+            pick(direction, which_kept),
+            points.at(which_kept),
+            pick(density, which_kept),
+            pick(last, which_kept),
+        )
+
+    def _counted(
+        self, arrivals: Arrivals, which: Some, kind: str, depth: int
+    ) -> tuple[NDArray[np.int16] | None, NDArray[np.bool_]]:
+        """The scatterings of paths with this one, and whether it was the last; of one kind alone these are all alike."""
+        if arrivals.counts is None:
+            return None, np.broadcast_to(depth >= min(self._most, self._most_of[kind]), arrivals.path[which].shape)
+        counts = arrivals.counts[:, which].copy()
+        count = counts[list(KINDS).index(kind)]
+        count += 1
+        return counts, (count >= self._most_of[kind]) | (depth >= self._most)
+
+    def _arrived(self, light: Light, rays: Rays) -> Arrivals | None:
+        """Where rays come to, but the last; adds what shines there."""
+        emitters, shining = self._emitters, self._palette.has("emission")
+        world = emitters.world(rays.kind)
+        if rays.last.all() and not shining and not emitters.lamps_met_by(rays.kind):
+            open_ = np.flatnonzero(~self._space.blocked(rays.points, rays.direction, np.full(len(rays.path), np.inf)))
+            light.add(gather(rays.place, open_), pick(rays.weight, open_) * world[:, None])
+            return None
+        met, points, distance = self._space.first(rays.points, rays.direction, rays.kind)
+        reach = np.full(len(rays.path), np.inf)
+        reach[met] = distance
+        missed = np.flatnonzero(np.isinf(reach))
+        if world.any():
+            light.add(gather(rays.place, missed), pick(rays.weight, missed) * world[:, None])
+        if emitters.lamps_met_by(rays.kind):
+            seen = emitters.lamps_met(rays.points.position, rays.direction, 0.0, reach, rays.kind)
+            seen[:, missed] += emitters.suns_met(gather(rays.direction, missed), rays.kind)
+            light.add(rays.place, rays.weight * seen)
+        if shining:
+            self._add_emission(light, rays, met, points, distance)
+        if rays.last.any():
+            onwards = np.flatnonzero(~rays.last[met])
+            met, points = met[onwards], points.at(onwards)
+        if not len(met):
+            return None
+        return Arrivals(
+            gather(rays.path, met),
+            gather(rays.place, met),
+            pick(rays.weight, met),
+            None if rays.counts is None else gather(rays.counts, met),
+            gather(rays.direction, met) if self._specular else None,
+            points,
+        )
+
+    def _add_emission(self, light: Light, rays: Rays, met: Indices, points: Points, distance: Floats) -> None:
+        """Add what shines where rays come to, less what shadow rays were to find there."""
+        radiance = self._palette.colour("emission", points)
+        bright = np.flatnonzero(radiance.any(axis=0))
+        met, points, distance = met[bright], points.at(bright), distance[bright]
+        shared = self._emitters.surface_weight(
+            rays.points.at(met), points, gather(rays.direction, met), distance, pick(rays.density, met), rays.kind
+        )
+        light.add(gather(rays.place, met), pick(rays.weight, met) * gather(radiance, bright) * shared)
 
 
-def _places(arrivals: Arrivals, depth: int, count: int) -> dict[str, Indices]:
-    """Where in the light of `count` paths that belongs which rays of each kind bring after the depth-th scattering."""
-    if depth == 1:
-        return {kind: arrivals.path + count * (DIRECT if kind == "diffuse" else OTHER) for kind in KINDS}
-    was_direct = arrivals.place // count == DIRECT
-    return dict.fromkeys(KINDS, arrivals.place + count * (INDIRECT - DIRECT) * was_direct)
+def _places(light: Light, arrivals: Arrivals, depth: int) -> dict[str, Indices]:
+    """Where that belongs which rays of each kind bring after the depth-th scattering."""
+    if arrivals.place is None:
+        categories = {"diffuse": DIRECT, "glossy": OTHER, "transmission": OTHER}
+        return {kind: arrivals.path + light.place(category) for kind, category in categories.items() if category in light}
+    if depth > 2 or DIRECT not in light:
+        return dict.fromkeys(KINDS, arrivals.place)
+    was_direct = (arrivals.place >= light.place(DIRECT)) & (arrivals.place < light.place(DIRECT) + light.count)
+    return dict.fromkeys(KINDS, arrivals.place + was_direct * (light.place(INDIRECT) - light.place(DIRECT)))
 
 
-def _joined(parts: list[Arrivals]) -> Arrivals | None:
+def _joined(parts: list[Arrivals | None]) -> Arrivals | None:
     """All paths that go on, in one; None where none does."""
-    parts = [part for part in parts if len(part.path)]
+    parts = [part for part in parts if part is not None]
     if len(parts) < 2:
         return parts[0] if parts else None
     arrays = (

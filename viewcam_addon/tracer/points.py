@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import offset
-from .arrays import Floats, Indices, cross, dot, gather
+from .arrays import Floats, Indices, Some, cross, dot, gather, pick
 from .balls import balls_of
 from .ellipsoids import Ellipsoids
 from .materials import PLAIN, Material
@@ -47,10 +47,10 @@ class Points:
     def count(self) -> int:
         return len(self.primitive)
 
-    def at(self, which: Indices | slice | NDArray[np.bool_]) -> "Points":
+    def at(self, which: Some) -> "Points":
         """Some of the points."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
-        return Points(**{name: None if value is None else value[..., which] for name, value in values.items()})
+        return Points(**{name: None if value is None else pick(value, which) for name, value in values.items()})
 
     @staticmethod
     def joined(parts: "list[Points]") -> "Points":
