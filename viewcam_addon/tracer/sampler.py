@@ -10,17 +10,17 @@ does the same, since carries go upwards and a is odd; all further digits are ind
 odd value equally often, and s every value. That is the joint distribution of two numbers under Owen's nested permutations
 (Annals of Statistics 25, 1997), and the variance of a mean depends on pairs only: it is Owen's, for a product and a sum.
 
-**Dimensions.** Film and first scattering have dimensions of their own: those that belong together, both axes of the film, of a
-lamp, and of a direction, are Sobol's first two in an order of points that Sobol's other dimensions give. So each such pair is
-as good as two dimensions can be, and no two depend on one another. Later scatterings have the first one's dimensions, each in
-an order of its own, by a nested permutation of the points' indices (padding: Burley, JCGT 9, 2020).
+**Dimensions.** Film and first scattering have ten of their own. Those that belong together, two of the film, of a lamp and of
+a direction, are Sobol's first two, in the order of points that another of Sobol's dimensions gives. So each such pair is as
+good as two dimensions can be, all ten are nearly so together, and what film and lamp do together converges too. Later scatterings
+have the first one's dimensions, each in an order of its own, a nested permutation of the points (padding: Burley, JCGT 9, 2020).
 
 Any number of samples may be taken. Beside a power of two the last points lack their partners: what is smooth is then off as
 1/N; edges, off as N^−3/4, lose nothing.
 
 Rejected: hashes that resemble Owen's permutations (Laine and Karras 2011; Burley), three or four multiplications instead of
 one; his own, a tree of random bits for each dimension; an order of points for each pixel, which costs a matrix for each number;
-padding from the start, as Cycles does, which converges as N^−1/2 where film and lamp matter together; one shift for all points
+padding from the start, as in Cycles, with which what film and lamp do together is off as N^−1/2; one shift for all points
 of a pixel (Cranley and Patterson 1976), off as 1/N; blue noise over the picture, which makes pixels depend on one another.
 benchmarks/light/convergence.py compares them.
 """
@@ -36,16 +36,20 @@ Samples = int | NDArray[np.integer]
 FILM, SCATTERING = 2, 8
 """How many dimensions the film has, and each scattering."""
 
-# Sobol's dimensions after the first: the degree of a primitive polynomial, its coefficients as bits, and the first direction
-# numbers (Joe and Kuo, SIAM J. Sci. Comput. 30, 2008, new-joe-kuo-6).
+# Sobol's dimensions, as in Joe and Kuo's table: the degree of a primitive polynomial, its inner coefficients as bits, and the
+# first direction numbers. Polynomials and the second dimension are theirs (SIAM J. Sci. Comput. 30, 2008). The other direction
+# numbers are the best of some thousand random ones of each, by the t-values of all pairs of the ten dimensions, of film and
+# lamp, film and direction, and so on as they meet in integrals; theirs are made for pairs alone, and not for pairs of pairs.
 _SECOND = (1, 0, (1,))
-_LAMP = (3, 2, (1, 1, 1))
-_DIRECTION = (4, 4, (1, 3, 5, 13))
-_SINGLE = ((3, 1, (1, 3, 1)), (4, 1, (1, 1, 3, 3)), (5, 2, (1, 1, 5, 5, 17)), (5, 4, (1, 1, 5, 5, 5)))
+_LAMP = (6, 22, (1, 3, 3, 9, 31, 21))
+_DIRECTION = (5, 11, (1, 1, 3, 15, 29))
+_EMITTER = (6, 13, (1, 3, 3, 15, 1, 19))
+_COMPONENT = (5, 14, (1, 1, 3, 11, 7))
+_ROULETTE = (5, 2, (1, 1, 5, 13, 11))
+_SPARE = (6, 1, (1, 3, 7, 5, 19, 39))
 
 _BITS = 24
 _LOW = 16  # bits of a sample's number that its scattering's order changes, and for which there are tables
-_ORDER = 0xFFFFFFFF  # the key of a scattering's order of points, as no dimension's
 
 
 class Sampler:
@@ -93,10 +97,12 @@ class Sampler:
 
     def _order(self, scattering: int) -> Words:
         """Which of Sobol's points each of the first samples has at a scattering."""
-        if scattering == 0:
-            return self._first
-        factor, shift = self._hashed(np.array([scattering]), np.array([_ORDER], np.uint32))
-        return _reversed(_reversed(self._first << np.uint32(32 - _LOW)) * factor[0] + shift[0]) >> np.uint32(32 - _LOW)
+        order = self._first.copy()
+        if scattering > 0:
+            keys = _mixed(np.arange(scattering * _LOW, (scattering + 1) * _LOW, dtype=np.uint32) + self._seeds[0])
+            for bit, key in enumerate(keys):  # Owen's permutation: each bit is flipped, or not, by those above it
+                order ^= (_mixed(self._first >> np.uint32(bit + 1) ^ key) & np.uint32(1)) << np.uint32(bit)
+        return order
 
 
 def _mixed(words: Words) -> Words:
@@ -147,9 +153,9 @@ def _sobol(degree: int, coefficients: int, start: tuple[int, ...]) -> Words:
 def _matrices() -> Words:
     """(FILM + SCATTERING, _BITS): the columns of the matrices of all dimensions, their digits in reverse order."""
     first, second = np.uint32(1) << np.arange(_BITS, dtype=np.uint32), _sobol(*_SECOND)
-    lamp, direction = _sobol(*_LAMP), _sobol(*_DIRECTION)
-    emitter, component, roulette, spare = (_sobol(*single) for single in _SINGLE)
-    lamps, directions = (_transformed(columns, second[None])[0] for columns in (lamp, direction))
+    singles = [_sobol(*numbers) for numbers in (_EMITTER, _LAMP, _DIRECTION, _COMPONENT, _ROULETTE, _SPARE)]
+    emitter, lamp, direction, component, roulette, spare = singles
+    lamps, directions = _transformed(lamp, second[None])[0], _transformed(direction, second[None])[0]
     return np.stack([first, second, emitter, lamp, lamps, direction, directions, component, roulette, spare])
 
 
