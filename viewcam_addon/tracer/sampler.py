@@ -12,8 +12,9 @@ odd value equally often, and s every value. That is the joint distribution of tw
 
 **Dimensions.** Film and first scattering have ten of their own. Those that belong together, two of the film, of a lamp and of
 a direction, are Sobol's first two, in the order of points that another of Sobol's dimensions gives. So each such pair is as
-good as two dimensions can be, all ten are nearly so together, and what film and lamp do together converges too. Later scatterings
-have the first one's dimensions, each in an order of its own, a nested permutation of the points (padding: Burley, JCGT 9, 2020).
+good as two dimensions can be, all ten are nearly so together, and what film and lamp do together converges too. Later
+scatterings have the first one's dimensions, each in an order of its own, by a nested permutation of the points (padding:
+Burley, JCGT 9, 2020).
 
 Any number of samples may be taken. Beside a power of two the last points lack their partners: what is smooth is then off as
 1/N; edges, off as N^−3/4, lose nothing.
