@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 
 from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.tracer.arrays import dot
+from viewcam_addon.tracer.ellipsoids import ellipsoids_of
+from viewcam_addon.tracer.emitters import Aimed, Emitters
+from viewcam_addon.tracer.points import Points, Surfaces
+from viewcam_addon.tracer.sampler import Sampler
 from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres
+from viewcam_addon.tracer.textures import Palette
+from viewcam_addon.tracer.triangles import Planes, triangles_of
+from viewcam_addon.tracer.view import View
 
 
 @pytest.fixture(scope="session")
@@ -142,3 +150,97 @@ def random_scene(ball, make_scene, make_mesh, make_spheres, random_matrix):
         return make_scene(camera, *things, clip=(rng.uniform(0, 1.5), rng.uniform(6, 14)))
 
     return build
+
+
+class Lighting:
+    """The emitters of a scene, asked in world space."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.view = View(scene.camera)
+        placed = [(thing, scene.geometries[thing.geometry]) for thing in scene.objects]
+        triangles = triangles_of([pair for pair in placed if isinstance(pair[1], Mesh)], self.view)
+        ellipsoids = ellipsoids_of([pair for pair in placed if isinstance(pair[1], Spheres)], self.view)
+        self.surfaces = Surfaces(scene, self.view, triangles, Planes(triangles, self.view), ellipsoids)
+        self.emitters = Emitters(scene, self.view, self.surfaces, Palette(scene))
+
+    def points(self, position, normal, count: int) -> Points:
+        """A point of a surface, as many times; position and normal (3,) or (3, count), world space."""
+        position = self.view.axes @ (np.reshape(position, (3, -1)) - self.view.eye[:, None]) * np.ones(count)
+        normal = np.reshape(normal, (3, -1)) / np.linalg.norm(np.reshape(normal, (3, -1)), axis=0)
+        normal = self.view.axes @ normal * np.ones(count)
+        zeros = np.zeros(count, np.intp)
+        return Points(position, normal, normal, zeros > 0, zeros.astype(np.int32), zeros, np.zeros(count))
+
+    def aimed(self, position, normal, count: int = 4096, seed: int = 1) -> tuple[Aimed, np.ndarray]:
+        """Samples at a point, and their cosines to its normal, 0 below the horizon."""
+        points = self.points(position, normal, count)
+        numbers = Sampler(seed, count).numbers(np.zeros(count, np.int64), np.arange(count), 2, 3)
+        aimed = self.emitters.sample(points, numbers)
+        return aimed, np.maximum(dot(points.normal, aimed.direction), 0.0)
+
+    def irradiance(self, position, normal, count: int = 4096, seed: int = 1) -> tuple[float, float]:
+        """The mean of the first channel, and its standard error as if the samples were independent."""
+        aimed, cosine = self.aimed(position, normal, count, seed)
+        values = aimed.light[0] * cosine
+        return values.mean(), values.std() / np.sqrt(count)
+
+    def seen(self, starts, directions, kind: str = "camera", nearest=0.0, farthest=np.inf) -> np.ndarray:
+        """(3, n) radiance of all lamps that rays run into; starts, directions (3, n), world space."""
+        starts, directions = self.view.axes @ (starts - self.view.eye[:, None]), self.view.axes @ directions
+        near = self.emitters.lamps_met(starts, directions, nearest, farthest, kind)
+        return near + self.emitters.suns_met(directions, kind)
+
+
+@pytest.fixture(scope="session")
+def make_lighting(make_lit):
+    """make_lighting(lamp, …, surfaces=[(geometry, material), …], world=…) → Lighting, from a camera that looks askew."""
+
+    def build(*lamps, surfaces=(), **light) -> Lighting:
+        camera = Pinhole((0.3, -0.2, 0.4), (-1, 2, 1), (0.1, 0.2, 1), 100, 8, 8, mirrored=True)
+        return Lighting(make_lit(camera, *surfaces, lamps=lamps, **light))
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def off_by():
+    """off_by((mean, error), expected, precision) → standard errors; fails where these are too large to tell anything.
+
+    The sum of 4096 float64 numbers is off by less than 1e-12 of it.
+    """
+
+    def judge(found: tuple[float, float], expected: float, precision: float = 0.02) -> float:
+        mean, error = found
+        assert error <= precision * abs(expected), f"the standard error {error:.2g} of {expected:.6g} tells nothing"
+        return (mean - expected) / max(error, 1e-12 * abs(expected), 1e-300)
+
+    return judge
+
+
+@pytest.fixture(scope="session")
+def polygon_irradiance():
+    """polygon_irradiance(corners (n, 3), normal) → the irradiance at the origin of a polygon of radiance 1, by Lambert (1760).
+
+    Half the sum, over the sides, of the angle that a side fills times the cosine of its plane's normal, of what the horizon
+    leaves of the polygon.
+    """
+
+    def irradiance(corners, normal) -> float:
+        normal = np.array(normal) / np.linalg.norm(normal)
+        heights = corners @ normal
+        above = []
+        for number, (corner, height) in enumerate(zip(corners, heights, strict=True)):
+            before, low = corners[number - 1], heights[number - 1]
+            if (height > 0) != (low > 0):
+                above.append(before + (corner - before) * (low / (low - height)))
+            if height > 0:
+                above.append(corner)
+        total = 0.0
+        for first, second in zip(above, above[1:] + above[:1], strict=True):
+            across = np.cross(first, second)
+            length = np.linalg.norm(across)
+            if length > 0:
+                total += np.arctan2(length, first @ second) * (across @ normal) / length
+        return abs(total) / 2
+
+    return irradiance

@@ -53,9 +53,9 @@ class Aimed(NamedTuple):
 def weight(pdf: Floats, other: Floats) -> Floats:
     """The part that counts of a sample whose direction was picked with the density `pdf`, where another way of picking has the
     density `other`. An infinite pdf counts whole."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.nan_to_num(other / pdf, nan=0.0, posinf=1e100)
-    return 1.0 / (1.0 + ratio * ratio)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        ratio = np.where(np.isinf(pdf), 0.0, np.nan_to_num(np.divide(other, pdf), posinf=np.inf))
+        return 1.0 / (1.0 + ratio * ratio)
 
 
 class Emitters:
@@ -123,7 +123,8 @@ class Emitters:
             )
         with np.errstate(divide="ignore", invalid="ignore"):
             light = np.where(chance > 0, np.minimum(light / chance, _MOST), 0.0)
-        return Aimed(direction, distance, light, pdf * chance, gather(self._shadowed, which))
+            pdf = np.where(chance > 0, pdf * chance, np.inf)
+        return Aimed(direction, distance, light, pdf, gather(self._shadowed, which))
 
     def _choose(self, points: Points, u: Floats) -> tuple[Indices, Floats, Floats]:
         """Which emitter each point gets, the chance that it had, 0 where none lights the point, and what is left of u."""
