@@ -72,8 +72,10 @@ class Sun(Lamp):
         largest = np.abs(towards).max()
         if not largest > 0:
             raise InputError(f"towards of light {self.name!r} is 0, 0, 0: give the direction to the sun")
-        towards /= largest
-        object.__setattr__(self, "towards", tuple((towards / np.sqrt(towards @ towards)).tolist()))
+        if abs(towards @ towards - 1) > 2.0**-50:  # what is a unit vector stays one, to the last bit
+            towards /= largest
+            towards /= np.sqrt(towards @ towards)
+        object.__setattr__(self, "towards", tuple(towards.tolist()))
 
     @property
     def is_dark(self) -> bool:
