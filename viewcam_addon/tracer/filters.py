@@ -27,7 +27,7 @@ import functools
 
 import numpy as np
 
-from .arrays import Floats
+from .arrays import Floats, gather
 from .film import Film
 
 _COEFFICIENTS = (0.35875, 0.48829, 0.14128, 0.01168)
@@ -45,9 +45,9 @@ def offsets(film: Film, u: Floats) -> Floats:
     step = scaled.astype(np.intp)
     scaled -= step
     places, lengths = _inverse()
-    offset = lengths[step]
+    offset = gather(lengths, step)
     offset *= scaled
-    offset += places[step]
+    offset += gather(places, step)
     offset *= film.filter_width
     offset += 0.5
     return offset

@@ -80,30 +80,36 @@ class Palette:
 
 
 def looked_up(picture: Picture, uv: Floats, closest: bool) -> Floats:
-    """(3, n) float64: the linear colours of an image at (2, n) UV."""
+    """(3, n) float64: the linear colours of an image at (2, n) UV; those at 0 where UV is not finite."""
     height, width = picture.pixels.shape[:2]
-    pixels = picture.pixels.reshape(-1, 3)
-    u, v = uv - np.floor(uv)
+    with np.errstate(invalid="ignore"):
+        u, v = uv - np.floor(uv)
+    if not np.isfinite(uv).all():
+        u, v = np.nan_to_num(u), np.nan_to_num(v)
+
+    def pixels(row: Indices, column: Indices) -> NDArray[np.float32]:
+        return np.take(picture.pixels.reshape(-1, 3), row * width + column, axis=0, mode="clip")
+
     if closest:
-        column, row = (np.minimum((u * width).astype(np.intp), width - 1), np.minimum((v * height).astype(np.intp), height - 1))
-        encoded = pixels[row * width + column].T
+        row, column = ((place * count).astype(np.intp) for place, count in ((v, height), (u, width)))
+        encoded = pixels(np.minimum(row, height - 1), np.minimum(column, width - 1))
     else:
         left, right, across = _between(u, width)
         below, above, up = _between(v, height)
-        lower = pixels[below * width + left].T * (1.0 - across) + pixels[below * width + right].T * across
-        upper = pixels[above * width + left].T * (1.0 - across) + pixels[above * width + right].T * across
+        lower = pixels(below, left) * (1.0 - across) + pixels(below, right) * across
+        upper = pixels(above, left) * (1.0 - across) + pixels(above, right) * across
         encoded = lower * (1.0 - up) + upper * up
-    return decoded(encoded).astype(np.float64) if picture.srgb else encoded.astype(np.float64)
+    return (decoded(encoded) if picture.srgb else encoded).T.astype(np.float64)
 
 
 def _between(u: Floats, count: int) -> tuple[Indices, Indices, Floats]:
-    """The two of `count` pixels in a row whose centres are about u, 0 to 1, and how far u is from the one to the other."""
+    """The two of `count` pixels in a row about whose centres u, 0 to 1, is; (n, 1) how far it is from the one to the other."""
     place = u * count - 0.5
     first = np.floor(place)
     share = place - first
     first = first.astype(np.intp)
     second = first + 1
-    return np.where(first < 0, count - 1, first), np.where(second >= count, 0, second), share
+    return np.where(first < 0, count - 1, first), np.where(second >= count, 0, second), share[:, None]
 
 
 def decoded(encoded: NDArray[np.floating]) -> NDArray[np.float32]:
