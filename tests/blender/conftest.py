@@ -190,13 +190,88 @@ def both_sides(fresh_blender, scene, tmp_path):
 
 
 def _passes_of(path):
-    """The passes of an EXR, read in a process without Blender, which has an OpenEXR library of its own."""
-    program = "import sys, numpy; from viewcam_addon import image; numpy.savez(sys.argv[2], **image.read(sys.argv[1]).passes)"
+    """The passes of an EXR."""
+    return _all_passes_of([path])[0]
+
+
+def _all_passes_of(paths):
+    """The passes of EXRs, read in a process without Blender, which has an OpenEXR library of its own."""
+    program = """
+import sys, numpy
+from viewcam_addon import image
+for path in sys.argv[1:]:
+    numpy.savez(path + ".npz", **image.read(path).passes)
+"""
     search_path = os.pathsep.join([str(Path(viewcam_addon.__file__).parent.parent), *filter(None, sys.path)])
-    arrays = path.with_suffix(".npz")
-    subprocess.run([sys.executable, "-c", program, path, arrays], check=True, env=os.environ | {"PYTHONPATH": search_path})
-    with np.load(arrays) as archive:
-        return dict(archive)
+    paths = [str(path) for path in paths]
+    subprocess.run([sys.executable, "-c", program, *paths], check=True, env=os.environ | {"PYTHONPATH": search_path})
+    found = []
+    for path in paths:
+        with np.load(f"{path}.npz") as archive:
+            found.append(dict(archive))
+    return found
+
+
+@pytest.fixture
+def read_passes():
+    """A function that reads EXRs, all at once: paths → a dict of passes each."""
+    return _all_passes_of
+
+
+@pytest.fixture
+def make_material(fresh_blender):
+    """make_material(name, shader's class, {input: value}) → a material of this one shader, without anything else."""
+
+    def make(name, kind, **inputs):
+        material = fresh_blender.data.materials.new(name)
+        if not material.node_tree:  # new materials have one from 5.0 on
+            material.use_nodes = True
+        tree = material.node_tree
+        tree.nodes.clear()
+        shader = tree.nodes.new(kind)
+        shader.name = "Shader"
+        output = tree.nodes.new("ShaderNodeOutputMaterial")
+        output.name = "Output"
+        tree.links.new(shader.outputs[0], output.inputs["Surface"])
+        for key, value in inputs.items():
+            shader.inputs[key.replace("_", " ")].default_value = value
+        return material
+
+    return make
+
+
+@pytest.fixture
+def add_lamp(fresh_blender, scene):
+    """add_lamp(type, location, rotation, property=value, …) → the object of a light that all rays see."""
+
+    def make(kind, location=(0, 0, 5), rotation=(0, 0, 0), name="Lamp", **properties):
+        data = fresh_blender.data.lights.new(name, kind)
+        for key, value in properties.items():
+            setattr(data, key, value)
+        block = fresh_blender.data.objects.new(name, data)
+        scene.collection.objects.link(block)
+        block.location, block.rotation_euler = location, rotation
+        block.visible_camera = True
+        return block
+
+    return make
+
+
+@pytest.fixture
+def set_world(fresh_blender, scene):
+    """set_world(colour, strength) → a new world of a Background node, which is the scene's."""
+
+    def make(colour=(1, 1, 1), strength=1.0):
+        world = fresh_blender.data.worlds.new("World")
+        if not world.node_tree:
+            world.use_nodes = True
+        scene.world = world
+        background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
+        background.inputs["Color"].default_value = (*colour, 1)
+        background.inputs["Strength"].default_value = strength
+        return world
+
+    return make
 
 
 @pytest.fixture
