@@ -41,10 +41,10 @@ class Alone:
         for number, triangle in enumerate(self._chosen):
             normal = self._normals[:, number]
             with np.errstate(all="ignore"):  # a ray along the plane
-                distance = (self._heights[number] - normal @ starts) / (normal @ directions)
+                distance = (self._heights[number] - dot(normal, starts)) / dot(normal, directions)
                 which = np.flatnonzero((distance > 0) & (distance < limits))
             distance = distance[which]
             inside = starts[:, which] + distance * directions[:, which] - self._corners[:, number, None]
-            first, second = (gradient[:, number] @ inside for gradient in self._gradients)
+            first, second = (dot(gradient[:, number], inside) for gradient in self._gradients)
             kept = np.flatnonzero((first >= 0) & (second >= 0) & (first + second <= 1))
             yield triangle, which[kept], distance[kept]

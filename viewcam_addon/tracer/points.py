@@ -85,6 +85,7 @@ class Surfaces:
         sizes = [len(mesh.triangles) for _, mesh in triangles.placed]
         # On which side of the cross product of its sides, in camera space, a triangle has its front, and its smooth normals.
         self._front = np.repeat(np.where(np.array(mirrored, bool), -1, 1) * int(view.handedness), sizes).astype(np.int8)
+        self._corner_normals = _corner_normals(triangles, view)
         colours = [colour for material in materials_of(scene) for colour in material.colours.values()]
         self._has_uv = any(colour.image is not None for colour in colours)
         self._colours = _corner_colours(triangles) if any(colour.vertex for colour in colours) else None
@@ -184,13 +185,12 @@ class Surfaces:
         )
 
     def _shading(self, triangle: Indices, first: Floats, second: Floats, normal: Floats, side: Floats) -> Floats:
-        if self.triangles.corner_normals is None:
+        if self._corner_normals is None:
             return normal
-        smooth = _interpolated(gather(self.triangles.corner_normals, triangle), first, second, 3)
+        smooth = _interpolated(gather(self._corner_normals, triangle), first, second, 3)
         length = np.sqrt(dot(smooth, smooth))
         with np.errstate(invalid="ignore", divide="ignore"):
-            smooth *= side * self._view.handedness / length
-        smooth = self._view.axes @ smooth
+            smooth *= side / length
         return smooth if length.all() else np.where(length > 0, smooth, normal)
 
     def _uv(self, triangle: Indices, first: Floats, second: Floats) -> Floats | None:
@@ -228,6 +228,14 @@ def _materials(scene: Scene, things: list[tuple[Object, object]]) -> NDArray[np.
         names = placed.materials + ("",) * len(placed.material_indices)
         parts.append(np.array([numbers[name] for name in names], np.int32)[geometry.materials])
     return np.concatenate(parts)
+
+
+def _corner_normals(triangles: Triangles, view: View) -> NDArray[np.float32] | None:
+    """(9, m), as in `Triangles`, in camera space and on the side of the cross product of the triangles' sides."""
+    if triangles.corner_normals is None:
+        return None
+    axes = view.handedness * view.axes
+    return np.concatenate([axes @ triangles.corner_normals[first : first + 3] for first in (0, 3, 6)]).astype(np.float32)
 
 
 def _corner_colours(triangles: Triangles) -> NDArray[np.float32]:

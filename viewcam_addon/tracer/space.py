@@ -10,6 +10,7 @@ scatter in a closed room a few in a million leave it, which no picture shows.
 
 import threading
 from collections.abc import Iterator
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,7 +107,8 @@ class _Sight:
         nearest = np.full(len(found), np.inf)
         met = np.flatnonzero(found >= 0)
         nearest[met] = self._surfaces.distance(found[met], starts[:, met], directions[:, met])
-        for primitive, which, distance in self._others(points, starts, directions, nearest):
+        hits = chain(self._alone.met(starts, directions, nearest), self._balls(points, directions, nearest))
+        for primitive, which, distance in hits:
             nearer = distance < nearest[which]
             which = which[nearer]
             nearest[which] = distance[nearer]
@@ -114,24 +116,34 @@ class _Sight:
         return found
 
     def blocked(self, points: Points, directions: Floats, distances: Floats) -> NDArray[np.bool_]:
+        """Whether anything stands before lights, (n,), at these finite distances."""
         starts = offset.start(points.position, points.normal, directions, points.offset)
-        origins, ways, lengths = offset.shadow_rays(starts, points.position + directions * distances)
+        lights = points.position + directions * distances
+        origins, ways, lengths = offset.shadow_rays(starts, lights)
         if self._embree is None:
             blocked = np.zeros(points.count, bool)
         else:
             unit = np.float32(self._unit)
             blocked = self._embree.run(origins * unit, ways * unit, dists=lengths, query="OCCLUDED") >= 0
-        if self._alone.is_empty and self._crowd.is_empty:
-            return blocked
-        limits = np.where(blocked, 0.0, lengths * distances)
-        for _, which, distance in self._others(points, starts, directions, limits):
-            which = which[distance < limits[which]]
-            blocked[which], limits[which] = True, 0.0
+        if not self._alone.is_empty:
+            limits = np.where(blocked, 0.0, lengths)
+            blocked |= _any(self._alone.met(starts, lights - starts, limits), limits)
+        if not self._crowd.is_empty:
+            limits = np.where(blocked, 0.0, lengths * distances)
+            blocked |= _any(self._balls(points, directions, limits), limits)
         return blocked
 
-    def _others(self, points: Points, starts: Floats, directions: Floats, limits: Floats) -> Iterator[Hits]:
-        """What Embree does not see: the primitives that rays meet nearer than limits, which may shrink in between."""
-        yield from self._alone.met(starts, directions, limits)
+    def _balls(self, points: Points, directions: Floats, limits: Floats) -> Iterator[Hits]:
+        """The spheres that rays meet nearer than limits, as primitives."""
         count = self._surfaces.triangles.count
         for ball, which, distance in self._crowd.met(points.position, directions, points.primitive - count, limits):
             yield count + ball, which, distance
+
+
+def _any(hits: Iterator[Hits], limits: Floats) -> NDArray[np.bool_]:
+    """Which rays meet anything nearer than their limits; these become 0 then."""
+    met = np.zeros(len(limits), bool)
+    for _, which, distance in hits:
+        which = which[distance < limits[which]]
+        met[which], limits[which] = True, 0.0
+    return met

@@ -1,6 +1,6 @@
 """What scattered and shadow rays meet, against brute force: float64, in world space, every ray against every primitive."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,64 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer import crowd, space
-from viewcam_addon.tracer.ellipsoids import ellipsoids_of
 from viewcam_addon.tracer.offset import start
-from viewcam_addon.tracer.points import Points, Surfaces
-from viewcam_addon.tracer.scene import Mesh, Scene, Spheres
-from viewcam_addon.tracer.space import Space
-from viewcam_addon.tracer.triangles import Planes, triangles_of
-from viewcam_addon.tracer.view import View
-from viewcam_addon.tracer.visibility import visibility
+from viewcam_addon.tracer.scene import Mesh, Scene
 
 SEEDS = st.integers(0, 2**32 - 1)
-
-
-@pytest.fixture(params=["Embree", "NumPy"])
-def finder(request, monkeypatch):
-    """Both ways to find what rays meet."""
-    if request.param == "NumPy":
-        without_embree(monkeypatch)
-    elif space.EmbreeScene is None:
-        pytest.skip("embreex is not installed")
-    return request.param
-
-
-def without_embree(monkeypatch) -> None:
-    for module in (space, crowd):
-        monkeypatch.setattr(module, "EmbreeScene", None)
-
-
-@dataclass
-class Stage:
-    """A scene made ready, and the points that its camera sees."""
-
-    scene: Scene
-    view: View
-    surfaces: Surfaces
-    space: Space
-    points: Points
-
-
-def staged(scene: Scene) -> Stage:
-    view = View(scene.camera)
-    things = [(placed, scene.geometries[placed.geometry]) for placed in scene.objects]
-    triangles = triangles_of([thing for thing in things if isinstance(thing[1], Mesh)], view)
-    ellipsoids = ellipsoids_of([thing for thing in things if isinstance(thing[1], Spheres)], view)
-    planes = Planes(triangles, view)
-    surfaces = Surfaces(scene, view, triangles, planes, ellipsoids)
-    rows, columns = np.mgrid[: scene.camera.height, : scene.camera.width]
-    x, y = scene.camera.view_plane(columns.ravel() + 0.5, rows.ravel() + 0.5)
-    found = visibility(triangles, planes, ellipsoids, scene.clip).first(x, y)
-    met = np.flatnonzero(found >= 0)
-    return Stage(scene, view, surfaces, Space(surfaces), surfaces.seen(found[met], x[met], y[met]))
-
-
-def outwards(points: Points, rng) -> np.ndarray:
-    """(3, n) unit directions, evenly over the side that the normals are on."""
-    directions = rng.normal(size=(3, points.count))
-    directions /= np.linalg.norm(directions, axis=0)
-    return directions * np.where((directions * points.normal).sum(axis=0) < 0, -1.0, 1.0)
 
 
 class Oracle:
@@ -74,7 +20,7 @@ class Oracle:
     What is met is told by `Points.primitive`'s numbers.
     """
 
-    def __init__(self, stage: Stage, kind: str) -> None:
+    def __init__(self, stage, kind: str) -> None:
         self._view = stage.view
         corners, self._hidden, self._spheres = [np.empty((0, 3, 3))], [], []
         for placed in stage.scene.objects:
@@ -134,7 +80,7 @@ class Oracle:
 NEARBY = 16 * 2.0**-24
 
 
-def unexplained(stage: Stage, kind: str, starts, directions, leaving, found) -> np.ndarray:
+def unexplained(stage, kind: str, starts, directions, leaving, found) -> np.ndarray:
     """Which rays meet a primitive (−1 for none) that neither they nor any ray near them meets, by brute force."""
     oracle = Oracle(stage, kind)
     wrong = np.flatnonzero(oracle.first(starts, directions, leaving)[0] != found)
@@ -156,21 +102,21 @@ def found_first(stage, points, directions, kind="diffuse"):
 
 @settings(max_examples=6)
 @given(seed=SEEDS)
-def test_scattered_rays_meet_first_what_brute_force_finds(random_scene, seed):
-    check_scattered_rays(random_scene, seed)
+def test_scattered_rays_meet_first_what_brute_force_finds(random_scene, stage_of, outwards, seed):
+    check_scattered_rays(random_scene, stage_of, outwards, seed)
 
 
 @settings(max_examples=4)
 @given(seed=SEEDS)
-def test_without_embree_they_meet_the_same(random_scene, seed):
+def test_without_embree_they_meet_the_same(random_scene, stage_of, outwards, without_embree, seed):
     with pytest.MonkeyPatch.context() as patch:
         without_embree(patch)
-        check_scattered_rays(random_scene, seed)
+        check_scattered_rays(random_scene, stage_of, outwards, seed)
 
 
-def check_scattered_rays(random_scene, seed, shift=0.0):
+def check_scattered_rays(random_scene, stage_of, outwards, seed, shift=0.0):
     rng = np.random.default_rng(seed)
-    stage = staged(random_scene(seed))
+    stage = stage_of(random_scene(seed))
     if not stage.points.count:
         return
     points = stage.points.at(rng.integers(0, stage.points.count, 150))
@@ -189,28 +135,28 @@ def check_scattered_rays(random_scene, seed, shift=0.0):
     assert (np.einsum("in,in->n", hits.normal, directions[:, met]) <= 1e-12).all(), "a normal looks away from the ray"
 
 
-def test_starts_that_are_moved_are_found_out(random_scene):
+def test_starts_that_are_moved_are_found_out(random_scene, stage_of, outwards):
     with pytest.raises(AssertionError, match="rays meet what no ray near them meets"):
-        check_scattered_rays(random_scene, 0, shift=0.1)
+        check_scattered_rays(random_scene, stage_of, outwards, 0, shift=0.1)
 
 
 @settings(max_examples=6)
 @given(seed=SEEDS)
-def test_shadow_rays_are_blocked_where_brute_force_finds_something_on_their_way(random_scene, seed):
-    check_shadow_rays(random_scene, seed)
+def test_shadow_rays_are_blocked_where_brute_force_finds_something_on_their_way(random_scene, stage_of, outwards, seed):
+    check_shadow_rays(random_scene, stage_of, outwards, seed)
 
 
 @settings(max_examples=4)
 @given(seed=SEEDS)
-def test_without_embree_the_same_are_blocked(random_scene, seed):
+def test_without_embree_the_same_are_blocked(random_scene, stage_of, outwards, without_embree, seed):
     with pytest.MonkeyPatch.context() as patch:
         without_embree(patch)
-        check_shadow_rays(random_scene, seed)
+        check_shadow_rays(random_scene, stage_of, outwards, seed)
 
 
-def check_shadow_rays(random_scene, seed, stretch=1.0):
+def check_shadow_rays(random_scene, stage_of, outwards, seed, stretch=1.0):
     rng = np.random.default_rng(seed)
-    stage = staged(random_scene(seed))
+    stage = stage_of(random_scene(seed))
     if not stage.points.count:
         return
     points = stage.points.at(rng.integers(0, stage.points.count, 150))
@@ -232,16 +178,16 @@ def check_shadow_rays(random_scene, seed, stretch=1.0):
     assert not len(wrong), f"{len(wrong)} of 150 shadow rays are blocked or open and no ray near them is"
 
 
-def test_shadow_rays_that_go_a_tenth_too_far_are_found_out(random_scene):
+def test_shadow_rays_that_go_a_tenth_too_far_are_found_out(random_scene, stage_of, outwards):
     with pytest.raises(AssertionError, match="blocked or open"):
         for seed in range(5):
-            check_shadow_rays(random_scene, seed, stretch=1.1)
+            check_shadow_rays(random_scene, stage_of, outwards, seed, stretch=1.1)
 
 
-def test_the_rays_of_a_scene_without_anything_meet_nothing(make_scene, make_mesh, make_spheres, finder):
+def test_the_rays_of_a_scene_without_anything_meet_nothing(stage_of, outwards, make_scene, make_mesh, make_spheres, finder):
     camera = Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 10, 8, 8)
     wall = make_mesh([[-9, -9, -5], [9, -9, -5], [0, 20, -5]], [[0, 1, 2]])
-    points = staged(make_scene(camera, wall)).points
+    points = stage_of(make_scene(camera, wall)).points
     flat = np.diag([1.0, 1.0, 0.0, 1.0])
     for things in (
         (),
@@ -252,23 +198,23 @@ def test_the_rays_of_a_scene_without_anything_meet_nothing(make_scene, make_mesh
         (make_spheres([[0, 0, -2]], 0.0),),
         ((make_spheres([[0, 0, -2]], 1.0), flat),),  # a sphere that its matrix flattens
     ):
-        stage = staged(make_scene(camera, *things))
+        stage = stage_of(make_scene(camera, *things))
         directions = outwards(points, np.random.default_rng(0))
         met, hits, distances = stage.space.first(points, directions, "diffuse")
         assert not len(met) and not hits.count and not len(distances)
         assert not stage.space.blocked(points, directions, np.full(points.count, np.inf)).any()
 
 
-def test_no_rays_meet_nothing(random_scene, finder):
-    stage = staged(random_scene(1))
+def test_no_rays_meet_nothing(random_scene, stage_of, finder):
+    stage = stage_of(random_scene(1))
     none = stage.points.at(np.empty(0, np.intp))
     met, hits, distances = stage.space.first(none, np.empty((3, 0)), "glossy")
     assert not len(met) and not hits.count and not len(distances)
     assert stage.space.blocked(none, np.empty((3, 0)), np.empty(0)).shape == (0,)
 
 
-def test_directions_that_are_no_directions_meet_nothing(random_scene, finder):
-    stage = staged(random_scene(1))
+def test_directions_that_are_no_directions_meet_nothing(random_scene, stage_of, finder):
+    stage = stage_of(random_scene(1))
     points = stage.points.at(slice(0, 4))
     directions = np.array([[0, 0, 0], [np.nan, 0, 1], [np.inf, 0, 0], [np.nan] * 3], float).T
     with np.errstate(invalid="ignore"):
@@ -285,7 +231,9 @@ def _hidden(scene: Scene, number: int, *kinds: str) -> Scene:
 
 @pytest.mark.parametrize("kind", ["camera", "diffuse", "glossy", "transmission", "shadow"])
 @pytest.mark.parametrize("thing", ["mesh", "wide mesh", "sphere"])
-def test_what_is_hidden_from_a_kind_of_rays_is_met_by_all_others(make_scene, make_mesh, make_spheres, finder, kind, thing):
+def test_what_is_hidden_from_a_kind_of_rays_is_met_by_all_others(
+    stage_of, make_scene, make_mesh, make_spheres, finder, kind, thing
+):
     """A floor, and between it and a ceiling something: it hides the one from the other."""
     size = 1e4 if thing == "wide mesh" else 3
     square = np.array([[-size, -size], [size, -size], [size, size], [-size, size]])
@@ -299,8 +247,8 @@ def test_what_is_hidden_from_a_kind_of_rays_is_met_by_all_others(make_scene, mak
     scene = make_scene(camera, level(0.0), middle, level(2.0))
     seen = []
     for hidden in (False, True):
-        stage = staged(_hidden(scene, 1, kind) if hidden else scene)
-        floor = staged(make_scene(Pinhole((0, 0, 0.5), (0, 0, 0), (0, 1, 0), 10, 1, 1), level(0.0))).points
+        stage = stage_of(_hidden(scene, 1, kind) if hidden else scene)
+        floor = stage_of(make_scene(Pinhole((0, 0, 0.5), (0, 0, 0), (0, 1, 0), 10, 1, 1), level(0.0))).points
         up = np.array([[0.0], [0.0], [1.0]])
         floor = replace(floor, position=stage.view.axes @ (0 * up - stage.view.eye[:, None]), normal=stage.view.axes @ up)
         if kind == "camera":
