@@ -233,8 +233,8 @@ def _loupe(comparison: RadianceComparison, shown: tuple) -> str:
         return ""
     items = "".join(_crop(comparison, shown, row, question) for row, question in failed[:_MOST_CROPS])
     return (
-        "<h2>Under the loupe</h2><p class=note>The worst place of each question that failed, in Combined: reference on the left, "
-        f"test on the right.</p><ul class=loupe>{items}</ul>"
+        "<h2>Under the loupe</h2><p class=note>The worst place of each question that failed, in Combined: reference on the "
+        f"left, test on the right.</p><ul class=loupe>{items}</ul>"
     )
 
 

@@ -84,14 +84,13 @@ def change_words(reference: float, test: float) -> str:
 
 
 def worst_question(row: "LightRow") -> "Question | None":
-    """Of those that fail, the one that tells where: the whole picture where most of it differs, else the largest tiles."""
+    """Of those that fail, the one that tells where: the smallest tiles, or the whole picture where half of them differ."""
     failing = [question for question in row.questions if not question.ok]
     if not failing:
         return None
-    whole, tiles = failing[-1].size == WHOLE, [question for question in failing if question.size != WHOLE]
-    if whole and (row.factor is not None or any(question.is_everywhere for question in tiles)):
-        return failing[-1]
-    return tiles[-1] if tiles else failing[-1]
+    tiles = [question for question in failing if question.size not in (PIXELS, WHOLE)] or failing
+    whole = failing[-1] if failing[-1].size == WHOLE else None
+    return whole if whole and (row.factor is not None or tiles[0].is_everywhere) else tiles[0]
 
 
 def _noisy_lines(comparison: "RadianceComparison") -> list[str]:

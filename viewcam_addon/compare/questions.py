@@ -5,7 +5,9 @@ shows in the mean. By itself, a place that rare light has missed so far looks bo
 that crosses the corner of a pixel may have been missed by all of its samples.
 
 What is within rounding is no difference: a pixel's is taken beyond the law's maximum, a tile's sum beyond the law's 99th
-percentile of each pixel, since a mean of rounding errors can't exceed what nearly all of them stay below.
+percentile of each pixel, since a mean of rounding errors can't exceed what nearly all of them stay below. Nor is what Cycles'
+table of the Blackman-Harris filter does (tracer/filters.py): it shifts the picture by 4.9e-4 px to the right and upwards, and
+changes a pixel by 0.21 % of the contrast around it at most. Of a tile a shift changes only what passes its border.
 """
 
 from collections.abc import Iterator
@@ -16,6 +18,7 @@ from numpy.typing import NDArray
 
 from . import law, noise
 from .law import Array
+from .mismatches import largest_around
 from .sides import CHANNEL_NAMES, Sides
 
 PIXELS, WHOLE = 1, 0
@@ -23,6 +26,10 @@ SIZES = (PIXELS, 8, 32, WHOLE)
 """Sides of the tiles, in pixels; 0 is one tile over all."""
 
 _NEARLY_ALL = law.ROUNDINGS[law.PERCENTILES.index(99.0)]
+# Of the default filter width of 1.5 px; twice the shift, for what the table does beside shifting.
+_FILTER_SHIFT, _FILTER_CONTRAST = 2 * 4.9e-4, 0.0021
+# Standard errors of what has no noise at all: beyond any limit, and a number still.
+_CERTAIN = 1e6
 _TINY = np.finfo(float).tiny
 
 
@@ -112,22 +119,36 @@ def over_pixels(tiles: Array, shape: tuple[int, int], size: int) -> Array:
 def _answers(sides: Sides, one: Array, freedom: tuple[int, int], level: float) -> Iterator[tuple[int, Array, Array]]:
     """For each size: (size, errors, what is allowed)."""
     difference = sides.difference
-    errors, both = _pixel_errors(sides, law.ROUNDINGS[-1] * one, freedom)
+    errors, both = _pixel_errors(sides, law.ROUNDINGS[-1] * one + _FILTER_CONTRAST * _contrast(sides.reference), freedom)
     yield PIXELS, errors, noise.student_critical(both, noise.sidak(level, errors.size))
     rounding = np.broadcast_to(_NEARLY_ALL * one, difference.shape)
+    across = [np.gradient(sides.reference, axis=axis) for axis in (0, 1) if sides.reference.shape[axis] > 1]
     for size in SIZES[1:]:
         total, square, allowance = (noise.tile_sums(values, size) for values in (difference, difference**2, rounding))
-        errors = _beyond(total, allowance) / np.sqrt(np.maximum(np.maximum(square, noise.mean_around(square)), _TINY))
+        allowance = allowance + _FILTER_SHIFT * sum(np.abs(noise.tile_sums(slope, size)) for slope in across)
+        errors = _errors(_beyond(total, allowance), np.maximum(square, noise.mean_around(square)))
         yield size, errors, np.full(errors.shape, noise.sign_critical(noise.sidak(level, errors.size)))
 
 
 def _pixel_errors(sides: Sides, rounding: Array, freedom: tuple[int, int]) -> tuple[Array, Array]:
     """Each pixel's difference in standard errors, 0 where they are not known, and Welch's degrees of freedom."""
     variances = [np.maximum(variance, noise.mean_around(variance)) for variance in (sides.variance, sides.spread)]
-    total = np.maximum(variances[0] + variances[1], _TINY)
-    share = np.where(np.isfinite(total), variances[0] / np.where(np.isfinite(total), total, 1.0), 0.5)
+    total = variances[0] + variances[1]
+    known = np.isfinite(total) & (total > 0.0)
+    share = np.divide(variances[0], total, out=np.full(total.shape, 0.5), where=known)
     both = 1.0 / (share**2 / freedom[0] + (1.0 - share) ** 2 / freedom[1])
-    return _beyond(sides.difference, rounding) / np.sqrt(total), both
+    return _errors(_beyond(sides.difference, rounding), total), both
+
+
+def _errors(differences: Array, variances: Array) -> Array:
+    errors = differences / np.sqrt(np.maximum(variances, _TINY))
+    return np.clip(errors, -_CERTAIN, _CERTAIN)
+
+
+def _contrast(values: Array) -> Array:
+    """Each channel's largest difference within each pixel's 3 × 3 neighbourhood."""
+    channels = np.moveaxis(values, -1, 0)
+    return np.stack([largest_around(channel) + largest_around(-channel) for channel in channels], axis=-1)
 
 
 def _beyond(values: Array, allowance: Array) -> Array:

@@ -34,7 +34,7 @@ class LightRow:
     """What was found in one quantity.
 
     reference, test : means over the picture and its channels. ratio : test over reference, nan where that is 0.
-    ratio_error : its standard error.
+    ratio_error : its standard error. visible : the relative bias of the whole picture that is found half of the time.
     questions : the statistical ones, none where there is no noise. steady, edges : the exact comparison, None where there is.
     broken : pixels that are no numbers on one side or both. factor : the one that explains all of the difference, or None.
     """
@@ -43,6 +43,7 @@ class LightRow:
     reference: float
     test: float
     ratio_error: float
+    visible: float
     broken: int
     questions: tuple[Question, ...] = ()
     steady: Row | None = None
@@ -52,11 +53,6 @@ class LightRow:
     @property
     def ratio(self) -> float:
         return self.test / self.reference if self.reference else float("nan")
-
-    @property
-    def visible(self) -> float:
-        """The relative bias of the whole picture that would be found half of the time."""
-        return self.questions[-1].limit * self.ratio_error if self.questions else 0.0
 
     @property
     def ok(self) -> bool:
@@ -128,10 +124,11 @@ def carries_light(image: Image) -> bool:
     return "Combined" in image.passes
 
 
-def compare(reference: Image, tests: Sequence[Image], pinhole: Pinhole) -> RadianceComparison:
+def compare(reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_samples: int | None = None) -> RadianceComparison:
     """Compare one reference with one test picture or with several of different seeds.
 
-    pinhole : the camera of the reference, which must have the passes Combined and Depth.
+    pinhole : the camera of the reference, which must have the passes Combined and Depth. test_samples : of each test picture,
+    where that is not what its file tells (Cycles counts a first sample that it leaves out).
 
     Raises
     ------
@@ -141,7 +138,7 @@ def compare(reference: Image, tests: Sequence[Image], pinhole: Pinhole) -> Radia
     found = list(all_sides(reference, tests))
     combined, black = found[0], tuple(sides.name for sides in found[1:] if sides.is_black)
     lit = [sides for sides in found if sides.name not in black]
-    samples, seeds = (samples_of(reference), samples_of(tests[0])), len(tests)
+    samples, seeds = (samples_of(reference), test_samples or samples_of(tests[0])), len(tests)
     is_noisy = not quiet(combined.reference, combined.variance).all()
     is_noisy |= seeds > 1 and not quiet(combined.test, combined.spread).all()
     freedom = (max((samples[0] or 2) - 1, 1), max(seeds - 1, 1))
@@ -168,7 +165,7 @@ def _steady(sides: Sides, rounding: steady.Rounding) -> tuple[LightRow, dict[str
     row, edges, roundings = steady.compare(sides, one, rounding.shift)
     factor = None if row.ok else _factor(sides, lambda scaled: steady.compare(scaled, one, rounding.shift)[0].ok)
     drawn = {"difference": sides.difference.mean(axis=-1), "roundings": roundings}
-    return LightRow(*_means(sides), 0.0, int(sides.broken.sum()), steady=row, edges=edges, factor=factor), drawn
+    return LightRow(*_means(sides), 0.0, 0.0, int(sides.broken.sum()), steady=row, edges=edges, factor=factor), drawn
 
 
 def _noisy(
@@ -176,11 +173,12 @@ def _noisy(
 ) -> tuple[LightRow, dict[str, Array]]:
     one = rounding.of(sides)
     asked = questions.ask(sides, one, freedom, level)
-    name, mean, other = _means(sides)
-    # Channels share their samples, so that each pixel's sum over them is one error.
-    errors = (sides.difference - sides.difference.mean()).sum(axis=-1)
-    error = float(np.sqrt((errors**2).sum())) / sides.reference.size
-    row = LightRow(name, mean, other, error / mean if mean else float("nan"), int(sides.broken.sum()), asked)
+    errors = sides.difference - sides.difference.mean(axis=(0, 1))
+    # Channels share their samples, so that each pixel's sum over them is one error; but each channel is asked by itself.
+    ratio_error = _relative(np.sqrt((errors.sum(axis=-1) ** 2).sum()), sides.reference.sum())
+    by_channel = map(_relative, np.sqrt((errors**2).sum(axis=(0, 1))), sides.reference.sum(axis=(0, 1)))
+    visible = asked[-1].limit * min(by_channel)
+    row = LightRow(*_means(sides), ratio_error, visible, int(sides.broken.sum()), asked)
     if not row.ok:
         scaled_passes = _factor(sides, lambda scaled: all(q.ok for q in questions.ask(scaled, one, freedom, level)))
         row = replace(row, factor=scaled_passes)
@@ -194,6 +192,10 @@ def _noisy(
 
 def _means(sides: Sides) -> tuple[str, float, float]:
     return sides.name, float(sides.reference.mean()), float(sides.test.mean())
+
+
+def _relative(error: float, light: float) -> float:
+    return float(error / light) if light > 0.0 else float("inf")
 
 
 def _factor(sides: Sides, passes: Callable[[Sides], bool]) -> float | None:

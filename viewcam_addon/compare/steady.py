@@ -79,10 +79,9 @@ def compare(sides: Sides, one: Array, shift: Array) -> tuple[Row, Edges, Array]:
     error = np.abs(sides.difference).max(axis=-1)
     most = law.ROUNDINGS[-1] * one
     apart = error > most
-    largest, smallest = (
-        np.stack([sign * largest_around(sign * channel) for channel in np.moveaxis(sides.reference, -1, 0)], axis=-1)
-        for sign in (1.0, -1.0)
-    )
+    channels = np.moveaxis(sides.reference, -1, 0)
+    largest = np.stack([largest_around(channel) for channel in channels], axis=-1)
+    smallest = -np.stack([largest_around(-channel) for channel in channels], axis=-1)
     allowance = largest_around(most)
     margin = allowance[..., None]
     near = ((sides.test <= largest + margin) & (sides.test >= smallest - margin)).all(axis=-1)
