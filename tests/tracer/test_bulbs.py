@@ -237,6 +237,7 @@ def test_a_lamp_where_the_surface_is_gives_numbers(make_lighting):
     for lamp in (
         point(1e10, (0, 0, 0)),
         point(1e10, (0, 0, 0), radius=1e-30),
+        point(1e10, (0, 0, 1), radius=1e-200),
         point(1e10, (0, 0, 0), radius=1.0, soft_falloff=True),
         Spot("spot", matrix=matrix, power=(1e10,) * 3),
         Spot("spot", matrix=matrix, power=(1e10,) * 3, radius=1.0, angle=np.pi),
@@ -252,6 +253,12 @@ def test_dark_lamps_light_nothing_and_are_not_there(make_lighting):
     dark = [point(0.0, (0, 0, 1), radius=1.0), Sun("sun", irradiance=(0, 0, 0)), Spot("spot", matrix=flat)]
     lighting = make_lighting(*dark)
     assert not lighting.emitters.lit and not lighting.emitters.sampled("diffuse") and not lighting.emitters.meets("camera")
+
+
+def test_lamps_of_next_to_no_size_are_seen_as_numbers_or_not_at_all(make_lighting):
+    for size in (1e-320, 1e-200, 1e-99, 1e-30):
+        lighting = make_lighting(point(1e18, (0, 0, 1), radius=size), Sun("sun", towards=(0, 0, 1), angle=size))
+        assert np.isfinite(lighting.seen(np.zeros((3, 1)), np.array([[0.0], [0.0], [1.0]]))).all()
 
 
 # Sabotage: 1 % of a solid angle, a cosine, a π

@@ -43,6 +43,11 @@ def columns(vectors: Sequence[Sequence[float]]) -> Floats:
     return np.array(vectors, np.float64).reshape(-1, 3).T.copy()
 
 
+def _not_tiny(sizes: Sequence[float]) -> Floats:
+    """Sizes as they are, but 0 where their squares are nothing that float64 can divide by."""
+    return np.where(np.array(sizes) > 1e-100, sizes, 0.0)
+
+
 def risen(height: Floats, distance: Floats, reach: Floats) -> Floats:
     """About the cosine under which what reaches `reach` round a place is seen, 0 only if all of it is below the horizon.
 
@@ -74,7 +79,7 @@ class Suns:
 
     def __init__(self, lamps: Sequence[Sun], view: View) -> None:
         self.colours = columns([lamp.irradiance for lamp in lamps])
-        half = np.array([lamp.angle for lamp in lamps]) / 2
+        half = _not_tiny([lamp.angle / 2 for lamp in lamps])
         self.sized = half > 0
         self._towards = view.axes @ columns([lamp.towards for lamp in lamps])
         self._half_chord = np.sin(half / 2)
@@ -117,7 +122,7 @@ class Bulbs:
         places = [lamp.matrix[:3, 3] if isinstance(lamp, Spot) else lamp.position for lamp in lamps]
         self.colours = columns([lamp.power for lamp in lamps])
         self.centres = view.axes @ (columns(places) - view.eye[:, None])
-        self._radii = self.reach = np.array([lamp.radius for lamp in lamps])
+        self._radii = self.reach = _not_tiny([lamp.radius for lamp in lamps])
         self.sized = self._radii > 0
         self._soft = np.array([lamp.soft_falloff for lamp in lamps])
         self._cones = _Cones(lamps, view) if any(isinstance(lamp, Spot) for lamp in lamps) else None

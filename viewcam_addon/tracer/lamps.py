@@ -112,7 +112,7 @@ class _Beam:
         axis = directions.sum(axis=1)
         length = float(np.linalg.norm(axis))
         self._axis = axis / length if length > 0 else np.array([0.0, 0.0, 1.0])
-        self._opening = float(np.arccos(np.clip((self._axis @ directions).min(), -1.0, 1.0))) + _ROUNDING
+        self._opening = float(np.arccos(np.clip(dot(self._axis, directions).min(), -1.0, 1.0))) + _ROUNDING
 
     def reaches(self, centres: Floats, reach: Floats) -> NDArray[np.bool_]:
         """(k,) whether any of the rays can come within `reach` of the centres, (3, k)."""
@@ -120,5 +120,7 @@ class _Beam:
         distance = np.sqrt(dot(way, way))
         reach = reach + self._radius
         with np.errstate(divide="ignore", invalid="ignore"):
-            aside = np.arccos(np.clip(self._axis @ way / distance, -1.0, 1.0)) - np.arcsin(np.minimum(reach / distance, 1.0))
+            aside = np.arccos(np.clip(dot(self._axis, way) / distance, -1.0, 1.0)) - np.arcsin(
+                np.minimum(reach / distance, 1.0)
+            )
         return (distance <= reach * (1 + _ROUNDING)) | (aside <= self._opening)

@@ -9,6 +9,7 @@ hidden_from : which rays don't see the lamp itself, of "camera", "diffuse", "glo
     does not light.
 """
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass
 from typing import ClassVar
@@ -23,6 +24,9 @@ from .materials import radiance
 RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
 """The kinds of rays that things may be hidden from; lamps have no shadow."""
 
+# Of coordinates and sizes: as of scenes, products of a few of them are float64's.
+LARGEST = 1e18
+
 
 @dataclass(frozen=True, eq=False)
 class Lamp:
@@ -34,21 +38,28 @@ class Lamp:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "hidden_from", hidden_from(f"light {self.name!r}", self.hidden_from))
+        truth = checks.truth(f"casts_shadow of light {self.name!r}", self.casts_shadow)
+        object.__setattr__(self, "casts_shadow", truth)
 
     @property
     def is_dark(self) -> bool:
         """Whether it gives no light at all."""
         raise NotImplementedError
 
-    def _check(self, what: str, value: object, least: float = 0.0, most: float = 1e18) -> None:
+    def _check(self, what: str, value: object, least: float = 0.0, most: float = LARGEST) -> None:
         object.__setattr__(self, what, checks.number(f"{what} of light {self.name!r}", value, least, most))
+
+    def _check_angle(self) -> None:
+        """At most π, as which the float32 just above it counts, Blender's 180°."""
+        self._check("angle", self.angle, 0.0, float(np.float32(np.pi)))
+        object.__setattr__(self, "angle", min(self.angle, np.pi))
 
     def _check_colour(self, what: str) -> None:
         object.__setattr__(self, what, radiance(f"{what} of light {self.name!r}", getattr(self, what)))
 
     def _check_matrix(self) -> None:
-        if self.matrix.shape != (4, 4) or not np.isfinite(self.matrix).all():
-            raise InputError(f"the matrix of light {self.name!r} must be 4 × 4 finite numbers: check its transform")
+        if np.shape(self.matrix) != (4, 4) or not (np.abs(self.matrix) <= LARGEST).all():
+            raise InputError(f"the matrix of light {self.name!r} must be 4 × 4 numbers below {LARGEST:g}: check its transform")
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,15 +78,15 @@ class Sun(Lamp):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._check_colour("irradiance")
-        self._check("angle", self.angle, 0.0, np.pi)
-        towards = np.array(checks.vector(f"towards of light {self.name!r}", self.towards, 3))
-        largest = np.abs(towards).max()
+        self._check_angle()
+        towards = checks.vector(f"towards of light {self.name!r}", self.towards, 3)
+        largest = max(map(abs, towards))
         if not largest > 0:
             raise InputError(f"towards of light {self.name!r} is 0, 0, 0: give the direction to the sun")
-        if abs(towards @ towards - 1) > 2.0**-50:  # what is a unit vector stays one, to the last bit
-            towards /= largest
-            towards /= np.sqrt(towards @ towards)
-        object.__setattr__(self, "towards", tuple(towards.tolist()))
+        if abs(math.hypot(*towards) - 1) > 2.0**-50:  # what is a unit vector stays one, to the last bit
+            towards = tuple(component / largest for component in towards)
+            towards = tuple(component / math.hypot(*towards) for component in towards)
+        object.__setattr__(self, "towards", towards)
 
     @property
     def is_dark(self) -> bool:
@@ -98,7 +109,10 @@ class Point(Lamp):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "position", checks.vector(f"position of light {self.name!r}", self.position, 3))
+        position = checks.vector(f"position of light {self.name!r}", self.position, 3)
+        if max(map(abs, position)) > LARGEST:
+            raise InputError(f"position of light {self.name!r} is {checks.shown(position)}: give numbers below {LARGEST:g}")
+        object.__setattr__(self, "position", position)
         self._check_colour("power")
         self._check("radius", self.radius)
 
@@ -129,7 +143,7 @@ class Spot(Lamp):
         self._check_matrix()
         self._check_colour("power")
         self._check("radius", self.radius)
-        self._check("angle", self.angle, 0.0, np.pi)
+        self._check_angle()
         self._check("blend", self.blend, 0.0, 1.0)
 
     @property
@@ -156,8 +170,8 @@ class Area(Lamp):
         self._check_matrix()
         self._check_colour("power")
         size = checks.vector(f"size of light {self.name!r}", self.size, 2)
-        if min(size) < 0:
-            raise InputError(f"size of light {self.name!r} is {size}: give two numbers that are not negative")
+        if not all(0 <= side <= LARGEST for side in size):
+            raise InputError(f"size of light {self.name!r} is {checks.shown(size)}: give two numbers from 0 to {LARGEST:g}")
         object.__setattr__(self, "size", size)
 
     @property
