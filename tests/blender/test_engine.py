@@ -271,4 +271,4 @@ def settings_of(scene):
             if prop.type in ("BOOLEAN", "INT", "FLOAT", "ENUM", "STRING") and not prop.is_readonly:
                 value = getattr(owner, prop.identifier)
                 found[prefix + prop.identifier] = tuple(map(repr, value)) if getattr(prop, "is_array", False) else repr(value)
-    return found | {"counts": [len(getattr(bpy.data, kind)) for kind in ("objects", "meshes", "materials", "images", "scenes")]}
+    return found | {"counts": [len(getattr(bpy.data, kind)) for kind in ("objects", "meshes", "materials", "scenes")]}

@@ -1,11 +1,12 @@
 """The panels of the render engine "Virtual Pinhole Reference", and those of Blender that it shares.
 
 Blender shows a panel to the engines that its class names in COMPAT_ENGINES. Generic panels (output, colour management, camera,
-physics, ...) name BLENDER_RENDER and are shared, as other engines' add-ons do, and so are EEVEE's panels for the nodes of
-materials and worlds. Where a panel shows what is not modelled (EEVEE's lamps), one of ours stands in its place. Rejected:
-sharing Cycles' own panels, which ask their common base class for its engines and can be had only all together.
+physics, ...) name BLENDER_RENDER and are shared, as other engines' add-ons do, and so are EEVEE's for the nodes of materials
+and worlds. Where one shows what is not modelled (EEVEE's lamps) or would stand above ours (Simplify), ours takes its place.
+Rejected: sharing Cycles' own panels, which ask their common base class for its engines and can be had only all together.
 """
 
+import re
 from collections.abc import Iterator
 from typing import ClassVar
 
@@ -17,14 +18,7 @@ from .engine import ASKED_BY, VIEWCAM_RenderEngine
 ENGINE = VIEWCAM_RenderEngine.bl_idname
 
 _SHARED = ("EEVEE_MATERIAL_PT_context_material", "EEVEE_MATERIAL_PT_surface", "EEVEE_WORLD_PT_surface")
-_NOT_SHARED = (
-    "DATA_PT_preview",
-    "DATA_PT_light",
-    "DATA_PT_spot",
-    "NODE_DATA_PT_light",
-    "DATA_PT_camera_stereoscopy",
-    "RENDER_PT_stereoscopy",
-)
+_NOT_SHARED = re.compile("freestyle|RENDER_PT_simplify|DATA_PT_(preview|light|spot)$")
 
 
 class _Panel:
@@ -45,7 +39,6 @@ class _Panel:
 
 class VIEWCAM_RENDER_PT_sampling(_Panel, bpy.types.Panel):
     bl_label = "Sampling"
-    bl_order = -1
 
     def draw(self, context: bpy.types.Context) -> None:
         settings, column = context.scene.virtual_pinhole_reference, self.column()
@@ -89,6 +82,20 @@ class VIEWCAM_RENDER_PT_film(_CyclesSettingsPanel, bpy.types.Panel):
             column.prop(scene.cycles, "filter_width", text="Width")
 
 
+class VIEWCAM_RENDER_PT_simplify(_Panel, bpy.types.Panel):
+    bl_label = "Simplify"
+    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        self.layout.prop(context.scene.render, "use_simplify", text="")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column = self.column()
+        column.active = context.scene.render.use_simplify
+        column.prop(context.scene.render, "simplify_subdivision_render", text="Max Subdivision")
+        column.prop(context.scene.render, "simplify_child_particles_render", text="Max Child Particles")
+
+
 class VIEWCAM_VIEWLAYER_PT_passes(_Panel, bpy.types.Panel):
     bl_label = "Passes"
     bl_context = "view_layer"
@@ -112,11 +119,11 @@ class VIEWCAM_LIGHT_PT_light(_Panel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         self.layout.row().prop(context.light, "type", expand=True)
         column = self.column()
-        for name in _lamp_settings(context.light):
+        for name in lamp_settings(context.light):
             column.prop(context.light, name)
 
 
-def _lamp_settings(lamp: bpy.types.Light) -> Iterator[str]:
+def lamp_settings(lamp: bpy.types.Light) -> Iterator[str]:
     """Those that count in the picture; some versions know fewer of them."""
     yield "color"
     if hasattr(lamp, "use_temperature"):
@@ -150,6 +157,7 @@ CLASSES = (
     VIEWCAM_RENDER_PT_sampling,
     VIEWCAM_RENDER_PT_light_paths,
     VIEWCAM_RENDER_PT_film,
+    VIEWCAM_RENDER_PT_simplify,
     VIEWCAM_VIEWLAYER_PT_passes,
     VIEWCAM_LIGHT_PT_light,
     VIEWCAM_OBJECT_PT_ray_visibility,
@@ -174,9 +182,5 @@ def _blenders_panels() -> Iterator[type[bpy.types.Panel]]:
     """The panels that are shared."""
     for each in bpy.types.Panel.__subclasses__():
         engines = vars(each).get("COMPAT_ENGINES", ())
-        if each.__name__ in _SHARED or ("BLENDER_RENDER" in engines and not _is_left_out(each.__name__)):
+        if each.__name__ in _SHARED or ("BLENDER_RENDER" in engines and not _NOT_SHARED.search(each.__name__)):
             yield each
-
-
-def _is_left_out(name: str) -> bool:
-    return "freestyle" in name or name in _NOT_SHARED
