@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from .arrays import Floats, Indices, gather
 from .glowing import Glowing
 from .lamps import Lamps
-from .lights import Lamp
+from .lights import RAYS, Lamp
 from .points import Points, Surfaces
 from .scene import Scene
 from .textures import Palette
@@ -69,8 +69,8 @@ class Emitters:
         self._world = scene.world
         self._shines = palette.has("emission")
         self.lit = bool(lamps) or self._shines or any(scene.world.radiance)
-        self._met = {kind: Lamps(_seen_by(kind, lamps), view) for kind in ("camera", "glossy", "transmission")}
-        self._lamps = Lamps(_seen_by("diffuse", lamps), view)
+        seen = _seen_by_kind(lamps, view)
+        self._lamps, self._met = seen.pop("diffuse"), seen
         self._glowing = Glowing(scene, surfaces, palette)
         self._count = self._lamps.count + self._glowing.count
         self._shadowed = np.append(self._lamps.shadowed, np.ones(self._glowing.count, bool))
@@ -199,5 +199,12 @@ def _extent(surfaces: Surfaces) -> float:
     return float(np.linalg.norm(np.ptp(places, axis=1))) / 2 or 1.0 if places.shape[1] else 1.0
 
 
-def _seen_by(kind: str, lamps: Sequence[Lamp]) -> list[Lamp]:
-    return [lamp for lamp in lamps if kind not in lamp.hidden_from]
+def _seen_by_kind(lamps: Sequence[Lamp], view: View) -> dict[str, Lamps]:
+    """The lamps that each kind of ray sees; one table where several see the same."""
+    made: dict[tuple[int, ...], Lamps] = {}
+    seen = {}
+    for kind in RAYS[:-1]:
+        some = [lamp for lamp in lamps if kind not in lamp.hidden_from]
+        key = tuple(map(id, some))
+        seen[kind] = made[key] = made.get(key) or Lamps(some, view)
+    return seen
