@@ -7,6 +7,6 @@ import functools
 
 from .. import charts
 
-SWEEPS = ("convergence",)
+SWEEPS = ("convergence", "pictures")
 
 run = functools.partial(charts.run, __package__, SWEEPS)

@@ -1,0 +1,77 @@
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks.charts import Curve
+from benchmarks.light import convergence
+from benchmarks.light.convergence import OURS, slope
+
+
+@pytest.fixture(scope="module")
+def charts():
+    return {chart.name.removeprefix("convergence-"): chart for chart in convergence.charts(quick=True)}
+
+
+def curve(chart, name) -> Curve:
+    (found,) = (curve for curve in chart.curves if curve.name == name)
+    return found
+
+
+def slope_of(chart, name):
+    return slope(curve(chart, name).x, curve(chart, name).y)
+
+
+def test_ours_is_behind_no_other_method_anywhere(charts):
+    assert [sentence for chart in charts.values() for sentence in chart.behind()] == []
+
+
+def test_the_error_of_edges_falls_as_the_three_quarters_power(charts):
+    assert slope_of(charts["edge"], OURS) <= -0.75
+
+
+def test_the_error_of_what_is_smooth_falls_nearly_as_the_power_of_one_and_a_half(charts):
+    assert slope_of(charts["lamp"], OURS) <= -1.3
+
+
+def test_an_edge_in_four_dimensions_falls_faster_than_noise_where_padding_does_not(charts):
+    """The theory's −5/8 for an edge in four dimensions; padding ends at −½."""
+    chart = charts["soft-shadow"]
+    assert slope_of(chart, OURS) <= -0.6
+    assert curve(chart, OURS).y[-1] < 0.9 * curve(chart, "Owen's permutations, padded").y[-1]
+
+
+def test_random_numbers_fall_as_noise_does_in_every_chart(charts):
+    """Which also tests the answers on paper: with a wrong one, errors would not fall."""
+    for chart in charts.values():
+        assert slope_of(chart, "random numbers") == pytest.approx(-0.5, abs=0.05), chart.name
+
+
+@pytest.mark.parametrize("name", ["edge", "lamp"])
+def test_in_two_dimensions_ours_is_owens_permutations(charts, name):
+    """The same variance; RMS over 256 pixels is off by its own 1/√512 on both sides, thrice that is 19 %."""
+    ours, owen = curve(charts[name], OURS).y, curve(charts[name], "Owen's permutations, padded").y
+    np.testing.assert_allclose(np.log(ours), np.log(owen), atol=math.log(1.19))
+
+
+def test_a_sampler_that_repeats_itself_is_told(monkeypatch):
+    ours = convergence.METHODS[OURS]
+    monkeypatch.setitem(
+        convergence.METHODS, OURS, lambda pairs, pixels, samples: ours(pairs, pixels, samples // 4).repeat(4, 2)
+    )
+    assert any(chart.behind() for chart in convergence.charts(quick=True))
+
+
+def test_the_cube_is_cut_as_on_paper():
+    half = convergence._cut_cube(np.ones((4, 1)), np.array([2.0]))
+    assert half[0] == pytest.approx(0.5, abs=1e-12)
+    corner = convergence._cut_cube(np.array([[1.0], [2.0]]), np.array([1.0]))
+    assert corner[0] == pytest.approx(0.25, abs=1e-15)
+    # Seen from the other side: 1 − x < 0.3 is x > 0.7.
+    assert convergence._cut_cube(np.array([[-1.0], [1e-9]]), np.array([-0.7]))[0] == pytest.approx(0.3, abs=1e-6)
+
+
+def test_a_lamp_that_fills_the_sky_shines_on_a_floor_with_its_radiance():
+    """¼ of the hemisphere for each of its four corners; and the textbook's square, as wide as high above the floor, 0.2395."""
+    assert 4 * convergence._corner_share(np.array(1e9), np.array(1e9)) == pytest.approx(1)
+    assert 4 * convergence._corner_share(np.array(0.5), np.array(0.5)) == pytest.approx(0.2394564705, abs=1e-9)
