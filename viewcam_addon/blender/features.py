@@ -125,7 +125,8 @@ def note_object(
         if any(modifier.type == "NODES" and modifier.show_render for modifier in real.modifiers):
             ledger.note(name, "approximated", "has no material, and Cycles may bend its normals where they graze")
     for material in filter(None, slots):
-        ledger.call_for_cycles(material.original, materials.keep_normals)
+        if not shading:  # the Normal pass; mirrors and glass bend normals on both sides (scattering.specular_normal)
+            ledger.call_for_cycles(material.original, materials.keep_normals)
         reasons = materials.departures(material)
         if shading:
             reasons += shading.reading(material).reasons
