@@ -33,6 +33,7 @@ def lamps_in(depsgraph: bpy.types.Depsgraph, bounces: Bounces, ledger: Ledger) -
             ledger.note(name, "exported", "a light")
             hidden_from = features.hidden_from(placed, depsgraph.view_layer_eval) - {"shadow"}
             matrix = np.array(instance.matrix_world, dtype=np.float64)
+            features.note_linking(placed, ledger)
             _note(name, light, bounces, ledger)
             lamp = _lamp(name, light, matrix, hidden_from, _strength(name, light, ledger), ledger)
             if lamp is not None:

@@ -5,7 +5,12 @@ from .lights import World
 from .materials import PLAIN, Material
 from .scene import Object, Scene
 
-_COUNTED_AS = {"diffuse": "diffuse", "mirror": "glossy", "glass": "transmission", "refraction": "transmission"}
+_COUNTED_AS = {
+    "diffuse": ("diffuse",),
+    "mirror": ("glossy",),
+    "glass": ("glossy", "transmission"),
+    "refraction": ("transmission",),
+}
 
 
 def least_level(scene: Scene) -> tuple[str, str]:
@@ -24,7 +29,7 @@ def least_level(scene: Scene) -> tuple[str, str]:
     if not scattering:
         return direct, f"Light comes from {light}, and nothing reflects it."
     for placed, component in scattering:
-        if getattr(bounces, _COUNTED_AS[component]) > 0:
+        if any(getattr(bounces, kind) > 0 for kind in _COUNTED_AS[component]):
             what = {"diffuse": "reflects light onto others", "mirror": "mirrors"}.get(component, "is clear")
             return path, f"Light comes from {light}, and {placed.name!r} {what}."
     return direct, f"Light comes from {light}, and the scene allows no bounces of the kinds that it has."
