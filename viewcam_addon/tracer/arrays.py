@@ -10,7 +10,7 @@ Indices = NDArray[np.intp]
 
 def gather(table: NDArray, index: Indices) -> NDArray:
     """The entries `index` of the last axis of `table`. They must exist: NumPy's check would take longer than the copying."""
-    return np.take(table, index, axis=-1, mode="clip")
+    return table.take(index, axis=-1, mode="clip")
 
 
 Some = slice | Indices

@@ -244,7 +244,7 @@ def _corner_colours(triangles: Triangles) -> NDArray[np.float32]:
         np.zeros((9, len(mesh.triangles)), np.float32) if mesh.corner_colours is None else mesh.corner_colours.reshape(-1, 9).T
         for _, mesh in triangles.placed
     ]
-    return np.concatenate([np.empty((9, 0), np.float32), *colours], axis=1)
+    return np.ascontiguousarray(np.concatenate([np.empty((9, 0), np.float32), *colours], axis=1))
 
 
 def _interpolated(corners: NDArray[np.float32], first: Floats, second: Floats, count: int) -> Floats:

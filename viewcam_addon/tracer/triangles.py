@@ -96,7 +96,8 @@ def triangles_of(pairs: list[tuple[Object, Mesh]], view: View) -> Triangles:
 
 
 def _joined(parts: list[NDArray], empty: tuple[int, ...], dtype: type) -> NDArray:
-    return np.concatenate(parts, axis=-1, dtype=dtype, casting="same_kind") if parts else np.empty(empty, dtype)
+    joined = np.concatenate(parts, axis=-1, dtype=dtype, casting="same_kind") if parts else np.empty(empty, dtype)
+    return np.ascontiguousarray(joined)  # what is not, NumPy copies whole whenever some of it is gathered
 
 
 def _corner_normals(placed: Object, mesh: Mesh, shared: bool) -> Float32s:
