@@ -51,7 +51,8 @@ def test_cosine_directions_are_unit_and_above_their_surface_with_the_cosine_over
     rng = np.random.default_rng(seed)
     normal = random_units(rng)
     u = rng.random((2, 200))
-    u[:, :3] = [[0.0, 0.5, 1 - 2**-32], [0.0, 0.5, 1 - 2**-32]]
+    normal[:, 4:8] = normal[:, [0, 0, 1, 1]]
+    u[0, :8] = [0.0, 0.5, 1 - 2**-53, 0.0, 0.0, 1 - 2**-53, 0.0, 1 - 2**-53]  # with normals along ±z
     direction, density = cosine_direction(normal, u)
     cosine = dot(direction, normal)
     np.testing.assert_allclose(dot(direction, direction), 1, atol=16 * ROUNDING)

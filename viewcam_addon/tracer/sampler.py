@@ -49,6 +49,11 @@ _COMPONENT = (5, 14, (1, 1, 3, 11, 7))
 _ROULETTE = (5, 2, (1, 1, 5, 13, 11))
 _SPARE = (6, 1, (1, 3, 7, 5, 19, 39))
 
+# Of the hashes (the last is 2³² over the golden ratio), and of the reversal: which bits of a byte change places.
+_MIXERS = tuple(np.uint32(factor) for factor in (0x7FEB352D, 0x846CA68B, 0x9E3779B1))
+_SWAPS = tuple((np.uint32(shift), np.uint32(mask)) for shift, mask in ((1, 0x55555555), (2, 0x33333333), (4, 0x0F0F0F0F)))
+_1, _15, _16 = np.uint32(1), np.uint32(15), np.uint32(16)
+
 _BITS = 24
 _LOW = 16  # bits of a sample's number that its scattering's order changes, and for which there are tables
 
@@ -77,12 +82,21 @@ class Sampler:
         digits += shift
         return _reversed(digits) * 2.0**-32
 
+    def grid(self, pixels: NDArray[np.integer], samples: NDArray[np.integer], first: int, count: int) -> Floats:
+        """(count, s · n): the same for s samples of n pixels, sample after sample; the pixels' random words are made once."""
+        dimensions = range(first, first + count)
+        factor, shift = self._hashed(pixels, np.array(dimensions, np.uint32))
+        digits = np.stack([self._points(dimension, samples) for dimension in dimensions])
+        digits = digits[:, :, None] * factor[:, None]
+        digits += shift[:, None]
+        return _reversed(digits.reshape(count, -1)) * 2.0**-32
+
     def _hashed(self, pixels: NDArray[np.integer], keys: Words) -> tuple[Words, Words]:
         """Two random words for each key and pixel, (k, n) each; the first odd."""
         shift = _mixed(_mixed(pixels.astype(np.uint32) ^ self._seeds[0]) ^ _mixed(keys + self._seeds[1])[:, None])
-        factor = shift * np.uint32(0x9E3779B1)
-        factor ^= factor >> np.uint32(15)
-        factor |= np.uint32(1)
+        factor = shift * _MIXERS[2]
+        factor ^= factor >> _15
+        factor |= _1
         return factor, shift
 
     def _points(self, dimension: int, samples: NDArray[np.integer]) -> Words:
@@ -108,21 +122,23 @@ class Sampler:
 
 def _mixed(words: Words) -> Words:
     """A permutation of all words that looks random (Wellons, Prospecting for Hash Functions, 2018: lowbias32)."""
-    words = words ^ (words >> np.uint32(16))
-    words *= np.uint32(0x7FEB352D)
-    words ^= words >> np.uint32(15)
-    words *= np.uint32(0x846CA68B)
-    words ^= words >> np.uint32(16)
+    higher = words >> _16
+    words = words ^ higher
+    words *= _MIXERS[0]
+    words ^= np.right_shift(words, _15, out=higher)
+    words *= _MIXERS[1]
+    words ^= np.right_shift(words, _16, out=higher)
     return words
 
 
 def _reversed(words: Words) -> Words:
     """The bits of contiguous words in reverse order; `words` is used up. Bytes are turned by NumPy, the bits in each here."""
-    for shift, mask in ((1, 0x55555555), (2, 0x33333333), (4, 0x0F0F0F0F)):
-        higher = words >> np.uint32(shift)
-        higher &= np.uint32(mask)
-        words &= np.uint32(mask)
-        words <<= np.uint32(shift)
+    higher = np.empty_like(words)
+    for shift, mask in _SWAPS:
+        np.right_shift(words, shift, out=higher)
+        higher &= mask
+        words &= mask
+        words <<= shift
         words |= higher
     return words.byteswap(inplace=True)
 

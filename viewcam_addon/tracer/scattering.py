@@ -12,6 +12,8 @@ from .arrays import Floats, dot
 
 # Cycles': how far a mirror's ray rises above the surface at least, or this part of how far the ray rises that comes.
 _LEAST_RISE, _RISE_SHARE = 0.01, 0.9
+# Half of a sampler's last digit: no direction is a pole of the sphere, which would be no direction where it meets the surface.
+_POLE = 2.0**-33
 
 
 def axes_about(normal: Floats) -> tuple[Floats, Floats]:
@@ -22,8 +24,19 @@ def axes_about(normal: Floats) -> tuple[Floats, Floats]:
     x, y, z = normal
     sign = np.copysign(1.0, z)
     a = -1.0 / (sign + z)
-    b = x * y * a
-    return np.stack([1.0 + sign * x * x * a, sign * b, -sign * x]), np.stack([b, sign + y * y * a, -y])
+    right, up = np.empty((2, *normal.shape))
+    xa = x * a
+    np.multiply(sign, x, out=right[2])
+    np.multiply(right[2], xa, out=right[0])
+    right[0] += 1.0
+    np.multiply(xa, y, out=up[0])
+    np.multiply(sign, up[0], out=right[1])
+    np.negative(right[2], out=right[2])
+    a *= y
+    np.multiply(a, y, out=up[1])
+    up[1] += sign
+    np.negative(y, out=up[2])
+    return right, up
 
 
 def cosine_direction(normal: Floats, u: Floats) -> tuple[Floats, Floats]:
@@ -31,20 +44,22 @@ def cosine_direction(normal: Floats, u: Floats) -> tuple[Floats, Floats]:
 
     normal : (3, n). u : (2, n), in [0, 1).
 
-    Returns directions (3, n), unit, and their density per solid angle (n,), the cosine over π. The square is mapped to a disc,
-    its squares to pieces of equal area that are about as wide as long (Shirley and Chiu, 1997), and the disc lifted to the
-    hemisphere (Malley).
+    Returns directions (3, n), unit, and their density per solid angle (n,), the cosine over π. They point from where a unit
+    sphere touches the surface to points that lie evenly all over the sphere, twice the cosine away: no frame is needed.
     """
-    right, up = axes_about(normal)
-    a, b = 2.0 * u - 1.0
-    wide = np.abs(a) > np.abs(b)
-    radius = np.where(wide, a, b)
-    turn = np.where(wide, b, a)
-    turn *= np.pi / 4 / np.where(radius == 0.0, 1.0, radius)
-    far, aside = radius * np.cos(turn), radius * np.sin(turn)
-    x, y = np.where(wide, far, aside), np.where(wide, aside, far)
-    cosine = np.sqrt(np.maximum(1.0 - radius * radius, 0.0))
-    return x * right + y * up + cosine * normal, cosine / np.pi
+    turn = u[1] * (2 * np.pi)
+    height = u[0] * (2.0 - 4 * _POLE)
+    height += 2 * _POLE - 1.0
+    across = np.sqrt(1.0 - height * height)
+    direction = np.empty(normal.shape)
+    np.multiply(across, np.cos(turn), out=direction[0])
+    np.multiply(across, np.sin(turn), out=direction[1])
+    direction[2] = height
+    direction += normal
+    length = np.sqrt(dot(direction, direction))
+    direction /= length
+    length *= 0.5 / np.pi
+    return direction, length
 
 
 def reflected(direction: Floats, normal: Floats) -> Floats:
@@ -59,11 +74,14 @@ def refracted(direction: Floats, normal: Floats, ratio: Floats) -> tuple[Floats,
 
     Returns directions (3, n), unit, and (n,) bool, True where no light goes through; there the direction is along the surface.
     """
-    across = (direction - dot(direction, normal) * normal) / ratio
+    across = direction - dot(direction, normal) * normal
+    across /= ratio
     squared = dot(across, across)
     total = squared >= 1.0
-    length = np.where(total, np.sqrt(squared), 1.0)
-    return across / length - np.sqrt(np.maximum(1.0 - squared, 0.0)) * normal, total
+    if total.any():
+        across /= np.where(total, np.sqrt(squared), 1.0)
+    across -= np.sqrt(np.maximum(1.0 - squared, 0.0)) * normal
+    return across, total
 
 
 def fresnel(cosine: Floats, ratio: Floats) -> Floats:
