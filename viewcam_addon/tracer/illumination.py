@@ -71,7 +71,7 @@ class Illumination:
             check()
             some = np.arange(first, min(first + at_a_time, self._samples))
             pixel, sample = np.tile(pixels, len(some)), np.repeat(some, count)
-            px, py = offsets(self._film, self._sampler.numbers(pixel, sample, 0, 2)) if self._samples > 1 else (0.5, 0.5)
+            px, py = offsets(self._film, self._sampler.grid(pixels, some, 0, 2)) if self._samples > 1 else (0.5, 0.5)
             x, y, primitives = self._eye(np.tile(columns, len(some)) + px, np.tile(rows, len(some)) + py)
             sums.add(self._paths.trace(pixel, sample, primitives, x, y))
         sums.write(passes, self._paths.random)
