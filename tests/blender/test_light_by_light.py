@@ -118,7 +118,15 @@ def test_a_spot_without_a_radius(stage, add_lamp):
     assert_within(stage(light), 1.2e-6, 2e-4)
 
 
-@pytest.mark.parametrize("shape", ["SQUARE", "RECTANGLE", "DISK", "ELLIPSE"])
+@pytest.mark.parametrize(
+    "shape",
+    [
+        pytest.param("SQUARE", marks=pytest.mark.exhaustive),
+        "RECTANGLE",
+        "DISK",
+        pytest.param("ELLIPSE", marks=pytest.mark.exhaustive),
+    ],
+)
 def test_an_area_light_and_how_it_is_seen(stage, add_lamp, shape):
     def light(rng):
         lamp = add_lamp("AREA", (*rng.uniform(-2, 2, 2), rng.uniform(1.5, 3)), turned(rng, 0.5), energy=200, shape=shape)
