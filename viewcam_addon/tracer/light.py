@@ -67,7 +67,7 @@ class Sums:
 
     def add(self, light: Light) -> None:
         """Add some samples of every pixel: the paths are those of all pixels, sample after sample."""
-        values = light.values.reshape(3, len(self._categories), -1, self._count)
+        values = light.values.reshape(3, len(self._categories), light.count // self._count, self._count)
         combined = np.zeros((3, values.shape[2], self._count))
         for row in self._shown:
             combined += values[:, row]
