@@ -1,22 +1,20 @@
 """Whole pictures of light whose answer is known on paper.
 
-What is random is judged by the mean of the picture: it must lie within 3 standard errors of the answer, and these must be small.
-Every law is a function that says by how much it is broken, so that sabotage can be told by the same figures.
+What is random is judged by the mean of the picture: it must lie within 3 standard errors of the answer, and these must be
+small. What is not random is judged by rounding. What sabotage does is in test_paths_in_a_box.py.
 """
 
 import numpy as np
 import pytest
 
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer import emitters, lobes, paths, scattering
-from viewcam_addon.tracer.film import Bounces, Film
+from viewcam_addon.tracer.film import Bounces
 from viewcam_addon.tracer.lights import Area, Point, Sun, World
 from viewcam_addon.tracer.materials import Colour, Material
 from viewcam_addon.tracer.render import render
 
 FLOAT32 = 2.0**-24
-# A picture is a mean of float64, rounded once; what goes into it, the lamps and the surface, is rounded some ten times in float64
-# and, in offset.py's starts alone, in float32, which only visibility sees.
+# A picture is a mean of float64, rounded once; smooth normals are float32, and what only visibility sees.
 ROUNDED = 4 * FLOAT32
 DOWN = Pinhole((0, 0, 4), (0, 0, 0), (0, 1, 0), 40, 32, 24)
 """Looks down at the origin, where a pixel is 0.1 wide."""
@@ -32,8 +30,8 @@ def glow(*radiance) -> Material:
 
 
 def square(make_mesh, half=1.0, height=0.0, x=0.0, y=0.0, up=True):
-    corners = np.array([[-half, -half, 0], [half, -half, 0], [half, half, 0], [-half, half, 0]]) + (x, y, height)
-    return make_mesh(corners, [[0, 1, 2], [0, 2, 3]] if up else [[0, 2, 1], [0, 3, 2]])
+    corners = np.array([[-half, -half, 0], [half, -half, 0], [half, half, 0], [-half, half, 0]])
+    return make_mesh(np.add(corners, (x, y, height)), [[0, 1, 2], [0, 2, 3]] if up else [[0, 2, 1], [0, 3, 2]])
 
 
 def box(make_mesh, half=1.0):
@@ -137,8 +135,7 @@ def test_a_plane_under_a_sun_has_albedo_times_irradiance_times_cosine_over_pi(ma
     assert (passes["Variance"] == 0).all() and (passes["Combined"][..., 3] == 1).all()
 
 
-def point_on_plane(make_mesh, make_lit):
-    """The largest relative error of a plane under a point."""
+def test_a_plane_under_a_point_has_power_over_four_pi_square_distance_times_cosine(make_mesh, make_lit):
     lamp = Point("point", position=(0.5, -0.3, 1.5), power=(30, 20, 10))
     passes = render(make_lit(DOWN, (square(make_mesh, 10), lambert(0.8)), lamps=(lamp,)), "direct", 1, threads=1)
     rows, columns = np.mgrid[: DOWN.height, : DOWN.width]
@@ -147,11 +144,7 @@ def point_on_plane(make_mesh, make_lit):
     way = np.array(lamp.position) - floor
     distance = np.linalg.norm(way, axis=-1)
     irradiance = np.array(lamp.power) / (4 * np.pi * distance[..., None] ** 2) * (way[..., 2] / distance)[..., None]
-    return np.abs(passes["Combined"][..., :3] / (0.8 / np.pi * irradiance) - 1).max()
-
-
-def test_a_plane_under_a_point_has_power_over_four_pi_square_distance_times_cosine(make_mesh, make_lit):
-    assert point_on_plane(make_mesh, make_lit) <= ROUNDED
+    assert np.abs(passes["Combined"][..., :3] / (0.8 / np.pi * irradiance) - 1).max() <= ROUNDED
 
 
 def test_a_lambert_sphere_under_a_sun_is_bright_by_its_cosine_and_dark_behind(make_spheres, make_lit):
@@ -178,8 +171,8 @@ def lit_from_above(make_mesh, make_lit, lamp=None, thing=None, samples=64, seed=
 
 
 def facing_rectangle(half_x, half_y, height):
-    """Form factor from a point to a parallel rectangle centred above it (Howell, A Catalog of Radiation Configuration Factors, B-3,
-    four times a quarter)."""
+    """Form factor from a point to a parallel rectangle centred above it: four times that of a quarter, with a corner there
+    (Howell, A Catalog of Radiation Configuration Factors, B-3)."""
     x, y = half_x / height, half_y / height
     a, b = np.hypot(1, x), np.hypot(1, y)
     return 4 / (2 * np.pi) * (x / a * np.arctan(y / a) + y / b * np.arctan(x / b))

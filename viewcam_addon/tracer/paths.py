@@ -238,7 +238,7 @@ class Paths:
         if depth > _CERTAIN:
             survival = np.where(last, 1.0, np.minimum(np.sqrt(weights.max(axis=0)), 1.0))
             kept &= numbers(which, _SURVIVAL, 1)[0] < survival
-            weights = weights / np.where(survival > 0, survival, 1.0)
+            weights = _made_up_for(weights, survival)
         which_kept = some(kept)
         return Rays(
             kind,
@@ -306,6 +306,11 @@ class Paths:
             rays.points.at(met), points, gather(rays.direction, met), distance, pick(rays.density, met), rays.kind
         )
         light.add(gather(rays.place, met), pick(rays.weight, met) * gather(radiance, bright) * shared)
+
+
+def _made_up_for(weights: Floats, survival: Floats) -> Floats:
+    """The weights of paths that went on by this chance: they stand for those that did not."""
+    return weights / np.where(survival > 0, survival, 1.0)
 
 
 def _places(light: Light, arrivals: Arrivals, depth: int) -> dict[str, Indices]:
