@@ -13,7 +13,7 @@ from ..image import Image
 from . import charts, page, pictures
 from .charts import figure
 from .law import PERCENTILES, ROUNDINGS
-from .light_verdict import change_words, place_words, samples_words
+from .light_verdict import change_words, edge_words, place_words, samples_words
 from .questions import WHOLE, Question
 from .radiance import LightRow, RadianceComparison
 
@@ -57,7 +57,7 @@ def write_report(
     shown = tuple(pictures.tone_mapped(side, bright) for side in (reference["Combined"][..., :3], comparison.test))
     viewer = page.Viewer()
     viewer.add(
-        "combined", "Combined", f"{page.SWAP} Both under one exposure.{_mean_of(tests)}", reference=shown[0], test=shown[1]
+        "picture", "Combined", f"{page.SWAP} Both under one exposure.{_mean_of(tests)}", reference=shown[0], test=shown[1]
     )
     for name, values in comparison.maps.items():
         _add_map(viewer, comparison, name, values)
@@ -148,15 +148,15 @@ def _add_signed(
 def _table(comparison: RadianceComparison) -> str:
     if not comparison.is_noisy:
         body = page.percentiles([row.steady for row in comparison.rows])
-        body += "".join(_edge_line(row) for row in comparison.rows if row.edges.count)
+        body += "".join(_edge_line(row) for row in comparison.rows if row.edges.count + row.edges.leaks)
     else:
         names = ("Quantity", "Reference", "Test", "Ratio", *(q.name for q in comparison.rows[0].questions), "")
         body = f"<thead><tr>{''.join(f'<th scope=col>{name}</th>' for name in names)}</tr></thead><tbody>"
         body += "".join(map(_noisy_line, comparison.rows))
     width = 3 + len(PERCENTILES)
     body += "".join(
-        f'<tr><th scope=row>{name}</th><td colspan="{width}" style="text-align:left">black on both sides</td></tr>'
-        for name in comparison.black
+        f'<tr><th scope=row>{name}</th><td colspan="{width}" style="text-align:left">the same to the last bit</td></tr>'
+        for name in comparison.equal
     )
     return body + "</tbody>"
 
@@ -172,10 +172,10 @@ def _noisy_line(row: LightRow) -> str:
 
 def _edge_line(row: LightRow) -> str:
     edges = row.edges
-    words = f"{edges.explained:,} show what is beside them; {edges.allowed:,} may"
     return (
-        f"<tr><th scope=row>{row.name} at edges</th><td>{edges.count:,}</td>"
-        f'<td colspan="{len(PERCENTILES)}" style="text-align:left">{words}</td><td></td><td>{page.mark(edges.ok)}</td></tr>'
+        f"<tr><th scope=row>{row.name} at edges</th><td>{edges.count + edges.leaks:,}</td>"
+        f'<td colspan="{len(PERCENTILES)}" style="text-align:left">{edge_words(edges)}</td><td></td>'
+        f"<td>{page.mark(edges.ok)}</td></tr>"
     )
 
 

@@ -9,7 +9,9 @@ from .statistics import percentile_name
 from .verdict import mark, percent
 
 if TYPE_CHECKING:
-    from .radiance import LightRow, Place, Question, RadianceComparison
+    from .questions import Place, Question
+    from .radiance import LightRow, RadianceComparison
+    from .steady import Edges
 
 # Factors that tell what went wrong, and how well a factor has to fit one: a picture without noise tells it to some digits.
 _TELLING = {
@@ -48,8 +50,8 @@ def sentence(comparison: "RadianceComparison") -> str:
 def lines(comparison: "RadianceComparison") -> list[str]:
     """A line for each quantity, aligned, what an eye sees, and the verdict last."""
     table = _noisy_lines(comparison) if comparison.is_noisy else _steady_lines(comparison)
-    if comparison.black:
-        table.append(f"{'Black':<17}{', '.join(comparison.black)}: on both sides")
+    if comparison.equal:
+        table.append(f"{'To the last bit':<17}{', '.join(comparison.equal)}")
     seen = comparison.appearance
     expected = "" if seen.expected_relmse is None else f", of which noise explains {seen.expected_relmse:.2e}"
     flip = "needs the package flip-evaluator" if seen.flip is None else f"{seen.flip:.4f}"
@@ -113,11 +115,14 @@ def _steady_lines(comparison: "RadianceComparison") -> list[str]:
     return table
 
 
+def edge_words(edges: "Edges") -> str:
+    """12 pixels differ at edges (63 may) and 1 elsewhere (2 may)."""
+    at_edges = f"{edges.count:,} pixels differ at edges ({edges.allowed:,} may)"
+    return f"{at_edges} and {edges.leaks:,} elsewhere ({edges.allowed_leaks:,} may)"
+
+
 def _edges(row: "LightRow") -> str:
-    edges = row.edges
-    if not edges.count:
-        return ""
-    return f"; {edges.count:,} pixels differ at edges ({edges.explained:,} show what is beside them, {edges.allowed:,} may)"
+    return f"; {edge_words(row.edges)}" if row.edges.count or row.edges.leaks else ""
 
 
 def _difference(row: "LightRow") -> str:
@@ -127,10 +132,7 @@ def _difference(row: "LightRow") -> str:
     if question is None:
         steady, edges = row.steady, row.edges
         if not edges.ok:
-            return (
-                f"{row.name} differs in {edges.count:,} pixels by more than float32 allows, {edges.explained:,} of them show "
-                f"what is beside them, as {edges.allowed:,} may"
-            )
+            return f"{row.name} differs by more than float32 allows: {edge_words(edges)}"
         percentile, share = steady.worst
         return f"{row.name} is off by {share:.3g} times its tolerance at {percentile_name(percentile)}"
     place = question.worst

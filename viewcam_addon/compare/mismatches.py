@@ -170,6 +170,12 @@ def largest_around(values: Array) -> Array:
     return np.maximum(np.maximum(across[:height], across[1 : height + 1]), across[2:])
 
 
+def contrast(values: Array) -> Array:
+    """(height, width, channels): the largest difference within each pixel's 3 × 3 neighbourhood."""
+    channels = np.moveaxis(values, -1, 0)
+    return np.stack([largest_around(channel) + largest_around(-channel) for channel in channels], axis=-1)
+
+
 def explain(
     columns: NDArray, rows: NDArray, seen: Seen, reach: Array, agreement: Agreement, surface_at: SurfaceAt
 ) -> tuple[Array, int]:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from . import law, noise
 from .law import Array
-from .mismatches import largest_around
+from .mismatches import contrast
 from .sides import CHANNEL_NAMES, Sides
 
 PIXELS, WHOLE = 1, 0
@@ -119,7 +119,7 @@ def over_pixels(tiles: Array, shape: tuple[int, int], size: int) -> Array:
 def _answers(sides: Sides, one: Array, freedom: tuple[int, int], level: float) -> Iterator[tuple[int, Array, Array]]:
     """For each size: (size, errors, what is allowed)."""
     difference = sides.difference
-    errors, both = _pixel_errors(sides, law.ROUNDINGS[-1] * one + _FILTER_CONTRAST * _contrast(sides.reference), freedom)
+    errors, both = _pixel_errors(sides, law.ROUNDINGS[-1] * one + _FILTER_CONTRAST * contrast(sides.reference), freedom)
     yield PIXELS, errors, noise.student_critical(both, noise.sidak(level, errors.size))
     rounding = np.broadcast_to(_NEARLY_ALL * one, difference.shape)
     across = [np.gradient(sides.reference, axis=axis) for axis in (0, 1) if sides.reference.shape[axis] > 1]
@@ -143,12 +143,6 @@ def _pixel_errors(sides: Sides, rounding: Array, freedom: tuple[int, int]) -> tu
 def _errors(differences: Array, variances: Array) -> Array:
     errors = differences / np.sqrt(np.maximum(variances, _TINY))
     return np.clip(errors, -_CERTAIN, _CERTAIN)
-
-
-def _contrast(values: Array) -> Array:
-    """Each channel's largest difference within each pixel's 3 × 3 neighbourhood."""
-    channels = np.moveaxis(values, -1, 0)
-    return np.stack([largest_around(channel) + largest_around(-channel) for channel in channels], axis=-1)
 
 
 def _beyond(values: Array, allowance: Array) -> Array:

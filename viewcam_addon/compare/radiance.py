@@ -74,8 +74,8 @@ class RadianceComparison:
     """What differs between a reference and the mean of some test pictures, in light.
 
     samples : of the reference, and of all test pictures together; None where the files do not tell. seeds : test pictures.
-    is_noisy : whether chance had a part in it. rows : one for each quantity, Combined first. black : quantities without light
-    on either side. appearance : relMSE and FLIP. test : the mean of the test pictures' Combined, (height, width, 3).
+    is_noisy : whether chance had a part in it. rows : one for each quantity, Combined first. equal : further quantities, the
+    same to the last bit. appearance : relMSE and FLIP. test : the mean of the test pictures' Combined, (height, width, 3).
     maps : name to (height, width) float32, rows from the bottom: what differs in Combined and in quantities that fail.
     """
 
@@ -84,7 +84,7 @@ class RadianceComparison:
     seeds: int
     is_noisy: bool
     rows: tuple[LightRow, ...]
-    black: tuple[str, ...]
+    equal: tuple[str, ...]
     appearance: Appearance
     test: Array
     maps: dict[str, NDArray[np.float32]]
@@ -114,7 +114,7 @@ class RadianceComparison:
             "noisy": self.is_noisy,
             "false_alarms": FALSE_ALARMS,
             "quantities": [row.to_json() for row in self.rows],
-            "black": list(self.black),
+            "equal": list(self.equal),
             "appearance": asdict(self.appearance),
         }
 
@@ -136,8 +136,8 @@ def compare(reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_sam
         if the sizes differ, a pass is missing, or there is no test picture.
     """
     found = list(all_sides(reference, tests))
-    combined, black = found[0], tuple(sides.name for sides in found[1:] if sides.is_black)
-    lit = [sides for sides in found if sides.name not in black]
+    combined, equal = found[0], tuple(sides.name for sides in found[1:] if sides.are_equal)
+    unequal = [sides for sides in found if sides.name not in equal]
     samples, seeds = (samples_of(reference), test_samples or samples_of(tests[0])), len(tests)
     is_noisy = not quiet(combined.reference, combined.variance).all()
     is_noisy |= seeds > 1 and not quiet(combined.test, combined.spread).all()
@@ -145,9 +145,9 @@ def compare(reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_sam
     rounding = steady.Rounding(pinhole, reference, max(filter(None, samples), default=1))
 
     rows, maps = [], {}
-    for sides in lit:
+    for sides in unequal:
         if is_noisy:
-            row, drawn = _noisy(sides, rounding, freedom, FALSE_ALARMS / len(lit))
+            row, drawn = _noisy(sides, rounding, freedom, FALSE_ALARMS / len(unequal))
         else:
             row, drawn = _steady(sides, rounding)
         rows.append(row)
@@ -157,7 +157,7 @@ def compare(reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_sam
     if flip is not None:
         maps["FLIP"] = flip
     together = (samples[0], samples[1] and samples[1] * seeds)
-    return RadianceComparison(pinhole, together, seeds, is_noisy, tuple(rows), black, appearance, combined.test, maps)
+    return RadianceComparison(pinhole, together, seeds, is_noisy, tuple(rows), equal, appearance, combined.test, maps)
 
 
 def _steady(sides: Sides, rounding: steady.Rounding) -> tuple[LightRow, dict[str, Array]]:

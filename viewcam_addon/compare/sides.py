@@ -48,9 +48,9 @@ class Sides:
         return self.test - self.reference
 
     @property
-    def is_black(self) -> bool:
-        """Whether there is nothing on either side."""
-        return not (self.reference.any() or self.test.any() or self.broken.any())
+    def are_equal(self) -> bool:
+        """Whether nothing differs, to the last bit, so that there is nothing to ask."""
+        return bool((self.reference == self.test).all() and not self.broken.any())
 
 
 def samples_of(image: Image) -> int | None:

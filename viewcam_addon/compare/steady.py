@@ -1,8 +1,10 @@
 """Light without noise: exact pictures, which may differ by what float32 rounds, and by what lies on the other side of an edge.
 
-A pixel on the edge of a shadow or a silhouette is one or the other, and the smallest shift of a ray decides. Such a pixel shows
-what one of its neighbours shows, and is rare: an edge lies within δ of the centre of a pixel beside it with the probability δ.
-So as many pixels as a shift by the law's 99th percentile would turn may differ, and those must show what is near them.
+A pixel on the edge of a shadow or a silhouette is one or the other, and the smallest shift of a ray decides. Such pixels are
+rare: an edge lies within δ of the centre of a pixel beside it with the probability δ. So as many of them may differ as a shift
+by the law's 99th percentile would turn. What they show instead is not asked: it need not be what is beside them, for a ray
+that slips through a silhouette meets the dark back of what it should have met. Rarer still are rays that slip through a closed
+surface, so that a pixel amid a shadow is lit.
 
 Rejected: accepting every pixel that shows what a neighbour shows; a picture shifted by a tenth of a pixel would pass.
 """
@@ -15,13 +17,15 @@ from ..image import Image
 from ..pinhole import Pinhole
 from . import law
 from .law import Array
-from .mismatches import largest_around
+from .mismatches import contrast, largest_around
 from .noise import poisson_allowance
 from .sides import Sides
 from .statistics import Row, measure
 
-# Pixels on edges are independent events; their number exceeds what is allowed once in a thousand pictures.
-_EDGE_LEVEL = 1e-3
+# Pixels on edges are independent events; their number exceeds what is allowed once in a thousand pictures, and so do leaks,
+# of which 120 pictures by Cycles of 57,600 pixels, each with one lamp, had one.
+_RARELY = 1e-3
+_LEAKS = 1e-6
 # An edge between a pixel and each of its neighbours to the left, right, top and bottom.
 _SIDES_OF_A_PIXEL = 4
 # Errors are told relative to the value, or to this share of the mean where the value is less.
@@ -30,15 +34,16 @@ _DARK = 1e-3
 
 @dataclass(frozen=True)
 class Edges:
-    """Pixels that differ by more than rounding. explained : how many show what is near them. allowed : how many may."""
+    """Pixels that differ by more than rounding: at edges, and how many may; elsewhere, and how many may."""
 
     count: int
-    explained: int
     allowed: int
+    leaks: int
+    allowed_leaks: int
 
     @property
     def ok(self) -> bool:
-        return self.explained == self.count <= self.allowed
+        return self.count <= self.allowed and self.leaks <= self.allowed_leaks
 
     def to_json(self) -> dict:
         return {**asdict(self), "ok": self.ok}
@@ -78,20 +83,15 @@ def compare(sides: Sides, one: Array, shift: Array) -> tuple[Row, Edges, Array]:
     """
     error = np.abs(sides.difference).max(axis=-1)
     most = law.ROUNDINGS[-1] * one
-    apart = error > most
-    channels = np.moveaxis(sides.reference, -1, 0)
-    largest = np.stack([largest_around(channel) for channel in channels], axis=-1)
-    smallest = -np.stack([largest_around(-channel) for channel in channels], axis=-1)
-    allowance = largest_around(most)
-    margin = allowance[..., None]
-    near = ((sides.test <= largest + margin) & (sides.test >= smallest - margin)).all(axis=-1)
-    on_edge = (largest - smallest).max(axis=-1) > allowance
-    turned = _SIDES_OF_A_PIXEL * law.ROUNDINGS[law.PERCENTILES.index(99.0)] * shift[on_edge]
+    apart, on_edge = error > most, contrast(sides.reference).max(axis=-1) > largest_around(most)
+    turned = np.minimum(_SIDES_OF_A_PIXEL * law.ROUNDINGS[law.PERCENTILES.index(99.0)] * shift, 1.0)[on_edge].sum()
     edges = Edges(
-        int(apart.sum()), int((apart & near).sum()), poisson_allowance(float(np.minimum(turned, 1.0).sum()), _EDGE_LEVEL)
+        int((apart & on_edge).sum()),
+        poisson_allowance(float(turned), _RARELY),
+        int((apart & ~on_edge).sum()),
+        poisson_allowance(_LEAKS * apart.size, _RARELY),
     )
-    judged = ~(apart & near) if edges.explained <= edges.allowed else np.full(apart.shape, True)
-    judged &= ~sides.broken
+    judged = ~sides.broken & ~(apart & edges.ok)
     size = np.abs(sides.reference).max(axis=-1)
     scale = np.maximum(size, max(_DARK * float(size.mean()), np.finfo(float).tiny))
     row = measure(sides.name, "relative", (error / scale)[judged], (one / scale)[judged])
