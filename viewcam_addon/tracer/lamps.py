@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Floats, Indices, dot
+from .arrays import Floats, Indices, dot, gather
 from .bulbs import Bulbs, Suns, entries
 from .lights import Area, Lamp, Point, Spot, Sun
 from .plates import Ellipses, Rectangles
@@ -17,8 +17,11 @@ from .view import View
 
 # More light than any picture holds, less than makes products overflow.
 _MOST = 1e100
-# Rays at a time: their arrays stay in a core's cache, and those of neighbouring pixels see few of many lamps.
+# Rays at a time: their arrays stay in a core's cache.
 _RAYS = 4096
+# For more lamps it pays to ask first which of them such a beam of rays can reach.
+_MANY = 16
+_BALL = 1e-12  # of a squared distance: the roundings of it and of what is subtracted
 _ROUNDING = 1e-6  # of angles: the arc cosine of 1 − 2⁻⁵³ is 1e-8
 
 Table = Suns | Bulbs | Rectangles | Ellipses
@@ -81,16 +84,19 @@ class Lamps:
         """As `Emitters.lamps_met`."""
         count = directions.shape[1]
         light = np.zeros((3, count))
-        nearest, farthest = np.broadcast_to(nearest, count), np.broadcast_to(farthest, count)
-        for first in range(0, count if self.sized else 0, _RAYS):
-            some = slice(first, first + _RAYS)
-            ways = starts[:, some], directions[:, some]
-            beam = _Beam(*ways)
-            for table in self._tables:
-                if not isinstance(table, Suns):
-                    for lamp in np.flatnonzero(table.sized & beam.reaches(table.centres, table.reach)):
-                        factors = table.met(lamp, *ways, nearest[some], farthest[some])
-                        light[:, some] += table.colours[:, lamp, None] * factors
+        starts, nearest, farthest = (
+            np.broadcast_to(values, (*np.shape(values)[:-1], count)) for values in (starts, nearest, farthest)
+        )
+        tables = [table for table in self._tables if not isinstance(table, Suns) and table.sized.any()]
+        are_many = sum(len(table.sized) for table in tables) > _MANY
+        for first in range(0, count if tables else 0, _RAYS):
+            part = slice(first, first + _RAYS)
+            rays = [values[..., part] for values in (starts, directions, nearest, farthest)]
+            beam = _Beam(*rays[:2]) if are_many else None
+            for table in tables:
+                seen = table.sized if beam is None else table.sized & beam.reaches(table.centres, table.reach)
+                for lamp in np.flatnonzero(seen):
+                    _add_lamp(light[:, part], table, lamp, *rays)
         return light
 
     def suns_met(self, directions: Floats) -> Floats:
@@ -101,6 +107,20 @@ class Lamps:
                 for lamp in np.flatnonzero(table.sized):
                     light += table.colours[:, lamp, None] * table.met(lamp, directions)
         return light
+
+
+def _add_lamp(
+    light: Floats, table: Table, lamp: int, starts: Floats, directions: Floats, nearest: Floats, farthest: Floats
+) -> None:
+    """Add what rays see of a lamp. Most pass by it so far off that a ball round it tells."""
+    way = table.centres[:, lamp, None] - starts
+    along, squared = dot(way, directions), dot(way, way)
+    reach = table.reach[lamp] ** 2
+    close = (squared * (1 - _BALL) - along * along <= reach) & ((along > 0) | (squared <= reach))
+    close = np.flatnonzero(close)
+    if len(close):
+        factors = table.met(lamp, *(gather(values, close) for values in (starts, directions, nearest, farthest)))
+        light[:, close] += table.colours[:, lamp, None] * factors
 
 
 class _Beam:
