@@ -37,8 +37,9 @@ def picture_of(image: bpy.types.Image) -> Picture:
         srgb = image.source == "FILE" and not image.packed_file and not image.is_dirty
         rgb = _encoded(rgb) if srgb else rgb
     if image.channels == 4 and image.alpha_mode == "STRAIGHT" and not image.is_float:
-        rgb = rgb * pixels[..., 3:]
-    return Picture(np.ascontiguousarray(np.nan_to_num(rgb, posinf=0.0, neginf=0.0)), srgb)
+        # As Cycles does it, in whole bytes.
+        rgb = np.rint(rgb * 255) * np.rint(pixels[..., 3:] * 255) // 255 / 255
+    return Picture(np.ascontiguousarray(np.nan_to_num(rgb, posinf=0.0, neginf=0.0), np.float32), srgb)
 
 
 def mean(image: bpy.types.Image) -> tuple[float, float, float]:

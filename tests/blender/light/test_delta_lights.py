@@ -11,9 +11,9 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.tracer.render import render
 
-# Relative errors of Cycles at the 50th and 99th percentile: those of the facts that this project began with, which another tracer
-# measured on other scenes with 4.2 to 5.2 (a sun's 99th percentile was 1.9e-7 there; here it is 2.3e-7 in 4.2). For a spot there
-# was only the 50th; the 99th is 1.25 times what is measured here.
+# Relative errors of Cycles at the 50th and 99th percentile: those of the facts that this project began with, which another
+# tracer measured on other scenes with 4.2 to 5.2 (a sun's 99th percentile was 1.9e-7 there; here it is 2.3e-7 in 4.2). For a
+# spot there was only the 50th; the 99th is 1.25 times what is measured here.
 SUN, POINT, SPOT = (7e-8, 2.4e-7), (2.4e-7, 9e-7), (1.2e-6, 1.8e-6)
 # Smooth normals of Cycles, in radians at the 99th percentile: 2.5e-4°, and 2e-3° since 5.1.
 SMOOTH = 2e-3 if bpy.app.version >= (5, 1) else 2.5e-4

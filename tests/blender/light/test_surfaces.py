@@ -1,0 +1,216 @@
+"""What surfaces are made of, under one sun and one sample: colours, textures and stand-ins, all without noise."""
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from viewcam_addon.blender import materials
+
+# Of the light that the brightest texture reflects. A cosine's rounding is 2e-7 at the 99th percentile (test_delta_lights.py); a
+# texture adds what its UV is off: 1e-5 of the picture's width at most, in textures of a few pixels.
+FLAT, TEXTURED = 4e-7, 1e-4
+
+
+@pytest.fixture(autouse=True)
+def sun(add_lamp):
+    add_lamp("SUN", rotation=(0.4, 0.3, 0), angle=0.0, energy=3.0)
+
+
+@pytest.fixture
+def floor(stage):
+    """The floor's material, and the nodes that it can be changed by."""
+    return bpy.data.objects["Floor"].data.materials[0]
+
+
+def check(sides, tolerance):
+    """The same light on both sides, but for a hundredth of the pixels, that lie on edges of textures."""
+    for each in sides:
+        ours, theirs = each.traced["Combined"], each.cycles[0]["Combined"]
+        error = np.abs(ours - theirs)[..., :3].max(axis=-1) / theirs[..., :3].max()
+        told = np.percentile(error, [50, 90, 99, 100])
+        assert told[2] <= tolerance and theirs[..., :3].max() > 0.05, told
+
+
+def told(sides):
+    return {entry.object: entry.reason for entry in sides[0].exported.ledger if entry.status != "exported"}
+
+
+@pytest.fixture
+def image(fresh_blender):
+    """image(space, opacity, **options) → an image of 5 × 3 random pixels."""
+
+    def make(space="sRGB", opacity=1.0, **options):
+        made = bpy.data.images.new("Checks", 5, 3, **options)
+        made.colorspace_settings.name = space
+        pixels = np.random.default_rng(1).random((15, 4), np.float32)
+        pixels[:, 3] = opacity
+        made.pixels.foreach_set(pixels.ravel())
+        made.update()
+        return made
+
+    return make
+
+
+def texture(material, image, interpolation, output="Color"):
+    node = material.node_tree.nodes.new("ShaderNodeTexImage")
+    node.image, node.interpolation = image, interpolation
+    material.node_tree.links.new(node.outputs["Color"], material.node_tree.nodes["Shader"].inputs["Color"])
+    return node
+
+
+def test_a_principled_surface_without_gloss(pictures, make_material):
+    for name in ("Monkey", "Floor"):
+        data = bpy.data.objects[name].data
+        data.materials[0] = make_material(
+            name, "ShaderNodeBsdfPrincipled", Base_Color=(0.7, 0.4, 0.2, 1), Specular_IOR_Level=0.0, Roughness=0.3
+        )
+    sides = pictures(scenes=2)
+    check(sides, FLAT)
+    assert not told(sides)
+
+
+def test_no_material_is_a_plain_one(pictures):
+    for name in ("Monkey", "Floor"):
+        bpy.data.objects[name].data.materials.clear()
+    sides = pictures(scenes=2)
+    check(sides, FLAT)
+    assert not told(sides)
+    assert np.unique(sides[0].traced["Diffuse Color"]).tolist() == pytest.approx([0, 0.8])
+
+
+@pytest.mark.parametrize("interpolation", ["Linear", "Closest"])
+@pytest.mark.parametrize(("space", "options"), [("sRGB", {}), ("Non-Color", {}), ("Non-Color", {"float_buffer": True})])
+def test_images_of_bytes_and_floats(pictures, floor, image, interpolation, space, options):
+    texture(floor, image(space, **options), interpolation)
+    sides = pictures(scenes=2)
+    check(sides, TEXTURED)
+    assert not told(sides) and len(np.unique(sides[0].cycles[0]["Diffuse Color"])) > 10
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("kind", ["PNG", "OPEN_EXR"])
+@pytest.mark.parametrize("opacity", [1.0, 0.5])
+def test_images_from_files(pictures, floor, image, tmp_path, kind, opacity, packed):
+    made = image("sRGB" if kind == "PNG" else "Non-Color", opacity, float_buffer=kind != "PNG", alpha=True)
+    made.filepath_raw, made.file_format = str(tmp_path / "file"), kind
+    made.save()
+    loaded = bpy.data.images.load(str(tmp_path / "file"))
+    loaded.colorspace_settings.name = made.colorspace_settings.name
+    if packed:
+        loaded.pack()
+    texture(floor, loaded, "Linear")
+    sides = pictures(scenes=1)
+    check(sides, TEXTURED)
+    assert not told(sides)
+
+
+@pytest.mark.parametrize("domain", ["POINT", "CORNER"])
+@pytest.mark.parametrize("kind", ["FLOAT_COLOR", "BYTE_COLOR"])
+@pytest.mark.parametrize("name", ["Paint", ""])
+def test_colours_of_the_mesh(pictures, floor, domain, kind, name):
+    mesh = bpy.data.objects["Floor"].data
+    mesh.color_attributes.new("Other", "FLOAT_COLOR", "POINT")
+    attribute = mesh.color_attributes.new("Paint", kind, domain)
+    values = np.random.default_rng(2).random((len(attribute.data), 4), np.float32)
+    attribute.data.foreach_set("color", values.ravel())
+    mesh.color_attributes.render_color_index = mesh.color_attributes.find("Paint")
+    node = floor.node_tree.nodes.new("ShaderNodeVertexColor")
+    node.layer_name = name
+    floor.node_tree.links.new(node.outputs["Color"], floor.node_tree.nodes["Shader"].inputs["Color"])
+    sides = pictures(scenes=1)
+    check(sides, TEXTURED)
+    assert not told(sides) and len(np.unique(sides[0].cycles[0]["Diffuse Color"])) > 1000
+
+
+def rough(material):
+    material.node_tree.nodes["Shader"].inputs["Roughness"].default_value = 0.5
+
+
+def noisy(material):
+    tree = material.node_tree
+    tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs[1], tree.nodes["Shader"].inputs["Color"])
+
+
+def bumpy(material):
+    tree = material.node_tree
+    bump = tree.nodes.new("ShaderNodeBump")
+    tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs[0], bump.inputs["Height"])
+    tree.links.new(bump.outputs[0], tree.nodes["Shader"].inputs["Normal"])
+
+
+def clipped(material):
+    made = bpy.data.images.new("Grey", 4, 4)
+    made.pixels.foreach_set(np.random.default_rng(3).random(64, np.float32))
+    texture(material, made, "Cubic").extension = "CLIP"
+
+
+def see_through(material):
+    tree = material.node_tree
+    mixed = tree.nodes.new("ShaderNodeMixShader")
+    tree.links.new(tree.nodes.new("ShaderNodeBsdfTransparent").outputs[0], mixed.inputs[1])
+    tree.links.new(tree.nodes["Shader"].outputs[0], mixed.inputs[2])
+    tree.links.new(mixed.outputs[0], tree.nodes["Output"].inputs["Surface"])
+
+
+STAND_INS = {rough: "Roughness 0.5", noisy: "not modelled", bumpy: "turns", clipped: "clip", see_through: "transparent"}
+
+
+@pytest.mark.parametrize("change", STAND_INS, ids=lambda change: change.__name__)
+def test_a_stand_in_is_the_same_on_both_sides(pictures, floor, change):
+    change(floor)
+    sides = pictures(scenes=1)
+    check(sides, TEXTURED)
+    assert STAND_INS[change] in told(sides)["Floor"], told(sides)
+
+
+@pytest.mark.parametrize("change", [rough, noisy, bumpy], ids=lambda change: change.__name__)
+def test_without_its_stand_in_the_comparison_fails(pictures, floor, change, monkeypatch):
+    """The test above must be able to fail."""
+    change(floor)
+    monkeypatch.setattr(materials, "stand_in", lambda borrow, material, reading: None)
+    sides = pictures(scenes=1)
+    with pytest.raises(AssertionError):
+        check(sides, TEXTURED)
+
+
+def test_another_uv_map_than_the_active_one_is_told(pictures, floor, image):
+    mesh = bpy.data.objects["Floor"].data
+    second = mesh.uv_layers.new(name="Second")
+    for each in second.uv:
+        each.vector *= 3
+    node = texture(floor, image(), "Linear")
+    tree = floor.node_tree
+    tree.links.new(tree.nodes.new("ShaderNodeUVMap").outputs[0], node.inputs["Vector"])
+    tree.nodes["UV Map"].uv_map = "Second"
+    sides = pictures(scenes=1)
+    check(sides, TEXTURED)
+    assert "'Second'" in told(sides)["Floor"]
+
+
+def test_clay_covers_everything_alike(pictures, floor):
+    noisy(floor)
+    bpy.data.objects["Monkey"].data.materials.clear()
+    layer = bpy.context.view_layer
+    sides = pictures(scenes=2, clay=True)
+    check(sides, FLAT)
+    assert not told(sides) and layer.material_override is None
+    assert np.unique(sides[0].cycles[0]["Diffuse Color"]).tolist() == pytest.approx([0, 0.8])
+
+
+@pytest.mark.parametrize("hidden", ["camera", "shadow"])
+def test_what_is_hidden_from_some_rays_is_there_for_others(pictures, hidden):
+    monkey = bpy.data.objects["Monkey"]
+    shown = pictures(scenes=1)[0]
+    setattr(monkey, f"visible_{hidden}", False)
+    sides = pictures(scenes=1)
+    check(sides, FLAT)
+    assert next(each for each in sides[0].exported.objects if each.name == "Monkey").hidden_from == {hidden}
+    assert np.abs(sides[0].traced["Combined"] - shown.traced["Combined"]).max() > 0.1
+
+
+def test_a_scene_seen_from_its_eye_is_lit_likewise(pictures, scene):
+    scene.cycles.pixel_filter_type, scene.render.film_transparent = "BOX", True
+    sides = pictures(scenes=2, recenter=True)
+    check(sides, 2 * FLAT)
+    assert sides[0].exported.film.transparent and sides[0].exported.film.filter == "BOX"
