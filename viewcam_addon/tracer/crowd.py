@@ -79,22 +79,24 @@ class Crowd:
 
     def _many_met(self, starts: Floats, directions: Floats, leaving: Indices, limits: Floats) -> Iterator[Hits]:
         rays = np.flatnonzero(limits > 0)
-        gone, beyond = np.zeros(len(rays)), limits[rays]
+        gone, beyond = np.zeros(len(rays)), self._beyond(limits[rays])
         while len(rays):
-            ways = directions[:, rays]
-            origins = starts[:, rays] + gone * ways
+            ways = gather(directions, rays)
+            origins = gather(starts, rays) + gone * ways
             ahead = np.minimum((beyond - gone) * self._unit, _FAR).astype(np.float32)
             crossed = self._embree.run(rows(origins * self._unit), rows(ways), dists=ahead, output=1)
             on = np.flatnonzero(crossed["primID"] >= 0)
-            rays, gone, beyond = rays[on], gone[on], beyond[on]
+            rays, gone = rays[on], gone[on]
             ball = self._many[crossed["primID"][on] >> 3]
-            distance = self._balls.distance(ball, starts[:, rays], ways[:, on])
+            distance = self._balls.distance(ball, gather(starts, rays), gather(ways, on))
             distance[leaving[rays] == self._balls.number[ball]] = np.inf
             yield ball, rays, distance
             gone = gone + crossed["tfar"][on] / self._unit
-            gone += _STEP * (np.abs(origins[:, on]).max(axis=0) + gone)
-            limit = limits[rays]
-            # An octahedron that holds the start is left within `_widest`, be there a nearer hit or not.
-            beyond = np.where(limit > 0, np.minimum(beyond, np.maximum(limit, self._widest)), 0.0)
+            gone += _STEP * (np.abs(gather(origins, on)).max(axis=0) + gone)
+            beyond = self._beyond(limits[rays])
             further = np.flatnonzero(gone < beyond)
             rays, gone, beyond = rays[further], gone[further], beyond[further]
+
+    def _beyond(self, limits: Floats) -> Floats:
+        """How far rays go on. An octahedron that holds the start is left within `_widest`, be there a nearer hit or not."""
+        return np.where(limits > 0, np.maximum(limits, self._widest), 0.0)
