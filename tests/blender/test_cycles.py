@@ -4,7 +4,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import cycles, depsgraph, indices
+from viewcam_addon.blender import cycles, depsgraph, indices, job
 from viewcam_addon.blender.borrowing import borrowed
 from viewcam_addon.errors import InputError
 
@@ -38,10 +38,14 @@ def state(scene):
         "objects": {block.name: dump(block, 2) for block in bpy.data.objects},
         "cameras": {block.name: dump(block, 2) for block in bpy.data.cameras},
         "materials": {block.name: dump(block, 2) for block in bpy.data.materials},
+        "lights": {block.name: dump(block, 2) for block in bpy.data.lights},
+        "worlds": {block.name: dump(block, 2) for block in bpy.data.worlds},
         "trees": {
-            block.name: [dump(node, 0) for node in block.node_tree.nodes] for block in bpy.data.materials if block.node_tree
+            block.name: [dump(node, 0) for node in block.node_tree.nodes]
+            for block in (*bpy.data.materials, *bpy.data.lights, *bpy.data.worlds)
+            if block.node_tree
         },
-        "worlds": [block.name for block in bpy.data.worlds],
+        "names": [[block.name for block in blocks] for blocks in (bpy.data.materials, bpy.data.scenes, bpy.data.meshes)],
         "frame": (scene.frame_current, scene.frame_subframe),
     }
 
@@ -86,7 +90,18 @@ def crowded(scene, camera_object):
     world.use_nodes = True
     output = world.node_tree.nodes.get("World Output") or world.node_tree.nodes.new("ShaderNodeOutputWorld")
     world.node_tree.links.new(world.node_tree.nodes.new("ShaderNodeVolumeScatter").outputs[0], output.inputs["Volume"])
+    world.cycles.max_bounces = 3
     scene.world = world
+    lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "AREA"))
+    scene.collection.objects.link(lamp)
+    lamp.location, lamp.data.spread = (0, 0, 5), 1.0
+    lamp.data.cycles.max_bounces, lamp.data.cycles.use_multiple_importance_sampling = 3, False
+    lamp.light_linking.receiver_collection = bpy.data.collections.new("Receivers")
+    if not lamp.data.node_tree:
+        lamp.data.use_nodes = True
+    tree = lamp.data.node_tree
+    emission = next(node for node in tree.nodes if node.type == "EMISSION")
+    tree.links.new(tree.nodes.new("ShaderNodeLightFalloff").outputs["Linear"], emission.inputs["Strength"])
     held_out = bpy.data.collections.new("Held out")
     scene.collection.children.link(held_out)
     scene.view_layers[0].layer_collection.children["Held out"].holdout = True
@@ -100,6 +115,7 @@ def crowded(scene, camera_object):
     render.filepath, render.film_transparent = "//never/####", True
     scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.pixel_filter_type = 77, True, "GAUSSIAN"
     scene.cycles.use_camera_cull = scene.cycles.use_animated_seed = True
+    scene.cycles.caustics_reflective, scene.cycles.film_exposure, scene.cycles.seed = False, 0.5, 5
     scene.frame_set(7)
     return scene
 
@@ -122,6 +138,65 @@ def test_everything_borrowed_is_given_back(crowded, both_sides, engine, file_for
     before = state(crowded)
     both_sides()
     assert not (changed := list(differences(before, state(crowded)))), "\n".join(changed)
+
+
+@pytest.mark.parametrize("request_", [{}, {"clay": True}, {"recenter": True}], ids=str)
+def test_everything_borrowed_for_light_is_given_back(crowded, tmp_path, request_):
+    crowded.render.image_settings.file_format = "PNG"
+    before = state(crowded)
+    paths = [tmp_path / "first.exr", tmp_path / "second.exr"]
+    exported = job.export_and_render(job.Request(level="path", samples=4, threads=2, **request_), paths)
+    assert not (changed := list(differences(before, state(crowded)))), "\n".join(changed)
+    assert all(path.stat().st_size > 1000 for path in paths) and paths[0].read_bytes() != paths[1].read_bytes()
+    told = {entry.object: entry.reason for entry in exported.ledger}
+    assert "spread" in told["Lamp"] and "light linking" in told["Lamp"] and "has a volume" in told["Fog"]
+
+
+@pytest.fixture
+def settings_of_renders(monkeypatch):
+    """What of Cycles' settings each render is made with, in place of rendering."""
+    seen = []
+
+    def look(scene, to_file):
+        names = ("samples", "seed", "max_bounces", "diffuse_bounces", "pixel_filter_type", "film_exposure")
+        seen.append({name: getattr(scene.cycles, name) for name in names})
+        seen[-1]["passes"] = {
+            f"use_pass_{name}" for name in ("z", "emit", "position") if getattr(scene.view_layers[0], f"use_pass_{name}")
+        }
+
+    monkeypatch.setattr(cycles, "render_still", look)
+    monkeypatch.setattr(cycles, "is_whole", lambda path: path.touch() is None)
+    return seen
+
+
+def test_pictures_of_light_share_samples_and_count_seeds(scene, camera_object, tmp_path, settings_of_renders):
+    scene.cycles.max_bounces, scene.cycles.diffuse_bounces, scene.cycles.film_exposure = 9, 3, 2.0
+    scene.cycles.pixel_filter_type = "BOX"
+    paths = [tmp_path / f"{number}.exr" for number in range(3)]
+    job.export_and_render(job.Request(level="path", samples=48, seed=7), paths)
+    first = 0 if hasattr(scene.cycles, "sample_subset_length") else 1  # before 4.4 the first sample is not counted
+    assert [each["samples"] for each in settings_of_renders] == [17 - first] * 3
+    assert [each["seed"] for each in settings_of_renders] == [7, 8, 9]
+    assert settings_of_renders[0]["max_bounces"] == 9 and settings_of_renders[0]["diffuse_bounces"] == 3
+    assert settings_of_renders[0]["pixel_filter_type"] == "BOX" and settings_of_renders[0]["film_exposure"] == 2.0
+    assert settings_of_renders[0]["passes"] == {"use_pass_emit"}, "what is at the centre needs the first sample"
+
+
+def test_direct_light_has_no_bounces_and_one_sample_is_the_centre(scene, camera_object, tmp_path, settings_of_renders):
+    job.export_and_render(job.Request(level="direct", samples=1), [tmp_path / "picture.exr"])
+    (seen,) = settings_of_renders
+    assert (seen["samples"], seen["max_bounces"], seen["diffuse_bounces"]) == (1, 0, 0)
+    assert seen["pixel_filter_type"] == "BLACKMAN_HARRIS" and seen["passes"] == {"use_pass_emit", "use_pass_z"}
+
+
+def test_the_level_is_the_least_where_it_is_left_to_the_scene(scene, camera_object, tmp_path, settings_of_renders):
+    bpy.ops.mesh.primitive_cube_add()
+    scene.world = None
+    exported = job.export_and_render(job.Request(level="auto"), [tmp_path / "dark.exr"])
+    assert settings_of_renders[-1]["passes"] >= {"use_pass_position"} and not exported.lamps
+    scene.collection.objects.link(bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN")))
+    exported = job.export_and_render(job.Request(level="auto"), [tmp_path / "lit.exr"])
+    assert settings_of_renders[-1]["max_bounces"] == exported.bounces.total and exported.lamps
 
 
 def test_everything_is_given_back_after_an_error(crowded, camera_object, tmp_path, monkeypatch):

@@ -57,7 +57,6 @@ _FRAME = (
     "pixel_aspect_x",
     "pixel_aspect_y",
     "use_border",
-    "use_crop_to_border",
     "border_min_x",
     "border_max_x",
     "border_min_y",
@@ -231,6 +230,7 @@ def _empty_scene(borrow: Borrower, scene: bpy.types.Scene, view_layer: bpy.types
     borrow.afterwards(bpy.data.scenes.remove, temporary)
     for name in _FRAME:
         setattr(temporary.render, name, getattr(scene.render, name))
+    temporary.render.use_crop_to_border = scene.render.use_border  # as in borrowing.still_of_one_layer
     if hasattr(scene, "cycles"):
         for name in CYCLES_SETTINGS:
             setattr(temporary.cycles, name, getattr(scene.cycles, name))
