@@ -18,8 +18,6 @@ from viewcam_addon.tracer.scattering import cosine_direction
 from viewcam_addon.tracer.scene import Mesh
 from viewcam_addon.tracer.space import Space
 
-pytest.importorskip("embreex")
-
 SEEDS = st.integers(0, 2**32 - 1)
 SQUARE = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
 
