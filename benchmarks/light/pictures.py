@@ -30,23 +30,23 @@ from .convergence import slope
 Picture = Callable[[int, int], NDArray[np.float32]]
 """(samples, seed) → (height, width, 3)."""
 
-WIDTH, HEIGHT = 36, 24
-
 
 def charts(quick: bool = False) -> tuple[Chart, ...]:
     return tuple(
-        _chart(name, title, level, build, quick)
-        for name, title, level, build in (
-            ("edge", "A picture of an edge", "direct", _edge),
-            ("shadow", "A picture of a soft shadow", "direct", _shadow),
-            ("corner", "A picture of a corner, three bounces", "path", partial(_shadow, walls=True)),
+        _chart(name, title, size, level, build, quick)
+        for name, title, size, level, build in (
+            ("edge", "A picture of an edge", (72, 48), "direct", _edge),
+            ("shadow", "A picture of a soft shadow", (36, 24), "direct", _shadow),
+            ("corner", "A picture of a corner, three bounces", (36, 24), "path", partial(_shadow, walls=True)),
         )
     )
 
 
-def _chart(name: str, title: str, level: str, build: Callable[[bpy.types.Scene], None], quick: bool) -> Chart:
+def _chart(
+    name: str, title: str, size: tuple[int, int], level: str, build: Callable[[bpy.types.Scene], None], quick: bool
+) -> Chart:
     samples = [4**power for power in range(1, 4 if quick else 6)]
-    scene, camera = empty_stage(WIDTH, HEIGHT)
+    scene, camera = empty_stage(*size)
     camera.location, camera.rotation_euler = (0.0, -6.0, 4.0), (0.95, 0.0, 0.0)
     build(scene)
     bpy.context.view_layer.update()
@@ -98,6 +98,9 @@ class _Noise:
     def numbers(self, pixels: NDArray, samples: NDArray, first: int, count: int) -> NDArray[np.float64]:
         key = [self._seed, first, int(pixels[0]), int(np.ravel(samples)[0])] if len(pixels) else 0
         return np.random.default_rng(key).random((count, len(pixels)))
+
+    def grid(self, pixels: NDArray, samples: NDArray, first: int, count: int) -> NDArray[np.float64]:
+        return self.numbers(np.tile(pixels, len(samples)), samples, first, count)
 
 
 def _edge(scene: bpy.types.Scene) -> None:

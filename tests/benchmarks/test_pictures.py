@@ -32,7 +32,7 @@ def test_our_pictures_are_noisier_than_no_others(charts):
 
 def test_the_noise_of_pictures_falls_as_that_of_integrals(charts):
     found = {name: slopes(chart)["ours"] for name, chart in charts.items()}
-    assert found["edge"] <= -0.7, found  # −¾, of a picture in which a few dozen pixels are noisy
+    assert found["edge"] <= -0.72, found  # −¾, measured in a picture in which two hundred pixels are noisy
     assert found["shadow"] <= -0.6, found  # an edge in four dimensions
     assert found["corner"] <= -0.5, found
 

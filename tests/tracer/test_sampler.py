@@ -142,6 +142,12 @@ def test_a_sample_of_a_pixel_is_the_same_whoever_asks_for_it_and_how():
     np.testing.assert_array_equal(Sampler(7, 100).numbers(pixels[17:18], 5, 13, 2)[:, 0], all_at_once[13:15, 5, 17])
 
 
+def test_a_grid_of_samples_and_pixels_is_the_same_numbers_sample_after_sample():
+    sampler, pixels, samples = Sampler(7, 100), np.arange(50, 90), np.array([3, 4, 99])
+    expected = sampler.numbers(np.tile(pixels, 3), np.repeat(samples, 40), 1, 4)
+    np.testing.assert_array_equal(sampler.grid(pixels, samples, 1, 4), expected)
+
+
 def test_more_samples_begin_with_those_of_fewer():
     few, many = Sampler(6, 16), Sampler(6, 5000)
     np.testing.assert_array_equal(few.numbers(np.arange(9), 15, 0, 30), many.numbers(np.arange(9), 15, 0, 30))
