@@ -127,7 +127,7 @@ def _edges(row: "LightRow") -> str:
 
 def _difference(row: "LightRow") -> str:
     if row.broken:
-        return f"{row.name} has {row.broken:,} pixels that are no numbers"
+        return f"{row.name} has {row.broken:,} pixel{'s' if row.broken > 1 else ''} without a number"
     question = worst_question(row)
     if question is None:
         steady, edges = row.steady, row.edges
@@ -150,7 +150,8 @@ def _hint(row: "LightRow") -> str:
         return ""
     tolerance = max(_FIT, 4.0 * row.ratio_error / row.ratio)
     known = next((name for name, value in _TELLING.items() if abs(row.factor / value - 1.0) < tolerance), None)
-    return f" (all of it is a factor of {row.factor:.5g}{f', which is {known}' if known else ''})"
+    error = f" ± {4.0 * row.ratio_error:.1g}" if row.ratio_error else ""
+    return f" (all of it is a factor of {row.factor:.5g}{error}{f', which is {known}' if known else ''})"
 
 
 def _mean_words(row: "LightRow") -> str:

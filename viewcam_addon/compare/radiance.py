@@ -201,7 +201,7 @@ def _relative(error: float, light: float) -> float:
 def _factor(sides: Sides, passes: Callable[[Sides], bool]) -> float | None:
     """What the test is times the reference, if that explains all of the difference."""
     _, reference, test = _means(sides)
-    if min(reference, test) <= 0.0:
+    if min(reference, test) <= 0.0 or sides.broken.any():
         return None
     factor = test / reference
     return factor if passes(replace(sides, test=sides.test / factor, spread=sides.spread / factor**2)) else None

@@ -108,10 +108,11 @@ def _variance(reference: Image) -> Array:
 def _sides(name: str, reference: Image, tests: Sequence[Image], variance: Array) -> Sides:
     expected = _values(reference, name)
     mean, squares = np.zeros_like(expected), np.zeros_like(expected)
-    for count, image in enumerate(tests, 1):  # Welford's running mean and sum of squares
-        step = _values(image, name) - mean
-        mean = mean + step / count
-        squares += step**2 * (count - 1) / count
+    with np.errstate(invalid="ignore"):
+        for count, image in enumerate(tests, 1):  # Welford's running mean and sum of squares
+            step = _values(image, name) - mean
+            mean = mean + step / count
+            squares += step**2 * (count - 1) / count
     seeds = len(tests)
     spread = squares / (seeds * (seeds - 1)) if seeds > 1 else np.full_like(mean, np.inf)
     broken = ~(np.isfinite(expected).all(axis=-1) & np.isfinite(mean).all(axis=-1))

@@ -1,0 +1,128 @@
+"""Light without noise: a float32 renderer's roundings pass, and what is more than that does not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from viewcam_addon.compare import law
+from viewcam_addon.compare.radiance import compare
+from viewcam_addon.image import Image
+
+SUN = np.array([0.4, -0.5, 0.75]) / np.linalg.norm([0.4, -0.5, 0.75])
+COLOURS = np.array([(0.0, 0.0, 0.0), (0.6, 0.6, 0.5), (0.8, 0.3, 0.2), (0.2, 0.6, 0.7), (0.5, 0.4, 0.8)])
+
+
+def light(scene, px=0.5, py=0.5, albedo=1.0):
+    """The scene on paper under a sun, with shadows; pass name → (height, width, channels)."""
+    passes = scene.picture(px, py).passes
+    height, width = scene.pinhole.height, scene.pinhole.width
+    position, normal, index = (passes[name].astype(np.float64) for name in ("Position", "Normal", "Object Index"))
+    cosine = np.maximum(normal @ SUN, 0.0)
+    for *centre, radius in scene.spheres:
+        to_centre = np.array(centre) + scene.offset - position
+        along = to_centre @ SUN
+        cosine[(along > 1e-6) & ((to_centre**2).sum(axis=-1) - along**2 < radius**2 * (1 - 1e-9))] = 0.0
+    colour = albedo * COLOURS[index[..., 0].astype(int)]
+    direct = 3.0 / np.pi * cosine[..., None] * (index > 0)
+    combined = np.concatenate([colour * direct, np.ones((height, width, 1))], axis=-1)
+    made = {"Combined": combined, "Diffuse Direct": direct * np.ones(3), "Diffuse Color": colour}
+    return {name: values.astype(np.float32) for name, values in made.items()} | {
+        name: passes[name] for name in ("Depth", "Object Index")
+    }
+
+
+def picture(scene, **more):
+    return Image(light(scene, **more), scene.pinhole, {"samples": "1"}, "light.exr")
+
+
+def rendered(scene, seed=0):
+    """A float32 renderer's: every ray is off by the law's roundings, and every value by some of its own."""
+    rng = np.random.default_rng(seed)
+    exact = scene.picture()
+    shift = law.ray_shift(scene.pinhole, exact.passes)
+    shift[exact["Object Index"][..., 0] == 0] = np.median(shift)
+    dx, dy = 0.35 * shift * rng.normal(size=(2, *shift.shape))
+    passes = light(scene, px=0.5 + dx, py=0.5 + dy)
+    for name in ("Combined", "Diffuse Direct"):
+        passes[name] = (passes[name] * (1 + 2.0**-24 * rng.normal(0, 3, passes[name].shape))).astype(np.float32)
+    return Image(passes, scene.pinhole, {"cycles.ViewLayer.samples": "1"}, "rendered.exr")
+
+
+def test_a_float32_renderers_picture_is_the_same(paper_scene):
+    comparison = compare(picture(paper_scene), [rendered(paper_scene)], paper_scene.pinhole)
+    assert comparison.passed, "\n".join(comparison.lines())
+    assert not comparison.is_noisy
+    assert comparison.sentence.startswith("The same picture: over 64,000 pixels without noise ")
+
+
+def test_far_from_the_origin_pixels_on_edges_turn_and_are_within_their_number(far_scene):
+    """Five kilometres away rays are off by a hundredth of a pixel: some pixels on edges show the other side."""
+    edges = compare(picture(far_scene), [rendered(far_scene)], far_scene.pinhole).rows[0].edges
+    assert 0 < edges.count <= edges.allowed
+
+
+def combined(image, change):
+    values = image["Combined"].copy()
+    change(values)
+    return replace(image, passes={**image.passes, "Combined": values})
+
+
+def brighter(factor):
+    def change(values):
+        values[..., :3] *= np.float32(factor)
+
+    return change
+
+
+def no_number(values):
+    values[100, 160, 1] = np.nan
+
+
+FAULTS = {
+    "a hundred-thousandth too bright": lambda s: combined(rendered(s), brighter(1 + 1e-5)),
+    "albedo off by a hundredth": lambda s: picture(s, albedo=1.01),
+    "a shift of a hundredth of a pixel": lambda s: picture(s, px=0.51),
+    "a shift of half a pixel": lambda s: picture(s, py=1.0),
+    "no shadows of the smallest ball": lambda s: Image(
+        {**light(replace(s, spheres=s.spheres[:2])), "Depth": light(s)["Depth"]}, s.pinhole, {"samples": "1"}
+    ),
+    "one pixel that is no number": lambda s: combined(rendered(s), no_number),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_without_noise_is_found(paper_scene, fault):
+    comparison = compare(picture(paper_scene), [FAULTS[fault](paper_scene)], paper_scene.pinhole)
+    assert not comparison.passed, f"{fault}: {comparison.sentence}"
+    assert comparison.sentence.startswith("Different here: "), comparison.sentence
+
+
+def test_a_factor_that_explains_all_is_told_and_named(paper_scene):
+    reference = picture(paper_scene)
+    sentence = compare(reference, [combined(rendered(paper_scene), brighter(np.pi))], paper_scene.pinhole).sentence
+    assert "a factor of 3.1416, which is π" in sentence
+    sentence = compare(reference, [combined(rendered(paper_scene), brighter(1.25))], paper_scene.pinhole).sentence
+    assert "a factor of 1.25)" in sentence
+    assert "factor" not in compare(reference, [picture(paper_scene, px=0.6)], paper_scene.pinhole).sentence
+
+
+def test_a_pixel_or_two_that_leak_are_let_pass_and_no_more(paper_scene):
+    """One in a million may: more than one in 64,000 happens by chance once in 500 pictures, more than two once in 20,000."""
+
+    def leaking(count):
+        def change(values):
+            values[2, 10 : 10 + 3 * count : 3, :3] = 0.5
+
+        return compare(picture(paper_scene), [combined(rendered(paper_scene), change)], paper_scene.pinhole)
+
+    assert leaking(2).rows[0].edges.leaks == 2 == leaking(2).rows[0].edges.allowed_leaks
+    assert leaking(2).passed and not leaking(3).passed
+
+
+def test_the_law_grows_with_slope_value_lamp_and_samples():
+    base = law.radiance_error(np.array(1e-4), np.array(0.1), np.array(1.0), np.array(1.0), 1)
+    assert base == pytest.approx(1e-5 + 2.0**-24 * (8 + 1 / 80 + 4))
+    for more in ((2e-4, 0.1, 1.0, 1.0, 1), (1e-4, 0.2, 1.0, 1.0, 1), (1e-4, 0.1, 2.0, 1.0, 1), (1e-4, 0.1, 1.0, 9.0, 1)):
+        assert law.radiance_error(*map(np.array, more)) > base
+    assert law.radiance_error(*map(np.array, (1e-4, 0.1, 1.0, 1.0)), 1024) > base
