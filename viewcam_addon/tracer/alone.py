@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .arrays import Floats, Indices, cross, dot
+from .arrays import Floats, Indices, cross, dot, gather
 from .triangles import Triangles
 
 
@@ -44,7 +44,7 @@ class Alone:
                 distance = (self._heights[number] - dot(normal, starts)) / dot(normal, directions)
                 which = np.flatnonzero((distance > 0) & (distance < limits))
             distance = distance[which]
-            inside = starts[:, which] + distance * directions[:, which] - self._corners[:, number, None]
+            inside = gather(starts, which) + distance * gather(directions, which) - self._corners[:, number, None]
             first, second = (dot(gradient[:, number], inside) for gradient in self._gradients)
             kept = np.flatnonzero((first >= 0) & (second >= 0) & (first + second <= 1))
             yield triangle, which[kept], distance[kept]

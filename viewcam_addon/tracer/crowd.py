@@ -73,7 +73,7 @@ class Crowd:
         for ball in self._few:
             which = self._balls.near(ball, starts, directions, limits)
             which = which[leaving[which] != self._balls.number[ball]]
-            yield ball, which, self._balls.distance(ball, starts[:, which], directions[:, which])
+            yield ball, which, self._balls.distance(ball, gather(starts, which), gather(directions, which))
         if len(self._many):
             yield from self._many_met(starts, directions, leaving, limits)
 

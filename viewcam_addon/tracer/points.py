@@ -94,18 +94,18 @@ class Surfaces:
         """The points where n rays from the eye, (x, y, 1), meet what visibility.py found for them; no primitive is −1."""
         directions = np.stack([x, y, np.ones_like(x)])
 
-        def triangle_points(triangle: Indices, which: Indices | slice) -> Points:
-            depth, first, second = self.planes.hit(triangle, x[which], y[which])
-            ways = directions[:, which]
+        def triangle_points(triangle: Indices, which: Some) -> Points:
+            depth, first, second = self.planes.hit(triangle, pick(x, which), pick(y, which))
+            ways = pick(directions, which)
             normal = gather(self.planes.forms[:3], triangle)
             side = gather(self.planes.side, triangle) * self._view.handedness
             with np.errstate(all="ignore"):
                 normal /= -np.sqrt(dot(normal, normal))
             return self._on_triangles(triangle, normal, side, first, second, ways * depth, ways)
 
-        def sphere_points(sphere: Indices, which: Indices | slice) -> Points:
-            depth = self._ellipsoids.depth(sphere, x[which], y[which])
-            ways = directions[:, which]
+        def sphere_points(sphere: Indices, which: Some) -> Points:
+            depth = self._ellipsoids.depth(sphere, pick(x, which), pick(y, which))
+            ways = pick(directions, which)
             centres = gather(self._ellipsoids.positions, sphere)
             return self._on_spheres(gather(self._ellipsoids.number, sphere), centres, ways * depth, ways)
 
@@ -118,22 +118,22 @@ class Surfaces:
         """
         distances = np.empty(len(primitives))
 
-        def triangle_points(triangle: Indices, which: Indices | slice) -> Points:
+        def triangle_points(triangle: Indices, which: Some) -> Points:
             corner, *sides = self._sides(triangle)
-            ways = directions[:, which]
+            ways = pick(directions, which)
             normal = cross(*sides)
-            first, second = _barycentric(corner, sides, normal, origins[:, which], ways)
+            first, second = _barycentric(corner, sides, normal, pick(origins, which), ways)
             position = corner + first * sides[0] + second * sides[1]
-            distances[which] = dot(position - origins[:, which], ways)
+            distances[which] = dot(position - pick(origins, which), ways)
             side = np.where(dot(normal, ways) > 0, -1.0, 1.0)
             with np.errstate(all="ignore"):
                 normal *= side / np.sqrt(dot(normal, normal))
             return self._on_triangles(triangle, normal, side, first, second, position, ways)
 
-        def sphere_points(ball: Indices, which: Indices | slice) -> Points:
-            ways = directions[:, which]
-            distances[which] = self.balls.distance(ball, origins[:, which], ways)
-            position = origins[:, which] + ways * distances[which]
+        def sphere_points(ball: Indices, which: Some) -> Points:
+            ways = pick(directions, which)
+            distances[which] = self.balls.distance(ball, pick(origins, which), ways)
+            position = pick(origins, which) + ways * distances[which]
             return self._on_spheres(gather(self.balls.number, ball), gather(self.balls.centres, ball), position, ways)
 
         return self._split(primitives, triangle_points, sphere_points), distances
@@ -171,6 +171,7 @@ class Surfaces:
         """
         lost = ~np.isfinite(normal[0] + normal[1] + normal[2])
         if lost.any():  # no surface, but what was found there looks at the ray
+            side = np.where(lost, 1.0, side)
             normal = np.where(lost, -ways / np.sqrt(dot(ways, ways)), normal)
         return Points(
             position=position,

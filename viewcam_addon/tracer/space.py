@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from . import offset
 from .alone import Alone
-from .arrays import Floats, Indices, dot
+from .arrays import Floats, Indices, dot, gather
 from .crowd import Crowd, Hits
 from .embree import EmbreeScene, rows, scene_of, unit_of
 from .points import Points, Surfaces
@@ -47,7 +47,7 @@ class Space:
         """
         found = self._sight(kind).first(points, directions)
         met = np.flatnonzero(found >= 0)
-        return met, *self._surfaces.met(found[met], points.position[:, met], directions[:, met])
+        return met, *self._surfaces.met(found[met], gather(points.position, met), gather(directions, met))
 
     def blocked(self, points: Points, directions: Floats, distances: Floats) -> NDArray[np.bool_]:
         """Whether something stands between points of surfaces and lights, (n,).
@@ -106,7 +106,7 @@ class _Sight:
             return found
         nearest = np.full(len(found), np.inf)
         met = np.flatnonzero(found >= 0)
-        nearest[met] = self._surfaces.distance(found[met], starts[:, met], directions[:, met])
+        nearest[met] = self._surfaces.distance(found[met], gather(starts, met), gather(directions, met))
         hits = chain(self._alone.met(starts, directions, nearest), self._balls(points, directions, nearest))
         for primitive, which, distance in hits:
             nearer = distance < nearest[which]
