@@ -167,6 +167,16 @@ def test_the_density_of_shadow_rays_is_one_over_the_whole_sphere(make_lighting, 
     assert density.sum() / count * 4 * np.pi == pytest.approx(sent, abs=0.01)
 
 
+def test_spheres_that_shine_are_found_by_scattered_rays_alone_and_count_whole(make_lighting, make_mesh, make_spheres):
+    """π L (R/d)², beside a mesh that shadow rays are sent to."""
+    mesh = make_mesh(SQUARE - np.array([0, 0, 3]), [[0, 1, 2], [0, 2, 3]])
+    lighting = make_lighting(surfaces=[(make_spheres([[0, 0, 2]], 1.5), glow(3)), (mesh, glow(3))])
+    ways = Ways(lighting, (0, 0, 0), (0, 0, 1))
+    assert (ways.shared == 1).all() and not ways.aimed.any()
+    mean, error = ways.mean(ways.scattered_weighted)
+    assert error < 0.02 * mean and abs(mean - 3 * np.pi * (1.5 / 2) ** 2) <= 3 * error, (mean, error)
+
+
 def test_a_surface_that_diffuse_rays_do_not_see_is_not_aimed_at(make_lighting, make_mesh, make_lit):
     scene = make_lit(Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 9, 8, 8), (make_mesh(SQUARE, [[0, 1, 2]]), glow(3)))
     hidden = replace(scene, objects=(replace(scene.objects[0], hidden_from=frozenset({"diffuse"})),))
