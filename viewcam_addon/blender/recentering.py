@@ -36,7 +36,7 @@ from . import camera as cameras
 from . import datablocks, features, findings, materials, pose
 from .borrowing import Borrower, borrowed, still_of_one_layer
 from .depsgraph import visit
-from .export import placements
+from .export import light_in, placements
 from .film import CYCLES_SETTINGS
 from .ledger import Ledger
 from .shading import Shading
@@ -148,6 +148,8 @@ def _seen(
     depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, ledger: Ledger, borrow: Borrower, lit: bool
 ) -> tuple[_View, list[_Placed], dict[bpy.types.ID, _Copy]]:
     """What of the file is rendered; geometries are copied, and the copies gone when the loan ends."""
+    if lit:
+        light_in(depsgraph, ledger)  # for what the ledger tells of the file's own lamps
     view = _view(depsgraph, camera_object)
     eye = np.array(view.shown.eye)
     plain = materials.plain(borrow)

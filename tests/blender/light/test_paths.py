@@ -1,0 +1,160 @@
+"""Light that is scattered many times or comes from large things: in all, it is Cycles' within three standard errors.
+
+The pictures are small and of few samples: what is random averages out over their pixels, and what is wrong does not.
+"""
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+# Cycles' pictures of a scene, for their spread tells Cycles' noise, and the samples of each.
+SCENES, COUNT, SAMPLES = 4, 2, 16
+MOST = 3.0  # standard errors
+
+
+@pytest.fixture(autouse=True)
+def light(add_lamp, set_world, scene):
+    """A sun with a size, an area light, a little of the sky; small pictures."""
+    scene.render.resolution_x, scene.render.resolution_y = 48, 36
+    add_lamp("SUN", rotation=(0.4, 0.3, 0), angle=0.3, energy=1.5)
+    add_lamp("AREA", (-2, -1, 3), (0.3, -0.6, 0), energy=100.0, size=1.0)
+
+
+def deviation(sides, name="Combined"):
+    """By how many standard errors, and by what share, all light of all scenes differs from Cycles'."""
+    ours = theirs = variance = 0.0
+    for each in sides:
+        pictures = np.array([passes[name][..., :3] for passes in each.cycles], np.float64)
+        ours += each.traced[name][..., :3].sum(dtype=np.float64)
+        theirs += pictures.mean(axis=0).sum()
+        variance += each.traced["Variance"].sum(dtype=np.float64) + (pictures.var(axis=0, ddof=1) / len(pictures)).sum()
+    return (ours - theirs) / np.sqrt(variance), ours / theirs - 1
+
+
+def check(sides):
+    errors, share = deviation(sides)
+    assert abs(errors) <= MOST and abs(share) < 0.01, f"{errors:+.2f} standard errors, {share:+.3%}"
+    assert not [each for each in sides[0].exported.ledger if each.status != "exported"]
+
+
+@pytest.fixture
+def take(pictures, stage, set_world):
+    """take(**request) → Sides of scenes at level path, under a sky."""
+
+    def make(**options):
+        set_world((0.2, 0.3, 0.4), 1.0)
+        return pictures(**{"scenes": SCENES, "samples": SAMPLES, "count": COUNT, "level": "path"} | options)
+
+    return make
+
+
+def replace_monkey(make_material, kind, **inputs):
+    bpy.data.objects["Monkey"].data.materials[0] = make_material("Of the monkey", kind, **inputs)
+
+
+def smooth():
+    for polygon in bpy.data.objects["Monkey"].data.polygons:
+        polygon.use_smooth = True
+
+
+@pytest.mark.parametrize("level", ["direct", "path"])
+def test_lambert_surfaces(take, level):
+    check(take(level=level))
+
+
+@pytest.mark.parametrize("is_smooth", [False, True])
+@pytest.mark.parametrize("kind", ["Glossy", "Glass", "Refraction"])
+def test_mirrors_and_glass(take, make_material, kind, is_smooth):
+    replace_monkey(make_material, f"ShaderNodeBsdf{kind}", Color=(0.9, 0.8, 0.7, 1), Roughness=0.0)
+    if is_smooth:
+        smooth()
+    check(take())
+
+
+def test_surfaces_that_shine_light_others(take, make_material):
+    replace_monkey(make_material, "ShaderNodeEmission", Color=(0.9, 0.8, 0.7, 1), Strength=3.0)
+    check(take())
+
+
+def test_a_principled_surface_that_shines(take, make_material):
+    inputs = {"Specular IOR Level": 0.0, "Emission Color": (0.2, 0.5, 1, 1), "Emission Strength": 0.5}
+    replace_monkey(make_material, "ShaderNodeBsdfPrincipled", **inputs)
+    check(take())
+
+
+def test_a_mixture_of_everything(take, make_material):
+    replace_monkey(make_material, "ShaderNodeBsdfDiffuse", Color=(0.3, 0.5, 0.9, 1))
+    tree = bpy.data.objects["Monkey"].data.materials[0].node_tree
+    last = tree.nodes["Shader"]
+    for kind in ("BsdfGlass", "BsdfGlossy", "Emission"):
+        shader, mixed = tree.nodes.new(f"ShaderNode{kind}"), tree.nodes.new("ShaderNodeMixShader")
+        if "Roughness" in shader.inputs:
+            shader.inputs["Roughness"].default_value = 0.0
+        tree.links.new(last.outputs[0], mixed.inputs[1])
+        tree.links.new(shader.outputs[0], mixed.inputs[2])
+        mixed.inputs[0].default_value = 0.3
+        last = mixed
+    tree.links.new(last.outputs[0], tree.nodes["Output"].inputs["Surface"])
+    check(take())
+
+
+@pytest.mark.parametrize("ray", ["diffuse", "glossy", "transmission", "shadow"])
+def test_what_is_hidden_from_one_kind_of_rays(take, make_material, ray, mesh_from, add):
+    """A glowing ball before a mirror and glass: seen in neither, or in all but one."""
+    replace_monkey(make_material, "ShaderNodeBsdfGlass", Roughness=0.0)
+    ball = add(mesh_from("uv_sphere", radius=0.5), "Ball", (1.2, -0.5, 0.3))
+    ball.data.materials.append(make_material("Glow", "ShaderNodeEmission", Color=(1, 0.7, 0.4, 1), Strength=2.0))
+    setattr(ball, f"visible_{ray}", False)
+    check(take())
+
+
+def test_lamps_and_worlds_that_hide(take, make_material):
+    replace_monkey(make_material, "ShaderNodeBsdfGlossy", Roughness=0.0)
+    lamp = next(block for block in bpy.data.objects if block.type == "LIGHT" and block.data.type == "AREA")
+    lamp.visible_glossy = lamp.visible_camera = False
+    sides = take()
+    check(sides)
+    bpy.context.scene.world.cycles_visibility.diffuse = False
+    assert sides[0].exported.lamps[1].hidden_from >= {"glossy", "camera"}
+
+
+def test_few_bounces_of_each_kind_are_counted_alike(take, make_material, scene):
+    replace_monkey(make_material, "ShaderNodeBsdfGlass", Roughness=0.0)
+    scene.cycles.max_bounces, scene.cycles.transmission_bounces, scene.cycles.diffuse_bounces = 3, 2, 1
+    check(take())
+
+
+def test_a_see_through_film_with_its_own_exposure_and_filter(take, scene):
+    scene.render.film_transparent, scene.cycles.film_exposure, scene.cycles.pixel_filter_type = True, 1.7, "BOX"
+    bpy.data.objects["Floor"].hide_render = True
+    sides = take()
+    check(sides)
+    for each in sides:
+        theirs = np.mean([passes["Combined"][..., 3] for passes in each.cycles])
+        assert each.traced["Combined"][..., 3].mean() == pytest.approx(theirs, rel=0.05) and 0 < theirs < 0.9
+
+
+@pytest.mark.parametrize("sabotage", ["albedo", "bounce"])
+def test_a_percent_less_light_is_caught(take, scene, sabotage, monkeypatch):
+    """The tests above must be able to fail."""
+    from viewcam_addon.blender import export, shaders
+    from viewcam_addon.tracer.film import Bounces
+    from viewcam_addon.tracer.materials import Colour, Material
+
+    if sabotage == "albedo":
+        right = shaders.read
+
+        def darker(material):
+            reading = right(material)
+            rgb = tuple(0.99 * value for value in reading.material.diffuse.rgb)
+            reading.material = Material(diffuse=Colour(rgb))
+            return reading
+
+        monkeypatch.setattr(shaders, "read", darker)
+    else:
+        scene.cycles.max_bounces = 1
+        monkeypatch.setattr(export.film, "bounces_of", lambda scene, ledger: Bounces(0, 4, 4, 12))
+        monkeypatch.setattr("viewcam_addon.blender.film.BOUNCES", {})
+    errors, share = deviation(take())
+    assert errors < -MOST, f"{errors:+.2f} standard errors, {share:+.3%}"
