@@ -15,9 +15,8 @@ Cycles' table (intern/cycles/scene/film.cpp, 1,024 entries, of which the middle 
 u = ½, its first sample, misses the centre by half a step: 0.25/511 px for BOX, 3.5e-4 f for BLACKMAN_HARRIS. The last entry
 is left at 0, so that one sample of 1,023 is spread evenly from the pixel's lower left corner to the filter's end: that makes
 BOX exact, and moves the mean of BLACKMAN_HARRIS by (f/2 − ¼)/1,023 px, 4.9e-4 px at f = 1.5. And its outer steps are long.
-In all its filter differs from the true one by 0.21 % of the mass (f = 1.5): where a pixel's surroundings differ by the contrast
-c, no more than 0.0021 c, and 4.9e-4 px times the slope where they are smooth. Noise of an edge's pixels, up to c/(2 √N), is
-larger up to 56,000 samples of a pixel that has nothing but that edge.
+An edge's pixel is off by no more than 5.8e-4 of the contrast for it (f = 1.5, edges at any angle), one of a smooth surface by
+4.9e-4 px times the slope. The tracer's own noise of such a pixel, 0.35 N^−3/4 of the contrast, is larger up to 5,000 samples.
 
 Rejected: weighting samples of several pixels (splatting), which makes neighbours' errors depend on one another and their
 variance unknown; Newton's method on each number, whose sines cost ten times as much; and Cycles' table.
