@@ -74,7 +74,7 @@ def sides_of(kind, rng, samples, each, seeds, told=1.0):
 
 
 def ask(sides, samples, seeds):
-    return questions.ask(sides, NO_ROUNDING, (samples - 1, max(seeds - 1, 1)), LEVEL)
+    return questions.ask(sides, NO_ROUNDING, 0.0, (samples - 1, max(seeds - 1, 1)), LEVEL)
 
 
 @pytest.mark.parametrize(
@@ -165,8 +165,8 @@ def test_a_pixel_without_noise_may_differ_by_rounding_and_by_no_more():
     none, reference = np.zeros((HEIGHT, WIDTH, 3)), np.full((HEIGHT, WIDTH, 3), 0.5)
     flat = Sides("Combined", reference, reference + 1.9e-7, none, none, np.zeros((HEIGHT, WIDTH), bool))
     rounding = np.full((HEIGHT, WIDTH), 1e-8)
-    assert questions.ask(flat, rounding, (255, 7), LEVEL)[0].ok
-    assert not questions.ask(replace(flat, test=flat.test + 2e-8), rounding, (255, 7), LEVEL)[0].ok
+    assert questions.ask(flat, rounding, 0.0, (255, 7), LEVEL)[0].ok
+    assert not questions.ask(replace(flat, test=flat.test + 2e-8), rounding, 0.0, (255, 7), LEVEL)[0].ok
 
 
 def test_a_shift_of_cycles_filter_table_is_allowed_and_one_of_a_tenth_of_a_pixel_is_not():

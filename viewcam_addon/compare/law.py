@@ -46,8 +46,9 @@ FLOAT32 = 2.0**-24
 RADIANCE_ROUNDINGS = 8.0
 # The cosine between a surface and the lamp is a sum of three products of rounded normals. The normal of a flat face is that of
 # its rounded vertices, which turns it by their rounding over the face's extent: measured on flat faces of some pixels to some
-# hundred, 8 roundings for one pixel in a thousand and up to 37.
-COSINE_ROUNDINGS = 4.0
+# hundred, 8 roundings for one pixel in a thousand and up to 37. With all of these the worst of 64 pictures by Cycles of 4.2,
+# 5.0 and 5.2, each with a sun, a point or a spot lamp, uses up 0.8 of the law at the percentile where it comes closest.
+COSINE_ROUNDINGS = 6.0
 # Cycles adds its samples up in float32. The sum is rounded by half a unit of its last place at most, N times, and half of the
 # samples are added while it has its last exponent: N / 4 roundings if all of them go the same way, which is N / 80 times the
 # maximum of ROUNDINGS.

@@ -150,7 +150,7 @@ def _hint(row: "LightRow") -> str:
         return ""
     tolerance = max(_FIT, 4.0 * row.ratio_error / row.ratio)
     known = next((name for name, value in _TELLING.items() if abs(row.factor / value - 1.0) < tolerance), None)
-    error = f" ± {4.0 * row.ratio_error:.1g}" if row.ratio_error else ""
+    error = f" ± {row.ratio_error:.1g}" if row.ratio_error else ""
     return f" (all of it is a factor of {row.factor:.5g}{error}{f', which is {known}' if known else ''})"
 
 

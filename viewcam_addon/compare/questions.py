@@ -94,14 +94,18 @@ class Question:
         }
 
 
-def ask(sides: Sides, one_rounding: Array, freedom: tuple[int, int], level: float) -> tuple[Question, ...]:
+def ask(
+    sides: Sides, one_rounding: Array, floor: Array | float, freedom: tuple[int, int], level: float
+) -> tuple[Question, ...]:
     """All sizes, asked so that chance makes any of them fail with the probability `level` at most.
 
-    one_rounding : (height, width) what one rounding of float32 causes. freedom : the degrees of freedom of both sides'
-    variances. level : shared out evenly over the sizes, and over the tiles and channels of each after Šidák.
+    one_rounding, floor : (height, width) what one rounding of float32 and what storage causes. freedom : the degrees of
+    freedom of both sides' variances. level : shared out evenly over the sizes, and over the tiles and channels of each after
+    Šidák.
     """
     share = level / len(SIZES)
-    return tuple(_question(sides, *answer) for answer in _answers(sides, one_rounding[..., None], freedom, share))
+    answers = _answers(sides, one_rounding[..., None], np.atleast_2d(floor)[..., None], freedom, share)
+    return tuple(_question(sides, *answer) for answer in answers)
 
 
 def worst_channel(errors: Array) -> Array:
@@ -116,12 +120,14 @@ def over_pixels(tiles: Array, shape: tuple[int, int], size: int) -> Array:
     return tiles
 
 
-def _answers(sides: Sides, one: Array, freedom: tuple[int, int], level: float) -> Iterator[tuple[int, Array, Array]]:
+def _answers(
+    sides: Sides, one: Array, floor: Array, freedom: tuple[int, int], level: float
+) -> Iterator[tuple[int, Array, Array]]:
     """For each size: (size, errors, what is allowed)."""
     difference = sides.difference
-    errors, both = _pixel_errors(sides, law.ROUNDINGS[-1] * one + _FILTER_CONTRAST * contrast(sides.reference), freedom)
+    errors, both = _pixel_errors(sides, law.ROUNDINGS[-1] * one + floor + _FILTER_CONTRAST * contrast(sides.reference), freedom)
     yield PIXELS, errors, noise.student_critical(both, noise.sidak(level, errors.size))
-    rounding = np.broadcast_to(_NEARLY_ALL * one, difference.shape)
+    rounding = np.broadcast_to(_NEARLY_ALL * one + floor, difference.shape)
     across = [np.gradient(sides.reference, axis=axis) for axis in (0, 1) if sides.reference.shape[axis] > 1]
     for size in SIZES[1:]:
         total, square, allowance = (noise.tile_sums(values, size) for values in (difference, difference**2, rounding))

@@ -142,7 +142,7 @@ def compare(reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_sam
     is_noisy = not quiet(combined.reference, combined.variance).all()
     is_noisy |= seeds > 1 and not quiet(combined.test, combined.spread).all()
     freedom = (max((samples[0] or 2) - 1, 1), max(seeds - 1, 1))
-    rounding = steady.Rounding(pinhole, reference, max(filter(None, samples), default=1))
+    rounding = steady.Rounding(pinhole, reference, tests[0], max(filter(None, samples), default=1))
 
     rows, maps = [], {}
     for sides in unequal:
@@ -161,9 +161,9 @@ def compare(reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_sam
 
 
 def _steady(sides: Sides, rounding: steady.Rounding) -> tuple[LightRow, dict[str, Array]]:
-    one = rounding.of(sides)
-    row, edges, roundings = steady.compare(sides, one, rounding.shift)
-    factor = None if row.ok else _factor(sides, lambda scaled: steady.compare(scaled, one, rounding.shift)[0].ok)
+    law = (rounding.one(sides), rounding.floor(sides), rounding.shift, rounding.belongs)
+    row, edges, roundings = steady.compare(sides, *law)
+    factor = None if row.ok else _factor(sides, lambda scaled: steady.compare(scaled, *law)[0].ok)
     drawn = {"difference": sides.difference.mean(axis=-1), "roundings": roundings}
     return LightRow(*_means(sides), 0.0, 0.0, int(sides.broken.sum()), steady=row, edges=edges, factor=factor), drawn
 
@@ -171,8 +171,8 @@ def _steady(sides: Sides, rounding: steady.Rounding) -> tuple[LightRow, dict[str
 def _noisy(
     sides: Sides, rounding: steady.Rounding, freedom: tuple[int, int], level: float
 ) -> tuple[LightRow, dict[str, Array]]:
-    one = rounding.of(sides)
-    asked = questions.ask(sides, one, freedom, level)
+    given = (rounding.one(sides), rounding.floor(sides), freedom, level)
+    asked = questions.ask(sides, *given)
     errors = sides.difference - sides.difference.mean(axis=(0, 1))
     # Channels share their samples, so that each pixel's sum over them is one error; but each channel is asked by itself.
     ratio_error = _relative(np.sqrt((errors.sum(axis=-1) ** 2).sum()), sides.reference.sum())
@@ -180,10 +180,10 @@ def _noisy(
     visible = asked[-1].limit * min(by_channel)
     row = LightRow(*_means(sides), ratio_error, visible, int(sides.broken.sum()), asked)
     if not row.ok:
-        scaled_passes = _factor(sides, lambda scaled: all(q.ok for q in questions.ask(scaled, one, freedom, level)))
+        scaled_passes = _factor(sides, lambda scaled: all(q.ok for q in questions.ask(scaled, *given)))
         row = replace(row, factor=scaled_passes)
     pixels, tiles = asked[0], asked[1]
-    spread = questions.over_pixels(questions.worst_channel(tiles.errors), one.shape, tiles.size)
+    spread = questions.over_pixels(questions.worst_channel(tiles.errors), sides.broken.shape, tiles.size)
     drawn = {"difference": sides.difference.mean(axis=-1), "tiles": spread}
     if pixels.errors.any():
         drawn["standard errors"] = questions.worst_channel(pixels.errors)

@@ -9,9 +9,11 @@ surface, so that a pixel amid a shadow is lit.
 Rejected: accepting every pixel that shows what a neighbour shows; a picture shifted by a tenth of a pixel would pass.
 """
 
+import re
 from dataclasses import asdict, dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..image import Image
 from ..pinhole import Pinhole
@@ -23,11 +25,16 @@ from .sides import Sides
 from .statistics import Row, measure
 
 # Pixels on edges are independent events; their number exceeds what is allowed once in a thousand pictures, and so do leaks,
-# of which 120 pictures by Cycles of 57,600 pixels, each with one lamp, had one.
+# of which 64 pictures by Cycles of 57,600 pixels, each with one lamp, had one.
 _RARELY = 1e-3
 _LEAKS = 1e-6
 # An edge between a pixel and each of its neighbours to the left, right, top and bottom.
 _SIDES_OF_A_PIXEL = 4
+# Roundings of what can't be rounded at all, such as black: beyond any limit, and a number still.
+_BEYOND_COUNTING = 1e6
+# The first Blender that stores smooth normals in 16 bits, and the quantities that show it.
+_SHORT_NORMALS = (5, 2)
+_SHADED = ("Combined", "Diffuse Direct")
 # Errors are told relative to the value, or to this share of the mean where the value is less.
 _DARK = 1e-3
 
@@ -50,40 +57,52 @@ class Edges:
 
 
 class Rounding:
-    """What one rounding of float32 causes in the light of a picture.
+    """What rounding causes in the light of a picture.
 
+    test : one of the test pictures, which tells its Blender. samples : of each picture, the most.
     shift : (height, width) pixels, law.ray_shift from the reference's depths; where nothing was hit the median.
+    belongs : (height, width) the object of each pixel, 0 for none or where nobody knows.
     """
 
-    def __init__(self, pinhole: Pinhole, reference: Image, samples: int) -> None:
+    def __init__(self, pinhole: Pinhole, reference: Image, test: Image, samples: int) -> None:
         self.shift = _ray_shift(pinhole, reference)
         self._samples = samples
-        self._belongs = np.zeros(self.shift.shape)
+        self.belongs = np.zeros(self.shift.shape)
         if "Object Index" in reference.passes:
-            self._belongs = reference["Object Index"][..., 0]
+            self.belongs = reference["Object Index"][..., 0]
         # What the light on a surface would be if it came from straight above, as far as the picture tells: the largest
         # Diffuse Direct anywhere, in the surface's colour.
-        self._brightest = 0.0
+        self._brightest: Array | float = 0.0
+        self._storage = law.NORMAL_STORAGE if _blender_of(test) >= _SHORT_NORMALS else 0.0
         if "Diffuse Direct" in reference.passes and "Diffuse Color" in reference.passes:
-            self._brightest = np.nan_to_num(reference["Diffuse Direct"]).max() * reference["Diffuse Color"].max(axis=-1)
+            lit = float(np.nan_to_num(reference["Diffuse Direct"]).max())
+            self._brightest = lit * reference["Diffuse Color"].max(axis=-1).astype(np.float64)
 
-    def of(self, sides: Sides) -> Array:
-        """(height, width) the error of a quantity, the largest of its channels."""
-        slope = law.slopes(sides.reference, self._belongs)
+    def one(self, sides: Sides) -> Array:
+        """(height, width) the error of a quantity that one rounding of float32 causes, the largest of its channels."""
+        channels = np.split(sides.reference, sides.reference.shape[2], axis=2)
+        slope = np.max([law.slopes(channel, self.belongs) for channel in channels], axis=0)
         value = np.abs(sides.reference).max(axis=-1)
         return law.radiance_error(self.shift, slope, value, self._brightest, self._samples)
 
+    def floor(self, sides: Sides) -> Array | float:
+        """(height, width) what the storage of smooth normals may add: the lamp's light times the cosine's change."""
+        if not self._storage or sides.name not in _SHADED:
+            return 0.0
+        cosine = np.abs(sides.reference).max(axis=-1) / np.maximum(self._brightest, np.finfo(float).tiny)
+        return self._storage * self._brightest * np.sqrt(1.0 - np.minimum(cosine, 1.0) ** 2)
 
-def compare(sides: Sides, one: Array, shift: Array) -> tuple[Row, Edges, Array]:
+
+def compare(sides: Sides, one: Array, floor: Array | float, shift: Array, belongs: NDArray) -> tuple[Row, Edges, Array]:
     """The figures of all pixels, those on edges, and the error of each pixel in roundings.
 
-    one : (height, width) `Rounding.of` these sides. shift : that of the same.
+    one, floor : those of `Rounding` for these sides. shift, belongs : its own.
 
     Returns the row, relative errors; the edges; (height, width) float64.
     """
     error = np.abs(sides.difference).max(axis=-1)
-    most = law.ROUNDINGS[-1] * one
-    apart, on_edge = error > most, contrast(sides.reference).max(axis=-1) > largest_around(most)
+    most = law.ROUNDINGS[-1] * one + floor
+    apart, on_edge = error > most, _on_edge(sides.reference, belongs, most)
     turned = np.minimum(_SIDES_OF_A_PIXEL * law.ROUNDINGS[law.PERCENTILES.index(99.0)] * shift, 1.0)[on_edge].sum()
     edges = Edges(
         int((apart & on_edge).sum()),
@@ -94,8 +113,29 @@ def compare(sides: Sides, one: Array, shift: Array) -> tuple[Row, Edges, Array]:
     judged = ~sides.broken & ~(apart & edges.ok)
     size = np.abs(sides.reference).max(axis=-1)
     scale = np.maximum(size, max(_DARK * float(size.mean()), np.finfo(float).tiny))
-    row = measure(sides.name, "relative", (error / scale)[judged], (one / scale)[judged])
-    return row, edges, error / np.maximum(one, np.finfo(float).tiny)
+    row = measure(sides.name, "relative", (error / scale)[judged], (one / scale)[judged], (floor / scale)[judged])
+    return row, edges, np.minimum(error / np.maximum(one, np.finfo(float).tiny), _BEYOND_COUNTING)
+
+
+def _on_edge(values: Array, belongs: NDArray, most: Array) -> NDArray[np.bool_]:
+    """(height, width): pixels beside a silhouette, or beside a step of the light rather than on a slope of it.
+
+    A step bends the light by its own height from one pixel to the next, a slope by little of what it changes over three pixels.
+    """
+    change = contrast(values).max(axis=-1)
+    bend = np.zeros(values.shape)
+    for axis in (0, 1):
+        if values.shape[axis] > 2:
+            inner = tuple(slice(1, -1) if i == axis else slice(None) for i in range(3))
+            bend[inner] = np.maximum(bend[inner], np.abs(np.diff(values, 2, axis=axis)))
+    is_step = largest_around(bend.max(axis=-1)) > change / 4
+    return (change > largest_around(most)) & (is_step | (contrast(belongs[..., None])[..., 0] > 0))
+
+
+def _blender_of(image: Image) -> tuple[int, ...]:
+    """The version of Blender that wrote a picture, as its file tells from 5.0 on."""
+    told = re.match(r"Blender (\d+)\.(\d+)", image.attributes.get("Software", ""))
+    return tuple(map(int, told.groups())) if told else ()
 
 
 def _ray_shift(pinhole: Pinhole, reference: Image) -> Array:
