@@ -10,7 +10,7 @@ Rejected: decoding images when they are loaded (not what Cycles does), and mip m
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Floats, Indices, gather
+from .arrays import Float32s, Floats, Indices, gather
 from .materials import Colour, Picture
 from .points import Points, materials_of
 from .scene import Scene
@@ -26,7 +26,6 @@ class Palette:
     def __init__(self, scene: Scene) -> None:
         materials = materials_of(scene)
         used = _used(scene)
-        self._images = scene.images
         self._ior = np.array([material.ior for material in materials])
         self._colours: dict[str, list[Colour | None]] = {}
         self._constants: dict[str, Floats] = {}
@@ -35,6 +34,11 @@ class Palette:
             if any(colours):
                 self._colours[component] = colours
                 self._constants[component] = np.array([colour.rgb if colour else (0.0, 0.0, 0.0) for colour in colours]).T
+        images = {
+            colour.image for colours in self._colours.values() for colour in colours if colour and colour.image is not None
+        }
+        self._pictures = scene.images
+        self._textures = {name: Texture(scene.images[name]) for name in images}
         self._only = int(np.flatnonzero(used)[0]) if np.count_nonzero(used) == 1 else None
 
     def has(self, component: str) -> bool:
@@ -66,7 +70,7 @@ class Palette:
     def _vary(self, values: Floats, colour: Colour, points: Points, which: slice | Indices) -> None:
         """Multiply values of a colour by what varies over the surface."""
         if colour.image is not None:
-            values[:, which] *= looked_up(self._images[colour.image], points.uv[:, which], colour.closest)
+            values[:, which] *= self._textures[colour.image].at(points.uv[:, which], colour.closest)
         if colour.vertex:
             values[:, which] *= points.vertex_colour[:, which]
 
@@ -75,41 +79,51 @@ class Palette:
         colour = self._colours.get(component, {})[material] if self.has(component) else None
         if colour is None:
             return np.zeros(3)
-        factor = 1.0 if colour.image is None else _mean(self._images[colour.image])
+        factor = 1.0 if colour.image is None else _mean(self._pictures[colour.image])
         return np.array(colour.rgb) * factor
 
 
-def looked_up(picture: Picture, uv: Floats, closest: bool) -> Floats:
-    """(3, n) float64: the linear colours of an image at (2, n) UV; those at 0 where UV is not finite."""
-    height, width = picture.pixels.shape[:2]
-    with np.errstate(invalid="ignore"):
-        u, v = uv - np.floor(uv)
-    if not np.isfinite(uv).all():
-        u, v = np.nan_to_num(u), np.nan_to_num(v)
+class Texture:
+    """A picture, made ready to be looked up: each channel of its pixels in one piece of memory."""
 
-    def pixels(row: Indices, column: Indices) -> NDArray[np.float32]:
-        return np.take(picture.pixels.reshape(-1, 3), row * width + column, axis=0, mode="clip")
+    def __init__(self, picture: Picture) -> None:
+        self._height, self._width = picture.pixels.shape[:2]
+        self._channels = [np.ascontiguousarray(picture.pixels[..., channel]).ravel() for channel in range(3)]
+        self._srgb = picture.srgb
 
-    if closest:
-        row, column = ((place * count).astype(np.intp) for place, count in ((v, height), (u, width)))
-        encoded = pixels(np.minimum(row, height - 1), np.minimum(column, width - 1))
-    else:
-        left, right, across = _between(u, width)
-        below, above, up = _between(v, height)
-        lower = pixels(below, left) * (1.0 - across) + pixels(below, right) * across
-        upper = pixels(above, left) * (1.0 - across) + pixels(above, right) * across
-        encoded = lower * (1.0 - up) + upper * up
-    return (decoded(encoded) if picture.srgb else encoded).T.astype(np.float64)
+    def at(self, uv: Floats, closest: bool) -> Floats:
+        """(3, n) float64: the linear colours at (2, n) UV, blended in float32; those at 0 where UV is not finite."""
+        with np.errstate(invalid="ignore"):
+            u, v = uv - np.floor(uv)
+        if not np.isfinite(uv).all():
+            u, v = np.nan_to_num(u), np.nan_to_num(v)
+        pixels = self._closest(u, v) if closest else self._around(u, v)
+        colours = np.empty((3, len(u)))
+        for colour, channel in zip(colours, self._channels, strict=True):
+            blend = sum(channel.take(pixel, mode="clip") * share for pixel, share in pixels)
+            colour[:] = decoded(blend) if self._srgb else blend
+        return colours
+
+    def _closest(self, u: Floats, v: Floats) -> list[tuple[Indices, float]]:
+        """The pixel at each place, with all of the weight."""
+        column = np.minimum((u * self._width).astype(np.intp), self._width - 1)
+        row = np.minimum((v * self._height).astype(np.intp), self._height - 1)
+        return [(row * self._width + column, np.float32(1))]
+
+    def _around(self, u: Floats, v: Floats) -> list[tuple[Indices, Float32s]]:
+        """The four pixels about whose centres each place is, and their weights."""
+        columns, rows = _between(u, self._width), _between(v, self._height)
+        return [(row * self._width + column, up * across) for row, up in rows for column, across in columns]
 
 
-def _between(u: Floats, count: int) -> tuple[Indices, Indices, Floats]:
-    """The two of `count` pixels in a row about whose centres u, 0 to 1, is; (n, 1) how far it is from the one to the other."""
+def _between(u: Floats, count: int) -> tuple[tuple[Indices, Float32s], tuple[Indices, Float32s]]:
+    """The two of `count` pixels in a row about whose centres u, 0 to 1, is, and their weights."""
     place = u * count - 0.5
     first = np.floor(place)
-    share = place - first
+    share = (place - first).astype(np.float32)
     first = first.astype(np.intp)
     second = first + 1
-    return np.where(first < 0, count - 1, first), np.where(second >= count, 0, second), share[:, None]
+    return (np.where(first < 0, count - 1, first), 1 - share), (np.where(second >= count, 0, second), share)
 
 
 def decoded(encoded: NDArray[np.floating]) -> NDArray[np.float32]:
