@@ -49,8 +49,10 @@ class Points:
 
     def at(self, which: Some) -> "Points":
         """Some of the points."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
-        return Points(**{name: None if value is None else pick(value, which) for name, value in values.items()})
+        given = vars(self).items()
+        values = {name: None if value is None else pick(value, which) for name, value in given if name != "shading"}
+        # Where nothing is smooth, both normals are one array, and stay it.
+        return Points(shading=values["normal"] if self.shading is self.normal else pick(self.shading, which), **values)
 
     @staticmethod
     def joined(parts: "list[Points]") -> "Points":
