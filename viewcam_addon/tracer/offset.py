@@ -19,8 +19,9 @@ The sum is the triangle's offset, u (3.5 M + (8 + σ) L); with half of it there 
 What it can't mend: directions are rounded too, and a flat ray passes over what lies farther off and is rounded by more. So a
 ray that rises from its surface by less than 2⁻¹⁸ of its length counts as blocked: a rounding decides about it, and it brings no
 more than that part of a light. Needles thinner than some u M are no surface in float32: of rays along them, a few in 100,000
-meet them. And a wall that is nearer than the offset is behind the start: beside the eye, a floor of 10 km in two triangles has
-one of millimetres.
+meet them. And a wall that is nearer than the offset is behind the start: beside the eye, a floor of 10 km in two triangles
+would have one of millimetres. Such wide triangles are tested in float64 (alone.py); what their rays need is to clear what
+Embree sees near the eye, so they start as far off as those of a triangle that is as large as it is near.
 
 Ellipsoids need none (offsets of 0): they are tested in float64, with the start as the eye. It may lie inside by a rounding,
 from where nothing of them is seen, or outside, from where a ray that goes outwards has its near root behind it.

@@ -5,14 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from viewcam_addon.tracer import crowd, space
+from viewcam_addon.tracer import crowd, space, visibility
 from viewcam_addon.tracer.ellipsoids import ellipsoids_of
 from viewcam_addon.tracer.points import Points, Surfaces
 from viewcam_addon.tracer.scene import Mesh, Scene, Spheres
 from viewcam_addon.tracer.space import Space
 from viewcam_addon.tracer.triangles import Planes, triangles_of
 from viewcam_addon.tracer.view import View
-from viewcam_addon.tracer.visibility import visibility
 
 
 @dataclass
@@ -40,7 +39,7 @@ def stage_of():
         surfaces = Surfaces(scene, view, triangles, planes, ellipsoids)
         rows, columns = np.mgrid[: scene.camera.height, : scene.camera.width]
         x, y = scene.camera.view_plane(columns.ravel() + 0.5, rows.ravel() + 0.5)
-        found = visibility(triangles, planes, ellipsoids, scene.clip).first(x, y)
+        found = visibility.visibility(triangles, planes, ellipsoids, scene.clip).first(x, y)
         met = np.flatnonzero(found >= 0)
         return Stage(scene, view, surfaces, Space(surfaces), surfaces.seen(found[met], x[met], y[met]), met)
 
@@ -49,10 +48,10 @@ def stage_of():
 
 @pytest.fixture(scope="session")
 def without_embree():
-    """without_embree(monkeypatch): scattered and shadow rays do without, from now on."""
+    """without_embree(monkeypatch): all rays do without, from now on."""
 
     def patch(monkeypatch) -> None:
-        for module in (space, crowd):
+        for module in (visibility, space, crowd):
             monkeypatch.setattr(module, "EmbreeScene", None)
 
     return patch

@@ -100,13 +100,13 @@ def found_first(stage, points, directions, kind="diffuse"):
     return found, far, hits
 
 
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(seed=SEEDS)
 def test_scattered_rays_meet_first_what_brute_force_finds(random_scene, stage_of, outwards, seed):
     check_scattered_rays(random_scene, stage_of, outwards, seed)
 
 
-@settings(max_examples=4)
+@settings(max_examples=2)
 @given(seed=SEEDS)
 def test_without_embree_they_meet_the_same(random_scene, stage_of, outwards, without_embree, seed):
     with pytest.MonkeyPatch.context() as patch:
@@ -140,13 +140,13 @@ def test_starts_that_are_moved_are_found_out(random_scene, stage_of, outwards):
         check_scattered_rays(random_scene, stage_of, outwards, 0, shift=0.1)
 
 
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(seed=SEEDS)
 def test_shadow_rays_are_blocked_where_brute_force_finds_something_on_their_way(random_scene, stage_of, outwards, seed):
     check_shadow_rays(random_scene, stage_of, outwards, seed)
 
 
-@settings(max_examples=4)
+@settings(max_examples=2)
 @given(seed=SEEDS)
 def test_without_embree_the_same_are_blocked(random_scene, stage_of, outwards, without_embree, seed):
     with pytest.MonkeyPatch.context() as patch:
