@@ -1,6 +1,10 @@
 """Two pictures: what differs, by how much, and is it explained.
 
-geometry.py compares; law.py says what is allowed; statistics.py measures each pass; mismatches.py finds the pixels that see
-another surface and re-traces them; cameras.py compares the cameras themselves; verdict.py puts it into sentences; report.py
-draws it.
+Geometry: geometry.py compares; law.py says what is allowed; statistics.py measures each pass; mismatches.py finds the pixels
+that see another surface and re-traces them; cameras.py compares the cameras themselves; verdict.py puts it into sentences;
+report.py draws it.
+
+Light: radiance.py compares; sides.py makes means and variances of several seeds; steady.py judges light without noise by the
+law, questions.py noisy light by chance, with the distributions of noise.py; perception.py tells what an eye sees;
+light_verdict.py puts it into sentences; light_report.py draws it. Both reports share page.py, pictures.py and charts.py.
 """

@@ -163,11 +163,16 @@ def _table(comparison: RadianceComparison) -> str:
 
 def _noisy_line(row: LightRow) -> str:
     cells = f"<td>{figure(row.reference)}</td><td>{figure(row.test)}</td><td>{row.ratio:.5f} ± {row.ratio_error:.5f}</td>"
-    for question in row.questions:
-        errors = abs(question.worst.errors)
-        title = f"{place_words(question.worst, question.size)}; {question.limit:.2f} standard errors are allowed"
-        cells += page.bar_cell(f"{errors:.2f} of {question.limit:.2f}", title, errors / question.limit)
+    cells += "".join(map(_answer_cell, row.questions))
     return f"<tr><th scope=row>{row.name}</th>{cells}<td>{page.mark(row.ok)}</td></tr>"
+
+
+def _answer_cell(question: Question) -> str:
+    if question.is_open:
+        return '<td title="the noise of single pixels is not known, or none differs">–</td>'
+    errors = abs(question.worst.errors)
+    title = f"{place_words(question.worst, question.size)}; {question.limit:.2f} standard errors are allowed"
+    return page.bar_cell(f"{errors:.2f} of {question.limit:.2f}", title, errors / question.limit)
 
 
 def _edge_line(row: LightRow) -> str:

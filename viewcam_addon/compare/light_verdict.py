@@ -99,9 +99,13 @@ def _noisy_lines(comparison: "RadianceComparison") -> list[str]:
     names = [question.name for question in comparison.rows[0].questions]
     table = [f"{'standard errors':<17}{'ratio':>20}" + "".join(f"{name:>18}" for name in names)]
     for row in comparison.rows:
-        cells = "".join(f"{f'{abs(q.worst.errors):.1f} of {q.limit:.1f}':>18}" for q in row.questions)
+        cells = "".join(f"{_answer(question):>18}" for question in row.questions)
         table.append(f"{row.name:<17}{f'{row.ratio:.5f} ± {row.ratio_error:.5f}':>20}{cells}  {mark(row.ok)}")
     return table
+
+
+def _answer(question: "Question") -> str:
+    return "–" if question.is_open else f"{abs(question.worst.errors):.1f} of {question.limit:.1f}"
 
 
 def _steady_lines(comparison: "RadianceComparison") -> list[str]:

@@ -69,6 +69,11 @@ class Question:
         return {WHOLE: "whole picture", PIXELS: "pixels"}.get(self.size, f"tiles of {self.size} × {self.size}")
 
     @property
+    def is_open(self) -> bool:
+        """Whether nobody knows an answer: of pixels whose noise is not known, or that do not differ."""
+        return not self.errors.any()
+
+    @property
     def failing(self) -> NDArray[np.bool_]:
         """(rows, columns) bool: tiles that differ in some channel."""
         return (np.abs(self.errors) > self.allowed).any(axis=-1)
