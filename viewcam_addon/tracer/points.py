@@ -80,7 +80,7 @@ class Surfaces:
         things = [*triangles.placed, *self.balls.placed]
         self._material = _materials(scene, things)
         # Of spheres 0: they are tested in float64.
-        self._offset = np.zeros(len(self._material), np.float32)
+        self._offset = np.zeros(len(self._material))
         self._offset[: triangles.count] = offset.triangle_offsets(triangles)
         self._offset[planes.wide] = offset.wide_offsets(planes)
         mirrored = [np.linalg.det(placed.matrix[:3, :3]) < 0 for placed, _ in triangles.placed]
@@ -182,7 +182,7 @@ class Surfaces:
             backside=side * gather(self._front, triangle) < 0,
             material=gather(self._material, triangle),
             primitive=triangle,
-            offset=gather(self._offset, triangle).astype(np.float64),
+            offset=gather(self._offset, triangle),
             uv=self._uv(triangle, first, second),
             vertex_colour=None if self._colours is None else _interpolated(gather(self._colours, triangle), first, second, 3),
         )

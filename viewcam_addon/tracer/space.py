@@ -120,12 +120,11 @@ class _Sight:
         """Whether anything stands before lights, (n,), at these finite distances."""
         starts = offset.start(points.position, points.normal, directions, points.offset)
         lights = points.position + directions * distances
-        origins, ways, lengths = offset.shadow_rays(starts, lights)
+        origins, ways, lengths = offset.shadow_rays(starts * self._unit, lights * self._unit)
         if self._embree is None:
             blocked = np.zeros(points.count, bool)
         else:
-            unit = np.float32(self._unit)
-            blocked = self._embree.run(origins * unit, ways * unit, dists=lengths, query="OCCLUDED") >= 0
+            blocked = self._embree.run(origins, ways, dists=lengths, query="OCCLUDED") >= 0
         if not self._alone.is_empty:
             limits = np.where(blocked, 0.0, lengths)
             blocked |= _any(self._alone.met(starts, lights - starts, limits), limits)

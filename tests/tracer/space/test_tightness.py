@@ -14,7 +14,7 @@ from viewcam_addon.tracer import offset, triangles, visibility
 # to a corner of the room than float32 can tell.
 LEAKS = 1e-5
 
-PLACES = [(1.0, 0.0), (1e-3, 0.0), (1e4, 0.0), (1.0, 1e3), (1e-2, 1e5)]
+PLACES = [(1.0, 0.0), (1e-3, 0.0), (1e4, 0.0), (1.0, 1e3), (1e-2, 1e5), (1e-30, 0.0), (1e12, 0.0)]
 HALVES = [[0, 1, 2], [0, 2, 3]]
 SQUARE = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
 
