@@ -12,6 +12,7 @@ import pytest
 
 from viewcam_addon.compare import questions
 from viewcam_addon.compare.sides import Sides
+from viewcam_addon.compare.steady import Allowance
 
 LEVEL = 0.01
 HEIGHT, WIDTH = 32, 40
@@ -22,7 +23,15 @@ rows, columns = np.mgrid[:HEIGHT, :WIDTH]
 TRUTH = np.stack([0.2 + 0.5 * columns / WIDTH, 0.3 + 0.3 * rows / HEIGHT, np.full((HEIGHT, WIDTH), 0.4)], axis=-1)
 # How much of each pixel lies behind an edge that crosses the picture aslant.
 COVER = np.clip((columns - WIDTH / 3 + 0.3 * rows) / 3, 0.0, 1.0)[..., None]
-NO_ROUNDING = np.full((HEIGHT, WIDTH), 1e-9)
+
+
+def rounding(one):
+    """One rounding of each pixel's value; nothing is shifted, nothing stored in short."""
+    none = np.zeros((HEIGHT, WIDTH))
+    return Allowance(none, none + one, none, none)
+
+
+NO_ROUNDING = rounding(1e-9)
 
 
 # Each draws the mean of so many samples of every pixel, and the variance of that mean as its samples tell it.
@@ -74,7 +83,7 @@ def sides_of(kind, rng, samples, each, seeds, told=1.0):
 
 
 def ask(sides, samples, seeds):
-    return questions.ask(sides, NO_ROUNDING, 0.0, (samples - 1, max(seeds - 1, 1)), LEVEL)
+    return questions.ask(sides, NO_ROUNDING, (samples - 1, max(seeds - 1, 1)), LEVEL)
 
 
 @pytest.mark.parametrize(
@@ -164,9 +173,8 @@ def test_a_pixel_without_noise_may_differ_by_rounding_and_by_no_more():
     """20 roundings of 1e-8 are allowed where there is no contrast, and then nothing, since there is no noise."""
     none, reference = np.zeros((HEIGHT, WIDTH, 3)), np.full((HEIGHT, WIDTH, 3), 0.5)
     flat = Sides("Combined", reference, reference + 1.9e-7, none, none, np.zeros((HEIGHT, WIDTH), bool))
-    rounding = np.full((HEIGHT, WIDTH), 1e-8)
-    assert questions.ask(flat, rounding, 0.0, (255, 7), LEVEL)[0].ok
-    assert not questions.ask(replace(flat, test=flat.test + 2e-8), rounding, 0.0, (255, 7), LEVEL)[0].ok
+    assert questions.ask(flat, rounding(1e-8), (255, 7), LEVEL)[0].ok
+    assert not questions.ask(replace(flat, test=flat.test + 2e-8), rounding(1e-8), (255, 7), LEVEL)[0].ok
 
 
 def test_a_shift_of_cycles_filter_table_is_allowed_and_one_of_a_tenth_of_a_pixel_is_not():
@@ -191,3 +199,12 @@ def test_a_row_of_the_result_is_plain_json():
         for entry in told
     ]
     assert [entry["name"] for entry in told] == ["pixels", "tiles of 8 × 8", "tiles of 32 × 32", "whole picture"]
+
+
+def test_a_shift_of_the_picture_is_no_excuse_for_a_bias_of_noisy_light():
+    """Noise looks like slopes, of a tenth a pixel; a shift by 1e-3 px times them would allow a bias, were they not summed."""
+    shift = np.full((HEIGHT, WIDTH), 1e-3)
+    allowed = replace(NO_ROUNDING, moved=0.1 * shift, shift=shift)
+    sides = sides_of(grey, np.random.default_rng(9), 256, 32, 8)
+    right, wrong = (questions.ask(replace(sides, test=factor * sides.test), allowed, (255, 7), LEVEL) for factor in (1.0, 1.02))
+    assert right[-1].errors.all() and right[-1].ok and not wrong[-1].ok

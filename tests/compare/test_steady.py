@@ -120,14 +120,11 @@ def test_a_pixel_or_two_that_leak_are_let_pass_and_no_more(paper_scene):
     assert leaking(2).passed and not leaking(3).passed
 
 
-def test_the_law_grows_with_slope_value_lamp_and_samples():
-    base = law.radiance_error(np.array(1e-4), np.array(0.1), np.array(1.0), np.array(1.0), 1)
-    assert base == pytest.approx(
-        1e-5 + 2.0**-24 * (law.RADIANCE_ROUNDINGS + 1 / law.SAMPLES_PER_ROUNDING + law.COSINE_ROUNDINGS)
-    )
-    for more in ((2e-4, 0.1, 1.0, 1.0, 1), (1e-4, 0.2, 1.0, 1.0, 1), (1e-4, 0.1, 2.0, 1.0, 1), (1e-4, 0.1, 1.0, 9.0, 1)):
-        assert law.radiance_error(*map(np.array, more)) > base
-    assert law.radiance_error(*map(np.array, (1e-4, 0.1, 1.0, 1.0)), 1024) > base
+def test_the_law_grows_with_value_lamp_and_samples():
+    base = law.radiance_error(1.0, 1.0, 1)
+    assert base == 2.0**-24 * (law.RADIANCE_ROUNDINGS + 1 / law.SAMPLES_PER_ROUNDING + law.COSINE_ROUNDINGS)
+    for more in ((2.0, 1.0, 1), (1.0, 9.0, 1), (1.0, 1.0, 1024)):
+        assert law.radiance_error(*more) > base
 
 
 def test_short_normals_are_allowed_to_the_blender_that_has_them_and_to_no_other(paper_scene):

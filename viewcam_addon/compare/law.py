@@ -139,16 +139,15 @@ def uv_storage(seen: Seen) -> Array:
     return 2.5 * FLOAT32 * np.maximum(np.abs(seen["UV"][..., :2]).max(axis=-1), 1.0)
 
 
-def radiance_error(shift: Array, slope: Array, value: Array, brightest: Array | float, samples: int) -> Array:
-    """Error of a radiance that one rounding causes, in its own unit.
+def radiance_error(value: Array, brightest: Array | float, samples: int) -> Array:
+    """Error of a radiance that one rounding of its own figures causes, in its own unit.
 
-    The picture's shift (`shift`, pixels) times the slope of the radiance in the picture (`slope`, per pixel); the roundings of
-    the value itself (RADIANCE_ROUNDINGS, and those of adding up the samples); and those of the cosine between the surface and
-    the lamp, which are absolute: on a surface that the light grazes they are roundings of what the light would be from straight
-    above (`brightest`).
+    Its roundings (RADIANCE_ROUNDINGS, and those of adding up the samples), and those of the cosine between the surface and the
+    lamp, which are absolute: on a surface that the light grazes they are roundings of what the light would be from straight
+    above (`brightest`). The picture's shift times the slope of the radiance comes on top.
     """
     roundings = RADIANCE_ROUNDINGS + samples / SAMPLES_PER_ROUNDING
-    return shift * slope + FLOAT32 * (roundings * value + COSINE_ROUNDINGS * brightest)
+    return FLOAT32 * (roundings * value + COSINE_ROUNDINGS * brightest)
 
 
 def slopes(values: NDArray, belongs: NDArray) -> Array:

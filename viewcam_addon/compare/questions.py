@@ -7,7 +7,8 @@ that crosses the corner of a pixel may have been missed by all of its samples.
 What is within rounding is no difference: a pixel's is taken beyond the law's maximum, a tile's sum beyond the law's 99th
 percentile of each pixel, since a mean of rounding errors can't exceed what nearly all of them stay below. Nor is what Cycles'
 table of the Blackman-Harris filter does (tracer/filters.py): it shifts the picture by 4.9e-4 px to the right and upwards, and
-changes a pixel by 0.21 % of the contrast around it at most. Of a tile a shift changes only what passes its border.
+changes a pixel by 0.21 % of the contrast around it at most. A shift changes only what passes a tile's border, so that its
+effect is the sum of the slopes, in which noise cancels.
 """
 
 from collections.abc import Iterator
@@ -20,6 +21,7 @@ from . import law, noise
 from .law import Array
 from .mismatches import contrast
 from .sides import CHANNEL_NAMES, Sides
+from .steady import Allowance
 
 PIXELS, WHOLE = 1, 0
 SIZES = (PIXELS, 8, 32, WHOLE)
@@ -99,18 +101,14 @@ class Question:
         }
 
 
-def ask(
-    sides: Sides, one_rounding: Array, floor: Array | float, freedom: tuple[int, int], level: float
-) -> tuple[Question, ...]:
+def ask(sides: Sides, allowed: Allowance, freedom: tuple[int, int], level: float) -> tuple[Question, ...]:
     """All sizes, asked so that chance makes any of them fail with the probability `level` at most.
 
-    one_rounding, floor : (height, width) what one rounding of float32 and what storage causes. freedom : the degrees of
-    freedom of both sides' variances. level : shared out evenly over the sizes, and over the tiles and channels of each after
-    Šidák.
+    allowed : what rounding may do to these sides. freedom : the degrees of freedom of both sides' variances.
+    level : shared out evenly over the sizes, and over the tiles and channels of each after Šidák.
     """
     share = level / len(SIZES)
-    answers = _answers(sides, one_rounding[..., None], np.atleast_2d(floor)[..., None], freedom, share)
-    return tuple(_question(sides, *answer) for answer in answers)
+    return tuple(_question(sides, *answer) for answer in _answers(sides, allowed, freedom, share))
 
 
 def worst_channel(errors: Array) -> Array:
@@ -125,18 +123,17 @@ def over_pixels(tiles: Array, shape: tuple[int, int], size: int) -> Array:
     return tiles
 
 
-def _answers(
-    sides: Sides, one: Array, floor: Array, freedom: tuple[int, int], level: float
-) -> Iterator[tuple[int, Array, Array]]:
+def _answers(sides: Sides, allowed: Allowance, freedom: tuple[int, int], level: float) -> Iterator[tuple[int, Array, Array]]:
     """For each size: (size, errors, what is allowed)."""
     difference = sides.difference
-    errors, both = _pixel_errors(sides, law.ROUNDINGS[-1] * one + floor + _FILTER_CONTRAST * contrast(sides.reference), freedom)
+    errors, both = _pixel_errors(sides, allowed.most[..., None] + _FILTER_CONTRAST * contrast(sides.reference), freedom)
     yield PIXELS, errors, noise.student_critical(both, noise.sidak(level, errors.size))
-    rounding = np.broadcast_to(_NEARLY_ALL * one + floor, difference.shape)
+    rounding = np.repeat((_NEARLY_ALL * allowed.value + allowed.floor)[..., None], difference.shape[2], axis=2)
+    shift = _FILTER_SHIFT + _NEARLY_ALL * float(allowed.shift.max())
     across = [np.gradient(sides.reference, axis=axis) for axis in (0, 1) if sides.reference.shape[axis] > 1]
     for size in SIZES[1:]:
         total, square, allowance = (noise.tile_sums(values, size) for values in (difference, difference**2, rounding))
-        allowance = allowance + _FILTER_SHIFT * sum(np.abs(noise.tile_sums(slope, size)) for slope in across)
+        allowance = allowance + shift * sum(np.abs(noise.tile_sums(slope, size)) for slope in across)
         errors = _errors(_beyond(total, allowance), np.maximum(square, noise.mean_around(square)))
         yield size, errors, np.full(errors.shape, noise.sign_critical(noise.sidak(level, errors.size)))
 

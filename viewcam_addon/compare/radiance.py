@@ -161,9 +161,9 @@ def compare(reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_sam
 
 
 def _steady(sides: Sides, rounding: steady.Rounding) -> tuple[LightRow, dict[str, Array]]:
-    law = (rounding.one(sides), rounding.floor(sides), rounding.shift, rounding.belongs)
-    row, edges, roundings = steady.compare(sides, *law)
-    factor = None if row.ok else _factor(sides, lambda scaled: steady.compare(scaled, *law)[0].ok)
+    allowed = rounding.of(sides)
+    row, edges, roundings = steady.compare(sides, allowed, rounding.belongs)
+    factor = None if row.ok else _factor(sides, lambda scaled: steady.compare(scaled, allowed, rounding.belongs)[0].ok)
     drawn = {"difference": sides.difference.mean(axis=-1), "roundings": roundings}
     return LightRow(*_means(sides), 0.0, 0.0, int(sides.broken.sum()), steady=row, edges=edges, factor=factor), drawn
 
@@ -171,7 +171,7 @@ def _steady(sides: Sides, rounding: steady.Rounding) -> tuple[LightRow, dict[str
 def _noisy(
     sides: Sides, rounding: steady.Rounding, freedom: tuple[int, int], level: float
 ) -> tuple[LightRow, dict[str, Array]]:
-    given = (rounding.one(sides), rounding.floor(sides), freedom, level)
+    given = (rounding.of(sides), freedom, level)
     asked = questions.ask(sides, *given)
     errors = sides.difference - sides.difference.mean(axis=(0, 1))
     # Channels share their samples, so that each pixel's sum over them is one error; but each channel is asked by itself.

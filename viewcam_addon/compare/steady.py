@@ -56,18 +56,41 @@ class Edges:
         return {**asdict(self), "ok": self.ok}
 
 
+@dataclass(frozen=True, eq=False)
+class Allowance:
+    """What rounding may do to one quantity, each (height, width), the largest of its channels.
+
+    moved : by the shift of the picture, for one rounding. value : by one rounding of its own figures. floor : by storage.
+    shift : pixels, that of the picture for one rounding.
+    """
+
+    moved: Array
+    value: Array
+    floor: Array
+    shift: Array
+
+    @property
+    def one(self) -> Array:
+        """What one rounding of everything causes."""
+        return self.moved + self.value
+
+    @property
+    def most(self) -> Array:
+        """What no pixel may go beyond."""
+        return law.ROUNDINGS[-1] * self.one + self.floor
+
+
 class Rounding:
     """What rounding causes in the light of a picture.
 
     test : one of the test pictures, which tells its Blender. samples : of each picture, the most.
-    shift : (height, width) pixels, law.ray_shift from the reference's depths; where nothing was hit the median.
     belongs : (height, width) the object of each pixel, 0 for none or where nobody knows.
     """
 
     def __init__(self, pinhole: Pinhole, reference: Image, test: Image, samples: int) -> None:
-        self.shift = _ray_shift(pinhole, reference)
+        self._shift = _ray_shift(pinhole, reference)
         self._samples = samples
-        self.belongs = np.zeros(self.shift.shape)
+        self.belongs = np.zeros(self._shift.shape)
         if "Object Index" in reference.passes:
             self.belongs = reference["Object Index"][..., 0]
         # What the light on a surface would be if it came from straight above, as far as the picture tells: the largest
@@ -78,32 +101,31 @@ class Rounding:
             lit = float(np.nan_to_num(reference["Diffuse Direct"]).max())
             self._brightest = lit * reference["Diffuse Color"].max(axis=-1).astype(np.float64)
 
-    def one(self, sides: Sides) -> Array:
-        """(height, width) the error of a quantity that one rounding of float32 causes, the largest of its channels."""
+    def of(self, sides: Sides) -> Allowance:
         channels = np.split(sides.reference, sides.reference.shape[2], axis=2)
         slope = np.max([law.slopes(channel, self.belongs) for channel in channels], axis=0)
         value = np.abs(sides.reference).max(axis=-1)
-        return law.radiance_error(self.shift, slope, value, self._brightest, self._samples)
+        error = law.radiance_error(value, self._brightest, self._samples)
+        return Allowance(self._shift * slope, error, self._floor(sides.name, value), self._shift)
 
-    def floor(self, sides: Sides) -> Array | float:
-        """(height, width) what the storage of smooth normals may add: the lamp's light times the cosine's change."""
-        if not self._storage or sides.name not in _SHADED:
-            return 0.0
-        cosine = np.abs(sides.reference).max(axis=-1) / np.maximum(self._brightest, np.finfo(float).tiny)
+    def _floor(self, name: str, value: Array) -> Array:
+        """What the storage of smooth normals may add: the light from straight above times the cosine's change."""
+        if not self._storage or name not in _SHADED:
+            return np.zeros(value.shape)
+        cosine = value / np.maximum(self._brightest, np.finfo(float).tiny)
         return self._storage * self._brightest * np.sqrt(1.0 - np.minimum(cosine, 1.0) ** 2)
 
 
-def compare(sides: Sides, one: Array, floor: Array | float, shift: Array, belongs: NDArray) -> tuple[Row, Edges, Array]:
+def compare(sides: Sides, allowed: Allowance, belongs: NDArray) -> tuple[Row, Edges, Array]:
     """The figures of all pixels, those on edges, and the error of each pixel in roundings.
 
-    one, floor : those of `Rounding` for these sides. shift, belongs : its own.
+    allowed : of these sides. belongs : the object of each pixel.
 
     Returns the row, relative errors; the edges; (height, width) float64.
     """
     error = np.abs(sides.difference).max(axis=-1)
-    most = law.ROUNDINGS[-1] * one + floor
-    apart, on_edge = error > most, _on_edge(sides.reference, belongs, most)
-    turned = np.minimum(_SIDES_OF_A_PIXEL * law.ROUNDINGS[law.PERCENTILES.index(99.0)] * shift, 1.0)[on_edge].sum()
+    apart, on_edge = error > allowed.most, _on_edge(sides.reference, belongs, allowed.most)
+    turned = np.minimum(_SIDES_OF_A_PIXEL * law.ROUNDINGS[law.PERCENTILES.index(99.0)] * allowed.shift, 1.0)[on_edge].sum()
     edges = Edges(
         int((apart & on_edge).sum()),
         poisson_allowance(float(turned), _RARELY),
@@ -113,8 +135,10 @@ def compare(sides: Sides, one: Array, floor: Array | float, shift: Array, belong
     judged = ~sides.broken & ~(apart & edges.ok)
     size = np.abs(sides.reference).max(axis=-1)
     scale = np.maximum(size, max(_DARK * float(size.mean()), np.finfo(float).tiny))
-    row = measure(sides.name, "relative", (error / scale)[judged], (one / scale)[judged], (floor / scale)[judged])
-    return row, edges, np.minimum(error / np.maximum(one, np.finfo(float).tiny), _BEYOND_COUNTING)
+    row = measure(
+        sides.name, "relative", (error / scale)[judged], (allowed.one / scale)[judged], (allowed.floor / scale)[judged]
+    )
+    return row, edges, np.minimum(error / np.maximum(allowed.one, np.finfo(float).tiny), _BEYOND_COUNTING)
 
 
 def _on_edge(values: Array, belongs: NDArray, most: Array) -> NDArray[np.bool_]:
