@@ -226,7 +226,8 @@ def softbox(name: str, watts: float, code: str, location, target, width: float, 
     data.shape, data.size, data.size_y = "RECTANGLE", width, height
     data.energy, data.color = watts, colour(code)[:3]
     dx, dy, dz = (t - s for t, s in zip(target, location, strict=True))
-    tilt, turn = math.degrees(math.atan2(math.hypot(dx, dy), -dz)), math.degrees(math.atan2(dy, dx)) - 90
+    tilt = math.degrees(math.atan2(math.hypot(dx, dy), -dz))
+    turn = math.degrees(math.atan2(dy, dx)) - 90 if dx or dy else 0  # straight down, the width lies along x
     return place(name, data, location=location, rotation=(tilt, 0, turn))
 
 
