@@ -3,6 +3,7 @@
 #   make test          lint and the tests, with the newest bpy wheel for the Python found
 #   make test-exhaustive  the tests that take minutes: 10⁸ rays, millions of hostile numbers
 #   make test-matrix   the tests with Blender 4.2, 4.5 and 5.0 (and 5.2 where there is a Python 3.13) as wheels
+#   make test-light    whole pictures of light, 1024 samples a pixel, against Cycles of each of these
 #   make test-blender  the extension in a real Blender 5.2: $BLENDER, or blender on the PATH, or Debian's in a folder of its own
 #   make extension     dist/virtual_pinhole-VERSION-PLATFORM.zip for artists, built by that Blender
 #   make scenes        sample_scenes/*.blend anew, by Blender 4.2
@@ -10,7 +11,7 @@
 #   make benchmark     the tracer against Cycles
 #   make clean         removes all that these made, but for ~/.cache/virtual-pinhole
 
-.PHONY: demo test test-exhaustive lint test-matrix test-blender extension scenes charts benchmark clean
+.PHONY: demo test test-exhaustive lint test-matrix test-light test-blender extension scenes charts benchmark clean
 .DELETE_ON_ERROR:
 
 # bpy has wheels for these two only.
@@ -60,6 +61,11 @@ test-matrix: $(MATRIX:%=test-wheel-%)
 
 test-wheel-%: .venvs/%/ready
 	$(call PYTEST,.venvs/$*)
+
+test-light: $(MATRIX:%=test-light-%)
+
+test-light-%: .venvs/%/ready
+	$(call PYTEST,.venvs/$*) -m light
 
 .venvs/%/ready: $(PROJECT)
 	python=$$(.ci/python $(python-$*)) || { echo "Blender $*'s wheel needs Python $(python-$*), and there is none on the PATH or in pyenv"; exit 1; }; \

@@ -17,6 +17,8 @@ bpy = pytest.importorskip("bpy")
 from viewcam_addon.blender import camera
 from viewcam_addon.pinhole import Pinhole
 
+pytestmark = pytest.mark.light
+
 ROOT = Path(__file__).resolve().parent.parent
 SCENES = ROOT / "sample_scenes"
 SAMPLES = 1024
