@@ -23,8 +23,9 @@ from .surface import Passes
 from .textures import Palette
 from .view import View
 
-# Paths that are traced at a time, few enough for a core's cache, and of how many samples of a pixel if there are as many.
-PATHS, SAMPLES_AT_A_TIME = 16384, 16
+# Paths that are traced at a time, and of how many samples of a pixel if there are as many. Fewer would fit a core's cache, and
+# take a fifth longer: after some scatterings few are left, and NumPy is called as often for these.
+PATHS, SAMPLES_AT_A_TIME = 65536, 16
 
 CENTRES = ("Depth", "Object Index")
 """The passes that tell what is at the pixels' centres."""
@@ -52,7 +53,7 @@ class Illumination:
         palette, space = Palette(scene), Space(surfaces)
         emitters = Emitters(scene, view, surfaces, palette)
         bounces = scene.bounces if level == "path" else NO_BOUNCES
-        self._paths = Paths(surfaces, space, emitters, palette, bounces, self._sampler)
+        self._paths = Paths(surfaces, space, emitters, palette, self._sampler, bounces, scene.clip)
 
     @property
     def largest_tile(self) -> int:
@@ -62,16 +63,15 @@ class Illumination:
     def trace(self, passes: Passes, pixels: Indices, columns: Floats, rows: Floats, check: Callable[[], None]) -> None:
         """Write the light of n pixels into passes, name → (n, channels).
 
-        columns, rows : (n,) of the pixels' lower left corners. check : called between samples; what it raises ends the work.
+        columns, rows : (n,) of the pixels' lower left corners. check : called often; what it raises ends the work.
         """
         count = len(pixels)
         sums = Sums(count, self._paths.categories, self._film)
         at_a_time = max(1, PATHS // count)
         for first in range(0, self._samples, at_a_time):
-            check()
             some = np.arange(first, min(first + at_a_time, self._samples))
             pixel, sample = np.tile(pixels, len(some)), np.repeat(some, count)
             px, py = offsets(self._film, self._sampler.grid(pixels, some, 0, 2)) if self._samples > 1 else (0.5, 0.5)
             x, y, primitives = self._eye(np.tile(columns, len(some)) + px, np.tile(rows, len(some)) + py)
-            sums.add(self._paths.trace(pixel, sample, primitives, x, y))
+            sums.add(self._paths.trace(pixel, sample, primitives, x, y, check))
         sums.write(passes, self._paths.random)

@@ -37,6 +37,8 @@ _EMITTER, _DIRECTION, _WAY, _SURVIVAL = 0, 3, 5, 6
 Numbers = Callable[[Some, int, int], Floats]
 """Random numbers (count, k) for some of the paths: which, the first dimension, how many dimensions."""
 
+# Light may grow with every scattering by colours beyond 1; with no more than this, no square of it is infinite.
+_MOST_WEIGHT = 1e40
 # Scatterings before a path may be ended by chance. Sooner, it costs more noise than it saves time.
 _CERTAIN = 3
 
@@ -83,10 +85,17 @@ class Paths:
     """
 
     def __init__(
-        self, surfaces: Surfaces, space: Space, emitters: Emitters, palette: Palette, bounces: Bounces, sampler: Sampler
+        self,
+        surfaces: Surfaces,
+        space: Space,
+        emitters: Emitters,
+        palette: Palette,
+        sampler: Sampler,
+        bounces: Bounces,
+        clip: tuple[float, float],
     ) -> None:
         self._surfaces, self._space, self._emitters, self._palette = surfaces, space, emitters, palette
-        self._sampler = sampler
+        self._sampler, self._clip = sampler, clip
         specular = palette.has("mirror") or palette.has("glass") or palette.has("refraction")
         self._kinds = [*(["diffuse"] if palette.has("diffuse") else []), *(["glossy", "transmission"] if specular else [])]
         self._specular = specular
@@ -117,15 +126,19 @@ class Paths:
         onwards = min(self._most, self._most_of["diffuse"]) > 1 or emitters.meets("diffuse")
         return palette.has("glass") or (palette.has("diffuse") and (emitters.random or onwards))
 
-    def trace(self, pixels: Indices, samples: Indices, primitives: Indices, x: Floats, y: Floats) -> Light:
+    def trace(
+        self, pixels: Indices, samples: Indices, primitives: Indices, x: Floats, y: Floats, check: Callable[[], None]
+    ) -> Light:
         """The light of n paths whose rays from the eye, (x, y, 1), meet primitives, −1 for none.
 
-        pixels, samples : (n,) which random numbers each path has.
+        pixels, samples : (n,) which random numbers each path has. check : called between scatterings.
         """
+        check()
         light = Light(len(pixels), self.categories)
         arrivals = self._from_eye(light, primitives, x, y)
         depth = 0
         while arrivals is not None and self._emitters.lit:
+            check()
             depth += 1
             rays = self._scattered(light, arrivals, depth, pixels, samples)
             arrivals = _joined([self._arrived(light, some) for some in rays])
@@ -152,7 +165,9 @@ class Paths:
             reach = np.full(light.count, np.inf)
             reach[met] = np.sqrt(dot(points.position, points.position))
             place = light.place(EMITTED) + path
-            light.add(place, emitters.lamps_met(np.zeros_like(direction), direction, 0.0, reach, "camera"))
+            nearest, farthest = (depth / direction[2] for depth in self._clip)
+            farthest = np.minimum(farthest, reach)
+            light.add(place, emitters.lamps_met(np.zeros_like(direction), direction, nearest, farthest, "camera"))
             light.add(place[missed], emitters.suns_met(direction[:, missed], "camera"))
         if not points.count:
             return None
@@ -222,7 +237,7 @@ class Paths:
             return None
         weights = lobes.weights(chosen, which, kind)
         if arrivals.weight is not None:
-            weights = weights * pick(arrivals.weight, which)
+            weights = np.minimum(weights * pick(arrivals.weight, which), _MOST_WEIGHT)
         if kind == "diffuse":
             direction, density = scattering.cosine_direction(points.shading, numbers(which, _DIRECTION, 2))
             density *= pick(lobes.share(DIFFUSE), which)

@@ -1,0 +1,230 @@
+"""Pictures of light as pictures: what no thread, tile or watcher may change, what passes hold, how much memory they take."""
+
+import threading
+import time
+import tracemalloc
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from viewcam_addon import image
+from viewcam_addon.errors import InputError
+from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.tracer import illumination
+from viewcam_addon.tracer import render as render_module
+from viewcam_addon.tracer.film import Bounces, Film
+from viewcam_addon.tracer.lights import Area, Point, Sun, World
+from viewcam_addon.tracer.materials import Colour, Material
+from viewcam_addon.tracer.render import Stopped, Tracer, render
+
+PASSES = {*image.LIGHT_PASSES, "Depth", "Object Index"}
+FLOAT32 = 2.0**-24
+SEED = 3  # of a scene between whose things there is some of the world to see
+
+
+@pytest.fixture(scope="module")
+def lively(random_scene):
+    """A scene with all that light can be and do: lamps with and without a size, shining things, mirrors, glass, a world."""
+
+    def build(seed=SEED, width=96, height=54):
+        scene = random_scene(seed, width, height)
+        materials = {
+            "red": Material(diffuse=Colour((0.8, 0.1, 0.1))),
+            "shining": Material(diffuse=Colour((0.5,) * 3), emission=Colour((2.0, 3.0, 4.0))),
+            "mirror": Material(mirror=Colour((0.9,) * 3), diffuse=Colour((0.05,) * 3)),
+            "glass": Material(glass=Colour((1.0,) * 3)),
+            "": Material(),
+        }
+        objects = tuple(
+            replace(placed, materials=(name,))
+            for placed, name in zip(scene.objects, ("red", "mirror", "glass", "shining", ""), strict=True)
+        )
+        matrix = np.eye(4)
+        matrix[:3, 3] = (0, 0, 4)
+        lamps = (
+            Sun("sun", towards=(1, 2, 3), irradiance=(1, 1, 0.9), angle=0.1),
+            Point("point", position=(3, -2, 1), power=(50, 60, 70)),
+            Area("area", matrix=matrix, size=(2, 1), power=(80, 80, 80), ellipse=True),
+        )
+        del materials[""]
+        return replace(scene, objects=objects, materials=materials, lamps=lamps, world=World((0.1, 0.2, 0.4)))
+
+    return build
+
+
+def assert_same(first, second):
+    assert first.keys() == second.keys() == PASSES
+    for name in first:
+        differ = (first[name] != second[name]).any(axis=-1).sum()
+        assert differ == 0, f"{name} differs in {differ} pixels"
+
+
+@pytest.mark.parametrize("level", ["direct", "path"])
+def test_light_is_the_same_bit_for_bit_for_any_number_of_threads_and_any_tile(lively, level, monkeypatch):
+    scene = lively(SEED, 48, 27)
+    reference = render(scene, level, 20, 7, threads=1)
+    assert all(np.isfinite(values).all() for values in reference.values())
+    assert_same(reference, render(scene, level, 20, 7, threads=3))
+    monkeypatch.setattr(render_module, "SMALLEST_TILE", 1)
+    for paths, samples_at_a_time in ((4000, 16), (1000, 1), (3333, 7)):
+        monkeypatch.setattr(illumination, "PATHS", paths)
+        monkeypatch.setattr(illumination, "SAMPLES_AT_A_TIME", samples_at_a_time)
+        assert_same(reference, render(scene, level, 20, 7, threads=2))
+
+
+def test_seeds_give_other_noise_of_the_same_picture(lively):
+    scene = lively()
+    first, again, second = (render(scene, "path", 16, seed) for seed in (1, 1, 2))
+    assert_same(first, again)
+    apart = (first["Combined"] - second["Combined"])[..., :3].astype(float)
+    variance = (first["Variance"] + second["Variance"]).astype(float)
+    assert (apart != 0).any(axis=-1).mean() > 0.5
+    off = apart.sum(axis=(0, 1)) / np.sqrt(variance.sum(axis=(0, 1)))
+    assert (np.abs(off) < 4).all(), f"{off} standard errors apart"
+    assert np.array_equal(first["Depth"], second["Depth"])
+
+
+def test_a_single_sample_is_at_the_pixels_centre_and_of_no_known_variance(lively):
+    scene = replace(lively(), lamps=(), world=World((0, 0, 0)), film=Film(filter_width=9.0))
+    passes, seen = render(scene, "direct", 1), render(scene)
+    assert_same(passes, render(scene, "direct", 1, seed=5) | {name: passes[name] for name in ("Combined", "Diffuse Direct")})
+    shining = seen["Object Index"][..., 0] == 4
+    assert shining.any() and (passes["Emission"][shining] == (2, 3, 4)).all() and (passes["Emission"][~shining] == 0).all()
+    for name in ("Depth", "Object Index"):
+        assert np.array_equal(passes[name], seen[name])
+    assert np.isinf(passes["Variance"]).all(), "shining surfaces are found by chance"
+    plain = replace(scene, objects=scene.objects[:1], lamps=(Point("point", position=(3, -2, 1)),))
+    assert (render(plain, "direct", 1)["Variance"] == 0).all(), "one lamp of no size is found with certainty"
+    assert np.isinf(render(plain, "path", 1)["Variance"]).all()
+
+
+def test_passes_add_up_to_the_picture(lively):
+    scene = replace(lively(), film=Film(exposure=2.0))
+    without = Material(diffuse=Colour((0.3, 0.6, 0.9)))
+    scene = replace(scene, materials={**scene.materials, "mirror": without, "glass": without})
+    passes = {name: values.astype(float) for name, values in render(scene, "path", 8).items()}
+    lit = (passes["Diffuse Direct"] + passes["Diffuse Indirect"]) * passes["Diffuse Color"]
+    total = passes["Emission"] + passes["Environment"] + lit
+    # Each pass is rounded once, and a quotient twice.
+    assert np.allclose(passes["Combined"][..., :3], total, rtol=8 * FLOAT32, atol=8 * FLOAT32 * total.max())
+    assert all(passes[name].any() for name in passes)
+    single = render(replace(scene, film=Film()), "path", 8)
+    for name, power in {
+        **dict.fromkeys(("Combined", "Emission", "Environment", "Diffuse Direct"), 1),
+        "Variance": 2,
+        "Diffuse Color": 0,
+    }.items():
+        assert np.allclose(passes[name][..., :3], 2.0**power * single[name][..., :3], rtol=4 * FLOAT32), name
+
+
+def test_a_transparent_film_shows_the_world_in_its_pass_and_in_alpha_only(lively):
+    opaque, clear = (render(replace(lively(), film=Film(transparent=transparent)), "path", 8) for transparent in (False, True))
+    alpha = clear["Combined"][..., 3]
+    assert (
+        (opaque["Combined"][..., 3] == 1).all()
+        and (alpha == 0).any()
+        and (alpha == 1).any()
+        and ((alpha > 0) & (alpha < 1)).any()
+    )
+    assert np.array_equal(opaque["Environment"], clear["Environment"])
+    behind = opaque["Combined"][..., :3] - clear["Combined"][..., :3]
+    assert np.allclose(behind, opaque["Environment"], atol=4 * FLOAT32 * opaque["Combined"].max())
+    assert np.allclose(clear["Environment"], (1 - alpha[..., None]) * np.float32([0.1, 0.2, 0.4]), atol=4 * FLOAT32)
+
+
+def test_without_light_no_ray_is_scattered_and_nothing_shines(lively, monkeypatch):
+    scene = lively()
+    scene = replace(scene, lamps=(), world=World((0, 0, 0)), objects=scene.objects[:3])
+
+    def never(*_):
+        raise AssertionError("a ray that brings nothing was traced")
+
+    for name in ("first", "blocked"):
+        monkeypatch.setattr(f"viewcam_addon.tracer.space.Space.{name}", never)
+    passes = render(scene, "path", 4)
+    assert not passes["Combined"][..., :3].any() and passes["Diffuse Color"].any()
+    world = replace(scene, world=World((1, 1, 1)), objects=())
+    assert (render(world, "path", 4)["Combined"] == 1).all()
+
+
+def test_at_level_direct_lamps_of_no_size_send_no_ray_but_shadow_rays(lively, monkeypatch):
+    scene = lively()
+    lamps = (Sun("sun"), Point("point", position=(3, -2, 1)))
+    scene = replace(scene, lamps=lamps, world=World((0, 0, 0)), objects=scene.objects[:1])
+    traced = []
+    monkeypatch.setattr("viewcam_addon.tracer.space.Space.first", lambda *_: traced.append(1))
+    assert render(scene, "direct", 4)["Combined"][..., :3].any() and not traced
+
+
+class Audience:
+    """A watcher that counts, and says stop after so many seconds."""
+
+    def __init__(self, patience=np.inf):
+        self.rows, self.threads, self.end = [], set(), time.monotonic() + patience
+
+    def tile(self, passes, rows):
+        self.rows += rows
+        self.threads.add(threading.get_ident())
+        self.filled = (passes["Combined"][rows.start : rows.stop, :, 3] == 1).all()
+
+    def stop(self):
+        return time.monotonic() > self.end
+
+
+@pytest.mark.parametrize("level", ["geometry", "path"])
+def test_a_watcher_is_shown_all_rows_in_the_thread_that_asked(lively, level):
+    scene, audience = lively(SEED, 200, 150), Audience()
+    if level == "geometry":
+        audience.tile = lambda passes, rows: audience.rows.extend(rows)
+    watched = render(scene, level, 4, threads=2, watcher=audience)
+    assert set(audience.rows) == set(range(150))
+    if level == "path":
+        assert audience.threads == {threading.get_ident()} and audience.filled
+        assert_same(watched, render(scene, level, 4, threads=2))
+
+
+def test_a_render_of_hours_stops_within_a_second(lively):
+    scene = lively(SEED, 1920, 1080)
+    scene = replace(scene, bounces=Bounces(64, 64, 64, 64))
+    audience = Audience(patience=1.0)
+    with pytest.raises(Stopped):
+        render(scene, "path", 1 << 20, threads=2, watcher=audience)
+    late = time.monotonic() - audience.end
+    assert late < 5, f"{late:.1f} s"  # a second on two free cores; tests share theirs
+
+
+def test_what_a_watcher_raises_ends_the_render(lively):
+    audience = Audience()
+    audience.tile = lambda *_: 1 / 0
+    with pytest.raises(ZeroDivisionError):
+        render(lively(), "direct", 2, watcher=audience)
+
+
+def test_memory_beside_the_passes_does_not_grow_with_picture_and_samples(lively):
+    def beside(width, height, samples):
+        tracer = Tracer(lively(SEED, width, height), threads=1)
+        tracemalloc.start()
+        passes = tracer.render_light("path", samples, 0)
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return peak - sum(values.nbytes for values in passes.values())
+
+    small, large, longer = beside(80, 60, 16), beside(240, 160, 16), beside(80, 60, 64)
+    assert small <= illumination.PATHS * 8 * 250, f"{small / 1e6:.1f} MB"
+    for other in (large, longer):
+        assert other <= 1.3 * small + 1e6, f"{small / 1e6:.1f} MB, and {other / 1e6:.1f} MB for the larger one"
+
+
+def test_a_level_or_a_number_of_samples_that_is_none_is_told(lively):
+    with pytest.raises(InputError, match="photons"):
+        render(lively(), "photons")
+    with pytest.raises(InputError, match="samples"):
+        render(lively(), "direct", 0)
+
+
+def test_an_albedo_beyond_one_and_no_end_of_bounces_end_in_a_picture(ball, make_lit):
+    material = Material(diffuse=Colour((1e18,) * 3), emission=Colour((1e18,) * 3))
+    camera = Pinhole((0, 0, 0), (1, 0, 0), (0, 0, 1), 10, 8, 6)
+    passes = render(make_lit(camera, (ball(6), material), bounces=Bounces(1024, 1024, 1024, 1024)), "path", 2)
+    assert np.isfinite(passes["Combined"]).all() and (passes["Combined"][..., :3] > 1e18).all()
