@@ -128,14 +128,14 @@ def check(options: argparse.Namespace) -> Result:
         level = _export_and_render(options, scene, tests)
         threads = ["--threads", str(options.threads)] if options.threads else []
         light = ["--level", level, "--samples", str(options.samples), "--seed", str(options.seed)]
-        status = _child("render", scene, reference, *light, *threads)
+        status = run_beside("render", scene, reference, *light, *threads)
         if status:
             return status, {"error": "the reference could not be traced"}
         outputs = [word for flag in ("json", "report") if (to := getattr(options, flag)) for word in (f"--{flag}", str(to))]
         if level == "geometry":
             tests = tests[:1]
         # The child has written the JSON: there is nothing to add.
-        return _child("compare", reference, *tests, "--scene", scene, "--repeat", options.words, *threads, *outputs), {}
+        return run_beside("compare", reference, *tests, "--scene", scene, "--repeat", options.words, *threads, *outputs), {}
 
 
 def demo(options: argparse.Namespace) -> Result:
@@ -206,7 +206,7 @@ def _job() -> Any:
     return job
 
 
-def _child(*arguments: str | Path) -> int:
+def run_beside(*arguments: str | Path) -> int:
     """Run a sub-command in a Python process of its own, with the same modules in reach as here."""
     search_path = os.pathsep.join([str(PACKAGE.parent), *filter(None, sys.path)])
     command = [sys.executable, "-m", f"{PACKAGE.name}.cli", *map(str, arguments)]

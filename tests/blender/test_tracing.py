@@ -1,7 +1,9 @@
 """Tracing beside the thread that asked for it: bands arrive there, and cancelling ends it."""
 
+import gc
 import threading
 import time
+import weakref
 
 import numpy as np
 import pytest
@@ -71,3 +73,21 @@ def test_who_takes_no_more_bands_leaves_no_thread_behind(endless):
 def test_an_error_of_the_tracer_is_raised_here():
     with pytest.raises(InputError, match="the level is 'light'"):
         list(tracing.bands(SCENE, "light", 1, 0, 2, lambda: False))
+
+
+def test_a_cancelled_render_leaves_nothing_for_the_garbage_collector(monkeypatch):
+    real, tracers = renders.Tracer, []
+
+    class Tracer(real):
+        def __init__(self, *arguments):
+            super().__init__(*arguments)
+            tracers.append(weakref.ref(self))
+
+    monkeypatch.setattr(renders, "Tracer", Tracer)
+    gc.disable()
+    try:
+        asked = iter([False])
+        list(tracing.bands(SCENE, "direct", 10**6, 0, 2, lambda: next(asked, True)))
+        assert tracers and not any(tracer() for tracer in tracers)
+    finally:
+        gc.enable()

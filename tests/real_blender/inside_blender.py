@@ -2,7 +2,11 @@
 
 install ZIP            installs and enables the extension, as the button in the preferences does
 make FILE              a small scene whose camera is stated in the four values, saved
+light FILE             adds lamps and a sky to FILE, and says how the render engine shall trace it
 render FILE OUT        opens FILE with the extension enabled and renders its frame 1
+trace FILE OUT         the same with the extension's engine
+export FILE ARGUMENT…  opens FILE and runs `viewcam export` on it
+viewcam ARGUMENT…      runs `viewcam` in a process of its own, as check does
 apply FILE OUT JSON    the same, but turns the four values off, moves the camera away and applies the Pinhole in JSON instead
 pytest PACKAGES …      runs pytest with these arguments, from the checkout, with packages from the folder PACKAGES
 """
@@ -56,6 +60,18 @@ def make(file):
     bpy.ops.wm.save_as_mainfile(filepath=file)
 
 
+def light(file):
+    _, scene = open_file(file)
+    for kind, energy in (("SUN", 2.0), ("AREA", 300.0)):
+        lamp = bpy.data.objects.new(kind, bpy.data.lights.new(kind, kind))
+        lamp.data.energy, lamp.location = energy, (2, -3, 5)
+        scene.collection.objects.link(lamp)
+    scene.world = bpy.data.worlds.new("Sky")
+    settings = scene.virtual_pinhole_reference
+    settings.level, settings.samples, settings.seed = "PATH", 4, 7
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+
+
 def open_file(file):
     addon = enable()
     bpy.ops.wm.open_mainfile(filepath=file)
@@ -65,6 +81,22 @@ def open_file(file):
 def render(file, output):
     open_file(file)
     write_frame(output)
+
+
+def trace(file, output):
+    _, scene = open_file(file)
+    scene.render.engine = "VIEWCAM"
+    write_frame(output)
+
+
+def export(file, *arguments):
+    addon, _ = open_file(file)
+    sys.exit(importlib.import_module(f"{addon.__name__}.cli").main(["export", *arguments], blend_is_open=True))
+
+
+def viewcam(*arguments):
+    commands = importlib.import_module(f"{enable().__name__}.commands")
+    sys.exit(commands.run_beside(*arguments))
 
 
 def apply(file, output, pinhole):
@@ -95,5 +127,6 @@ def run_pytest(packages, *arguments):
 
 if __name__ == "__main__":
     command, *arguments = sys.argv[sys.argv.index("--") + 1 :]
-    {"install": install, "make": make, "render": render, "apply": apply, "pytest": run_pytest}[command](*arguments)
+    known = (install, make, light, render, trace, export, viewcam, apply)
+    {"pytest": run_pytest, **{each.__name__: each for each in known}}[command](*arguments)
     sys.stdout.flush()

@@ -276,7 +276,12 @@ def take_a_step(running):
     return 0.05
 
 
-if __name__ == "__main__":
+def start(steps):
+    """Take one step after another from when Blender's window is there, whatever file is opened meanwhile."""
     bpy.context.preferences.view.show_splash = False
     running = steps()
-    bpy.app.timers.register(lambda: take_a_step(running), first_interval=1.0)
+    bpy.app.timers.register(lambda: take_a_step(running), first_interval=1.0, persistent=True)
+
+
+if __name__ == "__main__":
+    start(steps)

@@ -71,15 +71,11 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
         settings = depsgraph.scene_eval.virtual_pinhole_reference
         scene = self._exported(depsgraph)
         level = least_level(scene)[0] if settings.level == "AUTO" else settings.level.lower()
-        asked_for = set(_asked_for(depsgraph.scene_eval, depsgraph.view_layer))
-        geometry: Passes = {}
-        if level != _GEOMETRY and asked_for & set(GEOMETRY_PASSES):
-            for passes, _ in self._bands(depsgraph, scene, _GEOMETRY):
-                geometry = passes
         words = f"Level {level}" if level == _GEOMETRY else f"Level {level}, {settings.samples} samples"
+        self.update_stats("", words)
         started, done = time.perf_counter(), np.zeros(scene.camera.height, bool)
-        for passes, rows in self._bands(depsgraph, scene, level):
-            self._show(depsgraph.view_layer.name, geometry | passes, rows, asked_for)
+        for band, rows in self._bands(depsgraph, scene, level):
+            self._show(depsgraph, band, rows)
             done[rows.start : rows.stop] = True
             self.update_progress(done.mean())
             remaining = round((time.perf_counter() - started) * (1 / done.mean() - 1))
@@ -106,19 +102,30 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
         return scene
 
     def _bands(self, depsgraph: bpy.types.Depsgraph, scene: Scene, level: str) -> Iterator[tuple[Passes, range]]:
-        settings, threads = depsgraph.scene_eval.virtual_pinhole_reference, depsgraph.scene.render.threads
-        return tracing.bands(scene, level, settings.samples, settings.seed, threads, self.test_break)
+        """Trace the scene: the passes of some rows, and which they are. What is where is that at the pixels' centres."""
 
-    def _show(self, layer: str, passes: Passes, rows: range, asked_for: set[str]) -> None:
-        """Hand over a band of rows."""
-        _, width, _ = passes["Depth"].shape
-        band = {name: values[rows.start : rows.stop] for name, values in passes.items()}
-        if "Combined" not in band:
-            band["Combined"] = _lit_from_the_eye(band)
-        result = self.begin_result(0, rows.start, width, len(rows), layer=layer)
+        def traced(level: str) -> Iterator[tuple[Passes, range]]:
+            return tracing.bands(scene, level, settings.samples, settings.seed, threads, self.test_break)
+
+        settings, threads = depsgraph.scene_eval.virtual_pinhole_reference, depsgraph.scene.render.threads
+        centres: Passes = {}
+        if level != _GEOMETRY and set(GEOMETRY_PASSES) & set(_asked_for(depsgraph.scene_eval, depsgraph.view_layer)):
+            for passes, _ in traced(_GEOMETRY):
+                centres = passes
+        for passes, rows in traced(level):
+            band = {name: values[rows.start : rows.stop] for name, values in (centres | passes).items()}
+            if level == _GEOMETRY:
+                band["Combined"] = _lit_from_the_eye(band)
+            yield band, rows
+
+    def _show(self, depsgraph: bpy.types.Depsgraph, band: Passes, rows: range) -> None:
+        """Hand over some rows of the passes that are asked for."""
+        _, width, _ = band["Combined"].shape
+        result = self.begin_result(0, rows.start, width, len(rows), layer=depsgraph.view_layer.name)
         there = result.layers[0].passes
-        for name in asked_for & band.keys():
-            there[versions.pass_name(name)].rect.foreach_set(band[name].ravel())
+        for name in _asked_for(depsgraph.scene_eval, depsgraph.view_layer):
+            if name in band:
+                there[versions.pass_name(name)].rect.foreach_set(band[name].ravel())
         self.end_result(result)
 
 

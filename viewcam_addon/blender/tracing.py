@@ -8,6 +8,7 @@ ask for Escape before a band is finished.
 import contextlib
 import queue
 import threading
+import traceback
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 
@@ -61,4 +62,7 @@ def bands(
                 return
         finally:
             watcher.cancelled.set()
+            # An error's frames hold the tracer, in a circle; where Python 3.14 broke it by itself, Blender 5.2 crashed.
+            if error := tracing.exception():
+                traceback.clear_frames(error.__traceback__)
     tracing.result()  # raises what was raised there

@@ -1,0 +1,134 @@
+"""Runs inside a real Blender with a window: renders with the engine as an artist does, and checks what happens.
+
+blender [--enable-event-simulate] -p 0 0 1600 1000 --addons … --python engine_in_a_window.py -- PART FILE OUT
+
+PART is `render`, with simulated events: picks the engine in the properties editor, looks into its panels, presses F12 and saves
+the result to OUT. Or it is `cancel`, without them, since Blender then hears no others: makes FILE heavy, presses F12, then
+Escape by xdotool, and writes the seconds until Blender says that the render was cancelled to OUT, for each of some times.
+Leaves with status 0, or 5 and a traceback.
+"""
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import bpy
+from bpy.app.handlers import persistent
+
+sys.path.append(str(Path(__file__).parent))
+from panel_in_a_window import ROW, move, region, start, window
+
+PART, FILE, OUT = sys.argv[sys.argv.index("--") + 1 :]
+TRACED_FOR = 2.0  # seconds that a heavy render goes on before it is cancelled
+CANCELLED = 6  # times
+
+told, ended = [], []
+
+
+@persistent
+def on_stats(words):
+    told.append(words)
+
+
+@persistent
+def on_complete(*_):
+    ended.append("completed")
+
+
+@persistent
+def on_cancel(*_):
+    ended.append("cancelled")
+
+
+def pick_the_engine():
+    """Ctrl and the mouse wheel over the choice of the engine."""
+    area, where = region("PROPERTIES", "WINDOW")
+    area.spaces.active.context = "RENDER"
+    yield
+    x = where.x + where.width * 0.7
+    for y in range(where.y + where.height - ROW, where.y, -ROW):
+        move(x, y)
+        yield
+        with bpy.context.temp_override(window=window(), area=area, region=where):
+            found = bpy.context.property
+        if found and found[1] == "render.engine":
+            break
+    for _ in range(len(bpy.types.RenderSettings.bl_rna.properties["engine"].enum_items) + 6):
+        if bpy.context.scene.render.engine == "VIEWCAM":
+            return
+        window().event_simulate(type="WHEELDOWNMOUSE", value="PRESS", x=int(x), y=int(y), ctrl=True)
+        yield
+        yield
+    raise AssertionError(f"the wheel brought {bpy.context.scene.render.engine} and not the engine")
+
+
+def look_into_the_panels():
+    area, _ = region("PROPERTIES", "WINDOW")
+    looks = [(None, ("RENDER", "OUTPUT", "VIEW_LAYER", "WORLD")), ("MESH", ("MATERIAL", "OBJECT")), ("CAMERA", ("DATA",))]
+    for kind, tabs in [*looks, ("LIGHT", ("DATA", "OBJECT"))]:
+        if kind:
+            window().view_layer.objects.active = next(each for each in bpy.context.scene.objects if each.type == kind)
+            yield
+        for tab in tabs:
+            area.spaces.active.context = tab
+            yield
+            yield
+
+
+def press_f12():
+    """The operator that the key is bound to: in a virtual screen without a window manager the key may find no window."""
+    ended.clear()
+    with bpy.context.temp_override(window=window()):
+        assert bpy.ops.render.render("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+    yield
+
+
+def render():
+    yield from pick_the_engine()
+    yield from look_into_the_panels()
+    yield from press_f12()
+    yield from wait_for("completed")
+    bpy.data.images["Render Result"].save_render(OUT)
+
+
+def cancel():
+    scene = bpy.context.scene
+    scene.render.engine = "VIEWCAM"
+    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 1920, 1080, 100
+    scene.virtual_pinhole_reference.samples = 1024
+    seconds = []
+    for _ in range(CANCELLED):
+        told.clear()
+        yield from press_f12()
+        while not any("Level path" in words for words in told):
+            yield
+        started = time.perf_counter()
+        while time.perf_counter() - started < TRACED_FOR:
+            yield
+        assert not ended, f"the render has {ended} already: make it heavier"
+        pressed = time.perf_counter()
+        subprocess.run(["xdotool", "key", "Escape"], check=True)
+        yield from wait_for("cancelled")
+        seconds.append(time.perf_counter() - pressed)
+    Path(OUT).write_text(json.dumps(seconds))
+
+
+def wait_for(end):
+    while not ended:
+        yield
+    assert ended == [end], ended
+
+
+def steps():
+    yield
+    bpy.ops.wm.open_mainfile(filepath=FILE, load_ui=False)
+    bpy.app.handlers.render_stats.append(on_stats)
+    bpy.app.handlers.render_complete.append(on_complete)
+    bpy.app.handlers.render_cancel.append(on_cancel)
+    yield
+    yield from {"render": render, "cancel": cancel}[PART]()
+
+
+start(steps)

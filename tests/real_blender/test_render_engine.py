@@ -1,0 +1,93 @@
+"""The render engine in a real Blender: from the shell the pixels of `viewcam render`, and F12 and Escape in a window."""
+
+import json
+import os
+import statistics
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from viewcam_addon import image
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+SCRIPT = Path(__file__).with_name("engine_in_a_window.py")
+# What inside_blender.py tells the engine.
+CHOICES = ("--level", "path", "--samples", "4", "--seed", "7")
+
+
+@pytest.fixture(scope="session")
+def lit_file(host):
+    path = host.user_folder / "lit.blend"
+    host.run_inside("make", path)
+    host.run_inside("light", path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def reference(host, lit_file):
+    """The picture of `viewcam export` and `viewcam render`."""
+    scene, picture = host.user_folder / "lit.json", host.user_folder / "reference.exr"
+    host.run_inside("export", lit_file, scene, *CHOICES)
+    host.run_inside("viewcam", "render", scene, picture, *CHOICES)
+    return image.read(picture).passes
+
+
+def test_a_frame_by_the_engine_has_the_pixels_of_viewcam_render(host, lit_file, reference):
+    path = host.user_folder / "traced_0001.exr"
+    if host.is_real:
+        outcome = host.run("-b", lit_file, "-E", "VIEWCAM", "-o", host.user_folder / "traced_####", "-f", "1")
+        assert path.exists(), outcome.stdout + outcome.stderr
+        assert "Traceback" not in outcome.stdout + outcome.stderr
+    else:
+        host.run_inside("trace", lit_file, path)
+    found = image.read(path).passes
+    assert {"Combined", "Depth", "Normal", "Position"} <= found.keys()
+    for name in ("Combined", "Depth"):
+        assert np.array_equal(found[name], reference[name]), name
+    assert found["Combined"][..., :3].std() > 0.01
+
+
+def test_what_can_not_be_rendered_is_status_1_and_a_sentence_and_no_file(real_blender, tmp_path):
+    file = tmp_path / "scene.blend"
+    real_blender.run_inside("make", file)
+    orthographic = "import bpy; bpy.context.scene.camera.data.type = 'ORTHO'"
+    outcome = real_blender.run(
+        *("-b", file, "--python-expr", orthographic, "-E", "VIEWCAM", "-o", tmp_path / "picture_####", "-f", "1")
+    )
+    said = outcome.stdout + outcome.stderr
+    assert outcome.returncode == 1 and "is orthographic, no pinhole" in said and "Traceback" not in said, said
+    assert not list(tmp_path.glob("picture_*"))
+
+
+def in_a_window(real_blender, *arguments, simulated):
+    events = ["--enable-event-simulate"] if simulated else []
+    outcome = subprocess.run(
+        [
+            *(ROOT / ".ci" / "blender-window", "--factory-startup", "--addons", "bl_ext.user_default.virtual_pinhole"),
+            *(*events, "-p", "0", "0", "1600", "1000", "--python", SCRIPT, "--", *arguments),
+        ],
+        env={**os.environ, "BLENDER_USER_RESOURCES": str(real_blender.user_folder)},
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=180,
+    )
+    said = outcome.stdout + outcome.stderr
+    assert outcome.returncode == 0 and "Traceback" not in said, said
+
+
+@pytest.mark.parametrize("host", ["real"], indirect=True)
+def test_f12_in_a_window_shows_the_picture_of_viewcam_render(host, lit_file, reference, tmp_path):
+    in_a_window(host, "render", lit_file, tmp_path / "shown.exr", simulated=True)
+    shown = image.read(tmp_path / "shown.exr").passes
+    assert np.array_equal(shown["Combined"], reference["Combined"])
+
+
+@pytest.mark.parametrize("host", ["real"], indirect=True)
+def test_escape_cancels_a_heavy_render_within_a_second(host, lit_file, tmp_path):
+    in_a_window(host, "cancel", lit_file, tmp_path / "seconds", simulated=False)
+    # The median: without a graphics card, Blender itself takes seconds to draw a new window, and hears no key meanwhile.
+    seconds = json.loads((tmp_path / "seconds").read_text())
+    assert statistics.median(seconds) < 1.0, seconds
