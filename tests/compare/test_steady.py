@@ -147,3 +147,10 @@ def test_the_law_s_shares_are_of_the_floor_too(paper_scene):
     image = combined(rendered(paper_scene), brighter(1 + 1e-3))
     image = replace(image, attributes={"Software": "Blender 5.2.3 LTS"})
     assert not compare(picture(paper_scene), [image], paper_scene.pinhole).passed
+
+
+def test_a_light_without_a_diffuse_pass_is_compared_without_a_warning(paper_scene, recwarn):
+    image = replace(rendered(paper_scene), attributes={"Software": "Blender 5.2.3 LTS"})
+    bare = [replace(one, passes={name: one[name] for name in ("Combined", "Depth")}) for one in (picture(paper_scene), image)]
+    radiance = compare(bare[0], [bare[1]], paper_scene.pinhole)
+    assert [row.name for row in radiance.rows] == ["Combined"] and not list(recwarn)

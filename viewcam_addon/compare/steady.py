@@ -112,8 +112,7 @@ class Rounding:
         """What the storage of smooth normals may add: the light from straight above times the cosine's change."""
         if not self._storage or name not in _SHADED:
             return np.zeros(value.shape)
-        cosine = value / np.maximum(self._brightest, np.finfo(float).tiny)
-        return self._storage * self._brightest * np.sqrt(1.0 - np.minimum(cosine, 1.0) ** 2)
+        return self._storage * np.sqrt(np.maximum(self._brightest**2 - value**2, 0.0))
 
 
 def compare(sides: Sides, allowed: Allowance, belongs: NDArray) -> tuple[Row, Edges, Array]:
