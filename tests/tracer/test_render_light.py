@@ -118,6 +118,17 @@ def test_passes_add_up_to_the_picture(lively):
         assert np.allclose(passes[name][..., :3], 2.0**power * single[name][..., :3], rtol=4 * FLOAT32), name
 
 
+@pytest.mark.parametrize("samples", [2, 16, 48, 100])
+def test_variance_is_that_of_pictures_with_other_seeds_or_somewhat_more(lively, samples):
+    """Batches share out space among them, too, so that means of them differ more than means of pictures would."""
+    scene = lively(SEED, 24, 14)
+    pictures = [render(scene, "direct", samples, seed, threads=1) for seed in range(24)]
+    true = np.var([passes["Combined"][..., :3] for passes in pictures], axis=0, ddof=1).mean(dtype=float)
+    told = np.mean([passes["Variance"] for passes in pictures], dtype=float)
+    # 24 seeds of some 300 pixels, most of whose variance is that of a few: the truth is known to a fifth.
+    assert 0.8 <= told / true <= 6, f"{told / true:.2f}"
+
+
 def test_a_transparent_film_shows_the_world_in_its_pass_and_in_alpha_only(lively):
     opaque, clear = (render(replace(lively(), film=Film(transparent=transparent)), "path", 8) for transparent in (False, True))
     alpha = clear["Combined"][..., 3]

@@ -66,7 +66,7 @@ class Illumination:
         columns, rows : (n,) of the pixels' lower left corners. check : called often; what it raises ends the work.
         """
         count = len(pixels)
-        sums = Sums(count, self._paths.categories, self._film)
+        sums = Sums(count, self._paths.categories, self._film, self._samples)
         at_a_time = max(1, PATHS // count)
         for first in range(0, self._samples, at_a_time):
             some = np.arange(first, min(first + at_a_time, self._samples))

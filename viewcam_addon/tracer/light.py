@@ -2,6 +2,12 @@
 
 The samples of a tile are added one after the other, in order, so that a sum is the same, bit for bit, whatever the tile.
 Colours are summed as differences from the pixel's first sample: where all are equal the variance is 0, and not a rounding.
+
+**Variance** of a mean is that of the means of batches, some 16 of as many samples that follow one another, over their number.
+The samples of a pixel share its space out among them (sampler.py), so that their own variance over their number is 3 to 11
+times too large at 64 to 256 samples. So are batches among themselves, but less: by 1.7 to 3.2, with 16 of them, and their
+estimate is off by a third (24 seeds of an area lamp with a world, at 0 and 4 bounces). Of fewer than 32 samples each is a batch.
+Rejected: batches that are scrambled each on its own, which makes the estimate right by making the picture noisier.
 """
 
 from collections.abc import Sequence
@@ -16,6 +22,7 @@ COLOUR, EMITTED, BACKGROUND, DIRECT, INDIRECT, OTHER = "Diffuse Color", "Emissio
 """The colour of diffuse surfaces that the eye sees, and what it sees of lights; of the world behind all; after one diffuse
 scattering; after more, the first of them diffuse; and what mirrors and glass show. All light is the picture."""
 
+_BATCHES = 16
 # The largest float32, so that no pixel is infinite.
 _MOST = float(np.finfo(np.float32).max)
 
@@ -52,18 +59,20 @@ class Light:
 
 
 class Sums:
-    """The sums over the samples of `count` pixels."""
+    """The sums over the samples of `count` pixels. samples : how many there will be."""
 
-    def __init__(self, count: int, categories: Sequence[str], film: Film) -> None:
+    def __init__(self, count: int, categories: Sequence[str], film: Film, samples: int) -> None:
         self._film, self._count, self._samples = film, count, 0
+        # A power of two, since that is how many points together fill their space.
+        self._batch_size = 1 << max(samples // _BATCHES, 1).bit_length() - 1
         self._categories = list(categories)
         hidden = (COLOUR, BACKGROUND) if film.transparent else (COLOUR,)
         self._shown = [row for row, category in enumerate(categories) if category not in hidden]
         self._totals = np.zeros((3, len(categories), count))
         self._covered = np.zeros(count)
         self._first = np.zeros((3, count))
-        # Of the differences from the first sample, and of their squares.
-        self._differences, self._squares = np.zeros((3, count)), np.zeros((3, count))
+        # The sum of the differences from the first sample, and when the last batch began; of the batches' own sums, squared.
+        self._differences, self._before, self._squares = (np.zeros((3, count)) for _ in range(3))
 
     def add(self, light: Light) -> None:
         """Add some samples of every pixel: the paths are those of all pixels, sample after sample."""
@@ -74,13 +83,16 @@ class Sums:
         if self._samples == 0:
             self._first = combined[:, 0].copy()
         combined -= self._first[:, None]
-        squares = combined * combined
         for sample in range(values.shape[2]):
             self._totals += values[:, :, sample]
             self._differences += combined[:, sample]
-            self._squares += squares[:, sample]
+            self._samples += 1
+            if self._samples % self._batch_size == 0:
+                of_batch = self._differences - self._before
+                of_batch *= of_batch
+                self._squares += of_batch
+                self._before[:] = self._differences
         self._covered += light.covered.reshape(-1, self._count).sum(axis=0)
-        self._samples += values.shape[2]
 
     def write(self, passes: Passes, random: bool) -> None:
         """Write the means into passes, name → (count, channels).
@@ -108,10 +120,10 @@ class Sums:
         return self._totals[:, self._categories.index(category)] / self._samples
 
     def _variance(self) -> Floats:
-        """Of the mean: the samples' own over their number."""
-        number = self._samples
-        of_samples = (self._squares - self._differences * self._differences / number) / (number - 1)
-        return np.maximum(of_samples, 0.0) / number
+        """Of the mean: that of the batches' means over their number, as if those that began a further one had ended it."""
+        batches = self._samples // self._batch_size
+        of_sums = (self._squares - self._before * self._before / batches) / (batches - 1)
+        return np.maximum(of_sums, 0.0) / self._batch_size / self._samples
 
 
 def _without_colour(light: Floats, colour: Floats) -> Floats:
