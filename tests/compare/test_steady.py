@@ -45,7 +45,8 @@ def rendered(scene, roundings=0.35, seed=0):
     dx, dy = roundings * shift * rng.normal(size=(2, *shift.shape))
     passes = light(scene, px=0.5 + dx, py=0.5 + dy)
     for name in ("Combined", "Diffuse Direct"):
-        passes[name] = (passes[name] * (1 + 2.0**-24 * rng.normal(0, 3, passes[name].shape))).astype(np.float32)
+        colour = passes[name][..., :3]
+        colour *= (1 + 2.0**-24 * rng.normal(0, 3, colour.shape)).astype(np.float32)
     return Image(passes, scene.pinhole, {"cycles.ViewLayer.samples": "1"}, "rendered.exr")
 
 
