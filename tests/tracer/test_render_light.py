@@ -227,6 +227,15 @@ def test_memory_beside_the_passes_does_not_grow_with_picture_and_samples(lively)
         assert other <= 1.3 * small + 1e6, f"{small / 1e6:.1f} MB, and {other / 1e6:.1f} MB for the larger one"
 
 
+def test_memory_that_ends_while_light_is_traced_is_told(lively, monkeypatch):
+    def full(*_):
+        raise MemoryError
+
+    monkeypatch.setattr("viewcam_addon.tracer.space.Space.first", full)
+    with pytest.raises(InputError, match="memory"):
+        render(lively(), "path", 4)
+
+
 def test_a_level_or_a_number_of_samples_that_is_none_is_told(lively):
     with pytest.raises(InputError, match="photons"):
         render(lively(), "photons")

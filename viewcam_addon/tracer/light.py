@@ -6,7 +6,7 @@ Colours are summed as differences from the pixel's first sample: where all are e
 **Variance** of a mean is that of the means of batches, some 16 of as many samples that follow one another, over their number.
 The samples of a pixel share its space out among them (sampler.py), so that their own variance over their number is 3 to 11
 times too large at 64 to 256 samples. So are batches among themselves, but less: by 1.7 to 3.2, with 16 of them, and their
-estimate is off by a third (24 seeds of an area lamp with a world, at 0 and 4 bounces). Of fewer than 32 samples each is a batch.
+estimate is off by a third (24 seeds of an area lamp with a world, at 0 and 4 bounces). Below 32 samples each is a batch.
 Rejected: batches that are scrambled each on its own, which makes the estimate right by making the picture noisier.
 """
 

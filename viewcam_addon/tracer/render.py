@@ -154,10 +154,13 @@ def render(
         raise InputError(f"the level is {level!r}: give one of {', '.join(LEVELS)}")
     if samples < 1:
         raise InputError(f"the number of samples is {samples}: give at least 1")
-    tracer = Tracer(scene, threads)
-    if level == "geometry":
-        return tracer.render(watcher)
-    return tracer.render_light(level, samples, seed, watcher)
+    try:
+        tracer = Tracer(scene, threads)
+        if level == "geometry":
+            return tracer.render(watcher)
+        return tracer.render_light(level, samples, seed, watcher)
+    except MemoryError as error:
+        raise InputError("the scene needs more memory than there is: take some of it out, or give fewer threads") from error
 
 
 def _stop_if_asked(watcher: Watcher | None) -> None:
