@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from viewcam_addon.compare import questions
+from viewcam_addon.compare.radiance import VARIANCE_BATCHES
 from viewcam_addon.compare.sides import Sides
 from viewcam_addon.compare.steady import Allowance
 
@@ -41,6 +42,12 @@ def even(rng, samples):
     """Every sample an exponential variate, each channel for itself."""
     mean = rng.gamma(samples, TRUTH / samples)
     return mean, TRUTH**2 / samples * rng.chisquare(samples - 1, TRUTH.shape) / (samples - 1)
+
+
+def batched(rng, samples):
+    """The same; the variance is that of 16 batches of the samples."""
+    mean, _ = even(rng, samples)
+    return mean, TRUTH**2 / samples * rng.chisquare(15, TRUTH.shape) / 15
 
 
 def grey(rng, samples):
@@ -83,13 +90,15 @@ def sides_of(kind, rng, samples, each, seeds, told=1.0):
 
 
 def ask(sides, samples, seeds):
-    return questions.ask(sides, NO_ROUNDING, (samples - 1, max(seeds - 1, 1)), LEVEL)
+    """As radiance.compare asks, which takes the reference's variance to be that of batches."""
+    return questions.ask(sides, NO_ROUNDING, (min(samples, VARIANCE_BATCHES) - 1, max(seeds - 1, 1)), LEVEL)
 
 
 @pytest.mark.parametrize(
     ("kind", "samples", "each", "seeds", "told"),
     [
         pytest.param(even, 256, 32, 8, 1.0, id="variances are right"),
+        pytest.param(batched, 256, 32, 8, 1.0, id="the reference's variance is that of 16 batches"),
         pytest.param(grey, 256, 32, 8, 1.0, id="channels share their noise"),
         pytest.param(even, 256, 32, 8, 4.0, id="the reference's variance is told four times too large"),
         pytest.param(even, 256, 128, 2, 1.0, id="two seeds only"),

@@ -11,6 +11,7 @@ from viewcam_addon.compare import radiance
 from viewcam_addon.errors import InputError
 from viewcam_addon.image import Image
 from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.tracer import light
 
 WIDTH, HEIGHT, SAMPLES, SEEDS = 64, 48, 256, 8
 PINHOLE = Pinhole((5, -7, 4), (0.2, 0.1, 0.6), (0, 0, 1), 60.0, WIDTH, HEIGHT)
@@ -144,3 +145,7 @@ def test_samples_that_the_file_tells_wrongly_can_be_given():
     assert radiance.compare(reference, tests, PINHOLE, test_samples=16).sentence.startswith(
         "The same within noise at 256 and 128 samples: "
     )
+
+
+def test_the_references_variance_is_told_from_as_many_batches_as_it_is_judged_by():
+    assert light._BATCHES == radiance.VARIANCE_BATCHES

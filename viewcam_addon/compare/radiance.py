@@ -28,6 +28,9 @@ from .steady import Edges
 FALSE_ALARMS = 0.01
 """The probability, at most, that two sides of the same light are called different; shared out evenly over the quantities."""
 
+VARIANCE_BATCHES = 16
+"""Of so many means, or of one for each sample, the reference's Variance is estimated at least (tracer/light.py)."""
+
 
 @dataclass(frozen=True)
 class LightRow:
@@ -141,7 +144,7 @@ def compare(reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_sam
     samples, seeds = (samples_of(reference), test_samples or samples_of(tests[0])), len(tests)
     is_noisy = not quiet(combined.reference, combined.variance).all()
     is_noisy |= seeds > 1 and not quiet(combined.test, combined.spread).all()
-    freedom = (max((samples[0] or 2) - 1, 1), max(seeds - 1, 1))
+    freedom = (max(min(samples[0] or 2, VARIANCE_BATCHES) - 1, 1), max(seeds - 1, 1))
     rounding = steady.Rounding(pinhole, reference, tests[0], max(filter(None, samples), default=1))
 
     rows, maps = [], {}
