@@ -138,7 +138,9 @@ class Emitters:
         reached = self._estimates(points).cumsum(axis=0)
         total = reached[-1]
         wanted = u * total
-        which = np.minimum(np.count_nonzero(wanted >= reached, axis=0), self._count - 1)
+        which = np.zeros(len(u), np.intp)
+        for edge in reached[:-1]:
+            which += wanted >= edge
         rays = np.arange(len(u))
         before = np.where(which > 0, reached[which - 1, rays], 0.0)
         share = reached[which, rays] - before
