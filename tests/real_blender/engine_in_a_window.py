@@ -79,6 +79,8 @@ def look_into_the_panels():
 
 def press_f12():
     """The operator that the key is bound to: in a virtual screen without a window manager the key may find no window."""
+    while bpy.app.is_job_running("RENDER"):  # a cancelled one takes a while to go
+        yield
     ended.clear()
     with bpy.context.temp_override(window=window()):
         assert bpy.ops.render.render("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
