@@ -11,13 +11,12 @@ import json
 import os
 import shlex
 import sys
-import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
 from . import commands
-from .errors import InputError
+from .errors import InputError, bug
 from .files import written_whole
 
 
@@ -39,11 +38,9 @@ def main(arguments: Sequence[str] | None = None, blend_is_open: bool = False) ->
         print(f"viewcam {options.command}: {error}", file=sys.stderr)
     except KeyboardInterrupt:
         status, result = 130, {"error": "interrupted"}
-    except Exception as error:  # a bug: say where, in one line, as for every other error
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        what = f"{type(error).__name__} at {Path(place.filename).name}:{place.lineno}: {error}".splitlines()[0]
-        status, result = 2, {"error": what}
-        print(f"viewcam {options.command}: this is a bug, please report it ({what})", file=sys.stderr)
+    except Exception as error:  # in one line, as every other error
+        status, result = 2, {"error": bug(error)}
+        print(f"viewcam {options.command}: {bug(error)}", file=sys.stderr)
     if options.json and result:
         status = _write_json(options.json, {"exit_status": status, **result}) or status
     return status

@@ -1,3 +1,5 @@
+from types import SimpleNamespace
+
 import pytest
 
 bpy = pytest.importorskip("bpy")
@@ -90,3 +92,8 @@ def test_an_up_in_doubt_comes_with_a_better_one_and_a_certain_one_does_not(posed
     assert panel.better_up(posed_camera, scene) == (1, 0, 0)
     group.look_at = group.eye
     assert panel.better_up(posed_camera, scene) is None
+
+
+def test_the_camera_datas_panel_stays_away_from_the_data_of_a_lamp(posed_camera):
+    shown = [panel.VIEWCAM_PT_data.poll(SimpleNamespace(camera=data)) for data in (posed_camera.data, None)]
+    assert shown == [True, False]
