@@ -92,7 +92,7 @@ def compare(options: argparse.Namespace) -> Result:
     ledger = scene.ledger if scene else ()
     words = f"viewcam {options.repeat or options.words}"
     if radiance.carries_light(reference):
-        comparison = radiance.compare(reference, tests, camera)
+        comparison = radiance.compare(reference, tests, camera, options.test_samples)
         write_report = light_report.write_report
     elif len(tests) == 1:
         (tests,) = tests
@@ -134,6 +134,7 @@ def check(options: argparse.Namespace) -> Result:
         outputs = [word for flag in ("json", "report") if (to := getattr(options, flag)) for word in (f"--{flag}", str(to))]
         if level == "geometry":
             tests = tests[:1]
+        outputs += ["--test-samples", str(max(options.samples // count, 1))]
         # The child has written the JSON: there is nothing to add.
         return run_beside("compare", reference, *tests, "--scene", scene, "--repeat", options.words, *threads, *outputs), {}
 

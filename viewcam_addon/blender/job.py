@@ -14,7 +14,7 @@ import bpy
 
 from .. import intrinsics
 from ..errors import InputError
-from ..tracer.film import LEVELS, NO_BOUNCES
+from ..tracer.film import LEVELS, NO_BOUNCES, SAMPLES
 from ..tracer.levels import least_level
 from ..tracer.scene import LedgerEntry, Scene
 from . import cycles, datablocks, ensure_registered, indices, materials, recentering
@@ -22,7 +22,6 @@ from .borrowing import Borrower, borrowed
 from .export import Light, export_scene, survey
 from .ledger import Ledger
 
-SAMPLES = 64
 AUTO = "auto"
 
 # What a .blend starts with: itself, or a gzip or Zstandard stream.
@@ -36,7 +35,7 @@ class Request:
 
     recenter : whether both sides see the scene with its origin at the eye. level : one of film.LEVELS, or "auto" for the least
     that models all light of the scene (levels.py). samples : a pixel, of all of Cycles' pictures together, from level `direct`
-    on; SAMPLES where None. clay : whether one and the same material covers all surfaces.
+    on. clay : whether one and the same material covers all surfaces.
     """
 
     blend: str | os.PathLike[str] | None = None
@@ -47,7 +46,7 @@ class Request:
     recenter: bool = False
     threads: int | None = None
     level: str = "geometry"
-    samples: int | None = None
+    samples: int = SAMPLES
     seed: int = 0
     clay: bool = False
 
@@ -140,7 +139,7 @@ def _seen_from(stage: _Stage, request: Request) -> Iterator[_Stage]:
 
 def _render(stage: _Stage, request: Request, paths: Sequence[str | os.PathLike[str]], light: Light | None) -> None:
     """Cycles' pictures. light : as exported, of a stage that is lit."""
-    share = max((request.samples or SAMPLES) // len(paths), 1)
+    share = max(request.samples // len(paths), 1)
     for number, path in enumerate(paths):
         picture = None
         if stage.is_lit:

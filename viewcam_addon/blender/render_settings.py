@@ -5,6 +5,8 @@ What Cycles has a setting for (bounces, film, pixel filter), the engine takes fr
 
 import bpy
 
+from ..tracer.film import SAMPLES
+
 
 def _update_passes(_group: "ReferenceSettings", context: bpy.types.Context) -> None:
     """The compositor's sockets follow."""
@@ -29,7 +31,7 @@ class ReferenceSettings(bpy.types.PropertyGroup):
     samples: bpy.props.IntProperty(
         name="Samples",
         description="Paths of light through each pixel. With 1 it is the path through the pixel's centre",
-        default=64,
+        default=SAMPLES,
         min=1,
         soft_max=4096,
     )

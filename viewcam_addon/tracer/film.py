@@ -10,6 +10,9 @@ FILTERS = ("BOX", "BLACKMAN_HARRIS")
 LEVELS = ("geometry", "direct", "path")
 """How much is modelled, the least first."""
 
+SAMPLES = 64
+"""Samples a pixel, at the levels of light, where nobody says how many."""
+
 
 @dataclass(frozen=True)
 class Film:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from .arrays import Floats, Indices
 from .ellipsoids import ellipsoids_of
-from .film import LEVELS
+from .film import LEVELS, SAMPLES
 from .scene import Mesh, Scene, Spheres
 from .surface import Passes, Surface, background
 from .tiles import Stopped, Watcher, over_threads, tiles
@@ -133,7 +133,7 @@ class Tracer:
 def render(
     scene: Scene,
     level: str = "geometry",
-    samples: int = 64,
+    samples: int = SAMPLES,
     seed: int = 0,
     threads: int | None = None,
     watcher: Watcher | None = None,
