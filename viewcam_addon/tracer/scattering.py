@@ -47,13 +47,15 @@ def cosine_direction(normal: Floats, u: Floats) -> tuple[Floats, Floats]:
     Returns directions (3, n), unit, and their density per solid angle (n,), the cosine over π. They point from where a unit
     sphere touches the surface to points that lie evenly all over the sphere, twice the cosine away: no frame is needed.
     """
-    turn = u[1] * (2 * np.pi)
+    turn = u[1].astype(np.float32)  # a cosine of these takes a tenth of the time
+    turn *= np.float32(2 * np.pi)
+    direction = np.empty(normal.shape)
+    direction[0], direction[1] = np.cos(turn), np.sin(turn)
     height = u[0] * (2.0 - 4 * _POLE)
     height += 2 * _POLE - 1.0
-    across = np.sqrt(1.0 - height * height)
-    direction = np.empty(normal.shape)
-    np.multiply(across, np.cos(turn), out=direction[0])
-    np.multiply(across, np.sin(turn), out=direction[1])
+    across = 1.0 - height * height
+    across /= direction[0] * direction[0] + direction[1] * direction[1]  # 1 but for their roundings
+    direction[:2] *= np.sqrt(across, out=across)
     direction[2] = height
     direction += normal
     length = np.sqrt(dot(direction, direction))
