@@ -1,7 +1,7 @@
 """A box of light, after the one at Cornell: a red wall, a green wall, a lamp in the ceiling, a mirror ball and a glass ball.
 
-Nothing outside lights it. What the ceiling and the shadows show arrived by way of walls; the mirror and the glass bring the lamp
-where its own light does not reach, and a bar glows on the tall block. Every surface is of a kind that the reference tracer
+Nothing outside lights it. What the ceiling and the shadows show arrived by way of walls; the mirror and the glass bring the
+lamp where its own light does not reach, and a bar glows on the tall block. Every surface is of a kind that the reference tracer
 models whole: matte, perfect mirror, clear glass, emission.
 """
 
