@@ -169,7 +169,7 @@ class Lighting:
         normal = np.reshape(normal, (3, -1)) / np.linalg.norm(np.reshape(normal, (3, -1)), axis=0)
         normal = self.view.axes @ normal * np.ones(count)
         zeros = np.zeros(count, np.intp)
-        return Points(position, normal, normal, zeros > 0, zeros.astype(np.int32), zeros, np.zeros(count))
+        return Points(position, normal, normal, zeros > 0, zeros.astype(np.int32), zeros, np.zeros(count), None, None)
 
     def aimed(self, position, normal, count: int = 4096, seed: int = 1) -> tuple[Aimed, np.ndarray]:
         """Samples at a point, and their cosines to its normal, 0 below the horizon."""

@@ -32,6 +32,8 @@ over the primitive that the ray leaves, which embreex can't. What each of them c
 benchmarks/stability/secondary_rays.py.
 """
 
+from functools import reduce
+
 import numpy as np
 
 from .arrays import Float32s, Floats, cross, dot, gather
@@ -50,13 +52,15 @@ _ENDING = 4.0
 
 def triangle_offsets(triangles: Triangles) -> Floats:
     """(m,) float64, camera space: how far off each triangle a ray that leaves it starts."""
-    a, b, c = gather(triangles.vertices, triangles.corners).transpose(1, 0, 2)
-    sides = np.sort([_length(b - a), _length(c - b), _length(a - c)], axis=0)
-    doubled_area = _length(cross(b - a, c - a))
+    a, b, c = (gather(triangles.vertices, corners) for corners in triangles.corners)
+    ab, bc, ac = b - a, c - b, c - a
+    sides = _length(ab), _length(bc), _length(ac)
+    longest, shortest = (reduce(choose, sides) for choose in (np.maximum, np.minimum))
     with np.errstate(all="ignore"):
-        cap = np.fmin(sides[0] * sides[2] / doubled_area, _FLATTEST_CAP)
-    largest = np.abs([a, b, c]).max(axis=(0, 1))
-    return _FLOAT32 * (_ROUNDING * largest + (_ARITHMETIC + cap) * sides[2])
+        cap = np.fmin(shortest * longest / _length(cross(ab, ac)), _FLATTEST_CAP)
+    largest = np.abs(triangles.vertices).max(axis=0)
+    largest = reduce(np.maximum, (gather(largest, corners) for corners in triangles.corners))
+    return _FLOAT32 * (_ROUNDING * largest + (_ARITHMETIC + cap) * longest)
 
 
 def wide_offsets(planes: Planes) -> Floats:
@@ -70,7 +74,9 @@ def start(points: Floats, normals: Floats, directions: Floats, offsets: Floats) 
     points : (3, n) float64, camera space. normals : (3, n), unit, of the true geometry, of either side. directions : (3, n), of
     any length. offsets : (n,) of the primitives that the points lie on.
     """
-    return points + np.copysign(offsets, dot(normals, directions)) * normals
+    starts = np.copysign(offsets, dot(normals, directions)) * normals
+    starts += points
+    return starts
 
 
 def shadow_rays(starts: Floats, lights: Floats) -> tuple[Float32s, Float32s, Float32s]:
@@ -83,12 +89,19 @@ def shadow_rays(starts: Floats, lights: Floats) -> tuple[Float32s, Float32s, Flo
 
     Returns origins (n, 3), directions (n, 3), lengths (n,) in directions: all float32.
     """
-    origins = np.ascontiguousarray(starts.T, np.float32)
-    apart = lights - origins.T
-    distance = _length(apart)
-    slack = _FLOAT32 * (_ROUNDING * np.abs(lights).max(axis=0) + (_ARITHMETIC + _ENDING) * distance)
+    origins, directions = np.empty((2, starts.shape[1], 3), np.float32)
+    squared, largest = np.zeros((2, starts.shape[1]))
+    for axis, light in enumerate(lights):
+        origins[:, axis] = starts[axis]
+        apart = light - origins[:, axis]
+        directions[:, axis] = apart
+        apart *= apart
+        squared += apart
+        np.maximum(largest, np.abs(light), out=largest)
+    distance = np.sqrt(squared)
+    slack = _FLOAT32 * (_ROUNDING * largest + (_ARITHMETIC + _ENDING) * distance)
     lengths = np.maximum(distance - slack, 0.0) / np.where(distance > 0, distance, 1.0)
-    return origins, np.ascontiguousarray(apart.T, np.float32), lengths.astype(np.float32)
+    return origins, directions, lengths.astype(np.float32)
 
 
 def _length(vectors: Floats) -> Floats:

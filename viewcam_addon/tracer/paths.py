@@ -101,6 +101,7 @@ class Paths:
         self._specular = specular
         self._most = bounces.total + 1
         self._most_of = {kind: getattr(bounces, kind) + 1 for kind in KINDS}
+        self._bright = surfaces.made_of(palette.having("emission"))
         self.categories = self._found()
 
     def _found(self) -> list[str]:
@@ -282,17 +283,24 @@ class Paths:
         """Where rays come to, but the last; adds what shines there."""
         emitters, shining = self._emitters, self._palette.has("emission")
         world = emitters.world(rays.kind)
-        if rays.last.all() and not shining and not emitters.lamps_met_by(rays.kind):
-            open_ = np.flatnonzero(~self._space.blocked(rays.points, rays.direction, np.full(len(rays.path), np.inf)))
-            light.add(gather(rays.place, open_), pick(rays.weight, open_) * world[:, None])
+        lamps_met = emitters.lamps_met_by(rays.kind)
+        if not shining and not lamps_met and rays.last.all():
+            escaped = self._space.escaped(rays.points, rays.direction, rays.kind)
+            light.add(gather(rays.place, escaped), pick(rays.weight, escaped) * world[:, None])
             return None
-        met, points, distance = self._space.first(rays.points, rays.direction, rays.kind)
-        reach = np.full(len(rays.path), np.inf)
-        reach[met] = distance
-        missed = np.flatnonzero(np.isinf(reach))
+        found = self._space.found(rays.points, rays.direction, rays.kind)
         if world.any():
-            light.add(gather(rays.place, missed), pick(rays.weight, missed) * world[:, None])
-        if emitters.lamps_met_by(rays.kind):
+            escaped = np.flatnonzero(found < 0)
+            light.add(gather(rays.place, escaped), pick(rays.weight, escaped) * world[:, None])
+        asked = found >= 0
+        if not lamps_met and rays.last.any():
+            asked &= gather(self._bright, found) | ~rays.last
+        met = np.flatnonzero(asked)
+        points, distance = self._space.met(found, rays.points, rays.direction, met)
+        if lamps_met:
+            reach = np.full(len(rays.path), np.inf)
+            reach[met] = distance
+            missed = np.flatnonzero(found < 0)
             seen = emitters.lamps_met(rays.points.position, rays.direction, 0.0, reach, rays.kind)
             seen[:, missed] += emitters.suns_met(gather(rays.direction, missed), rays.kind)
             light.add(rays.place, rays.weight * seen)

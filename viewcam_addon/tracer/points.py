@@ -40,25 +40,39 @@ class Points:
     material: NDArray[np.int32]
     primitive: Indices
     offset: Floats
-    uv: Floats | None = None
-    vertex_colour: Floats | None = None
+    uv: Floats | None
+    vertex_colour: Floats | None
 
     @property
     def count(self) -> int:
-        return len(self.primitive)
+        return self.position.shape[1]
 
     def at(self, which: Some) -> "Points":
-        """Some of the points."""
-        given = vars(self).items()
-        values = {name: None if value is None else pick(value, which) for name, value in given if name != "shading"}
-        # Where nothing is smooth, both normals are one array, and stay it.
-        return Points(shading=values["normal"] if self.shading is self.normal else pick(self.shading, which), **values)
+        """Some of the points; what nobody reads of them is never copied."""
+        return self if isinstance(which, slice) and which == slice(None) else _Chosen(self, which)
 
     @staticmethod
     def joined(parts: "list[Points]") -> "Points":
         """Several, one after the other; all of one scene."""
         values = {field.name: [getattr(part, field.name) for part in parts] for field in fields(Points)}
         return Points(**{name: None if some[0] is None else np.concatenate(some, axis=-1) for name, some in values.items()})
+
+
+class _Chosen(Points):
+    """Some of other points."""
+
+    def __init__(self, points: Points, which: Some) -> None:
+        vars(self).update(_points=points, _which=which)
+
+    def __getattr__(self, name: str) -> NDArray | None:
+        points, which = vars(self)["_points"], vars(self)["_which"]
+        if name == "shading" and points.shading is points.normal:
+            value = self.normal  # where nothing is smooth, both normals are one array, and stay it
+        else:
+            value = getattr(points, name)
+            value = None if value is None else pick(value, which)
+        vars(self)[name] = value
+        return value
 
 
 def materials_of(scene: Scene) -> tuple[Material, ...]:
@@ -139,6 +153,11 @@ class Surfaces:
             return self._on_spheres(gather(self.balls.number, ball), gather(self.balls.centres, ball), position, ways)
 
         return self._split(primitives, triangle_points, sphere_points), distances
+
+    def made_of(self, materials: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """For each primitive, numbered as space.py finds them, whether its material is one of those."""
+        count = self.triangles.count
+        return gather(materials, np.append(self._material[:count], self._material[count:][self.balls.number]))
 
     def distance(self, triangle: Indices, origins: Floats, directions: Floats) -> Floats:
         """How far along rays the planes of triangles are, that were found for them."""
@@ -282,6 +301,7 @@ def _merged(count: int, parts: list[tuple[Indices, Points]]) -> Points:
         given = [(which, getattr(points, field.name)) for which, points in parts]
         first = given[0][1]
         if first is None:
+            values[field.name] = None
             continue
         values[field.name] = np.empty((*first.shape[:-1], count), first.dtype)
         for which, value in given:

@@ -46,9 +46,17 @@ class Space:
 
         Returns which of the rays met something, (k,), the points that they met, and how far from theirs, (k,) float64.
         """
-        found = self._sight(kind).first(points, directions)
+        found = self.found(points, directions, kind)
         met = np.flatnonzero(found >= 0)
-        return met, *self._surfaces.met(found[met], gather(points.position, met), gather(directions, met))
+        return met, *self.met(found, points, directions, met)
+
+    def found(self, points: Points, directions: Floats, kind: str) -> Indices:
+        """(n,) the primitive that each ray meets first, spheres counted as in `Surfaces.balls`, or −1."""
+        return self._sight(kind).first(points, directions)
+
+    def met(self, found: Indices, points: Points, directions: Floats, which: Indices) -> tuple[Points, Floats]:
+        """The points that some of the rays met, and how far from theirs."""
+        return self._surfaces.met(gather(found, which), gather(points.position, which), gather(directions, which))
 
     def blocked(self, points: Points, directions: Floats, distances: Floats) -> NDArray[np.bool_]:
         """Whether something stands between points of surfaces and lights, (n,).
@@ -62,6 +70,10 @@ class Space:
         blocked = self._sight("shadow").blocked(points, directions, distances)
         blocked |= np.abs(dot(points.normal, directions)) < offset.FLATTEST
         return blocked
+
+    def escaped(self, points: Points, directions: Floats, kind: str) -> Indices:
+        """Which of n rays that leave surfaces meet nothing; as in `first`."""
+        return self._sight(kind).escaped(points, directions)
 
     def _sight(self, kind: str) -> "_Sight":
         """What a kind of rays can meet; kinds that can meet the same share it."""
@@ -115,6 +127,13 @@ class _Sight:
             nearest[which] = distance[nearer]
             found[which] = primitive if np.ndim(primitive) == 0 else primitive[nearer]
         return found
+
+    def escaped(self, points: Points, directions: Floats) -> Indices:
+        """Which rays meet nothing."""
+        if self._embree is None or not (self._alone.is_empty and self._crowd.is_empty):
+            return np.flatnonzero(self.first(points, directions) < 0)
+        starts = offset.start(points.position, points.normal, directions, points.offset)
+        return np.flatnonzero(self._embree.run(rows(starts * self._unit), rows(directions), query="OCCLUDED") < 0)
 
     def blocked(self, points: Points, directions: Floats, distances: Floats) -> NDArray[np.bool_]:
         """Whether anything stands before lights, (n,), at these finite distances."""

@@ -45,6 +45,10 @@ class Palette:
         """Whether any surface has this component of a material, and not in black."""
         return component in self._colours
 
+    def having(self, component: str) -> NDArray[np.bool_]:
+        """For each of `materials_of(scene)`, whether it has this component."""
+        return np.array([colour is not None for colour in self._colours.get(component, [None] * len(self._ior))])
+
     @property
     def scatters(self) -> bool:
         """Whether any surface sends light on."""
