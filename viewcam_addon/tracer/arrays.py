@@ -27,6 +27,12 @@ def pick(table: NDArray, which: Some) -> NDArray:
     return table[..., which] if isinstance(which, slice) else gather(table, which)
 
 
+def put(table: NDArray, which: Indices, values: NDArray) -> None:
+    """Write some entries of the last axis of `table`, (n,) or (3, n): row by row takes NumPy a third of the time."""
+    for row, part in zip(np.atleast_2d(table), np.atleast_2d(values), strict=True):
+        row[which] = part
+
+
 def dot(a: NDArray, b: NDArray) -> NDArray:
     """a · b along the first axis, of three components."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

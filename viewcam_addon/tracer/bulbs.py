@@ -17,12 +17,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .arrays import Floats, Indices, dot, gather
+from .arrays import Floats, Indices, dot, gather, put
 from .lights import Point, Spot, Sun
-from .scattering import axes_about, cosine_direction
+from .scattering import axes_about, cosine_direction, turned
 from .view import View
 
-Sampled = tuple[Floats, Floats, Floats]
+Sampled = tuple[Floats, ...]
 """Directions (3, n) unit, distances (n,), and what a lamp's colour is multiplied with: its radiance over the density."""
 
 _QUARTER_SPHERE = 4 * np.pi  # a power over the squared distance's multiple of it is an irradiance
@@ -35,7 +35,7 @@ def entries(table: Floats, which: Indices) -> Floats:
 
 def replace(sampled: Sampled, which: Indices, instead: Sampled) -> None:
     for whole, part in zip(sampled, instead, strict=True):
-        whole[..., which] = part
+        put(whole, which, part)
 
 
 def columns(vectors: Sequence[Sequence[float]]) -> Floats:
@@ -53,9 +53,7 @@ def risen(height: Floats, distance: Floats, reach: Floats) -> Floats:
 
     height : of the place above the surface's plane. distance : of the place.
     """
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = (np.maximum(height, 0.0) + reach) / (distance + reach)
-    return np.where(height + reach > 0, share, 0.0)
+    return np.fmax(height + reach, 0.0) / (distance + reach)
 
 
 def one_minus_cosine(squared_sine: Floats) -> Floats:
@@ -70,8 +68,8 @@ def within_cone(axis: Floats, spread: Floats, u: Floats) -> tuple[Floats, Floats
     """
     right, up = axes_about(axis)
     short = u[0] * spread
-    sine, turn = np.sqrt(short * (2.0 - short)), 2 * np.pi * u[1]
-    return axis * (1.0 - short) + right * (sine * np.cos(turn)) + up * (sine * np.sin(turn)), short
+    sine, (x, y) = np.sqrt(short * (2.0 - short)), turned(u[1])
+    return axis * (1.0 - short) + right * (sine * x) + up * (sine * y), short
 
 
 class Suns:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Floats, Indices, gather
+from .bulbs import replace
 from .glowing import Glowing
 from .lamps import Lamps
 from .lights import RAYS, Lamp
@@ -29,10 +30,10 @@ from .view import View
 
 # For so many the chances are computed at each point; each takes a tenth of the time of a shadow ray among few triangles.
 _FEW = 32
-# More light than any picture holds, less than makes products overflow.
-_MOST = 1e200
+# A smaller chance than one over this comes never.
+_LONGEST_ODDS = 1e80
 # Points at a time: their arrays stay in a core's cache.
-_POINTS = 8192
+_POINTS = 16384
 _BELOW_1 = 1 - 2.0**-53
 
 
@@ -54,7 +55,7 @@ def weight(pdf: Floats, other: Floats) -> Floats:
     """The part that counts of a sample whose direction was picked with the density `pdf`, where another way of picking has the
     density `other`. An infinite pdf counts whole."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        ratio = np.where(np.isinf(pdf), 0.0, np.nan_to_num(np.divide(other, pdf), posinf=np.inf))
+        ratio = np.fmax(np.divide(other, pdf), 0.0)  # 0 where neither way finds anything
         return 1.0 / (1.0 + ratio * ratio)
 
 
@@ -102,56 +103,61 @@ class Emitters:
     def sample(self, points: Points, u: Floats) -> Aimed:
         """One emitter for each of n points, and a direction to it. u : (3, n) in [0, 1): which emitter, and where on it."""
         parts = [slice(first, first + _POINTS) for first in range(0, max(points.count, 1), _POINTS)]
-        aimed = [self._aim(points.at(part), u[:, part]) for part in parts]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            aimed = [self._aim(points.at(part), u[:, part]) for part in parts]
         return aimed[0] if len(aimed) == 1 else Aimed(*(np.concatenate(values, axis=-1) for values in zip(*aimed, strict=True)))
 
     def _aim(self, points: Points, u: Floats) -> Aimed:
-        which, chance, rest = self._choose(points, u[0])
-        first, count = self._lamps.count, points.count
-        pdf = np.full(count, np.inf)
+        which, odds, rest = self._choose(points, u[0])
+        position, shading, first = points.position, points.shading, self._lamps.count
+        pdf = np.broadcast_to(np.inf, points.count)
         if not self._glowing.count:
-            direction, distance, light = self._lamps.sample(which, points, u[1:])
+            direction, distance, light = self._lamps.sample(which, position, shading, u[1:])
         elif not first:
-            direction, distance, light, pdf = self._glowing.sample(which, points.position, rest, u[1:])
+            direction, distance, light, pdf = self._glowing.sample(which, position, rest, u[1:])
         else:
-            direction, distance, light = np.empty((3, count)), np.empty(count), np.empty((3, count))
-            some = np.flatnonzero(which < first)
-            direction[:, some], distance[some], light[:, some] = self._lamps.sample(which[some], points.at(some), u[1:, some])
-            some = np.flatnonzero(which >= first)
-            direction[:, some], distance[some], light[:, some], pdf[some] = self._glowing.sample(
-                which[some] - first, points.position[:, some], rest[some], u[1:, some]
-            )
-        with np.errstate(divide="ignore", invalid="ignore"):
-            light = np.where(chance > 0, np.minimum(light / chance, _MOST), 0.0)
-            pdf = np.where(chance > 0, pdf * chance, np.inf)
-        return Aimed(direction, distance, light, pdf, gather(self._shadowed, which))
+            found = np.empty((3, points.count)), np.empty(points.count), np.empty((3, points.count)), pdf.copy()
+            of_glowing = which >= first
+            some = np.flatnonzero(~of_glowing)
+            here = gather(position, some), gather(shading, some)
+            replace(found[:3], some, self._lamps.sample(gather(which, some), *here, gather(u[1:], some)))
+            some = np.flatnonzero(of_glowing)
+            asked = gather(which, some) - first, gather(position, some), gather(rest, some), gather(u[1:], some)
+            replace(found, some, self._glowing.sample(*asked))
+            direction, distance, light, pdf = found
+        if self._count > 1:
+            light *= odds
+            if self._glowing.count:
+                pdf = np.where(odds > 0, pdf / odds, np.inf)
+        shadowed = np.broadcast_to(True, points.count) if self._shadowed.all() else gather(self._shadowed, which)
+        return Aimed(direction, distance, light, pdf, shadowed)
 
     def _choose(self, points: Points, u: Floats) -> tuple[Indices, Floats, Floats]:
-        """Which emitter each point gets, the chance that it had, 0 where none lights the point, and what is left of u."""
+        """Which emitter each point gets, one over the chance that it had, or 0 where none lights it, and what is left of u."""
         if self._count == 1:
             return np.zeros(len(u), np.intp), np.ones(len(u)), u
         if self._chances is not None:
             which = np.searchsorted(self._reached, u, side="right")
             chance = gather(self._chances, which)
             before = gather(self._reached, which) - chance
-            return which, chance, np.clip((u - before) / chance, 0.0, _BELOW_1)
-        reached = self._estimates(points).cumsum(axis=0)
-        total = reached[-1]
+            return which, 1 / chance, np.clip((u - before) / chance, 0.0, _BELOW_1)
+        share, *others = self._estimates(points)
+        total = sum(others, start=share)
         wanted = u * total
-        which = np.zeros(len(u), np.intp)
-        for edge in reached[:-1]:
-            which += wanted >= edge
-        rays = np.arange(len(u))
-        before = np.where(which > 0, reached[which - 1, rays], 0.0)
-        share = reached[which, rays] - before
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return which, np.nan_to_num(share / total), np.clip(np.nan_to_num((wanted - before) / share), 0.0, _BELOW_1)
+        which, before, reached = np.zeros(len(u), np.intp), 0.0, share
+        for estimate in others:
+            beyond = wanted >= reached
+            which += beyond
+            share, before = np.where(beyond, estimate, share), np.where(beyond, reached, before)
+            reached = reached + estimate
+        odds = np.where(share > 0, np.minimum(total / share, _LONGEST_ODDS), 0.0)
+        return which, odds, np.fmin((wanted - before) / share, _BELOW_1) if self._glowing.count else u
 
-    def _estimates(self, points: Points) -> Floats:
-        """(k, n): about how much each emitter brings to points."""
+    def _estimates(self, points: Points) -> list[Floats]:
+        """(n,) each: about how much each emitter brings to points."""
         at = points.position, points.normal
         lamps = [self._lamps.estimate(lamp, *at) for lamp in range(self._lamps.count)]
-        return np.stack([*lamps, *(self._glowing.estimate(number, *at) for number in range(self._glowing.count))])
+        return lamps + [self._glowing.estimate(number, *at) for number in range(self._glowing.count)]
 
     def _fixed_chances(self, extent: float) -> Floats:
         """(k,) chances of the emitters."""
@@ -187,9 +193,10 @@ class Emitters:
         if self._chances is not None:
             density *= gather(self._chances, owner)
         elif self._count > 1:
-            estimates = self._estimates(starts)
             with np.errstate(divide="ignore", invalid="ignore"):
-                density *= np.nan_to_num(estimates[owner, np.arange(met.count)] / estimates.sum(axis=0))
+                estimates = self._estimates(starts)
+                chosen = np.choose(owner, estimates, mode="clip") if self._glowing.count > 1 else estimates[-1]
+                density *= np.fmax(chosen / sum(estimates), 0.0)
         return weight(scattered_pdf, density)
 
 

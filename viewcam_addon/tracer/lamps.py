@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Floats, Indices, dot, gather
-from .bulbs import Bulbs, Suns, entries
+from .bulbs import Bulbs, Sampled, Suns, entries, replace
 from .lights import Area, Lamp, Point, Spot, Sun
 from .plates import Ellipses, Rectangles
-from .points import Points
 from .view import View
 
 # More light than any picture holds, less than makes products overflow.
@@ -51,20 +50,19 @@ class Lamps:
         self.count = len(shadowed)
         self.sized = any(table.sized.any() for table in self._tables)
 
-    def sample(self, which: Indices, points: Points, u: Floats) -> tuple[Floats, Floats, Floats]:
+    def sample(self, which: Indices, position: Floats, shading: Floats, u: Floats) -> Sampled:
         """Directions, distances, and radiances over densities, of one lamp for each point."""
         if len(self._tables) == 1:
-            return self._sample(self._tables[0], which, points.position, points.shading, u)
-        direction, distance, light = np.empty((3, len(which))), np.empty(len(which)), np.empty((3, len(which)))
+            return self._sample(self._tables[0], which, position, shading, u)
+        found = np.empty((3, len(which))), np.empty(len(which)), np.empty((3, len(which)))
         for table, first in zip(self._tables, self._firsts, strict=True):
             some = np.flatnonzero((which >= first) & (which < first + table.colours.shape[1]))
-            direction[:, some], distance[some], light[:, some] = self._sample(
-                table, which[some] - first, points.position[:, some], points.shading[:, some], u[:, some]
-            )
-        return direction, distance, light
+            asked = (gather(values, some) for values in (which - first, position, shading, u))
+            replace(found, some, self._sample(table, *asked))
+        return found
 
     @staticmethod
-    def _sample(table: Table, which: Indices, position: Floats, shading: Floats, u: Floats) -> tuple[Floats, Floats, Floats]:
+    def _sample(table: Table, which: Indices, position: Floats, shading: Floats, u: Floats) -> Sampled:
         direction, distance, factor = table.sample(which, position, shading, u)
         return direction, distance, entries(table.colours, which) * np.minimum(factor, _MOST)
 

@@ -1,9 +1,10 @@
 """Area lamps in camera space: rectangles and ellipses that shine to one side. Their tables answer as those of bulbs.py do.
 
-A rectangle is sampled evenly over the solid angle it fills (Ureña, Fajardo and King, An Area-Preserving Parametrization for
-Spherical Rectangles, 2013). That angle is a sum known to 10⁻¹⁵ only, so rectangles that fill less than 10⁻⁶, small or seen
-edge-on, are sampled by their area, and so are those that shear has made parallelograms. An ellipse is sampled by its area from
-afar; near it, where that would be unbounded, as the rectangle round it, of which a fifth is dark.
+From afar a lamp is sampled by its area. A rectangle that is near, or seen at a slant, is sampled evenly over the solid angle it
+fills (Ureña, Fajardo and King, An Area-Preserving Parametrization for Spherical Rectangles, 2013), which takes longer and is
+less noisy there. That angle is a sum known to 10⁻¹⁵ only, so rectangles that fill less than 10⁻⁶ are sampled by their area
+again, and so are those that shear has made parallelograms. An ellipse that is near, where sampling its area would be unbounded,
+is sampled as the rectangle round it, of which a fifth is dark.
 """
 
 from collections.abc import Sequence
@@ -11,14 +12,16 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Floats, Indices, dot
+from .arrays import Floats, Indices, dot, gather
 from .bulbs import Sampled, columns, entries, replace, risen
 from .lights import Area
+from .scattering import turned
 from .view import View
 
 _SMALLEST_ANGLE = 1e-6
-# How many times its longer half axis an ellipse is away where cos/distance² varies less over it than the dark fifth would cost.
-_FAR = 3.0
+# How many times its longer half axis a lamp is away where cos/distance² varies less over it than an ellipse's dark fifth costs;
+# and by which part of its distance the ends of a rectangle may be farther off than its middle there.
+_FAR, _SLANT = 3.0, 0.2
 _ASKEW = 1e-9  # |cos| between the sides of a parallelogram that is no rectangle
 
 
@@ -81,10 +84,9 @@ class _Plates:
         to = way + entries(self._first, which) * (lengths[0] * across) + entries(self._second, which) * (lengths[1] * along)
         squared = dot(to, to)
         distance = np.sqrt(squared)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ahead = to / distance
-            factor = -dot(entries(self._normals, which), ahead) / (np.pi * squared)
-        return ahead, distance, np.where(factor > 0, factor, 0.0)
+        to /= distance
+        factor = dot(entries(self._normals, which), to) / squared
+        return to, distance, np.fmax(factor * (-1 / np.pi), 0.0)
 
     def _by_angle(self, which: Indices, way: Floats, u: Floats) -> tuple[Sampled, Floats, Floats]:
         """Evenly over the solid angles of the rectangles; also the coordinates −1 to 1 along the half sides."""
@@ -96,8 +98,7 @@ class _Plates:
             middle[0] - lengths[0], middle[0] + lengths[0], middle[1] - lengths[1], middle[1] + lengths[1], depth, u
         )
         distance = np.sqrt(x * x + y * y + depth * depth)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ahead = (first * x + second * y + normal * depth) / distance
+        ahead = (first * x + second * y + normal * depth) / distance
         factor = np.where(depth < 0, solid_angle * entries(self._radiance, which), 0.0)
         return (ahead, distance, factor), (x - middle[0]) / lengths[0], (y - middle[1]) / lengths[1]
 
@@ -117,12 +118,19 @@ class Rectangles(_Plates):
 
     def sample(self, which: Indices, position: Floats, shading: Floats, u: Floats) -> Sampled:
         way = entries(self.centres, which) - position
-        sampled, _, _ = self._by_angle(which, way, u)
-        small = sampled[2] < _SMALLEST_ANGLE * entries(self._radiance, which)
-        by_area = np.flatnonzero(small | entries(self._askew, which))
-        if len(by_area):
-            u = u[:, by_area]
-            replace(sampled, by_area, self._by_area(which[by_area], way[:, by_area], 2 * u[0] - 1, 2 * u[1] - 1))
+        sampled = self._by_area(which, way, 2 * u[0] - 1, 2 * u[1] - 1)
+        lengths, squared = entries(self._lengths, which), dot(way, way)
+        apart = sum(
+            np.abs(dot(entries(side, which), way)) * length
+            for side, length in zip((self._first, self._second), lengths, strict=True)
+        )
+        near = (apart > _SLANT * squared) | (squared < (_FAR * lengths.max(axis=0)) ** 2)
+        near = np.flatnonzero(near & ~entries(self._askew, which))
+        if len(near):
+            which = gather(which, near)
+            by_angle, _, _ = self._by_angle(which, gather(way, near), gather(u, near))
+            wide = np.flatnonzero(by_angle[2] >= _SMALLEST_ANGLE * entries(self._radiance, which))
+            replace(sampled, gather(near, wide), [gather(values, wide) for values in by_angle])
         return sampled
 
 
@@ -130,8 +138,8 @@ class Ellipses(_Plates):
     @staticmethod
     def _half_sides(lamp: Area) -> tuple[Floats, Floats]:
         """The half axes, which a sheared circle has as well."""
-        turned, lengths, _ = np.linalg.svd(lamp.matrix[:3, :2] * (np.array(lamp.size) / 2))
-        return turned[:, 0] * lengths[0], turned[:, 1] * lengths[1]
+        axes, lengths, _ = np.linalg.svd(lamp.matrix[:3, :2] * (np.array(lamp.size) / 2))
+        return axes[:, 0] * lengths[0], axes[:, 1] * lengths[1]
 
     @staticmethod
     def _covers(across: Floats, along: Floats) -> NDArray[np.bool_]:
@@ -139,14 +147,11 @@ class Ellipses(_Plates):
 
     def sample(self, which: Indices, position: Floats, shading: Floats, u: Floats) -> Sampled:
         way = entries(self.centres, which) - position
-        near = dot(way, way) < (_FAR * entries(self._lengths, which)[0]) ** 2
-        if near.all():
-            return self._as_rectangle(which, way, u)
-        radius, turn = np.sqrt(u[0]), 2 * np.pi * u[1]
-        sampled = self._by_area(which, way, radius * np.cos(turn), radius * np.sin(turn))
-        near = np.flatnonzero(near)
+        radius, (x, y) = np.sqrt(u[0]), turned(u[1])
+        sampled = self._by_area(which, way, radius * x, radius * y)
+        near = np.flatnonzero(dot(way, way) < (_FAR * entries(self._lengths, which)[0]) ** 2)
         if len(near):
-            replace(sampled, near, self._as_rectangle(which[near], way[:, near], u[:, near]))
+            replace(sampled, near, self._as_rectangle(gather(which, near), gather(way, near), gather(u, near)))
         return sampled
 
     def _as_rectangle(self, which: Indices, way: Floats, u: Floats) -> Sampled:
@@ -165,24 +170,18 @@ def on_rectangle(x0: Floats, x1: Floats, y0: Floats, y1: Floats, depth: Floats, 
     squared = depth * depth
     with np.errstate(divide="ignore", invalid="ignore"):
         # The depth components of the unit normals of the planes through the origin and each side; the others are 0 in pairs.
-        bottom, right, top, left = (
-            -y0 / np.sqrt(squared + y0 * y0),
-            x1 / np.sqrt(squared + x1 * x1),
-            y1 / np.sqrt(squared + y1 * y1),
-            -x0 / np.sqrt(squared + x0 * x0),
-        )
+        bottom, right, top, left = (side / np.sqrt(squared + side * side) for side in (-y0, x1, y1, -x0))
         before = np.arcsin(bottom * right) + np.arcsin(right * top)
         behind = np.arcsin(top * left) + np.arcsin(left * bottom)
         solid_angle = before + behind
         # From here on x, that part of the angle is to the left of it which u asks for.
-        turn = u[0] * solid_angle - behind
-        sine = np.sin(turn)
-        rest = np.cos(turn) * bottom + top
+        cosine, sine = turned((u[0] * solid_angle - behind) / (2 * np.pi))
+        rest = cosine * bottom + top
         slope = np.sqrt(np.maximum(rest * rest - sine * sine * (squared / (squared + y0 * y0)), 0.0))
-        x = np.clip(np.nan_to_num(np.abs(depth) * sine * np.sign(rest) / slope), x0, x1)
+        x = np.minimum(np.fmax(np.copysign(depth, rest) * sine / slope, x0), x1)
         # With x known, y spreads as the sine of its elevation.
         distance = np.sqrt(x * x + squared)
         low, high = y0 / np.sqrt(distance * distance + y0 * y0), y1 / np.sqrt(distance * distance + y1 * y1)
         elevation = low + u[1] * (high - low)
-        y = np.clip(np.nan_to_num(elevation * distance / np.sqrt(np.maximum(1 - elevation * elevation, 0.0))), y0, y1)
-    return x, y, np.maximum(np.nan_to_num(solid_angle), 0.0)
+        y = np.minimum(np.fmax(elevation * distance / np.sqrt(np.maximum(1 - elevation * elevation, 0.0)), y0), y1)
+    return x, y, np.fmax(solid_angle, 0.0)

@@ -39,6 +39,14 @@ def axes_about(normal: Floats) -> tuple[Floats, Floats]:
     return right, up
 
 
+def turned(u: Floats) -> tuple[Floats, Floats]:
+    """Points of the unit circle, x and y, u of the way round it from (1, 0). One tangent of half the angle tells both: of
+    float64, NumPy's sine and cosine take ten times as long."""
+    slope = np.tan(u * np.pi)
+    chord = 2.0 / (1.0 + slope * slope)
+    return chord - 1.0, np.multiply(chord, slope, out=slope)
+
+
 def cosine_direction(normal: Floats, u: Floats) -> tuple[Floats, Floats]:
     """Directions as often as the cosine of their angle to the normal is large, and how often that is.
 
@@ -47,15 +55,12 @@ def cosine_direction(normal: Floats, u: Floats) -> tuple[Floats, Floats]:
     Returns directions (3, n), unit, and their density per solid angle (n,), the cosine over π. They point from where a unit
     sphere touches the surface to points that lie evenly all over the sphere, twice the cosine away: no frame is needed.
     """
-    turn = u[1].astype(np.float32)  # a cosine of these takes a tenth of the time
-    turn *= np.float32(2 * np.pi)
     direction = np.empty(normal.shape)
-    direction[0], direction[1] = np.cos(turn), np.sin(turn)
     height = u[0] * (2.0 - 4 * _POLE)
     height += 2 * _POLE - 1.0
-    across = 1.0 - height * height
-    across /= direction[0] * direction[0] + direction[1] * direction[1]  # 1 but for their roundings
-    direction[:2] *= np.sqrt(across, out=across)
+    across = np.sqrt(1.0 - height * height)
+    for component, turn in zip(direction[:2], turned(u[1]), strict=True):
+        np.multiply(across, turn, out=component)
     direction[2] = height
     direction += normal
     length = np.sqrt(dot(direction, direction))
