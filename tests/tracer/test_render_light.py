@@ -231,7 +231,7 @@ def test_memory_that_ends_while_light_is_traced_is_told(lively, monkeypatch):
     def full(*_):
         raise MemoryError
 
-    monkeypatch.setattr("viewcam_addon.tracer.space.Space.first", full)
+    monkeypatch.setattr("viewcam_addon.tracer.space.Space.found", full)
     with pytest.raises(InputError, match="memory"):
         render(lively(), "path", 4)
 

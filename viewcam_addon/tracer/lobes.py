@@ -43,6 +43,10 @@ class Lobes:
     def share(self, way: int) -> Floats:
         return self.shares[self.ways.index(way)]
 
+    def leads_on(self, kind: str) -> bool:
+        """Whether any way makes rays of a kind."""
+        return any(way in self.ways for way in KINDS[kind])
+
     def chosen(self, u: Floats) -> Indices:
         """(n,) the place in `ways` of the way that each path takes, −1 where none leads on. u : (n,) in [0, 1), or 0."""
         if len(self.ways) == 1:
@@ -76,16 +80,17 @@ class Lobes:
 
 
 def lobes_at(palette: Palette, points: Points, direction: Floats | None) -> Lobes:
-    """The ways of paths that come to points along (3, n) unit directions, which only mirrors and glass need."""
+    """The ways of paths that come to points along (3, n) unit directions; None where no point is of a mirror or of glass."""
     found: dict[int, Floats] = {}
     ratio = normal = None
+    specular = direction is not None
     if palette.has("diffuse"):
         found[DIFFUSE] = palette.colour("diffuse", points)
-    if direction is not None:
+    if specular:
         normal = scattering.specular_normal(direction, points.normal, points.shading)
-    if palette.has("mirror"):
+    if specular and palette.has("mirror"):
         found[MIRROR] = palette.colour("mirror", points)
-    if palette.has("glass") or palette.has("refraction"):
+    if specular and (palette.has("glass") or palette.has("refraction")):
         ior = palette.ior(points)
         ratio = np.where(points.backside, 1.0 / ior, ior)
         reflectance = scattering.fresnel(-dot(normal, direction), ratio)

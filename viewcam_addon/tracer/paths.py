@@ -59,6 +59,11 @@ class Arrivals:
     direction: Floats | None
     points: Points
 
+    def at(self, which: Some) -> "Arrivals":
+        """Some of them."""
+        given = (self.path, self.place, self.weight, self.counts, self.direction)
+        return Arrivals(*(None if values is None else pick(values, which) for values in given), self.points.at(which))
+
 
 @dataclass(slots=True)
 class Rays:
@@ -96,9 +101,9 @@ class Paths:
     ) -> None:
         self._surfaces, self._space, self._emitters, self._palette = surfaces, space, emitters, palette
         self._sampler, self._clip = sampler, clip
-        specular = palette.has("mirror") or palette.has("glass") or palette.has("refraction")
+        self._specular_materials = palette.having("mirror") | palette.having("glass") | palette.having("refraction")
+        self._specular = specular = bool(self._specular_materials.any())
         self._kinds = [*(["diffuse"] if palette.has("diffuse") else []), *(["glossy", "transmission"] if specular else [])]
-        self._specular = specular
         self._most = bounces.total + 1
         self._most_of = {kind: getattr(bounces, kind) + 1 for kind in KINDS}
         self._bright = surfaces.made_of(palette.having("emission"))
@@ -141,9 +146,18 @@ class Paths:
         while arrivals is not None and self._emitters.lit:
             check()
             depth += 1
-            rays = self._scattered(light, arrivals, depth, pixels, samples)
+            rays = [rays for alike in self._apart(arrivals) for rays in self._scattered(light, alike, depth, pixels, samples)]
             arrivals = _joined([self._arrived(light, some) for some in rays])
         return light
+
+    def _apart(self, arrivals: Arrivals) -> list[Arrivals]:
+        """Paths that have come to surfaces without mirrors and glass, which are less work, and the others."""
+        if not self._specular:
+            return [arrivals]
+        specular = gather(self._specular_materials, arrivals.points.material)
+        plain, others = arrivals.at(some(~specular)), arrivals.at(some(specular))
+        plain.direction = None
+        return [alike for alike in (plain, others) if alike.points.count]
 
     def _from_eye(self, light: Light, primitives: Indices, x: Floats, y: Floats) -> Arrivals | None:
         """What the eye's rays come to, and the passes that are of this alone."""
@@ -192,7 +206,9 @@ class Paths:
             return []
         everyone = len(arrivals.path)
         chosen = lobes.chosen(numbers(slice(None), _WAY, 1)[0] if len(lobes.ways) > 1 else np.zeros(everyone))
-        made = (self._rays(arrivals, lobes, chosen, kind, depth, places[kind], numbers) for kind in leading)
+        made = (
+            self._rays(arrivals, lobes, chosen, kind, depth, places[kind], numbers) for kind in leading if lobes.leads_on(kind)
+        )
         return [rays for rays in made if rays is not None]
 
     def _leads_on(self, kind: str, depth: int) -> bool:
