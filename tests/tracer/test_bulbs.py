@@ -6,7 +6,7 @@ them; where nothing is random it must be the answer, to the rounding of some twe
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from viewcam_addon.tracer import bulbs
@@ -137,6 +137,7 @@ def test_a_soft_falloff_makes_a_disc_that_faces_the_point(make_lighting, off_by,
 @given(seed=SEEDS, radius=st.floats(1e-6, 3.0), soft=st.booleans())
 def test_every_sample_looks_where_rays_run_into_the_lamp_and_carries_its_radiance(make_lighting, seed, radius, soft):
     """The same light over the same density for all samples: they are spread evenly over the solid angle."""
+    assume(abs(radius - 2) > 1e-6)  # on the sphere itself, where a rounding decides what is inside
     rng = np.random.default_rng(seed)
     centre = unit(rng) * 2
     lighting = make_lighting(point(7.0, centre, radius=radius, soft_falloff=soft))
