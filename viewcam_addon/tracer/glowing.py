@@ -9,10 +9,12 @@ needed anyway.
 import numpy as np
 
 from .arrays import Floats, Indices, cross, dot, gather
-from .bulbs import risen
 from .points import Points, Surfaces
 from .scene import Scene
 from .textures import Palette
+
+# Less has what a point sees of itself only.
+_LEAST_DENSITY = 1e-100
 
 
 class Glowing:
@@ -42,6 +44,11 @@ class Glowing:
 
     def _fill(self, shining: list[tuple[Indices, Floats]], sphere_count: int) -> None:
         self._primitives = np.concatenate([primitives for primitives, _ in shining])
+        a, b, c = self._corners(self._primitives)
+        normals = cross(b - a, c - a)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            normals /= np.sqrt(dot(normals, normals))
+        self._shapes = np.concatenate([a, b - a, c - a, normals])
         self._colours = np.concatenate([colours for _, colours in shining], axis=1)
         self._centres, self._reach = np.empty((3, self.count)), np.empty(self.count)
         self._brightness = np.empty(self.count)  # radiance times area
@@ -77,18 +84,17 @@ class Glowing:
         picked = np.searchsorted(self._reached, which + part, side="right")
         picked = np.minimum(picked, gather(self._last, which))
         primitive = gather(self._primitives, picked)
-        a, b, c = self._corners(primitive)
+        corner, first, second, normal = gather(self._shapes, picked).reshape(4, 3, -1)
         far = np.sqrt(u[0])
-        to = a + (b - a) * (far * (1 - u[1])) + (c - a) * (far * u[1]) - position
-        normal = cross(b - a, c - a)
+        along = far * u[1]
+        to = corner + first * (far - along) + second * along - position
         squared = dot(to, to)
         distance = np.sqrt(squared)
         with np.errstate(invalid="ignore", divide="ignore"):
-            ahead = to / distance
-            cosine = np.abs(dot(normal, ahead)) / np.sqrt(dot(normal, normal))
-            density = np.nan_to_num(gather(self._density, primitive) * squared / cosine)
-            light = self._radiance(picked, primitive, position, ahead) / density
-        return ahead, distance, np.where(density > 0, light, 0.0), density
+            ahead = np.divide(to, distance, out=to)
+            density = np.fmax(gather(self._density, primitive) * squared / np.abs(dot(normal, ahead)), 0.0)
+            factor = np.where(density > _LEAST_DENSITY, 1 / density, 0.0)
+        return ahead, distance, self._radiance(picked, primitive, position, ahead) * factor, density
 
     def _radiance(self, picked: Indices, primitive: Indices, position: Floats, ahead: Floats) -> Floats:
         if self._plain:
@@ -98,10 +104,9 @@ class Glowing:
     def estimate(self, number: int, position: Floats, normal: Floats) -> Floats:
         """(n,): about how much an object brings to points, 0 only where it brings nothing."""
         way = self._centres[:, number, None] - position
-        distance, reach = np.sqrt(dot(way, way)), self._reach[number]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            light = self._brightness[number] / (distance**2 + reach**2 / 2)
-        return light * risen(dot(normal, way), distance, reach)
+        squared, reach = dot(way, way), self._reach[number]
+        risen = np.fmax(dot(normal, way) + reach, 0.0)
+        return risen * (self._brightness[number] / ((squared + reach**2 / 2) * (np.sqrt(squared) + reach)))
 
     def powers(self) -> Floats:
         """(k,), of both sides."""

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Floats, Indices, dot, gather
-from .bulbs import Sampled, columns, entries, replace, risen
+from .arrays import Floats, Indices, dot, gather, pick, some
+from .bulbs import Sampled, columns, entries, replace
 from .lights import Area
 from .scattering import turned
 from .view import View
@@ -58,9 +58,10 @@ class _Plates:
         way = self.centres[:, lamp, None] - position
         reach = self.reach[lamp]
         before = -dot(way, self._normals[:, lamp])
-        distance = np.sqrt(dot(way, way))
-        light = self.colours[:, lamp].mean() / (np.pi * (distance**2 + reach**2 / 2))
-        light *= risen(dot(normal, way), distance, reach) * risen(before, distance, reach)
+        squared = dot(way, way)
+        farthest = np.sqrt(squared) + reach
+        light = np.fmax(dot(normal, way) + reach, 0.0) * (before + reach)  # two cosines, as of `risen`
+        light *= self.colours[:, lamp].mean() / np.pi / (farthest * farthest * (squared + reach**2 / 2))
         return np.where(before > 0, light, 0.0)
 
     def met(self, lamp: int, starts: Floats, ahead: Floats, nearest: Floats, farthest: Floats) -> Floats:
@@ -129,8 +130,8 @@ class Rectangles(_Plates):
         if len(near):
             which = gather(which, near)
             by_angle, _, _ = self._by_angle(which, gather(way, near), gather(u, near))
-            wide = np.flatnonzero(by_angle[2] >= _SMALLEST_ANGLE * entries(self._radiance, which))
-            replace(sampled, gather(near, wide), [gather(values, wide) for values in by_angle])
+            wide = some(by_angle[2] >= _SMALLEST_ANGLE * entries(self._radiance, which))
+            replace(sampled, pick(near, wide), [pick(values, wide) for values in by_angle])
         return sampled
 
 
@@ -180,8 +181,8 @@ def on_rectangle(x0: Floats, x1: Floats, y0: Floats, y1: Floats, depth: Floats, 
         slope = np.sqrt(np.maximum(rest * rest - sine * sine * (squared / (squared + y0 * y0)), 0.0))
         x = np.minimum(np.fmax(np.copysign(depth, rest) * sine / slope, x0), x1)
         # With x known, y spreads as the sine of its elevation.
-        distance = np.sqrt(x * x + squared)
-        low, high = y0 / np.sqrt(distance * distance + y0 * y0), y1 / np.sqrt(distance * distance + y1 * y1)
+        squared = x * x + squared
+        low, high = y0 / np.sqrt(squared + y0 * y0), y1 / np.sqrt(squared + y1 * y1)
         elevation = low + u[1] * (high - low)
-        y = np.minimum(np.fmax(elevation * distance / np.sqrt(np.maximum(1 - elevation * elevation, 0.0)), y0), y1)
+        y = np.minimum(np.fmax(elevation * np.sqrt(squared / np.maximum(1 - elevation * elevation, 0.0)), y0), y1)
     return x, y, np.fmax(solid_angle, 0.0)
