@@ -102,6 +102,9 @@ class Surfaces:
         # On which side of the cross product of its sides, in camera space, a triangle has its front, and its smooth normals.
         self._front = np.repeat(np.where(np.array(mirrored, bool), -1, 1) * int(view.handedness), sizes).astype(np.int8)
         self._corner_normals = _corner_normals(triangles, view)
+        # Towards the eye.
+        with np.errstate(all="ignore"):
+            self._normals = planes.forms[:3] / -np.sqrt(dot(planes.forms, planes.forms))
         colours = [colour for material in materials_of(scene) for colour in material.colours.values()]
         self._has_uv = any(colour.image is not None for colour in colours)
         self._colours = _corner_colours(triangles) if any(colour.vertex for colour in colours) else None
@@ -113,10 +116,8 @@ class Surfaces:
         def triangle_points(triangle: Indices, which: Some) -> Points:
             depth, first, second = self.planes.hit(triangle, pick(x, which), pick(y, which))
             ways = pick(directions, which)
-            normal = gather(self.planes.forms[:3], triangle)
+            normal = gather(self._normals, triangle)
             side = gather(self.planes.side, triangle) * self._view.handedness
-            with np.errstate(all="ignore"):
-                normal /= -np.sqrt(dot(normal, normal))
             return self._on_triangles(triangle, normal, side, first, second, ways * depth, ways)
 
         def sphere_points(sphere: Indices, which: Some) -> Points:
@@ -271,8 +272,10 @@ def _corner_colours(triangles: Triangles) -> NDArray[np.float32]:
 
 def _interpolated(corners: NDArray[np.float32], first: Floats, second: Floats, count: int) -> Floats:
     """(count, n) of what the (9, n) values at the corners are at the barycentric coordinates."""
-    third = 1.0 - first - second
-    return corners[:count] * third + corners[3 : 3 + count] * first + corners[6 : 6 + count] * second
+    values = corners[:count] * (1.0 - first - second)
+    values += corners[3 : 3 + count] * first
+    values += corners[6 : 6 + count] * second
+    return values
 
 
 def _plane_distance(corner: Floats, normal: Floats, origins: Floats, directions: Floats) -> Floats:
