@@ -32,8 +32,8 @@ from .view import View
 _FEW = 32
 # A smaller chance than one over this comes never.
 _LONGEST_ODDS = 1e80
-# Points at a time: their arrays stay in a core's cache.
-_POINTS = 16384
+# Points at a time. Twice as many gain nothing, half as many cost 3 % in calls of NumPy.
+_POINTS = 32768
 _BELOW_1 = 1 - 2.0**-53
 
 
