@@ -4,6 +4,8 @@ What is random is judged by the mean of the picture: it must lie within 3 standa
 small. What is not random is judged by rounding. What sabotage does is in test_paths_in_a_box.py.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -93,6 +95,19 @@ def test_a_white_ball_in_a_white_world_can_not_be_seen(ball, make_spheres, make_
         # Rays that rise from a facet by less than 2⁻¹⁸ count as blocked: a part of 2⁻³⁶ of the light.
         assert np.abs(passes["Combined"][..., :3] - 1).max() <= ROUNDED
         assert (passes["Diffuse Color"] > 0).any()
+
+
+@pytest.mark.parametrize("level", ["direct", "path"])
+@pytest.mark.parametrize(("hidden", "expected"), [("shadow", 0.0), ("diffuse", 0.5)])
+def test_the_world_is_hidden_by_what_diffuse_rays_see_and_not_by_what_shadow_rays_see(
+    make_mesh, make_lit, level, hidden, expected
+):
+    floor, roof = square(make_mesh, 3.0), square(make_mesh, 1e4, 5.0)
+    scene = make_lit(DOWN, (floor, lambert(0.5)), (roof, lambert(0)), world=World((1, 1, 1)), bounces=Bounces(2, 2, 2, 2))
+    roofed = replace(scene.objects[1], hidden_from=frozenset([hidden]))
+    picture = render(replace(scene, objects=(scene.objects[0], roofed)), level, 4)["Combined"][..., :3]
+    # Beside the roof a part of (5 / 1e4)² of the sky is seen.
+    assert abs(picture.mean(dtype=float) - expected) <= 1e-4, f"{picture.mean():.4f} and not {expected}"
 
 
 def test_a_smooth_ball_in_a_white_world_loses_what_its_normals_send_into_it(ball, make_lit):

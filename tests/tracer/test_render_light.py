@@ -151,7 +151,7 @@ def test_without_light_no_ray_is_scattered_and_nothing_shines(lively, monkeypatc
     def never(*_):
         raise AssertionError("a ray that brings nothing was traced")
 
-    for name in ("first", "blocked"):
+    for name in ("found", "escaped", "blocked"):
         monkeypatch.setattr(f"viewcam_addon.tracer.space.Space.{name}", never)
     passes = render(scene, "path", 4)
     assert not passes["Combined"][..., :3].any() and passes["Diffuse Color"].any()
@@ -164,7 +164,8 @@ def test_at_level_direct_lamps_of_no_size_send_no_ray_but_shadow_rays(lively, mo
     lamps = (Sun("sun"), Point("point", position=(3, -2, 1)))
     scene = replace(scene, lamps=lamps, world=World((0, 0, 0)), objects=scene.objects[:1])
     traced = []
-    monkeypatch.setattr("viewcam_addon.tracer.space.Space.first", lambda *_: traced.append(1))
+    for name in ("found", "escaped"):
+        monkeypatch.setattr(f"viewcam_addon.tracer.space.Space.{name}", lambda *_: traced.append(1))
     assert render(scene, "direct", 4)["Combined"][..., :3].any() and not traced
 
 
