@@ -22,11 +22,11 @@ import numpy as np
 from benchmarks import race
 from viewcam_addon import image
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer import scene_file, visibility
+from viewcam_addon.tracer.rays import visibility
+from viewcam_addon.tracer.rays.triangles import triangles_of
+from viewcam_addon.tracer.rays.view import View
 from viewcam_addon.tracer.render import TILE, Tracer, render
-from viewcam_addon.tracer.scene import Scene
-from viewcam_addon.tracer.triangles import triangles_of
-from viewcam_addon.tracer.view import View
+from viewcam_addon.tracer.scene import Scene, scene_file
 
 
 def main() -> int:

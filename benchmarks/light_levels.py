@@ -18,11 +18,10 @@ from functools import partial
 from pathlib import Path
 
 from benchmarks import race
-from viewcam_addon.tracer import scene_file
-from viewcam_addon.tracer.film import NO_BOUNCES
-from viewcam_addon.tracer.lights import World
 from viewcam_addon.tracer.render import render
-from viewcam_addon.tracer.scene import Scene
+from viewcam_addon.tracer.scene import Scene, scene_file
+from viewcam_addon.tracer.scene.film import NO_BOUNCES
+from viewcam_addon.tracer.scene.lamps import World
 
 SCENES = Path(__file__).resolve().parent.parent / "sample_scenes"
 

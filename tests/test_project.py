@@ -29,6 +29,8 @@ FLOORS = [
     "commands",
     "cli",
 ]
+# The same inside the tracer.
+TRACER_FLOORS = ["arrays", "scene", "rays", "light", "tiles", "render"]
 ROOF = {"__init__", "__main__"}
 
 # What exists inside Blender only.
@@ -67,12 +69,19 @@ def imported_modules(source: str, package: tuple[str, ...]) -> set[str]:
 
 def climbing_imports(source: str, path: Path) -> set[str]:
     """What `source`, as the file `path` relative to the package, imports from a floor above its own."""
-    floor = path.parts[0].removesuffix(".py")
+    imports = imported_modules(source, ("viewcam_addon", *path.parent.parts))
+    climbing = _climbing(imports, path.parts, "viewcam_addon", FLOORS)
+    if path.parts[0] == "tracer":
+        climbing |= _climbing(imports, path.parts[1:], "viewcam_addon.tracer", TRACER_FLOORS)
+    return climbing
+
+
+def _climbing(imports: set[str], path: tuple[str, ...], package: str, floors: list[str]) -> set[str]:
+    floor = path[0].removesuffix(".py")
     if floor in ROOF:
         return set()
-    imports = imported_modules(source, ("viewcam_addon", *path.parent.parts))
-    above = FLOORS[FLOORS.index(floor) + 1 :]
-    return {name for name in imports if name.startswith("viewcam_addon.") and name.split(".")[1] in above}
+    above = floors[floors.index(floor) + 1 :]
+    return {name for name in imports if any(f"{name}.".startswith(f"{package}.{room}.") for room in above)}
 
 
 def blender_imports(source: str) -> set[str]:
@@ -103,6 +112,8 @@ def test_imports_point_down_only(path):
         ("from ..blender.camera import apply", "tracer/render.py"),
         ("def late():\n    import viewcam_addon.cli", "blender/panel.py"),
         ("from .. import cli", "blender/panel.py"),
+        ("from ..light.emitters import Emitters", "tracer/rays/space.py"),
+        ("from ..rays.view import View", "tracer/scene/lamps.py"),
     ],
 )
 def test_an_import_that_climbs_is_seen(source, path):
@@ -112,6 +123,8 @@ def test_an_import_that_climbs_is_seen(source, path):
 def test_every_room_has_a_floor():
     rooms = {path.relative_to(PACKAGE).parts[0].removesuffix(".py") for path in sources()}
     assert rooms - ROOF == set(FLOORS), "say in FLOORS on which floor the new room is"
+    rooms = {path.relative_to(PACKAGE / "tracer").parts[0].removesuffix(".py") for path in (PACKAGE / "tracer").rglob("*.py")}
+    assert rooms - ROOF == set(TRACER_FLOORS), "say in TRACER_FLOORS on which floor the new room is"
 
 
 def test_imports_inside_the_package_are_relative():

@@ -18,7 +18,7 @@ from typing import Any, NoReturn
 from . import commands
 from .errors import InputError, bug
 from .files import written_whole
-from .tracer.film import SAMPLES
+from .tracer.scene.film import SAMPLES
 
 
 def main(arguments: Sequence[str] | None = None, blend_is_open: bool = False) -> int:

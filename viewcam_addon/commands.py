@@ -33,7 +33,7 @@ Result = tuple[int, dict[str, Any]]
 
 
 def export(options: argparse.Namespace) -> Result:
-    from .tracer import scene_file
+    from .tracer.scene import scene_file
 
     with silent_libraries():
         scene = _job().export(_request(options))
@@ -45,8 +45,8 @@ def export(options: argparse.Namespace) -> Result:
 
 def render(options: argparse.Namespace) -> Result:
     from . import image
-    from .tracer import scene_file
     from .tracer.render import render as trace
+    from .tracer.scene import scene_file
 
     scene = scene_file.read(options.scene)
     if options.stated:
@@ -80,7 +80,7 @@ def cycles(options: argparse.Namespace) -> Result:
 def compare(options: argparse.Namespace) -> Result:
     from . import image
     from .compare import light_report, radiance, report
-    from .tracer import scene_file
+    from .tracer.scene import scene_file
 
     reference, tests = image.read(options.reference), [image.read(path) for path in options.tests]
     scene = scene_file.read(options.scene) if options.scene else None
@@ -161,7 +161,7 @@ def _export_and_render(options: argparse.Namespace, scene_path: Path, image_path
 
     Returns the level, the least one where that is asked for.
     """
-    from .tracer import scene_file
+    from .tracer.scene import scene_file
 
     started = time.perf_counter()
     with silent_libraries():
@@ -173,7 +173,7 @@ def _export_and_render(options: argparse.Namespace, scene_path: Path, image_path
 
 def _told_level(scene: Any) -> dict[str, str]:
     """The least level that models all of a scene's light, and why; said on the way."""
-    from .tracer.levels import least_level
+    from .tracer.scene.levels import least_level
 
     level, reason = least_level(scene)
     print(f"level {level} is enough. {reason}", flush=True)

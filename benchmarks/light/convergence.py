@@ -19,7 +19,7 @@ from math import prod
 import numpy as np
 from numpy.typing import NDArray
 
-from viewcam_addon.tracer.sampler import FILM, Sampler
+from viewcam_addon.tracer.light.sampler import FILM, Sampler
 
 from ..charts import Chart, Curve
 

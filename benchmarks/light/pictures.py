@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from viewcam_addon.blender import cycles
 from viewcam_addon.blender.export import export_scene
 from viewcam_addon.blender.ledger import Ledger
-from viewcam_addon.tracer import illumination
+from viewcam_addon.tracer.light import illumination
 from viewcam_addon.tracer.render import render
 
 from ..charts import Chart, Curve

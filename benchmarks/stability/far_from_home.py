@@ -27,8 +27,8 @@ from viewcam_addon.blender import job
 from viewcam_addon.blender.camera import apply
 from viewcam_addon.compare.geometry import compare
 from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.tracer.rays.view import View
 from viewcam_addon.tracer.render import render
-from viewcam_addon.tracer.view import View
 
 from ..charts import Chart, Curve
 from .stage import empty_stage

@@ -8,7 +8,7 @@ along it (cosines down to FLATTEST, evenly on the logarithm).
 - Leaks: rays that go into a closed slab through the side that the eye sees, off its rim. Every one must meet it from within.
 
 Candidates: no offset; a fixed distance of 1e-4 along the normal; 1e-6 · max(1, |P|), which was good enough for a room; steps of
-floats in each coordinate (Wächter and Binder, Ray Tracing Gems, 2019, ch. 6); ours, tracer/offset.py.
+floats in each coordinate (Wächter and Binder, Ray Tracing Gems, 2019, ch. 6); ours, tracer/rays/offset.py.
 
 Exact spheres are tested in float64: acne as above; leaks with another sphere that stands before each hit, closer than any
 float32 could tell. And shadow rays end at lamps: one that lies in a surface must not be hidden by it, and a sheet just before a
@@ -22,13 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer import offset
 from viewcam_addon.tracer.arrays import dot, gather
-from viewcam_addon.tracer.ellipsoids import Ellipsoids, ellipsoids_of
+from viewcam_addon.tracer.rays import offset
+from viewcam_addon.tracer.rays.ellipsoids import Ellipsoids, ellipsoids_of
+from viewcam_addon.tracer.rays.triangles import Planes, Triangles, triangles_of
+from viewcam_addon.tracer.rays.view import View
+from viewcam_addon.tracer.rays.visibility import embree_scene, visibility
 from viewcam_addon.tracer.scene import Mesh, Object, Spheres
-from viewcam_addon.tracer.triangles import Planes, Triangles, triangles_of
-from viewcam_addon.tracer.view import View
-from viewcam_addon.tracer.visibility import embree_scene, visibility
 
 from ..charts import Chart, Curve
 

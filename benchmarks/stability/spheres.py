@@ -8,7 +8,7 @@ nothing, as in Cycles, and that counts as right.
 Candidates, each in float32 and in float64: the textbook's quadratic; the same with the near root as c/q (Press et al.,
 Numerical Recipes, 5.6); and that with the discriminant of the perpendicular from the centre to the ray (Haines et al., Ray
 Tracing Gems, 2019, ch. 7). They are given the centre less the eye, subtracted in their own precision. Ours is
-tracer/ellipsoids.py.
+tracer/rays/ellipsoids.py.
 """
 
 from collections.abc import Callable, Iterator
@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.arrays import dot
-from viewcam_addon.tracer.ellipsoids import ellipsoids_of
+from viewcam_addon.tracer.rays.ellipsoids import ellipsoids_of
+from viewcam_addon.tracer.rays.view import View
 from viewcam_addon.tracer.scene import Object, Spheres
-from viewcam_addon.tracer.view import View
 
 from ..charts import Chart, Curve
 

@@ -7,8 +7,8 @@ float64 numbers that the methods are given.
 
 Candidates, given the corners relative to the eye: Möller and Trumbore (Fast, minimum storage ray/triangle intersection, 1997)
 in float32 and float64; Woop, Benthin and Wald (Watertight ray/triangle intersection, 2013) in both, in float32 with its way out
-to float64; Embree, robust and not, with its own float32 depth. Ours is Embree, robust, with an eye on corners
-(tracer/corners.py) and the depth in float64 (tracer/triangles.py); without Embree it is Plain in tracer/visibility.py.
+to float64; Embree, robust and not, with its own float32 depth. Ours is Embree, robust, with an eye on corners (corners.py in
+tracer/rays) and the depth in float64 (triangles.py there); without Embree it is Plain in visibility.py.
 """
 
 import math
@@ -22,11 +22,11 @@ from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer import visibility
-from viewcam_addon.tracer.ellipsoids import ellipsoids_of
+from viewcam_addon.tracer.rays import visibility
+from viewcam_addon.tracer.rays.ellipsoids import ellipsoids_of
+from viewcam_addon.tracer.rays.triangles import Planes, Triangles, triangles_of
+from viewcam_addon.tracer.rays.view import View
 from viewcam_addon.tracer.scene import Mesh, Object
-from viewcam_addon.tracer.triangles import Planes, Triangles, triangles_of
-from viewcam_addon.tracer.view import View
 
 from ..charts import Chart, Curve
 

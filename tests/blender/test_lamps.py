@@ -8,7 +8,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import job
-from viewcam_addon.tracer.lights import Area, Point, Spot, Sun
+from viewcam_addon.tracer.scene.lamps import Area, Point, Spot, Sun
 
 
 @pytest.fixture(autouse=True)

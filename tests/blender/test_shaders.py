@@ -6,7 +6,7 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import materials, shaders
 from viewcam_addon.blender.borrowing import borrowed
-from viewcam_addon.tracer.materials import PLAIN, Colour, Material
+from viewcam_addon.tracer.scene.materials import PLAIN, Colour, Material
 
 RED, GREEN = (0.5, 0.25, 0.125), (0.0, 1.0, 0.5)
 

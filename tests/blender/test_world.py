@@ -6,8 +6,8 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import job
-from viewcam_addon.tracer.film import Bounces, Film
-from viewcam_addon.tracer.lights import World
+from viewcam_addon.tracer.scene.film import Bounces, Film
+from viewcam_addon.tracer.scene.lamps import World
 
 
 @pytest.fixture

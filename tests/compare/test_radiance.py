@@ -11,7 +11,7 @@ from viewcam_addon.compare import radiance
 from viewcam_addon.errors import InputError
 from viewcam_addon.image import Image
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer import light
+from viewcam_addon.tracer.light import sums as light
 
 WIDTH, HEIGHT, SAMPLES, SEEDS = 64, 48, 256, 8
 PINHOLE = Pinhole((5, -7, 4), (0.2, 0.1, 0.6), (0, 0, 1), 60.0, WIDTH, HEIGHT)

@@ -12,12 +12,12 @@ import pytest
 from viewcam_addon.compare.radiance import compare
 from viewcam_addon.image import Image
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer import emitters
-from viewcam_addon.tracer.film import Bounces
-from viewcam_addon.tracer.lights import Area, Sun, World
-from viewcam_addon.tracer.materials import Colour, Material
+from viewcam_addon.tracer.light import emitters
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import Mesh, Object, Scene
+from viewcam_addon.tracer.scene.film import Bounces
+from viewcam_addon.tracer.scene.lamps import Area, Sun, World
+from viewcam_addon.tracer.scene.materials import Colour, Material
 
 CAMERA = Pinhole((4.5, -5.0, 3.0), (0.0, 0.6, 0.8), (0.0, 0.0, 1.0), 60.0, 64, 48)
 SEEDS = 8

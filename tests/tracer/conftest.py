@@ -5,14 +5,14 @@ import pytest
 
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.arrays import dot
-from viewcam_addon.tracer.ellipsoids import ellipsoids_of
-from viewcam_addon.tracer.emitters import Aimed, Emitters
-from viewcam_addon.tracer.points import Points, Surfaces
-from viewcam_addon.tracer.sampler import Sampler
+from viewcam_addon.tracer.light.emitters import Aimed, Emitters
+from viewcam_addon.tracer.light.sampler import Sampler
+from viewcam_addon.tracer.light.textures import Palette
+from viewcam_addon.tracer.rays.ellipsoids import ellipsoids_of
+from viewcam_addon.tracer.rays.points import Points, Surfaces
+from viewcam_addon.tracer.rays.triangles import Planes, triangles_of
+from viewcam_addon.tracer.rays.view import View
 from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres
-from viewcam_addon.tracer.textures import Palette
-from viewcam_addon.tracer.triangles import Planes, triangles_of
-from viewcam_addon.tracer.view import View
 
 
 @pytest.fixture(scope="session")

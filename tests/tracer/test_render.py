@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from viewcam_addon import image
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer import render as render_module
-from viewcam_addon.tracer import visibility
+from viewcam_addon.tracer.rays import visibility
+from viewcam_addon.tracer.rays.surface import PASSES
 from viewcam_addon.tracer.render import Tracer, render
 from viewcam_addon.tracer.scene import Object, Scene
-from viewcam_addon.tracer.surface import PASSES
 
 SEEDS = st.integers(0, 2**32 - 1)
 FLOAT32 = 2.0**-24

@@ -11,12 +11,12 @@ import pytest
 from viewcam_addon import image
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer import illumination
 from viewcam_addon.tracer import render as render_module
-from viewcam_addon.tracer.film import Bounces, Film
-from viewcam_addon.tracer.lights import Area, Point, Sun, World
-from viewcam_addon.tracer.materials import Colour, Material
+from viewcam_addon.tracer.light import illumination
 from viewcam_addon.tracer.render import Stopped, Tracer, render
+from viewcam_addon.tracer.scene.film import Bounces, Film
+from viewcam_addon.tracer.scene.lamps import Area, Point, Sun, World
+from viewcam_addon.tracer.scene.materials import Colour, Material
 
 PASSES = {*image.LIGHT_PASSES, "Depth", "Object Index"}
 FLOAT32 = 2.0**-24
@@ -152,7 +152,7 @@ def test_without_light_no_ray_is_scattered_and_nothing_shines(lively, monkeypatc
         raise AssertionError("a ray that brings nothing was traced")
 
     for name in ("found", "escaped", "blocked"):
-        monkeypatch.setattr(f"viewcam_addon.tracer.space.Space.{name}", never)
+        monkeypatch.setattr(f"viewcam_addon.tracer.rays.space.Space.{name}", never)
     passes = render(scene, "path", 4)
     assert not passes["Combined"][..., :3].any() and passes["Diffuse Color"].any()
     world = replace(scene, world=World((1, 1, 1)), objects=())
@@ -165,7 +165,7 @@ def test_at_level_direct_lamps_of_no_size_send_no_ray_but_shadow_rays(lively, mo
     scene = replace(scene, lamps=lamps, world=World((0, 0, 0)), objects=scene.objects[:1])
     traced = []
     for name in ("found", "escaped"):
-        monkeypatch.setattr(f"viewcam_addon.tracer.space.Space.{name}", lambda *_: traced.append(1))
+        monkeypatch.setattr(f"viewcam_addon.tracer.rays.space.Space.{name}", lambda *_: traced.append(1))
     assert render(scene, "direct", 4)["Combined"][..., :3].any() and not traced
 
 
@@ -232,7 +232,7 @@ def test_memory_that_ends_while_light_is_traced_is_told(lively, monkeypatch):
     def full(*_):
         raise MemoryError
 
-    monkeypatch.setattr("viewcam_addon.tracer.space.Space.found", full)
+    monkeypatch.setattr("viewcam_addon.tracer.rays.space.Space.found", full)
     with pytest.raises(InputError, match="memory"):
         render(lively(), "path", 4)
 

@@ -16,7 +16,7 @@ import bpy
 
 from ..errors import InputError
 from ..files import written_whole
-from ..tracer.film import Bounces, Film
+from ..tracer.scene.film import Bounces, Film
 from . import film, versions
 from .borrowing import Borrower, borrowed, still_of_one_layer
 from .depsgraph import render_still

@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from .. import errors
 from ..errors import InputError
 from ..image import BACKGROUND_DEPTH, CHANNELS, GEOMETRY_PASSES
-from ..tracer.film import LEVELS
-from ..tracer.levels import least_level
+from ..tracer.rays.surface import Passes
 from ..tracer.scene import Scene
-from ..tracer.surface import Passes
+from ..tracer.scene.film import LEVELS
+from ..tracer.scene.levels import least_level
 from . import datablocks, export, tracing, versions
 from .ledger import Ledger
 

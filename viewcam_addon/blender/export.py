@@ -16,9 +16,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tracer.film import Bounces, Film
-from ..tracer.lights import RAYS, Lamp, World
 from ..tracer.scene import Mesh, Object, Scene, Spheres
+from ..tracer.scene.film import Bounces, Film
+from ..tracer.scene.lamps import RAYS, Lamp, World
 from . import camera as cameras
 from . import export_geometry, features, film, lamps, world
 from .borrowing import borrowed, still_of_one_layer

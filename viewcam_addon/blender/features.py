@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import bpy
 
-from ..tracer.lights import RAYS
+from ..tracer.scene.lamps import RAYS
 from . import datablocks, export_geometry, materials, versions
 from .ledger import Ledger
 from .shading import Shading

@@ -2,7 +2,7 @@
 
 import bpy
 
-from ..tracer.film import FILTERS, Bounces, Film
+from ..tracer.scene.film import FILTERS, Bounces, Film
 from .ledger import Ledger
 
 # Those of Bounces → those of `scene.cycles`.

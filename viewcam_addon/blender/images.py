@@ -5,7 +5,7 @@ ImageMetaData::detect_colorspace): bytes and sRGB files stay encoded, and are de
 import bpy
 import numpy as np
 
-from ..tracer.materials import Picture
+from ..tracer.scene.materials import Picture
 
 _LINEAR = ("Non-Color", "Linear Rec.709", "Raw", "Linear")
 

@@ -14,9 +14,9 @@ import bpy
 
 from .. import intrinsics
 from ..errors import InputError
-from ..tracer.film import LEVELS, NO_BOUNCES, SAMPLES
-from ..tracer.levels import least_level
 from ..tracer.scene import LedgerEntry, Scene
+from ..tracer.scene.film import LEVELS, NO_BOUNCES, SAMPLES
+from ..tracer.scene.levels import least_level
 from . import cycles, datablocks, ensure_registered, indices, materials, recentering
 from .borrowing import Borrower, borrowed
 from .export import Light, export_scene, survey

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 import bpy
 import numpy as np
 
-from ..tracer.film import Bounces
-from ..tracer.lights import Area, Lamp, Point, Spot, Sun
+from ..tracer.scene.film import Bounces
+from ..tracer.scene.lamps import Area, Lamp, Point, Spot, Sun
 from . import features, nodes, shaders, versions
 from .borrowing import Borrower
 from .ledger import Ledger

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import bpy
 
-from ..tracer.materials import PLAIN, Colour
+from ..tracer.scene.materials import PLAIN, Colour
 from . import nodes, shaders, versions
 from .borrowing import Borrower
 

@@ -5,7 +5,7 @@ What Cycles has a setting for (bounces, film, pixel filter), the engine takes fr
 
 import bpy
 
-from ..tracer.film import SAMPLES
+from ..tracer.scene.film import SAMPLES
 
 
 def _update_passes(_group: "ReferenceSettings", context: bpy.types.Context) -> None:

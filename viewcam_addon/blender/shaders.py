@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 import bpy
 
-from ..tracer.materials import LARGEST_RADIANCE, PLAIN, Colour, Material
+from ..tracer.scene.materials import LARGEST_RADIANCE, PLAIN, Colour, Material
 from . import images, nodes, versions
 from .nodes import Input, Output
 

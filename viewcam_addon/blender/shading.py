@@ -2,7 +2,7 @@
 
 import bpy
 
-from ..tracer.materials import Material, Picture
+from ..tracer.scene.materials import Material, Picture
 from . import images, shaders
 
 

@@ -12,8 +12,8 @@ import traceback
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 
+from ..tracer.rays.surface import Passes
 from ..tracer.scene import Scene
-from ..tracer.surface import Passes
 
 _PATIENCE = 0.05
 """Seconds between two looks at whether it is cancelled."""

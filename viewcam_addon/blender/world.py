@@ -2,7 +2,7 @@
 
 import bpy
 
-from ..tracer.lights import World
+from ..tracer.scene.lamps import World
 from . import images, nodes, shaders, versions
 from .borrowing import Borrower
 from .ledger import Ledger

@@ -6,7 +6,7 @@ that crosses the corner of a pixel may have been missed by all of its samples.
 
 What is within rounding is no difference: a pixel's is taken beyond the law's maximum, a tile's sum beyond the law's 99th
 percentile of each pixel, since a mean of rounding errors can't exceed what nearly all of them stay below. Nor is what Cycles'
-table of the Blackman-Harris filter does (tracer/filters.py): it shifts the picture by 4.9e-4 px to the right and upwards, and
+table of the Blackman-Harris filter does (tracer/light/filters.py): it shifts the picture by 4.9e-4 px to the right and up, and
 changes a pixel by 0.21 % of the contrast around it at most. A shift changes only what passes a tile's border, so that its
 effect is the sum of the slopes, in which noise cancels.
 """

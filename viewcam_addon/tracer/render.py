@@ -13,14 +13,14 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from .arrays import Floats, Indices
-from .ellipsoids import ellipsoids_of
-from .film import LEVELS, SAMPLES
+from .rays.ellipsoids import ellipsoids_of
+from .rays.surface import Passes, Surface, background
+from .rays.triangles import Planes, triangles_of
+from .rays.view import View
+from .rays.visibility import visibility
 from .scene import Mesh, Scene, Spheres
-from .surface import Passes, Surface, background
+from .scene.film import LEVELS, SAMPLES
 from .tiles import Stopped, Watcher, over_threads, tiles
-from .triangles import Planes, triangles_of
-from .view import View
-from .visibility import visibility
 
 __all__ = ["Passes", "Stopped", "Tracer", "Watcher", "render"]
 
@@ -58,8 +58,8 @@ class Tracer:
 
     def render_light(self, level: str, samples: int, seed: int, watcher: Watcher | None = None) -> Passes:
         """The same of light, and what is at the pixel centres: Depth and Object Index."""
-        from .illumination import CENTRES, Illumination, dark
-        from .points import Surfaces
+        from .light.illumination import CENTRES, Illumination, dark
+        from .rays.points import Surfaces
 
         surfaces = Surfaces(self._scene, self._view, self._triangles, self._planes, self._ellipsoids)
         illumination = Illumination(self._scene, self._view, surfaces, self._eye, level, samples, seed)

@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from .surface import Passes
+from .rays.surface import Passes
 
 # The C library of Linux gives the memory of arrays back to the system as they are freed, and gets it again page by page: a
 # third of the time that light takes. It keeps what is smaller than the largest piece that it ever got back, if that is less

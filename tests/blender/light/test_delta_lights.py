@@ -127,7 +127,7 @@ def test_a_wrong_formula_is_caught(pictures, sun, sabotage, monkeypatch):
     from dataclasses import replace
 
     from viewcam_addon.blender import lamps
-    from viewcam_addon.tracer import materials
+    from viewcam_addon.tracer.scene import materials
 
     right = lamps.lamps_in
 

@@ -8,13 +8,13 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as blender_camera
-from viewcam_addon.tracer.ellipsoids import ellipsoids_of
-from viewcam_addon.tracer.points import Surfaces
-from viewcam_addon.tracer.scattering import refracted
+from viewcam_addon.tracer.light.scattering import refracted
+from viewcam_addon.tracer.rays.ellipsoids import ellipsoids_of
+from viewcam_addon.tracer.rays.points import Surfaces
+from viewcam_addon.tracer.rays.space import Space
+from viewcam_addon.tracer.rays.triangles import Planes, triangles_of
+from viewcam_addon.tracer.rays.view import View
 from viewcam_addon.tracer.scene import Object, Scene, Spheres
-from viewcam_addon.tracer.space import Space
-from viewcam_addon.tracer.triangles import Planes, triangles_of
-from viewcam_addon.tracer.view import View
 
 IOR = 1.5
 SKY = 40.0  # the radius of what render_positions makes shine

@@ -139,8 +139,8 @@ def test_a_see_through_film_with_its_own_exposure_and_filter(take, scene):
 def test_a_percent_less_light_is_caught(take, scene, sabotage, monkeypatch):
     """The tests above must be able to fail."""
     from viewcam_addon.blender import export, shaders
-    from viewcam_addon.tracer.film import Bounces
-    from viewcam_addon.tracer.materials import Colour, Material
+    from viewcam_addon.tracer.scene.film import Bounces
+    from viewcam_addon.tracer.scene.materials import Colour, Material
 
     if sabotage == "albedo":
         right = shaders.read

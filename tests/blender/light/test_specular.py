@@ -10,7 +10,7 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import cycles
 from viewcam_addon.tracer.arrays import dot
-from viewcam_addon.tracer.scattering import reflected, refracted, specular_normal
+from viewcam_addon.tracer.light.scattering import reflected, refracted, specular_normal
 
 
 @pytest.fixture

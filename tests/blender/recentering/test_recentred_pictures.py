@@ -14,7 +14,7 @@ from viewcam_addon.blender.camera import apply
 from viewcam_addon.cli import main
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer import scene_file
+from viewcam_addon.tracer.scene import scene_file
 
 UTM = (448262.25, 5411932.5, 42.0)
 ECEF = (4200952.5, 780362.0, 4720030.0)

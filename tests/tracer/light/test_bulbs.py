@@ -1,0 +1,296 @@
+"""Suns, points and spots against what is known on paper, with their own samples alone.
+
+A mean of n samples must lie within 3 standard errors of the answer, taken as if the samples were independent, which overstates
+them; where nothing is random it must be the answer, to the rounding of some twenty operations in float64.
+"""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from viewcam_addon.tracer.light import bulbs
+from viewcam_addon.tracer.scene.lamps import Point, Spot, Sun
+
+EXACT = 40 * 2.0**-53
+SEEDS = st.integers(0, 2**32 - 1)
+SCALES = st.integers(-6, 6)
+
+
+def unit(rng):
+    vector = rng.normal(size=3)
+    return vector / np.linalg.norm(vector)
+
+
+def tilted(rng, axis, angle):
+    """A unit vector at an angle to another."""
+    aside = np.cross(axis, unit(rng))
+    return axis * np.cos(angle) + aside / np.linalg.norm(aside) * np.sin(angle)
+
+
+def point(power, position, **more):
+    return Point("point", position=tuple(position), power=(power, power / 2, 0), **more)
+
+
+# Suns
+
+
+@given(seed=SEEDS, angle=st.floats(0, np.pi / 2))
+def test_a_sun_without_a_size_gives_its_irradiance_times_the_cosine(make_lighting, seed, angle):
+    rng = np.random.default_rng(seed)
+    towards = unit(rng)
+    lighting = make_lighting(Sun("sun", towards=towards, irradiance=(3, 2, 1)))
+    mean, error = lighting.irradiance((1, 2, 3), tilted(rng, towards, angle), 4)
+    assert abs(mean - 3 * np.cos(angle)) <= 3 * EXACT and error <= 3 * EXACT
+
+
+@settings(max_examples=25)
+@given(seed=SEEDS, diameter=st.floats(1e-4, 2.0), share=st.floats(0, 1))
+def test_a_sun_of_any_size_above_the_horizon_gives_as_much_as_one_without(make_lighting, off_by, seed, diameter, share):
+    """The irradiance of a cone is that of its axis: π sin² L cos."""
+    rng = np.random.default_rng(seed)
+    towards, angle = unit(rng), share * (np.pi - diameter) / 2
+    lighting = make_lighting(Sun("sun", towards=towards, irradiance=(3, 2, 1), angle=diameter))
+    found = lighting.irradiance((1, 2, 3), tilted(rng, towards, angle))
+    assert abs(off_by(found, 3 * np.cos(angle), 0.05 if share > 0.9 else 0.02)) <= 3, found
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7, 1.5, 2.5])
+def test_a_sun_of_half_the_sky_fades_as_it_sets(make_lighting, off_by, angle):
+    """The part of a hemisphere that is above a tilted horizon: (1 + cos)/2, by Lambert's law of the lune."""
+    rng = np.random.default_rng(1)
+    lighting = make_lighting(Sun("sun", towards=(1, 2, 3), irradiance=(3, 2, 1), angle=np.pi))
+    found = lighting.irradiance((1, 2, 3), tilted(rng, np.array((1, 2, 3)) / np.sqrt(14), angle))
+    assert abs(off_by(found, 3 * (1 + np.cos(angle)) / 2, 0.1)) <= 3, found
+
+
+def test_the_disc_of_a_sun_is_as_wide_and_as_bright_as_it_should_be(make_lighting):
+    lighting = make_lighting(Sun("sun", towards=(0, 0, 1), irradiance=(3, 2, 1), angle=0.4))
+    across = np.array([0.0, 0.1999999, 0.2000001, 1.0])
+    ahead = np.stack([np.sin(across), 0 * across, np.cos(across)])
+    seen = lighting.seen(np.zeros((3, 4)), ahead)
+    assert seen[0] == pytest.approx([3 / (np.pi * np.sin(0.2) ** 2)] * 2 + [0, 0], rel=EXACT)
+
+
+# Points
+
+
+@given(seed=SEEDS, scale=SCALES, share=st.floats(0, 1))
+def test_a_point_without_a_size_gives_its_power_over_four_pi_squared_distances(make_lighting, seed, scale, share):
+    rng = np.random.default_rng(seed)
+    size = 10.0**scale
+    position, towards, distance = rng.normal(size=3) * size, unit(rng), size * rng.uniform(0.1, 10)
+    lighting = make_lighting(point(7.0, position + towards * distance))
+    mean, _ = lighting.irradiance(position, tilted(rng, towards, share * np.pi / 2), 4)
+    expected = 7 / (4 * np.pi * distance**2)
+    # Camera space moves everything by the eye's place, which is about 1: that many roundings more of what is small.
+    moved = 1e-15 * (1 + size) / distance
+    assert abs(mean - expected * np.cos(share * np.pi / 2)) <= expected * (EXACT + 10 * moved)
+
+
+@settings(max_examples=40)
+@given(seed=SEEDS, scale=SCALES, radius=st.floats(1e-3, 0.99), share=st.floats(0, 1))
+def test_a_sphere_above_the_horizon_gives_as_much_as_a_point(make_lighting, off_by, seed, scale, radius, share):
+    """π L (R/d)² cos, with L = P/(4π² R²)."""
+    rng = np.random.default_rng(seed)
+    size = 10.0**scale
+    towards, angle = unit(rng), share * np.arccos(radius)
+    lighting = make_lighting(point(7.0, towards * size, radius=radius * size))
+    found = lighting.irradiance((0, 0, 0), tilted(rng, towards, angle))
+    assert abs(off_by(found, 7 / (4 * np.pi * size**2) * np.cos(angle), 0.05)) <= 3, found
+
+
+@pytest.mark.parametrize("angle", [1.2, 1.5, 1.7, 1.9])
+def test_a_sphere_that_is_partly_set_gives_what_is_above_the_horizon(make_lighting, off_by, angle):
+    """The form factor of a sphere that the horizon cuts (Naraghi; Howell's catalogue B-44), ratio 0.6 of radius to distance."""
+    ratio = 1 / 0.6
+    root = np.sqrt(ratio**2 - 1)
+    cotangent = np.cos(angle) / np.sin(angle)
+    rest = np.sin(angle) * np.sqrt(1 - (root * cotangent) ** 2)
+    form = (np.cos(angle) * np.arccos(-root * cotangent) - root * rest) / ratio**2 + np.arctan(rest / root)
+    rng = np.random.default_rng(2)
+    lighting = make_lighting(point(7.0, (0, 0, 2), radius=1.2))
+    found = lighting.irradiance((0, 0, 0), tilted(rng, np.array((0.0, 0.0, 1.0)), angle))
+    assert abs(off_by(found, form * 7 / (4 * np.pi**2 * 1.2**2), 0.05)) <= 3, found
+
+
+@given(seed=SEEDS, radius=st.floats(1.001, 100))
+def test_inside_a_sphere_every_surface_gets_pi_times_its_radiance(make_lighting, seed, radius):
+    rng = np.random.default_rng(seed)
+    lighting = make_lighting(point(7.0, unit(rng), radius=radius))
+    mean, error = lighting.irradiance((0, 0, 0), unit(rng), 64)
+    assert mean == pytest.approx(7 / (4 * np.pi * radius**2), rel=1e-12) and error <= 1e-12 * mean
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.3, 2.0, 5.0])
+@pytest.mark.parametrize("angle", [0.0, 0.15])
+def test_a_soft_falloff_makes_a_disc_that_faces_the_point(make_lighting, off_by, radius, angle):
+    """π L R²/(d² + R²) cos, as long as the disc is above the horizon."""
+    rng = np.random.default_rng(3)
+    lighting = make_lighting(point(7.0, (0, 0, 2), radius=radius, soft_falloff=True))
+    angle = min(angle, np.arctan(2 / max(radius, 1e-9)))
+    found = lighting.irradiance((0, 0, 0), tilted(rng, np.array((0.0, 0.0, 1.0)), angle))
+    assert abs(off_by(found, 7 / (4 * np.pi * (4 + radius**2)) * np.cos(angle))) <= 3, found
+
+
+@settings(max_examples=30)
+@given(seed=SEEDS, radius=st.floats(1e-6, 3.0), soft=st.booleans())
+def test_every_sample_looks_where_rays_run_into_the_lamp_and_carries_its_radiance(make_lighting, seed, radius, soft):
+    """The same light over the same density for all samples: they are spread evenly over the solid angle."""
+    assume(abs(radius - 2) > 1e-6)  # on the sphere itself, where a rounding decides what is inside
+    rng = np.random.default_rng(seed)
+    centre = unit(rng) * 2
+    lighting = make_lighting(point(7.0, centre, radius=radius, soft_falloff=soft))
+    aimed, cosine = lighting.aimed((0, 0, 0), centre, 200)
+    ahead = lighting.view.axes.T @ aimed.direction
+    inwards = 1e-7 * centre[:, None] / 2  # rays along the outline may miss by a rounding
+    ahead = (ahead + inwards) / np.linalg.norm(ahead + inwards, axis=0)
+    seen = lighting.seen(np.zeros((3, 200)), ahead)
+    assert seen[0] == pytest.approx(np.full(200, 7 / (4 * np.pi**2 * radius**2)), rel=1e-12)
+    at = ahead * aimed.distance - centre[:, None]
+    if not soft:
+        assert np.linalg.norm(at, axis=0) == pytest.approx(np.full(200, radius), rel=1e-5, abs=1e-6)
+    if radius <= 2 or soft:  # else the point is inside
+        solid = 2 * np.pi * (1 - (2 / np.hypot(2, radius) if soft else np.sqrt(1 - radius**2 / 4)))
+        precision = 1e-15 / (1 - np.sqrt(1 - min(radius**2 / 4, 1.0)))
+        assert aimed.light[0] / seen[0] == pytest.approx(np.full(200, solid), rel=max(1e-12, precision))
+    else:
+        assert aimed.light[0] * cosine == pytest.approx(seen[0] * np.pi, rel=1e-12)
+
+
+def test_rays_see_a_sphere_between_two_distances_only(make_lighting):
+    lighting = make_lighting(point(7.0, (0, 0, 5), radius=1.0))
+    ahead = np.array([[0.0], [0.0], [1.0]])
+    for nearest, farthest, there in ((0, np.inf, True), (0, 3.9, False), (0, 4.1, True), (4.1, np.inf, False)):
+        seen = lighting.seen(np.zeros((3, 1)), ahead, nearest=nearest, farthest=farthest)
+        assert bool(seen.any()) == there, (nearest, farthest)
+    assert not lighting.seen(np.zeros((3, 1)), -ahead).any()
+
+
+# Spots
+
+
+def turned(rng, scale, position):
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.linalg.qr(rng.normal(size=(3, 3)))[0] @ np.diag(scale)
+    matrix[:3, 3] = position
+    return matrix
+
+
+@given(
+    seed=SEEDS,
+    scale=st.tuples(*[st.sampled_from([-2.0, -1.0, 0.3, 1.0, 3.0])] * 3),
+    angle=st.floats(0.02, np.pi),
+    blend=st.floats(0, 1),
+)
+def test_a_spot_without_a_size_fades_with_the_angle_in_its_own_space(make_lighting, seed, scale, angle, blend):
+    """Smoothstep of (cos α − cos H)/((1 − cos H) blend): facts of Cycles, section 6."""
+    rng = np.random.default_rng(seed)
+    matrix = turned(rng, scale, (1, 2, 3))
+    lighting = make_lighting(Spot("spot", matrix=matrix, power=(7, 1, 1), angle=angle, blend=blend))
+    local = np.array([*rng.normal(size=2) * np.tan(angle / 2) * 0.7, -1.0])
+    way = matrix[:3, :3] @ local
+    cosine = 1 / np.linalg.norm(local)
+    edge = np.cos(angle / 2)
+    x = np.clip((cosine - edge) / max((1 - edge) * blend, 1e-30), 0, 1)
+    expected = 7 / (4 * np.pi * (way @ way)) * x * x * (3 - 2 * x)
+    mean, _ = lighting.irradiance(matrix[:3, 3] + way, -way, 2)
+    # The roundings of cos α and cos H count 1/((1 − cos H) blend) times as much.
+    slope = 1 / max((1 - edge) * blend, 1e-9)
+    if abs(cosine - edge) > 1e-12:
+        assert mean == pytest.approx(expected, rel=1e-9, abs=7 * slope * 1e-13)
+
+
+def by_running_into(lighting, position, normal, axis, count=65536):
+    """The irradiance of lamps above the horizon, from what rays see that are spread evenly over a hemisphere about `axis`."""
+    numbers = np.random.default_rng(8).random((2, count))
+    height = numbers[0]
+    right = np.cross(axis, (0.3, 0.5, 0.7))
+    right /= np.linalg.norm(right)
+    around, out = 2 * np.pi * numbers[1], np.sqrt(1 - height**2)
+    ahead = (
+        np.outer(axis, height) + np.outer(right, out * np.cos(around)) + np.outer(np.cross(axis, right), out * np.sin(around))
+    )
+    values = lighting.seen(np.outer(position, np.ones(count)), ahead)[0] * np.maximum(normal @ ahead, 0.0) * 2 * np.pi
+    return values.mean(), values.std() / np.sqrt(count)
+
+
+@pytest.mark.parametrize("soft", [False, True])
+@pytest.mark.parametrize(("radius", "angle"), [(0.8, 1.2), (1.3, 0.6), (1.5, 1.2)])
+@pytest.mark.parametrize("scale", [(1, 1, 1), (2, 0.5, 1), (1, 1, -1)])
+def test_a_spot_with_a_size_gives_what_rays_see_of_it(make_lighting, soft, radius, angle, scale):
+    rng = np.random.default_rng(4)
+    matrix = turned(rng, scale, (0, 0, 0))
+    beam = -matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
+    lighting = make_lighting(Spot("spot", matrix=matrix, power=(7, 1, 1), radius=radius, angle=angle, soft_falloff=soft))
+    position = 2 * beam + 0.2 * unit(rng)
+    mean, error = lighting.irradiance(position, -beam)
+    other, other_error = by_running_into(lighting, position, -beam, -position / np.linalg.norm(position))
+    both = np.hypot(error, other_error)
+    assert both < 0.05 * other and abs(mean - other) <= 3 * both, (mean, other, both)
+
+
+# Hostile
+
+
+def test_a_lamp_where_the_surface_is_gives_numbers(make_lighting):
+    matrix = np.eye(4)
+    for lamp in (
+        point(1e10, (0, 0, 0)),
+        point(1e10, (0, 0, 0), radius=1e-30),
+        point(1e10, (0, 0, 1), radius=1e-200),
+        point(1e10, (0, 0, 0), radius=1.0, soft_falloff=True),
+        Spot("spot", matrix=matrix, power=(1e10,) * 3),
+        Spot("spot", matrix=matrix, power=(1e10,) * 3, radius=1.0, angle=np.pi),
+    ):
+        aimed, cosine = make_lighting(lamp).aimed((0, 0, 0), (0, 0, 1), 64)
+        values = np.concatenate([aimed.direction, aimed.light, [cosine]])
+        assert np.isfinite(values).all() and np.isfinite(aimed.distance).all(), lamp
+        assert np.linalg.norm(aimed.direction, axis=0) == pytest.approx(np.ones(64))
+
+
+def test_dark_lamps_light_nothing_and_are_not_there(make_lighting):
+    flat = np.diag([1.0, 1.0, 0.0, 1.0])
+    dark = [point(0.0, (0, 0, 1), radius=1.0), Sun("sun", irradiance=(0, 0, 0)), Spot("spot", matrix=flat)]
+    lighting = make_lighting(*dark)
+    assert not lighting.emitters.lit and not lighting.emitters.sampled("diffuse") and not lighting.emitters.meets("camera")
+
+
+def test_lamps_of_next_to_no_size_are_seen_as_numbers_or_not_at_all(make_lighting):
+    for size in (1e-320, 1e-200, 1e-99, 1e-30):
+        lighting = make_lighting(point(1e18, (0, 0, 1), radius=size), Sun("sun", towards=(0, 0, 1), angle=size))
+        assert np.isfinite(lighting.seen(np.zeros((3, 1)), np.array([[0.0], [0.0], [1.0]]))).all()
+
+
+# Sabotage: 1 % of a solid angle, a cosine, a π
+
+
+NEAR = (0, 0, 2), (0, 0.3, 1), 7 / (16 * np.pi) / np.hypot(0.3, 1)
+"""Where a lamp of the power 7 stands, the normal of the surface at the origin, and what it gets."""
+
+
+def test_one_percent_of_a_constant_is_told(make_lighting, off_by, monkeypatch):
+    monkeypatch.setattr(bulbs, "_QUARTER_SPHERE", bulbs._QUARTER_SPHERE * 1.01)
+    place, normal, expected = NEAR
+    mean, _ = make_lighting(point(7.0, place)).irradiance((0, 0, 0), normal, 4)
+    assert abs(mean / expected - 1) > 0.009
+    seen = make_lighting(point(7.0, place, radius=0.7)).seen(np.zeros((3, 1)), np.array([[0.0], [0.0], [1.0]]))
+    assert abs(seen[0, 0] / (7 / (4 * np.pi**2 * 0.49)) - 1) > 0.009
+
+
+def test_samples_that_are_not_spread_evenly_are_told(make_lighting, off_by, monkeypatch):
+    even = bulbs.within_cone
+    monkeypatch.setattr(bulbs, "within_cone", lambda axis, spread, u: even(axis, spread, np.stack([u[0] ** 1.2, u[1]])))
+    place, normal, expected = NEAR
+    found = make_lighting(point(7.0, place, radius=1.6)).irradiance((0, 0, 0), normal)
+    assert abs(off_by(found, expected)) > 3, found
+
+
+def test_a_lost_cosine_and_a_lost_pi_are_told(make_lighting, off_by):
+    place, normal, expected = NEAR
+    lighting = make_lighting(point(7.0, place, radius=0.7))
+    aimed, _ = lighting.aimed((0, 0, 0), normal)
+    light = aimed.light[0]
+    assert abs(off_by((light.mean(), light.std() / 64), expected)) > 3
+    mean, error = lighting.irradiance((0, 0, 0), normal)
+    assert abs(off_by((mean / np.pi, error / np.pi), expected)) > 3

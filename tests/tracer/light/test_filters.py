@@ -1,0 +1,88 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from viewcam_addon.tracer.light.filters import density, mass, offsets
+from viewcam_addon.tracer.scene.film import Film
+
+WIDTHS = st.floats(0.01, 10.0)
+UNITS = st.integers(0, 2**32 - 1).map(lambda digits: digits / 2**32)
+
+
+def places(u, width=1.0):
+    """Where Blackman-Harris puts numbers, in widths from the centre."""
+    return (offsets(Film("BLACKMAN_HARRIS", width), np.stack([u, u]))[0] - 0.5) / width
+
+
+def cycles_table(width):
+    """The 1,024 places of intern/cycles/scene/film.cpp, from the pixel's lower left corner, the last of which is left at 0."""
+    count, half = 1023, 511
+    below = np.concatenate([[0.0], np.cumsum(density(np.arange(count) / (count - 1)))])
+    aside = np.interp(np.arange(half + 1) / half, below / below[-1], np.arange(count + 1) / count) * width
+    return np.concatenate([0.5 - aside[::-1], 0.5 + aside[1:], [0.0]])
+
+
+@given(WIDTHS, UNITS)
+def test_a_box_is_one_pixel_wide_whatever_its_width(width, u):
+    np.testing.assert_array_equal(offsets(Film("BOX", width), np.array([[u], [0.25]])), [[u], [0.25]])
+
+
+@given(WIDTHS)
+def test_the_middle_of_the_numbers_is_the_pixels_centre(width):
+    np.testing.assert_array_equal(offsets(Film("BLACKMAN_HARRIS", width), np.full((2, 1), 0.5)), 0.5)
+
+
+@given(WIDTHS, UNITS)
+def test_blackman_harris_reaches_its_width_to_either_side_and_is_symmetric(width, u):
+    place, mirrored = places(np.array([u, 1 - u if u else 1 - 2.0**-53]), width)
+    assert abs(place) <= 1 + 1e-12  # half a pixel's last bits over the least width
+    assert mirrored == pytest.approx(-place, abs=1e-9)  # at the outermost step 1e-16 of mass are 1e-11 widths
+
+
+def test_the_mass_is_the_integral_of_the_density_from_0_to_1():
+    x = np.linspace(-1, 1, 20001)
+    assert mass(np.array([-1.0, 0.0, 1.0])) == pytest.approx([0, 0.5, 1], abs=1e-15)
+    middles = (x[1:] + x[:-1]) / 2
+    # The mean of the density is its first coefficient; the midpoint rule is off by h² f″/24 < 1e-12 here.
+    np.testing.assert_allclose(np.diff(mass(x)), density(middles) / 0.35875 * 0.5e-4, atol=1e-11)
+
+
+def test_numbers_become_places_up_to_which_the_mass_is_the_number():
+    """Exactly at the 65,536 steps; between them within a step's mass."""
+    steps = np.arange(65536) / 65536
+    np.testing.assert_allclose(mass(places(steps)), steps, atol=1e-12)
+    between = np.random.default_rng(1).random(100_000)
+    assert np.abs(mass(places(between)) - between).max() < 2.0**-17
+
+
+def test_places_keep_the_order_of_the_numbers():
+    assert (np.diff(places(np.arange(1 << 20) / (1 << 20))) > 0).all()
+
+
+def test_the_filters_mean_is_the_centre_and_its_variance_is_on_paper():
+    """With y = x/f: the integral of y² cos(kπ(y + 1)) over −1 … 1 is 4 / (kπ)² for each cosine, 2/3 for the constant."""
+    a, b, c, d = 0.35875, 0.48829, 0.14128, 0.01168
+    variance = (a * 2 / 3 + 4 / np.pi**2 * (-b + c / 4 - d / 9)) / (2 * a)
+    place = places((np.arange(1 << 22) + 0.5) / (1 << 22))
+    assert place.mean() == pytest.approx(0, abs=1e-12)
+    assert place.var() == pytest.approx(variance, abs=1e-6)  # 7e-7 of it the straight steps'
+
+
+def test_the_steps_differ_from_the_filter_by_a_27_000th_of_its_mass():
+    x = np.linspace(-1, 1, 1_000_001)
+    steps = np.arange(65537) / 65536
+    straight = np.interp(x, np.append(places(steps[:-1]), 1.0), steps)
+    assert 0.5 * np.abs(np.diff(straight) - np.diff(mass(x))).sum() < 3.7e-5
+
+
+def test_cycles_table_differs_from_the_filter_by_what_the_module_says():
+    table = cycles_table(1.5)
+    assert table[511] == 0.5
+    assert (table[511] + table[512]) / 2 - 0.5 == pytest.approx(3.505e-4 * 1.5, rel=2e-3)  # its first sample
+    middles = (table[1:] + table[:-1]) / 2
+    assert middles.mean() - 0.5 == pytest.approx((1.5 / 2 - 0.25) / 1023, rel=1e-6)
+    x = np.linspace(-1.5, 1.5, 200_001)
+    low, high = np.minimum(table[1:], table[:-1]) - 0.5, np.maximum(table[1:], table[:-1]) - 0.5
+    below = sum(np.clip((x - a) / (b - a), 0, 1) for a, b in zip(low, high, strict=True)) / 1023
+    assert np.abs(below - mass(x / 1.5)).max() == pytest.approx(5.2e-4, abs=1e-5)  # edges along an axis

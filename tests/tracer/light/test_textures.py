@@ -1,0 +1,189 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.tracer.light.textures import Palette, Texture, decoded
+from viewcam_addon.tracer.rays.points import Points
+from viewcam_addon.tracer.scene import Mesh, Object, Scene
+from viewcam_addon.tracer.scene.materials import PLAIN, Colour, Material, Picture
+
+CAMERA = Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 10, 8, 8)
+SEEDS = st.integers(0, 2**32 - 1)
+COUNTS = st.integers(1, 9)
+BLENDED = 4e-7  # of pixels up to 3: some roundings of float32
+RED, GREEN = Colour((0.8, 0.0, 0.0)), Colour((0.0, 0.5, 0.0))
+
+
+def grey(values):
+    """A linear image of these values in each channel, rows from the bottom."""
+    return Picture(np.repeat(np.array(values, np.float32)[:, :, None], 3, axis=2))
+
+
+def at(u, v):
+    return np.array(np.broadcast_arrays(*np.atleast_1d(u, v)), np.float64)
+
+
+def looked_up(picture, uv, closest):
+    return Texture(picture).at(uv, closest)
+
+
+def points(material, uv=None, vertex_colour=None):
+    """Points of materials, where only what colours them matters."""
+    material = np.array(material, np.int32)
+    place = np.zeros((3, len(material)))
+    flags = np.zeros(len(material), bool)
+    return Points(place, place, place, flags, material, material.astype(np.intp), place[0], uv, vertex_colour)
+
+
+def scene_of(*materials, images=None, of_triangles=None):
+    """A triangle for each of the materials, None being none; or triangles of one object with these numbers."""
+    count = len(of_triangles) if of_triangles is not None else 1
+    mesh = Mesh(np.eye(3), np.tile(np.arange(3, dtype=np.int32), (count, 1)), np.array(of_triangles or [0], np.int32))
+    names = ["" if material is None else f"material {number}" for number, material in enumerate(materials)]
+    if of_triangles is not None:
+        objects = (Object("all", "mesh", np.eye(4), material_indices=tuple(range(len(names))), materials=tuple(names)),)
+    else:
+        objects = tuple(Object(f"object of {name}", "mesh", np.eye(4), materials=(name,)) for name in names)
+    table = {name: material for name, material in zip(names, materials, strict=True) if material is not None}
+    return Scene(CAMERA, {"mesh": mesh}, objects, materials=table, images=images or {})
+
+
+@given(SEEDS, COUNTS, COUNTS, st.booleans())
+def test_at_the_centres_of_pixels_an_image_shows_its_pixels_however_far_it_repeats(seed, width, height, closest):
+    rng = np.random.default_rng(seed)
+    picture = Picture(rng.random((height, width, 3)).astype(np.float32))
+    row, column = np.mgrid[:height, :width].reshape(2, -1)
+    away = rng.integers(-3, 4, (2, 1))
+    uv = np.array([(column + 0.5) / width, (row + 0.5) / height]) + away
+    expected = picture.pixels[row, column].T
+    np.testing.assert_allclose(looked_up(picture, uv, closest), expected, atol=BLENDED)
+
+
+def test_rows_count_from_the_bottom_and_columns_from_the_left():
+    picture = grey([[0.1, 0.2], [0.3, 0.4]])
+    found = looked_up(picture, at([0.1, 0.9, 0.1, 0.9], [0.1, 0.1, 0.9, 0.9]), closest=True)
+    np.testing.assert_allclose(found[0], [0.1, 0.2, 0.3, 0.4], atol=1e-7)
+
+
+def test_a_ramp_of_four_pixels_is_straight_between_their_centres_and_falls_back_over_the_border():
+    picture = grey([[0.0, 1.0, 2.0, 3.0]])
+    u = np.array([1, 2, 3, 4, 5, 6, 7]) / 8
+    np.testing.assert_allclose(looked_up(picture, at(u, 0 * u), False)[1], [0, 0.5, 1, 1.5, 2, 2.5, 3], atol=BLENDED)
+    # From the last centre, 7/8, to the first of the next repetition, 9/8, it falls from 3 to 0.
+    np.testing.assert_allclose(looked_up(picture, at([15 / 16, 1.0, -15 / 16], 0.5), False)[1], [2.25, 1.5, 0.75], atol=BLENDED)
+
+
+def test_between_four_pixels_of_a_checkerboard_an_image_is_their_mean():
+    picture = grey([[0.0, 1.0], [1.0, 0.0]])
+    np.testing.assert_allclose(looked_up(picture, at([0.5, 0.0, 0.5], [0.5, 0.0, 0.0]), False), 0.5, atol=BLENDED)
+
+
+def test_the_closest_pixel_changes_half_way_between_centres():
+    picture = grey([[0.0, 1.0]])
+    found = looked_up(picture, at([0.499999, 0.5, 0.999999, 1.0, -1e-9, -1e-20], 0.5), True)[0]
+    np.testing.assert_array_equal(found, [0, 1, 1, 0, 1, 1])
+
+
+@given(SEEDS, COUNTS, COUNTS)
+def test_an_interpolated_image_is_continuous_and_stays_between_its_pixels(seed, width, height):
+    rng = np.random.default_rng(seed)
+    picture = Picture(rng.random((height, width, 3)).astype(np.float32))
+    uv = rng.uniform(-2, 2, (2, 100))
+    here, beside = (looked_up(picture, place, False) for place in (uv, uv + 1e-9))
+    assert np.abs(here - beside).max() < 1e-6
+    assert here.min() >= picture.pixels.min() - BLENDED and here.max() <= picture.pixels.max() + BLENDED
+
+
+def test_srgb_is_decoded_after_pixels_are_blended():
+    """Half-way between 0 and 1 is the sRGB value ½, 0.2140; blending light would give ½."""
+    pixels = grey([[0.0, 1.0]]).pixels
+    found = looked_up(Picture(pixels, srgb=True), at([0.25, 0.5, 0.75], 0.5), False)[0]
+    np.testing.assert_allclose(found, [0, 0.21404114, 1], atol=1e-7)
+    assert looked_up(Picture(pixels), at(0.5, 0.5), False)[0, 0] == 0.5
+
+
+def test_srgb_is_the_standards_curve_to_float32s_rounding():
+    """At sRGB 8-bit values: 188 is nearly half the light; the two pieces meet at 0.04045."""
+    codes = np.arange(256) / 255
+    exact = np.where(codes <= 0.04045, codes / 12.92, ((codes + 0.055) / 1.055) ** 2.4)
+    np.testing.assert_allclose(decoded(codes), exact, rtol=6e-7)
+    assert decoded(np.array([188 / 255]))[0] == pytest.approx(0.50289, abs=1e-5)
+    below, above = decoded(np.array([0.0404499, 0.0404501]))
+    assert above - below == pytest.approx(0, abs=1e-7)
+
+
+def test_colours_that_are_not_finite_nowhere_come_from_uv_that_is_not():
+    picture = grey([[0.25, 1.0], [1.0, 1.0]])
+    uv = at([np.nan, np.inf, -np.inf, 1e30, -1e300], [0.3, np.nan, 0.3, 1e30, 0.25])
+    for closest in (False, True):
+        found = looked_up(picture, uv, closest)
+        assert np.isfinite(found).all() and found.min() >= 0.25
+
+
+def test_each_point_has_the_colour_of_its_material_and_black_where_its_material_has_none():
+    palette = Palette(scene_of(None, Material(diffuse=RED), Material(emission=GREEN)))
+    np.testing.assert_array_equal(
+        palette.colour("diffuse", points([0, 1, 2, 1])), np.array([[0.8, 0.8, 0.8], RED.rgb, [0, 0, 0], RED.rgb]).T
+    )
+    np.testing.assert_array_equal(palette.colour("emission", points([0, 1, 2])), np.array([[0] * 3, [0] * 3, GREEN.rgb]).T)
+
+
+def test_a_palette_has_only_what_surfaces_have():
+    glow, mirror, unlit = Material(emission=GREEN), Material(mirror=RED), Material(diffuse=Colour((0, 0, 0)))
+    palette = Palette(scene_of(glow))
+    assert palette.has("emission") and not palette.has("diffuse") and not palette.scatters, "nothing is of the plain material"
+    assert Palette(scene_of(glow, mirror)).scatters
+    assert not Palette(scene_of(unlit)).has("diffuse")
+    assert Palette(scene_of(None)).has("diffuse")
+    scene = scene_of(glow, mirror, unlit, of_triangles=[0, 2, 0])
+    assert not Palette(scene).has("mirror"), "no triangle has the second material"
+
+
+def test_a_slot_without_a_material_is_plain():
+    scene = scene_of(Material(emission=GREEN), of_triangles=[0, 0])
+    extra = Object("more", "mesh", np.eye(4), material_indices=(0, 0))
+    palette = Palette(Scene(CAMERA, scene.geometries, (*scene.objects, extra), materials=scene.materials))
+    np.testing.assert_array_equal(palette.colour("diffuse", points([0]))[:, 0], PLAIN.diffuse.rgb)
+
+
+def test_images_and_vertex_colours_multiply_the_colour_where_their_material_is_and_nowhere_else():
+    images = {"ramp": grey([[0.5, 0.25]])}
+    textured = Material(diffuse=Colour((1.0, 0.5, 0.0), image="ramp", closest=True, vertex=True))
+    palette = Palette(scene_of(textured, Material(diffuse=RED), images=images))
+    colours = np.array([[1.0, 1.0, 0.5], [1.0, 0.5, 1.0], [1.0, 0.0, 1.0]])
+    found = palette.colour("diffuse", points([1, 2, 1], at([0.1, 0.1, 0.9], 0.5), colours))
+    np.testing.assert_allclose(found.T, [[0.5, 0.25, 0], RED.rgb, [0.125, 0.125, 0]], atol=1e-7)
+
+
+@pytest.mark.parametrize("others", [(), (Material(diffuse=RED),)])
+def test_a_scene_of_one_material_has_the_same_colours_as_among_others(others):
+    images = {"ramp": grey([[0.5, 0.25]])}
+    palette = Palette(scene_of(Material(diffuse=Colour((1.0, 0.5, 0.1), image="ramp")), *others, images=images))
+    found = palette.colour("diffuse", points([1, 1], at([0.25, 0.75], 0.5)))
+    np.testing.assert_allclose(found.T, [[0.5, 0.25, 0.05], [0.25, 0.125, 0.025]], atol=1e-7)
+    found[:] = 0  # its own array, not the palette's
+    assert palette.colour("diffuse", points([1], at(0.25, 0.5))).any()
+
+
+def test_means_count_the_image_and_take_vertex_colours_as_white():
+    images = {"light": grey([[0.0, 1.0], [0.5, 0.5]]), "shown": Picture(grey([[0.0, 1.0], [0.5, 0.5]]).pixels, srgb=True)}
+    colour = (2.0, 1.0, 0.5)
+    palette = Palette(
+        scene_of(
+            Material(emission=Colour(colour, image="light", vertex=True)),
+            Material(emission=Colour(colour, image="shown")),
+            Material(diffuse=RED),
+            images=images,
+        )
+    )
+    np.testing.assert_allclose(palette.mean("emission", 1), np.array(colour) * 0.5, rtol=1e-6)
+    np.testing.assert_allclose(palette.mean("emission", 2), np.array(colour) * (1 + 2 * 0.21404114) / 4, rtol=1e-6)
+    np.testing.assert_array_equal(palette.mean("emission", 3), 0)
+    np.testing.assert_array_equal(palette.mean("glass", 3), 0)
+
+
+def test_indices_of_refraction_are_those_of_the_points_materials():
+    glass = Material(glass=RED, ior=1.33), Material(refraction=GREEN, ior=2.4)
+    np.testing.assert_array_equal(Palette(scene_of(*glass)).ior(points([2, 1, 2])), [2.4, 1.33, 2.4])

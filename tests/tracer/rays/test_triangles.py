@@ -1,0 +1,177 @@
+"""Where rays meet triangles, what is interpolated there, and which way normals point."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.tracer.rays.triangles import Planes, triangles_of
+from viewcam_addon.tracer.rays.view import View
+from viewcam_addon.tracer.render import Tracer
+from viewcam_addon.tracer.scene import Object, Scene
+
+SEEDS = st.integers(0, 2**32 - 1)
+FLOAT32, FLOAT64 = 2.0**-24, 2.0**-53
+
+
+def in_camera_space(camera, mesh, matrix=None):
+    view = View(camera)
+    triangles = triangles_of([(Object("object", "mesh", np.eye(4) if matrix is None else matrix), mesh)], view)
+    return Planes(triangles, view)
+
+
+@settings(max_examples=60)
+@given(seed=SEEDS, log_distance=st.integers(0, 4))
+def test_depth_and_barycentric_coordinates_agree_with_rational_arithmetic(make_mesh, seed, log_distance):
+    rng = np.random.default_rng(seed)
+    camera = Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 1, 1, 1)  # its camera space is the world with z turned round: exact
+    corners = rng.uniform(-1, 1, (3, 3)) - (0, 0, 2.0 * 10**log_distance)
+    planes = in_camera_space(camera, make_mesh(corners, [[0, 1, 2]]))
+    weights = rng.dirichlet((1, 1, 1))
+    point = weights @ (corners * (1, 1, -1))
+    x, y = point[:2] / point[2]
+    depth, first, second = (float(value[0]) for value in planes.hit(np.zeros(1, np.intp), np.array([x]), np.array([y])))
+
+    a, b, c = ([Fraction(value) for value in corner] for corner in corners * (1, 1, -1))
+    ray = [Fraction(x), Fraction(y), Fraction(1)]
+    edges = [[q - p for p, q in zip(a, other, strict=True)] for other in (b, c)]
+    whole = determinant(edges[0], edges[1], [-value for value in ray])
+    start = [-value for value in a]
+    exact_first = determinant(start, edges[1], [-value for value in ray]) / whole
+    exact_second = determinant(edges[0], start, [-value for value in ray]) / whole
+    exact_depth = determinant(edges[0], edges[1], start) / whole
+
+    # Forward error: the rounding of n·A and of n·(x, y, 1), each some 8 products and sums of 2⁻⁵³, over the cosine between the
+    # plane and the ray; barycentric coordinates lose distance over height besides.
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    cosine = abs(normal @ (x, y, -1)) / np.linalg.norm(normal) / np.linalg.norm((x, y, 1))
+    distance, height = np.linalg.norm(corners, axis=1).max(), np.linalg.norm(normal) / 2.9
+    allowed = 64 * FLOAT64 / max(cosine, 1e-300)
+    assert abs(depth / float(exact_depth) - 1) <= allowed
+    for value, exact in ((first, exact_first), (second, exact_second)):
+        assert abs(value - float(exact)) <= allowed * distance / height, f"{value} instead of {float(exact)}"
+
+
+def determinant(a, b, c):
+    return a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+
+
+@settings(max_examples=20)
+@given(seed=SEEDS)
+def test_a_uv_map_that_is_linear_in_the_position_is_shown_as_such(ball, make_scene, random_matrix, seed):
+    rng = np.random.default_rng(seed)
+    matrix = random_matrix(rng, spread=0.3)
+    scene = make_scene(Pinhole((0, -5, 1), (0, 0, 0), (0, 0, 1), 40, 48, 48), (ball(6), matrix))
+    passes = Tracer(scene).render()
+    hit = passes["Object Index"][..., 0] == 1
+    assert hit.any()
+    in_object = (np.linalg.inv(matrix) @ np.append(passes["Position"][hit].astype(float), np.ones((hit.sum(), 1)), axis=1).T).T
+    # The balls' UV map is the x and y of object space. Position and UV are rounded once, and the inverse magnifies the first.
+    allowed = FLOAT32 * (4 * np.linalg.norm(np.linalg.inv(matrix), 2) * 6 + 4)
+    worst = np.abs(passes["UV"][hit][:, :2] - in_object[:, :2]).max()
+    assert worst <= allowed, f"UV differs by {worst:.1e}, allowed {allowed:.1e}"
+    assert (passes["UV"][hit][:, 2] == 1).all() and (passes["UV"][~hit] == 0).all()
+
+
+@settings(max_examples=20)
+@given(seed=SEEDS)
+def test_flat_normals_face_the_eye_and_stand_upright_on_the_face_under_any_matrix(make_mesh, make_scene, random_matrix, seed):
+    rng = np.random.default_rng(seed)
+    corners = rng.normal(size=(3, 3))
+    matrix = random_matrix(rng)
+    camera = Pinhole((0, -9, 1), tuple(matrix[:3, 3] + matrix[:3, :3] @ corners.mean(axis=0)), (0, 0, 1), 500, 9, 9)
+    passes = Tracer(make_scene(camera, (make_mesh(corners, [[0, 1, 2]]), matrix))).surface_at([4], [4])
+    if passes["Facing"][0, 0] < 1e-3:
+        return  # seen edge-on, perhaps missed
+    world = corners @ matrix[:3, :3].T
+    normal = passes["Normal"][0].astype(float)
+    for edge in (world[1] - world[0], world[2] - world[0]):
+        assert abs(normal @ edge) <= 4 * FLOAT32 * np.linalg.norm(edge)
+    direction = camera.ray_directions(4, 4)
+    assert normal @ direction < 0
+    assert abs(-normal @ direction - passes["Facing"][0, 0]) <= 4 * FLOAT32
+
+
+def smooth_triangle(make_mesh, tilt=0.5):
+    """A triangle in the plane z = 0 whose corners' normals lean outwards."""
+    corners = np.array([[-1, -1, 0], [1, -1, 0], [0, 1.5, 0.0]])
+    normals = corners * tilt + (0, 0, 1)
+    return make_mesh(corners, [[0, 1, 2]], corner_normals=[normals / np.linalg.norm(normals, axis=1, keepdims=True)])
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_smooth_normals_are_those_of_the_corners_turned_with_the_face_towards_the_eye(make_mesh, make_scene, side, mirrored):
+    mesh = smooth_triangle(make_mesh)
+    matrix = np.diag([-1.0 if mirrored else 1.0, 1, 1, 1])
+    camera = Pinhole((0, 0, 5 * side), (0, 0, 0), (0, 1, 0), 400, 400, 400)
+    passes = Tracer(make_scene(camera, (mesh, matrix))).render()
+    column, row = 200, 150
+    position = passes["Position"][row, column].astype(float)
+    weights = np.linalg.solve(np.vstack([mesh.vertices[:, :2].T, np.ones(3)]), [position[0] * matrix[0, 0], position[1], 1])
+    expected = weights @ mesh.corner_normals[0].astype(float)
+    expected[0] *= matrix[0, 0]
+    expected *= side / np.linalg.norm(expected)
+    assert np.abs(passes["Normal"][row, column] - expected).max() <= 8 * FLOAT32
+
+
+def test_normals_of_a_mesh_with_one_user_are_normalised_at_its_corners_and_shared_ones_are_not(make_mesh):
+    """What Cycles does with a mesh that it moves to world space beforehand, and with one that it can't."""
+    mesh = smooth_triangle(make_mesh)
+    matrix = np.diag([3.0, 1, 1, 1])
+    camera = Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 100, 100, 100)
+    away = np.eye(4)
+    away[2, 3] = -100
+    normals = []
+    for objects in (("single",), ("first", "second")):
+        placed = tuple(Object(name, "mesh", matrix if index == 0 else away) for index, name in enumerate(objects))
+        passes = Tracer(Scene(camera, {"mesh": mesh}, placed)).surface_at([50], [40])
+        normals.append(passes["Normal"][0])
+    turned = mesh.corner_normals[0] / (3, 1, 1)
+    weights = np.array([0.5, 0.5, 0]) + (passes["Position"][0, 1] + 1) / 2.5 * np.array([-0.5, -0.5, 1])
+    weights += passes["Position"][0, 0] / 3 / 2 * np.array([-1, 1, 0])
+    for normal, corners in zip(normals, (turned / np.linalg.norm(turned, axis=1, keepdims=True), turned), strict=True):
+        expected = weights @ corners
+        assert np.abs(normal - expected / np.linalg.norm(expected)).max() <= 16 * FLOAT32
+    assert np.abs(normals[0] - normals[1]).max() > 1e-3, "the two ways differ on this triangle"
+
+
+def test_a_face_whose_corner_normals_cancel_shows_its_own(make_mesh, make_scene):
+    mesh = make_mesh([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], [[0, 1, 2]], corner_normals=np.zeros((1, 3, 3)))
+    camera = Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 100, 100, 100)
+    normal = Tracer(make_scene(camera, mesh)).surface_at([50], [50])["Normal"][0]
+    assert np.array_equal(normal, [0, 0, 1])
+
+
+def test_a_triangle_seen_nearly_edge_on_is_met_within_its_own_depths(make_mesh):
+    camera = Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 100, 100, 100)
+    for lift in (0.0, 1e-300, 1e-17, 1e-12):
+        planes = in_camera_space(camera, make_mesh([[-1, lift, -2], [1, lift, -2], [0, -lift, -9]], [[0, 1, 2]]))
+        depth, first, second = planes.hit(np.zeros(3, np.intp), np.array([0, 0, 0.1]), np.array([0, 1e-9, -1e-9]))
+        assert ((depth >= 2) & (depth <= 9)).all(), f"lift {lift}: {depth}"
+        assert ((first >= 0) & (second >= 0) & (first + second <= 1 + FLOAT64)).all(), f"lift {lift}: {first}, {second}"
+
+
+@pytest.mark.parametrize("slenderness", [1e2, 1e6, 1e12])
+def test_the_depth_of_a_sliver_does_not_know_how_slender_it_is(make_mesh, slenderness):
+    rng = np.random.default_rng(2)
+    camera = Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 1, 1, 1)
+    for _ in range(20):
+        along = rng.normal(size=3)
+        across = np.cross(along, rng.normal(size=3))
+        across /= np.linalg.norm(across) * slenderness / np.linalg.norm(along)
+        corners = np.array([along, -along, 0.2 * along + across]) * 0.3 - (0, 0, 3.0)
+        planes = in_camera_space(camera, make_mesh(corners, [[0, 1, 2]]))
+        point = np.array([0.3, 0.3, 0.4]) @ (corners * (1, 1, -1))
+        x, y = point[:2] / point[2]
+        depth = float(planes.depth(np.zeros(1, np.intp), np.array([x]), np.array([y]))[0])
+        a, b, c = ([Fraction(value) for value in corner] for corner in corners * (1, 1, -1))
+        p, q = ([end - start for start, end in zip(a, other, strict=True)] for other in (b, c))
+        ray = [Fraction(x), Fraction(y), Fraction(1)]
+        exact_depth = float(determinant(a, p, q) / determinant(ray, p, q))
+        cosine = abs(np.dot(np.cross(along, across), (x, y, -1))) / np.linalg.norm(np.cross(along, across))
+        # As for any triangle: some eight products and sums of 2⁻⁵³, over the cosine between the plane and the ray.
+        assert abs(depth / exact_depth - 1) <= 16 * FLOAT64 / cosine, f"{depth / exact_depth - 1:.1e}"

@@ -1,0 +1,258 @@
+"""What gives light, in a scene file: nothing is lost on the way, a hand can write it, and what is wrong is named."""
+
+import copy
+import json
+import math
+import re
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from viewcam_addon.errors import InputError
+from viewcam_addon.tracer.scene import scene_file
+from viewcam_addon.tracer.scene.film import FILTERS, Bounces, Film
+from viewcam_addon.tracer.scene.lamps import RAYS, Area, Point, Spot, Sun, World
+from viewcam_addon.tracer.scene.materials import Colour, Material, Picture
+
+DOCUMENTATION = Path(__file__).parents[3] / "docs" / "scene-file.md"
+
+
+@pytest.fixture(scope="session")
+def example():
+    """The second example of the documentation, which has light, as parsed JSON."""
+    return json.loads(re.findall(r"```json\n(.*?)```", DOCUMENTATION.read_text(encoding="utf-8"), re.DOTALL)[1])
+
+
+@pytest.fixture
+def read_document(tmp_path):
+    """read_document(document) → Scene: write it as JSON, read it as a scene."""
+
+    def read(document):
+        path = tmp_path / "scene.json"
+        path.write_text(json.dumps(document), encoding="utf-8")
+        return scene_file.read(path)
+
+    return read
+
+
+def differences(first, second, where="scene"):
+    """Where two values are not the same to the last bit."""
+    if type(first) is not type(second):
+        yield f"{where}: {first!r} became {second!r}"
+    elif isinstance(first, np.ndarray):
+        if first.dtype != second.dtype or not np.array_equal(first, second):
+            yield where
+    elif is_dataclass(first):
+        for each in fields(first):
+            yield from differences(getattr(first, each.name), getattr(second, each.name), f"{where}.{each.name}")
+    elif isinstance(first, dict) and list(first) == list(second):
+        for key in first:
+            yield from differences(first[key], second[key], f"{where}[{key!r}]")
+    elif isinstance(first, tuple) and len(first) == len(second):
+        for index, (one, other) in enumerate(zip(first, second, strict=True)):
+            yield from differences(one, other, f"{where}[{index}]")
+    elif first != second:
+        yield f"{where}: {first!r} became {second!r}"
+
+
+amounts = st.floats(0, 1e18)
+rgb = st.tuples(amounts, amounts, amounts)
+names = st.text(min_size=1, max_size=6)
+vectors = st.tuples(*[st.floats(-1e6, 1e6)] * 3)
+rays = st.frozensets(st.sampled_from(RAYS))
+matrices = st.lists(st.floats(-1e6, 1e6), min_size=12, max_size=12).map(
+    lambda numbers: np.vstack([np.reshape(numbers, (3, 4)), (0.0, 0.0, 0.0, 1.0)])
+)
+common = {"name": names, "hidden_from": rays, "casts_shadow": st.booleans()}
+round_lamps = common | {"power": rgb, "radius": st.floats(0, 1e6), "soft_falloff": st.booleans()}
+lamps = st.one_of(
+    st.builds(Sun, **common, towards=vectors.filter(any), irradiance=rgb, angle=st.floats(0, math.pi)),
+    st.builds(Point, **round_lamps, position=vectors),
+    st.builds(Spot, **round_lamps, matrix=matrices, angle=st.floats(0, math.pi), blend=st.floats(0, 1)),
+    st.builds(Area, **common, matrix=matrices, size=st.tuples(*[st.floats(0, 1e6)] * 2), power=rgb, ellipse=st.booleans()),
+)
+colours = st.builds(
+    Colour, rgb=rgb, image=st.sampled_from([None, "small", "large"]), closest=st.booleans(), vertex=st.booleans()
+)
+materials = st.builds(
+    Material,
+    **{name: st.none() | colours for name in ("diffuse", "emission", "mirror", "glass", "refraction")},
+    ior=st.floats(1e-3, 1e3),
+)
+films = st.builds(
+    Film,
+    filter=st.sampled_from(FILTERS),
+    filter_width=st.floats(0.01, 10),
+    transparent=st.booleans(),
+    exposure=st.floats(0, 1e6),
+)
+bounces = st.builds(Bounces, *[st.integers(0, 1024)] * 4)
+
+
+@settings(max_examples=30)
+@given(data=st.data())
+def test_light_that_is_written_is_read_back_to_the_last_bit(make_scene, make_mesh, random_scene, tmp_path_factory, data):
+    rng = np.random.default_rng(0)
+    mesh = replace(make_mesh(np.eye(3), [[0, 1, 2]]), corner_colours=rng.random((1, 3, 3), np.float32))
+    scene = make_scene(random_scene(0).camera, mesh)
+    chosen = data.draw(st.dictionaries(names, materials, max_size=3))
+    given_names = tuple(data.draw(st.lists(st.sampled_from(["", *chosen]), max_size=2)))
+    scene = replace(
+        scene,
+        # A tuple of names that are all empty says what no tuple says.
+        objects=(replace(scene.objects[0], materials=given_names if any(given_names) else (), hidden_from=data.draw(rays)),),
+        images={
+            "small": Picture(rng.random((1, 2, 3), np.float32), srgb=True),
+            "large": Picture(rng.normal(size=(7, 5, 3)).astype(np.float32)),
+        },
+        materials=chosen,
+        lamps=tuple(data.draw(st.lists(lamps, max_size=3))),
+        world=data.draw(st.builds(World, radiance=rgb, hidden_from=rays)),
+        film=data.draw(films),
+        bounces=data.draw(bounces),
+    )
+    path = tmp_path_factory.mktemp("scene") / "light.json"
+    scene_file.write(scene, path)
+    back = scene_file.read(path)
+    found = list(differences(scene, back))
+    assert not found, "\n".join(found)
+
+
+def test_the_round_trip_sees_what_is_lost(random_scene):
+    """The test above must be able to fail."""
+    scene = replace(random_scene(0), lamps=(Point("lamp", power=(1.0, 2.0, 3.0)),))
+    other = replace(scene, lamps=(Point("lamp", power=(1.0, 2.0, math.nextafter(3.0, 4.0))),))
+    assert [each.partition(":")[0] for each in differences(scene, other)] == ["scene.lamps[0].power[2]"]
+
+
+def test_a_scene_without_light_has_no_key_of_it(random_scene, tmp_path):
+    scene_file.write(random_scene(0), tmp_path / "scene.json")
+    document = json.loads((tmp_path / "scene.json").read_text(encoding="utf-8"))
+    assert set(document) == {"format", "version", "camera", "clip", "geometries", "objects", "ledger", "arrays"}
+    assert all(set(each) == {"name", "geometry", "matrix", "object_index", "material_indices"} for each in document["objects"])
+
+
+def test_the_documented_light_is_what_it_says(example, read_document):
+    scene = read_document(example)
+    wall, board = scene.materials["wall"], scene.materials["board"]
+    assert wall == Material(diffuse=Colour((0.7, 0.7, 0.7)))
+    assert board.diffuse == Colour((1.0, 1.0, 1.0), "checks", closest=True) and scene.images["checks"].srgb
+    assert scene.materials["pane"] == Material(glass=Colour((1.0, 1.0, 1.0)), ior=1.5)
+    sun, lamp, panel = scene.lamps
+    assert isinstance(sun, Sun) and sun.angle == 0.00918 and np.linalg.norm(sun.towards) == pytest.approx(1, abs=1e-15)
+    assert isinstance(lamp, Point) and (lamp.position, lamp.radius) == ((1.0, -2.0, 3.0), 0.1)
+    assert lamp.hidden_from == {"camera"}
+    assert isinstance(panel, Area) and panel.matrix[:3, 3].tolist() == [0, 0, 4] and panel.size == (1.0, 0.5)
+    assert scene.world.radiance == (0.05, 0.06, 0.08)
+    assert scene.film == Film(filter="BOX", transparent=True) and scene.bounces == Bounces(total=8)
+    assert scene.objects[1].hidden_from == {"shadow"}
+
+
+def test_every_key_of_light_is_documented():
+    text = DOCUMENTATION.read_text(encoding="utf-8")
+    keys = {
+        each.name for kind in (Sun, Point, Spot, Area, World, Film, Bounces, Material, Colour, Picture) for each in fields(kind)
+    }
+    missing = [key for key in sorted(keys) if f"`{key}`" not in text]
+    assert not missing, missing
+
+
+def changed(document, path, value):
+    """A copy in which the value at the path is another, or gone where it is None."""
+    document = copy.deepcopy(document)
+    inner = document
+    for key in path[:-1]:
+        inner = inner[key]
+    if value is None:
+        del inner[path[-1]]
+    else:
+        inner[path[-1]] = value
+    return document
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "words"),
+    [
+        (["images", "checks", "pixels"], None, ["image 'checks'", "'pixels'"]),
+        (["images", "checks", "pixels"], [[[1, 0]]], ["'pixels' of image 'checks'", "3"]),
+        (["images", "checks", "pixels"], [[]], ["image 'checks'"]),
+        (["images", "checks", "pixels"], [[[1, 0, "1"]]], ["'pixels' of image 'checks'", "numbers"]),
+        (["images", "checks", "pixels"], {"npz": "checks"}, ["'pixels' of image 'checks'", "'arrays'"]),
+        (["images", "checks", "srgb"], 1, ["'srgb' of image 'checks'", "true or false"]),
+        (["images", "checks", "path"], "x.png", ["image 'checks'", "unknown key 'path'"]),
+        (["images"], [], ["'images'", "object"]),
+        (["materials", "wall", "diffuse"], [0.7, 0.7], ["'diffuse' of material 'wall'", "3"]),
+        (["materials", "wall", "diffuse"], [0.7, 0.7, -0.1], ["'diffuse' of material 'wall'", "0 to"]),
+        (["materials", "wall", "diffuse"], {"image": "absent"}, ["'wall'", "'absent'"]),
+        (["materials", "wall", "diffuse"], {"image": 5}, ["'image' of 'diffuse' of material 'wall'"]),
+        (["materials", "wall", "diffuse"], {"texture": "checks"}, ["unknown key 'texture'"]),
+        (["materials", "wall", "diffuse"], "red", ["'diffuse' of material 'wall'", "object"]),
+        (["materials", "wall", "gloss"], 1, ["material 'wall'", "unknown key 'gloss'"]),
+        (["materials", "pane", "ior"], 0, ["material 'pane'", "ior"]),
+        (["materials", "pane", "ior"], "glass", ["'ior' of material 'pane'"]),
+        (["lamps"], {}, ["'lamps'", "list"]),
+        (["lamps", 0, "type"], "laser", ["'type' of lamp 'sun'", "'laser'", "area"]),
+        (["lamps", 0, "type"], None, ["lamp 'sun'", "'type'"]),
+        (["lamps", 0, "name"], None, ["lamp 0", "'name'"]),
+        (["lamps", 0, "towards"], [0, 0, 0], ["lamp 'sun'", "towards"]),
+        (["lamps", 0, "angle"], 4, ["lamp 'sun'", "angle"]),
+        (["lamps", 0, "irradiance"], [1, 1, 1e30], ["lamp 'sun'", "irradiance"]),
+        (["lamps", 0, "radius"], 1, ["lamp 'sun'", "unknown key 'radius'"]),
+        (["lamps", 1, "radius"], -1, ["lamp 'lamp'", "radius"]),
+        (["lamps", 1, "hidden_from"], ["x-ray"], ["lamp 'lamp'", "'x-ray'", "camera"]),
+        (["lamps", 1, "hidden_from"], "camera", ["'hidden_from' of lamp 'lamp'", "list"]),
+        (["lamps", 1, "hidden_from"], [[]], ["'hidden_from' of lamp 'lamp'", "text"]),
+        (["lamps", 1, "location"], [0, 0, 1], ["lamp 'lamp'", "unknown key 'location'"]),
+        (["lamps", 2, "matrix"], [[1, 0, 0, 0]] * 4, ["lamp 'panel'", "matrix beside"]),
+        (["lamps", 2, "size"], [1, -1], ["lamp 'panel'", "size"]),
+        (["lamps", 2, "size"], 1, ["'size' of lamp 'panel'", "2"]),
+        (["lamps", 2, "casts_shadow"], "no", ["'casts_shadow' of lamp 'panel'", "true or false"]),
+        (["world"], [1, 1, 1], ["'world'", "object"]),
+        (["world", "radiance"], [1, 1, -1], ["'world'", "radiance"]),
+        (["film", "filter"], "GAUSSIAN", ["'film'", "GAUSSIAN", "BLACKMAN_HARRIS"]),
+        (["film", "filter_width"], 0, ["'film'", "filter_width"]),
+        (["film", "transparent"], 1, ["'transparent' of 'film'", "true or false"]),
+        (["bounces", "total"], 1.5, ["'total' of 'bounces'", "whole"]),
+        (["bounces", "total"], 2000, ["'bounces'", "1024"]),
+        (["bounces", "volume"], 1, ["'bounces'", "unknown key 'volume'"]),
+        (["objects", 0, "materials"], ["absent"], ["'floor'", "'absent'"]),
+        (["objects", 0, "materials"], "wall", ["'materials' of object 'floor'", "list"]),
+        (["objects", 1, "hidden_from"], ["everything"], ["'bead'", "'everything'"]),
+    ],
+)
+def test_what_is_wrong_with_light_is_said_in_one_sentence_that_names_the_key(example, read_document, path, value, words):
+    with pytest.raises(InputError) as caught:
+        read_document(changed(example, path, value))
+    message = str(caught.value)
+    assert all(word in message for word in ["scene.json: ", *words]), message
+    assert "\n" not in message
+
+
+VALUES = (
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=3) | st.lists(st.floats(0, 1))
+)
+
+
+@settings(max_examples=150)
+@given(data=st.data(), value=VALUES)
+def test_whatever_a_key_of_light_is_replaced_by_is_read_or_refused_in_a_sentence(example, tmp_path_factory, data, value):
+    inner, path = example, []
+    while isinstance(inner, dict | list) and len(inner) and (not path or data.draw(st.booleans())):
+        keys = sorted(inner) if isinstance(inner, dict) else range(len(inner))
+        path.append(data.draw(st.sampled_from(keys)))
+        inner = inner[path[-1]]
+    document = copy.deepcopy(example)
+    target = document
+    for key in path[:-1]:
+        target = target[key]
+    target[path[-1]] = value
+    file = tmp_path_factory.mktemp("fuzz") / "scene.json"
+    file.write_text(json.dumps(document), encoding="utf-8")
+    try:
+        scene_file.read(file)
+    except InputError as error:
+        assert "\n" not in str(error) and len(str(error)) < 400, str(error)

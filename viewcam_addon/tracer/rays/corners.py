@@ -1,0 +1,102 @@
+"""Which rays pass so close by a corner of triangles that Embree may let them slip through.
+
+Embree tells on which side of an edge a ray d passes by the sign of d·((Q − P) × (Q + P)), P and Q the ends of the edge. Both
+triangles of an edge get the same number, so no ray passes between them. But each edge is rounded for itself, and where edges
+meet a ray can lie outside of all their triangles: of the rays that aim at the vertices of a ball of a million triangles, one in
+a hundred leaves it. visibility.py traces what lies beside such rays too.
+
+They are found by asking whether the cell of the view plane that a ray crosses holds a corner. Cells are as wide as 2⁻¹² of
+their distance from the view axis, to serve short and long lenses alike, and of those taken only two hashes each are kept (a
+Bloom filter): some rays are suspected without reason, but none is overlooked.
+
+Rejected: triangles enlarged until they overlap, which moves outlines for all rays; a small triangle before each vertex, which
+takes Embree as long again to build; vertices and rays on separate grids, which costs each two bits of its place.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Float32s, Floats, Indices
+
+# How far from a corner, in each coordinate of the view plane, Embree can err, relative to the corner's distance r from the view
+# axis, and to r² beyond 1, where rays run aslant. In units of 2⁻²⁴: 2 for rounding the vertex, X and Z, 2 for the sum Q + P, 1
+# for the ray and 6 for products and sums, times √2 as an edge may run askew. The most that was seen is 5.
+REACH = 16 * 2.0**-24
+
+# Beyond, at 89.1° from the view axis, twice the reach is more than a cell: all rays are suspected there.
+_FARTHEST = 64.0
+
+# Float32's multiples of 2⁻¹² of a power of two are what is left of a number to which 1.5 · 2¹¹ times that power is added.
+_EXPONENT, _GRAIN = np.int32(0x7F800000), np.int32((11 << 23) + (1 << 22))
+
+_PLACES_PER_CORNER = 32  # of which each takes two: of a thousand rays that pass by no corner, two are suspected
+_BIT = np.array([1, 2, 4, 8, 16, 32, 64, 128], np.uint8)
+_MIXER = np.uint64(0x9E3779B97F4A7C15)  # 2⁶⁴ over the golden ratio, whose multiples spread evenly
+
+
+class Corners:
+    """The corners of triangles, as cells of the view plane.
+
+    vertices : (3, n) float64, camera space.
+    """
+
+    def __init__(self, vertices: Floats) -> None:
+        with np.errstate(all="ignore"):  # what stands beside or behind the eye is left out
+            x, y = vertices[:2] / vertices[2]
+            distance = np.maximum(np.abs(x), np.abs(y))
+            seen = (vertices[2] > 0) & (distance <= _FARTHEST)
+        x, y, distance = x[seen], y[seen], distance[seen]
+        bits = max((len(x) * _PLACES_PER_CORNER).bit_length(), 3)
+        self._bits, self._rest = np.uint64(bits), np.uint64(64 - bits)
+        taken = np.zeros(1 << bits, bool)
+        reach = REACH * distance * np.maximum(distance, 1.0)
+        for farther in (-reach, reach):  # at powers of two, where cells of two widths meet
+            grain = _grain((distance + farther).astype(np.float32))
+            for right in (-reach, reach):
+                for up in (-reach, reach):
+                    cell = _cell((x + right).astype(np.float32), (y + up).astype(np.float32), grain)
+                    taken[(cell >> self._rest).view(np.int64)] = True
+                    taken[(self._again(cell) >> self._rest).view(np.int64)] = True
+        self._taken = np.packbits(taken, bitorder="little")  # to stay in a core's cache
+
+    def near(self, x: Float32s, y: Float32s) -> Indices:
+        """Which of the rays (x, y, 1) pass close by a corner, perhaps. x, y : (n,) float32."""
+        distance = np.abs(x)
+        np.maximum(distance, np.abs(y), out=distance)
+        if not distance.max(initial=0.0) <= _FARTHEST:
+            far = ~(distance <= _FARTHEST)
+            inner = np.flatnonzero(~far)
+            return np.concatenate([np.flatnonzero(far), inner[self.near(x[inner], y[inner])]])
+        cell = _cell(x, y, _grain(distance))
+        suspected = np.flatnonzero(self._is_taken(cell))
+        return suspected[self._is_taken(self._again(cell[suspected])) != 0]
+
+    def _again(self, cell: NDArray[np.uint64]) -> NDArray[np.uint64]:
+        """The second hash, from the bits behind the first."""
+        return cell << self._bits
+
+    def _is_taken(self, cell: NDArray[np.uint64]) -> NDArray[np.uint8]:
+        """Not 0 where the place of a cell is taken."""
+        place = (cell >> self._rest).view(np.int64)
+        bit = _BIT.take(place & 7)
+        place >>= 3
+        bit &= self._taken.take(place, mode="clip")
+        return bit
+
+
+def _grain(distance: Float32s) -> Float32s:
+    """What makes cells of the numbers it is added to, from their distance to the view axis, which it overwrites."""
+    bits = distance.view(np.int32)
+    bits &= _EXPONENT
+    bits += _GRAIN
+    return distance
+
+
+def _cell(x: Float32s, y: Float32s, grain: Float32s) -> NDArray[np.uint64]:
+    """A well-mixed number for each cell."""
+    cell = np.empty((len(x), 2), np.float32)
+    np.add(x, grain, out=cell[:, 0])
+    np.add(y, grain, out=cell[:, 1])
+    mixed = cell.view(np.uint64)[:, 0]
+    mixed *= _MIXER
+    return mixed

@@ -1,0 +1,255 @@
+"""Which primitive each ray from the eye meets first: Embree's answer, or that of plain NumPy.
+
+A primitive is a number, triangles first and spheres after them; −1 is none. Rays are points (x, y) of the view plane at
+distance 1 (see view.py). Only depths within the clip range count: what lies before it is looked through.
+
+**Spheres** are found through cards: each hides behind a rectangle that covers its outline and stands before it, parallel to
+the view plane. Embree gives the first card, float64 the exact sphere behind it, and the ray goes on behind that card until the
+next one stands behind the best hit. Since cards are parallel and no two share a depth, all rays meet them in the same order
+and step over none. Rejected: closed boxes round the spheres, where a ray that continues behind one's entry skips, by float32's
+rounding, the entries of others. Spheres that reach behind the eye's plane have no card and are tested by all rays of a tile
+that they touch.
+
+**Wide triangles**, which reach a hundred times as far as they come near to the eye, as a ground plane does, are tested by all
+rays in float64: Embree would round their distance with that of their corners, and show what stands behind them, or hides what
+lies on them.
+
+embreex knows no nearest distance, so a ray starts where the clip range does, or behind the last card.
+
+**Corners** of triangles may let a ray slip through that passes close by (corners.py). Then four rays round it are traced
+too, and where three of them meet something before what the ray itself met, the nearest of that is what it meets.
+"""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats, Indices, gather
+from .corners import REACH, Corners
+from .edges import Edges
+from .ellipsoids import Ellipsoids
+from .embree import EmbreeScene, embree_scene, scene_of, unit_of
+from .triangles import Planes, Triangles
+
+# Cards overlap the outline by 16 units of float32's last place, more than card and ray are rounded by, and follow one another
+# as far apart in depth, so that a ray that starts half-way between two has one surely behind it and the other before it.
+_MARGIN = 2.0**-20
+_CARD_SPACING = 2.0**-20
+_FAR = 1e37
+
+# Where rays beside one that passes close by a corner go: eleven units of float32's last place away, twice as far as Embree was
+# ever seen to err, and no farther than must be, since the mesh may be fine.
+_AROUND = np.array([[-0.5, -0.5, 0.5, 0.5], [-0.5, 0.5, -0.5, 0.5]])[:, :, None] * REACH
+
+# By how much wide triangles overlap those beside them, whose edges Embree sees rounded by 8 · 2⁻²⁴ of their corners' distances.
+_OVERLAP = 2.0**-21
+
+
+class Visibility(Protocol):
+    def first(self, x: Floats, y: Floats) -> Indices:
+        """The primitive that each ray meets first, or −1. x, y : (n,) float64."""
+
+
+def visibility(triangles: Triangles, planes: Planes, ellipsoids: Ellipsoids, clip: tuple[float, float]) -> Visibility:
+    """Embree where there is its wheel, otherwise plain NumPy."""
+    return (Plain if EmbreeScene is None else Embree)(triangles, planes, ellipsoids, clip)
+
+
+class Embree:
+    """Embree finds triangles and cards in float32; depths are compared in float64."""
+
+    def __init__(self, triangles: Triangles, planes: Planes, ellipsoids: Ellipsoids, clip: tuple[float, float]) -> None:
+        self._planes, self._ellipsoids = planes, ellipsoids
+        self._start, self._end = clip
+        self._triangle_count = triangles.count
+        self._unit = _embree_unit(triangles, ellipsoids)
+        self._corners = Corners(triangles.vertices)
+        hidden = triangles.hidden_from("camera")
+        self._wide = planes.wide[~hidden[planes.wide]]
+        self._wide_edges = Edges(triangles, self._wide)
+        self._wide_edges.overlap(_OVERLAP)
+        hidden[planes.wide] = True  # from Embree
+        self._triangles = scene_of(triangles, hidden, self._unit)
+        self._without_card = int(np.count_nonzero(np.isinf(ellipsoids.bounds[0])))
+        if ellipsoids.count > self._without_card:
+            self._cards, self._card_depth = _cards(ellipsoids, self._without_card, self._unit)
+        else:
+            self._cards = None
+
+    def first(self, x: Floats, y: Floats) -> Indices:
+        directions = _directions(x, y)
+        if self._triangles is None:
+            found = np.full(len(x), -1, np.intp)
+        else:
+            found = self._first_triangle(directions)
+            close = self._corners.near(directions[:, 0], directions[:, 1])
+            if len(close):
+                found[close] = self._without_slips(found[close], x[close], y[close])
+        if len(self._wide):
+            self._wide_before(found, x, y)
+        if self._ellipsoids.count:
+            self._spheres_before(found, directions, x, y)
+        return found
+
+    def _first_triangle(self, directions: NDArray[np.float32]) -> Indices:
+        length = min((self._end - self._start) * self._unit, _FAR)
+        return self._triangles.run(directions * np.float32(self._start * self._unit), directions, dists=length).astype(np.intp)
+
+    def _without_slips(self, found: Indices, x: Floats, y: Floats) -> Indices:
+        """What rays that pass close by a corner meet, from what they found and what four rays round each of them find.
+
+        A ray slipped through if what it found lies farther behind three of the four than they do behind one another.
+        """
+        distance = np.maximum(np.abs(x), np.abs(y))
+        aside = distance * np.maximum(distance, 1.0)
+        around = (x + _AROUND[0] * aside).ravel(), (y + _AROUND[1] * aside).ravel()
+        beside = self._first_triangle(_directions(*around))
+        depths = self._depth(beside, *around).reshape(4, -1)
+        nearest, _, third, _ = np.sort(depths, axis=0)
+        with np.errstate(invalid="ignore"):  # where three see nothing, it is no slip
+            slips = np.flatnonzero(self._depth(found, x, y) > third + (third - nearest))
+        if len(slips):
+            found[slips] = beside.reshape(4, -1)[depths[:, slips].argmin(axis=0), slips]
+        return found
+
+    def _wide_before(self, found: Indices, x: Floats, y: Floats) -> None:
+        """Put wide triangles into `found` where they stand before the triangle there."""
+        nearest = self._depth(found, x, y)
+        for number, triangle in enumerate(self._wide):
+            met = np.flatnonzero(self._wide_edges.inside(np.array([number]), x, y))
+            depth = self._planes.depth(np.array([triangle]), x[met], y[met])
+            nearer = (depth < nearest[met]) & (depth > 0) & (depth >= self._start) & (depth <= self._end)
+            nearest[met[nearer]], found[met[nearer]] = depth[nearer], triangle
+
+    def _depth(self, found: Indices, x: Floats, y: Floats) -> Floats:
+        """Depths of the triangles that were found, inf where none was."""
+        return np.where(found >= 0, self._planes.depth(found, x, y), np.inf)
+
+    def _spheres_before(self, found: Indices, directions: NDArray[np.float32], x: Floats, y: Floats) -> None:
+        """Put spheres into `found` where they stand before the triangle there."""
+        nearest = np.full(len(x), self._end, np.float64)
+        met = np.flatnonzero(found >= 0)
+        nearest[met] = self._planes.depth(found[met], x[met], y[met])
+        for sphere in _touching(self._ellipsoids, self._without_card, x, y):
+            depth = self._ellipsoids.depth(np.array([sphere]), x, y)
+            nearer = (depth < nearest) & (depth >= self._start)
+            nearest[nearer], found[nearer] = depth[nearer], self._triangle_count + sphere
+        if self._cards is None:
+            return
+        rays, origin = np.arange(len(x)), np.zeros(len(x), np.float32)  # origins in Embree's unit
+        while len(rays):
+            ahead = directions[rays]
+            limits = np.minimum(nearest[rays] * self._unit - origin, _FAR).astype(np.float32)
+            card = self._cards.run(ahead * origin[:, None], ahead, dists=limits) >> 1
+            behind = np.flatnonzero(card >= 0)
+            rays, card = rays[behind], card[behind].astype(np.intp)
+            sphere = card + self._without_card
+            depth = self._ellipsoids.depth(sphere, x[rays], y[rays])
+            nearer = (depth < nearest[rays]) & (depth >= self._start)
+            nearest[rays[nearer]], found[rays[nearer]] = depth[nearer], self._triangle_count + sphere[nearer]
+            origin = self._card_depth[card] * np.float32(1 + _CARD_SPACING / 2)
+            onwards = np.flatnonzero(origin < nearest[rays] * self._unit)
+            rays, origin = rays[onwards], origin[onwards]
+
+
+def _directions(x: Floats, y: Floats) -> NDArray[np.float32]:
+    directions = np.empty((len(x), 3), np.float32)
+    directions[:, 0], directions[:, 1], directions[:, 2] = x, y, 1
+    return directions
+
+
+def _embree_unit(triangles: Triangles, ellipsoids: Ellipsoids) -> float:
+    """Embree's units in one of the world."""
+    extents = np.abs(ellipsoids.positions).max(axis=0, initial=0.0) + ellipsoids.reach
+    return unit_of(max(np.abs(triangles.vertices).max(initial=0.0), extents.max(initial=0.0)))
+
+
+def _cards(ellipsoids: Ellipsoids, first: int, unit: float) -> tuple["EmbreeScene", NDArray[np.float32]]:
+    """A card of two triangles before each sphere from `first` on, and the cards' depths, in Embree's unit."""
+    nearest = ellipsoids.nearest[first:] * unit
+    place = np.arange(len(nearest)) * _CARD_SPACING
+    # The greatest depths that are not behind the spheres and grow by the spacing from card to card.
+    depth = np.exp(np.minimum.accumulate((np.log(nearest) - place)[::-1])[::-1] + place) * (1 - _CARD_SPACING)
+    depth = depth.astype(np.float32)
+    x0, x1, y0, y1 = ellipsoids.bounds[:, first:]
+    margin = _MARGIN * (1 + np.abs([x0, x1, y0, y1]).max(axis=0))
+    x0, x1, y0, y1 = x0 - margin, x1 + margin, y0 - margin, y1 + margin
+    vertices = np.empty((len(depth), 4, 3))
+    vertices[:, :, 0] = np.stack([x0, x1, x1, x0], axis=1) * depth[:, None]
+    vertices[:, :, 1] = np.stack([y0, y0, y1, y1], axis=1) * depth[:, None]
+    vertices[:, :, 2] = depth[:, None]
+    corners = np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(len(depth))[:, None, None]
+    return embree_scene(vertices.reshape(-1, 3), corners.reshape(-1, 3).astype(np.int32)), depth
+
+
+class Plain:
+    """Every ray against every primitive near it, in float64: slow, and watertight by what rounding could lose."""
+
+    _RAYS, _CANDIDATES = 256, 2048  # at a time: some arrays of 4 MB
+
+    def __init__(self, triangles: Triangles, planes: Planes, ellipsoids: Ellipsoids, clip: tuple[float, float]) -> None:
+        self._planes, self._ellipsoids = planes, ellipsoids
+        self._start, self._end = clip
+        self._triangle_count = triangles.count
+        self._edges = Edges(triangles)
+        self._bounds = np.concatenate([_triangle_bounds(self._edges.corners, planes), ellipsoids.bounds], axis=1)
+        hidden = np.flatnonzero(triangles.hidden_from("camera"))
+        self._bounds[0::2, hidden], self._bounds[1::2, hidden] = np.inf, -np.inf
+        self._bounds += np.array([[-1], [1], [-1], [1]]) * _MARGIN * (1 + np.nan_to_num(np.abs(self._bounds), posinf=0.0))
+
+    def first(self, x: Floats, y: Floats) -> Indices:
+        found = np.full(len(x), -1, np.intp)
+        nearest = np.full(len(x), np.inf)
+        near_all = self._candidates(np.arange(self._bounds.shape[1]), x, y)
+        for start in range(0, len(x), self._RAYS):
+            part = slice(start, start + self._RAYS)
+            near = self._candidates(near_all, x[part], y[part])
+            for first in range(0, len(near), self._CANDIDATES):
+                some = near[first : first + self._CANDIDATES]
+                depth = self._depths(some, x[part, None], y[part, None])
+                best = depth.argmin(axis=1)
+                best_depth = np.take_along_axis(depth, best[:, None], axis=1)[:, 0]
+                nearer = best_depth < nearest[part]
+                nearest[part] = np.where(nearer, best_depth, nearest[part])
+                found[part] = np.where(nearer, some[best], found[part])
+        return found
+
+    def _candidates(self, primitives: Indices, x: Floats, y: Floats) -> Indices:
+        if not len(x):
+            return primitives[:0]
+        x0, x1, y0, y1 = gather(self._bounds, primitives)
+        return primitives[(x0 <= x.max()) & (x1 >= x.min()) & (y0 <= y.max()) & (y1 >= y.min())]
+
+    def _depths(self, primitives: Indices, x: Floats, y: Floats) -> Floats:
+        """(n, k) depths at which n rays meet k primitives, inf where they don't or where the depth is clipped."""
+        split = np.searchsorted(primitives, self._triangle_count)
+        triangles, spheres = primitives[:split], primitives[split:] - self._triangle_count
+        inside = self._edges.inside(triangles, x, y)
+        depth = np.concatenate(
+            [np.where(inside, self._planes.depth(triangles, x, y), np.inf), self._ellipsoids.depth(spheres, x, y)], axis=1
+        )
+        return np.where((depth > 0) & (depth >= self._start) & (depth <= self._end), depth, np.inf)
+
+
+def _triangle_bounds(corners: Floats, planes: Planes) -> Floats:
+    """(4, m) bounds of triangles in the view plane, as in `Ellipsoids`; empty where a triangle can't be seen."""
+    least, greatest = planes.span
+    with np.errstate(all="ignore"):
+        across = corners[:, :2] / corners[:, 2:]
+    bounds = np.stack([across[:, 0].min(axis=0), across[:, 0].max(axis=0), across[:, 1].min(axis=0), across[:, 1].max(axis=0)])
+    wide = ~(least > 2.0**-10 * greatest)
+    bounds[0::2, wide], bounds[1::2, wide] = -np.inf, np.inf
+    unseen = (greatest <= 0) | ~(planes.distance > 0)
+    bounds[0::2, unseen], bounds[1::2, unseen] = np.inf, -np.inf
+    return bounds
+
+
+def _touching(ellipsoids: Ellipsoids, count: int, x: Floats, y: Floats) -> Indices:
+    """Which of the first `count` spheres reach into the pyramid of the rays, by the balls round them."""
+    (right, up, forward), reach = ellipsoids.positions[:, :count], ellipsoids.reach[:count]
+    touching = np.ones(count, bool)
+    for across, least, greatest in ((right, x.min(), x.max()), (up, y.min(), y.max())):
+        touching &= across - least * forward >= -reach * np.hypot(1, least)
+        touching &= greatest * forward - across >= -reach * np.hypot(1, greatest)
+    return np.flatnonzero(touching)

@@ -1,0 +1,220 @@
+"""What the tracer traces: meshes and spheres, the objects that place them in the world, the camera, and what gives light.
+
+A geometry is stored once, in its object's space, and placed by any number of objects. Nothing here knows files (scene_file.py)
+or rays (visibility.py, surface.py); the classes hold arrays and check their shapes. Materials, images, lamps, world, film and
+bounces matter from level `direct` on; a scene of level `geometry` leaves them out.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...pinhole import Pinhole
+from .film import Bounces, Film
+from .lamps import Lamp, World, hidden_from
+from .materials import Material, Picture
+
+# Visibility is found in float32, which holds the square of nothing larger.
+LARGEST = 1e18
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles in object space.
+
+    vertices : (n, 3) float64, object space.
+    triangles : (m, 3) int32, indices into `vertices`, counter-clockwise seen from the front.
+    corner_normals : (m, 3, 3) float32, object space, unit length, or None where every face is flat. On a flat face of a mesh
+        that has smooth ones, the three corners hold the face's own normal.
+    corner_uvs : (m, 3, 2) float32, or None where the mesh has no UV map.
+    corner_colours : (m, 3, 3) float32, linear, what `Colour.vertex` stands for, or None.
+    materials : (m,) int32, the index of each triangle's material in `Object.material_indices`.
+    """
+
+    vertices: NDArray[np.float64]
+    triangles: NDArray[np.int32]
+    materials: NDArray[np.int32]
+    corner_normals: NDArray[np.float32] | None = None
+    corner_uvs: NDArray[np.float32] | None = None
+    corner_colours: NDArray[np.float32] | None = None
+
+    def __post_init__(self) -> None:
+        count = len(self.triangles)
+        _check_shape("vertices", self.vertices, (None, 3))
+        _check_shape("triangles", self.triangles, (None, 3))
+        _check_shape("materials", self.materials, (count,))
+        if self.corner_normals is not None:
+            _check_shape("corner_normals", self.corner_normals, (count, 3, 3))
+        if self.corner_uvs is not None:
+            _check_shape("corner_uvs", self.corner_uvs, (count, 3, 2))
+        if self.corner_colours is not None:
+            _check_shape("corner_colours", self.corner_colours, (count, 3, 3))
+        if count and not 0 <= self.triangles.min() <= self.triangles.max() < len(self.vertices):
+            raise InputError(f"triangles name a vertex outside 0 … {len(self.vertices) - 1}: check the mesh")
+        if not np.isfinite(self.vertices).all():
+            raise InputError("vertices hold a number that is not finite: check the mesh")
+
+
+@dataclass(frozen=True, eq=False)
+class Spheres:
+    """Exact spheres in object space; the object's matrix may make ellipsoids of them.
+
+    centers : (n, 3) float64, object space.
+    radii : (n,) float64, object space, not negative.
+    materials : (n,) int32, as in `Mesh`.
+    """
+
+    centers: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    materials: NDArray[np.int32]
+
+    def __post_init__(self) -> None:
+        _check_shape("centers", self.centers, (None, 3))
+        _check_shape("radii", self.radii, (len(self.centers),))
+        _check_shape("materials", self.materials, (len(self.centers),))
+        if not (np.isfinite(self.centers).all() and np.isfinite(self.radii).all() and (self.radii >= 0).all()):
+            raise InputError("centers and radii of spheres must be finite and radii not negative: check the spheres")
+
+
+@dataclass(frozen=True, eq=False)
+class Object:
+    """One geometry, placed in the world.
+
+    geometry : key in `Scene.geometries`.
+    matrix : (4, 4) float64, object space to world space, affine; negative and non-uniform scale are welcome.
+    object_index : what the Object Index pass shows.
+    material_indices : what the Material Index pass shows, for each material of the geometry; at least one.
+    materials : keys in `Scene.materials`, for each material of the geometry; "", and all that are missing, are `PLAIN`.
+    hidden_from : which rays don't see it (lights.RAYS).
+    """
+
+    name: str
+    geometry: str
+    matrix: NDArray[np.float64]
+    object_index: int = 0
+    material_indices: tuple[int, ...] = (0,)
+    materials: tuple[str, ...] = ()
+    hidden_from: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        _check_shape(f"the matrix of object {self.name!r}", self.matrix, (4, 4))
+        if not np.isfinite(self.matrix).all():
+            raise InputError(f"the matrix of object {self.name!r} holds a number that is not finite: check its transform")
+        if not np.array_equal(self.matrix[3], (0, 0, 0, 1)):
+            raise InputError(f"the matrix of object {self.name!r} is not affine: its last row must be 0, 0, 0, 1")
+        if not self.material_indices:
+            raise InputError(f"object {self.name!r} has no material_indices: give at least one, 0 where it has no material")
+        object.__setattr__(self, "hidden_from", hidden_from(f"object {self.name!r}", self.hidden_from))
+
+
+@dataclass(frozen=True)
+class LedgerEntry:
+    """What became of one thing that the exporter met.
+
+    object : its name in Blender.
+    status : "exported", "approximated" or "skipped".
+    reason : one clause that says why, empty where it was exported whole.
+    """
+
+    object: str
+    status: str
+    reason: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A camera and what stands before it.
+
+    camera : the camera to trace. For a scene from Blender, as read back from Blender's float32 matrix and lens.
+    stated_camera : the camera as the four values state it, or None where nobody stated one.
+    clip : nearest and farthest planar depth z = −w·(P − e) that is visible.
+    origin : the point of the world from which all coordinates of the scene are counted: (0, 0, 0), or that of a recentred
+        export.
+    images : what `Colour.image` names.
+    """
+
+    camera: Pinhole
+    geometries: dict[str, Mesh | Spheres]
+    objects: tuple[Object, ...]
+    stated_camera: Pinhole | None = None
+    clip: tuple[float, float] = (0.0, float("inf"))
+    ledger: tuple[LedgerEntry, ...] = field(default=())
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    materials: dict[str, Material] = field(default_factory=dict)
+    images: dict[str, Picture] = field(default_factory=dict)
+    lamps: tuple[Lamp, ...] = ()
+    world: World = field(default_factory=World)
+    film: Film = field(default_factory=Film)
+    bounces: Bounces = field(default_factory=Bounces)
+
+    def __post_init__(self) -> None:
+        if len(self.origin) != 3 or not np.isfinite(self.origin).all():
+            raise InputError(f"origin is {self.origin}: give three finite numbers")
+        start, end = (float(depth) for depth in self.clip)
+        if not 0 <= start < end:
+            raise InputError(f"clip is {start:g} … {end:g}: give a nearest depth of at least 0 and a greater farthest depth")
+        object.__setattr__(self, "clip", (start, end))
+        materials = {name: _material_range(geometry.materials) for name, geometry in self.geometries.items()}
+        _check_camera(self.camera)
+        reaches = {name: _reach(geometry) for name, geometry in self.geometries.items()}
+        for placed in self.objects:
+            if placed.geometry not in materials:
+                raise InputError(
+                    f"object {placed.name!r} names the geometry {placed.geometry!r}, which the scene does not have"
+                )
+            _check_reach(placed, reaches[placed.geometry])
+            least, greatest = materials[placed.geometry]
+            if least < 0 or greatest >= len(placed.material_indices):
+                raise InputError(
+                    f"object {placed.name!r} has {len(placed.material_indices)} material_indices and its geometry "
+                    f"{placed.geometry!r} uses materials {least} … {greatest}: give one for each"
+                )
+            for name in placed.materials:
+                if name and name not in self.materials:
+                    raise InputError(f"object {placed.name!r} names the material {name!r}, which the scene does not have")
+        for name, material in self.materials.items():
+            for component, colour in material.colours.items():
+                if colour.image is not None and colour.image not in self.images:
+                    raise InputError(
+                        f"{component} of material {name!r} names the image {colour.image!r}, which the scene does not have"
+                    )
+
+
+def _check_camera(camera: Pinhole) -> None:
+    if max(map(abs, camera.eye)) > LARGEST:
+        raise InputError(f"the camera's eye is {camera.eye}: give coordinates below {LARGEST:g}")
+    slopes = np.abs(camera.view_plane([0.0, camera.width], [0.0, camera.height]))
+    if slopes.max() > LARGEST:
+        raise InputError(
+            f"the camera's distance of {min(camera.distance):g} pixels is {slopes.max():.3g} times smaller than its picture: "
+            f"give one, and a principal point, that make it less than {LARGEST:g}"
+        )
+
+
+def _reach(geometry: Mesh | Spheres) -> float:
+    """The largest |coordinate| of a geometry in its object's space, or what is no less."""
+    if isinstance(geometry, Mesh):
+        return float(np.abs(geometry.vertices).max(initial=0.0))
+    return float(np.abs(geometry.centers).max(initial=0.0)) + float(geometry.radii.max(initial=0.0))
+
+
+def _check_reach(placed: Object, reach: float) -> None:
+    largest = max(reach, float(np.abs(placed.matrix).max()))
+    if largest <= LARGEST:  # no product overflows
+        largest = max(
+            largest, 3 * reach * float(np.abs(placed.matrix[:3, :3]).max()) + float(np.abs(placed.matrix[:3, 3]).max())
+        )
+    if largest > LARGEST:
+        raise InputError(f"object {placed.name!r} reaches as far as {largest:.3g}: give it coordinates below {LARGEST:g}")
+
+
+def _material_range(materials: NDArray[np.int32]) -> tuple[int, int]:
+    return (int(materials.min()), int(materials.max())) if len(materials) else (0, 0)
+
+
+def _check_shape(name: str, array: NDArray, shape: tuple[int | None, ...]) -> None:
+    if array.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, array.shape, strict=True)):
+        wanted = " × ".join("n" if size is None else str(size) for size in shape)
+        raise InputError(f"{name} has the shape {array.shape} and must have {wanted}: check the scene")

@@ -1,0 +1,198 @@
+"""A value of a JSON file that knows where it stands, so that what is wrong with it can be said in one sentence.
+
+Rejected: a JSON schema (another dependency, and its messages speak of the schema instead of the file), and checks that are
+gathered at the end (the first wrong key usually explains the others).
+"""
+
+import contextlib
+import math
+import zipfile
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import checks
+from ...errors import InputError
+
+_LARGEST_WHOLE = 2**31 - 1
+
+
+class Field:
+    """A value, its name as a sentence says it ("eye of the camera") and the file that it comes from."""
+
+    def __init__(self, value: object, name: str, file: str) -> None:
+        self.value, self.name, self.file = value, name, file
+
+    def fail(self, problem: str) -> NoReturn:
+        """Raise InputError: the file, the name of this value, the problem (which begins with a verb)."""
+        raise InputError(f"{self.file}: {self.name} {problem}")
+
+    def hand_on(self, error: InputError) -> NoReturn:
+        """Raise what was found wrong inside this value, with the file and the name unless it names them already."""
+        if str(error).startswith(f"{self.file}: "):
+            raise error
+        raise InputError(f"{self.file}: {self.name}: {error}") from error
+
+    def fields(self, required: tuple[str, ...], optional: tuple[str, ...] = (), others: bool = False) -> dict[str, "Field"]:
+        """The values of an object's keys. All required ones must be there and, unless others=True, only known ones."""
+        table = self._object()
+        for key in required:
+            if key not in table:
+                self.fail(f"has no key {key!r}: add it")
+        unknown = None if others else next((key for key in table if key not in required + optional), None)
+        if unknown is not None:
+            self.fail(f"has an unknown key {unknown!r}: remove it, or give one of {', '.join(required + optional)}")
+        return {key: Field(value, f"{key!r} of {self.name}", self.file) for key, value in table.items()}
+
+    def named(self, kind: str) -> dict[str, "Field"]:
+        """The values of an object whose keys are names of things of this kind."""
+        return {key: Field(value, f"{kind} {key!r}", self.file) for key, value in self._object().items()}
+
+    def items(self, kind: str, count: int | None = None) -> list["Field"]:
+        """The values of a list of things of this kind, called by their name where they have one."""
+        if not isinstance(self.value, list) or count not in (None, len(self.value)):
+            self.fail(f"is no list{f' of {count}' if count else ''}: give one")
+        return [Field(value, _name(kind, index, value, self), self.file) for index, value in enumerate(self.value)]
+
+    def text(self) -> str:
+        if not isinstance(self.value, str):
+            self.fail(f"is {_shown(self.value)}: give a text")
+        return self.value
+
+    def truth(self) -> bool:
+        if not isinstance(self.value, bool):
+            self.fail(f"is {_shown(self.value)}: give true or false")
+        return self.value
+
+    def number(self) -> float:
+        if not _is_number(self.value):
+            self.fail(f"is {_shown(self.value)}: give a finite number")
+        return float(self.value)
+
+    def whole(self, least: int) -> int:
+        if type(self.value) is not int or not least <= self.value <= _LARGEST_WHOLE:
+            self.fail(f"is {_shown(self.value)}: give a whole number of at least {least}")
+        return self.value
+
+    def vector(self, count: int) -> tuple[float, ...]:
+        if not isinstance(self.value, list) or len(self.value) != count or not all(map(_is_number, self.value)):
+            self.fail(f"is {_shown(self.value)}: give a list of {count} finite numbers")
+        return tuple(map(float, self.value))
+
+    def array(self, arrays: "Arrays | None", dtype: type, shape: tuple[int | None, ...]) -> NDArray:
+        """A list of lists of numbers, or {"npz": key} where `arrays` are given; None in the shape stands for any number."""
+        if arrays is not None and isinstance(self.value, dict):
+            array = arrays.take(self.fields(("npz",))["npz"])
+        else:
+            array = self._nested(len(shape))
+        if np.issubdtype(dtype, np.integer):
+            if array.dtype.kind not in "iu" and array.size:
+                self.fail("holds numbers that are not whole: give whole ones")
+            if array.size and not -_LARGEST_WHOLE <= array.min() <= array.max() <= _LARGEST_WHOLE:
+                self.fail(f"holds a number beyond {_LARGEST_WHOLE}: give smaller ones")
+        if array.size == 0 and shape[0] in (None, 0):
+            array = array.reshape(0, *(size or 0 for size in shape[1:]))
+        if array.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, array.shape, strict=True)):
+            wanted = " × ".join("n" if size is None else str(size) for size in shape)
+            self.fail(f"has the shape {' × '.join(map(str, array.shape))} and must have {wanted}: correct it")
+        with np.errstate(over="ignore"):  # what is too large for float32 becomes infinite, and is refused here
+            array = array.astype(dtype, copy=False)
+        if not np.isfinite(array).all():
+            self.fail("holds a number that is not finite: give finite ones")
+        return array
+
+    def _object(self) -> dict:
+        if not isinstance(self.value, dict):
+            self.fail(f"is {_shown(self.value)}: give an object with keys")
+        return self.value
+
+    def _nested(self, depth: int) -> NDArray:
+        """The array of nested lists."""
+        level = [self.value]
+        for _ in range(depth):
+            if not all(isinstance(item, list) for item in level) or len({len(item) for item in level}) > 1:
+                self.fail(f"is no list{' of equally long lists' * (depth > 1)}: give one")
+            level = [value for item in level for value in item]
+        if not all(map(_is_number, level)):
+            self.fail("holds something that is no finite number: give numbers only")
+        whole = all(type(value) is int and abs(value) <= _LARGEST_WHOLE for value in level)
+        return np.array(self.value, dtype=np.int64 if whole else np.float64)
+
+
+class Arrays:
+    """The arrays of the .npz beside a scene file; none where the scene names no such file."""
+
+    def __init__(self, file: str = "", archive: np.lib.npyio.NpzFile | None = None) -> None:
+        self._file, self._archive = file, archive
+
+    def take(self, key: Field) -> NDArray:
+        """The array of this key, of real numbers."""
+        if self._archive is None:
+            key.fail("names an array, and the scene has no key 'arrays': add it, with the name of the .npz file")
+        if key.text() not in self._archive.files:  # `in` the archive itself would read the array, in NumPy before 1.25
+            key.fail(f"is {key.value!r}, which {self._file} does not hold: export the scene again")
+        try:
+            array = self._archive[key.value]
+        except ValueError as error:
+            raise InputError(
+                f"{self._file}: the array {key.value!r} holds pickled objects, which are not read: store numbers"
+            ) from error
+        except (OSError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
+            raise InputError(f"{self._file}: the array {key.value!r} is damaged: export the scene again") from error
+        if array.dtype.kind not in "iuf":
+            key.fail(f"names an array of {array.dtype}: store real numbers")
+        return array
+
+
+@contextlib.contextmanager
+def arrays_beside(scene_path: Path, field: Field | None) -> Iterator[Arrays]:
+    """Open the .npz that the field names, for the time of the block."""
+    if field is None:
+        yield Arrays()
+        return
+    path = _beside(scene_path, field)
+    refusal = f"{path.name} is no .npz file of arrays: export the scene again"
+    try:
+        file = path.open("rb")
+    except FileNotFoundError:
+        field.fail(f"names {path.name}, which is not there: put it beside the scene file")
+    except OSError as error:
+        raise InputError(refusal) from error
+    with file:
+        try:
+            archive = np.load(file, allow_pickle=False)
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+            raise InputError(refusal) from error
+        if not isinstance(archive, np.lib.npyio.NpzFile):
+            raise InputError(refusal)
+        yield Arrays(path.name, archive)
+
+
+def _beside(scene_path: Path, field: Field) -> Path:
+    """The path of a file in the scene file's own folder."""
+    folder = scene_path.resolve().parent
+    path = folder / field.text()
+    if "\0" in field.value or path.resolve().parent != folder or path.name != field.value:
+        field.fail(f"is {field.value!r}, which leaves the scene file's folder: give the name of a file in it")
+    return path
+
+
+def _name(kind: str, index: int, value: object, parent: Field) -> str:
+    name = value.get("name", value.get("object")) if isinstance(value, dict) else None
+    return f"{kind} {name!r}" if isinstance(name, str) else f"{kind} {index} of {parent.name}"
+
+
+def _is_number(value: object) -> bool:
+    if type(value) is int:
+        return abs(value) <= 2**1000
+    return type(value) is float and math.isfinite(value)
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, list | dict):
+        return "a list" if isinstance(value, list) else "an object"
+    return checks.shown(value) if value is not None else "null"

@@ -1,0 +1,81 @@
+"""Geometries as a scene file has them: meshes, spheres, and the planes that a hand writes."""
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from . import Mesh, Spheres
+from .fields import Arrays, Field
+
+_LARGEST_INLINE = 48  # numbers: a plane or a few spheres stay readable in the JSON
+
+
+def geometry_document(geometry: Mesh | Spheres, prefix: str, arrays: dict[str, NDArray]) -> dict:
+    """What the JSON holds; large arrays go into `arrays`, under keys that begin with the prefix."""
+    document: dict = {"type": "mesh" if isinstance(geometry, Mesh) else "spheres"}
+    for field in dataclasses.fields(geometry):
+        array = getattr(geometry, field.name)
+        if array is not None:
+            document[field.name] = array_document(array, f"{prefix}.{field.name}", arrays)
+    return document
+
+
+def array_document(array: NDArray, key: str, arrays: dict[str, NDArray]) -> list | dict:
+    """A small array itself, or where a large one stands."""
+    if array.size <= _LARGEST_INLINE:
+        return array.tolist()
+    arrays[key] = array
+    return {"npz": key}
+
+
+def geometry(field: Field, arrays: Arrays) -> Mesh | Spheres:
+    """The geometry that a field holds."""
+    kind = field.fields(("type",), others=True)["type"]
+    readers = {"mesh": _mesh, "spheres": _spheres, "plane": _plane}
+    if kind.text() not in readers:
+        kind.fail(f"is {kind.value!r}: give one of {', '.join(readers)}")
+    try:
+        return readers[kind.value](field, arrays)
+    except InputError as error:
+        field.hand_on(error)
+
+
+def _mesh(field: Field, arrays: Arrays) -> Mesh:
+    of_corners = {"corner_normals": 3, "corner_uvs": 2, "corner_colours": 3}
+    keys = field.fields(("type", "vertices", "triangles"), ("materials", *of_corners))
+    triangles = keys["triangles"].array(arrays, np.int32, (None, 3))
+    count = len(triangles)
+    return Mesh(
+        vertices=keys["vertices"].array(arrays, np.float64, (None, 3)),
+        triangles=triangles,
+        materials=_materials(keys, arrays, count),
+        **{key: keys[key].array(arrays, np.float32, (count, 3, width)) for key, width in of_corners.items() if key in keys},
+    )
+
+
+def _spheres(field: Field, arrays: Arrays) -> Spheres:
+    keys = field.fields(("type", "centers", "radii"), ("materials",))
+    centers = keys["centers"].array(arrays, np.float64, (None, 3))
+    radii = keys["radii"].array(arrays, np.float64, (len(centers),))
+    return Spheres(centers, radii, _materials(keys, arrays, len(centers)))
+
+
+def _plane(field: Field, arrays: Arrays) -> Mesh:
+    """The parallelogram from a corner along two edges, with a UV map that runs from 0 to 1 along them."""
+    keys = field.fields(("type", "corner", "edges"))
+    corner = np.array(keys["corner"].vector(3))
+    first, second = keys["edges"].array(arrays, np.float64, (2, 3))
+    triangles = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+    uvs = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
+    return Mesh(
+        vertices=np.stack([corner, corner + first, corner + first + second, corner + second]),
+        triangles=triangles,
+        materials=np.zeros(2, np.int32),
+        corner_uvs=uvs[triangles],
+    )
+
+
+def _materials(keys: dict[str, Field], arrays: Arrays, count: int) -> NDArray[np.int32]:
+    return keys["materials"].array(arrays, np.int32, (count,)) if "materials" in keys else np.zeros(count, np.int32)

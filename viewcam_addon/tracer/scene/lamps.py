@@ -1,0 +1,205 @@
+"""Lamps and the world, as data. What they do to a surface is computed in emitters.py.
+
+All quantities are what Cycles makes of Blender's settings, colour, strength, exposure and temperature multiplied out: for each
+of red, green and blue the irradiance of a sun on what faces it, and the power P of any other lamp. One with the area A has the
+radiance P/(π A), to one side if it is flat, and a sphere's area is 4π R²; one of no size has the irradiance P/(4π r²). Scaling
+the object scales an area lamp, shapes the cone of a spot, and does not change a radius.
+
+hidden_from : which rays don't see the lamp itself, of "camera", "diffuse", "glossy", "transmission"; what a lamp hides from, it
+    does not light.
+"""
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import checks
+from ...errors import InputError
+from .materials import radiance
+
+RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
+"""The kinds of rays that things may be hidden from; lamps have no shadow."""
+
+# Of coordinates and sizes: as of scenes, products of a few of them are float64's.
+LARGEST = 1e18
+
+
+@dataclass(frozen=True, eq=False)
+class Lamp:
+    """What all lamps have. casts_shadow : whether objects can stand in its light."""
+
+    name: str
+    hidden_from: frozenset[str] = frozenset()
+    casts_shadow: bool = True
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "hidden_from", hidden_from(f"light {self.name!r}", self.hidden_from))
+        truth = checks.truth(f"casts_shadow of light {self.name!r}", self.casts_shadow)
+        object.__setattr__(self, "casts_shadow", truth)
+
+    @property
+    def is_dark(self) -> bool:
+        """Whether it gives no light at all."""
+        raise NotImplementedError
+
+    def _check(self, what: str, value: object, least: float = 0.0, most: float = LARGEST) -> None:
+        object.__setattr__(self, what, checks.number(f"{what} of light {self.name!r}", value, least, most))
+
+    def _check_angle(self) -> None:
+        """At most π, as which the float32 just above it counts, Blender's 180°."""
+        self._check("angle", self.angle, 0.0, float(np.float32(np.pi)))
+        object.__setattr__(self, "angle", min(self.angle, np.pi))
+
+    def _check_colour(self, what: str) -> None:
+        object.__setattr__(self, what, radiance(f"{what} of light {self.name!r}", getattr(self, what)))
+
+    def _check_matrix(self) -> None:
+        if np.shape(self.matrix) != (4, 4) or not (np.abs(self.matrix) <= LARGEST).all():
+            raise InputError(f"the matrix of light {self.name!r} must be 4 × 4 numbers below {LARGEST:g}: check its transform")
+
+
+@dataclass(frozen=True, eq=False)
+class Sun(Lamp):
+    """Light from one direction, or from a disc of directions.
+
+    towards : unit vector to the sun, world space. irradiance : (3,) on a surface that faces it. angle : diameter of the disc,
+    radians, 0 to π.
+    """
+
+    kind: ClassVar[str] = "sun"
+    towards: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    irradiance: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    angle: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._check_colour("irradiance")
+        self._check_angle()
+        towards = checks.vector(f"towards of light {self.name!r}", self.towards, 3)
+        largest = max(map(abs, towards))
+        if not largest > 0:
+            raise InputError(f"towards of light {self.name!r} is 0, 0, 0: give the direction to the sun")
+        if abs(math.hypot(*towards) - 1) > 2.0**-50:  # what is a unit vector stays one, to the last bit
+            towards = tuple(component / largest for component in towards)
+            towards = tuple(component / math.hypot(*towards) for component in towards)
+        object.__setattr__(self, "towards", towards)
+
+    @property
+    def is_dark(self) -> bool:
+        return not any(self.irradiance)
+
+
+@dataclass(frozen=True, eq=False)
+class Point(Lamp):
+    """A point, or a sphere that shines evenly.
+
+    position : world space. power : (3,). radius : world units. soft_falloff : instead of a sphere, a disc that turns towards
+    whatever it lights, as Blender's setting of that name makes it: close by, it lights less.
+    """
+
+    kind: ClassVar[str] = "point"
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    power: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    radius: float = 0.0
+    soft_falloff: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        position = checks.vector(f"position of light {self.name!r}", self.position, 3)
+        if max(map(abs, position)) > LARGEST:
+            raise InputError(f"position of light {self.name!r} is {checks.shown(position)}: give numbers below {LARGEST:g}")
+        object.__setattr__(self, "position", position)
+        self._check_colour("power")
+        self._check("radius", self.radius)
+
+    @property
+    def is_dark(self) -> bool:
+        return not any(self.power)
+
+
+@dataclass(frozen=True, eq=False)
+class Spot(Lamp):
+    """A point or sphere that shines into a cone about its local −z axis.
+
+    matrix : (4, 4) float64, the lamp's space to world space; angles are measured in the lamp's space. power : (3,), of a point
+    that would shine everywhere as in the middle of the cone. radius : world units. angle : of the whole cone, radians, 0 to π.
+    blend : 0 to 1, the part of the cone over which the light falls off. soft_falloff : as of points.
+    """
+
+    kind: ClassVar[str] = "spot"
+    matrix: NDArray[np.float64] = None
+    power: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    radius: float = 0.0
+    angle: float = np.pi / 4
+    blend: float = 0.15
+    soft_falloff: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._check_matrix()
+        self._check_colour("power")
+        self._check("radius", self.radius)
+        self._check_angle()
+        self._check("blend", self.blend, 0.0, 1.0)
+
+    @property
+    def is_dark(self) -> bool:
+        return not any(self.power) or np.linalg.det(self.matrix[:3, :3]) == 0
+
+
+@dataclass(frozen=True, eq=False)
+class Area(Lamp):
+    """A rectangle or an ellipse that shines evenly to one side, towards its local −z axis; one without an area is dark.
+
+    matrix : (4, 4) float64, the lamp's space to world space. size : along its local x and y axes, before the matrix. power :
+    (3,). ellipse : instead of a rectangle.
+    """
+
+    kind: ClassVar[str] = "area"
+    matrix: NDArray[np.float64] = None
+    size: tuple[float, float] = (1.0, 1.0)
+    power: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    ellipse: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._check_matrix()
+        self._check_colour("power")
+        size = checks.vector(f"size of light {self.name!r}", self.size, 2)
+        if not all(0 <= side <= LARGEST for side in size):
+            raise InputError(f"size of light {self.name!r} is {checks.shown(size)}: give two numbers from 0 to {LARGEST:g}")
+        object.__setattr__(self, "size", size)
+
+    @property
+    def area(self) -> float:
+        """In world space."""
+        across, along = self.matrix[:3, :2].T * np.array(self.size)[:, None]
+        return float(np.linalg.norm(np.cross(across, along))) * (np.pi / 4 if self.ellipse else 1.0)
+
+    @property
+    def is_dark(self) -> bool:
+        return not any(self.power) or self.area == 0 or not self.matrix[:3, 2].any()
+
+
+@dataclass(frozen=True)
+class World:
+    """Light from everywhere beyond the scene. radiance : (3,). hidden_from : as for lamps."""
+
+    radiance: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    hidden_from: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radiance", radiance("radiance of the world", self.radiance))
+        object.__setattr__(self, "hidden_from", hidden_from("the world", self.hidden_from))
+
+
+def hidden_from(name: str, rays: Collection[str]) -> frozenset[str]:
+    """The kinds of rays that something is hidden from; InputError with its `name` where there is no such kind."""
+    unknown = sorted(set(rays) - set(RAYS))
+    if unknown:
+        raise InputError(f"{name} is hidden from {unknown[0]!r}: give some of {', '.join(RAYS)}")
+    return frozenset(rays)

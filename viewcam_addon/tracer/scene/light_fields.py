@@ -1,0 +1,163 @@
+"""What light is made of, as a scene file has it: materials, images, lamps, world, film and bounces.
+
+All of it may be left out, and each value that is what it would be without is left out when a scene is written. Angles are in
+radians: a file must give back the last bit of them, which degrees can't.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from . import Scene, placing
+from .fields import Arrays, Field
+from .film import Bounces, Film
+from .geometry_fields import array_document
+from .lamps import Area, Lamp, Point, Spot, Sun, World
+from .materials import Colour, Material, Picture
+
+KEYS = ("images", "materials", "lamps", "world", "film", "bounces")
+
+_LAMPS: dict[str, type[Lamp]] = {kind.kind: kind for kind in (Sun, Point, Spot, Area)}
+_WHITE = (1.0, 1.0, 1.0)
+
+_READERS: dict[str, Callable[[Field], Any]] = {
+    **dict.fromkeys(("towards", "irradiance", "position", "power", "radiance"), lambda field: field.vector(3)),
+    **dict.fromkeys(("angle", "radius", "blend", "filter_width", "exposure"), Field.number),
+    **dict.fromkeys(("casts_shadow", "soft_falloff", "ellipse", "transparent"), Field.truth),
+    **dict.fromkeys(("total", "diffuse", "glossy", "transmission"), lambda field: field.whole(0)),
+    "filter": Field.text,
+    "size": lambda field: field.vector(2),
+    "hidden_from": lambda field: hidden_from(field),
+}
+"""How the values are read that are called the same as in Lamp, World, Film and Bounces."""
+
+
+def light_document(scene: Scene, arrays: dict[str, NDArray]) -> dict:
+    """What the JSON holds of a scene's light; large images go into `arrays`."""
+    document = {
+        "images": {
+            name: {
+                "pixels": array_document(picture.pixels, f"image{index}.pixels", arrays),
+                **({"srgb": True} if picture.srgb else {}),
+            }
+            for index, (name, picture) in enumerate(scene.images.items())
+        },
+        "materials": {name: _material_document(material) for name, material in scene.materials.items()},
+        "lamps": [{"type": lamp.kind, "name": lamp.name} | _changed(lamp) for lamp in scene.lamps],
+        "world": _changed(scene.world),
+        "film": _changed(scene.film),
+        "bounces": _changed(scene.bounces),
+    }
+    return {key: value for key, value in document.items() if value}
+
+
+def light(fields: dict[str, Field], arrays: Arrays) -> dict[str, Any]:
+    """The arguments of `Scene` that those of `KEYS` among the fields give."""
+    found: dict[str, Any] = {}
+    if "images" in fields:
+        found["images"] = {name: _picture(field, arrays) for name, field in fields["images"].named("image").items()}
+    if "materials" in fields:
+        found["materials"] = {name: _material(field) for name, field in fields["materials"].named("material").items()}
+    if "lamps" in fields:
+        found["lamps"] = tuple(_lamp(field) for field in fields["lamps"].items("lamp"))
+    for key, kind in (("world", World), ("film", Film), ("bounces", Bounces)):
+        if key in fields:
+            found[key] = _simple(kind, fields[key])
+    return found
+
+
+def hidden_from(field: Field) -> frozenset[str]:
+    """Kinds of rays; whether there are such kinds is asked by what has the value."""
+    return frozenset(ray.text() for ray in field.items("kind of ray"))
+
+
+def _changed(owner: Lamp | World | Film | Bounces) -> dict[str, Any]:
+    """The values that are not what they are by default."""
+    changed = {}
+    for each in dataclasses.fields(owner):
+        value = getattr(owner, each.name)
+        if each.name == "matrix":
+            changed["matrix"] = value.tolist()
+        elif each.name != "name" and value != each.default:
+            changed[each.name] = sorted(value) if isinstance(value, frozenset) else value
+    return changed
+
+
+def _material_document(material: Material) -> dict[str, Any]:
+    document = {} if material.ior == Material.ior else {"ior": material.ior}
+    for each in dataclasses.fields(material):
+        colour = getattr(material, each.name)
+        if isinstance(colour, Colour):
+            document[each.name] = _colour_document(colour)
+    return document
+
+
+def _colour_document(colour: Colour) -> list[float] | dict[str, Any]:
+    if colour == Colour(colour.rgb):
+        return list(colour.rgb)
+    document = {each.name: getattr(colour, each.name) for each in dataclasses.fields(colour)}
+    return {key: value for key, value in document.items() if value and (key, value) != ("rgb", _WHITE)}
+
+
+def _picture(field: Field, arrays: Arrays) -> Picture:
+    keys = field.fields(("pixels",), ("srgb",))
+    pixels = keys["pixels"].array(arrays, np.float32, (None, None, 3))
+    try:
+        return Picture(pixels, keys["srgb"].truth() if "srgb" in keys else False)
+    except InputError as error:
+        field.hand_on(error)
+
+
+def _material(field: Field) -> Material:
+    components = [each.name for each in dataclasses.fields(Material) if each.name != "ior"]
+    keys = field.fields((), (*components, "ior"))
+    colours = {name: _colour(keys[name]) for name in components if name in keys}
+    try:
+        return Material(**colours, **({"ior": keys["ior"].number()} if "ior" in keys else {}))
+    except InputError as error:
+        field.hand_on(error)
+
+
+def _colour(field: Field) -> Colour:
+    """Three numbers, or an object where an image or the mesh's own colours come in."""
+    keys = {"rgb": field} if isinstance(field.value, list) else field.fields((), ("rgb", "image", "closest", "vertex"))
+    try:
+        return Colour(
+            rgb=keys["rgb"].vector(3) if "rgb" in keys else _WHITE,
+            image=keys["image"].text() if "image" in keys else None,
+            closest=keys["closest"].truth() if "closest" in keys else False,
+            vertex=keys["vertex"].truth() if "vertex" in keys else False,
+        )
+    except InputError as error:
+        field.hand_on(error)
+
+
+def _lamp(field: Field) -> Lamp:
+    kind = field.fields(("type", "name"), others=True)["type"]
+    if kind.text() not in _LAMPS:
+        kind.fail(f"is {kind.value!r}: give one of {', '.join(_LAMPS)}")
+    lamp = _LAMPS[kind.value]
+    names = [each.name for each in dataclasses.fields(lamp) if each.name not in ("name", "matrix")]
+    is_placed = len(names) + 1 < len(dataclasses.fields(lamp))
+    keys = field.fields(("type", "name"), (*names, *(placing.KEYS if is_placed else ())))
+    values = {name: _READERS[name](keys[name]) for name in names if name in keys}
+    if is_placed:
+        values["matrix"] = placing.matrix(field, keys)
+    try:
+        return lamp(keys["name"].text(), **values)
+    except InputError as error:
+        field.hand_on(error)
+
+
+def _simple(kind: type, field: Field) -> Any:
+    """A World, Film or Bounces."""
+    keys = field.fields((), tuple(each.name for each in dataclasses.fields(kind)))
+    values = {name: _READERS[name](each) for name, each in keys.items()}
+    try:
+        return kind(**values)
+    except InputError as error:
+        field.hand_on(error)

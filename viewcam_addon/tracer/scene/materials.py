@@ -1,0 +1,102 @@
+"""What surfaces are made of, as data: the few materials whose light has an answer in closed form.
+
+A material is a sum of components, each with a colour: Lambert's diffuse reflection, emission, a perfect mirror, clear glass and
+clear refraction. That is what Blender's shaders reduce to where they are smooth or rough all the way; what lies between is not
+modelled (blender/shaders.py finds the stand-in). Rejected: a graph of nodes, which would be a second Cycles, and roughness,
+which would need its microfacets to the last constant.
+
+Colours are linear, in the scene's own primaries; nobody here knows which.
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import checks
+from ...errors import InputError
+
+# Float32 passes and float64 sums hold products of these.
+LARGEST_RADIANCE = 1e18
+
+
+def radiance(name: str, values: object) -> tuple[float, float, float]:
+    """Three numbers that light can have: finite, not negative, not beyond `LARGEST_RADIANCE`; InputError with `name`."""
+    rgb = checks.vector(name, values, 3)
+    if not all(0.0 <= value <= LARGEST_RADIANCE for value in rgb):
+        raise InputError(f"{name} is {checks.shown(rgb)}: give three numbers from 0 to {LARGEST_RADIANCE:g}")
+    return rgb
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """An image that colours surfaces, laid out over UV (0, 0) to (1, 1) and repeated beyond.
+
+    pixels : (height, width, 3) float32, rows from the bottom; encoded as sRGB where `srgb` is true, else linear. Between
+        pixels the encoded values are interpolated, as Cycles does.
+    """
+
+    pixels: NDArray[np.float32]
+    srgb: bool = False
+
+    def __post_init__(self) -> None:
+        if self.pixels.ndim != 3 or self.pixels.shape[2] != 3 or not self.pixels.size:
+            raise InputError(f"an image has the shape {self.pixels.shape} and must have height × width × 3: check it")
+        if not np.isfinite(self.pixels).all():
+            raise InputError("an image holds a number that is not finite: check it")
+
+
+@dataclass(frozen=True)
+class Colour:
+    """A colour, the same everywhere or times what an image or the mesh's own colours say.
+
+    rgb : factors, not negative. image : key in `Scene.images`, looked up at the mesh's UV, or None. closest : the nearest pixel
+    of the image instead of a linear interpolation between four. vertex : times the mesh's `corner_colours`.
+    """
+
+    rgb: tuple[float, float, float]
+    image: str | None = None
+    closest: bool = False
+    vertex: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "rgb", radiance("a colour", self.rgb))
+
+    @property
+    def is_black(self) -> bool:
+        return not any(self.rgb)
+
+
+@dataclass(frozen=True)
+class Material:
+    """The components that a surface's light is the sum of; None is no such component.
+
+    diffuse : albedo of a Lambert surface, both of its sides. emission : radiance, of both sides. mirror : reflectance of a
+    perfect mirror. glass : colour of what is reflected and refracted by a clear dielectric, shared out by Fresnel's equations.
+    refraction : colour of what is refracted, nothing being reflected. ior : of glass and refraction, inside over outside.
+    """
+
+    diffuse: Colour | None = None
+    emission: Colour | None = None
+    mirror: Colour | None = None
+    glass: Colour | None = None
+    refraction: Colour | None = None
+    ior: float = 1.45
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "ior", checks.number("ior of a material", self.ior, 1e-3, 1e3))
+
+    @property
+    def colours(self) -> dict[str, Colour]:
+        """Component → its colour, without those that are None or black."""
+        found = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "ior"}
+        return {name: colour for name, colour in found.items() if colour is not None and not colour.is_black}
+
+    @property
+    def scatters(self) -> bool:
+        """Whether any light that falls on it leaves it again."""
+        return bool(self.colours.keys() - {"emission"})
+
+
+PLAIN = Material(diffuse=Colour((0.8, 0.8, 0.8)))
+"""What a surface without a material is made of, in Blender as here."""
