@@ -91,7 +91,7 @@ def prepare_cycles(folder: Path, width: int, height: int, levels: int, threads: 
     from viewcam_addon.blender.ledger import Ledger
 
     viewcam_addon.register()
-    scene, camera_object = _suzannes(width, height, levels)
+    scene, camera_object = suzannes(width, height, levels)
     view_layer = scene.view_layers[0]
     ledger = Ledger()
     scene_file.write(export_scene(scene, view_layer, camera_object, ledger), folder / "scene.json")
@@ -113,7 +113,7 @@ def prepare_cycles(folder: Path, width: int, height: int, levels: int, threads: 
     return {"Cycles": picture, "Cycles and its file": race.timed(with_file)}
 
 
-def _suzannes(width: int, height: int, levels: int):
+def suzannes(width: int, height: int, levels: int):
     """Three smooth Suzannes with UV maps and materials, and a camera before them."""
     import bpy
 
@@ -134,6 +134,7 @@ def _suzannes(width: int, height: int, levels: int):
     scene.render.resolution_x, scene.render.resolution_y = width, height
     pinhole = Pinhole((0.4, -6, 1.1), (0, 0, -0.1), (0, 0, 1), 1.45 * width / 1.92, width, height)
     camera.apply(camera_object, pinhole, scene)
+    scene.camera = camera_object
     return scene, camera_object
 
 

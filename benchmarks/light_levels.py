@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from benchmarks import race
+from benchmarks import geometry_level, race
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import Scene, scene_file
 from viewcam_addon.tracer.scene.film import NO_BOUNCES
@@ -28,7 +28,10 @@ SCENES = Path(__file__).resolve().parent.parent / "sample_scenes"
 
 @dataclass(frozen=True)
 class Contest:
-    """A sample scene at a level. least : how many times Cycles' samples a second are wanted."""
+    """A scene at a level: one of the sample scenes, or "suzannes", subdivided ones under one sun.
+
+    least : how many times Cycles' samples a second are wanted.
+    """
 
     scene: str
     level: str
@@ -38,8 +41,9 @@ class Contest:
 
 
 CONTESTS = (
-    Contest("studio", "direct", (640, 360), 16, 2.0),
-    Contest("cornell", "direct", (480, 480), 16, 2.0),
+    Contest("suzannes", "direct", (640, 360), 64, 2.0),
+    Contest("studio", "direct", (640, 360), 64, 2.0),
+    Contest("cornell", "direct", (480, 480), 64, 2.0),
     Contest("studio", "path", (640, 360), 16, 0.5),
     Contest("cornell", "path", (480, 480), 16, 0.5),
 )
@@ -91,7 +95,12 @@ def prepare_cycles(contest: Contest, path: Path, threads: int) -> dict[str, race
     from viewcam_addon.blender.ledger import Ledger
 
     viewcam_addon.register()
-    job.open_blend(SCENES / f"{contest.scene}.blend")
+    if contest.scene == "suzannes":
+        geometry_level.suzannes(*contest.size, levels=3)
+        bpy.ops.object.light_add(type="SUN", rotation=(0.8, 0.3, 0.2))
+        bpy.context.object.data.energy = 3
+    else:
+        job.open_blend(SCENES / f"{contest.scene}.blend")
     scene, ledger = bpy.context.scene, Ledger()
     view_layer, camera_object = scene.view_layers[0], scene.camera
     scene.render.resolution_x, scene.render.resolution_y = contest.size

@@ -222,8 +222,8 @@ def test_memory_beside_the_passes_does_not_grow_with_picture_and_samples(lively)
         tracemalloc.stop()
         return peak - sum(values.nbytes for values in passes.values())
 
-    small, large, longer = beside(80, 60, 16), beside(240, 160, 16), beside(80, 60, 64)
-    assert small <= illumination.PATHS * 8 * 250, f"{small / 1e6:.1f} MB"
+    small, large, longer = beside(200, 170, 16), beside(400, 200, 16), beside(200, 170, 32)
+    assert small <= 2 * illumination.PATHS * 8 * 250, f"{small / 1e6:.1f} MB"
     for other in (large, longer):
         assert other <= 1.3 * small + 1e6, f"{small / 1e6:.1f} MB, and {other / 1e6:.1f} MB for the larger one"
 

@@ -23,8 +23,9 @@ from .sampler import Sampler
 from .sums import Sums
 from .textures import Palette
 
-# Paths that are traced at a time, and of how many samples of a pixel if there are as many. Fewer would fit a core's cache, and
-# take a fifth longer: after some scatterings few are left, and NumPy is called as often for these.
+# Paths that are traced at a time, twice as many where light bounces, and of how many samples of a pixel if there are as many.
+# Fewer would fit a core's cache, and take a fifth longer: after some scatterings few are left, and NumPy is called as often for
+# these.
 PATHS, SAMPLES_AT_A_TIME = 65536, 16
 
 CENTRES = ("Depth", "Object Index")
@@ -53,12 +54,13 @@ class Illumination:
         palette, space = Palette(scene), Space(surfaces)
         emitters = Emitters(scene, view, surfaces, palette)
         bounces = scene.bounces if level == "path" else NO_BOUNCES
+        self._paths_at_a_time = 2 * PATHS if bounces.total else PATHS
         self._paths = Paths(surfaces, space, emitters, palette, self._sampler, bounces, scene.clip)
 
     @property
     def largest_tile(self) -> int:
         """Pixels."""
-        return PATHS // min(self._samples, SAMPLES_AT_A_TIME)
+        return self._paths_at_a_time // min(self._samples, SAMPLES_AT_A_TIME)
 
     def trace(self, passes: Passes, pixels: Indices, columns: Floats, rows: Floats, check: Callable[[], None]) -> None:
         """Write the light of n pixels into passes, name → (n, channels).
@@ -67,7 +69,7 @@ class Illumination:
         """
         count = len(pixels)
         sums = Sums(count, self._paths.categories, self._film, self._samples)
-        at_a_time = max(1, PATHS // count)
+        at_a_time = max(1, self._paths_at_a_time // count)
         for first in range(0, self._samples, at_a_time):
             some = np.arange(first, min(first + at_a_time, self._samples))
             pixel, sample = np.tile(pixels, len(some)), np.repeat(some, count)
