@@ -88,9 +88,11 @@ scenes: .venvs/4.2/ready
 
 charts: .venv/test
 	.venv/bin/viewcam chart stability --json docs/charts/stability.json
+	.venv/bin/viewcam chart light --json docs/charts/light.json
 
 benchmark: .venv/demo
 	.venv/bin/python -m benchmarks.geometry_level
+	.venv/bin/python -m benchmarks.light_levels
 
 clean:
 	rm -rf .venv .venvs .pytest_cache .ruff_cache .hypothesis wheels dist build demo

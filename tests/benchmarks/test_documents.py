@@ -1,0 +1,18 @@
+"""The pages that show charts: all of them, and no others, with the figures that they were drawn from."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+
+
+@pytest.mark.parametrize("subject", ["stability", "light"])
+def test_the_page_shows_every_chart_and_the_figures_that_it_was_drawn_from(subject):
+    figures = json.loads((DOCS / "charts" / f"{subject}.json").read_text(encoding="utf-8"))
+    page = (DOCS / f"{subject}.md").read_text(encoding="utf-8")
+    shown = set(re.findall(rf"\(charts/({subject}-[a-z-]+)\.svg\)", page))
+    assert shown == set(figures["charts"]) == {path.stem for path in (DOCS / "charts").glob(f"{subject}-*.svg")}
+    assert figures["behind"] == []
