@@ -121,7 +121,7 @@ def test_light_is_the_same_within_noise_inside_a_real_blender(real_blender, scen
     words = ["check", "--level", "path", "--samples", "1024", "--size", size]
     outcome = real_blender.run("-b", ROOT / "sample_scenes" / f"{scene}.blend", "--command", "viewcam", *words)
     assert outcome.returncode == 0, outcome.stdout + outcome.stderr
-    assert "The same within noise at 1024 " in outcome.stdout, outcome.stdout
+    assert "The same within noise at 1,024 samples" in outcome.stdout, outcome.stdout
 
 
 def test_bad_input_inside_a_real_blender_is_one_sentence(real_blender, tmp_path):
