@@ -134,7 +134,10 @@ def test_flip_is_nothing_for_equal_pictures_and_much_for_others(same):
 
 def test_a_reference_without_light_is_not_judged_by_light(paper_scene):
     assert radiance.carries_light(both()[0])
-    assert not radiance.carries_light(paper_scene.picture())
+    geometry = paper_scene.picture()
+    assert not radiance.carries_light(geometry)
+    combined = np.zeros((*geometry["Depth"].shape[:2], 4), np.float32)
+    assert not radiance.carries_light(replace(geometry, passes=geometry.passes | {"Combined": combined})), "as Cycles writes it"
     with pytest.raises(InputError, match="no pass 'Depth'"):
         dark = Image({"Combined": np.zeros((HEIGHT, WIDTH, 4), np.float32)}, PINHOLE)
         radiance.compare(dark, [dark], PINHOLE)

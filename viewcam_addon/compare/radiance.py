@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..image import Image
+from ..image import LIGHT_PASSES, Image
 from ..pinhole import Pinhole
 from . import light_verdict, perception, questions, steady
 from .law import Array
@@ -123,8 +123,8 @@ class RadianceComparison:
 
 
 def carries_light(image: Image) -> bool:
-    """Whether a reference is to be compared by its light."""
-    return "Combined" in image.passes
+    """Whether a reference is to be compared by its light: Combined alone comes with every picture of Cycles."""
+    return "Combined" in image.passes and any(name in image.passes for name in LIGHT_PASSES if name != "Combined")
 
 
 def compare(reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_samples: int | None = None) -> RadianceComparison:
