@@ -81,4 +81,4 @@ def test_what_has_no_power_no_area_or_no_direction_is_dark(lamp, dark):
 def test_every_kind_of_ray_may_be_hidden_from():
     assert Sun("sun", hidden_from=RAYS).hidden_from == World(hidden_from=RAYS).hidden_from == frozenset(RAYS)
     with pytest.raises(NotImplementedError):
-        Lamp("lamp").is_dark  # noqa: B018
+        bool(Lamp("lamp").is_dark)
