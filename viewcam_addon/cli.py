@@ -8,6 +8,7 @@ Here are the words; what they do is in commands.py.
 
 import argparse
 import json
+import math
 import os
 import shlex
 import sys
@@ -93,17 +94,21 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         added.add_argument("--clay", action="store_true", help="the same matte material on everything, on both sides")
         light(added)
 
-    def light(added: argparse.ArgumentParser) -> None:
+    def light(added: argparse.ArgumentParser, samples: argparse._ActionsContainer | None = None) -> None:
         added.add_argument(
             "--level",
             choices=["geometry", "direct", "path", "auto"],
             default="geometry",
             help="how much is modelled; auto is the least that shows the scene's light (default: %(default)s)",
         )
-        added.add_argument(
+        (samples or added).add_argument(
             "--samples", type=_positive, metavar="N", default=SAMPLES, help="samples a pixel, for light (default: %(default)s)"
         )
         added.add_argument("--seed", type=_seed, metavar="N", default=0, help="another noise for another number (default: 0)")
+
+    def error(added: argparse._ActionsContainer, text: str) -> None:
+        text = f"for light: {text} as many samples of each pixel as it takes for a standard error of E, in the picture's units"
+        added.add_argument("--error", type=_error, metavar="E", help=text)
 
     def report(added: argparse.ArgumentParser) -> None:
         added.add_argument("--report", metavar="DIR", type=Path, help="write an HTML report there")
@@ -118,7 +123,9 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     added.add_argument("image", metavar="OUT.exr", type=Path)
     added.add_argument("--size", type=_size, metavar="WxH", help="pixels of the picture (default: the scene's)")
     added.add_argument("--stated", action="store_true", help="trace the four values as stated, not as Blender stored them")
-    light(added)
+    spent = added.add_mutually_exclusive_group()
+    light(added, spent)
+    error(spent, "in place of --samples")
 
     added = command(
         commands.cycles, "cycles", "Render a .blend with Cycles so that it can be compared, and give every setting back."
@@ -142,11 +149,13 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     added = command(commands.check, "check", "Export, trace, render with Cycles and compare, all in one go.")
     blend(added)
     scene_choices(added)
+    error(added, "the tracer takes")
     report(added)
 
     added = command(commands.demo, "demo", "Check the studio still that comes with the project, and write the report.")
     added.set_defaults(blend=commands.DEMO_SCENE, camera=None, frame=None, size=None, strict=False, recenter=False, clay=False)
     light(added)
+    error(added, "the tracer takes")
     added.add_argument(
         "--report", metavar="DIR", type=Path, default=Path("demo"), help="where the report goes (default: %(default)s)"
     )
@@ -169,6 +178,16 @@ def _positive(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is no whole number above 0")
     return int(text)
+
+
+def _error(text: str) -> float:
+    try:
+        error = float(text)
+    except ValueError:
+        error = math.nan
+    if not 0 < error < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number above 0")
+    return error
 
 
 def _seed(text: str) -> int:

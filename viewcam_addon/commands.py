@@ -21,6 +21,7 @@ from typing import Any
 
 from .errors import InputError
 from .terminal import silent_libraries
+from .tracer.scene.film import MOST_SAMPLES
 
 PACKAGE = Path(__file__).parent
 DEMO_SCENE = PACKAGE.parent / "sample_scenes" / "studio.blend"
@@ -60,11 +61,15 @@ def render(options: argparse.Namespace) -> Result:
     told = _told_level(scene) if options.level == "auto" else {}
     level = told.get("level", options.level)
     started = time.perf_counter()
-    passes = trace(scene, level, options.samples, options.seed, options.threads)
+    samples = MOST_SAMPLES if options.error else options.samples
+    passes = trace(scene, level, samples, options.seed, options.threads, **({"error": options.error} if options.error else {}))
     seconds = time.perf_counter() - started
     attributes = {"software": "Virtual Pinhole", "level": level}
     if level != "geometry":
-        attributes |= {"samples": str(options.samples), "seed": str(options.seed)}
+        if options.error:
+            samples = round(float(passes["Sample Count"].mean(dtype=float)))
+            attributes["error"] = str(options.error)
+        attributes |= {"samples": str(samples), "seed": str(options.seed)}
     image.write(options.image, image.Image(passes, scene.camera, attributes))
     print(f"traced {scene.camera.width} × {scene.camera.height} pixels in {seconds:.2f} s")
     return 0, {"image": str(options.image), "seconds": seconds} | told
@@ -127,7 +132,8 @@ def check(options: argparse.Namespace) -> Result:
         tests = [folder / f"cycles-{i + 1}.exr" for i in range(count)] if count > 1 else [folder / "cycles.exr"]
         level = _export_and_render(options, scene, tests)
         threads = ["--threads", str(options.threads)] if options.threads else []
-        light = ["--level", level, "--samples", str(options.samples), "--seed", str(options.seed)]
+        spent = ["--error", str(options.error)] if options.error else ["--samples", str(options.samples)]
+        light = ["--level", level, *spent, "--seed", str(options.seed)]
         status = run_beside("render", scene, reference, *light, *threads)
         if status:
             return status, {"error": "the reference could not be traced"}

@@ -13,6 +13,9 @@ LEVELS = ("geometry", "direct", "path")
 SAMPLES = 64
 """Samples a pixel, at the levels of light, where nobody says how many."""
 
+MOST_SAMPLES = 4096
+"""The most that a pixel gets where an error is wanted in place of a number of samples."""
+
 
 @dataclass(frozen=True)
 class Film:
