@@ -43,7 +43,7 @@ class Curve:
     x, y : as many numbers each. y = 0 lies on the lower edge; nan and inf mean that the method has no answer there.
     ours : whether it is the method in use. league : curves compete with those of the same league only (a method that computes
         in float64 does not compete with what Blender stores in float32). tie : errors up to this count as equal, the chart's
-        own tie if it is None.
+        own tie if it is None. limit : no method, but what the others of its league must not exceed.
     """
 
     name: str
@@ -52,6 +52,7 @@ class Curve:
     ours: bool = False
     league: str = ""
     tie: float | None = None
+    limit: bool = False
 
     def __post_init__(self) -> None:
         if len(self.x) != len(self.y):
@@ -80,10 +81,20 @@ class Chart:
     log_y: bool = True
 
     def behind(self) -> list[str]:
-        """One sentence for each place where the method in use is worse than twice the best of its league, and beyond a tie."""
+        """One sentence for each place where the method in use is worse than twice the best of its league, and beyond a tie;
+        and for each where a method is above a limit.
+        """
         sentences = []
+        for limit in (curve for curve in self.curves if curve.limit):
+            judged = [curve for curve in self.curves if curve.league == limit.league and not curve.limit]
+            for x, most in zip(limit.x, limit.y, strict=True):
+                sentences += [
+                    f"{self.title}: at {x:.3g} {name} is {y:.3g}, above {limit.name}, {most:.3g}"
+                    for y, name in _errors_at(x, judged)
+                    if y > most
+                ]
         for ours in (curve for curve in self.curves if curve.ours):
-            rivals = [curve for curve in self.curves if curve.league == ours.league and not curve.ours]
+            rivals = [curve for curve in self.curves if curve.league == ours.league and not (curve.ours or curve.limit)]
             tie = self.tie if ours.tie is None else ours.tie
             for x, error in zip(ours.x, ours.y, strict=True):
                 best, name = min(_errors_at(x, rivals), default=(math.inf, ""))
@@ -181,7 +192,9 @@ def _decades(chart: Chart) -> tuple[float, float]:
 def _styles(chart: Chart) -> list[tuple[Curve, str, str]]:
     """Each curve with its colour and marker; those in use last, so that they lie on top."""
     others = iter(zip(_COLOURS, _MARKERS, strict=True))
-    styled = [(curve, *((_OURS, "o") if curve.ours else next(others))) for curve in chart.curves]
+    styled = [
+        (curve, *((_OURS, "o") if curve.ours else ("0.5", "") if curve.limit else next(others))) for curve in chart.curves
+    ]
     return sorted(styled, key=lambda style: style[0].ours)
 
 
@@ -191,7 +204,8 @@ def _draw_curve(curve: Curve, axes: Axes, colour: str, marker: str) -> None:
     answered = np.isfinite(y)
     shown = np.where(answered, np.clip(y, low, high) if axes.get_yscale() == "log" else y, np.nan)
     style = {"linewidth": 2.8, "markersize": 5} if curve.ours else {"linewidth": 1.2, "markersize": 4}
-    dash = {"linestyle": "--"} if curve.ours and any(line.get_color() == colour for line in axes.lines) else {}
+    dashed = curve.limit or (curve.ours and any(line.get_color() == colour for line in axes.lines))
+    dash = {"linestyle": "--"} if dashed else {}
     name = textwrap.fill(curve.name, 27)
     axes.plot(x, shown, color=colour, marker=marker, label=name, clip_on=False, **style, **dash)
     if not answered.all():

@@ -42,6 +42,19 @@ def test_a_rival_without_an_answer_beats_nobody():
     assert chart_of(Curve("ours", X, (1, 1, math.nan), ours=True), Curve("other", X, (math.nan,) * 3)).behind() == []
 
 
+def test_what_is_above_a_limit_is_told_with_both_figures_and_what_is_below_it_is_not():
+    limit = Curve("what is allowed", X, (3.0, 3.0, 3.0), limit=True)
+    assert chart_of(limit, Curve("memory", X, (1.0, 2.9, 3.0))).behind() == []
+    (sentence,) = chart_of(limit, Curve("memory", X, (1.0, 3.1, 3.0))).behind()
+    assert "at 0.1 memory is 3.1, above what is allowed, 3" in sentence
+    assert chart_of(limit, Curve("memory", X, (9.0, 9.0, 9.0), league="other")).behind() == []
+
+
+def test_a_limit_is_no_rival():
+    limit, ours = Curve("what is allowed", X, (1e-9,) * 3, limit=True), Curve("ours", X, (1e-10,) * 3, ours=True)
+    assert chart_of(limit, ours, Curve("other", X, (2e-10,) * 3)).behind() == []
+
+
 def test_a_curve_of_unequal_lengths_is_refused():
     with pytest.raises(ValueError, match="3 x and 2 y"):
         Curve("ours", X, (1, 1))
