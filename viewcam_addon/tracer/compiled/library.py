@@ -20,11 +20,13 @@ except ImportError:  # no wheel for this machine
 
 FUNCTIONS = ("rtcIntersect16", "rtcOccluded16")
 
-# struct RTCRayHit16 as rows of 16 float32 or int32, and a row for which lanes hold rays.
+# struct RTCRayHit16 as rows of 16 float32 or int32, and a row for which lanes hold rays, and one for what else Embree is told.
 LANES = 16
 ORIGIN, NEAR, DIRECTION, TIME, FAR, MASK, ID, FLAGS = 0, 3, 4, 7, 8, 9, 10, 11
 PRIMITIVE, GEOMETRY, INSTANCE, INSTANCE_PRIMITIVE, VALID = 17, 18, 19, 20, 21
-ROWS = 22
+ARGUMENTS = 22  # struct RTCIntersectArguments: flags, which features (all), and null pointers
+ROWS = 23
+COHERENT = 1 << 16  # RTC_RAY_QUERY_FLAG_COHERENT
 ALIGNMENT = 64  # bytes
 
 _SCENE = object.__basicsize__  # cdef class EmbreeScene: the scene, whether it is committed, its device
@@ -36,6 +38,17 @@ def pointer_of(scene: "rtcore_scene.EmbreeScene") -> int:
     return ctypes.c_size_t.from_address(id(scene) + _SCENE).value
 
 
+def shared() -> ctypes.CDLL:
+    """Embree's library.
+
+    Raises
+    ------
+    OSError
+        if it is not there.
+    """
+    return ctypes.CDLL(str(_windows_library() if os.name == "nt" else rtcore_scene.__file__))
+
+
 def addresses() -> dict[str, int]:
     """Where in memory Embree's packet functions are.
 
@@ -44,7 +57,7 @@ def addresses() -> dict[str, int]:
     OSError, AttributeError
         if there are none.
     """
-    library = ctypes.CDLL(str(_windows_library() if os.name == "nt" else rtcore_scene.__file__))
+    library = shared()
     return {name: ctypes.cast(getattr(library, name), ctypes.c_void_p).value for name in FUNCTIONS}
 
 

@@ -41,7 +41,7 @@ class Triangles:
     object_index, material_index : (m,) float32, what the passes show.
     largest_coordinate : (m,) float32, of the three vertices in world space, without its sign.
     placed : the objects with their meshes, whose triangles follow one another.
-    embree_scenes : what embree.py made of them.
+    embree_scenes : what embree.py made of them. former_scenes : what it made of them when their vertices were elsewhere.
     """
 
     vertices: Floats
@@ -53,6 +53,7 @@ class Triangles:
     largest_coordinate: Float32s
     placed: tuple[tuple[Object, Mesh], ...]
     embree_scenes: dict = field(default_factory=dict)
+    former_scenes: dict = field(default_factory=dict)
 
     @property
     def count(self) -> int:
