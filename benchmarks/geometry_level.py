@@ -19,9 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import race
+from benchmarks import memory, race
 from viewcam_addon import image
-from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.rays import visibility
 from viewcam_addon.tracer.rays.triangles import triangles_of
 from viewcam_addon.tracer.rays.view import View
@@ -39,12 +38,12 @@ def main() -> int:
     width, height = map(int, options.size.split("x"))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        with race.Blender(prepare_cycles, folder, width, height, options.levels, options.threads) as blender:
+        with race.Contestant(prepare_cycles, folder, width, height, options.levels, options.threads) as blender:
             scene = scene_file.read(folder / "scene.json")
             times = race.run(blender.runners() | _tracer_runners(scene, folder, options.threads), options.rounds)
         megabytes = {side: (folder / f"{side}.exr").stat().st_size / 1e6 for side in ("cycles", "tracer")}
-    memory = {"tracer": race.peak_memory(), "Cycles": blender.peak_memory}
-    _report(times, megabytes, memory, scene, options)
+    peaks = {"tracer": memory.peak() / 1e6, "Cycles": blender.peak_memory}
+    _report(times, megabytes, peaks, scene, options)
     return 0
 
 
@@ -84,6 +83,7 @@ def _bare_embree(scene: Scene, threads: int) -> Callable[[], object]:
 def prepare_cycles(folder: Path, width: int, height: int, levels: int, threads: int) -> dict[str, race.Runner]:
     """In Blender's process: write the scene, and offer Cycles' renders."""
     import viewcam_addon
+    from benchmarks import suzannes
     from viewcam_addon.blender import cycles
     from viewcam_addon.blender.borrowing import borrowed, still_of_one_layer
     from viewcam_addon.blender.depsgraph import render_still
@@ -91,7 +91,7 @@ def prepare_cycles(folder: Path, width: int, height: int, levels: int, threads: 
     from viewcam_addon.blender.ledger import Ledger
 
     viewcam_addon.register()
-    scene, camera_object = suzannes(width, height, levels)
+    scene, camera_object = suzannes.three(width, height, levels)
     view_layer = scene.view_layers[0]
     ledger = Ledger()
     scene_file.write(export_scene(scene, view_layer, camera_object, ledger), folder / "scene.json")
@@ -113,32 +113,7 @@ def prepare_cycles(folder: Path, width: int, height: int, levels: int, threads: 
     return {"Cycles": picture, "Cycles and its file": race.timed(with_file)}
 
 
-def suzannes(width: int, height: int, levels: int):
-    """Three smooth Suzannes with UV maps and materials, and a camera before them."""
-    import bpy
-
-    from viewcam_addon.blender import camera
-
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    scene = bpy.context.scene
-    for index in range(3):
-        bpy.ops.mesh.primitive_monkey_add(location=(2.4 * index - 2.4, 0, 0), rotation=(0, 0, 0.3 * index - 0.3))
-        suzanne = bpy.context.object
-        suzanne.pass_index = index + 1
-        suzanne.data.materials.append(bpy.data.materials.new(f"paint {index}"))
-        suzanne.data.polygons.foreach_set("use_smooth", [True] * len(suzanne.data.polygons))
-        modifier = suzanne.modifiers.new("Subdivision", "SUBSURF")
-        modifier.levels = modifier.render_levels = levels
-    camera_object = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    scene.collection.objects.link(camera_object)
-    scene.render.resolution_x, scene.render.resolution_y = width, height
-    pinhole = Pinhole((0.4, -6, 1.1), (0, 0, -0.1), (0, 0, 1), 1.45 * width / 1.92, width, height)
-    camera.apply(camera_object, pinhole, scene)
-    scene.camera = camera_object
-    return scene, camera_object
-
-
-def _report(times: dict, megabytes: dict, memory: dict, scene: Scene, options: argparse.Namespace) -> None:
+def _report(times: dict, megabytes: dict, peaks: dict, scene: Scene, options: argparse.Namespace) -> None:
     median = race.medians(times)
     triangles = sum(len(scene.geometries[placed.geometry].triangles) for placed in scene.objects)
     rays = scene.camera.width * scene.camera.height
@@ -157,7 +132,7 @@ def _report(times: dict, megabytes: dict, memory: dict, scene: Scene, options: a
     line("share of bare Embree, with all preparation", "bare Embree", "tracer", "", ".0%")
     print()
     print(f"files: tracer {megabytes['tracer']:.0f} MB, Cycles {megabytes['cycles']:.0f} MB")
-    print(f"peak memory: tracer {memory['tracer']:.0f} MB, Blender with Cycles {memory['Cycles']:.0f} MB")
+    print(f"peak memory: tracer {peaks['tracer']:.0f} MB, Blender with Cycles {peaks['Cycles']:.0f} MB")
 
 
 if __name__ == "__main__":

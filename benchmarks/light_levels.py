@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from benchmarks import geometry_level, race
+from benchmarks import race
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import Scene, scene_file
 from viewcam_addon.tracer.scene.film import NO_BOUNCES
@@ -28,7 +28,7 @@ SCENES = Path(__file__).resolve().parent.parent / "sample_scenes"
 
 @dataclass(frozen=True)
 class Contest:
-    """A scene at a level: one of the sample scenes, or "suzannes", subdivided ones under one sun.
+    """A scene at a level: one of the sample scenes, or "suzannes", six of them under one sun.
 
     least : how many times Cycles' samples a second are wanted.
     """
@@ -68,7 +68,7 @@ def hold(contest: Contest, options: argparse.Namespace) -> bool:
     """Race both on one scene and say how it ended; whether as it is wanted."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scene.json"
-        with race.Blender(prepare_cycles, contest, path, options.threads) as blender:
+        with race.Contestant(prepare_cycles, contest, path, options.threads) as blender:
             scene = scene_file.read(path)
             trace = partial(render, scene, contest.level, contest.samples, threads=options.threads)
             times = race.run({**blender.runners(), "tracer": race.timed(trace)}, options.rounds)
@@ -88,6 +88,7 @@ def prepare_cycles(contest: Contest, path: Path, threads: int) -> dict[str, race
     import bpy
 
     import viewcam_addon
+    from benchmarks import suzannes
     from viewcam_addon.blender import cycles, job
     from viewcam_addon.blender.borrowing import borrowed, still_of_one_layer
     from viewcam_addon.blender.depsgraph import render_still
@@ -96,9 +97,7 @@ def prepare_cycles(contest: Contest, path: Path, threads: int) -> dict[str, race
 
     viewcam_addon.register()
     if contest.scene == "suzannes":
-        geometry_level.suzannes(*contest.size, levels=3)
-        bpy.ops.object.light_add(type="SUN", rotation=(0.8, 0.3, 0.2))
-        bpy.context.object.data.energy = 3
+        suzannes.six(*contest.size)
     else:
         job.open_blend(SCENES / f"{contest.scene}.blend")
     scene, ledger = bpy.context.scene, Ledger()
@@ -125,7 +124,7 @@ def compare_needs(options: argparse.Namespace) -> None:
     """What a scene does not have costs nothing: its time beside that of the next lower level."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scene.json"
-        with race.Blender(prepare_cycles, Contest("studio", "direct", (640, 360), 1, 0), path, options.threads):
+        with race.Contestant(prepare_cycles, Contest("studio", "direct", (640, 360), 1, 0), path, options.threads):
             scene = scene_file.read(path)
     dark = replace(scene, lamps=(), world=World())
     trace = partial(_trace, threads=options.threads)

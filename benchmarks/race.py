@@ -1,54 +1,75 @@
-"""Races between Cycles and the tracer. Blender has a process of its own: OpenEXR must not be loaded beside the one it brings.
+"""Races between renderers, each in a process of its own: Blender brings an OpenEXR that must not be loaded beside another, and
+what is decided when a module is imported, as whether loops are compiled, can differ.
 
 The rounds of a race are interleaved, since a machine's speed drifts, and what is reported are medians and their ratios.
 """
 
+import functools
 import multiprocessing
 import os
-import resource
 import statistics
-import sys
 import time
 from collections import defaultdict
 from collections.abc import Callable, Mapping
 from multiprocessing.connection import Connection
+from typing import Any
+from unittest import mock
 
+from viewcam_addon.errors import InputError, bug
 from viewcam_addon.terminal import silent_libraries
 
-Runner = Callable[[], float]
+from . import memory
+
+Runner = Callable[..., float]
 
 
-class Blender:
-    """A process with Blender in it, for the time of a `with` block.
+class Contestant:
+    """A contestant in a process of its own, for the time of a `with` block.
 
     prepare : a function at the top of a module; it is called there with the arguments and returns what can be asked for:
-    name → a function that does it once and returns its seconds.
+    name → a function that does it once and returns its seconds. environment : variables that the process finds set.
     """
 
-    def __init__(self, prepare: Callable[..., Mapping[str, Runner]], *arguments: object) -> None:
+    def __init__(
+        self, prepare: Callable[..., Mapping[str, Runner]], *arguments: object, environment: Mapping[str, str] | None = None
+    ) -> None:
         context = multiprocessing.get_context("spawn")
         self._here, there = context.Pipe()
         self._process = context.Process(target=_serve, args=(there, prepare, arguments))
-        self._process.start()
+        with mock.patch.dict(os.environ, environment or {}):
+            self._process.start()
         there.close()
-        self.names: list[str] = self._here.recv()
-        self.peak_memory = 0.0
+        self.names: list[str] = self._answer()
+        self.peak_memory = 0.0  # megabytes, once it has ended
 
-    def __enter__(self) -> "Blender":
+    def __enter__(self) -> "Contestant":
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self._here.send(None)
-        self.peak_memory = self._here.recv()
+    def __exit__(self, kind: type | None, *_: object) -> None:
+        if self._process.is_alive() and kind is None:
+            self._here.send(None)
+            self.peak_memory = self._here.recv()
+        else:
+            self._process.terminate()
         self._process.join()
 
     def runners(self) -> dict[str, Runner]:
-        """What can be asked for, as functions of this process."""
-        return {name: lambda name=name: self._ask(name) for name in self.names}
+        """What can be asked for, as functions of this process; their arguments are sent along."""
+        return {name: functools.partial(self._ask, name) for name in self.names}
 
-    def _ask(self, name: str) -> float:
-        self._here.send(name)
-        return self._here.recv()
+    def _ask(self, name: str, *arguments: object) -> float:
+        self._here.send((name, arguments))
+        return self._answer()
+
+    def _answer(self) -> Any:
+        """What comes back; what went wrong over there is raised here."""
+        try:
+            answer = self._here.recv()
+        except EOFError:
+            raise InputError("a contestant's process has ended by itself: run it alone to see why") from None
+        if isinstance(answer, InputError):
+            raise answer
+        return answer
 
 
 def run(runners: Mapping[str, Runner], rounds: int) -> dict[str, list[float]]:
@@ -75,18 +96,17 @@ def medians(times: Mapping[str, list[float]]) -> dict[str, float]:
     return {name: statistics.median(seconds) for name, seconds in times.items()}
 
 
-def peak_memory() -> float:
-    """Megabytes; the operating system counts them in kilobytes, macOS in bytes."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
-
-
 def _serve(asked: Connection, prepare: Callable[..., Mapping[str, Runner]], arguments: tuple) -> None:
-    """Blender keeps its progress to itself."""
+    """Renderers keep their progress to themselves; what goes wrong is told in a sentence."""
     with silent_libraries():
-        runners = prepare(*arguments)
-        asked.send(list(runners))
-        while (name := asked.recv()) is not None:
-            asked.send(runners[name]())
-        asked.send(peak_memory())
+        try:
+            runners = prepare(*arguments)
+            asked.send(list(runners))
+            while (request := asked.recv()) is not None:
+                name, given = request
+                asked.send(runners[name](*given))
+            asked.send(memory.peak() / 1e6)
+        except Exception as error:
+            asked.send(error if isinstance(error, InputError) else InputError(f"a contestant failed: {bug(error)}"))
         asked.close()
         os._exit(0)  # bpy's own clean-up crashes in some versions
