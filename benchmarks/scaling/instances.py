@@ -1,0 +1,38 @@
+"""Instances: one mesh of a thousand triangles, placed 1 to 10,000 times."""
+
+from functools import partial
+
+from ..charts import Chart
+from . import growth, scenes
+from .point import DIRECT, FIRST, GEOMETRY, PREPARING, Work, measure
+from .triangles import BYTES_A_TRIANGLE
+
+
+def charts(quick: bool = False) -> tuple[Chart, ...]:
+    counts = (1, 100) if quick else (1, 10, 100, 1_000, 10_000)
+    size, work = ((160, 90), Work(once=True)) if quick else (scenes.SIZE, Work())
+    sweep = [(count, measure(partial(scenes.instances, count, size), work)) for count in counts]
+    stages = (PREPARING, GEOMETRY, FIRST, DIRECT)
+    times, memory = growth.time_curves(sweep, stages), growth.memory_curves(sweep, stages)
+    fixed, each = max(sweep[0][1].peak.values()), BYTES_A_TRIANGLE * sweep[0][1].triangles
+    name = f"a fixed amount and {BYTES_A_TRIANGLE} bytes a triangle of each"
+    limit = growth.memory_limit(counts, fixed, each, name)
+    return (
+        growth.chart(
+            "instances-time",
+            f"Time against instances of a thousand triangles, {size[0]} × {size[1]} pixels",
+            "instances",
+            growth.SECONDS,
+            times,
+            f"Read that each instance costs what its triangles do. {growth.told(times, 'the instances')}",
+        ),
+        growth.chart(
+            "instances-memory",
+            f"Memory against instances of a thousand triangles, {size[0]} × {size[1]} pixels",
+            "instances",
+            growth.MEGABYTES,
+            [*memory, limit],
+            "Read that nothing exceeds the dashed line, though instances share their mesh: each has its triangles in camera "
+            f"space. {growth.told(memory, 'the instances')}",
+        ),
+    )

@@ -1,0 +1,48 @@
+"""Triangles: 1e3 to 1e7, in one mesh and in many of a thousand each, in the same picture."""
+
+from functools import partial
+
+from ..charts import Chart
+from . import growth, scenes
+from .point import DIRECT, FIRST, GEOMETRY, PREPARING, Work, measure
+
+# Beyond the scene's own arrays: hierarchy, camera space, planes, and the tables of light.
+BYTES_A_TRIANGLE = 300
+
+
+def charts(quick: bool = False) -> tuple[Chart, ...]:
+    counts = (1_000, 100_000) if quick else (1_000, 10_000, 100_000, 1_000_000, 3_000_000, 10_000_000)
+    size, work = ((160, 90), Work(once=True)) if quick else (scenes.SIZE, Work())
+    one, many = (
+        [(measured.triangles, measured) for measured in (measure(partial(make, count, size), work) for count in counts)]
+        for make in (scenes.one_mesh, scenes.many_meshes)
+    )
+    times = growth.time_curves(one, (PREPARING, GEOMETRY, FIRST, DIRECT), "one mesh: ")
+    times += growth.time_curves(many, (PREPARING, FIRST, DIRECT), "many meshes: ")
+    memory = growth.memory_curves(one, (PREPARING, GEOMETRY, FIRST, DIRECT), "one mesh: ")
+    memory += growth.memory_curves(many, (PREPARING, FIRST, DIRECT), "many meshes: ")
+    x, largest = [x for x, _ in one], one[-1][1]
+    # What the least scene takes is the picture's and its tiles'.
+    fixed = max(one[0][1].peak.values())
+    limit = growth.memory_limit(x, fixed, BYTES_A_TRIANGLE, f"a fixed amount and {BYTES_A_TRIANGLE} bytes a triangle")
+    each = {stage: (largest.peak[stage] - one[0][1].peak[stage]) / largest.triangles for stage in (PREPARING, GEOMETRY, DIRECT)}
+    told = ", ".join(f"{stage} {count:.0f}" for stage, count in each.items())
+    return (
+        growth.chart(
+            "triangles-time",
+            f"Time against triangles, {size[0]} × {size[1]} pixels",
+            "triangles",
+            growth.SECONDS,
+            times,
+            f"Read that preparing grows with the triangles, and a picture hardly. {growth.told(times, 'the triangles')}",
+        ),
+        growth.chart(
+            "triangles-memory",
+            f"Memory against triangles, {size[0]} × {size[1]} pixels",
+            "triangles",
+            growth.MEGABYTES,
+            [*memory, limit],
+            "Read that nothing exceeds the dashed line, which is what the least scene's picture takes, a quarter more, and "
+            f"{BYTES_A_TRIANGLE} bytes a triangle. Bytes a triangle, of {largest.triangles:,} in one mesh: {told}.",
+        ),
+    )
