@@ -5,6 +5,7 @@ import pytest
 
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.arrays import dot
+from viewcam_addon.tracer.compiled import standing
 from viewcam_addon.tracer.light.emitters import Aimed, Emitters
 from viewcam_addon.tracer.light.sampler import Sampler
 from viewcam_addon.tracer.light.textures import Palette
@@ -13,6 +14,12 @@ from viewcam_addon.tracer.rays.points import Points, Surfaces
 from viewcam_addon.tracer.rays.triangles import Planes, triangles_of
 from viewcam_addon.tracer.rays.view import View
 from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres
+
+
+@pytest.fixture
+def without_kernels(monkeypatch):
+    """NumPy's functions compute everything: for tests that break one of them on purpose."""
+    monkeypatch.setattr(standing, "AVAILABLE", False)
 
 
 @pytest.fixture(scope="session")

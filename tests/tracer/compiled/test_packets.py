@@ -37,16 +37,16 @@ def shards(rng, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 @needs_embree
 @settings(max_examples=20)
-@given(seed=st.integers(0, 2**32 - 1), rays=st.integers(0, 100))
-def test_packets_answer_as_embreex_does_ray_by_ray(packets, seed, rays):
+@given(seed=st.integers(0, 2**32 - 1), rays=st.integers(0, 100), coherent=st.booleans())
+def test_packets_answer_as_embreex_does_ray_by_ray(packets, seed, rays, coherent):
     rng = np.random.default_rng(seed)
     scene = embree_scene(*shards(rng, 2000))
     origins, directions = rng.normal(size=(2, 3, rays)).astype(np.float32)
     directions[:, ::7] = directions[:, :1]  # some side by side
     lengths = np.where(rng.random(rays) < 0.5, rng.exponential(size=rays), packets.FARTHEST).astype(np.float32)
     found, blocked = np.empty(rays, np.intp), np.empty(rays, bool)
-    packets.intersect(library.pointer_of(scene), origins, directions, lengths, found)
-    packets.occluded(library.pointer_of(scene), origins, directions, lengths, blocked)
+    packets.intersect(library.pointer_of(scene), origins, directions, lengths, coherent, found)
+    packets.occluded(library.pointer_of(scene), origins, directions, lengths, coherent, blocked)
     rows = origins.T.copy(), directions.T.copy()
     assert np.array_equal(found, scene.run(*rows, dists=lengths.copy()))
     assert np.array_equal(blocked, scene.run(*rows, dists=lengths.copy(), query="OCCLUDED") >= 0)
@@ -85,7 +85,7 @@ def test_kernels_work_where_no_cache_can_be_written(packets):
     program = (
         "from numba.core import caching; caching.CacheImpl._locator_classes = [];"
         "from viewcam_addon.tracer.compiled import packets;"
-        "print(packets.new_packet().shape, type(packets.new_packet._cache).__name__)"
+        "print(packets.new_packet(True).shape, type(packets.new_packet._cache).__name__)"
     )
     outcome = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True)
     assert outcome.stdout.strip() == f"({library.ROWS}, {library.LANES}) NullCache", outcome.stderr

@@ -142,9 +142,9 @@ def test_a_sample_of_a_pixel_is_the_same_whoever_asks_for_it_and_how():
     np.testing.assert_array_equal(Sampler(7, 100).numbers(pixels[17:18], 5, 13, 2)[:, 0], all_at_once[13:15, 5, 17])
 
 
-def test_a_grid_of_samples_and_pixels_is_the_same_numbers_sample_after_sample():
+def test_a_grid_of_samples_and_pixels_is_the_same_numbers_pixel_after_pixel():
     sampler, pixels, samples = Sampler(7, 100), np.arange(50, 90), np.array([3, 4, 99])
-    expected = sampler.numbers(np.tile(pixels, 3), np.repeat(samples, 40), 1, 4)
+    expected = sampler.numbers(np.repeat(pixels, 3), np.tile(samples, 40), 1, 4)
     np.testing.assert_array_equal(sampler.grid(pixels, samples, 1, 4), expected)
 
 

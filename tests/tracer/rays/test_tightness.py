@@ -121,7 +121,7 @@ def flat(points, rng):
     return points.normal * slope + across / np.linalg.norm(across, axis=0) * np.sqrt(1 - slope**2)
 
 
-def test_rays_that_start_on_the_surface_itself_meet_it(monkeypatch, stage_of, make_scene, turned, ball):
+def test_rays_that_start_on_the_surface_itself_meet_it(without_kernels, monkeypatch, stage_of, make_scene, turned, ball):
     if visibility.EmbreeScene is None:
         pytest.skip("without Embree all is float64")
     monkeypatch.setattr(offset, "start", lambda points, normals, directions, offsets: points)

@@ -19,6 +19,8 @@ from numba.core import types
 
 from .library import (
     ALIGNMENT,
+    ARGUMENTS,
+    COHERENT,
     DIRECTION,
     FAR,
     FLAGS,
@@ -57,12 +59,18 @@ def kernel(function: Callable) -> Callable:
 
 
 @kernel
-def new_packet():
-    """(ROWS, LANES) float32, aligned as Embree wants it, no rays in it."""
+def new_packet(coherent):
+    """(ROWS, LANES) float32, aligned as Embree wants it, no rays in it.
+
+    coherent : whether rays run side by side, as those of one pixel or to one lamp do: they are then traced as a beam, in a
+    third of the time. Others take longer so.
+    """
     memory = np.zeros((ROWS + 1) * LANES, np.float32)
     offset = (ALIGNMENT - memory.ctypes.data % ALIGNMENT) % ALIGNMENT // 4
     packet = memory[offset : offset + ROWS * LANES].reshape(ROWS, LANES)
-    packet.view(np.int32)[MASK] = -1
+    bits = packet.view(np.int32)
+    bits[MASK] = -1
+    bits[ARGUMENTS, 0], bits[ARGUMENTS, 1] = COHERENT if coherent else 0, -1
     return packet
 
 
@@ -84,7 +92,7 @@ def meet(scene, packet, count):
         bits[ID, lane], bits[FLAGS, lane] = 0, 0
         bits[PRIMITIVE, lane], bits[GEOMETRY, lane] = -1, -1
         bits[INSTANCE, lane], bits[INSTANCE_PRIMITIVE, lane] = -1, -1
-    _intersect16(packet.ctypes.data + VALID * ALIGNMENT, scene, packet.ctypes.data, 0)
+    _intersect16(packet.ctypes.data + VALID * ALIGNMENT, scene, packet.ctypes.data, packet.ctypes.data + ARGUMENTS * ALIGNMENT)
 
 
 @kernel
@@ -95,7 +103,7 @@ def block(scene, packet, count):
         bits[VALID, lane] = -1 if lane < count else 0
         packet[NEAR, lane], packet[TIME, lane] = 0, 0
         bits[ID, lane], bits[FLAGS, lane] = 0, 0
-    _occluded16(packet.ctypes.data + VALID * ALIGNMENT, scene, packet.ctypes.data, 0)
+    _occluded16(packet.ctypes.data + VALID * ALIGNMENT, scene, packet.ctypes.data, packet.ctypes.data + ARGUMENTS * ALIGNMENT)
 
 
 @kernel
@@ -111,12 +119,12 @@ def blocked(packet, lane):
 
 
 @kernel
-def intersect(scene, origins, directions, lengths, found):
+def intersect(scene, origins, directions, lengths, coherent, found):
     """What n rays meet first, or −1, into `found`, (n,) of integers.
 
     scene : library.pointer_of. origins, directions : (3, n) float32. lengths : (n,) float32, FARTHEST for no limit.
     """
-    packet = new_packet()
+    packet = new_packet(coherent)
     for start in range(0, found.size, LANES):
         count = min(LANES, found.size - start)
         for lane in range(count):
@@ -129,9 +137,9 @@ def intersect(scene, origins, directions, lengths, found):
 
 
 @kernel
-def occluded(scene, origins, directions, lengths, found):
+def occluded(scene, origins, directions, lengths, coherent, found):
     """Whether n rays meet anything, into `found`, (n,) bool; as `intersect`."""
-    packet = new_packet()
+    packet = new_packet(coherent)
     for start in range(0, found.size, LANES):
         count = min(LANES, found.size - start)
         for lane in range(count):

@@ -83,12 +83,12 @@ class Sampler:
         return _reversed(digits) * 2.0**-32
 
     def grid(self, pixels: NDArray[np.integer], samples: NDArray[np.integer], first: int, count: int) -> Floats:
-        """(count, s · n): the same for s samples of n pixels, sample after sample; the pixels' random words are made once."""
+        """(count, n · s): the same for s samples of n pixels, pixel after pixel; the pixels' random words are made once."""
         dimensions = range(first, first + count)
         factor, shift = self._hashed(pixels, np.array(dimensions, np.uint32))
         digits = np.stack([self._points(dimension, samples) for dimension in dimensions])
-        digits = digits[:, :, None] * factor[:, None]
-        digits += shift[:, None]
+        digits = digits[:, None] * factor[:, :, None]
+        digits += shift[:, :, None]
         return _reversed(digits.reshape(count, -1)) * 2.0**-32
 
     def _hashed(self, pixels: NDArray[np.integer], keys: Words) -> tuple[Words, Words]:

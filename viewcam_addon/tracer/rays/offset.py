@@ -42,12 +42,12 @@ from .triangles import Planes, Triangles
 FLATTEST = 2.0**-18
 """|cos| between a ray and its surface's normal below which it counts as blocked."""
 
-_FLOAT32 = 2.0**-24
-_ROUNDING, _ARITHMETIC = 3.5, 8.0
+FLOAT32 = 2.0**-24
+ROUNDING, ARITHMETIC = 3.5, 8.0
 # Flatter caps are lower than u σ L, and no surface to speak of.
 _FLATTEST_CAP = 2.0**11
 # Seen from the start, L is the distance: σ is taken as 1, and direction and length are rounded as well, by √3 and by 1.
-_ENDING = 4.0
+ENDING = 4.0
 
 
 def triangle_offsets(triangles: Triangles) -> Floats:
@@ -60,12 +60,12 @@ def triangle_offsets(triangles: Triangles) -> Floats:
         cap = np.fmin(shortest * longest / _length(cross(ab, ac)), _FLATTEST_CAP)
     largest = np.abs(triangles.vertices).max(axis=0)
     largest = reduce(np.maximum, (gather(largest, corners) for corners in triangles.corners))
-    return _FLOAT32 * (_ROUNDING * largest + (_ARITHMETIC + cap) * longest)
+    return FLOAT32 * (ROUNDING * largest + (ARITHMETIC + cap) * longest)
 
 
 def wide_offsets(planes: Planes) -> Floats:
     """(k,) float64, camera space: that of `planes.wide`, which are tested in float64: as of a small triangle near the eye."""
-    return _FLOAT32 * _ROUNDING * gather(planes.distance, planes.wide)
+    return FLOAT32 * ROUNDING * gather(planes.distance, planes.wide)
 
 
 def start(points: Floats, normals: Floats, directions: Floats, offsets: Floats) -> Floats:
@@ -99,7 +99,7 @@ def shadow_rays(starts: Floats, lights: Floats) -> tuple[Float32s, Float32s, Flo
         squared += apart
         np.maximum(largest, np.abs(light), out=largest)
     distance = np.sqrt(squared)
-    slack = _FLOAT32 * (_ROUNDING * largest + (_ARITHMETIC + _ENDING) * distance)
+    slack = FLOAT32 * (ROUNDING * largest + (ARITHMETIC + ENDING) * distance)
     lengths = np.maximum(distance - slack, 0.0) / np.where(distance > 0, distance, 1.0)
     return origins, directions, lengths.astype(np.float32)
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Indices, dot, gather
+from ..compiled.standing import or_compiled
 from . import offset
 from .crowd import Crowd, Hits
 from .embree import EmbreeScene, rows, scene_of, unit_of
@@ -110,13 +111,13 @@ class _Sight:
 
     def first(self, points: Points, directions: Floats) -> Indices:
         """The primitive that each ray meets first, spheres counted as in `Surfaces.balls`, or −1."""
-        starts = offset.start(points.position, points.normal, directions, points.offset)
         if self._embree is None:
             found = np.full(points.count, -1, np.intp)
         else:
-            found = self._embree.run(rows(starts * self._unit), rows(directions)).astype(np.intp)
+            found = first_triangles(self._embree, self._unit, points, directions)
         if self._alone.is_empty and self._crowd.is_empty:
             return found
+        starts = offset.start(points.position, points.normal, directions, points.offset)
         nearest = np.full(len(found), np.inf)
         met = np.flatnonzero(found >= 0)
         nearest[met] = self._surfaces.distance(found[met], gather(starts, met), gather(directions, met))
@@ -132,18 +133,19 @@ class _Sight:
         """Which rays meet nothing."""
         if self._embree is None or not (self._alone.is_empty and self._crowd.is_empty):
             return np.flatnonzero(self.first(points, directions) < 0)
-        starts = offset.start(points.position, points.normal, directions, points.offset)
-        return np.flatnonzero(self._embree.run(rows(starts * self._unit), rows(directions), query="OCCLUDED") < 0)
+        return np.flatnonzero(~any_triangle(self._embree, self._unit, points, directions))
 
     def blocked(self, points: Points, directions: Floats, distances: Floats) -> NDArray[np.bool_]:
         """Whether anything stands before lights, (n,), at these finite distances."""
-        starts = offset.start(points.position, points.normal, directions, points.offset)
-        lights = points.position + directions * distances
-        origins, ways, lengths = offset.shadow_rays(starts * self._unit, lights * self._unit)
         if self._embree is None:
             blocked = np.zeros(points.count, bool)
         else:
-            blocked = self._embree.run(origins, ways, dists=lengths, query="OCCLUDED") >= 0
+            blocked = triangle_before(self._embree, self._unit, points, directions, distances)
+        if self._alone.is_empty and self._crowd.is_empty:
+            return blocked
+        starts = offset.start(points.position, points.normal, directions, points.offset)
+        lights = points.position + directions * distances
+        *_, lengths = offset.shadow_rays(starts * self._unit, lights * self._unit)
         if not self._alone.is_empty:
             limits = np.where(blocked, 0.0, lengths)
             blocked |= _any(self._alone.met(starts, lights - starts, limits), limits)
@@ -157,6 +159,30 @@ class _Sight:
         count = self._surfaces.triangles.count
         for ball, which, distance in self._crowd.met(points.position, directions, points.primitive - count, limits):
             yield count + ball, which, distance
+
+
+@or_compiled
+def first_triangles(embree: "EmbreeScene", unit: float, points: Points, directions: Floats) -> Indices:
+    """The triangle that each ray meets first, or −1. unit : that of the scene; the rest as in `Space.first`."""
+    starts = offset.start(points.position, points.normal, directions, points.offset)
+    return embree.run(rows(starts * unit), rows(directions)).astype(np.intp)
+
+
+@or_compiled
+def any_triangle(embree: "EmbreeScene", unit: float, points: Points, directions: Floats) -> NDArray[np.bool_]:
+    """Whether each ray meets any triangle."""
+    starts = offset.start(points.position, points.normal, directions, points.offset)
+    return embree.run(rows(starts * unit), rows(directions), query="OCCLUDED") >= 0
+
+
+@or_compiled
+def triangle_before(
+    embree: "EmbreeScene", unit: float, points: Points, directions: Floats, distances: Floats
+) -> NDArray[np.bool_]:
+    """Whether a triangle stands before each light; as in `Space.blocked`."""
+    starts = offset.start(points.position, points.normal, directions, points.offset)
+    origins, ways, lengths = offset.shadow_rays(starts * unit, (points.position + directions * distances) * unit)
+    return embree.run(origins, ways, dists=lengths, query="OCCLUDED") >= 0
 
 
 def _any(hits: Iterator[Hits], limits: Floats) -> NDArray[np.bool_]:
