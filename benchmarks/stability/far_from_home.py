@@ -85,7 +85,7 @@ def _arithmetic(places: Array, count: int) -> list[Curve]:
 
 def _relative_to_the_eye(pinhole: Pinhole, matrix: Array, points: Array) -> Array:
     """(2, n) columns and rows by the tracer's camera space."""
-    right, up, forward = View(pinhole).points(matrix, points)[0]
+    right, up, forward = View(pinhole).points(matrix, points)
     (cx, cy), (dx, dy) = pinhole.principal_point, pinhole.distance
     return np.stack([cx + dx * right / forward, cy + dy * up / forward])
 

@@ -255,7 +255,7 @@ def _first_on_the_ground(extent: float, random: np.random.Generator) -> Iterator
     ground = np.stack([np.cos(angles), np.sin(angles), np.zeros(4)], axis=-1) * extent * random.uniform(0.6, 1, (4, 1))
     mat = np.array([[-0.4, 0.7, 1e-4], [0.4, 0.7, 1e-4], [0.4, 1.7, 1e-4], [-0.4, 1.7, 1e-4]])
     view = View(Pinhole((0, 0, 1), (*random.uniform(-0.2, 0.2, 2), 0), (0, 1, 0), 1, 1, 1))
-    points, _ = view.points(np.eye(4), np.concatenate([ground, mat]))
+    points = view.points(np.eye(4), np.concatenate([ground, mat]))
     corners = points.T[np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]).T]
     weights = random.dirichlet((1, 1, 1), 40)
     aimed = np.concatenate([weights @ corners[:, 2], weights @ corners[:, 3]])

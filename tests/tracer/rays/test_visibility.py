@@ -79,7 +79,7 @@ def test_no_ray_leaves_a_closed_mesh_through_its_edges_or_vertices(ball, make_sc
     corners = shell.vertices[shell.triangles]
     share = rng.uniform(0, 1, (len(corners), 3, 1))
     on_edges = corners * share + np.roll(corners, 1, axis=1) * (1 - share)
-    points, _ = View(scene.camera).points(np.eye(4), np.concatenate([shell.vertices, on_edges.reshape(-1, 3)]))
+    points = View(scene.camera).points(np.eye(4), np.concatenate([shell.vertices, on_edges.reshape(-1, 3)]))
     points = points[:, points[2] > 1e-3]
     found = seen_from.first(points[0] / points[2], points[1] / points[2])
     assert (found >= 0).all(), f"{(found < 0).sum()} of {len(found)} rays leave the closed ball"

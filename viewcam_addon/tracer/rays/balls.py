@@ -96,7 +96,7 @@ def balls_of(pairs: list[tuple[Object, Spheres]], view: View) -> Balls:
         inverses.append((np.linalg.inv(turned) if solid[-1] else np.eye(3)).T.reshape(9))
         directions, lengths, _ = np.linalg.svd(turned)
         axes.append((directions * lengths).T)
-        centres.append(view.points(placed.matrix, spheres.centers)[0])
+        centres.append(view.points(placed.matrix, spheres.centers))
     owner = np.repeat(np.arange(len(pairs)), [len(spheres.radii) for _, spheres in pairs])
     radii = np.concatenate([np.empty(0), *(spheres.radii for _, spheres in pairs)])
     half_axes = gather(np.array(axes).reshape(-1, 3, 3).transpose(1, 2, 0), owner) * radii

@@ -9,7 +9,9 @@ Embree's own t, u, v (float32).
 """
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +19,7 @@ from numpy.typing import NDArray
 from ... import exact
 from ..arrays import Float32s, Floats, Indices, cross, dot, gather, linear
 from ..scene import Mesh, Object
+from .tables import AT_A_TIME, Piece, each, joined, made_once, pieces, spread
 from .view import View
 
 # Thinner triangles than float32 can tell from a line are no surface.
@@ -34,24 +37,15 @@ class Triangles:
 
     vertices : (3, v) float64, camera space: [axis, vertex].
     corners : (3, m) int32: [corner, triangle], indices into `vertices`.
-    corner_normals : (9, m) float32, world space: [3 · corner + axis, triangle], of any length, on the side from which the
-        corners run counter-clockwise, 0 on meshes without; or None where no mesh has any.
-    corner_uvs : (9, m) float32: [3 · corner + channel, triangle] with the channels u, v, 1 (0, 0, 0 without a UV map); or None
-        where no mesh has a UV map.
-    object_index, material_index : (m,) float32, what the passes show.
-    largest_coordinate : (m,) float32, of the three vertices in world space, without its sign.
     placed : the objects with their meshes, whose triangles follow one another.
+    threads : how many fill the other tables. These are made when they are first asked for.
     embree_scenes : what embree.py made of them. former_scenes : what it made of them when their vertices were elsewhere.
     """
 
     vertices: Floats
     corners: NDArray[np.int32]
-    corner_normals: Float32s | None
-    corner_uvs: Float32s | None
-    object_index: Float32s
-    material_index: Float32s
-    largest_coordinate: Float32s
     placed: tuple[tuple[Object, Mesh], ...]
+    threads: int = 1
     embree_scenes: dict = field(default_factory=dict)
     former_scenes: dict = field(default_factory=dict)
 
@@ -59,72 +53,153 @@ class Triangles:
     def count(self) -> int:
         return self.corners.shape[1]
 
+    @property
+    def counts(self) -> list[int]:
+        """How many triangles each object has."""
+        return [len(mesh.triangles) for _, mesh in self.placed]
+
     def hidden_from(self, ray: str) -> NDArray[np.bool_]:
         """(m,): which triangles a kind of rays does not see (lights.RAYS)."""
-        hidden = np.array([ray in placed.hidden_from for placed, _ in self.placed], bool)
-        return np.repeat(hidden, [len(mesh.triangles) for _, mesh in self.placed])
+        return np.repeat(np.array([ray in placed.hidden_from for placed, _ in self.placed], bool), self.counts)
+
+    def by_material(self, values: Sequence[Sequence], kind: type) -> NDArray:
+        """(m,): what the materials of the triangles have. values : for each object, of each of its materials."""
+        counts = [len(some) for some in values]
+        first = np.cumsum([0, *counts], dtype=np.int32)[:-1]
+        which = np.concatenate([np.empty(0, np.int32), *(mesh.materials for _, mesh in self.placed)])
+        which += np.repeat(first, self.counts)
+        return np.array([value for some in values for value in some], kind).take(which)
+
+    @made_once
+    def object_index(self) -> Float32s:
+        """(m,), what the pass shows."""
+        return np.repeat(np.array([placed.object_index for placed, _ in self.placed], np.float32), self.counts)
+
+    @made_once
+    def material_index(self) -> Float32s:
+        """(m,), what the pass shows."""
+        return self.by_material([placed.material_indices for placed, _ in self.placed], np.float32)
+
+    @made_once
+    def largest_coordinate(self) -> Float32s:
+        """(m,), of the three vertices in world space or of their object, without its sign: what is far from its object's own
+        origin is the small difference of large numbers."""
+        largest = np.empty(self.vertices.shape[1], np.float32)
+        matrices, meshes = _matrices(self.placed), [mesh.vertices for _, mesh in self.placed]
+
+        def fill(part: tuple[slice, list[Piece]]) -> None:
+            where, some = part
+            matrix, points = spread(matrices, some), joined(meshes, some).T
+            coordinates = [np.abs(dot(row, points) + row[3]) for row in matrix]
+            largest[where] = np.maximum.reduce([*coordinates, np.abs(matrix[:, 3]).max(axis=0) + np.zeros(points.shape[1])])
+
+        each(fill, pieces([len(points) for points in meshes]), self.threads)
+        return np.maximum.reduce([gather(largest, corner) for corner in self.corners])
+
+    @made_once
+    def corner_normals(self) -> Float32s | None:
+        """(9, m), world space: [3 · corner + axis, triangle], of any length, on the side from which the corners run
+        counter-clockwise, 0 on meshes without; or None where no mesh has any.
+
+        They are turned by the cofactors of their object's matrix, as the normals of its faces are. Cycles turns those of a mesh
+        that only one object uses into world space before it interpolates, and normalises them there; those of a mesh that
+        several objects share it interpolates in object space.
+        """
+        if all(mesh.corner_normals is None for _, mesh in self.placed):
+            return None
+        users = Counter(id(mesh) for _, mesh in self.placed)
+        shared = np.array([users[id(mesh)] > 1 for _, mesh in self.placed])
+        first, second, third = _matrices(self.placed)[:, :3]
+        cofactors = np.stack([cross(second, third), cross(third, first), cross(first, second)])
+        largest = np.abs(cofactors).max(axis=(0, 1))
+        cofactors /= np.where(largest > 0, largest, 1.0)
+        normals = np.empty((9, self.count), np.float32)
+        meshes = [mesh.corner_normals for _, mesh in self.placed]
+
+        def fill(part: tuple[slice, list[Piece]]) -> None:
+            where, some = part
+            turn, as_they_are = spread(cofactors, some), spread(shared, some)
+            for corner, given in enumerate(_joined_corners(meshes, some)):
+                turned = np.stack([dot(row, given) for row in turn])
+                if not as_they_are.all():
+                    length = np.sqrt(dot(turned, turned))
+                    turned /= np.where((length > 0) & ~as_they_are, length, 1.0)
+                normals[3 * corner : 3 * corner + 3, where] = turned
+
+        each(fill, pieces(self.counts), self.threads)
+        return normals
+
+    @made_once
+    def corner_uvs(self) -> Float32s | None:
+        """(9, m): [3 · corner + channel, triangle] with the channels u, v, 1 (0, 0, 0 without a UV map); or None where no mesh
+        has a UV map."""
+        if all(mesh.corner_uvs is None for _, mesh in self.placed):
+            return None
+        uvs = np.empty((9, self.count), np.float32)
+        meshes = [mesh.corner_uvs for _, mesh in self.placed]
+        mapped = np.array([some is not None for some in meshes], np.float32)
+
+        def fill(part: tuple[slice, list[Piece]]) -> None:
+            where, some = part
+            for corner, given in enumerate(_joined_corners(meshes, some, 2)):
+                uvs[3 * corner : 3 * corner + 2, where] = given
+            uvs[2::3, where] = spread(mapped, some)
+
+        each(fill, pieces(self.counts), self.threads)
+        return uvs
 
 
-def triangles_of(pairs: list[tuple[Object, Mesh]], view: View) -> Triangles:
+def triangles_of(pairs: list[tuple[Object, Mesh]], view: View, threads: int = 1) -> Triangles:
     """The triangles of all objects that are meshes, instances written out (embreex has no instances)."""
-    users = Counter(id(mesh) for _, mesh in pairs)
-    smooth = any(mesh.corner_normals is not None for _, mesh in pairs)
-    mapped = any(mesh.corner_uvs is not None for _, mesh in pairs)
-    vertices, corners, normals, uvs, objects, materials, largest = [], [], [], [], [], [], []
-    vertex_count = 0
-    for placed, mesh in pairs:
-        points, coordinate = view.points(placed.matrix, mesh.vertices)
-        vertices.append(points)
-        corners.append(mesh.triangles.T + np.int32(vertex_count))
-        vertex_count += points.shape[1]
-        largest.append(coordinate[mesh.triangles.T].max(axis=0))
-        objects.append(np.full(len(mesh.triangles), placed.object_index, np.float32))
-        materials.append(np.array(placed.material_indices, np.float32)[mesh.materials])
-        if smooth:
-            normals.append(_corner_normals(placed, mesh, shared=users[id(mesh)] > 1))
-        if mapped:
-            uvs.append(_corner_uvs(mesh))
-    return Triangles(
-        vertices=_joined(vertices, (3, 0), np.float64),
-        corners=_joined(corners, (3, 0), np.int32),
-        corner_normals=_joined(normals, (9, 0), np.float32) if smooth else None,
-        corner_uvs=_joined(uvs, (9, 0), np.float32) if mapped else None,
-        object_index=_joined(objects, (0,), np.float32),
-        material_index=_joined(materials, (0,), np.float32),
-        largest_coordinate=_joined(largest, (0,), np.float32),
-        placed=tuple(pairs),
-    )
+    vertex_counts = [len(mesh.vertices) for _, mesh in pairs]
+    first = np.cumsum([0, *vertex_counts], dtype=np.int32)[:-1]
+    corners = np.empty((3, sum(len(mesh.triangles) for _, mesh in pairs)), np.int32)
+    meshes = [mesh.triangles for _, mesh in pairs]
+
+    def fill(part: tuple[slice, list[Piece]]) -> None:
+        where, some = part
+        np.add(joined(meshes, some).T, spread(first, some), out=corners[:, where])
+
+    each(fill, pieces([len(triangles) for triangles in meshes]), threads)
+    return Triangles(_vertices(pairs, view, threads), corners, tuple(pairs), threads)
 
 
-def _joined(parts: list[NDArray], empty: tuple[int, ...], dtype: type) -> NDArray:
-    joined = np.concatenate(parts, axis=-1, dtype=dtype, casting="same_kind") if parts else np.empty(empty, dtype)
-    return np.ascontiguousarray(joined)  # what is not, NumPy copies whole whenever some of it is gathered
+def _vertices(pairs: Sequence[tuple[Object, Mesh]], view: View, threads: int) -> Floats:
+    """(3, v), camera space."""
+    meshes = [mesh.vertices for _, mesh in pairs]
+    counts = [len(points) for points in meshes]
+    vertices = np.empty((3, sum(counts)))
+    matrices = _matrices(pairs)
+
+    def fill(part: tuple[slice, list[Piece]]) -> None:
+        where, some = part
+        vertices[:, where] = view.points(spread(matrices, some), joined(meshes, some))
+
+    each(fill, pieces(counts), threads)
+    return vertices
 
 
-def _corner_normals(placed: Object, mesh: Mesh, shared: bool) -> Float32s:
-    """(9, m) corner normals of one object, turned by the cofactors of its matrix, as the normal of its faces is.
+def _matrices(pairs: Sequence[tuple[Object, Mesh]]) -> Floats:
+    """(3, 4, objects), to world space."""
+    return np.array([placed.matrix[:3] for placed, _ in pairs]).reshape(-1, 3, 4).transpose(1, 2, 0)
 
-    Cycles turns the normals of a mesh that only one object uses into world space before it interpolates, and normalises
-    them there; those of a mesh that several objects share it interpolates in object space.
+
+def _joined_corners(meshes: list[Float32s | None], some: list[Piece], channels: int = 3) -> NDArray:
+    """(3, channels, n): what the corners of some triangles have, 0 on meshes without."""
+    parts = [
+        np.zeros((part.stop - part.start, 3, channels), np.float32) if meshes[number] is None else meshes[number][part]
+        for number, part in some
+    ]
+    return np.ascontiguousarray((parts[0] if len(parts) == 1 else np.concatenate(parts)).transpose(1, 2, 0))
+
+
+def facing(forms: Floats) -> Floats:
+    """(3, n): the unit normals of planes, towards the eye, in camera space; not finite where there is none.
+
+    forms : (3, n) or more, of which the first three rows are N.
     """
-    if mesh.corner_normals is None:
-        return np.zeros((9, len(mesh.triangles)), np.float32)
-    linear = placed.matrix[:3, :3]
-    cofactors = cross(linear[:, [1, 2, 0]], linear[:, [2, 0, 1]])
-    cofactors /= np.abs(cofactors).max() or 1.0
-    normals = cofactors @ mesh.corner_normals.reshape(-1, 3).T
-    if not shared:
-        length = np.sqrt(dot(normals, normals))
-        normals /= np.where(length > 0, length, 1.0)
-    return normals.reshape(3, -1, 3).transpose(2, 0, 1).reshape(9, -1).astype(np.float32)
-
-
-def _corner_uvs(mesh: Mesh) -> Float32s:
-    uvs = np.zeros((3, 3, len(mesh.triangles)), np.float32)
-    if mesh.corner_uvs is not None:
-        uvs[:, :2] = mesh.corner_uvs.transpose(1, 2, 0)
-        uvs[:, 2] = 1
-    return uvs.reshape(9, -1)
+    with np.errstate(all="ignore"):
+        return forms[:3] / -np.sqrt(dot(forms, forms))
 
 
 def _normal(first: Floats, second: Floats) -> Floats:
@@ -142,58 +217,99 @@ def _normal(first: Floats, second: Floats) -> Floats:
 
 
 class Planes:
-    """Where rays meet the planes of triangles: the linear forms N, G₁, G₂ and the face normals.
+    """Where rays meet the planes of triangles: the linear forms N, G₁, G₂.
 
     forms : (9, m) float64. span : (2, m) float64, least and greatest depth of the triangle's vertices.
-    normals : (3, m) float32, unit, world space, facing the eye. distance : (m,) float64, of the plane from the eye.
-    side : (m,) float32: 1 where the eye sees the corners run counter-clockwise, −1 where clockwise.
-    magnitude : (m,) float32: what a renderer's relative rounding applies to, the largest coordinate in world space plus the
-        distance of the farthest corner from the eye times the triangle's slenderness, its longest side over its height:
-        barycentric coordinates that are computed from the eye are off by a rounding of that distance over the height, and
-        move the hit along the longest side.
+    side : (m,) int8: 1 where the eye sees the corners run counter-clockwise, −1 where clockwise.
     wide : (k,) indices of triangles whose corners are more than `WIDE` times as far from the eye as they themselves.
+
+    The other tables are made when they are first asked for.
     """
 
     def __init__(self, triangles: Triangles, view: View) -> None:
+        self._triangles, self._view = triangles, view
         count = triangles.count
         self.forms: Floats = np.empty((9, count))
         self.span: Floats = np.empty((2, count))
-        self.normals: Float32s = np.empty((3, count), np.float32)
-        self.distance: Floats = np.empty(count)
-        self.side: Float32s = np.empty(count, np.float32)
-        self.magnitude: Float32s = np.empty(count, np.float32)
-        wide = []
-        step = 16384
-        with np.errstate(all="ignore"):  # a triangle without area, or one seen edge-on, has no forms: depth() sees to it
-            for first in range(0, count, step):
-                wide.append(first + self._fill(slice(first, first + step), triangles, view))
+        self.side: NDArray[np.int8] = np.empty(count, np.int8)
+        self._far = dot(triangles.vertices, triangles.vertices)
+        wide = each(self._fill, self._parts(), triangles.threads)
+        del self._far
         self.wide: Indices = np.concatenate([np.empty(0, np.intp), *wide])
 
-    def _fill(self, part: slice, triangles: Triangles, view: View) -> Indices:
-        """Fill the tables for a part of the triangles; which of the part are wide."""
-        a, b, c = gather(triangles.vertices, triangles.corners[:, part]).transpose(1, 0, 2)
-        self.span[0, part] = np.minimum(np.minimum(a[2], b[2]), c[2])
-        self.span[1, part] = np.maximum(np.maximum(a[2], b[2]), c[2])
+    def _parts(self) -> list[slice]:
+        return [slice(first, first + AT_A_TIME) for first in range(0, self._triangles.count, AT_A_TIME)]
+
+    def _fill(self, part: slice) -> Indices:
+        """Fill the tables for a part of the triangles; which of them are wide."""
+        corners = self._triangles.corners[:, part]
+        a, b, c = gather(self._triangles.vertices, corners).transpose(1, 0, 2)
+        np.minimum(np.minimum(a[2], b[2]), c[2], out=self.span[0, part])
+        np.maximum(np.maximum(a[2], b[2]), c[2], out=self.span[1, part])
         first, second = b - a, c - a
-        normal = _normal(first, second)
-        squared = dot(normal, normal)
-        volume = dot(normal, a)
-        plane = normal / volume
-        self.forms[0:3, part] = plane
-        for rows, gradient in ((slice(3, 6), cross(second, normal)), (slice(6, 9), cross(normal, first))):
-            gradient /= squared
-            self.forms[rows, part] = gradient - dot(gradient, a) * plane
-        length = np.sqrt(squared)
-        self.distance[part] = np.nan_to_num(np.abs(volume) / length)
-        self.normals[:, part] = np.nan_to_num(view.axes.T @ (normal * (-np.sign(volume) / length)))
-        self.side[part] = np.sign(volume) * -view.handedness
-        longest = np.maximum(np.maximum(dot(first, first), dot(second, second)), dot(c - b, c - b))
-        farthest = np.sqrt(np.maximum(np.maximum(dot(a, a), dot(b, b)), dot(c, c)))
-        reach = farthest * np.minimum(longest / length, _MOST_SLENDER)
-        self.magnitude[part] = triangles.largest_coordinate[part] + reach
-        # One whose plane comes near the eye, but not itself, has no side that is nearly as long as it is far.
-        near = (np.sqrt(longest) > 0.9 * farthest) & (farthest > WIDE * self.distance[part]) & (self.distance[part] > 0)
-        return np.flatnonzero(near)
+        with np.errstate(all="ignore"):  # a triangle without area, or one seen edge-on, has no forms: depth() sees to it
+            normal = _normal(first, second)
+            squared = dot(normal, normal)
+            volume = dot(normal, a)
+            plane = np.divide(normal, volume, out=self.forms[0:3, part])
+            for rows, gradient in ((slice(3, 6), cross(second, normal)), (slice(6, 9), cross(normal, first))):
+                gradient /= squared
+                np.subtract(gradient, dot(gradient, a) * plane, out=self.forms[rows, part])
+            self.side[part] = np.sign(volume) * -self._view.handedness
+            farthest = reduce(np.maximum, (gather(self._far, corner) for corner in corners))
+            near = np.flatnonzero((farthest * squared > WIDE**2 * volume * volume) & (volume != 0))
+            # One whose plane comes near the eye, but not itself, has no side that is nearly as long as it is far.
+            ends = a[:, near], b[:, near], c[:, near]
+            sides = (dot(side, side) for side in (ends[1] - ends[0], ends[2] - ends[0], ends[2] - ends[1]))
+            return part.start + near[reduce(np.maximum, sides) > 0.9**2 * farthest[near]]
+
+    @made_once
+    def distance(self) -> Floats:
+        """(m,), of the plane from the eye; 0 where it is seen edge-on, or has no area."""
+        distance = np.empty(self._triangles.count)
+
+        def fill(part: slice) -> None:
+            plane = self.forms[:3, part]
+            with np.errstate(all="ignore"):
+                distance[part] = np.nan_to_num(1.0 / np.sqrt(dot(plane, plane)))
+
+        each(fill, self._parts(), self._triangles.threads)
+        return distance
+
+    @made_once
+    def normals(self) -> Float32s:
+        """(3, m), unit, world space, facing the eye; 0 where the plane is seen edge-on."""
+        normals = np.empty((3, self._triangles.count), np.float32)
+
+        def fill(part: slice) -> None:
+            towards_eye = facing(self.forms[:3, part])
+            normals[:, part] = [np.nan_to_num(dot(axis, towards_eye)) for axis in self._view.axes.T]
+
+        each(fill, self._parts(), self._triangles.threads)
+        return normals
+
+    @made_once
+    def magnitude(self) -> Float32s:
+        """(m,): what a renderer's relative rounding applies to, the largest coordinate in world space plus the distance of the
+        farthest corner from the eye times the triangle's slenderness, its longest side over its height: barycentric coordinates
+        that are computed from the eye are off by a rounding of that distance over the height, and move the hit along the
+        longest side.
+        """
+        magnitude = np.empty(self._triangles.count, np.float32)
+        largest = self._triangles.largest_coordinate
+
+        def fill(part: slice) -> None:
+            a, b, c = gather(self._triangles.vertices, self._triangles.corners[:, part]).transpose(1, 0, 2)
+            sides = b - a, c - a, c - b
+            normal = _normal(*sides[:2])
+            longest = reduce(np.maximum, (dot(side, side) for side in sides))
+            farthest = np.sqrt(reduce(np.maximum, (dot(corner, corner) for corner in (a, b, c))))
+            with np.errstate(all="ignore"):
+                slender = np.minimum(longest / np.sqrt(dot(normal, normal)), _MOST_SLENDER)
+                magnitude[part] = largest[part] + farthest * slender
+
+        each(fill, self._parts(), self._triangles.threads)
+        return magnitude
 
     def depth(self, triangle: Indices, x: Floats, y: Floats) -> Floats:
         """Planar depth at which rays (x, y, 1) meet the triangles that were found for them; all broadcast.

@@ -11,7 +11,7 @@ Rejected: world axes with the origin at the eye, where the lens magnifies that r
 import numpy as np
 
 from ...pinhole import Pinhole
-from ..arrays import Floats, linear
+from ..arrays import Floats, dot, linear
 
 
 class View:
@@ -27,17 +27,14 @@ class View:
         self.axes: Floats = np.stack([-u if camera.mirrored else u, v, -w])
         self.handedness = 1.0 if camera.mirrored else -1.0
 
-    def points(self, matrix: Floats, points: Floats) -> tuple[Floats, Floats]:
-        """Points of an object's space in camera space, and how large their world coordinates are.
+    def points(self, matrix: Floats, points: Floats) -> Floats:
+        """(3, n): points of an object's space in camera space.
 
-        matrix : (4, 4), object space to world space. points : (n, 3), object space.
-
-        Returns (3, n) camera space and (n,) the largest |coordinate| in world space, of the points or of their object: what is
-        far from its object's own origin is the small difference of large numbers.
+        matrix : (4, 4) or (3, 4), object space to world space, or (3, 4, n), one for each point. points : (n, 3), object space.
         """
-        relative = matrix[:3, :3] @ points.T
-        relative += (matrix[:3, 3] - self.eye)[:, None]
-        return self.axes @ relative, np.abs(relative + self.eye[:, None]).max(axis=0, initial=np.abs(matrix[:3, 3]).max())
+        points = np.ascontiguousarray(points.T)
+        relative = [dot(row, points) + (row[3] - eye) for row, eye in zip(matrix[:3], self.eye, strict=True)]
+        return np.stack([dot(axis, relative) for axis in self.axes])
 
     def world_position(self, depth: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
         """World coordinates, each (n,), of the points at (n,) planar depths on the rays (x, y, 1)."""
