@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Float32s, Floats, Indices
+from ..compiled.standing import or_compiled
 
 # How far from a corner, in each coordinate of the view plane, Embree can err, relative to the corner's distance r from the view
 # axis, and to r² beyond 1, where rays run aslant. In units of 2⁻²⁴: 2 for rounding the vertex, X and Z, 2 for the sum Q + P, 1
@@ -24,14 +25,15 @@ from ..arrays import Float32s, Floats, Indices
 REACH = 16 * 2.0**-24
 
 # Beyond, at 89.1° from the view axis, twice the reach is more than a cell: all rays are suspected there.
-_FARTHEST = 64.0
+FARTHEST = 64.0
 
 # Float32's multiples of 2⁻¹² of a power of two are what is left of a number to which 1.5 · 2¹¹ times that power is added.
-_EXPONENT, _GRAIN = np.int32(0x7F800000), np.int32((11 << 23) + (1 << 22))
+EXPONENT, GRAIN = np.int32(0x7F800000), np.int32((11 << 23) + (1 << 22))
 
 _PLACES_PER_CORNER = 32  # of which each takes two: of a thousand rays that pass by no corner, two are suspected
+_WHOLE = np.uint64(64)
 _BIT = np.array([1, 2, 4, 8, 16, 32, 64, 128], np.uint8)
-_MIXER = np.uint64(0x9E3779B97F4A7C15)  # 2⁶⁴ over the golden ratio, whose multiples spread evenly
+MIXER = np.uint64(0x9E3779B97F4A7C15)  # 2⁶⁴ over the golden ratio, whose multiples spread evenly
 
 
 class Corners:
@@ -44,10 +46,10 @@ class Corners:
         with np.errstate(all="ignore"):  # what stands beside or behind the eye is left out
             x, y = vertices[:2] / vertices[2]
             distance = np.maximum(np.abs(x), np.abs(y))
-            seen = (vertices[2] > 0) & (distance <= _FARTHEST)
+            seen = (vertices[2] > 0) & (distance <= FARTHEST)
         x, y, distance = x[seen], y[seen], distance[seen]
         bits = max((len(x) * _PLACES_PER_CORNER).bit_length(), 3)
-        self._bits, self._rest = np.uint64(bits), np.uint64(64 - bits)
+        self._bits = np.uint64(bits)
         taken = np.zeros(1 << bits, bool)
         reach = REACH * distance * np.maximum(distance, 1.0)
         for farther in (-reach, reach):  # at powers of two, where cells of two widths meet
@@ -55,40 +57,44 @@ class Corners:
             for right in (-reach, reach):
                 for up in (-reach, reach):
                     cell = _cell((x + right).astype(np.float32), (y + up).astype(np.float32), grain)
-                    taken[(cell >> self._rest).view(np.int64)] = True
-                    taken[(self._again(cell) >> self._rest).view(np.int64)] = True
+                    for hashed in (cell, cell << self._bits):  # the second from the bits behind the first
+                        taken[(hashed >> (_WHOLE - self._bits)).view(np.int64)] = True
         self._taken = np.packbits(taken, bitorder="little")  # to stay in a core's cache
 
-    def near(self, x: Float32s, y: Float32s) -> Indices:
-        """Which of the rays (x, y, 1) pass close by a corner, perhaps. x, y : (n,) float32."""
-        distance = np.abs(x)
-        np.maximum(distance, np.abs(y), out=distance)
-        if not distance.max(initial=0.0) <= _FARTHEST:
-            far = ~(distance <= _FARTHEST)
-            inner = np.flatnonzero(~far)
-            return np.concatenate([np.flatnonzero(far), inner[self.near(x[inner], y[inner])]])
-        cell = _cell(x, y, _grain(distance))
-        suspected = np.flatnonzero(self._is_taken(cell))
-        return suspected[self._is_taken(self._again(cell[suspected])) != 0]
+    def near(self, x: Floats, y: Floats) -> Indices:
+        """Which of the rays (x, y, 1) pass close by a corner, perhaps. x, y : (n,)."""
+        return suspects(self._taken, self._bits, x, y)
 
-    def _again(self, cell: NDArray[np.uint64]) -> NDArray[np.uint64]:
-        """The second hash, from the bits behind the first."""
-        return cell << self._bits
 
-    def _is_taken(self, cell: NDArray[np.uint64]) -> NDArray[np.uint8]:
-        """Not 0 where the place of a cell is taken."""
-        place = (cell >> self._rest).view(np.int64)
-        bit = _BIT.take(place & 7)
-        place >>= 3
-        bit &= self._taken.take(place, mode="clip")
-        return bit
+@or_compiled
+def suspects(taken: NDArray[np.uint8], bits: np.uint64, x: Floats, y: Floats) -> Indices:
+    """Which rays cross a cell that is taken in both hashes. taken : the places, eight a byte. bits : of a place's number."""
+    x, y = x.astype(np.float32), y.astype(np.float32)
+    distance = np.abs(x)
+    np.maximum(distance, np.abs(y), out=distance)
+    if not distance.max(initial=0.0) <= FARTHEST:
+        far = ~(distance <= FARTHEST)
+        inner = np.flatnonzero(~far)
+        return np.sort(np.concatenate([np.flatnonzero(far), inner[suspects.plain(taken, bits, x[inner], y[inner])]]))
+    cell = _cell(x, y, _grain(distance))
+    suspected = np.flatnonzero(_is_taken(taken, bits, cell))
+    return suspected[_is_taken(taken, bits, cell[suspected] << bits) != 0]
+
+
+def _is_taken(taken: NDArray[np.uint8], bits: np.uint64, cell: NDArray[np.uint64]) -> NDArray[np.uint8]:
+    """Not 0 where the place of a cell is taken."""
+    place = (cell >> (_WHOLE - bits)).view(np.int64)
+    bit = _BIT.take(place & 7)
+    place >>= 3
+    bit &= taken.take(place, mode="clip")
+    return bit
 
 
 def _grain(distance: Float32s) -> Float32s:
     """What makes cells of the numbers it is added to, from their distance to the view axis, which it overwrites."""
     bits = distance.view(np.int32)
-    bits &= _EXPONENT
-    bits += _GRAIN
+    bits &= EXPONENT
+    bits += GRAIN
     return distance
 
 
@@ -98,5 +104,5 @@ def _cell(x: Float32s, y: Float32s, grain: Float32s) -> NDArray[np.uint64]:
     np.add(x, grain, out=cell[:, 0])
     np.add(y, grain, out=cell[:, 1])
     mixed = cell.view(np.uint64)[:, 0]
-    mixed *= _MIXER
+    mixed *= MIXER
     return mixed

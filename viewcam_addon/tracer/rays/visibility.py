@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Indices, gather
+from ..compiled.standing import or_compiled
 from .corners import REACH, Corners
 from .edges import Edges
 from .ellipsoids import Ellipsoids
@@ -78,23 +79,22 @@ class Embree:
             self._cards = None
 
     def first(self, x: Floats, y: Floats) -> Indices:
-        directions = _directions(x, y)
         if self._triangles is None:
             found = np.full(len(x), -1, np.intp)
         else:
-            found = self._first_triangle(directions)
-            close = self._corners.near(directions[:, 0], directions[:, 1])
+            found = self._first_triangle(x, y)
+            close = self._corners.near(x, y)
             if len(close):
                 found[close] = self._without_slips(found[close], x[close], y[close])
         if len(self._wide):
             self._wide_before(found, x, y)
         if self._ellipsoids.count:
-            self._spheres_before(found, directions, x, y)
+            self._spheres_before(found, x, y)
         return found
 
-    def _first_triangle(self, directions: NDArray[np.float32]) -> Indices:
+    def _first_triangle(self, x: Floats, y: Floats) -> Indices:
         length = min((self._end - self._start) * self._unit, _FAR)
-        return self._triangles.run(directions * np.float32(self._start * self._unit), directions, dists=length).astype(np.intp)
+        return first_triangles(self._triangles, self._start * self._unit, length, x, y)
 
     def _without_slips(self, found: Indices, x: Floats, y: Floats) -> Indices:
         """What rays that pass close by a corner meet, from what they found and what four rays round each of them find.
@@ -104,7 +104,7 @@ class Embree:
         distance = np.maximum(np.abs(x), np.abs(y))
         aside = distance * np.maximum(distance, 1.0)
         around = (x + _AROUND[0] * aside).ravel(), (y + _AROUND[1] * aside).ravel()
-        beside = self._first_triangle(_directions(*around))
+        beside = self._first_triangle(*around)
         depths = self._depth(beside, *around).reshape(4, -1)
         nearest, _, third, _ = np.sort(depths, axis=0)
         with np.errstate(invalid="ignore"):  # where three see nothing, it is no slip
@@ -126,7 +126,7 @@ class Embree:
         """Depths of the triangles that were found, inf where none was."""
         return np.where(found >= 0, self._planes.depth(found, x, y), np.inf)
 
-    def _spheres_before(self, found: Indices, directions: NDArray[np.float32], x: Floats, y: Floats) -> None:
+    def _spheres_before(self, found: Indices, x: Floats, y: Floats) -> None:
         """Put spheres into `found` where they stand before the triangle there."""
         nearest = np.full(len(x), self._end, np.float64)
         met = np.flatnonzero(found >= 0)
@@ -137,6 +137,7 @@ class Embree:
             nearest[nearer], found[nearer] = depth[nearer], self._triangle_count + sphere
         if self._cards is None:
             return
+        directions = _directions(x, y)
         rays, origin = np.arange(len(x)), np.zeros(len(x), np.float32)  # origins in Embree's unit
         while len(rays):
             ahead = directions[rays]
@@ -151,6 +152,13 @@ class Embree:
             origin = self._card_depth[card] * np.float32(1 + _CARD_SPACING / 2)
             onwards = np.flatnonzero(origin < nearest[rays] * self._unit)
             rays, origin = rays[onwards], origin[onwards]
+
+
+@or_compiled
+def first_triangles(embree: "EmbreeScene", start: float, length: float, x: Floats, y: Floats) -> Indices:
+    """The triangle that each ray (x, y, 1) meets first, or −1, from the depth `start` on as far as `length` behind it."""
+    directions = _directions(x, y)
+    return embree.run(directions * np.float32(start), directions, dists=length).astype(np.intp)
 
 
 def _directions(x: Floats, y: Floats) -> NDArray[np.float32]:
