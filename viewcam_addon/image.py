@@ -51,7 +51,9 @@ _LIGHT = {
     "Diffuse Color": "RGB",
     "Variance": "RGB",
 }
-CHANNELS = _LIGHT | _GEOMETRY
+# Of a picture whose pixels have as many samples as a wanted error takes, how many.
+_OPTIONAL = {"Sample Count": "X"}
+CHANNELS = _LIGHT | _OPTIONAL | _GEOMETRY
 # What Blender 4 calls some of them in a file.
 OLDER_NAMES = {
     "IndexOB": "Object Index",

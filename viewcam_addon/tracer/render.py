@@ -5,6 +5,7 @@ one ray more that tells what is at its centre. Every pixel is computed alone and
 result is the same, bit for bit, for any number of threads.
 """
 
+import math
 import os
 from collections.abc import Callable
 
@@ -56,25 +57,46 @@ class Tracer:
 
         return self._picture(background, trace, SMALLEST_TILE, TILE, watcher)
 
-    def render_light(self, level: str, samples: int, seed: int, watcher: Watcher | None = None) -> Passes:
-        """The same of light, and what is at the pixel centres: Depth and Object Index."""
-        from .light.illumination import CENTRES, Illumination, dark
+    def render_light(
+        self, level: str, samples: int, seed: int, watcher: Watcher | None = None, error: float | None = None
+    ) -> Passes:
+        """The same of light, and what is at the pixel centres: Depth and Object Index.
+
+        error : as in `render`; then there is the pass Sample Count, too.
+        """
+        from .light.adaptive.rounds import Rounds, bands
+        from .light.illumination import CENTRES, Illumination, counted, dark
         from .rays.points import Surfaces
 
         surfaces = Surfaces(self._scene, self._view, self._triangles, self._planes, self._ellipsoids)
         illumination = Illumination(self._scene, self._view, surfaces, self._eye, level, samples, seed)
 
-        def trace(passes: Passes, tile: range) -> None:
-            columns, rows = self._corners(tile)
+        def check() -> None:
+            _stop_if_asked(watcher)
+
+        def trace_centres(passes: Passes, columns: Indices, rows: Indices) -> tuple[Floats, Floats, Indices]:
             x, y, primitives = self._eye(columns + 0.5, rows + 0.5)
-            centres = background((len(tile),))
+            centres = background((len(x),))
             self._surface.write(centres, primitives, x, y)
             for name in CENTRES:
                 passes[name][:] = centres[name]
-            illumination.trace(passes, np.arange(tile.start, tile.stop), columns, rows, lambda: _stop_if_asked(watcher))
+            return x, y, primitives
 
-        largest = illumination.largest_tile
-        return self._picture(dark, trace, min(largest, SMALLEST_TILE), largest, watcher)
+        def trace(passes: Passes, tile: range) -> None:
+            columns, rows = self._corners(tile)
+            trace_centres(passes, columns, rows)
+            illumination.trace(passes, np.arange(tile.start, tile.stop), columns, rows, check)
+
+        if error is None:
+            largest = illumination.largest_tile
+            return self._picture(dark, trace, min(largest, SMALLEST_TILE), largest, watcher)
+        rounds = Rounds(illumination, error, self._camera.width, trace_centres, self._in_parts, check)
+        passes = self._blank(counted)
+        for rows in bands(self._camera.width, self._camera.height):
+            rounds.trace({name: values[rows.start : rows.stop] for name, values in passes.items()}, rows)
+            if watcher is not None:
+                watcher.tile(passes, rows)
+        return passes
 
     def surface_at(self, columns: ArrayLike, rows: ArrayLike, px: ArrayLike = 0.5, py: ArrayLike = 0.5) -> Passes:
         """The surfaces at sample points of pixels.
@@ -106,12 +128,7 @@ class Tracer:
     ) -> Passes:
         """Passes that `trace` has written into, tile by tile."""
         width, height = self._camera.width, self._camera.height
-        try:
-            passes = blank((height, width))
-        except (MemoryError, ValueError) as error:
-            raise InputError(
-                f"a picture of {width} × {height} pixels needs more memory than there is: choose a size"
-            ) from error
+        passes = self._blank(blank)
         flat = {name: values.reshape(width * height, -1) for name, values in passes.items()}
 
         def work(tile: range) -> None:
@@ -123,6 +140,22 @@ class Tracer:
             if watcher is not None:
                 watcher.tile(passes, range(tile.start // width, (tile.stop - 1) // width + 1))
         return passes
+
+    def _blank(self, blank: Callable[[tuple[int, int]], Passes]) -> Passes:
+        """A picture in which nothing is to be seen."""
+        width, height = self._camera.width, self._camera.height
+        try:
+            return blank((height, width))
+        except (MemoryError, ValueError) as error:
+            raise InputError(
+                f"a picture of {width} × {height} pixels needs more memory than there is: choose a size"
+            ) from error
+
+    def _in_parts(self, work: Callable[[slice], None], count: int, largest: int) -> None:
+        """Call `work` with slices of so many things, each of no more than `largest`, in threads."""
+        runs = tiles(count, 1, self._threads, 1, largest)
+        for _ in over_threads(lambda run: work(slice(run.start, run.stop)), runs, self._threads):
+            pass
 
     def _corners(self, tile: range) -> tuple[Indices, Indices]:
         """Columns and rows of a tile's pixels, which are their lower left corners as well."""
@@ -137,16 +170,18 @@ def render(
     seed: int = 0,
     threads: int | None = None,
     watcher: Watcher | None = None,
+    error: float | None = None,
 ) -> Passes:
     """Trace the scene: pass name → (height, width, channels) float32, rows from the bottom.
 
     level : one of film.LEVELS. samples : of each pixel, at the levels of light; the only one is at its centre.
-    seed : another for other noise.
+    seed : another for other noise. error : the standard error that each pixel's Combined may have, scene-linear: the root of
+    the mean of its channels' variances. Then pixels get as few samples as that takes, `samples` at most; Sample Count tells.
 
     Raises
     ------
     InputError
-        if there is no such level, or not enough memory.
+        if there is no such level or error, or not enough memory.
     Stopped
         when the watcher says so.
     """
@@ -154,11 +189,13 @@ def render(
         raise InputError(f"the level is {level!r}: give one of {', '.join(LEVELS)}")
     if samples < 1:
         raise InputError(f"the number of samples is {samples}: give at least 1")
+    if error is not None and not 0.0 < error < math.inf:
+        raise InputError(f"the error is {error}: give a number above 0")
     try:
         tracer = Tracer(scene, threads)
         if level == "geometry":
             return tracer.render(watcher)
-        return tracer.render_light(level, samples, seed, watcher)
+        return tracer.render_light(level, samples, seed, watcher, error)
     except MemoryError as error:
         raise InputError("the scene needs more memory than there is: take some of it out, or give fewer threads") from error
 

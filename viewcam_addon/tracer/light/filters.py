@@ -66,6 +66,27 @@ def mass(x: Floats) -> Floats:
     return (a * theta - b * np.sin(theta) + c / 2 * np.sin(2 * theta) - d / 3 * np.sin(3 * theta)) / (2 * np.pi * a)
 
 
+def reach(film: Film) -> float:
+    """How far from a pixel's centre its samples lie at most, on each axis, in pixels."""
+    return 0.5 if film.filter == "BOX" else film.filter_width
+
+
+def beyond(film: Film, distance: float) -> float:
+    """The part of the film's filter that lies beyond so many pixels to one side of the centre."""
+    if film.filter == "BOX":
+        return max(0.5 - distance, 0.0)
+    return float(mass(-min(distance / film.filter_width, 1.0)))
+
+
+def variance(film: Film) -> float:
+    """Of where samples lie, on each axis, in pixels²: of a sum of cosines by its integral with x²."""
+    if film.filter == "BOX":
+        return 1 / 12
+    a, *others = _COEFFICIENTS
+    waves = sum((-1) ** k * value / k**2 for k, value in enumerate(others, start=1))
+    return film.filter_width**2 * (1 / 3 + 2 / np.pi**2 * waves / a)
+
+
 @functools.cache
 def _inverse() -> tuple[Floats, Floats]:
     """Where each step of the mass begins, and how far it reaches, in widths."""

@@ -5,11 +5,13 @@ own random numbers, so that their errors are independent of one another.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...image import BACKGROUND_DEPTH, CHANNELS, LIGHT_PASSES
-from ..arrays import Floats, Indices
+from ..arrays import Floats, Indices, gather
 from ..rays.points import Surfaces
 from ..rays.space import Space
 from ..rays.surface import Passes
@@ -28,6 +30,9 @@ from .textures import Palette
 # these.
 PATHS, SAMPLES_AT_A_TIME = 65536, 16
 
+# More lamps than these are sampled by chance, all of them at once.
+_LAMPS = 8
+
 CENTRES = ("Depth", "Object Index")
 """The passes that tell what is at the pixels' centres."""
 
@@ -42,6 +47,11 @@ def dark(shape: tuple[int, ...]) -> Passes:
     return passes
 
 
+def counted(shape: tuple[int, ...]) -> Passes:
+    """The same with the pass that counts samples."""
+    return dark(shape) | {"Sample Count": np.zeros((*shape, 1), np.float32)}
+
+
 class Illumination:
     """Light in one scene.
 
@@ -49,31 +59,63 @@ class Illumination:
     """
 
     def __init__(self, scene: Scene, view: View, surfaces: Surfaces, eye: Eye, level: str, samples: int, seed: int) -> None:
-        self._film, self._eye, self._samples = scene.film, eye, samples
-        self._sampler = Sampler(seed, samples)
-        palette, space = Palette(scene), Space(surfaces)
-        emitters = Emitters(scene, view, surfaces, palette)
-        bounces = scene.bounces if level == "path" else NO_BOUNCES
-        self._paths_at_a_time = 2 * PATHS if bounces.total else PATHS
-        self._paths = Paths(surfaces, space, emitters, palette, self._sampler, bounces, scene.clip)
+        self.film, self.samples, self.surfaces, self.eye = scene.film, samples, surfaces, eye
+        self._scene, self._view, self._clip = scene, view, scene.clip
+        self.sampler = Sampler(seed, samples)
+        self.palette, self._space = Palette(scene), Space(surfaces)
+        self._bounces = scene.bounces if level == "path" else NO_BOUNCES
+        self.paths_at_a_time = 2 * PATHS if self._bounces.total else PATHS
+        self.paths = self._paths_in(scene)
+        self._unsteady = self.palette.specular | self.palette.patterned
+
+    def _paths_in(self, scene: Scene) -> Paths:
+        emitters = Emitters(scene, self._view, self.surfaces, self.palette)
+        return Paths(self.surfaces, self._space, emitters, self.palette, self.sampler, self._bounces, self._clip)
+
+    def paths_by_lamp(self) -> list[Paths] | None:
+        """Paths of each lamp alone, none of which depends on chance; None where some do, or where there are too many."""
+        if not self.paths.random:
+            return [self.paths]
+        lamps = [lamp for lamp in self._scene.lamps if not lamp.is_dark]
+        if not 1 < len(lamps) <= _LAMPS:
+            return None
+        paths = [self._paths_in(replace(self._scene, lamps=(lamp,))) for lamp in lamps]
+        return None if any(alone.random for alone in paths) else paths
+
+    def unsteady(self, primitives: Indices, x: Floats, y: Floats) -> NDArray[np.bool_]:
+        """Whether what rays from the eye meet may show another thing right beside: a mirror, glass, or what has a pattern."""
+        unsteady = np.zeros(len(primitives), bool)
+        if self._unsteady.any():
+            met = np.flatnonzero(primitives >= 0)
+            points = self.surfaces.seen(primitives[met], x[met], y[met])
+            unsteady[met] = gather(self._unsteady, points.material)
+        return unsteady
 
     @property
     def largest_tile(self) -> int:
         """Pixels."""
-        return self._paths_at_a_time // min(self._samples, SAMPLES_AT_A_TIME)
+        return self.paths_at_a_time // min(self.samples, SAMPLES_AT_A_TIME)
 
     def trace(self, passes: Passes, pixels: Indices, columns: Floats, rows: Floats, check: Callable[[], None]) -> None:
         """Write the light of n pixels into passes, name → (n, channels).
 
         columns, rows : (n,) of the pixels' lower left corners. check : called often; what it raises ends the work.
         """
-        count = len(pixels)
-        sums = Sums(count, self._paths.categories, self._film, self._samples)
-        at_a_time = max(1, self._paths_at_a_time // count)
-        for first in range(0, self._samples, at_a_time):
-            some = np.arange(first, min(first + at_a_time, self._samples))
-            pixel, sample = np.tile(pixels, len(some)), np.repeat(some, count)
-            px, py = offsets(self._film, self._sampler.grid(pixels, some, 0, 2)) if self._samples > 1 else (0.5, 0.5)
-            x, y, primitives = self._eye(np.tile(columns, len(some)) + px, np.tile(rows, len(some)) + py)
-            sums.add(self._paths.trace(pixel, sample, primitives, x, y, check))
-        sums.write(passes, self._paths.random)
+        sums = self.sums(len(pixels), self.samples)
+        at_a_time = max(1, self.paths_at_a_time // len(pixels))
+        for first in range(0, self.samples, at_a_time):
+            self.add(sums, np.arange(first, min(first + at_a_time, self.samples)), pixels, columns, rows, check)
+        sums.write(passes, self.paths.random)
+
+    def sums(self, count: int, samples: int) -> Sums:
+        """Sums over no samples of so many pixels so far. samples : how many there will be."""
+        return Sums(count, self.paths.categories, self.film, samples)
+
+    def add(
+        self, sums: Sums, samples: Indices, pixels: Indices, columns: Floats, rows: Floats, check: Callable[[], None]
+    ) -> None:
+        """Trace some samples, given by their numbers, of the sums' pixels, and add them; the rest as in `trace`."""
+        some, count = len(samples), len(pixels)
+        px, py = offsets(self.film, self.sampler.grid(pixels, samples, 0, 2)) if self.samples > 1 else (0.5, 0.5)
+        x, y, primitives = self.eye(np.repeat(columns, some) + px, np.repeat(rows, some) + py)
+        sums.add(self.paths.trace(np.repeat(pixels, some), np.tile(samples, count), primitives, x, y, check))

@@ -11,10 +11,11 @@ Rejected: batches that are scrambled each on its own, which makes the estimate r
 """
 
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 
-from ..arrays import Floats, Indices
+from ..arrays import Floats, Indices, Some, pick, put
 from ..rays.surface import Passes
 from ..scene.film import Film
 
@@ -47,6 +48,10 @@ class Light:
     def place(self, category: str) -> int:
         return self._rows[category] * self.count
 
+    def of(self, category: str) -> Floats:
+        """(3, n): what the paths bring that belongs to a category."""
+        return self.values[:, self._rows[category]]
+
     def add(self, places: Indices, radiance: Floats) -> None:
         """Add (3, k) or (3, 1) to k different places."""
         for total, component in zip(self._flat, radiance, strict=True):
@@ -59,71 +64,105 @@ class Light:
 
 
 class Sums:
-    """The sums over the samples of `count` pixels. samples : how many there will be."""
+    """The sums over the samples of `count` pixels.
+
+    samples : how many there will be. categories : of light. taken : how many samples there are, of all pixels alike or of each.
+    """
 
     def __init__(self, count: int, categories: Sequence[str], film: Film, samples: int) -> None:
-        self._film, self._count, self._samples = film, count, 0
+        self._film, self._count = film, count
+        self.taken: int | Indices = 0
         # A power of two, since that is how many points together fill their space.
         self._batch_size = 1 << max(samples // _BATCHES, 1).bit_length() - 1
         self._categories = list(categories)
         hidden = (COLOUR, BACKGROUND) if film.transparent else (COLOUR,)
         self._shown = [row for row, category in enumerate(categories) if category not in hidden]
-        self._totals = np.zeros((3, len(categories), count))
-        self._covered = np.zeros(count)
-        self._first = np.zeros((3, count))
+        self._hold(np.zeros((3 * len(categories) + 13, count)))
+
+    def _hold(self, state: Floats) -> None:
+        """Keep all that is known of the pixels in the columns of one table, and names for its rows."""
+        self.state = state
+        self._totals = state[:-13].reshape(3, len(self._categories), -1)
+        self.covered, self._first = state[-13], state[-12:-9]
         # The sum of the differences from the first sample, and when the last batch began; of the batches' own sums, squared.
-        self._differences, self._before, self._squares = (np.zeros((3, count)) for _ in range(3))
+        self._differences, self._before, self._squares = state[-9:-6], state[-6:-3], state[-3:]
+
+    @property
+    def means(self) -> int:
+        """How many of the state's first rows are sums of what the pixels show, of categories or of all."""
+        return len(self.state) - 9
+
+    def at(self, which: Some) -> "Sums":
+        """A copy of some pixels."""
+        some = copy(self)
+        some._hold(np.array(pick(self.state, which)))
+        some._count = some.state.shape[1]
+        return some
+
+    def put(self, which: Indices | slice, some: "Sums") -> None:
+        """Put some pixels back."""
+        put(self.state, which, some.state)
+
+    @property
+    def combined(self) -> Floats:
+        """(3, count): the mean so far of what the pixels show."""
+        return (self._first + self._differences / self.taken) * self._film.exposure
 
     def add(self, light: Light) -> None:
-        """Add some samples of every pixel: the paths are those of all pixels, sample after sample."""
-        values = light.values.reshape(3, len(self._categories), light.count // self._count, self._count)
+        """Add some samples of every pixel: the paths are those of all samples of a pixel, pixel after pixel."""
+        values = light.values.reshape(3, len(self._categories), self._count, -1).transpose(0, 1, 3, 2).copy()
         combined = np.zeros((3, values.shape[2], self._count))
         for row in self._shown:
             combined += values[:, row]
-        if self._samples == 0:
-            self._first = combined[:, 0].copy()
+        if self.taken == 0:
+            self._first[:] = combined[:, 0]
         combined -= self._first[:, None]
         for sample in range(values.shape[2]):
             self._totals += values[:, :, sample]
             self._differences += combined[:, sample]
-            self._samples += 1
-            if self._samples % self._batch_size == 0:
+            self.taken += 1
+            if self.taken % self._batch_size == 0:
                 of_batch = self._differences - self._before
                 of_batch *= of_batch
                 self._squares += of_batch
                 self._before[:] = self._differences
-        self._covered += light.covered.reshape(-1, self._count).sum(axis=0)
+        self.covered += light.covered.reshape(self._count, -1).sum(axis=1)
 
     def write(self, passes: Passes, random: bool) -> None:
         """Write the means into passes, name → (count, channels).
 
         random : whether another seed would give another picture; if so, the variance of a single sample is infinite.
         """
-        number, exposure = self._samples, self._film.exposure
-        colour = self._mean(COLOUR)
-        _store(passes["Combined"], (self._first + self._differences / number) * exposure)
-        passes["Combined"][:, 3] = self._covered / number if self._film.transparent else 1.0
-        _store(passes["Emission"], self._mean(EMITTED) * exposure)
-        _store(passes["Environment"], self._mean(BACKGROUND) * exposure)
-        _store(passes["Diffuse Direct"], _without_colour(self._mean(DIRECT) * exposure, colour))
-        _store(passes["Diffuse Indirect"], _without_colour(self._mean(INDIRECT) * exposure, colour))
-        _store(passes["Diffuse Color"], colour)
-        if number > 1:
-            _store(passes["Variance"], self._variance() * exposure**2)
+        self.write_means(passes)
+        if self.taken > 1:
+            store(passes["Variance"], self.variance)
         else:
             passes["Variance"][:] = np.inf if random else 0.0
+
+    def write_means(self, passes: Passes) -> None:
+        """The same but for Variance."""
+        exposure = self._film.exposure
+        colour = self._mean(COLOUR)
+        store(passes["Combined"], self.combined)
+        passes["Combined"][:, 3] = self.covered / self.taken if self._film.transparent else 1.0
+        store(passes["Emission"], self._mean(EMITTED) * exposure)
+        store(passes["Environment"], self._mean(BACKGROUND) * exposure)
+        store(passes["Diffuse Direct"], _without_colour(self._mean(DIRECT) * exposure, colour))
+        store(passes["Diffuse Indirect"], _without_colour(self._mean(INDIRECT) * exposure, colour))
+        store(passes["Diffuse Color"], colour)
 
     def _mean(self, category: str) -> Floats:
         """(3, count)."""
         if category not in self._categories:
             return np.zeros((3, self._count))
-        return self._totals[:, self._categories.index(category)] / self._samples
+        return self._totals[:, self._categories.index(category)] / self.taken
 
-    def _variance(self) -> Floats:
-        """Of the mean: that of the batches' means over their number, as if those that began a further one had ended it."""
-        batches = self._samples // self._batch_size
+    @property
+    def variance(self) -> Floats:
+        """(3, count), of `combined`: that of the batches' means over their number, as if one that has begun had ended."""
+        batches = self.taken // self._batch_size
         of_sums = (self._squares - self._before * self._before / batches) / (batches - 1)
-        return np.maximum(of_sums, 0.0) / self._batch_size / self._samples
+        return np.maximum(of_sums, 0.0) / self._batch_size / self.taken * self._film.exposure**2
 
 
 def _without_colour(light: Floats, colour: Floats) -> Floats:
@@ -135,5 +174,6 @@ def _without_colour(light: Floats, colour: Floats) -> Floats:
     return np.where(black, divided.sum(axis=0) / others, divided)
 
 
-def _store(target: np.ndarray, values: Floats) -> None:
+def store(target: np.ndarray, values: Floats) -> None:
+    """Write (3, n) colours into a pass."""
     target[:, :3] = np.minimum(values, _MOST).T

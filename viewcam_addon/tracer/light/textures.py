@@ -50,6 +50,19 @@ class Palette:
         return np.array([colour is not None for colour in self._colours.get(component, [None] * len(self._ior))])
 
     @property
+    def specular(self) -> NDArray[np.bool_]:
+        """For each of `materials_of(scene)`, whether it is a mirror or clear."""
+        return self.having("mirror") | self.having("glass") | self.having("refraction")
+
+    @property
+    def patterned(self) -> NDArray[np.bool_]:
+        """For each of `materials_of(scene)`, whether its colours vary over the surface."""
+        patterned = np.zeros(len(self._ior), bool)
+        for colours in self._colours.values():
+            patterned |= [colour is not None and (colour.image is not None or colour.vertex) for colour in colours]
+        return patterned
+
+    @property
     def scatters(self) -> bool:
         """Whether any surface sends light on."""
         return bool(self._colours.keys() - {"emission"})
