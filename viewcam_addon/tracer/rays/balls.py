@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Indices, dot, gather
 from ..scene import Object, Spheres
+from .tables import in_camera_space
 from .view import View
 
 # |f|² − 1 below which the textbook's discriminant is better than the perpendicular's (ellipsoids.py).
@@ -88,25 +89,23 @@ class Balls:
 
 def balls_of(pairs: list[tuple[Object, Spheres]], view: View) -> Balls:
     """The spheres of all objects that are spheres, without those that are points or flat."""
-    centres, inverses, axes, solid = [np.empty((3, 0))], [], [], []
-    for placed, spheres in pairs:
-        linear = placed.matrix[:3, :3]
-        solid.append(np.linalg.matrix_rank(linear) == 3)
-        turned = view.axes @ linear
-        inverses.append((np.linalg.inv(turned) if solid[-1] else np.eye(3)).T.reshape(9))
-        directions, lengths, _ = np.linalg.svd(turned)
-        axes.append((directions * lengths).T)
-        centres.append(view.points(placed.matrix, spheres.centers))
+    matrices = np.array([placed.matrix for placed, _ in pairs]).reshape(-1, 4, 4)
+    solid = np.linalg.matrix_rank(matrices[:, :3, :3]) == 3
+    turned = view.axes @ matrices[:, :3, :3]
+    inverse = np.linalg.inv(np.where(solid[:, None, None], turned, np.eye(3)))
+    directions, lengths, _ = np.linalg.svd(turned)
+    axes = (directions * lengths[:, None]).transpose(2, 1, 0)  # [axis, component, object]
+    centres = in_camera_space(pairs, [spheres.centers for _, spheres in pairs], view)
     owner = np.repeat(np.arange(len(pairs)), [len(spheres.radii) for _, spheres in pairs])
     radii = np.concatenate([np.empty(0), *(spheres.radii for _, spheres in pairs)])
-    half_axes = gather(np.array(axes).reshape(-1, 3, 3).transpose(1, 2, 0), owner) * radii
+    half_axes = gather(axes, owner) * radii
     extent = np.sqrt((half_axes * half_axes).sum(axis=1))
-    held = np.array(solid, bool)[owner] & (extent > _SMALLEST).all(axis=0) & (extent < _LARGEST).all(axis=0)
+    held = solid[owner] & (extent > _SMALLEST).all(axis=0) & (extent < _LARGEST).all(axis=0)
     chosen = np.flatnonzero(held)
     return Balls(
-        centres=gather(np.concatenate(centres, axis=1), chosen),
+        centres=gather(centres, chosen),
         radii=gather(radii, chosen),
-        inverse=np.array(inverses).reshape(-1, 9).T.copy(),
+        inverse=inverse.transpose(2, 1, 0).reshape(9, -1),
         owner=gather(owner, chosen).astype(np.int32),
         axes=gather(half_axes, chosen),
         reach=gather(extent.max(axis=0, initial=0.0), chosen),

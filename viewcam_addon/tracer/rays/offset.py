@@ -37,6 +37,7 @@ from functools import reduce
 import numpy as np
 
 from ..arrays import Float32s, Floats, cross, dot, gather
+from .tables import each, parts
 from .triangles import Planes, Triangles
 
 FLATTEST = 2.0**-18
@@ -52,15 +53,23 @@ ENDING = 4.0
 
 def triangle_offsets(triangles: Triangles) -> Floats:
     """(m,) float64, camera space: how far off each triangle a ray that leaves it starts."""
-    a, b, c = (gather(triangles.vertices, corners) for corners in triangles.corners)
-    ab, bc, ac = b - a, c - b, c - a
-    sides = _length(ab), _length(bc), _length(ac)
-    longest, shortest = (reduce(choose, sides) for choose in (np.maximum, np.minimum))
-    with np.errstate(all="ignore"):
-        cap = np.fmin(shortest * longest / _length(cross(ab, ac)), _FLATTEST_CAP)
+    offsets = np.empty(triangles.count)
     largest = np.abs(triangles.vertices).max(axis=0)
-    largest = reduce(np.maximum, (gather(largest, corners) for corners in triangles.corners))
-    return FLOAT32 * (ROUNDING * largest + (ARITHMETIC + cap) * longest)
+
+    def fill(part: slice) -> None:
+        corners = triangles.corners[:, part]
+        a, b, c = gather(triangles.vertices, corners).transpose(1, 0, 2)
+        ab, ac, bc = b - a, c - a, c - b
+        sides = dot(ab, ab), dot(ac, ac), dot(bc, bc)
+        longest, shortest = (np.sqrt(reduce(choose, sides)) for choose in (np.maximum, np.minimum))
+        normal = cross(ab, ac)
+        with np.errstate(all="ignore"):
+            cap = np.fmin(shortest * longest / np.sqrt(dot(normal, normal)), _FLATTEST_CAP)
+        farthest = reduce(np.maximum, (gather(largest, corner) for corner in corners))
+        offsets[part] = FLOAT32 * (ROUNDING * farthest + (ARITHMETIC + cap) * longest)
+
+    each(fill, parts(triangles.count), triangles.threads)
+    return offsets
 
 
 def wide_offsets(planes: Planes) -> Floats:
@@ -102,7 +111,3 @@ def shadow_rays(starts: Floats, lights: Floats) -> tuple[Float32s, Float32s, Flo
     slack = FLOAT32 * (ROUNDING * largest + (ARITHMETIC + ENDING) * distance)
     lengths = np.maximum(distance - slack, 0.0) / np.where(distance > 0, distance, 1.0)
     return origins, directions, lengths.astype(np.float32)
-
-
-def _length(vectors: Floats) -> Floats:
-    return np.sqrt(dot(vectors, vectors))

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Indices, Some, cross, dot, gather, pick
-from ..scene import Object, Scene, Spheres
+from ..scene import Scene, Spheres
 from ..scene.materials import PLAIN, Material
 from . import offset
 from .balls import balls_of
 from .ellipsoids import Ellipsoids
-from .triangles import Planes, Triangles
+from .tables import by_material
+from .triangles import Planes, Triangles, facing
 from .view import View
 
 
@@ -92,19 +93,18 @@ class Surfaces:
         placed = [(placed, scene.geometries[placed.geometry]) for placed in scene.objects]
         self.balls = balls_of([pair for pair in placed if isinstance(pair[1], Spheres)], view)
         things = [*triangles.placed, *self.balls.placed]
-        self._material = _materials(scene, things)
+        names = [placed.materials + ("",) * len(placed.material_indices) for placed, _ in things]
+        numbers = {"": 0, **{name: number for number, name in enumerate(scene.materials, start=1)}}
+        self._material = by_material(things, [[numbers[name] for name in some] for some in names], np.int32)
         # Of spheres 0: they are tested in float64.
         self._offset = np.zeros(len(self._material))
         self._offset[: triangles.count] = offset.triangle_offsets(triangles)
         self._offset[planes.wide] = offset.wide_offsets(planes)
-        mirrored = [np.linalg.det(placed.matrix[:3, :3]) < 0 for placed, _ in triangles.placed]
-        sizes = [len(mesh.triangles) for _, mesh in triangles.placed]
         # On which side of the cross product of its sides, in camera space, a triangle has its front, and its smooth normals.
-        self._front = np.repeat(np.where(np.array(mirrored, bool), -1, 1) * int(view.handedness), sizes).astype(np.int8)
-        self._corner_normals = _corner_normals(triangles, view)
-        # Towards the eye.
-        with np.errstate(all="ignore"):
-            self._normals = planes.forms[:3] / -np.sqrt(dot(planes.forms, planes.forms))
+        matrices = np.array([placed.matrix[:3, :3] for placed, _ in triangles.placed]).reshape(-1, 3, 3)
+        front = np.where(np.linalg.det(matrices) < 0, -1, 1) * int(view.handedness)
+        self._front = np.repeat(front.astype(np.int8), triangles.counts)
+        self._axes = view.handedness * view.axes
         colours = [colour for material in materials_of(scene) for colour in material.colours.values()]
         self._has_uv = any(colour.image is not None for colour in colours)
         self._colours = _corner_colours(triangles) if any(colour.vertex for colour in colours) else None
@@ -116,7 +116,7 @@ class Surfaces:
         def triangle_points(triangle: Indices, which: Some) -> Points:
             depth, first, second = self.planes.hit(triangle, pick(x, which), pick(y, which))
             ways = pick(directions, which)
-            normal = gather(self._normals, triangle)
+            normal = facing(gather(self.planes.forms[:3], triangle))
             side = gather(self.planes.side, triangle) * self._view.handedness
             return self._on_triangles(triangle, normal, side, first, second, ways * depth, ways)
 
@@ -208,9 +208,10 @@ class Surfaces:
         )
 
     def _shading(self, triangle: Indices, first: Floats, second: Floats, normal: Floats, side: Floats) -> Floats:
-        if self._corner_normals is None:
+        if self.triangles.corner_normals is None:
             return normal
-        smooth = _interpolated(gather(self._corner_normals, triangle), first, second, 3)
+        smooth = _interpolated(gather(self.triangles.corner_normals, triangle), first, second, 3)
+        smooth = np.stack([dot(axis, smooth) for axis in self._axes])
         length = np.sqrt(dot(smooth, smooth))
         with np.errstate(invalid="ignore", divide="ignore"):
             smooth *= side / length
@@ -243,31 +244,14 @@ class Surfaces:
         )
 
 
-def _materials(scene: Scene, things: list[tuple[Object, object]]) -> NDArray[np.int32]:
-    """For each primitive, triangles first, the index of its material."""
-    numbers = {"": 0, **{name: number for number, name in enumerate(scene.materials, start=1)}}
-    parts = [np.empty(0, np.int32)]
-    for placed, geometry in things:
-        names = placed.materials + ("",) * len(placed.material_indices)
-        parts.append(np.array([numbers[name] for name in names], np.int32)[geometry.materials])
-    return np.concatenate(parts)
-
-
-def _corner_normals(triangles: Triangles, view: View) -> NDArray[np.float32] | None:
-    """(9, m), as in `Triangles`, in camera space and on the side of the cross product of the triangles' sides."""
-    if triangles.corner_normals is None:
-        return None
-    axes = view.handedness * view.axes
-    return np.concatenate([axes @ triangles.corner_normals[first : first + 3] for first in (0, 3, 6)]).astype(np.float32)
-
-
 def _corner_colours(triangles: Triangles) -> NDArray[np.float32]:
     """(9, m): [3 · corner + channel, triangle], 0 on meshes without."""
-    colours = [
-        np.zeros((9, len(mesh.triangles)), np.float32) if mesh.corner_colours is None else mesh.corner_colours.reshape(-1, 9).T
-        for _, mesh in triangles.placed
-    ]
-    return np.ascontiguousarray(np.concatenate([np.empty((9, 0), np.float32), *colours], axis=1))
+    table, end = np.zeros((9, triangles.count), np.float32), 0
+    for _, mesh in triangles.placed:
+        begin, end = end, end + len(mesh.triangles)
+        if mesh.corner_colours is not None:
+            table[:, begin:end] = mesh.corner_colours.reshape(-1, 9).T
+    return table
 
 
 def _interpolated(corners: NDArray[np.float32], first: Floats, second: Floats, count: int) -> Floats:

@@ -13,8 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
+from ..scene import Mesh, Object, Spheres
+from .view import View
+
 AT_A_TIME = 8192
 """Entries."""
+
+Things = Sequence[tuple[Object, Mesh | Spheres]]
+"""Objects with their geometries."""
 
 Piece = tuple[int, slice]
 """Of an object, by its number, some of its vertices or triangles."""
@@ -37,6 +44,11 @@ class made_once:
             if self._name not in vars(instance):
                 vars(instance)[self._name] = self._make(instance)
         return vars(instance)[self._name]
+
+
+def parts(count: int) -> list[slice]:
+    """So many entries, `AT_A_TIME`."""
+    return [slice(first, min(first + AT_A_TIME, count)) for first in range(0, count, AT_A_TIME)]
 
 
 def pieces(counts: Sequence[int]) -> Iterator[tuple[slice, list[Piece]]]:
@@ -72,6 +84,32 @@ def spread(values: NDArray, some: list[Piece]) -> NDArray:
     if len(numbers) == 1:
         return values[..., numbers]
     return np.repeat(values[..., numbers], [part.stop - part.start for _, part in some], axis=-1)
+
+
+def matrices(things: Things) -> Floats:
+    """(3, 4, objects), to world space."""
+    return np.array([placed.matrix[:3] for placed, _ in things]).reshape(-1, 3, 4).transpose(1, 2, 0)
+
+
+def in_camera_space(things: Things, points: Sequence[Floats], view: View, threads: int = 1) -> Floats:
+    """(3, n): the points of all objects. points : those of each, (k, 3), object space."""
+    counts = [len(some) for some in points]
+    places, placing = np.empty((3, sum(counts))), matrices(things)
+
+    def fill(part: tuple[slice, list[Piece]]) -> None:
+        where, some = part
+        places[:, where] = view.points(spread(placing, some), joined(points, some))
+
+    each(fill, pieces(counts), threads)
+    return places
+
+
+def by_material(things: Things, values: Sequence[Sequence], kind: type) -> NDArray:
+    """(n,): what the materials of all triangles or spheres have. values : for each object, of each of its materials."""
+    first = np.cumsum([0, *(len(some) for some in values)], dtype=np.int32)[:-1]
+    which = np.concatenate([np.empty(0, np.int32), *(geometry.materials for _, geometry in things)])
+    which += np.repeat(first, [len(geometry.materials) for _, geometry in things])
+    return np.array([value for some in values for value in some], kind).take(which)
 
 
 def each(work: Callable, items: Iterable, threads: int) -> list:

@@ -9,7 +9,6 @@ Embree's own t, u, v (float32).
 """
 
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 
@@ -19,7 +18,7 @@ from numpy.typing import NDArray
 from ... import exact
 from ..arrays import Float32s, Floats, Indices, cross, dot, gather, linear
 from ..scene import Mesh, Object
-from .tables import AT_A_TIME, Piece, each, joined, made_once, pieces, spread
+from .tables import Piece, by_material, each, in_camera_space, joined, made_once, matrices, parts, pieces, spread
 from .view import View
 
 # Thinner triangles than float32 can tell from a line are no surface.
@@ -62,14 +61,6 @@ class Triangles:
         """(m,): which triangles a kind of rays does not see (lights.RAYS)."""
         return np.repeat(np.array([ray in placed.hidden_from for placed, _ in self.placed], bool), self.counts)
 
-    def by_material(self, values: Sequence[Sequence], kind: type) -> NDArray:
-        """(m,): what the materials of the triangles have. values : for each object, of each of its materials."""
-        counts = [len(some) for some in values]
-        first = np.cumsum([0, *counts], dtype=np.int32)[:-1]
-        which = np.concatenate([np.empty(0, np.int32), *(mesh.materials for _, mesh in self.placed)])
-        which += np.repeat(first, self.counts)
-        return np.array([value for some in values for value in some], kind).take(which)
-
     @made_once
     def object_index(self) -> Float32s:
         """(m,), what the pass shows."""
@@ -78,18 +69,18 @@ class Triangles:
     @made_once
     def material_index(self) -> Float32s:
         """(m,), what the pass shows."""
-        return self.by_material([placed.material_indices for placed, _ in self.placed], np.float32)
+        return by_material(self.placed, [placed.material_indices for placed, _ in self.placed], np.float32)
 
     @made_once
     def largest_coordinate(self) -> Float32s:
         """(m,), of the three vertices in world space or of their object, without its sign: what is far from its object's own
         origin is the small difference of large numbers."""
         largest = np.empty(self.vertices.shape[1], np.float32)
-        matrices, meshes = _matrices(self.placed), [mesh.vertices for _, mesh in self.placed]
+        placing, meshes = matrices(self.placed), [mesh.vertices for _, mesh in self.placed]
 
         def fill(part: tuple[slice, list[Piece]]) -> None:
             where, some = part
-            matrix, points = spread(matrices, some), joined(meshes, some).T
+            matrix, points = spread(placing, some), joined(meshes, some).T
             coordinates = [np.abs(dot(row, points) + row[3]) for row in matrix]
             largest[where] = np.maximum.reduce([*coordinates, np.abs(matrix[:, 3]).max(axis=0) + np.zeros(points.shape[1])])
 
@@ -109,7 +100,7 @@ class Triangles:
             return None
         users = Counter(id(mesh) for _, mesh in self.placed)
         shared = np.array([users[id(mesh)] > 1 for _, mesh in self.placed])
-        first, second, third = _matrices(self.placed)[:, :3]
+        first, second, third = matrices(self.placed)[:, :3]
         cofactors = np.stack([cross(second, third), cross(third, first), cross(first, second)])
         largest = np.abs(cofactors).max(axis=(0, 1))
         cofactors /= np.where(largest > 0, largest, 1.0)
@@ -151,8 +142,7 @@ class Triangles:
 
 def triangles_of(pairs: list[tuple[Object, Mesh]], view: View, threads: int = 1) -> Triangles:
     """The triangles of all objects that are meshes, instances written out (embreex has no instances)."""
-    vertex_counts = [len(mesh.vertices) for _, mesh in pairs]
-    first = np.cumsum([0, *vertex_counts], dtype=np.int32)[:-1]
+    first = np.cumsum([0, *(len(mesh.vertices) for _, mesh in pairs)], dtype=np.int32)[:-1]
     corners = np.empty((3, sum(len(mesh.triangles) for _, mesh in pairs)), np.int32)
     meshes = [mesh.triangles for _, mesh in pairs]
 
@@ -161,36 +151,17 @@ def triangles_of(pairs: list[tuple[Object, Mesh]], view: View, threads: int = 1)
         np.add(joined(meshes, some).T, spread(first, some), out=corners[:, where])
 
     each(fill, pieces([len(triangles) for triangles in meshes]), threads)
-    return Triangles(_vertices(pairs, view, threads), corners, tuple(pairs), threads)
-
-
-def _vertices(pairs: Sequence[tuple[Object, Mesh]], view: View, threads: int) -> Floats:
-    """(3, v), camera space."""
-    meshes = [mesh.vertices for _, mesh in pairs]
-    counts = [len(points) for points in meshes]
-    vertices = np.empty((3, sum(counts)))
-    matrices = _matrices(pairs)
-
-    def fill(part: tuple[slice, list[Piece]]) -> None:
-        where, some = part
-        vertices[:, where] = view.points(spread(matrices, some), joined(meshes, some))
-
-    each(fill, pieces(counts), threads)
-    return vertices
-
-
-def _matrices(pairs: Sequence[tuple[Object, Mesh]]) -> Floats:
-    """(3, 4, objects), to world space."""
-    return np.array([placed.matrix[:3] for placed, _ in pairs]).reshape(-1, 3, 4).transpose(1, 2, 0)
+    vertices = in_camera_space(pairs, [mesh.vertices for _, mesh in pairs], view, threads)
+    return Triangles(vertices, corners, tuple(pairs), threads)
 
 
 def _joined_corners(meshes: list[Float32s | None], some: list[Piece], channels: int = 3) -> NDArray:
     """(3, channels, n): what the corners of some triangles have, 0 on meshes without."""
-    parts = [
+    given = [
         np.zeros((part.stop - part.start, 3, channels), np.float32) if meshes[number] is None else meshes[number][part]
         for number, part in some
     ]
-    return np.ascontiguousarray((parts[0] if len(parts) == 1 else np.concatenate(parts)).transpose(1, 2, 0))
+    return np.ascontiguousarray((given[0] if len(given) == 1 else np.concatenate(given)).transpose(1, 2, 0))
 
 
 def facing(forms: Floats) -> Floats:
@@ -233,12 +204,9 @@ class Planes:
         self.span: Floats = np.empty((2, count))
         self.side: NDArray[np.int8] = np.empty(count, np.int8)
         self._far = dot(triangles.vertices, triangles.vertices)
-        wide = each(self._fill, self._parts(), triangles.threads)
+        wide = each(self._fill, parts(count), triangles.threads)
         del self._far
         self.wide: Indices = np.concatenate([np.empty(0, np.intp), *wide])
-
-    def _parts(self) -> list[slice]:
-        return [slice(first, first + AT_A_TIME) for first in range(0, self._triangles.count, AT_A_TIME)]
 
     def _fill(self, part: slice) -> Indices:
         """Fill the tables for a part of the triangles; which of them are wide."""
@@ -273,7 +241,7 @@ class Planes:
             with np.errstate(all="ignore"):
                 distance[part] = np.nan_to_num(1.0 / np.sqrt(dot(plane, plane)))
 
-        each(fill, self._parts(), self._triangles.threads)
+        each(fill, parts(self._triangles.count), self._triangles.threads)
         return distance
 
     @made_once
@@ -285,7 +253,7 @@ class Planes:
             towards_eye = facing(self.forms[:3, part])
             normals[:, part] = [np.nan_to_num(dot(axis, towards_eye)) for axis in self._view.axes.T]
 
-        each(fill, self._parts(), self._triangles.threads)
+        each(fill, parts(self._triangles.count), self._triangles.threads)
         return normals
 
     @made_once
@@ -308,7 +276,7 @@ class Planes:
                 slender = np.minimum(longest / np.sqrt(dot(normal, normal)), _MOST_SLENDER)
                 magnitude[part] = largest[part] + farthest * slender
 
-        each(fill, self._parts(), self._triangles.threads)
+        each(fill, parts(self._triangles.count), self._triangles.threads)
         return magnitude
 
     def depth(self, triangle: Indices, x: Floats, y: Floats) -> Floats:
