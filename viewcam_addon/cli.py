@@ -163,8 +163,9 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     added = command(commands.chart, "chart", "Measure the methods and draw how they compare, in a clone of the project.")
     added.add_argument(
         "subject",
-        choices=["stability", "light"],
-        help="stability: every method up to where it fails; light: error against samples",
+        choices=["stability", "light", "speed", "scaling", "poses"],
+        help="stability: every method up to where it fails; light: error against samples; speed: error against time; "
+        "scaling: time and memory against size; poses: time against error of the camera's axes",
     )
     added.add_argument(
         "--output", metavar="DIR", type=Path, default=Path("docs", "charts"), help="where the SVGs go (default: %(default)s)"
