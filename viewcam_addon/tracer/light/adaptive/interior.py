@@ -19,8 +19,8 @@ from ..filters import beyond, reach, variance
 
 Mask = NDArray[np.bool_]
 
-# Of the wanted error, that an edge may change a pixel by unseen.
-_UNSEEN = 0.25
+# Of the wanted error, that an edge may change a pixel by unseen: at most, and half of that in the mean.
+_UNSEEN = 1.0
 CORRECTED = 0.5
 """Of the correction: by what part of it the corrected light may be off."""
 _LINES = ((0, 1), (1, 0), (1, 1), (1, -1))
