@@ -194,3 +194,14 @@ def _face_normals(mesh: Mesh) -> Floats:
     with np.errstate(all="ignore"):
         normal /= np.sqrt(dot(normal, normal))
     return normal
+
+
+def corners_of(triangles: Triangles, edges: Edges) -> list[Floats]:
+    """(3, n) each, camera space: both ends of edges, and the third corner of their triangles."""
+    triangle, side = edges >> 2, edges & 3
+    flat, corners = triangles.corners.ravel(), []
+    for further in range(3):
+        corner = side + np.int32(further)
+        corner[corner > 2] -= 3
+        corners.append(gather(triangles.vertices, flat.take(corner * np.intp(triangles.count) + triangle)))
+    return corners

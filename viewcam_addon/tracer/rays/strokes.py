@@ -83,7 +83,7 @@ class Canvas:
 
         starts, ends : (3, n), camera space. margin : in pixels, of each stroke or of all.
         """
-        stroke, first, last = self._clipped(starts, ends)
+        stroke, first, last = self.clipped(starts, ends)
         margin = np.broadcast_to(margin, starts.shape[1:])[stroke]
         steep = np.abs(last[1] - first[1]) > np.abs(last[0] - first[0])
         along = np.where(steep, [first[1], last[1]], [first[0], last[0]])
@@ -134,7 +134,7 @@ class Canvas:
         across[0, (across[0] == 0) & (across[1] == 0)] = 1.0
         return Pieces(stroke[which], row * self.width + column, at[0], at[1], at[2], across)
 
-    def _clipped(self, starts: Floats, ends: Floats) -> tuple[Indices, Floats, Floats]:
+    def clipped(self, starts: Floats, ends: Floats) -> tuple[Indices, Floats, Floats]:
         """Which strokes reach into the picture, and the places of both ends of what does, (3, k) each."""
         begins, finishes = self.planes(starts), self.planes(ends)
         outside = np.zeros(starts.shape[1], bool)
