@@ -1,96 +1,133 @@
 """Light that changes slowly, shared among neighbouring pixels: each becomes the mean of the largest window that noise allows.
 
-A window is a square round the pixel, of radius 1, 3, 7 or 15, all of it interior: symmetric, so that whatever changes
-linearly cancels, and never across an edge. Radii grow while a mean agrees with the one before it within what noise explains
-(after Lepski 1990; in pictures Katkovnik 1999, Kervrann and Boulanger 2006; in rendering Rousselle and others 2011, who
-compare two filters at a time as well, but by their estimated error). Noise halves from one to the next, so that steps too
-small to be told from it add up to no more than twice the first: a penumbra or a contact shadow stays as sharp as noise shows it.
+A window grows four times, to radius 1, 3, 7 and 15, along columns and then along rows: a pixel takes a quarter of those one gap
+to either side, which have grown as often, and keeps a half. It takes only pairs that mirror one another, so that whatever
+changes linearly cancels, and only if all is interior on the way to them, so that no edge is crossed: beside an edge windows are
+thin rather than small. In the open they become tents. Boxes need twice as many sums, or running totals, which a single pixel as
+bright as the sun spoils to the end of the picture.
 
-Weights are tents rather than boxes: a tent is the one before it, [1 2 1] with wider gaps, four sums in all, while boxes of
-every radius need twice as many sums or running totals, which a single pixel as bright as the sun spoils to the end of the
-picture. At the same width a tent keeps a third more noise, and half the bias of what is curved.
+Windows grow while what a step changes is what noise explains (after Lepski 1990; in pictures Katkovnik 1999, Kervrann and
+Boulanger 2006). A single pixel can not tell noise from a bend of the same size, and one that strays far, as one in a hundred
+does, would keep all its noise: so what steps change is added up round each pixel, as Rousselle and others (2012) do with the
+errors of their filters. Noise halves with every step, so that bends too slight to be told from it add up to no more than twice
+the first: penumbrae and contact shadows stay as sharp as noise shows them.
 
-Noise of few samples is told badly by each pixel, and best where it is least: a pixel that by chance met the lamp with all its
-samples claims none. So variances are pooled over a window before they judge anything.
+How noisy pixels are is told by their samples, and too badly: a few that by chance all met the lamp claim no noise, and many
+that share their pixel out among them (sampler.py) two to ten times too much. How neighbours bend (Immerkær 1996) tells it as
+long as pixels are independent and the light is smooth. Of both, pooled, the smaller one counts.
 """
-
-from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Float32s, Floats
 
-_LEVELS = 4
-_POOLED = 3
-# How many standard errors of the smaller window the larger one may be off. A single pixel outside them stays as it is, with all
-# its noise, so that they must be many there.
-_PIXEL, _WINDOW = 4.0, 2.5
-# Of the tolerance: windows do not grow where less noise than that is left.
+# The gap of each growth, and what it leaves of the variance along its axis: that of a tent over that of one half as wide.
+_GROWTHS = ((1, 0.375), (2, 0.4583), (4, 0.4886), (8, 0.4971))
+# The square of a step may be so many times the variance that it takes away; noise alone makes it 0.6 to 0.75 times.
+_EXPLAINED = 2.0
+# A pixel so many standard errors beside its neighbours is no noise, whatever is round it.
+_STRAY = 5.0
+# The radius over which variances are pooled. Steps are over twice that of the window.
+_POOL = 3
+# Windows do not grow where this part of the tolerance is all the noise that is left.
 _ENOUGH = 0.25
 
 
 def shared(light: Floats, variance: Floats, interior: NDArray[np.bool_], tolerance: float) -> tuple[Floats, Floats]:
     """Light with less noise, and the variance that is left.
 
-    light : (c, h, w) means of pixels, of the light that falls on surfaces. variance : (h, w), estimates of its variance, mean
-    over the channels; where it is not finite, nothing is shared. interior : (h, w), no edge of geometry, material or sharp
-    shadow is near. tolerance : the standard error that is wanted.
+    light : (c, h, w) means of pixels, of the light that falls on surfaces, independent of one another. variance : (h, w), as
+    its samples estimate it, the mean over the channels; not finite where they can not. interior : (h, w), no edge of geometry,
+    material or sharp shadow is near. tolerance : the standard error that is wanted.
 
-    Returns (c, h, w) and (h, w): the pooled variance of what is shared, and the square of the last step as far as noise does
-    not explain it, for the bias. Pixels that are not interior are returned as they are.
+    Returns (c, h, w) and (h, w): the variance of the means, and the square of the last step as far as noise does not explain
+    it, for the bias. Pixels that are not interior are returned as they are.
     """
-    usable = interior & np.isfinite(variance)
-    pooled = _pooled(variance, usable)
-    result, left = light.copy(), np.where(usable, pooled, variance)
-    planes = np.where(usable, np.concatenate([light, pooled[None]]), 0.0)
-    enough = (_ENOUGH * tolerance) ** 2
-    growing = usable & (pooled > enough)
-    mean, noise, margin, errors = planes[:-1], pooled, 0, _PIXEL
-    for (radius, weight, sums), (_, _, whole) in zip(_tents(planes, np.add), _tents(usable, np.logical_and), strict=True):
-        step, margin = radius - margin, radius
-        before, noise_before = _inner(mean, step), _inner(noise, step)
-        sums *= weight
-        mean, noise = sums[:-1], sums[-1] * _share(radius)
-        moved = mean - before
-        moved = np.einsum("chw,chw->hw", moved, moved) / len(mean)
-        grown = _inner(growing, step) & whole & (moved <= errors**2 * noise_before)
-        if not grown.any():
+    # Numbers beyond float32 are shared with no one: nothing that is compared with them holds.
+    with np.errstate(over="ignore", invalid="ignore"):
+        inside = np.where(interior, light, 0.0).astype(np.float32)
+        noise, pooled = _noise(inside, variance, interior)
+        added, left = _grown(np.concatenate([inside, noise[None]]), pooled, interior, (_ENOUGH * tolerance) ** 2)
+    return light + added, np.where(interior, left, variance)
+
+
+def _grown(planes: Float32s, known: Float32s, interior: NDArray[np.bool_], enough: float) -> tuple[Float32s, Float32s]:
+    """What windows add to the light, and the variance that is left.
+
+    planes : (c + 1, h, w), light and its variance, changed in place. known : (h, w), the variance pooled. enough : of variance.
+    """
+    added, left = np.zeros_like(planes[:-1]), known
+    growing = interior & (known > enough) & (known < np.inf)
+    # Whether all is interior from a pixel to that one gap on.
+    down, across = interior[:-1] & interior[1:], interior[:, :-1] & interior[:, 1:]
+    for gap, kept in _GROWTHS:
+        if not growing.any():
             break
-        np.copyto(_inner(result, radius), mean, where=grown)
-        np.copyto(_inner(left, radius), noise + np.maximum(moved - noise_before + noise, 0.0), where=grown)
-        growing, errors = grown & (noise > enough), _WINDOW
-    return result, left
+        # From one gap before a pixel to one behind: what it needs now, and at the next growth the one that begins there.
+        down, across = down[:-gap] & down[gap:], across[:, :-gap] & across[:, gap:]
+        before, grown = planes.copy(), np.zeros_like(interior)
+        _grow(planes, down, gap, kept)
+        _grow(planes.swapaxes(1, 2), across.T, gap, kept)
+        grown[gap:-gap] |= down
+        grown[:, gap:-gap] |= across
+        step = planes[:-1] - before[:-1]
+        square, taken = _square(step), before[-1] - planes[-1]
+        growing &= grown & (square <= _STRAY**2 * known)
+        growing &= _around(np.where(growing, square - _EXPLAINED * taken, 0.0), 4 * gap - 1) <= 0.0
+        known = planes[-1].copy()
+        step *= growing
+        added += step
+        left = np.where(growing, known + np.maximum(square - taken, 0.0), left)
+        growing &= known > enough
+    return added, left
 
 
-def _pooled(variance: Floats, usable: NDArray[np.bool_]) -> Floats:
-    """The mean of the usable variances round each pixel, (h, w)."""
-    planes = np.stack([np.where(usable, variance, 0.0), usable])
-    padded = np.pad(planes, ((0, 0), (_POOLED, _POOLED), (_POOLED, _POOLED)))
-    total, weight = next(sums for radius, _, sums in _tents(padded, np.add) if radius == _POOLED)
-    return total / np.maximum(weight, 1.0)
+def _grow(planes: Float32s, reached: NDArray[np.bool_], gap: int, kept: float) -> None:
+    """Let windows grow along the columns, in place.
+
+    planes : (c + 1, h, w), light and its variance. reached : (h − 2 gap, w), which pixels can.
+    """
+    middle = planes[:, gap:-gap]
+    bend = planes[:, : -2 * gap] + planes[:, 2 * gap :]
+    bend -= middle
+    bend -= middle
+    bend *= reached * np.float32(0.25)
+    # Of a variance the squares of the weights count, which are as 1 to 4 to 1.
+    bend[-1] *= np.float32(2 / 3)
+    middle += bend
+    middle[-1] *= np.where(reached, np.float32(kept), np.float32(1.0))
 
 
-def _share(radius: int) -> float:
-    """The sum of the squares of a tent's weights: what is left of the variance."""
-    half = radius + 1
-    return ((2 * half**2 + 1) / (3 * half**3)) ** 2
+def _noise(light: Float32s, variance: Floats, interior: NDArray[np.bool_]) -> tuple[Float32s, Float32s]:
+    """What is known of each pixel's variance, (h, w), and the same pooled, which is better known and may be infinite."""
+    told = interior & np.isfinite(variance)
+    smooth, bent = np.zeros_like(interior), np.zeros(interior.shape, np.float32)
+    if min(interior.shape) > 2:
+        rows = interior[:-2] & interior[1:-1] & interior[2:]
+        smooth[1:-1, 1:-1] = rows[:, :-2] & rows[:, 1:-1] & rows[:, 2:]
+        # 36 is the sum of the squares of (1, −2, 1) × (1, −2, 1).
+        bent[1:-1, 1:-1] = _square(np.diff(np.diff(light, n=2, axis=1), n=2, axis=2)) / 36
+    own = np.where(told, variance, 0.0).astype(np.float32)
+    total, number, bends, places = _around(np.stack([own, told, np.where(smooth, bent, 0.0), smooth]), _POOL)
+    by_samples = np.where(number > 0, total / np.maximum(number, 1.0), np.inf)
+    by_neighbours = np.where(2 * places > number, bends / np.maximum(places, 1.0), np.inf)
+    pooled = np.minimum(by_samples, by_neighbours)
+    return np.where(told, own * np.where(total > 0, pooled / by_samples, 0.0), bent), pooled
 
 
-def _tents(planes: NDArray, join: np.ufunc) -> Iterator[tuple[int, float, NDArray]]:
-    """Radius, weight and sums of all whole windows, (…, h − 2 r, w − 2 r); the mean is their product."""
-    radius, gap, weight = 0, 1, 1.0
-    for _ in range(_LEVELS):
-        if min(planes.shape[-2:]) <= 2 * gap:
-            return
-        radius, weight = radius + gap, weight / 16
+def _square(values: Float32s) -> Float32s:
+    """The mean of the squares over the channels."""
+    return np.einsum("chw,chw->hw", values, values) / len(values)
+
+
+def _around(planes: Float32s, radius: int) -> Float32s:
+    """The sums of (…, h, w) round each pixel, weighted by a tent. radius : 2ⁿ − 1."""
+    margins = [(0, 0)] * (planes.ndim - 2) + [(radius, radius)] * 2
+    sums, gap = np.pad(planes, margins), 1
+    while gap <= radius:
         for _ in range(2):
-            planes = join(planes[..., :-gap], planes[..., gap:])
-            planes = join(planes[..., :-gap, :], planes[..., gap:, :])
-        yield radius, weight, planes
+            sums = sums[..., :-gap, :] + sums[..., gap:, :]
+            sums = sums[..., :-gap] + sums[..., gap:]
         gap *= 2
-
-
-def _inner(planes: NDArray, margin: int) -> NDArray:
-    """The last two axes without a margin."""
-    return planes[..., margin : planes.shape[-2] - margin, margin : planes.shape[-1] - margin]
+    return sums
