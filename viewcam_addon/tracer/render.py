@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from .arrays import Floats, Indices
+from .rays.centres import Centres
 from .rays.ellipsoids import ellipsoids_of
-from .rays.surface import Passes, Surface, background
+from .rays.surface import Passes, Surface, unwritten
 from .rays.triangles import Planes, triangles_of
 from .rays.view import View
 from .rays.visibility import visibility
@@ -49,13 +50,13 @@ class Tracer:
 
     def render(self, watcher: Watcher | None = None) -> Passes:
         """Pass name → (height, width, channels) float32, rows from the bottom: the surfaces at the pixel centres."""
+        centres = Centres(self._camera, self._visibility)
 
         def trace(passes: Passes, tile: range) -> None:
-            columns, rows = self._corners(tile)
-            x, y, primitives = self._eye(columns + 0.5, rows + 0.5)
-            self._surface.write(passes, primitives, x, y)
+            x, y, close = centres.rays(tile)
+            self._surface.write(passes, self._visibility.first(x, y, close), x, y)
 
-        return self._picture(background, trace, SMALLEST_TILE, TILE, watcher)
+        return self._picture(unwritten, trace, SMALLEST_TILE, TILE, watcher)
 
     def render_light(
         self, level: str, samples: int, seed: int, watcher: Watcher | None = None, error: float | None = None
@@ -76,10 +77,7 @@ class Tracer:
 
         def trace_centres(passes: Passes, columns: Indices, rows: Indices) -> tuple[Floats, Floats, Indices]:
             x, y, primitives = self._eye(columns + 0.5, rows + 0.5)
-            centres = background((len(x),))
-            self._surface.write(centres, primitives, x, y)
-            for name in CENTRES:
-                passes[name][:] = centres[name]
+            self._surface.write({name: passes[name] for name in CENTRES}, primitives, x, y)
             return x, y, primitives
 
         def trace(passes: Passes, tile: range) -> None:
@@ -106,7 +104,7 @@ class Tracer:
         Returns pass name → (n, channels) float32.
         """
         column, row = np.broadcast_arrays(np.add(columns, px, dtype=np.float64), np.add(rows, py, dtype=np.float64))
-        passes = background(column.shape)
+        passes = unwritten(column.shape)
         for first in range(0, len(column), TILE):
             tile = slice(first, first + TILE)
             x, y, primitives = self._eye(column[tile], row[tile])

@@ -47,7 +47,7 @@ def test_the_same_rays_are_suspected_of_passing_close_by_a_corner(seed, extent):
     near = vertices[:2, ::3] + rng.normal(size=(2, 1000)) * corners.REACH * extent
     x, y = np.concatenate([near, rng.uniform(-extent, extent, (2, 1000)), [[0, np.nan, np.inf], [0, 0, -1]]], axis=1)
     kept = Corners(vertices)
-    suspected, expected = both(corners.suspects, kept._taken, kept._bits, x, y)
+    suspected, expected = both(corners.suspects, *kept._filter, x, y)
     assert np.array_equal(suspected, expected)
     assert extent > 1e20 or len(expected) >= 900, f"only {len(expected)} of 1000 rays beside corners are suspected"
 

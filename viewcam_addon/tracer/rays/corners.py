@@ -11,6 +11,8 @@ Bloom filter): some rays are suspected without reason, but none is overlooked.
 
 Rejected: triangles enlarged until they overlap, which moves outlines for all rays; a small triangle before each vertex, which
 takes Embree as long again to build; vertices and rays on separate grids, which costs each two bits of its place.
+
+The rays of a picture's pixel centres are found the other way round: of each corner it is known which pixel it stands in.
 """
 
 import numpy as np
@@ -18,6 +20,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Float32s, Floats, Indices
 from ..compiled.standing import or_compiled
+from .tables import made_once
 
 # How far from a corner, in each coordinate of the view plane, Embree can err, relative to the corner's distance r from the view
 # axis, and to r² beyond 1, where rays run aslant. In units of 2⁻²⁴: 2 for rounding the vertex, X and Z, 2 for the sum Q + P, 1
@@ -43,27 +46,60 @@ class Corners:
     """
 
     def __init__(self, vertices: Floats) -> None:
-        with np.errstate(all="ignore"):  # what stands beside or behind the eye is left out
-            x, y = vertices[:2] / vertices[2]
-            distance = np.maximum(np.abs(x), np.abs(y))
-            seen = (vertices[2] > 0) & (distance <= FARTHEST)
-        x, y, distance = x[seen], y[seen], distance[seen]
-        bits = max((len(x) * _PLACES_PER_CORNER).bit_length(), 3)
-        self._bits = np.uint64(bits)
-        taken = np.zeros(1 << bits, bool)
-        reach = REACH * distance * np.maximum(distance, 1.0)
+        self._vertices = vertices
+
+    @made_once
+    def _filter(self) -> tuple[NDArray[np.uint8], np.uint64]:
+        """The places that are taken, eight a byte, and how many bits the number of a place has."""
+        x, y = _seen(self._vertices, FARTHEST)
+        distance = np.maximum(np.abs(x), np.abs(y))
+        reach = _reach(distance)
+        bits = np.uint64(max((len(x) * _PLACES_PER_CORNER).bit_length(), 3))
+        taken = np.zeros(1 << int(bits), bool)
         for farther in (-reach, reach):  # at powers of two, where cells of two widths meet
             grain = _grain((distance + farther).astype(np.float32))
             for right in (-reach, reach):
                 for up in (-reach, reach):
                     cell = _cell((x + right).astype(np.float32), (y + up).astype(np.float32), grain)
-                    for hashed in (cell, cell << self._bits):  # the second from the bits behind the first
-                        taken[(hashed >> (_WHOLE - self._bits)).view(np.int64)] = True
-        self._taken = np.packbits(taken, bitorder="little")  # to stay in a core's cache
+                    for hashed in (cell, cell << bits):  # the second from the bits behind the first
+                        taken[(hashed >> (_WHOLE - bits)).view(np.int64)] = True
+        return np.packbits(taken, bitorder="little"), bits  # to stay in a core's cache
 
     def near(self, x: Floats, y: Floats) -> Indices:
         """Which of the rays (x, y, 1) pass close by a corner, perhaps. x, y : (n,)."""
-        return suspects(self._taken, self._bits, x, y)
+        return suspects(*self._filter, x, y)
+
+    def near_pixels(self, x: Floats, y: Floats) -> Indices | None:
+        """Which pixels' centres rays pass close by a corner through: their numbers, counted along the rows, in order.
+
+        x : (width,) of the columns. y : (height,) of the rows. None where a corner may concern several pixels, or all.
+        """
+        if min(len(x), len(y)) < 2:
+            return None
+        across, above = (x[-1] - x[0]) / (len(x) - 1), (y[-1] - y[0]) / (len(y) - 1)
+        farthest = max(np.abs(x).max(), np.abs(y).max())
+        if not (farthest <= FARTHEST and _reach(farthest) < 0.4 * min(across, above)):
+            return None
+        right, up = _seen(self._vertices, 2 * farthest)
+        column, row = np.rint((right - x[0]) / across).astype(np.intp), np.rint((up - y[0]) / above).astype(np.intp)
+        inside = np.flatnonzero((column >= 0) & (column < len(x)) & (row >= 0) & (row < len(y)))
+        column, row, right, up = column[inside], row[inside], right[inside], up[inside]
+        reach = _reach(np.maximum(np.abs(right), np.abs(up)))
+        close = (np.abs(x[column] - right) <= reach) & (np.abs(y[row] - up) <= reach)
+        return np.unique(row[close] * len(x) + column[close])
+
+
+def _seen(vertices: Floats, farthest: float) -> tuple[Floats, Floats]:
+    """Where in the view plane the corners are that stand before the eye and no farther than this from its axis."""
+    with np.errstate(all="ignore"):
+        x, y = vertices[:2] / vertices[2]
+        seen = np.flatnonzero((vertices[2] > 0) & (np.abs(x) <= farthest) & (np.abs(y) <= farthest))
+    return x[seen], y[seen]
+
+
+def _reach(distance: Floats | float) -> Floats | float:
+    """How far from a corner, in each coordinate of the view plane, rays are suspected."""
+    return REACH * distance * np.maximum(distance, 1.0)
 
 
 @or_compiled

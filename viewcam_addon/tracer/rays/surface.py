@@ -1,12 +1,16 @@
 """What a ray meets, as passes: depth, position, normal, indices, UV, and what a tolerance is derived from.
 
-Everything is computed in float64 on the primitive that visibility.py found and rounded once, to the pass's float32. Passes are
-named and laid out as in image.py. Only what the scene has is computed: no UV maps, no UV; no smooth normals, no interpolation.
+What a tolerance applies to is computed in float64 on the primitive that visibility.py found, and rounded once, to the pass's
+float32. Smooth normals and Facing are computed in float32, as by any renderer: their directions are off by some 2⁻²⁴, and both
+are compared with, or scale, what is uncertain by far more. Passes are named and laid out as in image.py, each channel a plane
+of memory of its own, as NumPy writes them fastest and as files store them. Only what is asked for and what the scene has is
+computed: no UV maps, no UV; no smooth normals, no interpolation.
 """
 
 from collections.abc import Iterable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...image import BACKGROUND_DEPTH, CHANNELS, GEOMETRY_PASSES
 from ..arrays import Float32s, Floats, Indices, dot, gather
@@ -18,14 +22,15 @@ PASSES = {name: len(CHANNELS[name]) for name in GEOMETRY_PASSES}
 """The passes of level `geometry` and their numbers of channels."""
 
 Passes = dict[str, Float32s]
-Where = slice | Indices
+Where = slice | NDArray[np.bool_]
 
 
-def background(shape: tuple[int, ...]) -> Passes:
-    """Passes of pixels that show nothing, as Cycles writes them. shape : all axes but the channels."""
-    passes = {name: np.zeros((*shape, channels), np.float32) for name, channels in PASSES.items()}
-    passes["Depth"][...] = BACKGROUND_DEPTH
-    return passes
+def unwritten(shape: tuple[int, ...], names: Iterable[str] = PASSES) -> Passes:
+    """Passes with nothing in them yet: (…, channels), views of planes. shape : all axes but the channels."""
+    channels = [len(CHANNELS[name]) for name in names]
+    planes = np.empty((sum(channels), *shape), np.float32)  # one piece: large ones come in large pages, five times as fast
+    parts = np.split(planes, np.cumsum(channels)[:-1])
+    return {name: np.moveaxis(part, 0, -1) for name, part in zip(names, parts, strict=True)}
 
 
 class Surface:
@@ -36,70 +41,103 @@ class Surface:
         self._eye_magnitude = np.float32(np.abs(view.eye).max())
 
     def write(self, passes: Passes, primitives: Indices, x: Floats, y: Floats) -> None:
-        """Write what n rays (x, y, 1) meet, the primitives that were found for them, into passes of n background pixels.
+        """Write what n rays (x, y, 1) meet, the primitives that were found for them; what meets nothing as Cycles writes it.
 
-        passes : name → (n, channels). primitives : (n,), triangles first, then spheres, −1 for none.
+        passes : those that are wanted, name → (n, channels). primitives : (n,), triangles first, then spheres, −1 for none.
         """
+        met = primitives >= 0
+        if not met.all():
+            for name, values in passes.items():
+                values[...] = BACKGROUND_DEPTH if name == "Depth" else 0
         spheres = primitives >= self._triangles.count
         for write, chosen, first in (
-            (self._write_triangles, (primitives >= 0) & ~spheres, 0),
+            (self._write_triangles, met & ~spheres if self._ellipsoids.count else met, 0),
             (self._write_spheres, spheres, self._triangles.count),
         ):
             if chosen.all():
                 write(passes, slice(None), primitives - first, x, y)
             elif chosen.any():
-                where = np.flatnonzero(chosen)
-                write(passes, where, primitives[where] - first, x[where], y[where])
+                write(passes, chosen, primitives[chosen] - first, x[chosen], y[chosen])
 
     def _write_triangles(self, passes: Passes, where: Where, triangle: Indices, x: Floats, y: Floats) -> None:
         depth, first, second = self._planes.hit(triangle, x, y)
-        cosine = gather(self._planes.distance, triangle) / (depth * np.sqrt(x * x + y * y + 1.0))
-        if self._triangles.corner_uvs is not None:
-            _store(passes["UV"], where, _interpolated(gather(self._triangles.corner_uvs, triangle), first, second))
-        _store(passes["Normal"], where, self._normal(triangle, first, second))
-        self._write_place(passes, where, x, y, depth, cosine)
-        self._write_labels(passes, where, triangle, self._triangles, self._planes.magnitude)
+        if "UV" in passes and self._triangles.corner_uvs is not None:
+            self._write_uv(passes["UV"], where, triangle, first, second)
+        if "Normal" in passes:
+            _store(passes["Normal"], where, self._normal(triangle, first, second))
+        if "Facing" in passes:
+            nearest = gather(self._planes.distance, triangle)
+            self._write_facing(passes, where, np.divide(nearest, depth, out=nearest), x, y)
+        self._write_place(passes, where, x, y, depth)
+        self._write_labels(passes, where, triangle, self._triangles, self._planes)
 
-    def _normal(self, triangle: Indices, first: Floats, second: Floats) -> Iterable[Floats]:
+    def _write_uv(self, target: Float32s, where: Where, triangle: Indices, first: Floats, second: Floats) -> None:
+        third = 1.0 - first - second
+        uvs = self._triangles.corner_uvs
+        a, b, c = (gather(uvs[corner : corner + 2], triangle) for corner in (0, 3, 6))
+        _store(target, where, (a[axis] * third + b[axis] * first + c[axis] * second for axis in range(2)))
+        target[..., 2][where] = gather(uvs[2], triangle)
+
+    def _normal(self, triangle: Indices, first: Floats, second: Floats) -> Iterable[Float32s]:
         """Three components of the normals at barycentric coordinates: smooth where the mesh has normals, else of the face."""
         if self._triangles.corner_normals is None:
             return gather(self._planes.normals, triangle)
-        smooth = _interpolated(gather(self._triangles.corner_normals, triangle), first, second)
+        weights = np.empty((3, len(triangle)), np.float32)
+        weights[1], weights[2] = first, second
+        np.subtract(1, weights[1], out=weights[0])
+        weights[0] -= weights[2]
+        corners = gather(self._triangles.corner_normals, triangle).reshape(3, 3, -1)
+        corners *= weights[:, None]
+        smooth = corners[0]
+        smooth += corners[1]
+        smooth += corners[2]
         length = np.sqrt(dot(smooth, smooth))
         side = gather(self._planes.side, triangle)
         if not length.all():  # the mesh has none, or they cancel: as in Cycles, the face's own
             smooth = np.where(length > 0, smooth, gather(self._planes.normals, triangle) * side)
-            length = np.where(length > 0, length, 1.0)
-        scale = side / length
-        return [component * scale for component in smooth]
+            length = np.where(length > 0, length, np.float32(1))
+        smooth *= np.divide(side, length, out=length)
+        return smooth
 
     def _write_spheres(self, passes: Passes, where: Where, sphere: Indices, x: Floats, y: Floats) -> None:
         depth = self._ellipsoids.depth(sphere, x, y)
-        cosine = -dot(self._ellipsoids.normal(sphere, x, y, depth), (x, y, 1.0)) / np.sqrt(x * x + y * y + 1.0)
-        normal = self._ellipsoids.shown_normal(sphere, x, y, depth)
-        _store(passes["Normal"], where, [dot(axis, normal) for axis in self._view.axes.T])
-        self._write_place(passes, where, x, y, depth, cosine)
-        self._write_labels(passes, where, sphere, self._ellipsoids, self._ellipsoids.magnitude)
+        if "Normal" in passes:
+            normal = self._ellipsoids.shown_normal(sphere, x, y, depth)
+            _store(passes["Normal"], where, (dot(axis, normal) for axis in self._view.axes.T))
+        if "Facing" in passes:
+            self._write_facing(passes, where, -dot(self._ellipsoids.normal(sphere, x, y, depth), (x, y, 1.0)), x, y)
+        self._write_place(passes, where, x, y, depth)
+        self._write_labels(passes, where, sphere, self._ellipsoids, self._ellipsoids)
 
-    def _write_place(self, passes: Passes, where: Where, x: Floats, y: Floats, depth: Floats, cosine: Floats) -> None:
-        passes["Depth"][where, 0] = depth
-        _store(passes["Position"], where, self._view.world_position(depth, x, y))
-        passes["Facing"][where, 0] = np.clip(cosine, 0.0, 1.0)
+    def _write_facing(self, passes: Passes, where: Where, across: Floats, x: Floats, y: Floats) -> None:
+        """The cosine between rays and surfaces, from what it is times the length of (x, y, 1)."""
+        x, y, cosine = x.astype(np.float32), y.astype(np.float32), across.astype(np.float32)
+        x *= x
+        y *= y
+        x += y
+        x += 1
+        cosine /= np.sqrt(x, out=x)
+        np.minimum(cosine, 1, out=cosine)
+        passes["Facing"][..., 0][where] = np.maximum(cosine, 0, out=cosine)
+
+    def _write_place(self, passes: Passes, where: Where, x: Floats, y: Floats, depth: Floats) -> None:
+        if "Depth" in passes:
+            passes["Depth"][..., 0][where] = depth
+        if "Position" in passes:
+            _store(passes["Position"], where, self._view.world_position(depth, x, y))
 
     def _write_labels(
-        self, passes: Passes, where: Where, index: Indices, table: Triangles | Ellipsoids, magnitude: Float32s
+        self, passes: Passes, where: Where, index: Indices, table: Triangles | Ellipsoids, magnitudes: Planes | Ellipsoids
     ) -> None:
-        passes["Object Index"][where, 0] = gather(table.object_index, index)
-        passes["Material Index"][where, 0] = gather(table.material_index, index)
-        passes["Magnitude"][where, 0] = np.maximum(gather(magnitude, index), self._eye_magnitude)
-
-
-def _interpolated(corners: Float32s, first: Floats, second: Floats) -> list[Floats]:
-    """Three components, each (n,), of what the (9, n) values at the corners are at the barycentric coordinates."""
-    third = 1.0 - first - second
-    return [corners[axis] * third + corners[axis + 3] * first + corners[axis + 6] * second for axis in range(3)]
+        if "Object Index" in passes:
+            passes["Object Index"][..., 0][where] = gather(table.object_index, index)
+        if "Material Index" in passes:
+            passes["Material Index"][..., 0][where] = gather(table.material_index, index)
+        if "Magnitude" in passes:
+            magnitude = gather(magnitudes.magnitude, index)
+            passes["Magnitude"][..., 0][where] = np.maximum(magnitude, self._eye_magnitude, out=magnitude)
 
 
 def _store(target: Float32s, where: Where, components: Iterable[Floats]) -> None:
     for channel, component in enumerate(components):
-        target[where, channel] = component
+        target[..., channel][where] = component

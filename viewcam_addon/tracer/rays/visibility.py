@@ -48,8 +48,17 @@ _OVERLAP = 2.0**-21
 
 
 class Visibility(Protocol):
-    def first(self, x: Floats, y: Floats) -> Indices:
-        """The primitive that each ray meets first, or −1. x, y : (n,) float64."""
+    def first(self, x: Floats, y: Floats, close: Indices | None = None) -> Indices:
+        """The primitive that each ray meets first, or −1.
+
+        x, y : (n,) float64. close : which of them `close` found, if these are rays of pixel centres.
+        """
+
+    def close(self, x: Floats, y: Floats) -> Indices | None:
+        """Which pixels want care, in order, counted along the rows, or None if that must be asked ray by ray.
+
+        x : (width,) of the columns' centres. y : (height,) of the rows'.
+        """
 
 
 def visibility(triangles: Triangles, planes: Planes, ellipsoids: Ellipsoids, clip: tuple[float, float]) -> Visibility:
@@ -78,12 +87,16 @@ class Embree:
         else:
             self._cards = None
 
-    def first(self, x: Floats, y: Floats) -> Indices:
+    def close(self, x: Floats, y: Floats) -> Indices | None:
+        return self._corners.near_pixels(x, y)
+
+    def first(self, x: Floats, y: Floats, close: Indices | None = None) -> Indices:
         if self._triangles is None:
             found = np.full(len(x), -1, np.intp)
         else:
             found = self._first_triangle(x, y)
-            close = self._corners.near(x, y)
+            if close is None:
+                close = self._corners.near(x, y)
             if len(close):
                 found[close] = self._without_slips(found[close], x[close], y[close])
         if len(self._wide):
@@ -206,7 +219,10 @@ class Plain:
         self._bounds[0::2, hidden], self._bounds[1::2, hidden] = np.inf, -np.inf
         self._bounds += np.array([[-1], [1], [-1], [1]]) * _MARGIN * (1 + np.nan_to_num(np.abs(self._bounds), posinf=0.0))
 
-    def first(self, x: Floats, y: Floats) -> Indices:
+    def close(self, x: Floats, y: Floats) -> None:
+        """None wants care."""
+
+    def first(self, x: Floats, y: Floats, close: Indices | None = None) -> Indices:
         found = np.full(len(x), -1, np.intp)
         nearest = np.full(len(x), np.inf)
         near_all = self._candidates(np.arange(self._bounds.shape[1]), x, y)
