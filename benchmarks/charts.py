@@ -8,13 +8,14 @@ Drawn with matplotlib, the ecosystem's usual choice. The report of a check draws
 no matplotlib.
 """
 
+import functools
 import importlib
 import importlib.metadata
 import math
 import os
 import platform
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -32,8 +33,13 @@ from viewcam_addon.terminal import silent_libraries
 _COLOURS = ("tab:orange", "tab:green", "tab:red", "tab:purple", "tab:brown", "tab:pink", "tab:olive", "tab:cyan")
 _MARKERS = "osv^Dd<>"
 _OURS = "#0b3d91"
+_OURS_LINES = ("-", "--", "-.", ":")
+_INK, _PAPER, _FAINT, _GRID = "#1f2328", "#ffffff", "#656d76", "#e5e8eb"
+# What these are where pages are dark. A picture on a page knows what its reader prefers, and not the page's own colours: so it
+# brings its paper along.
+_IN_THE_DARK = {_INK: "#e6edf3", _PAPER: "#0d1117", _FAINT: "#9198a1", _GRID: "#30363d", _OURS: "#58a6ff"}
 # What a measurement stands on, as far as it is installed.
-_PACKAGES = ("numpy", "embreex", "bpy")
+_PACKAGES = ("numpy", "embreex", "numba", "bpy", "mitsuba")
 
 
 @dataclass(frozen=True)
@@ -43,7 +49,8 @@ class Curve:
     x, y : as many numbers each. y = 0 lies on the lower edge; nan and inf mean that the method has no answer there.
     ours : whether it is the method in use. league : curves compete with those of the same league only (a method that computes
         in float64 does not compete with what Blender stores in float32). tie : errors up to this count as equal, the chart's
-        own tie if it is None. limit : no method, but what the others of its league must not exceed.
+        own tie if it is None. limit : no method, but what the others of its league must not exceed. spread : the least and
+        the most of each x, where it was measured several times.
     """
 
     name: str
@@ -53,6 +60,7 @@ class Curve:
     league: str = ""
     tie: float | None = None
     limit: bool = False
+    spread: Sequence[tuple[float, float]] = ()
 
     def __post_init__(self) -> None:
         if len(self.x) != len(self.y):
@@ -66,7 +74,7 @@ class Chart:
     name : of its file, without subject and extension. reading : a sentence that says what to read off.
     tie : errors up to this count as equal, inf where nothing is judged.
     reverse : the failure lies at small x, and x falls to the right.
-    log_x, log_y : whether the axes are logarithmic.
+    log_x, log_y : whether the axes are logarithmic. levels : heights that methods are compared at.
     """
 
     name: str
@@ -79,6 +87,7 @@ class Chart:
     reverse: bool = False
     log_x: bool = True
     log_y: bool = True
+    levels: tuple[float, ...] = ()
 
     def behind(self) -> list[str]:
         """One sentence for each place where the method in use is worse than twice the best of its league, and beyond a tie;
@@ -153,23 +162,40 @@ def draw(chart: Chart, path: Path, command: str) -> None:
     """
     # Letters stay text. The font that matplotlib brings along is the widest of the usual ones, so that another fits as well.
     settings = {"svg.fonttype": "none", "svg.hashsalt": chart.name, "font.family": "DejaVu Sans", "font.size": 9}
+    settings |= dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), _INK)
+    settings |= dict.fromkeys(("figure.facecolor", "axes.facecolor", "savefig.facecolor"), _PAPER)
+    reading = textwrap.wrap(chart.reading, 132)
+    caption = 1.05 + 0.17 * max(len(reading), 3)  # inches
     with matplotlib.rc_context(settings), written_whole(path) as temporary:
-        figure = Figure(figsize=(9, 6.4))
-        axes = figure.add_axes((0.085, 0.265, 0.655, 0.655))
+        figure = Figure(figsize=(9, 4.8 + caption))
+        up = 1 / figure.get_figheight()
+        axes = figure.add_axes((0.085, (caption + 0.14) * up, 0.655, 4.2 * up))
         _draw_axes(chart, axes)
         for curve, colour, marker in _styles(chart):
             _draw_curve(curve, axes, colour, marker)
         axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1), frameon=False, labelspacing=0.8, fontsize=8.5)
-        figure.text(0.03, 0.165, textwrap.fill(chart.reading, 132), va="top", linespacing=1.35)
-        figure.text(0.03, 0.025, f"{command}\n{machine()}", color="0.4", fontsize=7.5, linespacing=1.4)
+        figure.text(0.03, (caption - 0.5) * up, "\n".join(reading), va="top", linespacing=1.35)
+        figure.text(0.03, 0.16 * up, f"{command}\n{machine()}", color=_FAINT, fontsize=7.5, linespacing=1.4)
         figure.savefig(temporary, format="svg", metadata={"Date": None, "Title": chart.title, "Description": chart.reading})
+        text = temporary.read_text(encoding="utf-8")
+        temporary.write_text(text.replace("</style>", f"{_dark_rules()}</style>", 1), encoding="utf-8")
+
+
+def _dark_rules() -> str:
+    """CSS that turns the colours, which matplotlib writes into each element, where the reader prefers a dark page."""
+    rules = [
+        f'[style*="{what}: {light}"] {{{what}: {dark} !important}}'
+        for light, dark in _IN_THE_DARK.items()
+        for what in ("fill", "stroke")
+    ]
+    return "@media (prefers-color-scheme: dark) {" + " ".join(rules) + "}"
 
 
 def _draw_axes(chart: Chart, axes: Axes) -> None:
     axes.set_title(chart.title, loc="left", fontsize=12, fontweight="bold", pad=12)
     axes.set_xlabel(chart.x_label)
     axes.set_ylabel(chart.y_label)
-    axes.grid(color="0.9", linewidth=0.8)
+    axes.grid(color=_GRID, linewidth=0.8)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
     if chart.log_x:
@@ -179,6 +205,9 @@ def _draw_axes(chart: Chart, axes: Axes) -> None:
         axes.set_ylim(*_decades(chart))
     if chart.reverse:
         axes.invert_xaxis()
+    for level in chart.levels:
+        axes.axhline(level, color=_FAINT, linewidth=0.9, linestyle=(0, (4, 3)))
+        axes.annotate(f"{level:g}", (0.995, level), xycoords=("axes fraction", "data"), ha="right", va="bottom", color=_FAINT)
 
 
 def _decades(chart: Chart) -> tuple[float, float]:
@@ -193,7 +222,7 @@ def _styles(chart: Chart) -> list[tuple[Curve, str, str]]:
     """Each curve with its colour and marker; those in use last, so that they lie on top."""
     others = iter(zip(_COLOURS, _MARKERS, strict=True))
     styled = [
-        (curve, *((_OURS, "o") if curve.ours else ("0.5", "") if curve.limit else next(others))) for curve in chart.curves
+        (curve, *((_OURS, "o") if curve.ours else (_FAINT, "") if curve.limit else next(others))) for curve in chart.curves
     ]
     return sorted(styled, key=lambda style: style[0].ours)
 
@@ -204,10 +233,12 @@ def _draw_curve(curve: Curve, axes: Axes, colour: str, marker: str) -> None:
     answered = np.isfinite(y)
     shown = np.where(answered, np.clip(y, low, high) if axes.get_yscale() == "log" else y, np.nan)
     style = {"linewidth": 2.8, "markersize": 5} if curve.ours else {"linewidth": 1.2, "markersize": 4}
-    dashed = curve.limit or (curve.ours and any(line.get_color() == colour for line in axes.lines))
-    dash = {"linestyle": "--"} if dashed else {}
+    before = sum(line.get_color() == colour and line.get_marker() == marker for line in axes.lines)
+    dash = {"linestyle": "--" if curve.limit else _OURS_LINES[before % len(_OURS_LINES)]}
     name = textwrap.fill(curve.name, 27)
     axes.plot(x, shown, color=colour, marker=marker, label=name, clip_on=False, **style, **dash)
+    if curve.spread:
+        axes.hlines(shown, *np.transpose(curve.spread), color=colour, linewidth=1.2, alpha=0.6)
     if not answered.all():
         axes.plot(x[~answered], np.full((~answered).sum(), high), "x", color=colour, markersize=6, clip_on=False)
 
@@ -226,16 +257,30 @@ def run(
     InputError
         if there is no such sweep, or the folder can't be written to.
     """
+
+    def measure(sweep: str, quick: bool) -> Iterable[Chart]:
+        with silent_libraries():  # Blender prints a line for each picture
+            return importlib.import_module(f".{sweep}", package).charts(quick)
+
     subject = package.rpartition(".")[2]
+    return run_all(subject, {sweep: functools.partial(measure, sweep) for sweep in sweeps}, folder, only, quick)
+
+
+def run_all(
+    subject: str,
+    sweeps: Mapping[str, Callable[[bool], Iterable[Chart]]],
+    folder: Path,
+    only: Sequence[str] = (),
+    quick: bool = False,
+) -> tuple[int, dict[str, Any]]:
+    """The same for sweeps that are given as name → a function of `quick`."""
     unknown = set(only) - set(sweeps)
     if unknown:
         raise InputError(f"there is no sweep {min(unknown)!r}: choose from {', '.join(sweeps)}")
     measured: dict[str, Any] = {}
     behind: list[str] = []
     for sweep in only or sweeps:
-        with silent_libraries():  # Blender prints a line for each picture
-            charts = importlib.import_module(f".{sweep}", package).charts(quick)
-        for chart in charts:
+        for chart in sweeps[sweep](quick):
             name = f"{subject}-{chart.name}"
             draw(chart, folder / f"{name}.svg", f"viewcam chart {subject} --only {sweep}{' --quick' if quick else ''}")
             print(f"{name}: {chart.reading}", flush=True)

@@ -24,6 +24,7 @@ from viewcam_addon.tracer.light import illumination
 from viewcam_addon.tracer.render import render
 
 from ..charts import Chart, Curve
+from ..noise import Noise
 from ..stability.stage import empty_stage, read_elsewhere
 from .convergence import slope
 
@@ -57,7 +58,7 @@ def _chart(
         return render(exported, level, count, seed)["Combined"][..., :3]
 
     def noise(count: int, seed: int) -> NDArray[np.float32]:
-        with mock.patch.object(illumination, "Sampler", _Noise):
+        with mock.patch.object(illumination, "Sampler", Noise):
             return ours(count, seed)
 
     def theirs(count: int, seed: int) -> NDArray[np.float32]:
@@ -87,20 +88,6 @@ def _chart(
 
 def _rms(errors: NDArray[np.float32]) -> float:
     return float(np.sqrt(np.mean(np.square(errors, dtype=np.float64))))
-
-
-class _Noise:
-    """Random numbers in the place of the sampler's."""
-
-    def __init__(self, seed: int, samples: int) -> None:
-        self._seed = seed
-
-    def numbers(self, pixels: NDArray, samples: NDArray, first: int, count: int) -> NDArray[np.float64]:
-        key = [self._seed, first, int(pixels[0]), int(np.ravel(samples)[0])] if len(pixels) else 0
-        return np.random.default_rng(key).random((count, len(pixels)))
-
-    def grid(self, pixels: NDArray, samples: NDArray, first: int, count: int) -> NDArray[np.float64]:
-        return self.numbers(np.tile(pixels, len(samples)), samples, first, count)
 
 
 def _edge(scene: bpy.types.Scene) -> None:

@@ -1,0 +1,86 @@
+"""Cycles as a contestant, in a process with Blender in it."""
+
+import contextlib
+from pathlib import Path
+
+import bpy
+
+import viewcam_addon
+from viewcam_addon.blender import cycles, job, versions
+from viewcam_addon.blender.borrowing import Borrower, still_of_one_layer
+from viewcam_addon.blender.depsgraph import render_still
+from viewcam_addon.blender.export import export_scene
+from viewcam_addon.blender.ledger import Ledger, Remedy
+from viewcam_addon.tracer.scene import scene_file
+from viewcam_addon.tracer.scene.film import NO_BOUNCES
+
+from .. import race, suzannes
+
+SCENES = Path(__file__).resolve().parents[2] / "sample_scenes"
+
+# Of a pixel, where a noise threshold is asked for: Blender's own most.
+_MOST_SAMPLES = 4096
+
+
+def prepare(
+    scene_name: str, level: str, size: tuple[int, int], path: Path, threads: int, box_filter: bool = False
+) -> dict[str, race.Runner]:
+    """In Blender's process: write the scene, and offer renders.
+
+    scene_name : of a sample scene, or "suzannes". path : where the tracer's scene goes. box_filter : instead of the scene's.
+    """
+    viewcam_addon.register()
+    if scene_name == "suzannes":
+        suzannes.six(*size)
+    else:
+        job.open_blend(SCENES / f"{scene_name}.blend")
+    scene, ledger = bpy.context.scene, Ledger()
+    view_layer, camera_object = scene.view_layers[0], scene.camera
+    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = *size, 100
+    if box_filter:
+        scene.cycles.pixel_filter_type = "BOX"
+    exported = export_scene(scene, view_layer, camera_object, ledger, lit=True)
+    scene_file.write(exported, path)
+
+    def light(sampling: str, parameter: float, seed: int) -> cycles.Light:
+        samples = int(parameter) if sampling == "samples" else _MOST_SAMPLES
+        return cycles.Light(exported.film, NO_BOUNCES if level == "direct" else exported.bounces, samples, seed)
+
+    borrow = Borrower(contextlib.ExitStack())  # given back with the process
+    still_of_one_layer(borrow, scene, view_layer, camera_object)
+    borrow.set(scene.render, "threads_mode", "FIXED")
+    borrow.set(scene.render, "threads", threads)
+    for remedy in ledger.remedies.values():
+        remedy(borrow)
+    versions.set_multilayer_file(scene.render.image_settings)
+    scene.render.use_persistent_data = True
+
+    def picture(sampling: str, parameter: float, seed: int, file: Path) -> float:
+        cycles.borrow_settings(borrow, scene, view_layer, light(sampling, parameter, seed))
+        _adaptive(scene, sampling, parameter)(borrow)
+        scene.update_tag()  # what is kept would else keep the samples as well
+        view_layer.update()
+        seconds = race.timed(lambda: render_still(scene))()
+        bpy.data.images["Render Result"].save_render(str(file), scene=scene)
+        return seconds
+
+    def whole(sampling: str, parameter: float, seed: int, file: Path) -> float:
+        """Nothing is kept: the call switches that off for its time."""
+        chosen, threshold = light(sampling, parameter, seed), _adaptive(scene, sampling, parameter)
+        return race.timed(lambda: cycles.render(scene, view_layer, camera_object, file, [threshold], threads, chosen))()
+
+    return {"picture": picture, "whole": whole}
+
+
+def _adaptive(scene: bpy.types.Scene, sampling: str, parameter: float) -> Remedy:
+    """Cycles' own adaptive sampling, where a noise threshold is asked for: settings that come after all others."""
+
+    def set_all(borrow: Borrower) -> None:
+        if sampling == "error":
+            borrow.set(scene.cycles, "use_adaptive_sampling", True)
+            borrow.set(scene.cycles, "adaptive_threshold", parameter)
+            borrow.set(scene.cycles, "adaptive_min_samples", 0)  # Cycles' own choice, by the threshold
+            borrow.set(scene.cycles, "use_sample_subset", False)
+            borrow.set(scene.cycles, "samples", _MOST_SAMPLES)
+
+    return set_all

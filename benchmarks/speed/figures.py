@@ -1,0 +1,104 @@
+"""The two figures of a picture, measured against its reference, and their charts."""
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..charts import Chart
+from ..race import Runner
+from . import contest, standings
+from .contest import Effort, Method, Tracks
+from .references import Reference
+
+Sides = dict[str, dict[str, Runner]]
+"""Side → figure → runner (contest.measure)."""
+
+
+@dataclass(frozen=True)
+class Still:
+    """A picture. wanted : error → how many times as fast as the rivals, as (picture, job), None where nothing is asked for.
+
+    reference : side → samples of each half, of two sides.
+    """
+
+    name: str
+    title: str
+    level: str
+    size: tuple[int, int]
+    wanted: Mapping[float, tuple[float | None, float | None]]
+    reference: Mapping[str, int]
+
+    def small(self) -> "Still":
+        """A sixteenth of the pixels, and a reference of seconds."""
+        width, height = self.size
+        reference = {side: min(samples, 128) for side, samples in self.reference.items()}
+        return dataclasses.replace(self, size=(width // 4, height // 4), reference=reference)
+
+
+@dataclass(frozen=True)
+class Figure:
+    """What is timed. key : as contestants know it. name, seconds : as charts say it."""
+
+    key: str
+    name: str
+    seconds: str
+
+
+PICTURE = Figure("picture", "picture", "structures built and kept, no file")
+WHOLE = Figure("whole", "whole job", "from the loaded scene to the EXR on the disk")
+FRESH = Figure("fresh", "fresh process", "from a fresh process to the EXR on the disk")
+
+
+def charts(
+    still: Still, job: Figure, sides: Sides, methods: tuple[Method, ...], reference: Reference, quick: bool, path: Path
+) -> tuple[Chart, Chart]:
+    """The picture, and the job around the errors that are asked for.
+
+    path : where pictures may be written.
+    """
+    enough = max(0.9 * min(still.wanted), reference.error)
+    effort = Effort(rounds=1, enough=enough, longest=1) if quick else Effort(rounds=3, enough=enough, longest=10)
+    pictures = contest.measure(sides, methods, "picture", reference.error_of, effort, path)
+    few = [
+        dataclasses.replace(method, parameters=contest.near(points, tuple(still.wanted)))
+        for method, points in pictures.items()
+        if method.job
+    ]
+    effort = Effort(effort.rounds, enough=0, longest=float("inf"))
+    jobs = contest.measure(sides, few, job.key, reference.error_of, effort, path)
+    return (
+        _chart(still, PICTURE, [ratio for ratio, _ in still.wanted.values()], pictures, reference, quick),
+        _chart(still, job, [ratio for _, ratio in still.wanted.values()], jobs, reference, quick),
+    )
+
+
+def _chart(
+    still: Still, figure: Figure, ratios: list[float | None], tracks: Tracks, reference: Reference, quick: bool
+) -> Chart:
+    tracks = {method: _with_half(method, points, reference) for method, points in tracks.items()}
+    wanted = dict(zip(still.wanted, ratios, strict=True))
+    found = standings.standings(tracks, wanted, reference.error)
+    told = [standing.told() for standing in found]
+    told += [f"to {error:g} nobody can tell" for error in wanted if error not in {standing.target for standing in found}]
+    width, height = still.size
+    rounds = max(len(point.seconds) for points in tracks.values() for point in points)
+    return standings.Contested(
+        f"{still.name}-{figure.name.replace(' ', '-')}",
+        f"{still.title}, {width} × {height}, {still.level}: the {figure.name}",
+        f"seconds, {figure.seconds}: median, least and most of {rounds}",
+        "RMS error of Combined",
+        standings.curves(tracks, reference.error),
+        f"Read how long each takes to an error: {'; '.join(told)}. {reference.told()}{' Quick: not judged.' if quick else ''}",
+        tie=0.0,
+        levels=tuple(wanted),
+        standings=found,
+        measured={"methods": standings.measured(tracks), "reference": reference.figures()},
+        judged=not quick,
+    )
+
+
+def _with_half(method: Method, points: list[contest.Point], reference: Reference) -> list[contest.Point]:
+    """A rival's curve goes on with what the reference's own halves tell of it."""
+    half = next((half for half in reference.halves if method.rival and method.name == half.side), None)
+    return standings.with_point_by_line(points, half.samples, half.error) if half else points

@@ -1,0 +1,76 @@
+"""This project's tracer as a contestant, in a process of its own: compiled or not, with Embree or without."""
+
+import contextlib
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from unittest import mock
+
+from viewcam_addon import image
+from viewcam_addon.tracer.scene import scene_file
+from viewcam_addon.tracer.scene.film import MOST_SAMPLES
+
+from .. import race
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def prepare(scene_path: Path, level: str, threads: int, embree: bool = True) -> dict[str, race.Runner]:
+    """In the contestant's process."""
+    if not embree:
+        sys.modules["embreex"] = None  # as if it were not installed
+    from viewcam_addon.tracer.render import Tracer, render
+
+    scene = scene_file.read(scene_path)
+    tracer = Tracer(scene, threads)
+
+    def picture(sampling: str, parameter: float, seed: int, path: Path) -> float:
+        with _sampler(sampling):
+            started = time.perf_counter()
+            passes = tracer.render_light(level, seed=seed, **_effort(sampling, parameter))
+            seconds = time.perf_counter() - started
+        image.write(path, image.Image({"Combined": passes["Combined"]}, scene.camera))
+        return seconds
+
+    def whole(sampling: str, parameter: float, seed: int, path: Path) -> float:
+        with _sampler(sampling):
+            started = time.perf_counter()
+            passes = render(scene, level, seed=seed, threads=threads, **_effort(sampling, parameter))
+            image.write(path, image.Image(passes, scene.camera))
+            return time.perf_counter() - started
+
+    return {"picture": picture, "whole": whole}
+
+
+def fresh(scene_path: Path, level: str, threads: int, environment: dict[str, str]) -> race.Runner:
+    """From a fresh process to the EXR, as the shell does it."""
+
+    def runner(sampling: str, parameter: float, seed: int, path: Path) -> float:
+        words = ["--error", str(parameter)] if sampling == "error" else ["--samples", str(int(parameter))]
+        command = [sys.executable, "-m", "viewcam_addon.cli", "render", scene_path, path, "--level", level, *words]
+        command += ["--seed", str(seed), "--threads", str(threads)]
+        modules = {"PYTHONPATH": os.pathsep.join([str(ROOT), *filter(None, sys.path)])}
+        started = time.perf_counter()
+        subprocess.run(command, env=os.environ | environment | modules, check=True, stdout=subprocess.DEVNULL)
+        return time.perf_counter() - started
+
+    return runner
+
+
+def _effort(sampling: str, parameter: float) -> dict[str, float]:
+    """The options of render()."""
+    return {"samples": MOST_SAMPLES, "error": parameter} if sampling == "error" else {"samples": int(parameter)}
+
+
+@contextlib.contextmanager
+def _sampler(sampling: str) -> Iterator[None]:
+    """Random numbers in the place of the sampler's, if that is the sampling."""
+    from viewcam_addon.tracer.light import illumination
+
+    from ..noise import Noise
+
+    with mock.patch.object(illumination, "Sampler", Noise) if sampling == "random" else contextlib.nullcontext():
+        yield
