@@ -132,7 +132,7 @@ def test_suns_over_a_scene_of_one_tiny_sphere_have_their_chances(make_lighting, 
 def test_a_wrong_chance_is_told(make_lighting, off_by, monkeypatch):
     lamps, alone = spread(np.random.default_rng(3), 40)
     lighting = make_lighting(*lamps)
-    lighting.emitters._chances = lighting.emitters._chances[::-1]
+    lighting.emitters.chances = lighting.emitters.chances[::-1]
     assert abs(off_by(lighting.irradiance((0, 0, 0), UP, 2**16), alone.sum(), 0.1)) > 3
 
 

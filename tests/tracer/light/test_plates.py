@@ -163,7 +163,7 @@ def test_a_lamp_without_an_area_or_a_direction_is_dark(make_lighting, linear):
         assert lamp.is_dark and not make_lighting(lamp).emitters.lit
 
 
-def test_one_percent_of_a_solid_angle_and_uneven_samples_are_told(make_lighting, off_by, monkeypatch):
+def test_one_percent_of_a_solid_angle_and_uneven_samples_are_told(without_kernels, make_lighting, off_by, monkeypatch):
     right = plates.on_rectangle
     expected = 4 * (1 / np.sqrt(2)) * np.arctan(1 / np.sqrt(2))  # four times the quarter of 2 × 2 at the height 1
     lamp = down(1, size=(2, 2))

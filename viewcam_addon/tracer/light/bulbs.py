@@ -25,7 +25,7 @@ from .scattering import axes_about, cosine_direction, turned
 Sampled = tuple[Floats, ...]
 """Directions (3, n) unit, distances (n,), and what a lamp's colour is multiplied with: its radiance over the density."""
 
-_QUARTER_SPHERE = 4 * np.pi  # a power over the squared distance's multiple of it is an irradiance
+QUARTER_SPHERE = 4 * np.pi  # a power over the squared distance's multiple of it is an irradiance
 
 
 def entries(table: Floats, which: Indices) -> Floats:
@@ -79,32 +79,32 @@ class Suns:
         self.colours = columns([lamp.irradiance for lamp in lamps])
         half = _not_tiny([lamp.angle / 2 for lamp in lamps])
         self.sized = half > 0
-        self._towards = view.axes @ columns([lamp.towards for lamp in lamps])
+        self.towards = view.axes @ columns([lamp.towards for lamp in lamps])
         self._half_chord = np.sin(half / 2)
-        self._spread = 2 * self._half_chord**2  # 1 − cos
+        self.spread = 2 * self._half_chord**2  # 1 − cos
         with np.errstate(divide="ignore"):
-            self._radiance = np.where(self.sized, 1 / (np.pi * np.sin(half) ** 2), 0.0)
-        self._over_density = 2 / (2 - self._spread)  # that radiance times the solid angle, 2π (1 − cos)
+            self.radiance = np.where(self.sized, 1 / (np.pi * np.sin(half) ** 2), 0.0)
+        self.over_density = 2 / (2 - self.spread)  # that radiance times the solid angle, 2π (1 − cos)
 
     def sample(self, which: Indices, position: Floats, shading: Floats, u: Floats) -> Sampled:
-        towards, spread = entries(self._towards, which), entries(self._spread, which)
+        towards, spread = entries(self.towards, which), entries(self.spread, which)
         count = u.shape[1]
         if spread.any():
             towards, _ = within_cone(towards, spread, u)
         return (
             np.broadcast_to(towards, (3, count)),
             np.full(count, np.inf),
-            np.broadcast_to(entries(self._over_density, which), count),
+            np.broadcast_to(entries(self.over_density, which), count),
         )
 
     def estimate(self, lamp: int, position: Floats, normal: Floats) -> Floats:
-        sine = np.sqrt(self._spread[lamp] * (2 - self._spread[lamp]))
-        return risen(dot(normal, self._towards[:, lamp]), 1.0, sine) * self.colours[:, lamp].mean()
+        sine = np.sqrt(self.spread[lamp] * (2 - self.spread[lamp]))
+        return risen(dot(normal, self.towards[:, lamp]), 1.0, sine) * self.colours[:, lamp].mean()
 
     def met(self, lamp: int, ahead: Floats) -> Floats:
         """(n,) factors, 0 where rays (3, n), unit, pass the lamp by."""
-        apart = ahead - self._towards[:, lamp, None]
-        return np.where(dot(apart, apart) <= 4 * self._half_chord[lamp] ** 2, self._radiance[lamp], 0.0)
+        apart = ahead - self.towards[:, lamp, None]
+        return np.where(dot(apart, apart) <= 4 * self._half_chord[lamp] ** 2, self.radiance[lamp], 0.0)
 
 
 class Bulbs:
@@ -120,12 +120,12 @@ class Bulbs:
         places = [lamp.matrix[:3, 3] if isinstance(lamp, Spot) else lamp.position for lamp in lamps]
         self.colours = columns([lamp.power for lamp in lamps])
         self.centres = view.axes @ (columns(places) - view.eye[:, None])
-        self._radii = self.reach = _not_tiny([lamp.radius for lamp in lamps])
-        self.sized = self._radii > 0
-        self._soft = np.array([lamp.soft_falloff for lamp in lamps])
-        self._cones = _Cones(lamps, view) if any(isinstance(lamp, Spot) for lamp in lamps) else None
+        self.radii = self.reach = _not_tiny([lamp.radius for lamp in lamps])
+        self.sized = self.radii > 0
+        self.soft = np.array([lamp.soft_falloff for lamp in lamps])
+        self.cones = _Cones(lamps, view) if any(isinstance(lamp, Spot) for lamp in lamps) else None
         with np.errstate(divide="ignore"):
-            self._radiance = np.where(self.sized, 1 / (_QUARTER_SPHERE * np.pi * self._radii**2), 0.0)
+            self.radiance = np.where(self.sized, 1 / (QUARTER_SPHERE * np.pi * self.radii**2), 0.0)
 
     def sample(self, which: Indices, position: Floats, shading: Floats, u: Floats) -> Sampled:
         way = entries(self.centres, which) - position
@@ -133,13 +133,13 @@ class Bulbs:
         distance = np.sqrt(squared)
         with np.errstate(divide="ignore", invalid="ignore"):
             axis = np.where(distance > 0, way / distance, [[0.0], [0.0], [1.0]])
-            if not entries(self._radii, which).any():
-                factor = np.where(distance > 0, 1 / (_QUARTER_SPHERE * squared), 0.0)
-                return axis, distance, factor if self._cones is None else factor * self._cones.attenuation(which, axis)
+            if not entries(self.radii, which).any():
+                factor = np.where(distance > 0, 1 / (QUARTER_SPHERE * squared), 0.0)
+                return axis, distance, factor if self.cones is None else factor * self.cones.attenuation(which, axis)
         return self._sample_sized(which, way, axis, distance, shading, u)
 
     def _sample_sized(self, which: Indices, way: Floats, axis: Floats, distance: Floats, shading: Floats, u: Floats) -> Sampled:
-        radius, soft = entries(self._radii, which), entries(self._soft, which)
+        radius, soft = entries(self.radii, which), entries(self.soft, which)
         radius_squared, squared = radius * radius, distance * distance
         to_edge = squared + np.where(soft, radius_squared, 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -151,11 +151,11 @@ class Bulbs:
             reached = np.where(soft, np.nan_to_num(squared / along), along - root)
         sampled = ahead, reached, factor
         inside = ~soft & (distance <= radius) & (radius > 0)
-        if self._cones is not None:
-            narrow = np.flatnonzero(~soft & ~inside & (entries(self._cones.spread, which) < spread))
+        if self.cones is not None:
+            narrow = np.flatnonzero(~soft & ~inside & (entries(self.cones.spread, which) < spread))
             if len(narrow):
                 replace(sampled, narrow, self._along_the_beam(which[narrow], way[:, narrow], u[:, narrow]))
-            factor *= np.where(inside, 1.0, self._cones.attenuation(which, ahead))
+            factor *= np.where(inside, 1.0, self.cones.attenuation(which, ahead))
         inside = np.flatnonzero(inside)
         if len(inside):
             replace(sampled, inside, self._from_inside(which[inside], way[:, inside], shading[:, inside], u[:, inside]))
@@ -163,37 +163,37 @@ class Bulbs:
 
     def _along_the_beam(self, which: Indices, way: Floats, u: Floats) -> Sampled:
         """Samples of spheres so large, or near, that the cones of their spots are narrower than they look."""
-        spread, radius = entries(self._cones.spread, which), entries(self._radii, which)
-        ahead, _ = within_cone(entries(self._cones.axes, which), spread, u)
+        spread, radius = entries(self.cones.spread, which), entries(self.radii, which)
+        ahead, _ = within_cone(entries(self.cones.axes, which), spread, u)
         along = dot(way, ahead)
         root = radius * radius - (dot(way, way) - along * along)
         hit = (root >= 0) & (along > 0)
-        return ahead, along - np.sqrt(np.maximum(root, 0.0)), hit * entries(self._radiance, which) * (2 * np.pi * spread)
+        return ahead, along - np.sqrt(np.maximum(root, 0.0)), hit * entries(self.radiance, which) * (2 * np.pi * spread)
 
     def _from_inside(self, which: Indices, way: Floats, shading: Floats, u: Floats) -> Sampled:
         ahead, density = cosine_direction(shading, u)
-        along, radius = dot(way, ahead), entries(self._radii, which)
+        along, radius = dot(way, ahead), entries(self.radii, which)
         reached = along + np.sqrt(np.maximum(radius * radius - dot(way, way) + along * along, 0.0))
-        return ahead, reached, entries(self._radiance, which) / np.maximum(density, _LEAST_DENSITY)
+        return ahead, reached, entries(self.radiance, which) / np.maximum(density, LEAST_DENSITY)
 
     def estimate(self, lamp: int, position: Floats, normal: Floats) -> Floats:
         way = self.centres[:, lamp, None] - position
-        radius = self._radii[lamp]
+        radius = self.radii[lamp]
         distance = np.sqrt(dot(way, way))
         with np.errstate(divide="ignore", invalid="ignore"):
-            falloff = self.colours[:, lamp].mean() / (_QUARTER_SPHERE * np.maximum(distance, radius) ** 2)
+            falloff = self.colours[:, lamp].mean() / (QUARTER_SPHERE * np.maximum(distance, radius) ** 2)
             light = np.where(distance + radius > 0, falloff, 0.0) * risen(dot(normal, way), distance, radius)
-            if self._cones is not None:
-                seen = self._cones.attenuation(np.array([lamp]), way / distance)
-                light *= np.maximum(np.nan_to_num(seen), _LEAST_OF_A_WIDE_SPOT if radius > 0 else 0.0)
+            if self.cones is not None:
+                seen = self.cones.attenuation(np.array([lamp]), way / distance)
+                light *= np.maximum(np.nan_to_num(seen), LEAST_OF_A_WIDE_SPOT if radius > 0 else 0.0)
         return light
 
     def met(self, lamp: int, starts: Floats, ahead: Floats, nearest: Floats, farthest: Floats) -> Floats:
         """(n,) factors, 0 where rays (3, n), unit, pass the lamp by between `nearest` and `farthest`, distances."""
-        radius_squared = self._radii[lamp] ** 2
+        radius_squared = self.radii[lamp] ** 2
         way = self.centres[:, lamp, None] - starts
         along, squared = dot(way, ahead), dot(way, way)
-        if self._soft[lamp]:
+        if self.soft[lamp]:
             with np.errstate(divide="ignore", invalid="ignore"):
                 distance = squared / along
                 hit = (along > 0) & (distance * distance - squared <= radius_squared)
@@ -202,21 +202,21 @@ class Bulbs:
             root = radius_squared - dot(aside, aside)
             inside = squared <= radius_squared
             distance = along + np.copysign(np.sqrt(np.maximum(root, 0.0)), inside - 0.5)
-            hit = (root >= 0) & ((along > 0) | (inside & (self._cones is None or not self._cones.is_spot[lamp])))
+            hit = (root >= 0) & ((along > 0) | (inside & (self.cones is None or not self.cones.is_spot[lamp])))
         hit = np.flatnonzero(hit & (distance > nearest) & (distance < farthest))
         factors = np.zeros(len(along))
-        factors[hit] = self._radiance[lamp]
-        if self._cones is not None:
-            lit = self._cones.attenuation(np.array([lamp]), ahead[:, hit])
-            factors[hit] *= lit if self._soft[lamp] else np.where(inside[hit], 1.0, lit)
+        factors[hit] = self.radiance[lamp]
+        if self.cones is not None:
+            lit = self.cones.attenuation(np.array([lamp]), ahead[:, hit])
+            factors[hit] *= lit if self.soft[lamp] else np.where(inside[hit], 1.0, lit)
         return factors
 
 
-_LEAST_OF_A_WIDE_SPOT = 0.05
+LEAST_OF_A_WIDE_SPOT = 0.05
 """What the estimate of a spot that has a radius never falls below: part of it may be seen from where its middle is dark."""
 
 _HARD_EDGE = 1e-30
-_LEAST_DENSITY = 1e-30
+LEAST_DENSITY = 1e-30
 _SHEARED = 1e-9
 
 
@@ -230,12 +230,12 @@ class _Cones:
     def __init__(self, lamps: Sequence[Point | Spot], view: View) -> None:
         self.is_spot = np.array([isinstance(lamp, Spot) for lamp in lamps])
         inverses = [np.linalg.inv(lamp.matrix[:3, :3]) @ view.axes.T if isinstance(lamp, Spot) else np.eye(3) for lamp in lamps]
-        self._inverse = np.stack([inverse.ravel() for inverse in inverses], axis=1)
+        self.inverse = np.stack([inverse.ravel() for inverse in inverses], axis=1)
         angles = np.array([lamp.angle if isinstance(lamp, Spot) else 0.0 for lamp in lamps])
         blends = np.array([lamp.blend if isinstance(lamp, Spot) else 0.0 for lamp in lamps])
         edge = np.cos(angles / 2)
-        self._edge = np.where(self.is_spot, edge, -2.0)
-        self._slope = 1 / np.maximum((1 - edge) * blends, _HARD_EDGE)
+        self.edge = np.where(self.is_spot, edge, -2.0)
+        self.slope = 1 / np.maximum((1 - edge) * blends, _HARD_EDGE)
         linear = np.array([lamp.matrix[:3, :3] if isinstance(lamp, Spot) else np.eye(3) for lamp in lamps])
         squares = linear.transpose(0, 2, 1) @ linear
         lengths = np.diagonal(squares, axis1=1, axis2=2)
@@ -246,9 +246,9 @@ class _Cones:
 
     def attenuation(self, which: Indices, ahead: Floats) -> Floats:
         """(n,) for rays (3, n), unit, towards the lamps."""
-        inverse = entries(self._inverse, which)
+        inverse = entries(self.inverse, which)
         x, y, z = (dot(inverse[row : row + 3], ahead) for row in (0, 3, 6))
         with np.errstate(invalid="ignore"):
             cosine = z / np.sqrt(x * x + y * y + z * z)
-        rise = np.clip((cosine - entries(self._edge, which)) * entries(self._slope, which), 0.0, 1.0)
+        rise = np.clip((cosine - entries(self.edge, which)) * entries(self.slope, which), 0.0, 1.0)
         return rise * rise * (3 - 2 * rise)

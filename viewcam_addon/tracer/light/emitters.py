@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Indices, gather
+from ..compiled.standing import or_compiled
 from ..rays.points import Points, Surfaces
 from ..rays.view import View
 from ..scene import Scene
@@ -31,10 +32,10 @@ from .textures import Palette
 # For so many the chances are computed at each point; each takes a tenth of the time of a shadow ray among few triangles.
 _FEW = 32
 # A smaller chance than one over this comes never.
-_LONGEST_ODDS = 1e80
+LONGEST_ODDS = 1e80
 # Points at a time. Twice as many gain nothing, half as many cost 3 % in calls of NumPy.
 _POINTS = 32768
-_BELOW_1 = 1 - 2.0**-53
+BELOW_1 = 1 - 2.0**-53
 
 
 class Aimed(NamedTuple):
@@ -71,26 +72,27 @@ class Emitters:
         self._shines = palette.has("emission")
         self.lit = bool(lamps) or self._shines or any(scene.world.radiance)
         seen = _seen_by_kind(lamps, view)
-        self._lamps, self._met = seen.pop("diffuse"), seen
-        self._glowing = Glowing(scene, surfaces, palette)
-        self._count = self._lamps.count + self._glowing.count
-        self._shadowed = np.append(self._lamps.shadowed, np.ones(self._glowing.count, bool))
-        self._chances = self._fixed_chances(_extent(surfaces)) if self._count > _FEW else None
-        self._reached = None if self._chances is None else np.append(self._chances.cumsum()[:-1], 1.0)
+        self.lamps, self._met = seen.pop("diffuse"), seen
+        self.glowing = Glowing(scene, surfaces, palette)
+        self.count = self.lamps.count + self.glowing.count
+        self.shadowed = np.append(self.lamps.shadowed, np.ones(self.glowing.count, bool))
+        self.chances = self._fixed_chances(_extent(surfaces)) if self.count > _FEW else None
+        self.rows: Floats | None = None  # what the kernel makes of all emitters, at its first use
+        self.reached = None if self.chances is None else np.append(self.chances.cumsum()[:-1], 1.0)
 
     def sampled(self, kind: str) -> bool:
         """Whether there is anything that `sample` finds for surfaces that scatter this kind of rays: diffuse ones only."""
-        return kind == "diffuse" and self._count > 0
+        return kind == "diffuse" and self.count > 0
 
     @property
     def random(self) -> bool:
         """Whether what `sample` finds depends on its numbers: there are several emitters, or one that has a size."""
-        return self._count > 1 or self._lamps.sized or self._glowing.count > 0
+        return self.count > 1 or self.lamps.sized or self.glowing.count > 0
 
     @property
     def weighed(self) -> bool:
         """Whether rays that are scattered may find what `sample` finds, too, so that each counts in part."""
-        return self._glowing.count > 0
+        return self.glowing.count > 0
 
     def lamps_met_by(self, kind: str) -> bool:
         """Whether rays of this kind can run into lamps."""
@@ -102,45 +104,43 @@ class Emitters:
 
     def sample(self, points: Points, u: Floats) -> Aimed:
         """One emitter for each of n points, and a direction to it. u : (3, n) in [0, 1): which emitter, and where on it."""
-        parts = [slice(first, first + _POINTS) for first in range(0, max(points.count, 1), _POINTS)]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            aimed = [self._aim(points.at(part), u[:, part]) for part in parts]
-        return aimed[0] if len(aimed) == 1 else Aimed(*(np.concatenate(values, axis=-1) for values in zip(*aimed, strict=True)))
+        return aimed(self, points, u)
 
-    def _aim(self, points: Points, u: Floats) -> Aimed:
+    def aim(self, points: Points, u: Floats) -> Aimed:
+        """`sample` of points that are no more than arrays fit into a core's cache."""
         which, odds, rest = self._choose(points, u[0])
-        position, shading, first = points.position, points.shading, self._lamps.count
+        position, shading, first = points.position, points.shading, self.lamps.count
         pdf = np.broadcast_to(np.inf, points.count)
-        if not self._glowing.count:
-            direction, distance, light = self._lamps.sample(which, position, shading, u[1:])
+        if not self.glowing.count:
+            direction, distance, light = self.lamps.sample(which, position, shading, u[1:])
         elif not first:
-            direction, distance, light, pdf = self._glowing.sample(which, position, rest, u[1:])
+            direction, distance, light, pdf = self.glowing.sample(which, position, rest, u[1:])
         else:
             found = np.empty((3, points.count)), np.empty(points.count), np.empty((3, points.count)), pdf.copy()
             of_glowing = which >= first
             some = np.flatnonzero(~of_glowing)
             here = gather(position, some), gather(shading, some)
-            replace(found[:3], some, self._lamps.sample(gather(which, some), *here, gather(u[1:], some)))
+            replace(found[:3], some, self.lamps.sample(gather(which, some), *here, gather(u[1:], some)))
             some = np.flatnonzero(of_glowing)
             asked = gather(which, some) - first, gather(position, some), gather(rest, some), gather(u[1:], some)
-            replace(found, some, self._glowing.sample(*asked))
+            replace(found, some, self.glowing.sample(*asked))
             direction, distance, light, pdf = found
-        if self._count > 1:
+        if self.count > 1:
             light *= odds
-            if self._glowing.count:
+            if self.glowing.count:
                 pdf = np.where(odds > 0, pdf / odds, np.inf)
-        shadowed = np.broadcast_to(True, points.count) if self._shadowed.all() else gather(self._shadowed, which)
+        shadowed = np.broadcast_to(True, points.count) if self.shadowed.all() else gather(self.shadowed, which)
         return Aimed(direction, distance, light, pdf, shadowed)
 
     def _choose(self, points: Points, u: Floats) -> tuple[Indices, Floats, Floats]:
         """Which emitter each point gets, one over the chance that it had, or 0 where none lights it, and what is left of u."""
-        if self._count == 1:
+        if self.count == 1:
             return np.zeros(len(u), np.intp), np.ones(len(u)), u
-        if self._chances is not None:
-            which = np.searchsorted(self._reached, u, side="right")
-            chance = gather(self._chances, which)
-            before = gather(self._reached, which) - chance
-            return which, 1 / chance, np.clip((u - before) / chance, 0.0, _BELOW_1)
+        if self.chances is not None:
+            which = np.searchsorted(self.reached, u, side="right")
+            chance = gather(self.chances, which)
+            before = gather(self.reached, which) - chance
+            return which, 1 / chance, np.clip((u - before) / chance, 0.0, BELOW_1)
         share, *others = self._estimates(points)
         total = sum(others, start=share)
         wanted = u * total
@@ -150,19 +150,19 @@ class Emitters:
             which += beyond
             share, before = np.where(beyond, estimate, share), np.where(beyond, reached, before)
             reached = reached + estimate
-        odds = np.where(share > 0, np.minimum(total / share, _LONGEST_ODDS), 0.0)
-        return which, odds, np.fmin((wanted - before) / share, _BELOW_1) if self._glowing.count else u
+        odds = np.where(share > 0, np.minimum(total / share, LONGEST_ODDS), 0.0)
+        return which, odds, np.fmin((wanted - before) / share, BELOW_1) if self.glowing.count else u
 
     def _estimates(self, points: Points) -> list[Floats]:
         """(n,) each: about how much each emitter brings to points."""
         at = points.position, points.normal
-        lamps = [self._lamps.estimate(lamp, *at) for lamp in range(self._lamps.count)]
-        return lamps + [self._glowing.estimate(number, *at) for number in range(self._glowing.count)]
+        lamps = [self.lamps.estimate(lamp, *at) for lamp in range(self.lamps.count)]
+        return lamps + [self.glowing.estimate(number, *at) for number in range(self.glowing.count)]
 
     def _fixed_chances(self, extent: float) -> Floats:
         """(k,) chances of the emitters."""
-        powers = np.concatenate([self._lamps.powers(extent), self._glowing.powers()])
-        return 0.5 * powers / powers.sum() + 0.5 / self._count
+        powers = np.concatenate([self.lamps.powers(extent), self.glowing.powers()])
+        return 0.5 * powers / powers.sum() + 0.5 / self.count
 
     def lamps_met(self, starts: Floats, directions: Floats, nearest: Floats, farthest: Floats, kind: str) -> Floats:
         """(3, n), the radiance of all lamps that have a size, without suns, and that rays run through.
@@ -186,18 +186,27 @@ class Emitters:
 
         starts, met : from where to where. directions, distance : of the way. scattered_pdf : the rays' density.
         """
-        if kind != "diffuse" or not self._glowing.count:
+        if kind != "diffuse" or not self.glowing.count:
             return np.ones(met.count)
-        density = self._glowing.density(met, directions, distance)
-        owner = self._lamps.count + gather(self._glowing.owner, met.primitive)
-        if self._chances is not None:
-            density *= gather(self._chances, owner)
-        elif self._count > 1:
+        density = self.glowing.density(met, directions, distance)
+        owner = self.lamps.count + gather(self.glowing.owner, met.primitive)
+        if self.chances is not None:
+            density *= gather(self.chances, owner)
+        elif self.count > 1:
             with np.errstate(divide="ignore", invalid="ignore"):
                 estimates = self._estimates(starts)
-                chosen = np.choose(owner, estimates, mode="clip") if self._glowing.count > 1 else estimates[-1]
+                chosen = np.choose(owner, estimates, mode="clip") if self.glowing.count > 1 else estimates[-1]
                 density *= np.fmax(chosen / sum(estimates), 0.0)
         return weight(scattered_pdf, density)
+
+
+@or_compiled
+def aimed(emitters: Emitters, points: Points, u: Floats) -> Aimed:
+    """As `Emitters.sample`."""
+    parts = [slice(first, first + _POINTS) for first in range(0, max(points.count, 1), _POINTS)]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = [emitters.aim(points.at(part), u[:, part]) for part in parts]
+    return found[0] if len(found) == 1 else Aimed(*(np.concatenate(values, axis=-1) for values in zip(*found, strict=True)))
 
 
 def _extent(surfaces: Surfaces) -> float:

@@ -14,7 +14,7 @@ from ..scene import Scene
 from .textures import Palette
 
 # Less has what a point sees of itself only.
-_LEAST_DENSITY = 1e-100
+LEAST_DENSITY = 1e-100
 
 
 class Glowing:
@@ -40,36 +40,36 @@ class Glowing:
             self._fill(shining, spheres)
             used = [scene.materials[name] for placed in scene.objects for name in placed.materials if name]
             emissions = [material.colours["emission"] for material in used if "emission" in material.colours]
-            self._plain = not any(colour.image is not None or colour.vertex for colour in emissions)
+            self.plain = not any(colour.image is not None or colour.vertex for colour in emissions)
 
     def _fill(self, shining: list[tuple[Indices, Floats]], sphere_count: int) -> None:
-        self._primitives = np.concatenate([primitives for primitives, _ in shining])
-        a, b, c = self._corners(self._primitives)
+        self.primitives = np.concatenate([primitives for primitives, _ in shining])
+        a, b, c = self._corners(self.primitives)
         normals = cross(b - a, c - a)
         with np.errstate(invalid="ignore", divide="ignore"):
             normals /= np.sqrt(dot(normals, normals))
-        self._shapes = np.concatenate([a, b - a, c - a, normals])
-        self._colours = np.concatenate([colours for _, colours in shining], axis=1)
-        self._centres, self._reach = np.empty((3, self.count)), np.empty(self.count)
-        self._brightness = np.empty(self.count)  # radiance times area
-        self._reached, self._last = np.empty(len(self._primitives)), np.empty(self.count, np.intp)
-        self._density = np.zeros(self._surfaces.triangles.count + sphere_count)
-        self.owner = np.full(len(self._density), -1, np.int32)
+        self.shapes = np.concatenate([a, b - a, c - a, normals])
+        self.colours = np.concatenate([colours for _, colours in shining], axis=1)
+        self.centres, self.reach = np.empty((3, self.count)), np.empty(self.count)
+        self.brightness = np.empty(self.count)  # radiance times area
+        self.reached, self.last = np.empty(len(self.primitives)), np.empty(self.count, np.intp)
+        self.densities = np.zeros(self._surfaces.triangles.count + sphere_count)
+        self.owner = np.full(len(self.densities), -1, np.int32)
         end = 0
         for number, (primitives, colours) in enumerate(shining):
             corners = np.stack(self._corners(primitives))
             normals = cross(corners[1] - corners[0], corners[2] - corners[0])
             emission = colours.mean(axis=0)
             shares = np.sqrt(dot(normals, normals)) / 2 * emission
-            self._brightness[number] = total = shares.sum()
+            self.brightness[number] = total = shares.sum()
             least, greatest = corners.min(axis=(0, 2)), corners.max(axis=(0, 2))
-            self._centres[:, number] = (least + greatest) / 2
-            self._reach[number] = np.linalg.norm(greatest - least) / 2
+            self.centres[:, number] = (least + greatest) / 2
+            self.reach[number] = np.linalg.norm(greatest - least) / 2
             part = slice(end, end := end + len(primitives))
             with np.errstate(invalid="ignore", divide="ignore"):
-                self._reached[part] = number + np.nan_to_num(shares.cumsum() / total)
-                self._density[primitives] = np.nan_to_num(emission / total, posinf=0.0)
-            self._last[number] = part.start + np.flatnonzero(shares).max(initial=0)
+                self.reached[part] = number + np.nan_to_num(shares.cumsum() / total)
+                self.densities[primitives] = np.nan_to_num(emission / total, posinf=0.0)
+            self.last[number] = part.start + np.flatnonzero(shares).max(initial=0)
             self.owner[primitives] = number
 
     def _corners(self, triangle: Indices) -> tuple[Floats, ...]:
@@ -81,10 +81,10 @@ class Glowing:
 
         which : (n,) objects. part : (n,) and u : (2, n), in [0, 1): which triangle, and where on it.
         """
-        picked = np.searchsorted(self._reached, which + part, side="right")
-        picked = np.minimum(picked, gather(self._last, which))
-        primitive = gather(self._primitives, picked)
-        corner, first, second, normal = gather(self._shapes, picked).reshape(4, 3, -1)
+        picked = np.searchsorted(self.reached, which + part, side="right")
+        picked = np.minimum(picked, gather(self.last, which))
+        primitive = gather(self.primitives, picked)
+        corner, first, second, normal = gather(self.shapes, picked).reshape(4, 3, -1)
         far = np.sqrt(u[0])
         along = far * u[1]
         to = corner + first * (far - along) + second * along - position
@@ -92,29 +92,29 @@ class Glowing:
         distance = np.sqrt(squared)
         with np.errstate(invalid="ignore", divide="ignore"):
             ahead = np.divide(to, distance, out=to)
-            density = np.fmax(gather(self._density, primitive) * squared / np.abs(dot(normal, ahead)), 0.0)
-            factor = np.where(density > _LEAST_DENSITY, 1 / density, 0.0)
+            density = np.fmax(gather(self.densities, primitive) * squared / np.abs(dot(normal, ahead)), 0.0)
+            factor = np.where(density > LEAST_DENSITY, 1 / density, 0.0)
         return ahead, distance, self._radiance(picked, primitive, position, ahead) * factor, density
 
     def _radiance(self, picked: Indices, primitive: Indices, position: Floats, ahead: Floats) -> Floats:
-        if self._plain:
-            return gather(self._colours, picked)
+        if self.plain:
+            return gather(self.colours, picked)
         return self._palette.colour("emission", self._surfaces.met(primitive, position, ahead)[0])
 
     def estimate(self, number: int, position: Floats, normal: Floats) -> Floats:
         """(n,): about how much an object brings to points, 0 only where it brings nothing."""
-        way = self._centres[:, number, None] - position
-        squared, reach = dot(way, way), self._reach[number]
+        way = self.centres[:, number, None] - position
+        squared, reach = dot(way, way), self.reach[number]
         risen = np.fmax(dot(normal, way) + reach, 0.0)
-        return risen * (self._brightness[number] / ((squared + reach**2 / 2) * (np.sqrt(squared) + reach)))
+        return risen * (self.brightness[number] / ((squared + reach**2 / 2) * (np.sqrt(squared) + reach)))
 
     def powers(self) -> Floats:
         """(k,), of both sides."""
-        return 2 * np.pi * self._brightness if self.count else np.empty(0)
+        return 2 * np.pi * self.brightness if self.count else np.empty(0)
 
     def density(self, points: Points, ahead: Floats, distance: Floats) -> Floats:
         """(n,) by solid angle, with which `sample` would send rays that met points of its objects; 0 for other points."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.nan_to_num(
-                gather(self._density, points.primitive) * distance * distance / np.abs(dot(points.normal, ahead))
+                gather(self.densities, points.primitive) * distance * distance / np.abs(dot(points.normal, ahead))
             )

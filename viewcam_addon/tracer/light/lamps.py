@@ -15,7 +15,7 @@ from .bulbs import Bulbs, Sampled, Suns, entries, replace
 from .plates import Ellipses, Rectangles
 
 # More light than any picture holds, less than makes products overflow.
-_MOST = 1e100
+MOST = 1e100
 # Rays at a time: their arrays stay in a core's cache.
 _RAYS = 4096
 # For more lamps it pays to ask first which of them such a beam of rays can reach.
@@ -39,23 +39,23 @@ class Lamps:
     """
 
     def __init__(self, lamps: Sequence[Lamp], view: View) -> None:
-        self._tables, self._firsts, shadowed = [], [], []
+        self.tables, self.firsts, shadowed = [], [], []
         for table, belongs in _KINDS:
             some = [lamp for lamp in lamps if belongs(lamp)]
             if some:
-                self._tables.append(table(some, view))
-                self._firsts.append(len(shadowed))
+                self.tables.append(table(some, view))
+                self.firsts.append(len(shadowed))
                 shadowed += [lamp.casts_shadow for lamp in some]
         self.shadowed = np.array(shadowed, bool)
         self.count = len(shadowed)
-        self.sized = any(table.sized.any() for table in self._tables)
+        self.sized = any(table.sized.any() for table in self.tables)
 
     def sample(self, which: Indices, position: Floats, shading: Floats, u: Floats) -> Sampled:
         """Directions, distances, and radiances over densities, of one lamp for each point."""
-        if len(self._tables) == 1:
-            return self._sample(self._tables[0], which, position, shading, u)
+        if len(self.tables) == 1:
+            return self._sample(self.tables[0], which, position, shading, u)
         found = np.empty((3, len(which))), np.empty(len(which)), np.empty((3, len(which)))
-        for table, first in zip(self._tables, self._firsts, strict=True):
+        for table, first in zip(self.tables, self.firsts, strict=True):
             some = np.flatnonzero((which >= first) & (which < first + table.colours.shape[1]))
             asked = (gather(values, some) for values in (which - first, position, shading, u))
             replace(found, some, self._sample(table, *asked))
@@ -64,17 +64,17 @@ class Lamps:
     @staticmethod
     def _sample(table: Table, which: Indices, position: Floats, shading: Floats, u: Floats) -> Sampled:
         direction, distance, factor = table.sample(which, position, shading, u)
-        return direction, distance, entries(table.colours, which) * np.minimum(factor, _MOST)
+        return direction, distance, entries(table.colours, which) * np.minimum(factor, MOST)
 
     def estimate(self, lamp: int, position: Floats, normal: Floats) -> Floats:
         """(n,): about how much a lamp brings to points, 0 only where it brings nothing."""
-        kind = np.searchsorted(self._firsts, lamp, side="right") - 1
-        return self._tables[kind].estimate(lamp - self._firsts[kind], position, normal)
+        kind = np.searchsorted(self.firsts, lamp, side="right") - 1
+        return self.tables[kind].estimate(lamp - self.firsts[kind], position, normal)
 
     def powers(self, extent: float) -> Floats:
         """(k,), of suns what falls on a scene as large as this."""
         powers = [
-            table.colours.mean(axis=0) * (4 * np.pi * extent**2 if isinstance(table, Suns) else 1.0) for table in self._tables
+            table.colours.mean(axis=0) * (4 * np.pi * extent**2 if isinstance(table, Suns) else 1.0) for table in self.tables
         ]
         return np.concatenate([np.empty(0), *powers])
 
@@ -85,7 +85,7 @@ class Lamps:
         starts, nearest, farthest = (
             np.broadcast_to(values, (*np.shape(values)[:-1], count)) for values in (starts, nearest, farthest)
         )
-        tables = [table for table in self._tables if not isinstance(table, Suns) and table.sized.any()]
+        tables = [table for table in self.tables if not isinstance(table, Suns) and table.sized.any()]
         are_many = sum(len(table.sized) for table in tables) > _MANY
         for first in range(0, count if tables else 0, _RAYS):
             part = slice(first, first + _RAYS)
@@ -100,7 +100,7 @@ class Lamps:
     def suns_met(self, directions: Floats) -> Floats:
         """As `Emitters.suns_met`."""
         light = np.zeros_like(directions)
-        for table in self._tables:
+        for table in self.tables:
             if isinstance(table, Suns):
                 for lamp in np.flatnonzero(table.sized):
                     light += table.colours[:, lamp, None] * table.met(lamp, directions)

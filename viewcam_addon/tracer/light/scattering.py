@@ -13,7 +13,7 @@ from ..arrays import Floats, dot
 # Cycles': how far a mirror's ray rises above the surface at least, or this part of how far the ray rises that comes.
 _LEAST_RISE, _RISE_SHARE = 0.01, 0.9
 # Half of a sampler's last digit: no direction is a pole of the sphere, which would be no direction where it meets the surface.
-_POLE = 2.0**-33
+POLE = 2.0**-33
 
 
 def axes_about(normal: Floats) -> tuple[Floats, Floats]:
@@ -44,7 +44,7 @@ def turned(u: Floats) -> tuple[Floats, Floats]:
     float64, NumPy's sine and cosine take ten times as long."""
     slope = np.tan(u * np.pi)
     chord = 2.0 / (1.0 + slope * slope)
-    return chord - 1.0, np.multiply(chord, slope, out=slope)
+    return chord - 1.0, chord * slope
 
 
 def cosine_direction(normal: Floats, u: Floats) -> tuple[Floats, Floats]:
@@ -56,8 +56,8 @@ def cosine_direction(normal: Floats, u: Floats) -> tuple[Floats, Floats]:
     sphere touches the surface to points that lie evenly all over the sphere, twice the cosine away: no frame is needed.
     """
     direction = np.empty(normal.shape)
-    height = u[0] * (2.0 - 4 * _POLE)
-    height += 2 * _POLE - 1.0
+    height = u[0] * (2.0 - 4 * POLE)
+    height += 2 * POLE - 1.0
     across = np.sqrt(1.0 - height * height)
     for component, turn in zip(direction[:2], turned(u[1]), strict=True):
         np.multiply(across, turn, out=component)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Indices, Some, cross, dot, gather, pick
+from ..compiled.standing import or_compiled
 from ..scene import Scene, Spheres
 from ..scene.materials import PLAIN, Material
 from . import offset
@@ -89,44 +90,46 @@ class Surfaces:
 
     def __init__(self, scene: Scene, view: View, triangles: Triangles, planes: Planes, ellipsoids: Ellipsoids) -> None:
         self.triangles, self.planes = triangles, planes
-        self._view, self._ellipsoids = view, ellipsoids
+        self.handedness, self._ellipsoids = view.handedness, ellipsoids
         placed = [(placed, scene.geometries[placed.geometry]) for placed in scene.objects]
         self.balls = balls_of([pair for pair in placed if isinstance(pair[1], Spheres)], view)
         things = [*triangles.placed, *self.balls.placed]
         names = [placed.materials + ("",) * len(placed.material_indices) for placed, _ in things]
         numbers = {"": 0, **{name: number for number, name in enumerate(scene.materials, start=1)}}
-        self._material = by_material(things, [[numbers[name] for name in some] for some in names], np.int32)
+        self.material = by_material(things, [[numbers[name] for name in some] for some in names], np.int32)
         # Of spheres 0: they are tested in float64.
-        self._offset = np.zeros(len(self._material))
-        self._offset[: triangles.count] = offset.triangle_offsets(triangles)
-        self._offset[planes.wide] = offset.wide_offsets(planes)
+        self.offset = np.zeros(len(self.material))
+        self.offset[: triangles.count] = offset.triangle_offsets(triangles)
+        self.offset[planes.wide] = offset.wide_offsets(planes)
         # On which side of the cross product of its sides, in camera space, a triangle has its front, and its smooth normals.
         matrices = np.array([placed.matrix[:3, :3] for placed, _ in triangles.placed]).reshape(-1, 3, 3)
         front = np.where(np.linalg.det(matrices) < 0, -1, 1) * int(view.handedness)
-        self._front = np.repeat(front.astype(np.int8), triangles.counts)
-        self._axes = view.handedness * view.axes
+        self.front = np.repeat(front.astype(np.int8), triangles.counts)
+        self.axes = view.handedness * view.axes
         colours = [colour for material in materials_of(scene) for colour in material.colours.values()]
-        self._has_uv = any(colour.image is not None for colour in colours)
-        self._colours = _corner_colours(triangles) if any(colour.vertex for colour in colours) else None
+        self.has_uv = any(colour.image is not None for colour in colours)
+        self.colours = _corner_colours(triangles) if any(colour.vertex for colour in colours) else None
 
     def seen(self, primitives: Indices, x: Floats, y: Floats) -> Points:
         """The points where n rays from the eye, (x, y, 1), meet what visibility.py found for them; no primitive is −1."""
-        directions = np.stack([x, y, np.ones_like(x)])
 
         def triangle_points(triangle: Indices, which: Some) -> Points:
-            depth, first, second = self.planes.hit(triangle, pick(x, which), pick(y, which))
-            ways = pick(directions, which)
-            normal = facing(gather(self.planes.forms[:3], triangle))
-            side = gather(self.planes.side, triangle) * self._view.handedness
-            return self._on_triangles(triangle, normal, side, first, second, ways * depth, ways)
+            return triangles_seen(self, triangle, pick(x, which), pick(y, which))
 
         def sphere_points(sphere: Indices, which: Some) -> Points:
             depth = self._ellipsoids.depth(sphere, pick(x, which), pick(y, which))
-            ways = pick(directions, which)
+            ways = _ways(pick(x, which), pick(y, which))
             centres = gather(self._ellipsoids.positions, sphere)
             return self._on_spheres(gather(self._ellipsoids.number, sphere), centres, ways * depth, ways)
 
         return self._split(primitives, triangle_points, sphere_points)
+
+    def materials_seen(self, primitives: Indices) -> NDArray[np.int32]:
+        """(n,): the materials of primitives that visibility.py found, as in `Points.material`; where there is none, 0."""
+        if not len(self._material):
+            return np.zeros(len(primitives), np.int32)
+        number = np.append(np.arange(self.triangles.count), self._ellipsoids.number + self.triangles.count)
+        return np.where(primitives >= 0, gather(self._material, gather(number, np.maximum(primitives, 0))), 0)
 
     def met(self, primitives: Indices, origins: Floats, directions: Floats) -> tuple[Points, Floats]:
         """The points where n rays from anywhere meet the primitives that space.py found for them, and how far off, (n,).
@@ -136,16 +139,8 @@ class Surfaces:
         distances = np.empty(len(primitives))
 
         def triangle_points(triangle: Indices, which: Some) -> Points:
-            corner, *sides = self._sides(triangle)
-            ways = pick(directions, which)
-            normal = cross(*sides)
-            first, second = _barycentric(corner, sides, normal, pick(origins, which), ways)
-            position = corner + first * sides[0] + second * sides[1]
-            distances[which] = dot(position - pick(origins, which), ways)
-            side = np.where(dot(normal, ways) > 0, -1.0, 1.0)
-            with np.errstate(all="ignore"):
-                normal *= side / np.sqrt(dot(normal, normal))
-            return self._on_triangles(triangle, normal, side, first, second, position, ways)
+            points, distances[which] = triangles_met(self, triangle, pick(origins, which), pick(directions, which))
+            return points
 
         def sphere_points(ball: Indices, which: Some) -> Points:
             ways = pick(directions, which)
@@ -158,14 +153,14 @@ class Surfaces:
     def made_of(self, materials: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """For each primitive, numbered as space.py finds them, whether its material is one of those."""
         count = self.triangles.count
-        return gather(materials, np.append(self._material[:count], self._material[count:][self.balls.number]))
+        return gather(materials, np.append(self.material[:count], self.material[count:][self.balls.number]))
 
     def distance(self, triangle: Indices, origins: Floats, directions: Floats) -> Floats:
         """How far along rays the planes of triangles are, that were found for them."""
-        corner, *sides = self._sides(triangle)
+        corner, *sides = self.sides(triangle)
         return _plane_distance(corner, cross(*sides), origins, directions)
 
-    def _sides(self, triangle: Indices) -> tuple[Floats, Floats, Floats]:
+    def sides(self, triangle: Indices) -> tuple[Floats, Floats, Floats]:
         """(3, n) each: the first corner, and from it to the second and the third."""
         a, b, c = (gather(self.triangles.vertices, gather(corner, triangle)) for corner in self.triangles.corners)
         return a, b - a, c - a
@@ -183,7 +178,7 @@ class Surfaces:
             parts.append((which, make(primitives[which] - first, which)))
         return _merged(len(primitives), parts)
 
-    def _on_triangles(
+    def on_triangles(
         self, triangle: Indices, normal: Floats, side: Floats, first: Floats, second: Floats, position: Floats, ways: Floats
     ) -> Points:
         """Points at barycentric coordinates of triangles.
@@ -199,26 +194,30 @@ class Surfaces:
             position=position,
             normal=normal,
             shading=self._shading(triangle, first, second, normal, side),
-            backside=side * gather(self._front, triangle) < 0,
-            material=gather(self._material, triangle),
+            backside=side * gather(self.front, triangle) < 0,
+            material=gather(self.material, triangle),
             primitive=triangle,
-            offset=gather(self._offset, triangle),
-            uv=self._uv(triangle, first, second),
-            vertex_colour=None if self._colours is None else _interpolated(gather(self._colours, triangle), first, second, 3),
+            offset=gather(self.offset, triangle),
+            **dict(zip(("uv", "vertex_colour"), self.varying(triangle, first, second), strict=True)),
         )
+
+    def varying(self, triangle: Indices, first: Floats, second: Floats) -> tuple[Floats | None, Floats | None]:
+        """UV and vertex colours at barycentric coordinates of triangles, where anybody asks for them."""
+        colours = None if self.colours is None else _interpolated(gather(self.colours, triangle), first, second, 3)
+        return self._uv(triangle, first, second), colours
 
     def _shading(self, triangle: Indices, first: Floats, second: Floats, normal: Floats, side: Floats) -> Floats:
         if self.triangles.corner_normals is None:
             return normal
         smooth = _interpolated(gather(self.triangles.corner_normals, triangle), first, second, 3)
-        smooth = np.stack([dot(axis, smooth) for axis in self._axes])
+        smooth = np.stack([dot(axis, smooth) for axis in self.axes])
         length = np.sqrt(dot(smooth, smooth))
         with np.errstate(invalid="ignore", divide="ignore"):
             smooth *= side / length
         return smooth if length.all() else np.where(length > 0, smooth, normal)
 
     def _uv(self, triangle: Indices, first: Floats, second: Floats) -> Floats | None:
-        if not self._has_uv:
+        if not self.has_uv:
             return None
         if self.triangles.corner_uvs is None:
             return np.zeros((2, len(triangle)))
@@ -236,12 +235,41 @@ class Surfaces:
             normal=normal,
             shading=normal,
             backside=backside,
-            material=gather(self._material, primitive),
+            material=gather(self.material, primitive),
             primitive=primitive,
             offset=np.zeros(len(number)),
-            uv=np.zeros((2, len(number))) if self._has_uv else None,
-            vertex_colour=None if self._colours is None else np.zeros((3, len(number))),
+            uv=np.zeros((2, len(number))) if self.has_uv else None,
+            vertex_colour=None if self.colours is None else np.zeros((3, len(number))),
         )
+
+
+def _ways(x: Floats, y: Floats) -> Floats:
+    """(3, n) rays of the eye."""
+    return np.stack([x, y, np.ones_like(x)])
+
+
+@or_compiled
+def triangles_seen(surfaces: Surfaces, triangle: Indices, x: Floats, y: Floats) -> Points:
+    """The points where rays from the eye, (x, y, 1), meet triangles that were found for them."""
+    depth, first, second = surfaces.planes.hit(triangle, x, y)
+    ways = _ways(x, y)
+    normal = facing(gather(surfaces.planes.forms[:3], triangle))
+    side = gather(surfaces.planes.side, triangle) * surfaces.handedness
+    return surfaces.on_triangles(triangle, normal, side, first, second, ways * depth, ways)
+
+
+@or_compiled
+def triangles_met(surfaces: Surfaces, triangle: Indices, origins: Floats, ways: Floats) -> tuple[Points, Floats]:
+    """The points where rays from anywhere meet triangles that were found for them, and how far off."""
+    corner, *sides = surfaces.sides(triangle)
+    normal = cross(*sides)
+    first, second = _barycentric(corner, sides, normal, origins, ways)
+    position = corner + first * sides[0] + second * sides[1]
+    distances = dot(position - origins, ways)
+    side = np.where(dot(normal, ways) > 0, -1.0, 1.0)
+    with np.errstate(all="ignore"):
+        normal *= side / np.sqrt(dot(normal, normal))
+    return surfaces.on_triangles(triangle, normal, side, first, second, position, ways), distances
 
 
 def _corner_colours(triangles: Triangles) -> NDArray[np.float32]:

@@ -1,0 +1,91 @@
+"""The kernel of light/emitters.py: one emitter for each point."""
+
+import numpy as np
+
+from ..light import emitters as plain
+from .lamps import OBJECT, colour_of, estimate, kind_of, limited, over, sample, sample_object, table_of
+from .packets import kernel
+from .vectors import inlined, put, scaled, taken
+
+_LONGEST_ODDS, _BELOW_1 = plain.LONGEST_ODDS, plain.BELOW_1
+_NONE = np.empty(0)
+
+
+@inlined
+def _by_estimate(table, estimates, position, normal, u):
+    """Emitters._choose where there are few."""
+    total = 0.0
+    for lamp in range(len(table)):
+        estimates[lamp] = estimate(table[lamp], position, normal)
+        total = total + estimates[lamp] if lamp else estimates[lamp]
+    wanted = u * total
+    which, share, before, reached = 0, estimates[0], 0.0, estimates[0]
+    for lamp in range(1, len(table)):
+        if wanted >= reached:
+            which += 1
+            share, before = estimates[lamp], reached
+        reached += estimates[lamp]
+    odds = np.minimum(total / share, _LONGEST_ODDS) if share > 0 else 0.0
+    return which, odds, np.fmin((wanted - before) / share, _BELOW_1)
+
+
+@inlined
+def _by_chance(chances, reached, u):
+    """Emitters._choose where there are many."""
+    which = np.searchsorted(reached, u, side="right")
+    chance = chances[which]
+    return which, 1 / chance, np.minimum(np.maximum((u - (reached[which] - chance)) / chance, 0.0), _BELOW_1)
+
+
+@kernel
+def _aim(table, chances, reached_chances, objects, positions, normals, shadings, u, number, directions, distances, light, pdf):
+    shapes, densities, primitives, reached, last, colours = objects
+    count = len(table)
+    first_object = count - len(last)
+    estimates = np.empty(count)
+    for point in range(positions.shape[1]):
+        position, normal = taken(positions, point), taken(normals, point)
+        which, odds, rest = 0, 1.0, u[0, point]
+        if chances.size:
+            which, odds, rest = _by_chance(chances, reached_chances, u[0, point])
+        elif count > 1:
+            which, odds, rest = _by_estimate(table, estimates, position, normal, u[0, point])
+        row = table[which]
+        if kind_of(row) == OBJECT:
+            ahead, distance, density, picked = sample_object(
+                shapes, densities, primitives, reached, last, which - first_object, position, rest, u[1, point], u[2, point]
+            )
+            colour, factor = taken(colours, picked), over(density)
+        else:
+            ahead, distance, factor = sample(row, position, taken(shadings, point), u[1, point], u[2, point])
+            colour, factor, density = colour_of(row), limited(factor), np.inf
+        brought = scaled(colour, factor)
+        if count > 1:
+            brought = scaled(brought, odds)
+            density = density / odds if odds > 0 else np.inf
+        put(directions, point, ahead)
+        put(light, point, brought)
+        distances[point], pdf[point], number[point] = distance, density, which
+
+
+def aimed(emitters, points, u):
+    glowing = emitters.glowing
+    if glowing.count and not glowing.plain:  # what textures make of each point is no loop
+        return plain.aimed.plain(emitters, points, u)
+    if emitters.rows is None:
+        emitters.rows = table_of(emitters.lamps, glowing)
+    objects = _NO_OBJECTS
+    if glowing.count:
+        objects = (glowing.shapes, glowing.densities, glowing.primitives, glowing.reached, glowing.last, glowing.colours)
+    chances, reached = (_NONE, _NONE) if emitters.chances is None else (emitters.chances, emitters.reached)
+    count = points.count
+    number = np.empty(count, np.intp)
+    directions, light = np.empty((2, 3, count))
+    distances, pdf = np.empty((2, count))
+    given = points.position, points.normal, points.shading, u
+    _aim(emitters.rows, chances, reached, objects, *given, number, directions, distances, light, pdf)
+    shadowed = np.broadcast_to(True, count) if emitters.shadowed.all() else emitters.shadowed[number]
+    return plain.Aimed(directions, distances, light, pdf, shadowed)
+
+
+_NO_OBJECTS = (np.empty((12, 0)), _NONE, np.empty(0, np.intp), _NONE, np.empty(0, np.intp), np.empty((3, 0)))
