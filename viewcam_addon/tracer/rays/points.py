@@ -126,10 +126,10 @@ class Surfaces:
 
     def materials_seen(self, primitives: Indices) -> NDArray[np.int32]:
         """(n,): the materials of primitives that visibility.py found, as in `Points.material`; where there is none, 0."""
-        if not len(self._material):
+        if not len(self.material):
             return np.zeros(len(primitives), np.int32)
         number = np.append(np.arange(self.triangles.count), self._ellipsoids.number + self.triangles.count)
-        return np.where(primitives >= 0, gather(self._material, gather(number, np.maximum(primitives, 0))), 0)
+        return np.where(primitives >= 0, gather(self.material, gather(number, np.maximum(primitives, 0))), 0)
 
     def met(self, primitives: Indices, origins: Floats, directions: Floats) -> tuple[Points, Floats]:
         """The points where n rays from anywhere meet the primitives that space.py found for them, and how far off, (n,).
