@@ -8,6 +8,7 @@ result is the same, bit for bit, for any number of threads.
 import math
 import os
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,11 +18,13 @@ from .arrays import Floats, Indices
 from .rays.centres import Centres
 from .rays.ellipsoids import ellipsoids_of
 from .rays.surface import Passes, Surface, unwritten
+from .rays.tables import made_once
 from .rays.triangles import Planes, triangles_of
 from .rays.view import View
 from .rays.visibility import visibility
-from .scene import Mesh, Scene, Spheres
+from .scene import Mesh, Object, Scene, Spheres
 from .scene.film import LEVELS, SAMPLES
+from .scene.sameness import same_materials, same_things
 from .tiles import Stopped, Watcher, over_threads, tiles
 
 __all__ = ["Passes", "Stopped", "Tracer", "Watcher", "render"]
@@ -34,19 +37,56 @@ TILE, SMALLEST_TILE = 65536, 4096
 class Tracer:
     """A scene made ready for tracing from its camera.
 
-    scene : what to trace. threads : how many threads to trace with, all cores if it is None.
+    scene : what to trace. threads : how many threads to trace with, all cores if it is None. kept : the tracer of another
+    scene, as a frame before this one, which is used up. Where the same things stand before the same camera, however long its
+    lens and however large its picture, nothing is made anew; where the camera was moved, Embree's hierarchy is refitted.
+
+    No array of a scene may be changed while there is a tracer of it.
     """
 
-    def __init__(self, scene: Scene, threads: int | None = None) -> None:
+    def __init__(self, scene: Scene, threads: int | None = None, kept: "Tracer | None" = None) -> None:
         self._scene, self._camera = scene, scene.camera
         self._threads = threads or os.cpu_count() or 1
         self._view = View(scene.camera)
-        placed = [(placed, scene.geometries[placed.geometry]) for placed in scene.objects]
-        self._triangles = triangles_of([pair for pair in placed if isinstance(pair[1], Mesh)], self._view)
-        self._ellipsoids = ellipsoids_of([pair for pair in placed if isinstance(pair[1], Spheres)], self._view)
+        former = None if kept is None else kept._used_up()
+        if former is None or not same_things(scene, former._scene):
+            self._triangles = triangles_of(_placed(scene, Mesh), self._view, self._threads)
+        elif self._view.is_same(former._view):
+            self._take_over(former)
+            return
+        else:
+            self._triangles = former._triangles.moved(self._view)
+        self._ellipsoids = ellipsoids_of(_placed(scene, Spheres), self._view)
         self._planes = Planes(self._triangles, self._view)
-        self._visibility = visibility(self._triangles, self._planes, self._ellipsoids, scene.clip)
+        self._see()
+
+    def _see(self) -> None:
+        self._visibility = visibility(self._triangles, self._planes, self._ellipsoids, self._scene.clip)
         self._surface = Surface(self._view, self._triangles, self._planes, self._ellipsoids)
+
+    def _take_over(self, former: "Tracer") -> None:
+        """Everything of a tracer whose camera stands where this one's does, before the same things."""
+        self._triangles, self._ellipsoids, self._planes = former._triangles, former._ellipsoids, former._planes
+        if self._scene.clip == former._scene.clip:
+            self._visibility, self._surface = former._visibility, former._surface
+        else:
+            self._see()
+        if "_lit" in vars(former) and same_materials(self._scene, former._scene):
+            self._lit = former._lit
+
+    def _used_up(self) -> "Tracer":
+        """All that this tracer has, in another one; this one can't trace any more."""
+        heir = object.__new__(Tracer)
+        vars(heir).update(vars(self))
+        vars(self).clear()
+        return heir
+
+    @made_once
+    def _lit(self) -> Any:
+        """What light needs, whatever its level and samples (`Lit`)."""
+        from .light.illumination import Lit
+
+        return Lit.by(self._scene, self._view, self._triangles, self._planes, self._ellipsoids)
 
     def render(self, watcher: Watcher | None = None) -> Passes:
         """Pass name → (height, width, channels) float32, rows from the bottom: the surfaces at the pixel centres."""
@@ -67,10 +107,8 @@ class Tracer:
         """
         from .light.adaptive.rounds import Rounds, bands
         from .light.illumination import CENTRES, Illumination, counted, dark
-        from .rays.points import Surfaces
 
-        surfaces = Surfaces(self._scene, self._view, self._triangles, self._planes, self._ellipsoids)
-        illumination = Illumination(self._scene, self._view, surfaces, self._eye, level, samples, seed)
+        illumination = Illumination(self._scene, self._view, self._lit, self._eye, level, samples, seed)
 
         def check() -> None:
             _stop_if_asked(watcher)
@@ -196,6 +234,12 @@ def render(
         return tracer.render_light(level, samples, seed, watcher, error)
     except MemoryError as error:
         raise InputError("the scene needs more memory than there is: take some of it out, or give fewer threads") from error
+
+
+def _placed(scene: Scene, kind: type) -> list[tuple[Object, Mesh | Spheres]]:
+    """The objects that are meshes or spheres, with their geometries."""
+    placed = [(placed, scene.geometries[placed.geometry]) for placed in scene.objects]
+    return [thing for thing in placed if isinstance(thing[1], kind)]
 
 
 def _stop_if_asked(watcher: Watcher | None) -> None:

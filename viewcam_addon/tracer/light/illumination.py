@@ -6,15 +6,18 @@ own random numbers, so that their errors are independent of one another.
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...image import BACKGROUND_DEPTH, CHANNELS, LIGHT_PASSES
 from ..arrays import Floats, Indices, gather
+from ..rays.ellipsoids import Ellipsoids
 from ..rays.points import Surfaces
 from ..rays.space import Space
 from ..rays.surface import Passes
+from ..rays.triangles import Planes, Triangles
 from ..rays.view import View
 from ..scene import Scene
 from ..scene.film import NO_BOUNCES
@@ -52,17 +55,30 @@ def counted(shape: tuple[int, ...]) -> Passes:
     return dark(shape) | {"Sample Count": np.zeros((*shape, 1), np.float32)}
 
 
+class Lit(NamedTuple):
+    """What light needs of a scene, whatever the lamps and however it is sampled."""
+
+    surfaces: Surfaces
+    space: Space
+    palette: Palette
+
+    @staticmethod
+    def by(scene: Scene, view: View, triangles: Triangles, planes: Planes, ellipsoids: Ellipsoids) -> "Lit":
+        surfaces = Surfaces(scene, view, triangles, planes, ellipsoids)
+        return Lit(surfaces, Space(surfaces), Palette(scene))
+
+
 class Illumination:
     """Light in one scene.
 
-    eye : what the eye sees. level : "direct" or "path". samples, seed : as in render.render.
+    lit : what light needs of it. eye : what the eye sees. level : "direct" or "path". samples, seed : as in render.render.
     """
 
-    def __init__(self, scene: Scene, view: View, surfaces: Surfaces, eye: Eye, level: str, samples: int, seed: int) -> None:
-        self.film, self.samples, self.surfaces, self.eye = scene.film, samples, surfaces, eye
+    def __init__(self, scene: Scene, view: View, lit: Lit, eye: Eye, level: str, samples: int, seed: int) -> None:
+        self.film, self.samples, self.eye = scene.film, samples, eye
         self._scene, self._view, self._clip = scene, view, scene.clip
         self.sampler = Sampler(seed, samples)
-        self.palette, self._space = Palette(scene), Space(surfaces)
+        self.surfaces, self._space, self.palette = lit
         self._bounces = scene.bounces if level == "path" else NO_BOUNCES
         self.paths_at_a_time = 2 * PATHS if self._bounces.total else PATHS
         self.paths = self._paths_in(scene)

@@ -61,7 +61,7 @@ class Surface:
 
     def _write_triangles(self, passes: Passes, where: Where, triangle: Indices, x: Floats, y: Floats) -> None:
         depth, first, second = self._planes.hit(triangle, x, y)
-        if "UV" in passes and self._triangles.corner_uvs is not None:
+        if "UV" in passes:
             self._write_uv(passes["UV"], where, triangle, first, second)
         if "Normal" in passes:
             _store(passes["Normal"], where, self._normal(triangle, first, second))
@@ -72,8 +72,11 @@ class Surface:
         self._write_labels(passes, where, triangle, self._triangles, self._planes)
 
     def _write_uv(self, target: Float32s, where: Where, triangle: Indices, first: Floats, second: Floats) -> None:
-        third = 1.0 - first - second
         uvs = self._triangles.corner_uvs
+        if uvs is None:
+            target[where] = 0
+            return
+        third = 1.0 - first - second
         a, b, c = (gather(uvs[corner : corner + 2], triangle) for corner in (0, 3, 6))
         _store(target, where, (a[axis] * third + b[axis] * first + c[axis] * second for axis in range(2)))
         target[..., 2][where] = gather(uvs[2], triangle)
@@ -101,6 +104,8 @@ class Surface:
 
     def _write_spheres(self, passes: Passes, where: Where, sphere: Indices, x: Floats, y: Floats) -> None:
         depth = self._ellipsoids.depth(sphere, x, y)
+        if "UV" in passes:
+            passes["UV"][where] = 0
         if "Normal" in passes:
             normal = self._ellipsoids.shown_normal(sphere, x, y, depth)
             _store(passes["Normal"], where, (dot(axis, normal) for axis in self._view.axes.T))

@@ -9,7 +9,7 @@ Embree's own t, u, v (float32).
 """
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import reduce
 
 import numpy as np
@@ -60,6 +60,13 @@ class Triangles:
     def hidden_from(self, ray: str) -> NDArray[np.bool_]:
         """(m,): which triangles a kind of rays does not see (lights.RAYS)."""
         return np.repeat(np.array([ray in placed.hidden_from for placed, _ in self.placed], bool), self.counts)
+
+    def moved(self, view: View) -> "Triangles":
+        """The same triangles seen by another camera. Of Embree's scenes it takes possession: these have to stand elsewhere."""
+        vertices = in_camera_space(self.placed, [mesh.vertices for _, mesh in self.placed], view, self.threads)
+        moved = replace(self, vertices=vertices, embree_scenes={}, former_scenes=self.embree_scenes)
+        vars(moved).update({name: table for name, table in vars(self).items() if name in _OF_THE_WORLD})
+        return moved
 
     @made_once
     def object_index(self) -> Float32s:
@@ -138,6 +145,10 @@ class Triangles:
 
         each(fill, pieces(self.counts), self.threads)
         return uvs
+
+
+_OF_THE_WORLD = ("object_index", "material_index", "largest_coordinate", "corner_normals", "corner_uvs")
+"""The tables that do not depend on the camera."""
 
 
 def triangles_of(pairs: list[tuple[Object, Mesh]], view: View, threads: int = 1) -> Triangles:

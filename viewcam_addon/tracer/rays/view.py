@@ -27,6 +27,11 @@ class View:
         self.axes: Floats = np.stack([-u if camera.mirrored else u, v, -w])
         self.handedness = 1.0 if camera.mirrored else -1.0
 
+    def is_same(self, other: "View") -> bool:
+        """Whether this is the same space, to the last bit."""
+        mine, others = ((view.eye.tobytes(), view.axes.tobytes(), view.handedness) for view in (self, other))
+        return mine == others
+
     def points(self, matrix: Floats, points: Floats) -> Floats:
         """(3, n): points of an object's space in camera space.
 
