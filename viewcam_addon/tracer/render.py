@@ -17,6 +17,7 @@ from ..errors import InputError
 from .arrays import Floats, Indices
 from .rays.centres import Centres
 from .rays.ellipsoids import ellipsoids_of
+from .rays.outlines import Outlines
 from .rays.surface import Passes, Surface, unwritten
 from .rays.tables import made_once
 from .rays.triangles import Planes, triangles_of
@@ -88,6 +89,10 @@ class Tracer:
 
         return Lit.by(self._scene, self._view, self._triangles, self._planes, self._ellipsoids)
 
+    @made_once
+    def _outlines(self) -> Outlines:
+        return Outlines(self._scene, self._view, self._triangles, self._planes, self._ellipsoids, self._visibility)
+
     def render(self, watcher: Watcher | None = None) -> Passes:
         """Pass name → (height, width, channels) float32, rows from the bottom: the surfaces at the pixel centres."""
         centres = Centres(self._camera, self._visibility)
@@ -105,7 +110,7 @@ class Tracer:
 
         error : as in `render`; then there is the pass Sample Count, too.
         """
-        from .light.adaptive.rounds import Rounds, bands
+        from .light.adaptive.rounds import Rounds
         from .light.illumination import CENTRES, Illumination, counted, dark
 
         illumination = Illumination(self._scene, self._view, self._lit, self._eye, level, samples, seed)
@@ -126,9 +131,15 @@ class Tracer:
         if error is None:
             largest = illumination.largest_tile
             return self._picture(dark, trace, min(largest, SMALLEST_TILE), largest, watcher)
-        rounds = Rounds(illumination, error, self._camera.width, trace_centres, self._in_parts, check)
-        passes = self._blank(counted)
-        for rows in bands(self._camera.width, self._camera.height):
+        primitives = np.empty((self._camera.height, self._camera.width), np.int32)
+
+        def see(passes: Passes, tile: range) -> None:
+            check()
+            _, _, primitives.ravel()[tile.start : tile.stop] = trace_centres(passes, *self._corners(tile))
+
+        passes = self._picture(counted, see, SMALLEST_TILE, TILE, None)
+        rounds = Rounds(illumination, error, self._outlines, passes["Depth"][..., 0], primitives, self._in_parts, check)
+        for rows in rounds.bands():
             rounds.trace({name: values[rows.start : rows.stop] for name, values in passes.items()}, rows)
             if watcher is not None:
                 watcher.tile(passes, rows)
@@ -164,7 +175,12 @@ class Tracer:
     ) -> Passes:
         """Passes that `trace` has written into, tile by tile."""
         width, height = self._camera.width, self._camera.height
-        passes = self._blank(blank)
+        try:
+            passes = blank((height, width))
+        except (MemoryError, ValueError) as error:
+            raise InputError(
+                f"a picture of {width} × {height} pixels needs more memory than there is: choose a size"
+            ) from error
         flat = {name: values.reshape(width * height, -1) for name, values in passes.items()}
 
         def work(tile: range) -> None:
@@ -176,16 +192,6 @@ class Tracer:
             if watcher is not None:
                 watcher.tile(passes, range(tile.start // width, (tile.stop - 1) // width + 1))
         return passes
-
-    def _blank(self, blank: Callable[[tuple[int, int]], Passes]) -> Passes:
-        """A picture in which nothing is to be seen."""
-        width, height = self._camera.width, self._camera.height
-        try:
-            return blank((height, width))
-        except (MemoryError, ValueError) as error:
-            raise InputError(
-                f"a picture of {width} × {height} pixels needs more memory than there is: choose a size"
-            ) from error
 
     def _in_parts(self, work: Callable[[slice], None], count: int, largest: int) -> None:
         """Call `work` with slices of so many things, each of no more than `largest`, in threads."""

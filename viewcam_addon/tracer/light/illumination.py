@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...image import BACKGROUND_DEPTH, CHANNELS, LIGHT_PASSES
-from ..arrays import Floats, Indices, gather
+from ..arrays import Floats, Indices
 from ..rays.ellipsoids import Ellipsoids
+from ..rays.outlines import Outlines
 from ..rays.points import Surfaces
 from ..rays.space import Space
 from ..rays.surface import Passes
@@ -75,14 +76,13 @@ class Illumination:
     """
 
     def __init__(self, scene: Scene, view: View, lit: Lit, eye: Eye, level: str, samples: int, seed: int) -> None:
-        self.film, self.samples, self.eye = scene.film, samples, eye
+        self.camera, self.film, self.samples, self.eye = scene.camera, scene.film, samples, eye
         self._scene, self._view, self._clip = scene, view, scene.clip
         self.sampler = Sampler(seed, samples)
         self.surfaces, self._space, self.palette = lit
         self._bounces = scene.bounces if level == "path" else NO_BOUNCES
         self.paths_at_a_time = 2 * PATHS if self._bounces.total else PATHS
         self.paths = self._paths_in(scene)
-        self._unsteady = self.palette.specular | self.palette.patterned
 
     def _paths_in(self, scene: Scene) -> Paths:
         emitters = Emitters(scene, self._view, self.surfaces, self.palette)
@@ -98,14 +98,12 @@ class Illumination:
         paths = [self._paths_in(replace(self._scene, lamps=(lamp,))) for lamp in lamps]
         return None if any(alone.random for alone in paths) else paths
 
-    def unsteady(self, primitives: Indices, x: Floats, y: Floats) -> NDArray[np.bool_]:
-        """Whether what rays from the eye meet may show another thing right beside: a mirror, glass, or what has a pattern."""
-        unsteady = np.zeros(len(primitives), bool)
-        if self._unsteady.any():
-            met = np.flatnonzero(primitives >= 0)
-            points = self.surfaces.seen(primitives[met], x[met], y[met])
-            unsteady[met] = gather(self._unsteady, points.material)
-        return unsteady
+    def edges(self, outlines: Outlines, depth: Floats, primitives: Indices) -> NDArray[np.bool_]:
+        """(height, width): the pixels that an outline or the edge of a sharp shadow may cross.
+
+        depth, primitives : (height, width), what is seen at the pixels' centres.
+        """
+        return outlines.seen(depth, primitives) | outlines.shadows(depth, self.surfaces, self._space, primitives)
 
     @property
     def largest_tile(self) -> int:

@@ -70,11 +70,11 @@ class Sums:
     """
 
     def __init__(self, count: int, categories: Sequence[str], film: Film, samples: int) -> None:
-        self._film, self._count = film, count
+        self._film, self.count = film, count
         self.taken: int | Indices = 0
         # A power of two, since that is how many points together fill their space.
         self._batch_size = 1 << max(samples // _BATCHES, 1).bit_length() - 1
-        self._categories = list(categories)
+        self.categories = list(categories)
         hidden = (COLOUR, BACKGROUND) if film.transparent else (COLOUR,)
         self._shown = [row for row, category in enumerate(categories) if category not in hidden]
         self._hold(np.zeros((3 * len(categories) + 13, count)))
@@ -82,7 +82,7 @@ class Sums:
     def _hold(self, state: Floats) -> None:
         """Keep all that is known of the pixels in the columns of one table, and names for its rows."""
         self.state = state
-        self._totals = state[:-13].reshape(3, len(self._categories), -1)
+        self._totals = state[:-13].reshape(3, len(self.categories), -1)
         self.covered, self._first = state[-13], state[-12:-9]
         # The sum of the differences from the first sample, and when the last batch began; of the batches' own sums, squared.
         self._differences, self._before, self._squares = state[-9:-6], state[-6:-3], state[-3:]
@@ -96,7 +96,7 @@ class Sums:
         """A copy of some pixels."""
         some = copy(self)
         some._hold(np.array(pick(self.state, which)))
-        some._count = some.state.shape[1]
+        some.count = some.state.shape[1]
         return some
 
     def put(self, which: Indices | slice, some: "Sums") -> None:
@@ -110,8 +110,8 @@ class Sums:
 
     def add(self, light: Light) -> None:
         """Add some samples of every pixel: the paths are those of all samples of a pixel, pixel after pixel."""
-        values = light.values.reshape(3, len(self._categories), self._count, -1).transpose(0, 1, 3, 2).copy()
-        combined = np.zeros((3, values.shape[2], self._count))
+        values = light.values.reshape(3, len(self.categories), self.count, -1).transpose(0, 1, 3, 2).copy()
+        combined = np.zeros((3, values.shape[2], self.count))
         for row in self._shown:
             combined += values[:, row]
         if self.taken == 0:
@@ -126,7 +126,12 @@ class Sums:
                 of_batch *= of_batch
                 self._squares += of_batch
                 self._before[:] = self._differences
-        self.covered += light.covered.reshape(self._count, -1).sum(axis=1)
+        self.covered += light.covered.reshape(self.count, -1).sum(axis=1)
+
+    def change(self, category: str, more: Floats) -> None:
+        """Add (3, count) to the sum of a category that shows in the picture."""
+        self._totals[:, self.categories.index(category)] += more
+        self._differences += more
 
     def write(self, passes: Passes, random: bool) -> None:
         """Write the means into passes, name → (count, channels).
@@ -142,20 +147,20 @@ class Sums:
     def write_means(self, passes: Passes) -> None:
         """The same but for Variance."""
         exposure = self._film.exposure
-        colour = self._mean(COLOUR)
+        colour = self.mean(COLOUR)
         store(passes["Combined"], self.combined)
         passes["Combined"][:, 3] = self.covered / self.taken if self._film.transparent else 1.0
-        store(passes["Emission"], self._mean(EMITTED) * exposure)
-        store(passes["Environment"], self._mean(BACKGROUND) * exposure)
-        store(passes["Diffuse Direct"], _without_colour(self._mean(DIRECT) * exposure, colour))
-        store(passes["Diffuse Indirect"], _without_colour(self._mean(INDIRECT) * exposure, colour))
+        store(passes["Emission"], self.mean(EMITTED) * exposure)
+        store(passes["Environment"], self.mean(BACKGROUND) * exposure)
+        store(passes["Diffuse Direct"], without_colour(self.mean(DIRECT) * exposure, colour))
+        store(passes["Diffuse Indirect"], without_colour(self.mean(INDIRECT) * exposure, colour))
         store(passes["Diffuse Color"], colour)
 
-    def _mean(self, category: str) -> Floats:
-        """(3, count)."""
-        if category not in self._categories:
-            return np.zeros((3, self._count))
-        return self._totals[:, self._categories.index(category)] / self.taken
+    def mean(self, category: str) -> Floats:
+        """(3, count): of the light that belongs to a category, so far, without exposure."""
+        if category not in self.categories:
+            return np.zeros((3, self.count))
+        return self._totals[:, self.categories.index(category)] / self.taken
 
     @property
     def variance(self) -> Floats:
@@ -165,7 +170,7 @@ class Sums:
         return np.maximum(of_sums, 0.0) / self._batch_size / self.taken * self._film.exposure**2
 
 
-def _without_colour(light: Floats, colour: Floats) -> Floats:
+def without_colour(light: Floats, colour: Floats) -> Floats:
     """Light divided by the colour that it fell on; where a channel is black, the mean of the others, as in Cycles."""
     black = colour == 0
     divided = light / np.where(black, 1.0, colour)

@@ -26,14 +26,14 @@ CORRECTED = 0.5
 _LINES = ((0, 1), (1, 0), (1, 1), (1, -1))
 
 
-def interior(light: Floats, excluded: Mask, film: Film, error: float) -> Mask:
+def interior(light: Floats, alone: Mask, film: Film, error: float) -> Mask:
     """(height, width): the pixels that need no sample but their centre's.
 
-    light : (channels, height, width), at the centres. excluded : (height, width), pixels in which something may change unseen
-    by their centres. error : that is wanted of a pixel.
+    light : (channels, height, width), at the centres. alone : (height, width), pixels within whose reach something may change
+    unseen by the centres. error : that is wanted of a pixel.
     """
     bends = _bends(light)
-    doubtful = _within(excluded, film)
+    doubtful = alone.copy()
     doubtful[[0, -1]] = doubtful[:, [0, -1]] = True  # what is beside the picture is not known
     for distance in range(int(np.ceil(reach(film)))):
         changed = bends * beyond(film, distance) > _UNSEEN * error
@@ -67,9 +67,9 @@ def widened(mask: Mask, distance: int) -> Mask:
     return mask
 
 
-def _within(excluded: Mask, film: Film) -> Mask:
-    """Pixels whose filter reaches into the square of an excluded one."""
-    return widened(excluded, max(int(np.ceil(reach(film) - 0.5)), 0))
+def within(mask: Mask, film: Film) -> Mask:
+    """Pixels whose filter reaches into the square of one of the mask's."""
+    return widened(mask, max(int(np.ceil(reach(film) - 0.5)), 0))
 
 
 def _bends(light: Floats) -> Floats:

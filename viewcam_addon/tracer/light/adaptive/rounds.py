@@ -14,12 +14,16 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Floats, Indices, gather, put
+from ...arrays import Float32s, Floats, Indices, gather
+from ...rays.outlines import Outlines
 from ...rays.surface import Passes
 from ..illumination import Illumination
-from ..sums import DIRECT, Light, Sums, store
-from .estimate import BLOCK, efficiency, missed
-from .interior import CORRECTED, correction, interior
+from ..sums import DIRECT, Light
+from .band import Band
+from .estimate import BLOCK
+from .interior import interior, within
+
+Mask = NDArray[np.bool_]
 
 # Samples of each pixel that its centre does not tell all of, and how many are traced at a time.
 _FIRST, _AT_A_TIME = 8, 16
@@ -28,59 +32,79 @@ _BAND, _WRITTEN = 1 << 19, 1 << 15
 
 Parts = Callable[[Callable[[slice], None], int, int], None]
 """Calls a function with slices of so many things, each of no more than so many, in some thread."""
-Centres = Callable[[Passes, Indices, Indices], tuple[Floats, Floats, Indices]]
-"""Writes the passes of pixels' centres, at columns and rows; tells the rays through them and the primitives that these meet."""
-
-
-def bands(width: int, height: int) -> list[range]:
-    """Rows that are traced together: as many whole blocks as make no more than `_BAND` pixels, but at least one."""
-    rows = max(_BAND // width // BLOCK, 1) * BLOCK
-    return [range(first, min(first + rows, height)) for first in range(0, height, rows)]
 
 
 class Rounds:
-    """Samples one band after the other.
+    """Samples one band of a picture after the other.
 
-    error : that is wanted of each pixel's Combined, a standard error. centres, parts : see above. check : called often; what it
-    raises ends the work.
+    error : that is wanted of each pixel's Combined, a standard error. depth, primitives : (height, width), what is seen at the
+    pixels' centres. parts : see above. check : called often; what it raises ends the work.
     """
 
     def __init__(
-        self, illumination: Illumination, error: float, width: int, centres: Centres, parts: Parts, check: Callable[[], None]
+        self,
+        illumination: Illumination,
+        error: float,
+        outlines: Outlines,
+        depth: Float32s,
+        primitives: Indices,
+        parts: Parts,
+        check: Callable[[], None],
     ) -> None:
-        self._light, self._error, self._width = illumination, error, width
-        self._centres, self._parts, self._check = centres, parts, check
+        self._light, self._error, self._primitives = illumination, error, primitives
+        self._parts, self._check = parts, check
         self._certain = illumination.paths_by_lamp()
+        self._edges = illumination.edges(outlines, depth, primitives)
+
+    def bands(self) -> list[range]:
+        """Rows that are traced together: as many whole blocks as make no more than `_BAND` pixels, but at least one."""
+        height, width = self._primitives.shape
+        rows = max(_BAND // width // BLOCK, 1) * BLOCK
+        return [range(first, min(first + rows, height)) for first in range(0, height, rows)]
 
     def trace(self, passes: Passes, rows: range) -> None:
         """Write the light of some rows into passes, name → (rows, width, channels)."""
-        passes = {name: values.reshape(-1, values.shape[2]) for name, values in passes.items()}
-        band = _Band(self._light, rows, self._width)
-        active = np.flatnonzero(~self._by_centres(band, passes))
+        width = self._primitives.shape[1]
+        band = Band(self._light.sums(len(rows) * width, 1), self._light.film, rows, width)
+        alone = self._alone(band)
+        active = np.flatnonzero(~self._by_centres(band, alone))
         taken = 0
         while len(active) and taken < self._light.samples:
             more = min(2 * taken or _FIRST, self._light.samples)
             self._sample(band, active, taken, more)
             taken = more
-            active = active[band.estimated(active) > self._error**2]
-        self._parts(lambda part: band.write(passes, part), len(band.pixels), _WRITTEN)
+            variance = band.estimated(active)
+            if self._certain is None:
+                shared = band.shared(~alone, self._error)
+                variance = np.where(gather(alone, active), variance, gather(shared, active))
+            active = active[variance > self._error**2]
+        if self._certain is None:
+            band.share(~alone, self._error)
+        flat = {name: values.reshape(-1, values.shape[2]) for name, values in passes.items()}
+        self._parts(lambda part: band.write(flat, part), len(band.pixels), _WRITTEN)
 
-    def _by_centres(self, band: "_Band", passes: Passes) -> NDArray[np.bool_]:
-        """Trace the pixels' centres; which of the pixels these are enough for, (n,)."""
-        excluded = np.zeros(len(band.pixels), bool)
+    def _alone(self, band: Band) -> Mask:
+        """(n,): the pixels in which something may change that their neighbours don't show."""
+        rows = slice(band.rows[0], band.rows[-1] + 1)
+        unsteady = self._light.palette.specular
+        if self._certain is not None:
+            unsteady = unsteady | self._light.palette.patterned
+        made_of = self._light.surfaces.materials_seen(self._primitives[rows].ravel())
+        alone = self._edges[rows] | gather(unsteady, made_of).reshape(band.shape)
+        return within(alone, self._light.film).ravel()
+
+    def _by_centres(self, band: Band, alone: Mask) -> Mask:
+        """Which of the pixels their centres are enough for, (n,), whose light there is then traced."""
+        if self._certain is None:
+            return np.zeros(len(band.pixels), bool)
 
         def trace(part: slice) -> None:
-            self._check()
-            there = {name: values[part] for name, values in passes.items()}
-            x, y, primitives = self._centres(there, band.columns[part], band.rows[part])
-            if self._certain is not None:
-                band.add_centres(part, self._certain_light(band.pixels[part], primitives, x, y))
-                excluded[part] = self._light.unsteady(primitives, x, y)
+            primitives = self._primitives[band.rows[part], band.columns[part]]
+            x, y = self._light.camera.view_plane(band.columns[part] + 0.5, band.rows[part] + 0.5)
+            band.add_centres(part, self._certain_light(band.pixels[part], primitives, x, y))
 
         self._parts(trace, len(band.pixels), self._light.paths_at_a_time)
-        if self._certain is None:
-            return excluded
-        done = interior(band.shown, excluded.reshape(band.shape), self._light.film, self._error)
+        done = interior(band.shown, alone.reshape(band.shape), self._light.film, self._error)
         band.doubt(done)
         self._parts(lambda part: band.smooth(done, part.start), band.means, 1)
         return done.ravel()
@@ -93,7 +117,7 @@ class Rounds:
             light.of(DIRECT)[:] += other.of(DIRECT)
         return light
 
-    def _sample(self, band: "_Band", active: Indices, taken: int, more: int) -> None:
+    def _sample(self, band: Band, active: Indices, taken: int, more: int) -> None:
         """Take samples of the active pixels, of which they have `taken` so far, until they have `more`."""
         halves = (taken or more // 2, more)
 
@@ -109,86 +133,3 @@ class Rounds:
             band.put(which, sums, means[0], halves[0])
 
         self._parts(trace, len(active), self._light.paths_at_a_time // min(more - taken, _AT_A_TIME))
-
-
-class _Band:
-    """What is known so far of the n pixels of some rows.
-
-    taken : (n,) samples of each. variance : (3, n), of their mean. spread : (n,), the samples' own. apart : (n,), how far their
-    halves' means are apart, as a variance. The latter two are means over the channels.
-    """
-
-    def __init__(self, light: Illumination, rows: range, width: int) -> None:
-        self.pixels = np.arange(rows.start * width, rows.stop * width)
-        self.rows, self.columns = np.divmod(self.pixels, width)
-        self.shape = len(rows), width
-        count = len(self.pixels)
-        self._film, self._sums = light.film, light.sums(count, 1)
-        self.taken = np.ones(count, np.int32)
-        self._variance, self._spread, self._apart = np.zeros((3, count)), np.zeros(count), np.zeros(count)
-
-    def add_centres(self, part: slice, light: Light) -> None:
-        """Add the light at some pixels' centres."""
-        sums = self._sums.at(part)
-        sums.add(light)
-        self._sums.put(part, sums)
-
-    @property
-    def means(self) -> int:
-        """How many rows of the sums' state are to be smooth where the light is."""
-        return self._sums.means
-
-    @property
-    def shown(self) -> Floats:
-        """(channels, height, width): what the centres show, with alpha where not all is opaque."""
-        self._sums.taken = 1
-        shown = self._sums.combined
-        if self._film.transparent:
-            shown = np.concatenate([shown, self._sums.covered[None]])
-        return shown.reshape(-1, *self.shape)
-
-    def smooth(self, done: NDArray[np.bool_], row: int) -> None:
-        """Make of the centres' light the filter's mean where pixels are done, and nothing elsewhere, in one row of the sums."""
-        values = self._sums.state[row].reshape(self.shape)
-        values[:] = np.where(done, values + correction(values, self._film), 0.0)
-
-    def doubt(self, done: NDArray[np.bool_]) -> None:
-        """Take for the variance of pixels that are done what may be wrong with their correction."""
-        for variance, shown in zip(self._variance, self.shown, strict=False):
-            off = CORRECTED * correction(shown, self._film)
-            variance[:] = np.where(done, off * off, 0.0).ravel()
-
-    def sums_of(self, which: Indices, taken: int) -> Sums:
-        """A copy of the sums of some pixels, of which so many samples were taken."""
-        sums = self._sums.at(which)
-        sums.taken = taken
-        return sums
-
-    def put(self, which: Indices, sums: Sums, before: Floats, half: int) -> None:
-        """Put sums back. before : their mean when so many samples were taken, about half of those that are now."""
-        self._sums.put(which, sums)
-        self.taken[which] = sums.taken
-        variance = sums.variance
-        put(self._variance, which, variance)
-        self._spread[which] = variance.mean(axis=0) * sums.taken
-        self._apart[which] = ((sums.combined - before) ** 2).mean(axis=0) * (half / (sums.taken - half))
-
-    def estimated(self, active: Indices) -> Floats:
-        """The variances of the means of pixels that have just got samples, as many each."""
-        own, apart = np.zeros((2, *self.shape))
-        samples = self.taken[active[0]]
-        own.ravel()[active] = gather(self._spread, active) / samples
-        apart.ravel()[active] = gather(self._apart, active)
-        factor = gather(efficiency(own, apart).ravel(), active)
-        put(self._variance, active, gather(self._variance, active) * factor)
-        unseen = gather(missed(self._spread.reshape(self.shape), samples).ravel(), active)
-        return np.maximum(gather(own.ravel(), active) * factor, unseen)
-
-    def write(self, passes: Passes, part: slice) -> None:
-        """Write some pixels' passes."""
-        passes = {name: values[part] for name, values in passes.items()}
-        sums = self._sums.at(part)
-        sums.taken = self.taken[part]
-        sums.write_means(passes)
-        store(passes["Variance"], self._variance[:, part])
-        passes["Sample Count"][:, 0] = sums.taken

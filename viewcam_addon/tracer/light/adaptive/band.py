@@ -1,0 +1,131 @@
+"""What is known of the pixels of some rows between rounds of samples, and what they tell of one another."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Floats, Indices, gather, put
+from ...rays.surface import Passes
+from ...scene.film import Film
+from ..sharing import shared
+from ..sums import COLOUR, DIRECT, INDIRECT, Light, Sums, store, without_colour
+from .estimate import efficiency, missed
+from .interior import CORRECTED, correction
+
+Mask = NDArray[np.bool_]
+
+
+class Band:
+    """n pixels.
+
+    sums : over none of their samples. rows : of the picture. width : of the picture.
+
+    taken : (n,) samples of each. variance : (3, n), of their mean. spread : (n,), the samples' own. apart : (n,), how far their
+    halves' means are apart, as a variance. The latter two are means over the channels.
+    """
+
+    def __init__(self, sums: Sums, film: Film, rows: range, width: int) -> None:
+        self.pixels = np.arange(rows.start * width, rows.stop * width)
+        self.rows, self.columns = np.divmod(self.pixels, width)
+        self.shape = len(rows), width
+        self._film, self._sums = film, sums
+        self.taken = np.ones(sums.count, np.int32)
+        self._variance, self._spread, self._apart = (np.zeros((*rows, sums.count)) for rows in ((3,), (), ()))
+
+    def add_centres(self, part: slice, light: Light) -> None:
+        """Add the light at some pixels' centres."""
+        sums = self._sums.at(part)
+        sums.add(light)
+        self._sums.put(part, sums)
+
+    @property
+    def means(self) -> int:
+        """How many rows of the sums' state are to be smooth where the light is."""
+        return self._sums.means
+
+    @property
+    def shown(self) -> Floats:
+        """(channels, height, width): what the centres show, with alpha where not all is opaque."""
+        self._sums.taken = 1
+        shown = self._sums.combined
+        if self._film.transparent:
+            shown = np.concatenate([shown, self._sums.covered[None]])
+        return shown.reshape(-1, *self.shape)
+
+    def smooth(self, done: Mask, row: int) -> None:
+        """Make of the centres' light the filter's mean where pixels are done, and nothing elsewhere, in one row of the sums."""
+        values = self._sums.state[row].reshape(self.shape)
+        values[:] = np.where(done, values + correction(values, self._film), 0.0)
+
+    def doubt(self, done: Mask) -> None:
+        """Take for the variance of pixels that are done what may be wrong with their correction."""
+        for variance, shown in zip(self._variance, self.shown, strict=False):
+            off = CORRECTED * correction(shown, self._film)
+            variance[:] = np.where(done, off * off, 0.0).ravel()
+
+    def sums_of(self, which: Indices, taken: int) -> Sums:
+        """A copy of the sums of some pixels, of which so many samples were taken."""
+        sums = self._sums.at(which)
+        sums.taken = taken
+        return sums
+
+    def put(self, which: Indices, sums: Sums, before: Floats, half: int) -> None:
+        """Put sums back. before : their mean when so many samples were taken, about half of those that are now."""
+        self._sums.put(which, sums)
+        self.taken[which] = sums.taken
+        variance = sums.variance
+        put(self._variance, which, variance)
+        self._spread[which] = variance.mean(axis=0) * sums.taken
+        self._apart[which] = ((sums.combined - before) ** 2).mean(axis=0) * (half / (sums.taken - half))
+
+    def estimated(self, active: Indices) -> Floats:
+        """The variances of the means of pixels that have just got samples, as many each."""
+        own, apart = np.zeros((2, *self.shape))
+        samples = self.taken[active[0]]
+        own.ravel()[active] = gather(self._spread, active) / samples
+        apart.ravel()[active] = gather(self._apart, active)
+        factor = gather(efficiency(own, apart).ravel(), active)
+        put(self._variance, active, gather(self._variance, active) * factor)
+        unseen = gather(missed(self._spread.reshape(self.shape), samples).ravel(), active)
+        return np.maximum(gather(own.ravel(), active) * factor, unseen)
+
+    def shared(self, which: Mask, error: float) -> Floats:
+        """(n,): the variances of the pixels' means, if those of `which` share the light that falls on them.
+
+        which : (n,). error : that is wanted.
+        """
+        _, left, _ = self._shared(which, error)
+        return left.ravel()
+
+    def share(self, which: Mask, error: float) -> None:
+        """Give pixels of `which` the light that they share."""
+        more, _, kinds = self._shared(which, error)
+        more *= self.taken
+        for number, kind in enumerate(kinds):
+            self._sums.change(kind, more[3 * number : 3 * number + 3])
+
+    def _shared(self, which: Mask, error: float) -> tuple[Floats, Floats, list[str]]:
+        """What sharing adds to the means, (3 kinds, n), their variance, (n,), and the kinds of light that are shared."""
+        sums = self._sums
+        sums.taken = self.taken
+        colour = sums.mean(COLOUR)
+        bright = (colour * colour).mean(axis=0)
+        which = which & (bright > 0)
+        kinds = [kind for kind in (DIRECT, INDIRECT) if kind in sums.categories]
+        light = np.concatenate([without_colour(sums.mean(kind), colour) for kind in kinds])
+        # Of one kind, if both have as much.
+        share = np.where(which, bright, 1.0) * (self._film.exposure**2 * len(kinds))
+        own = self._variance.mean(axis=0)
+        tolerance = error / np.sqrt(share[which].max(initial=1e-300))
+        shape = (-1, *self.shape)
+        mean, left = shared(light.reshape(shape), (own / share).reshape(self.shape), which.reshape(self.shape), tolerance)
+        more = np.where(which, mean.reshape(light.shape) - light, 0.0) * np.tile(colour, (len(kinds), 1))
+        return more, np.where(which, left.ravel() * share, own), kinds
+
+    def write(self, passes: Passes, part: slice) -> None:
+        """Write some pixels' passes."""
+        passes = {name: values[part] for name, values in passes.items()}
+        sums = self._sums.at(part)
+        sums.taken = self.taken[part]
+        sums.write_means(passes)
+        store(passes["Variance"], self._variance[:, part])
+        passes["Sample Count"][:, 0] = sums.taken
