@@ -8,8 +8,14 @@ names of older versions are read as the same passes. Channels are named as Cycle
 The camera travels with the picture: as the standard attributes worldToCamera and worldToNDC (float32 matrices for row vectors,
 as OpenEXR has them) and, in full precision, as JSON in our own attribute.
 
-OpenEXR is the format's own project. Rejected: imageio and OpenCV (no multi-part files, no attributes). It is imported where it
-is needed, because Blender's own process must not have a second copy of that library.
+Files are compressed by run lengths (RLE). Of the 14 channels of a geometry picture of 1920 × 1080, 116 MB, that takes two cores
+0.17 s of their time and leaves 30 MB; ZIP, Blender's choice, 0.37 s and 19 MB; PIZ 0.52 s and 17 MB; no compression 0.09 s, and
+then the disk is waited for. Pictures of light are half as large again as with ZIP, in 0.4 times its time. Tracing a geometry
+picture takes 0.2 s: compressing should not take longer.
+
+OpenEXR is the format's own project. Rejected: imageio and OpenCV (no multi-part files, no attributes); the compressions that
+OpenEXR learned last (HTJ2K, ZSTD), which Blender can't read. It is imported where it is needed, because Blender's own process
+must not have a second copy of that library.
 """
 
 import dataclasses
@@ -167,7 +173,7 @@ def write(path: str | os.PathLike[str], image: Image) -> None:
         for name, array in image.passes.items()
         for i, letter in enumerate(CHANNELS[name])
     }
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **image.attributes}
+    header = {"compression": OpenEXR.RLE_COMPRESSION, "type": OpenEXR.scanlineimage, **image.attributes}
     if image.camera is not None:
         header |= _camera_attributes(image.camera)
     with written_whole(path) as temporary:
