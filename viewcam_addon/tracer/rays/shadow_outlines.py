@@ -39,6 +39,9 @@ _PAST = 2.0**-20
 _NEARER = 2.0**-8
 # By how much the shadow of a piece is drawn longer, at both ends, so that it overlaps that of the next.
 _OVERLAP = 0.25
+# How far past the surface is asked again whether the lamp shines on a piece, of its length: where a fine mesh turns from the
+# light, the pieces of its silhouette hide one another half.
+_ASIDE = 0.5
 _CIRCLE = 16  # pieces of a circle to begin with
 _LAYERS = 16  # things without a shadow that light is followed through
 
@@ -82,7 +85,7 @@ class Light:
 class Straight:
     """Edges of triangles as curves. starts, ends, third : (3, n), the third corners. largest : (n,), of their coordinates."""
 
-    pieces = 1
+    pieces, is_rim = 1, False
 
     def __init__(self, starts: Floats, ends: Floats, third: Floats) -> None:
         self._starts, self._ways, self._third = starts, ends - starts, third
@@ -93,19 +96,19 @@ class Straight:
     def at(self, which: Indices, part: Floats) -> Floats:
         return gather(self._starts, which) + part * gather(self._ways, which)
 
-    def past(self, which: Indices, points: Floats, ahead: Floats) -> Floats:
-        """Points just past the surface, seen along `ahead`."""
+    def past(self, which: Indices, points: Floats, ahead: Floats, farther: Floats | float = 0.0) -> Floats:
+        """Points just past the surface, seen along `ahead`, or farther past it."""
         aside = cross(ahead, gather(self._ways, which))
         length = np.sqrt(dot(aside, aside))
         aside /= np.where(length > 0, length, 1.0)
         inwards = dot(aside, gather(self._third, which) - points)
-        return points - np.copysign(gather(self._past, which), inwards) * aside
+        return points - np.copysign(gather(self._past, which) + farther, inwards) * aside
 
 
 class Round:
     """Outlines of spheres as curves. primitives : (n,) of the spheres."""
 
-    pieces = _CIRCLE
+    pieces, is_rim = _CIRCLE, False
 
     def __init__(self, rims: Rims, centres: Floats, primitives: Indices) -> None:
         self._rims, self._centres, self.primitives = rims, centres, primitives
@@ -114,16 +117,20 @@ class Round:
     def at(self, which: Indices, part: Floats) -> Floats:
         return self._rims.at(which, part * (2 * np.pi))
 
-    def past(self, which: Indices, points: Floats, ahead: Floats) -> Floats:
+    def past(self, which: Indices, points: Floats, ahead: Floats, farther: Floats | float = 0.0) -> Floats:
+        """As of straight ones."""
         outward = points - gather(self._centres, which)
-        return points + outward * (_PAST * np.abs(points).max(axis=0) / np.sqrt(dot(outward, outward)))
+        return points + outward * ((_PAST * np.abs(points).max(axis=0) + farther) / np.sqrt(dot(outward, outward)))
 
 
 class Rim(Round):
-    """The rim of a spot's cone as a curve about the lamp."""
+    """The rim of a spot's cone as a curve about the lamp, which is its centre."""
 
-    def past(self, which: Indices, points: Floats, ahead: Floats) -> Floats:
-        return points
+    is_rim = True
+
+    def past(self, which: Indices, points: Floats, ahead: Floats, farther: Floats | float = 0.0) -> Floats:
+        """Where its light comes from."""
+        return gather(self._centres, which)
 
 
 Curves = Straight | Round
@@ -186,30 +193,25 @@ class ShadowOutlines:
     def _of(self, light: Light, curves: Curves) -> Iterator[Strokes]:
         """What one lamp makes of curves: where they lie themselves, and where their shadows do."""
         pieces = _Pieces.whole(curves)
-        is_rim = isinstance(curves, Rim)
         for last in [False] * _ROUNDS + [True]:
-            pieces = pieces.some(self._may_matter(light, curves, pieces, is_rim))
+            pieces = pieces.some(self._may_matter(light, curves, pieces))
             if not len(pieces.which):
                 return
-            shadows = list(self._shadows(light, curves, pieces, is_rim))
+            shadows = list(self._shadows(light, curves, pieces))
             cuts = np.ones(len(pieces.which), np.intp) if last else self._cuts(curves, pieces, shadows)
             done = cuts == 1
-            own = (
-                []
-                if is_rim
-                else [(np.flatnonzero(done), *(curves.at(pieces.which[done], part[done]) for part in pieces.ends()))]
-            )
-            shadows = [tuple(values[..., done[some]] for values in (some, starts, ends)) for some, starts, ends in shadows]
-            yield from self._lit(light, curves, pieces, own + shadows, is_rim)
+            own = [] if curves.is_rim else [(np.arange(len(cuts)), *(curves.at(pieces.which, part) for part in pieces.ends()))]
+            parts = [tuple(values[..., done[some]] for values in (some, *ends)) for some, *ends in own + shadows]
+            yield from self._lit(light, curves, pieces, parts)
             if done.all():
                 return
             pieces = pieces.cut(np.flatnonzero(~done), cuts[~done])
 
-    def _may_matter(self, light: Light, curves: Curves, pieces: "_Pieces", is_rim: bool) -> Indices:
+    def _may_matter(self, light: Light, curves: Curves, pieces: "_Pieces") -> Indices:
         """The pieces that, or whose shadows, may lie in the picture, as far as its four sides tell."""
         start, end, middle = (curves.at(pieces.which, part) for part in (*pieces.ends(), pieces.first + pieces.width / 2))
         bulge = middle - (start + end) / 2
-        begins = [np.broadcast_to(light.place[:, None], start.shape)] * 2 if is_rim else [start, end]
+        begins = [np.broadcast_to(light.place[:, None], start.shape)] * 2 if curves.is_rim else [start, end]
         ways = [light.rays(start), light.rays(end)]
         outside = np.zeros(len(pieces.which), bool)
         for slack, *values in zip(*(self._canvas.planes(some)[:4] for some in (bulge, *begins, *ways)), strict=True):
@@ -219,25 +221,24 @@ class ShadowOutlines:
             outside |= (begin < 0) & (way + (0.0 if light.is_sun else slack) <= 0)
         return np.flatnonzero(~outside)
 
-    def _points(self, curves: Curves, pieces: "_Pieces", light: Light, is_rim: bool) -> tuple[Points, Floats, Floats]:
-        """The middles of pieces, just past the surface, and the light's way and distance there."""
+    def _starts(self, light: Light, curves: Curves, pieces: "_Pieces", farther: Floats | float = 0.0) -> tuple[Points, Floats]:
+        """Where light goes on past the middles of pieces, and in which directions."""
         points = curves.at(pieces.which, pieces.first + pieces.width / 2)
         ahead, _ = light.ways(points)
-        points = np.broadcast_to(light.place[:, None], points.shape) if is_rim else curves.past(pieces.which, points, ahead)
-        ahead, distance = (ahead, np.zeros(points.shape[1])) if is_rim else light.ways(points)
-        return _points(points, ahead, gather(curves.primitives, pieces.which)), ahead, distance
+        past = curves.past(pieces.which, points, ahead, farther)
+        if not curves.is_rim:
+            ahead, _ = light.ways(past)
+        return _points(past, ahead, gather(curves.primitives, pieces.which)), ahead
 
-    def _shadows(
-        self, light: Light, curves: Curves, pieces: "_Pieces", is_rim: bool
-    ) -> Iterator[tuple[Indices, Floats, Floats]]:
+    def _shadows(self, light: Light, curves: Curves, pieces: "_Pieces") -> Iterator[tuple[Indices, Floats, Floats]]:
         """Which of the pieces have a shadow, and from where to where it goes, (3, k) each."""
-        if not (light.casts_shadow or is_rim):
+        if not (light.casts_shadow or curves.is_rim):
             return
-        points, ahead, _ = self._points(curves, pieces, light, is_rim)
+        points, ahead = self._starts(light, curves, pieces)
         which = np.arange(points.count)
         ends = [curves.at(pieces.which, part) for part in pieces.ends(_OVERLAP)]
         ways = [light.ways(end)[0] for end in ends]
-        if is_rim:
+        if curves.is_rim:
             ends = [points.position, points.position]
         for _ in range(_LAYERS):
             some = points.at(which)
@@ -266,9 +267,7 @@ class ShadowOutlines:
 
     def _cuts(self, curves: Curves, pieces: "_Pieces", shadows: list[tuple[Indices, Floats, Floats]]) -> Indices:
         """Into how many parts pieces are to be cut."""
-        starts, ends = (curves.at(pieces.which, part) for part in pieces.ends())
-        way = ends - starts
-        cuts = np.sqrt(dot(way, way)) / (self._pixel * COARSE)
+        cuts = pieces.lengths(curves) / (self._pixel * COARSE)
         for which, starts, ends in shadows:
             stroke, first, last = self._canvas.clipped(starts, ends)
             length = np.hypot(last[0] - first[0], last[1] - first[1])
@@ -276,7 +275,7 @@ class ShadowOutlines:
         return np.clip(np.ceil(np.minimum(np.nan_to_num(cuts), _MOST_AT_ONCE)), 1, _MOST_AT_ONCE).astype(np.intp)
 
     def _lit(
-        self, light: Light, curves: Curves, pieces: "_Pieces", parts: list[tuple[Indices, Floats, Floats]], is_rim: bool
+        self, light: Light, curves: Curves, pieces: "_Pieces", parts: list[tuple[Indices, Floats, Floats]]
     ) -> Iterator[Strokes]:
         """Those strokes that lie in the picture and whose pieces the lamp shines on."""
         shown = []
@@ -287,10 +286,14 @@ class ShadowOutlines:
         for which, _, _ in shown:
             asked[which] = True
         lit = np.ones(len(asked), bool)
-        if light.casts_shadow and not is_rim and asked.any():
+        if light.casts_shadow and not curves.is_rim and asked.any():
             some = np.flatnonzero(asked)
-            points, ahead, distance = self._points(curves, pieces.some(some), light, is_rim)
-            lit[some] = ~self._space.blocked(points, -ahead, distance)
+            for farther in (0.0, _ASIDE):
+                asked = pieces.some(some)
+                points, ahead = self._starts(light, curves, asked, farther * asked.lengths(curves))
+                dark = self._space.blocked(points, -ahead, light.ways(points.position)[1])
+                lit[some] = ~dark
+                some = some[dark]
         for which, starts, ends in shown:
             kept = np.flatnonzero(lit[which])
             starts, ends = gather(starts, kept), gather(ends, kept)
@@ -313,6 +316,11 @@ class _Pieces:
 
     def ends(self, overlap: float = 0.0) -> tuple[Floats, Floats]:
         return self.first - overlap * self.width, self.first + (1 + overlap) * self.width
+
+    def lengths(self, curves: Curves) -> Floats:
+        """(n,) in units of the world."""
+        start, end = (curves.at(self.which, part) for part in self.ends())
+        return np.sqrt(dot(end - start, end - start))
 
     def some(self, chosen: Indices) -> "_Pieces":
         return _Pieces(self.which[chosen], self.first[chosen], self.width[chosen])
