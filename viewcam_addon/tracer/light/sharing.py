@@ -9,18 +9,30 @@ bright as the sun spoils to the end of the picture.
 Windows grow while what a step changes is what noise explains (after Lepski 1990; in pictures Katkovnik 1999, Kervrann and
 Boulanger 2006). A single pixel can not tell noise from a bend of the same size, and one that strays far, as one in a hundred
 does, would keep all its noise: so what steps change is added up round each pixel, as Rousselle and others (2012) do with the
-errors of their filters. Noise halves with every step, so that bends too slight to be told from it add up to no more than twice
-the first: penumbrae and contact shadows stay as sharp as noise shows them.
+errors of their filters. Penumbrae and contact shadows stay as sharp as noise shows them.
+
+What bends less than that is flattened still: too little to be seen at a pixel, and yet several standard errors of the mean of
+a whole wall. So what windows have added is spread over the largest of them, and taken back (twicing, Tukey 1977): the sums
+over tiles of 32 × 32 pixels were off by 0.7 standard errors, 3 at most, and are by 0.25, and 1.5 where fireflies are.
 
 How noisy pixels are is told by their samples, and too badly: a few that by chance all met the lamp claim no noise, and many
 that share their pixel out among them (sampler.py) two to ten times too much. How neighbours bend (Immerkær 1996) tells it as
 long as pixels are independent and the light is smooth. Of both, pooled, the smaller one counts.
+
+Measured at 320 × 180, root mean square errors of interior pixels before and after: studio still at `direct`, 4 samples, 0.084
+and 0.036; 16, 0.032 and 0.020; 64, 0.0133 and 0.0116, most of it in the shadows of leaves; Cornell box, 4 samples, 0.063 and
+0.008; 64, 0.0073 and 0.0024; at `path`, 16 samples, 0.17 and 0.05, of which 0.03 are the reference's own.
 """
+
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Float32s, Floats
+
+Booleans = NDArray[np.bool_]
+_Growth = tuple[int, float, Booleans, Booleans]
 
 # The gap of each growth, and what it leaves of the variance along its axis: that of a tent over that of one half as wide.
 _GROWTHS = ((1, 0.375), (2, 0.4583), (4, 0.4886), (8, 0.4971))
@@ -32,9 +44,11 @@ _STRAY = 5.0
 _POOL = 3
 # Windows do not grow where this part of the tolerance is all the noise that is left.
 _ENOUGH = 0.25
+# Brighter light is not shared: float32 could not hold sums of its squares.
+_LARGEST = 1e15
 
 
-def shared(light: Floats, variance: Floats, interior: NDArray[np.bool_], tolerance: float) -> tuple[Floats, Floats]:
+def shared(light: Floats, variance: Floats, interior: Booleans, tolerance: float) -> tuple[Floats, Floats]:
     """Light with less noise, and the variance that is left.
 
     light : (c, h, w) means of pixels, of the light that falls on surfaces, independent of one another. variance : (h, w), as
@@ -42,66 +56,82 @@ def shared(light: Floats, variance: Floats, interior: NDArray[np.bool_], toleran
     material or sharp shadow is near. tolerance : the standard error that is wanted.
 
     Returns (c, h, w) and (h, w): the variance of the means, and the square of the last step as far as noise does not explain
-    it, for the bias. Pixels that are not interior are returned as they are.
+    it, for the bias; infinite where neither samples nor neighbours tell it. Pixels that are not interior are returned as they
+    are.
     """
-    # Numbers beyond float32 are shared with no one: nothing that is compared with them holds.
-    with np.errstate(over="ignore", invalid="ignore"):
-        inside = np.where(interior, light, 0.0).astype(np.float32)
-        noise, pooled = _noise(inside, variance, interior)
-        added, left = _grown(np.concatenate([inside, noise[None]]), pooled, interior, (_ENOUGH * tolerance) ** 2)
+    interior = interior & (np.abs(light).max(axis=0) < _LARGEST)
+    inside = np.where(interior, light, 0.0).astype(np.float32)
+    noise, pooled = _noise(inside, variance, interior)
+    added, left = _added(inside, noise, pooled, interior, (_ENOUGH * tolerance) ** 2)
     return light + added, np.where(interior, left, variance)
 
 
-def _grown(planes: Float32s, known: Float32s, interior: NDArray[np.bool_], enough: float) -> tuple[Float32s, Float32s]:
+def _added(light: Float32s, noise: Float32s, pooled: Float32s, interior: Booleans, enough: float) -> tuple[Float32s, Float32s]:
     """What windows add to the light, and the variance that is left.
 
-    planes : (c + 1, h, w), light and its variance, changed in place. known : (h, w), the variance pooled. enough : of variance.
+    light : (c, h, w), 0 where it is not interior. noise, pooled : (h, w), what _noise tells. enough : of variance.
     """
-    added, left = np.zeros_like(planes[:-1]), known
-    growing = interior & (known > enough) & (known < np.inf)
-    # Whether all is interior from a pixel to that one gap on.
-    down, across = interior[:-1] & interior[1:], interior[:, :-1] & interior[:, 1:]
-    for gap, kept in _GROWTHS:
+    planes, added, left = np.concatenate([light, noise[None]]), np.zeros_like(light), pooled
+    growing, grown = interior & (pooled > enough) & (pooled < np.inf), np.zeros_like(interior)
+    growths = []
+    for gap, kept, down, across in _growths(interior):
         if not growing.any():
             break
-        # From one gap before a pixel to one behind: what it needs now, and at the next growth the one that begins there.
-        down, across = down[:-gap] & down[gap:], across[:, :-gap] & across[:, gap:]
-        before, grown = planes.copy(), np.zeros_like(interior)
-        _grow(planes, down, gap, kept)
-        _grow(planes.swapaxes(1, 2), across.T, gap, kept)
-        grown[gap:-gap] |= down
-        grown[:, gap:-gap] |= across
+        before = planes.copy()
+        reached = _grow(planes, gap, kept, down, across)
+        growths.append((gap, kept, down, across))
         step = planes[:-1] - before[:-1]
         square, taken = _square(step), before[-1] - planes[-1]
-        growing &= grown & (square <= _STRAY**2 * known)
+        growing &= reached & (square <= _STRAY**2 * (pooled if gap == 1 else before[-1]))
         growing &= _around(np.where(growing, square - _EXPLAINED * taken, 0.0), 4 * gap - 1) <= 0.0
-        known = planes[-1].copy()
+        grown |= growing
         step *= growing
         added += step
-        left = np.where(growing, known + np.maximum(square - taken, 0.0), left)
-        growing &= known > enough
-    return added, left
+        left = np.where(growing, planes[-1] + np.maximum(square - taken, 0.0), left)
+        growing &= planes[-1] > enough
+    spread = _spread(np.concatenate([added, noise[None]]), growths) * grown
+    return added - spread[:-1], np.minimum(left + spread[-1], pooled)
 
 
-def _grow(planes: Float32s, reached: NDArray[np.bool_], gap: int, kept: float) -> None:
-    """Let windows grow along the columns, in place.
+def _spread(planes: Float32s, growths: list[_Growth]) -> Float32s:
+    """Light and its variance in windows that have all grown, wherever they can, as far as any has."""
+    for growth in growths:
+        _grow(planes, *growth)
+    return planes
 
-    planes : (c + 1, h, w), light and its variance. reached : (h − 2 gap, w), which pixels can.
+
+def _growths(interior: Booleans) -> Iterator[_Growth]:
+    """Gap, what is left of the variance, and where all is interior from one gap before a pixel to one behind.
+
+    The latter twice: (h − 2 gap, w) along columns, (h, w − 2 gap) along rows.
     """
-    middle = planes[:, gap:-gap]
-    bend = planes[:, : -2 * gap] + planes[:, 2 * gap :]
-    bend -= middle
-    bend -= middle
-    bend *= reached * np.float32(0.25)
-    # Of a variance the squares of the weights count, which are as 1 to 4 to 1.
-    bend[-1] *= np.float32(2 / 3)
-    middle += bend
-    middle[-1] *= np.where(reached, np.float32(kept), np.float32(1.0))
+    down, across = interior[:-1] & interior[1:], interior[:, :-1] & interior[:, 1:]
+    for gap, kept in _GROWTHS:
+        # Where all is interior from a pixel to one gap on, then to two.
+        down, across = down[:-gap] & down[gap:], across[:, :-gap] & across[:, gap:]
+        yield gap, kept, down, across
 
 
-def _noise(light: Float32s, variance: Floats, interior: NDArray[np.bool_]) -> tuple[Float32s, Float32s]:
+def _grow(planes: Float32s, gap: int, kept: float, down: Booleans, across: Booleans) -> Booleans:
+    """Let windows grow, in place; (h, w), which do. planes : (c + 1, h, w), light and its variance."""
+    grown = np.zeros(planes.shape[1:], bool)
+    for turned, reached, which in ((planes, down, grown), (planes.swapaxes(1, 2), across.T, grown.T)):
+        which[gap:-gap] |= reached
+        middle = turned[:, gap:-gap]
+        bend = turned[:, : -2 * gap] + turned[:, 2 * gap :]
+        bend -= middle
+        bend -= middle
+        bend *= reached * np.float32(0.25)
+        # Of a variance the squares of the weights count, which are as 1 to 4 to 1.
+        bend[-1] *= np.float32(2 / 3)
+        middle += bend
+        middle[-1] *= np.where(reached, np.float32(kept), np.float32(1.0))
+    return grown
+
+
+def _noise(light: Float32s, variance: Floats, interior: Booleans) -> tuple[Float32s, Float32s]:
     """What is known of each pixel's variance, (h, w), and the same pooled, which is better known and may be infinite."""
-    told = interior & np.isfinite(variance)
+    told = interior & (variance < _LARGEST**2)
     smooth, bent = np.zeros_like(interior), np.zeros(interior.shape, np.float32)
     if min(interior.shape) > 2:
         rows = interior[:-2] & interior[1:-1] & interior[2:]
@@ -113,7 +143,8 @@ def _noise(light: Float32s, variance: Floats, interior: NDArray[np.bool_]) -> tu
     by_samples = np.where(number > 0, total / np.maximum(number, 1.0), np.inf)
     by_neighbours = np.where(2 * places > number, bends / np.maximum(places, 1.0), np.inf)
     pooled = np.minimum(by_samples, by_neighbours)
-    return np.where(told, own * np.where(total > 0, pooled / by_samples, 0.0), bent), pooled
+    with np.errstate(invalid="ignore"):
+        return np.where(told, np.where(own > 0, own * (pooled / by_samples), 0.0), bent), pooled
 
 
 def _square(values: Float32s) -> Float32s:
