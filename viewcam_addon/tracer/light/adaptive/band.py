@@ -118,8 +118,10 @@ class Band:
         tolerance = error / np.sqrt(share[which].max(initial=1e-300))
         shape = (-1, *self.shape)
         mean, left = shared(light.reshape(shape), (own / share).reshape(self.shape), which.reshape(self.shape), tolerance)
-        more = np.where(which, mean.reshape(light.shape) - light, 0.0) * np.tile(colour, (len(kinds), 1))
-        return more, np.where(which, left.ravel() * share, own), kinds
+        left = left.ravel() * share
+        better = which & (left < own)
+        more = np.where(better, mean.reshape(light.shape) - light, 0.0) * np.tile(colour, (len(kinds), 1))
+        return more, np.where(better, left, own), kinds
 
     def write(self, passes: Passes, part: slice) -> None:
         """Write some pixels' passes."""
