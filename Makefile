@@ -8,10 +8,11 @@
 #   make extension     dist/virtual_pinhole-VERSION-PLATFORM.zip for artists, built by that Blender
 #   make scenes        sample_scenes/*.blend anew, by Blender 4.2
 #   make charts        docs/charts anew: every method up to where it fails
-#   make benchmark     the tracer against Cycles
+#   make bench         all benchmarks of speed, scaling and poses, some with charts in docs/charts; fails where a target is missed
+#   make bench-guard   whether the tracer has become slower than it was, as a share of bare Embree's speed; a minute or two
 #   make clean         removes all that these made, but for ~/.cache/virtual-pinhole
 
-.PHONY: demo test test-exhaustive lint test-matrix test-light test-blender extension scenes charts benchmark clean
+.PHONY: demo test test-exhaustive lint test-matrix test-light test-blender extension scenes charts bench bench-guard clean
 .DELETE_ON_ERROR:
 
 # bpy has wheels for these two only.
@@ -90,9 +91,14 @@ charts: .venv/test
 	.venv/bin/viewcam chart stability --json docs/charts/stability.json
 	.venv/bin/viewcam chart light --json docs/charts/light.json
 
-benchmark: .venv/demo
-	.venv/bin/python -m benchmarks.geometry_level
-	.venv/bin/python -m benchmarks.light_levels
+bench: .venv/test
+	status=0; \
+	for name in geometry_level light_levels; do .venv/bin/python -m benchmarks.$$name || status=1; done; \
+	for name in speed scaling poses; do .venv/bin/viewcam chart $$name --json docs/charts/$$name.json || status=1; done; \
+	exit $$status
+
+bench-guard: .venv/test
+	$(call PYTEST,.venv) -m speed
 
 clean:
 	rm -rf .venv .venvs .pytest_cache .ruff_cache .hypothesis wheels dist build demo

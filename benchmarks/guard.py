@@ -1,0 +1,223 @@
+"""Whether the tracer has become slower: its speed as a share of bare Embree's on the same rays, in one run, on any machine.
+
+    python -m benchmarks.guard            # exit status 1 if a ratio has fallen by a third
+    python -m benchmarks.guard --record   # write what is measured into guard.json, after a change that is meant
+
+The yardstick is embreex alone, which this project does not change: rays that were made beforehand, in tiles over as many
+threads. Tracer and yardstick take turns, and the median of their ratios counts, since a machine's speed drifts. Measured are:
+
+- geometry: a picture of 1920 × 1080 with all passes. The yardstick traces a ray for each pixel.
+- direct: light of a wide sun. The yardstick traces the eye's ray and the shadow ray of each sample.
+- adaptive: light of a sun without size, with a wanted error. The yardstick traces the rays of as many samples of each pixel as
+  have, without a wanted error, the same RMS error.
+
+Plain NumPy and the compiled extra have a ratio each.
+"""
+
+import argparse
+import json
+import math
+import multiprocessing
+import os
+import statistics
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
+from numpy.typing import NDArray
+
+from benchmarks import race
+from benchmarks.scaling import scenes
+from viewcam_addon.files import written_whole
+from viewcam_addon.tracer import compiled
+from viewcam_addon.tracer.render import Tracer
+from viewcam_addon.tracer.scene import Scene
+from viewcam_addon.tracer.scene.lamps import Sun
+
+Rays = NDArray[np.float32]
+Ratios = dict[str, float]
+
+RECORDED = Path(__file__).with_suffix(".json")
+VARIANTS = ("numpy", "compiled")
+
+# A ratio that has fallen to less of what was recorded is a failure; the machine may be busy, so it is measured again.
+LEAST, ATTEMPTS, ROUNDS = 2 / 3, 3, 5
+_TRIANGLES, _TILE, _SIZE, _SAMPLES = 200_000, 65_536, (320, 180), 16
+_SUN = Sun("Sun", towards=(-0.8, -0.3, 0.52), irradiance=(3.0, 3.0, 3.0))
+_WIDE_SUN = replace(_SUN, angle=0.2)
+# A wanted error, the samples that it may take, those of the picture that it is measured against, and those on both sides of it.
+_ERROR, _MOST, _CONVERGED, _FEW, _MANY = 0.01, 256, 128, 16, 64
+
+
+def measure(variant: str, names: Sequence[str], sabotage: Callable[[], None] | None = None) -> Ratios:
+    """What is measured → its ratio, in a process of its own. sabotage : picklable; called there before."""
+    spawn = multiprocessing.get_context("spawn")
+    with _environment(VIEWCAM_COMPILED=str(int(variant == "compiled"))), ProcessPoolExecutor(1, spawn) as pool:
+        return pool.submit(_measure, names, sabotage).result()
+
+
+def fallen(measured: Ratios, recorded: Ratios) -> list[str]:
+    """A sentence for each ratio that has fallen by a third or more."""
+    return [
+        f"{name}: {measured[name]:.2f} of the yardstick's speed, and {ratio:.2f} was recorded: it has fallen by a third"
+        for name, ratio in recorded.items()
+        if not measured[name] >= LEAST * ratio
+    ]
+
+
+def judged(variant: str, recorded: Ratios) -> tuple[Ratios, list[str]]:
+    """The best ratios of as many attempts as it takes, and what has fallen in all of them."""
+    best: Ratios = dict.fromkeys(recorded, 0.0)
+    for _ in range(ATTEMPTS):
+        slow = [name for name in recorded if fallen(best, {name: recorded[name]})]
+        best |= {name: max(best[name], ratio) for name, ratio in (measure(variant, slow) if slow else {}).items()}
+    return best, fallen(best, recorded)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--record", action="store_true", help=f"write {RECORDED.name}")
+    options = parser.parse_args()
+    recorded = json.loads(RECORDED.read_text(encoding="utf-8")) if RECORDED.is_file() else {}
+    variants = VARIANTS if compiled.AVAILABLE else VARIANTS[:1]
+    if options.record:
+        for variant in variants:
+            attempts = [measure(variant, tuple(_MEASURES)) for _ in range(ATTEMPTS)]
+            recorded[variant] = {name: round(statistics.median(ratios[name] for ratios in attempts), 2) for name in _MEASURES}
+        with written_whole(RECORDED) as temporary:
+            temporary.write_text(json.dumps(recorded, indent=2) + "\n", encoding="utf-8")
+        print(json.dumps(recorded, indent=2))
+        return 0
+    failed = []
+    for variant in variants:
+        ratios, sentences = judged(variant, recorded[variant])
+        for name, ratio in ratios.items():
+            print(f"{variant}, {name}: {ratio:.2f} (recorded: {recorded[variant][name]:.2f})")
+        failed += [f"{variant}, {sentence}" for sentence in sentences]
+    print(*failed, sep="\n", end="\n" if failed else "")
+    return 1 if failed else 0
+
+
+@contextmanager
+def _environment(**variables: str) -> Iterator[None]:
+    """These variables, also for processes that begin in the meantime."""
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def _measure(names: Sequence[str], sabotage: Callable[[], None] | None) -> Ratios:
+    if sabotage is not None:
+        sabotage()
+    return {name: _MEASURES[name]() for name in names}
+
+
+def _geometry() -> float:
+    scene = scenes.one_mesh(_TRIANGLES, (1920, 1080))
+    yardstick = Yardstick(scene)
+    directions = yardstick.eye_rays(0.5, 0.5)
+    eyes = yardstick.eyes(directions)
+    return _share(lambda: yardstick.trace(eyes, directions), Tracer(scene).render)
+
+
+def _direct() -> float:
+    scene = scenes.one_mesh(_TRIANGLES, _SIZE, [_WIDE_SUN])
+    tracer = Tracer(scene)
+    return _share(Yardstick(scene).of_light(_SAMPLES), lambda: tracer.render_light("direct", _SAMPLES, 0))
+
+
+def _adaptive() -> float:
+    scene = scenes.one_mesh(_TRIANGLES, _SIZE, [_SUN])
+    tracer = Tracer(scene)
+
+    def light(samples: int, seed: int, error: float | None = None) -> NDArray[np.float64]:
+        return tracer.render_light("direct", samples, seed, error=error)["Combined"].astype(np.float64)
+
+    converged = light(_CONVERGED, 1)
+    few, many, adaptive = (
+        math.log(np.square(light(*how) - converged).mean()) for how in ((_FEW, 0), (_MANY, 0), (_MOST, 0, _ERROR))
+    )
+    worth = _FEW * (_MANY / _FEW) ** ((few - adaptive) / (few - many))
+    return worth / _SAMPLES * _share(Yardstick(scene).of_light(_SAMPLES), lambda: light(_MOST, 0, _ERROR))
+
+
+_MEASURES = {"geometry": _geometry, "direct": _direct, "adaptive": _adaptive}
+
+
+def _share(yardstick: Callable[[], object], work: Callable[[], object]) -> float:
+    """The median of the yardstick's time over that of the work, in rounds of both."""
+    times = race.run({"yardstick": race.timed(yardstick), "work": race.timed(work)}, ROUNDS)
+    return statistics.median(bare / ours for bare, ours in zip(times["yardstick"], times["work"], strict=True))
+
+
+class Yardstick:
+    """embreex and nothing else: a scene of meshes, counted from the eye, in float32."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._camera, eye = scene.camera, np.array(scene.camera.eye)
+        self._embree = EmbreeScene(robust=True)
+        for placed in scene.objects:
+            mesh, matrix = scene.geometries[placed.geometry], placed.matrix
+            vertices = mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+            TriangleMesh(self._embree, (vertices - eye).astype(np.float32), mesh.triangles)
+        self._embree.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))  # builds the hierarchy
+
+    def eye_rays(self, px: float | NDArray[np.float64], py: float | NDArray[np.float64]) -> Rays:
+        """Directions through points of all pixels, row by row."""
+        rows, columns = np.divmod(np.arange(self._camera.width * self._camera.height), self._camera.width)
+        return self._camera.ray_directions(columns, rows, px, py).astype(np.float32)
+
+    def eyes(self, directions: Rays) -> Rays:
+        return np.zeros_like(directions)
+
+    def points(self, directions: Rays) -> Rays:
+        """Where rays from the eye meet the mesh, a little before it; those that meet nothing are left out."""
+        found = self._embree.run(self.eyes(directions), directions, output=True)
+        met = found["geomID"] >= 0
+        return directions[met] * (found["tfar"][met, None] * np.float32(1 - 1e-4))
+
+    def towards(self, sun: Sun, count: int) -> Rays:
+        """Directions into the disc of a sun."""
+        aside = np.random.default_rng(1).normal(size=(count, 3)) * math.tan(sun.angle / 4)
+        return (np.array(sun.towards) + aside).astype(np.float32)
+
+    def of_light(self, samples: int) -> Callable[[], None]:
+        """What traces the rays of so many samples of each pixel, the eye's and those of shadows."""
+        rng = np.random.default_rng(0)
+        pixels = self._camera.width * self._camera.height
+        directions = np.concatenate([self.eye_rays(*rng.random((2, pixels))) for _ in range(samples)])
+        eyes, points = self.eyes(directions), self.points(directions)
+        towards = self.towards(_WIDE_SUN, len(points))
+
+        def trace() -> None:
+            self.trace(eyes, directions)
+            self.trace(points, towards, "OCCLUDED")
+
+        return trace
+
+    def trace(self, origins: Rays, directions: Rays, query: str = "INTERSECT") -> None:
+        """All rays, in tiles over all cores."""
+
+        def tile(first: int) -> None:
+            some = slice(first, first + _TILE)
+            self._embree.run(origins[some], directions[some], query=query)
+
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            list(pool.map(tile, range(0, len(origins), _TILE)))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

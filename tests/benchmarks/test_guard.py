@@ -1,0 +1,82 @@
+"""The guard of speed. `make bench-guard` and CI run what is marked; the rest is arithmetic."""
+
+import json
+import time
+
+import pytest
+
+pytest.importorskip("embreex")
+
+from benchmarks import guard
+from viewcam_addon.tracer.render import Tracer
+
+RECORDED = json.loads(guard.RECORDED.read_text(encoding="utf-8"))
+
+
+def test_a_ratio_may_fall_by_less_than_a_third():
+    recorded = {"geometry": 0.6, "direct": 1.2}
+    assert guard.fallen({"geometry": 0.41, "direct": 0.81}, recorded) == []
+    (sentence,) = guard.fallen({"geometry": 0.39, "direct": 2.0}, recorded)
+    assert sentence == "geometry: 0.39 of the yardstick's speed, and 0.60 was recorded: it has fallen by a third"
+    assert len(guard.fallen({"geometry": float("nan"), "direct": 0.5}, recorded)) == 2
+
+
+def test_what_is_slow_in_every_attempt_has_fallen_and_what_is_slow_in_two_has_not(monkeypatch):
+    recorded, asked = {"geometry": 0.6, "direct": 1.0}, []
+    found = iter([{"geometry": 0.1, "direct": 0.9}, {"geometry": 0.2}, {"geometry": 0.5}])
+
+    def measure(_variant, names):
+        asked.append(names)
+        return next(found)
+
+    monkeypatch.setattr(guard, "measure", measure)
+    assert guard.judged("numpy", recorded) == ({"geometry": 0.5, "direct": 0.9}, [])
+    assert asked == [["geometry", "direct"], ["geometry"], ["geometry"]]
+    monkeypatch.setattr(guard, "measure", lambda _variant, names: dict.fromkeys(names, 0.35))
+    _, sentences = guard.judged("numpy", recorded)
+    assert len(sentences) == 2 and sentences[0].startswith("geometry: 0.35")
+
+
+def test_both_variants_have_a_ratio_of_everything_that_is_measured():
+    assert RECORDED.keys() == set(guard.VARIANTS)
+    assert all(ratios.keys() == {"geometry", "direct", "adaptive"} for ratios in RECORDED.values())
+
+
+@pytest.mark.speed
+@pytest.mark.parametrize("variant", guard.VARIANTS)
+def test_the_tracer_has_not_become_slower_by_a_third(variant):
+    if variant == "compiled":
+        pytest.importorskip("numba")
+    ratios, sentences = guard.judged(variant, RECORDED[variant])
+    assert not sentences, f"{sentences}, of {ratios}"
+
+
+def _doubled_trace():
+    """Each picture of geometry is traced twice."""
+    render = Tracer.render
+
+    def twice(self):
+        render(self)
+        return render(self)
+
+    Tracer.render = twice
+
+
+def _sleep():
+    """Each picture of light takes a sleep as long as itself."""
+    render_light = Tracer.render_light
+
+    def slow(self, *arguments):
+        start = time.perf_counter()
+        passes = render_light(self, *arguments)
+        time.sleep(time.perf_counter() - start)
+        return passes
+
+    Tracer.render_light = slow
+
+
+@pytest.mark.speed
+@pytest.mark.parametrize(("sabotage", "slower"), [(_doubled_trace, "geometry"), (_sleep, "direct")])
+def test_sabotage_is_told(sabotage, slower):
+    sentences = guard.fallen(guard.measure("numpy", [slower], sabotage), {slower: RECORDED["numpy"][slower]})
+    assert sentences
