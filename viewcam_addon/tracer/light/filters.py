@@ -27,6 +27,7 @@ import functools
 import numpy as np
 
 from ..arrays import Floats, gather
+from ..compiled.standing import or_compiled
 from ..scene.film import Film
 
 _COEFFICIENTS = (0.35875, 0.48829, 0.14128, 0.01168)
@@ -40,14 +41,20 @@ def offsets(film: Film, u: Floats) -> Floats:
     """
     if film.filter == "BOX":
         return u
+    return spread(u, film.filter_width)
+
+
+@or_compiled
+def spread(u: Floats, width: float) -> Floats:
+    """As `offsets`, by the Blackman-Harris filter of a width."""
     scaled = u * _STEPS
     step = scaled.astype(np.intp)
     scaled -= step
-    places, lengths = _inverse()
+    places, lengths = inverse()
     offset = gather(lengths, step)
     offset *= scaled
     offset += gather(places, step)
-    offset *= film.filter_width
+    offset *= width
     offset += 0.5
     return offset
 
@@ -88,7 +95,7 @@ def variance(film: Film) -> float:
 
 
 @functools.cache
-def _inverse() -> tuple[Floats, Floats]:
+def inverse() -> tuple[Floats, Floats]:
     """Where each step of the mass begins, and how far it reaches, in widths."""
     u = np.arange(_STEPS // 2 + 1) / _STEPS
     x = np.linspace(-1.0, 0.0, 8193)

@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
+from ..compiled.standing import or_compiled
 
 Words = NDArray[np.uint32]
 Samples = int | NDArray[np.integer]
@@ -50,7 +51,7 @@ _ROULETTE = (5, 2, (1, 1, 5, 13, 11))
 _SPARE = (6, 1, (1, 3, 7, 5, 19, 39))
 
 # Of the hashes (the last is 2³² over the golden ratio), and of the reversal: which bits of a byte change places.
-_MIXERS = tuple(np.uint32(factor) for factor in (0x7FEB352D, 0x846CA68B, 0x9E3779B1))
+MIXERS = tuple(np.uint32(factor) for factor in (0x7FEB352D, 0x846CA68B, 0x9E3779B1))
 _SWAPS = tuple((np.uint32(shift), np.uint32(mask)) for shift, mask in ((1, 0x55555555), (2, 0x33333333), (4, 0x0F0F0F0F)))
 _1, _15, _16 = np.uint32(1), np.uint32(15), np.uint32(16)
 
@@ -74,41 +75,42 @@ class Sampler:
 
         pixels : (n,) from 0 to 2³² − 1. samples : (n,), or one for all, from 0.
         """
-        dimensions = range(first, first + count)
-        digits, shift = self._hashed(pixels, np.array(dimensions, np.uint32))
-        which = np.atleast_1d(samples)
-        for row, dimension in zip(digits, dimensions, strict=True):
-            row *= self._points(dimension, which)
-        digits += shift
-        return _reversed(digits) * 2.0**-32
+        return scrambled(self, pixels, samples, first, count)
 
     def grid(self, pixels: NDArray[np.integer], samples: NDArray[np.integer], first: int, count: int) -> Floats:
         """(count, n · s): the same for s samples of n pixels, pixel after pixel; the pixels' random words are made once."""
-        dimensions = range(first, first + count)
-        factor, shift = self._hashed(pixels, np.array(dimensions, np.uint32))
-        digits = np.stack([self._points(dimension, samples) for dimension in dimensions])
-        digits = digits[:, None] * factor[:, :, None]
-        digits += shift[:, :, None]
-        return _reversed(digits.reshape(count, -1)) * 2.0**-32
+        return scrambled_grid(self, pixels, samples, first, count)
 
-    def _hashed(self, pixels: NDArray[np.integer], keys: Words) -> tuple[Words, Words]:
+    def words(self, first: int, count: int) -> tuple[Words, Words, np.uint32] | None:
+        """What makes the numbers of dimensions: the digits of all samples' points, (count, samples), the dimensions' random words
+        and the seed's; None where there are too many samples, or dimensions of more than one scattering."""
+        (scattering, row), (last, _) = _place(first), _place(first + count - 1)
+        if scattering != last or len(self._first) == 1 << _LOW:
+            return None
+        keys = _mixed(np.arange(first, first + count, dtype=np.uint32) + self._seeds[1])
+        return self._table(scattering)[row : row + count], keys, self._seeds[0]
+
+    def hashed(self, pixels: NDArray[np.integer], keys: Words) -> tuple[Words, Words]:
         """Two random words for each key and pixel, (k, n) each; the first odd."""
         shift = _mixed(_mixed(pixels.astype(np.uint32) ^ self._seeds[0]) ^ _mixed(keys + self._seeds[1])[:, None])
-        factor = shift * _MIXERS[2]
+        factor = shift * MIXERS[2]
         factor ^= factor >> _15
         factor |= _1
         return factor, shift
 
-    def _points(self, dimension: int, samples: NDArray[np.integer]) -> Words:
+    def points(self, dimension: int, samples: NDArray[np.integer]) -> Words:
         """(n,): the digits of Sobol's points in a dimension, before they are scrambled."""
-        scattering, place = divmod(dimension - FILM, SCATTERING) if dimension >= FILM else (0, dimension - FILM)
-        table = self._tables.get(scattering)
-        if table is None:
-            table = self._tables[scattering] = _transformed(self._order(scattering), _MATRICES[:, :_LOW])
-        digits = np.take(table[FILM + place], samples & (1 << _LOW) - 1, mode="clip")
+        scattering, row = _place(dimension)
+        digits = np.take(self._table(scattering)[row], samples & (1 << _LOW) - 1, mode="clip")
         if len(self._first) == 1 << _LOW:
-            digits ^= _transformed((samples >> _LOW).astype(np.uint32), _MATRICES[None, FILM + place, _LOW:])[0]
+            digits ^= _transformed((samples >> _LOW).astype(np.uint32), _MATRICES[None, row, _LOW:])[0]
         return digits
+
+    def _table(self, scattering: int) -> Words:
+        """(FILM + SCATTERING, samples): the points' digits at a scattering, of all dimensions."""
+        if scattering not in self._tables:
+            self._tables[scattering] = _transformed(self._order(scattering), _MATRICES[:, :_LOW])
+        return self._tables[scattering]
 
     def _order(self, scattering: int) -> Words:
         """Which of Sobol's points each of the first samples has at a scattering."""
@@ -120,13 +122,43 @@ class Sampler:
         return order
 
 
+@or_compiled
+def scrambled(sampler: Sampler, pixels: NDArray[np.integer], samples: Samples, first: int, count: int) -> Floats:
+    """As `Sampler.numbers`."""
+    dimensions = range(first, first + count)
+    digits, shift = sampler.hashed(pixels, np.array(dimensions, np.uint32))
+    which = np.atleast_1d(samples)
+    for row, dimension in zip(digits, dimensions, strict=True):
+        row *= sampler.points(dimension, which)
+    digits += shift
+    return _reversed(digits) * 2.0**-32
+
+
+@or_compiled
+def scrambled_grid(
+    sampler: Sampler, pixels: NDArray[np.integer], samples: NDArray[np.integer], first: int, count: int
+) -> Floats:
+    """As `Sampler.grid`."""
+    dimensions = range(first, first + count)
+    factor, shift = sampler.hashed(pixels, np.array(dimensions, np.uint32))
+    digits = np.stack([sampler.points(dimension, samples) for dimension in dimensions])
+    digits = digits[:, None] * factor[:, :, None]
+    digits += shift[:, :, None]
+    return _reversed(digits.reshape(count, -1)) * 2.0**-32
+
+
+def _place(dimension: int) -> tuple[int, int]:
+    """The scattering that a dimension belongs to, and its row in the tables."""
+    return (0, dimension) if dimension < FILM else ((dimension - FILM) // SCATTERING, FILM + (dimension - FILM) % SCATTERING)
+
+
 def _mixed(words: Words) -> Words:
     """A permutation of all words that looks random (Wellons, Prospecting for Hash Functions, 2018: lowbias32)."""
     higher = words >> _16
     words = words ^ higher
-    words *= _MIXERS[0]
+    words *= MIXERS[0]
     words ^= np.right_shift(words, _15, out=higher)
-    words *= _MIXERS[1]
+    words *= MIXERS[1]
     words ^= np.right_shift(words, _16, out=higher)
     return words
 
