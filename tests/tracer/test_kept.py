@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.tracer.compiled import standing
 from viewcam_addon.tracer.rays import embree
 from viewcam_addon.tracer.render import Tracer
 from viewcam_addon.tracer.scene import Mesh
@@ -86,8 +87,11 @@ def test_only_moving_the_camera_refits_and_zooming_makes_nothing_anew(scene, mon
     pictures(zoomed)
     assert zoomed._planes is planes and zoomed._lit is lit
     assert (len(built), len(refitted)) == (2, 0)
-    pictures(Tracer(replace(scene, camera=camera(0.05)), kept=zoomed))
-    assert (len(built), len(refitted)) == ((2, 2) if embree._EMBREE else (4, 0))
+    moved = Tracer(replace(scene, camera=camera(0.05)), kept=zoomed)
+    pictures(moved)
+    assert (len(built), len(refitted)) == (4, 0), "once, so that it can be refitted"
+    pictures(Tracer(replace(scene, camera=camera(0.08)), kept=moved))
+    assert (len(built), len(refitted)) == ((4, 2) if embree._EMBREE else (6, 0))
 
 
 def test_a_second_picture_of_light_prepares_nothing_again(scene):
@@ -115,6 +119,7 @@ def without_embree_anywhere(monkeypatch):
 
     for module in (visibility, space, crowd):
         monkeypatch.setattr(module, "EmbreeScene", None)
+    monkeypatch.setattr(standing, "AVAILABLE", False)
 
 
 def one_mesh(scene, **changes):
@@ -163,7 +168,7 @@ CHANGES = {
 def test_nothing_is_kept_where_things_have_changed(change, moved, scene):
     now = CHANGES[change](copied(scene))
     now = replace(now, camera=camera(0.2)) if moved else now
-    before = Tracer(scene)
+    before = Tracer(scene, kept=Tracer(replace(scene, camera=camera(0.1))))  # moved before
     pictures(before)
     old, fresh = before._triangles, Tracer(now)
     kept = Tracer(now, kept=before)
@@ -203,4 +208,3 @@ def test_scenes_are_the_same_by_content(scene):
     for one, other in (((1,), (1, 2)), (1, True), (np.zeros(3), np.zeros(3, np.float32)), ({"a": 1, "b": 2}, {"b": 2, "a": 1})):
         assert not same(one, other), f"{one!r} is taken for {other!r}"
     assert isinstance(scene.geometries["geometry 0"], Mesh)
-

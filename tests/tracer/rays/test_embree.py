@@ -29,9 +29,10 @@ def assert_same(one, other):
         assert not differing, f"{differing} of {len(one[name])} rays have another {name}"
 
 
-def test_scenes_give_the_answers_of_those_that_embreex_makes(monkeypatch):
+@pytest.mark.parametrize("moving", [False, True])
+def test_scenes_give_the_answers_of_those_that_embreex_makes(moving, monkeypatch):
     vertices, triangles = soup(np.random.default_rng(1))
-    own = embree.embree_scene(vertices, triangles, 0.5)
+    own = embree.embree_scene(vertices, triangles, 0.5, moving)
     monkeypatch.setattr(embree, "_EMBREE", None)
     theirs = embree.embree_scene(vertices, triangles, 0.5)
     one = answers(own, np.random.default_rng(2))
@@ -42,7 +43,7 @@ def test_scenes_give_the_answers_of_those_that_embreex_makes(monkeypatch):
 def test_a_refitted_scene_gives_the_answers_of_a_new_one():
     rng = np.random.default_rng(3)
     vertices, triangles = soup(rng)
-    scene = embree.embree_scene(vertices, triangles)
+    scene = embree.embree_scene(vertices, triangles, moving=True)
     before = answers(scene, np.random.default_rng(4))
     moved = vertices @ np.linalg.qr(rng.normal(size=(3, 3)))[0] + (0.5, -0.2, 0.1)
     for unit in (1.0, 0.25):

@@ -3,7 +3,8 @@
 embreex copies a mesh number by number, in Python, which takes longer than Embree takes to build its hierarchy. So Embree's own
 functions are called where they were found (compiled/library.py): a copy is then a pass of NumPy, and a hierarchy whose corners
 have moved is refitted, in a tenth of the time of a new one. Embree refits only what was made for it: in a scene that is dynamic
-and of low quality, a geometry whose quality is "refit" is first built as carefully as in any other scene.
+and of low quality, a geometry whose quality is "refit" is first built as carefully as in any other scene, but it takes 32 bytes
+more a triangle. So a scene is built for that when its camera moves for the first time.
 """
 
 import ctypes
@@ -79,10 +80,11 @@ def rows(vectors: Floats) -> Float32s:
     return np.ascontiguousarray(vectors.T, np.float32)
 
 
-def embree_scene(vertices: Floats, triangles: NDArray[np.int32], unit: float = 1.0) -> "EmbreeScene":
+def embree_scene(vertices: Floats, triangles: NDArray[np.int32], unit: float = 1.0, moving: bool = False) -> "EmbreeScene":
     """A scene of triangles, ready for any thread.
 
-    vertices : (v, 3). triangles : (m, 3) indices. unit : what the vertices are multiplied by.
+    vertices : (v, 3). triangles : (m, 3) indices. unit : what the vertices are multiplied by. moving : whether it can be
+    refitted.
     """
     scene = EmbreeScene(robust=True)
     if _EMBREE is None:
@@ -90,12 +92,14 @@ def embree_scene(vertices: Floats, triangles: NDArray[np.int32], unit: float = 1
         scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))  # builds the hierarchy, once, before threads come
         return scene
     own = library.pointer_of(scene)
-    _EMBREE.rtcSetSceneFlags(own, _ROBUST | _DYNAMIC)
-    _EMBREE.rtcSetSceneBuildQuality(own, _LOW)
+    if moving:
+        _EMBREE.rtcSetSceneFlags(own, _ROBUST | _DYNAMIC)
+        _EMBREE.rtcSetSceneBuildQuality(own, _LOW)
     device = _EMBREE.rtcGetSceneDevice(own)
     geometry = _EMBREE.rtcNewGeometry(device, _TRIANGLES)
     _EMBREE.rtcReleaseDevice(device)
-    _EMBREE.rtcSetGeometryBuildQuality(geometry, _REFIT)
+    if moving:
+        _EMBREE.rtcSetGeometryBuildQuality(geometry, _REFIT)
     corners = _EMBREE.rtcSetNewGeometryBuffer(geometry, _CORNERS, 0, _THREE_UNSIGNED, 12, len(triangles))
     places = _EMBREE.rtcSetNewGeometryBuffer(geometry, _VERTICES, 0, _THREE_FLOATS, 12, len(vertices))
     if not (corners and places):
@@ -112,7 +116,7 @@ def embree_scene(vertices: Floats, triangles: NDArray[np.int32], unit: float = 1
 
 
 def _refit(scene: "EmbreeScene", vertices: Floats, unit: float) -> None:
-    """Move the vertices of a scene that `embree_scene` made, and what is built on them."""
+    """Move the vertices of a scene that `embree_scene` made to be moved, and what is built on them."""
     own = library.pointer_of(scene)
     geometry = _EMBREE.rtcGetGeometry(own, 0)
     places = _EMBREE.rtcGetGeometryBufferData(geometry, _VERTICES, 0)
@@ -156,4 +160,4 @@ def _built(triangles: Triangles, left_out: NDArray[np.bool_], unit: float) -> "E
     if left_out.any():
         corners = corners.copy()
         corners[left_out] = 0  # points
-    return embree_scene(triangles.vertices.T, corners, unit)
+    return embree_scene(triangles.vertices.T, corners, unit, triangles.moving)

@@ -54,18 +54,17 @@ ENDING = 4.0
 def triangle_offsets(triangles: Triangles) -> Floats:
     """(m,) float64, camera space: how far off each triangle a ray that leaves it starts."""
     offsets = np.empty(triangles.count)
-    largest = np.abs(triangles.vertices).max(axis=0)
 
     def fill(part: slice) -> None:
-        corners = triangles.corners[:, part]
-        a, b, c = gather(triangles.vertices, corners).transpose(1, 0, 2)
+        corners = gather(triangles.vertices, triangles.corners[:, part])
+        a, b, c = corners.transpose(1, 0, 2)
         ab, ac, bc = b - a, c - a, c - b
         sides = dot(ab, ab), dot(ac, ac), dot(bc, bc)
         longest, shortest = (np.sqrt(reduce(choose, sides)) for choose in (np.maximum, np.minimum))
         normal = cross(ab, ac)
         with np.errstate(all="ignore"):
             cap = np.fmin(shortest * longest / np.sqrt(dot(normal, normal)), _FLATTEST_CAP)
-        farthest = reduce(np.maximum, (gather(largest, corner) for corner in corners))
+        farthest = np.abs(corners, out=corners).max(axis=(0, 1))
         offsets[part] = FLOAT32 * (ROUNDING * farthest + (ARITHMETIC + cap) * longest)
 
     each(fill, parts(triangles.count), triangles.threads)
@@ -74,7 +73,8 @@ def triangle_offsets(triangles: Triangles) -> Floats:
 
 def wide_offsets(planes: Planes) -> Floats:
     """(k,) float64, camera space: that of `planes.wide`, which are tested in float64: as of a small triangle near the eye."""
-    return FLOAT32 * ROUNDING * gather(planes.distance, planes.wide)
+    plane = gather(planes.forms[:3], planes.wide)
+    return FLOAT32 * ROUNDING / np.sqrt(dot(plane, plane))
 
 
 def start(points: Floats, normals: Floats, directions: Floats, offsets: Floats) -> Floats:

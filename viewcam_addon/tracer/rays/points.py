@@ -16,7 +16,7 @@ from ..scene.materials import PLAIN, Material
 from . import offset
 from .balls import balls_of
 from .ellipsoids import Ellipsoids
-from .tables import by_material
+from .tables import by_material, parts
 from .triangles import Planes, Triangles, facing
 from .view import View
 
@@ -153,7 +153,11 @@ class Surfaces:
     def made_of(self, materials: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """For each primitive, numbered as space.py finds them, whether its material is one of those."""
         count = self.triangles.count
-        return gather(materials, np.append(self.material[:count], self.material[count:][self.balls.number]))
+        made = np.empty(count + self.balls.count, bool)
+        for part in parts(count):
+            made[part] = gather(materials, self.material[part])
+        made[count:] = gather(materials, gather(self.material[count:], self.balls.number))
+        return made
 
     def distance(self, triangle: Indices, origins: Floats, directions: Floats) -> Floats:
         """How far along rays the planes of triangles are, that were found for them."""
@@ -203,13 +207,13 @@ class Surfaces:
 
     def varying(self, triangle: Indices, first: Floats, second: Floats) -> tuple[Floats | None, Floats | None]:
         """UV and vertex colours at barycentric coordinates of triangles, where anybody asks for them."""
-        colours = None if self.colours is None else _interpolated(gather(self.colours, triangle), first, second, 3)
+        colours = None if self.colours is None else _interpolated(gather(self.colours, triangle), first, second)
         return self._uv(triangle, first, second), colours
 
     def _shading(self, triangle: Indices, first: Floats, second: Floats, normal: Floats, side: Floats) -> Floats:
         if self.triangles.corner_normals is None:
             return normal
-        smooth = _interpolated(gather(self.triangles.corner_normals, triangle), first, second, 3)
+        smooth = _interpolated(gather(self.triangles.corner_normals, triangle), first, second)
         smooth = np.stack([dot(axis, smooth) for axis in self.axes])
         length = np.sqrt(dot(smooth, smooth))
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -221,7 +225,7 @@ class Surfaces:
             return None
         if self.triangles.corner_uvs is None:
             return np.zeros((2, len(triangle)))
-        return _interpolated(gather(self.triangles.corner_uvs, triangle), first, second, 2)
+        return _interpolated(gather(self.triangles.corner_uvs, triangle), first, second)
 
     def _on_spheres(self, number: Indices, centres: Floats, position: Floats, ways: Floats) -> Points:
         """As in Cycles, the normal of an ellipsoid too is the direction from its centre."""
@@ -282,11 +286,12 @@ def _corner_colours(triangles: Triangles) -> NDArray[np.float32]:
     return table
 
 
-def _interpolated(corners: NDArray[np.float32], first: Floats, second: Floats, count: int) -> Floats:
-    """(count, n) of what the (9, n) values at the corners are at the barycentric coordinates."""
-    values = corners[:count] * (1.0 - first - second)
-    values += corners[3 : 3 + count] * first
-    values += corners[6 : 6 + count] * second
+def _interpolated(corners: NDArray[np.float32], first: Floats, second: Floats) -> Floats:
+    """(k, n) of what the (3k, n) values at the corners are at the barycentric coordinates."""
+    a, b, c = corners.reshape(3, -1, corners.shape[1])
+    values = a * (1.0 - first - second)
+    values += b * first
+    values += c * second
     return values
 
 

@@ -106,10 +106,14 @@ def in_camera_space(things: Things, points: Sequence[Floats], view: View, thread
 
 def by_material(things: Things, values: Sequence[Sequence], kind: type) -> NDArray:
     """(n,): what the materials of all triangles or spheres have. values : for each object, of each of its materials."""
-    first = np.cumsum([0, *(len(some) for some in values)], dtype=np.int32)[:-1]
-    which = np.concatenate([np.empty(0, np.int32), *(geometry.materials for _, geometry in things)])
-    which += np.repeat(first, [len(geometry.materials) for _, geometry in things])
-    return np.array([value for some in values for value in some], kind).take(which)
+    first = np.cumsum([0, *(len(some) for some in values)])[:-1]
+    flat = np.array([value for some in values for value in some], kind)
+    materials = [geometry.materials for _, geometry in things]
+    counts = [len(some) for some in materials]
+    found = np.empty(sum(counts), kind)
+    for where, some in pieces(counts):
+        found[where] = flat.take(joined(materials, some) + spread(first, some))
+    return found
 
 
 def each(work: Callable, items: Iterable, threads: int) -> list:

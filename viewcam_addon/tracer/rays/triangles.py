@@ -38,13 +38,15 @@ class Triangles:
     corners : (3, m) int32: [corner, triangle], indices into `vertices`.
     placed : the objects with their meshes, whose triangles follow one another.
     threads : how many fill the other tables. These are made when they are first asked for.
-    embree_scenes : what embree.py made of them. former_scenes : what it made of them when their vertices were elsewhere.
+    moving : whether other views of them are expected. embree_scenes : what embree.py made of them. former_scenes : what it
+        made of them in the view before.
     """
 
     vertices: Floats
     corners: NDArray[np.int32]
     placed: tuple[tuple[Object, Mesh], ...]
     threads: int = 1
+    moving: bool = False
     embree_scenes: dict = field(default_factory=dict)
     former_scenes: dict = field(default_factory=dict)
 
@@ -57,6 +59,11 @@ class Triangles:
         """How many triangles each object has."""
         return [len(mesh.triangles) for _, mesh in self.placed]
 
+    @made_once
+    def extent(self) -> float:
+        """The largest coordinate in camera space, without its sign."""
+        return max(self.vertices.max(initial=0.0), -self.vertices.min(initial=0.0))
+
     def hidden_from(self, ray: str) -> NDArray[np.bool_]:
         """(m,): which triangles a kind of rays does not see (lights.RAYS)."""
         return np.repeat(np.array([ray in placed.hidden_from for placed, _ in self.placed], bool), self.counts)
@@ -64,7 +71,8 @@ class Triangles:
     def moved(self, view: View) -> "Triangles":
         """The same triangles seen by another camera. Of Embree's scenes it takes possession: these have to stand elsewhere."""
         vertices = in_camera_space(self.placed, [mesh.vertices for _, mesh in self.placed], view, self.threads)
-        moved = replace(self, vertices=vertices, embree_scenes={}, former_scenes=self.embree_scenes)
+        former = self.embree_scenes if self.moving else {}
+        moved = replace(self, vertices=vertices, moving=True, embree_scenes={}, former_scenes=former)
         vars(moved).update({name: table for name, table in vars(self).items() if name in _OF_THE_WORLD})
         return moved
 
@@ -78,10 +86,9 @@ class Triangles:
         """(m,), what the pass shows."""
         return by_material(self.placed, [placed.material_indices for placed, _ in self.placed], np.float32)
 
-    @made_once
-    def largest_coordinate(self) -> Float32s:
-        """(m,), of the three vertices in world space or of their object, without its sign: what is far from its object's own
-        origin is the small difference of large numbers."""
+    def largest_coordinates(self) -> Float32s:
+        """(v,), of vertices in world space or of their object, without its sign: what is far from its object's own origin is
+        the small difference of large numbers."""
         largest = np.empty(self.vertices.shape[1], np.float32)
         placing, meshes = matrices(self.placed), [mesh.vertices for _, mesh in self.placed]
 
@@ -89,10 +96,10 @@ class Triangles:
             where, some = part
             matrix, points = spread(placing, some), joined(meshes, some).T
             coordinates = [np.abs(dot(row, points) + row[3]) for row in matrix]
-            largest[where] = np.maximum.reduce([*coordinates, np.abs(matrix[:, 3]).max(axis=0) + np.zeros(points.shape[1])])
+            largest[where] = np.maximum(reduce(np.maximum, coordinates), np.abs(matrix[:, 3]).max(axis=0))
 
         each(fill, pieces([len(points) for points in meshes]), self.threads)
-        return np.maximum.reduce([gather(largest, corner) for corner in self.corners])
+        return largest
 
     @made_once
     def corner_normals(self) -> Float32s | None:
@@ -129,25 +136,27 @@ class Triangles:
 
     @made_once
     def corner_uvs(self) -> Float32s | None:
-        """(9, m): [3 · corner + channel, triangle] with the channels u, v, 1 (0, 0, 0 without a UV map); or None where no mesh
-        has a UV map."""
+        """(6, m): [2 · corner + channel, triangle], 0 on meshes without a UV map; or None where no mesh has one."""
         if all(mesh.corner_uvs is None for _, mesh in self.placed):
             return None
-        uvs = np.empty((9, self.count), np.float32)
+        uvs = np.empty((6, self.count), np.float32)
         meshes = [mesh.corner_uvs for _, mesh in self.placed]
-        mapped = np.array([some is not None for some in meshes], np.float32)
 
         def fill(part: tuple[slice, list[Piece]]) -> None:
             where, some = part
-            for corner, given in enumerate(_joined_corners(meshes, some, 2)):
-                uvs[3 * corner : 3 * corner + 2, where] = given
-            uvs[2::3, where] = spread(mapped, some)
+            uvs[:, where] = _joined_corners(meshes, some, 2).reshape(6, -1)
 
         each(fill, pieces(self.counts), self.threads)
         return uvs
 
+    @made_once
+    def mapped(self) -> NDArray[np.bool_] | None:
+        """(m,): which triangles are of meshes that have a UV map; or None where all are."""
+        mapped = [mesh.corner_uvs is not None for _, mesh in self.placed]
+        return None if all(mapped) else np.repeat(np.array(mapped, bool), self.counts)
 
-_OF_THE_WORLD = ("object_index", "material_index", "largest_coordinate", "corner_normals", "corner_uvs")
+
+_OF_THE_WORLD = ("object_index", "material_index", "corner_normals", "corner_uvs", "mapped")
 """The tables that do not depend on the camera."""
 
 
@@ -243,9 +252,9 @@ class Planes:
             return part.start + near[reduce(np.maximum, sides) > 0.9**2 * farthest[near]]
 
     @made_once
-    def distance(self) -> Floats:
+    def distance(self) -> Float32s:
         """(m,), of the plane from the eye; 0 where it is seen edge-on, or has no area."""
-        distance = np.empty(self._triangles.count)
+        distance = np.empty(self._triangles.count, np.float32)
 
         def fill(part: slice) -> None:
             plane = self.forms[:3, part]
@@ -275,17 +284,18 @@ class Planes:
         longest side.
         """
         magnitude = np.empty(self._triangles.count, np.float32)
-        largest = self._triangles.largest_coordinate
+        largest = self._triangles.largest_coordinates()
 
         def fill(part: slice) -> None:
-            a, b, c = gather(self._triangles.vertices, self._triangles.corners[:, part]).transpose(1, 0, 2)
+            corners = self._triangles.corners[:, part]
+            a, b, c = gather(self._triangles.vertices, corners).transpose(1, 0, 2)
             sides = b - a, c - a, c - b
             normal = _normal(*sides[:2])
             longest = reduce(np.maximum, (dot(side, side) for side in sides))
             farthest = np.sqrt(reduce(np.maximum, (dot(corner, corner) for corner in (a, b, c))))
             with np.errstate(all="ignore"):
                 slender = np.minimum(longest / np.sqrt(dot(normal, normal)), _MOST_SLENDER)
-                magnitude[part] = largest[part] + farthest * slender
+                magnitude[part] = reduce(np.maximum, (gather(largest, corner) for corner in corners)) + farthest * slender
 
         each(fill, parts(self._triangles.count), self._triangles.threads)
         return magnitude

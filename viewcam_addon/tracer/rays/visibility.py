@@ -183,7 +183,7 @@ def _directions(x: Floats, y: Floats) -> NDArray[np.float32]:
 def _embree_unit(triangles: Triangles, ellipsoids: Ellipsoids) -> float:
     """Embree's units in one of the world."""
     extents = np.abs(ellipsoids.positions).max(axis=0, initial=0.0) + ellipsoids.reach
-    return unit_of(max(np.abs(triangles.vertices).max(initial=0.0), extents.max(initial=0.0)))
+    return unit_of(max(triangles.extent, extents.max(initial=0.0)))
 
 
 def _cards(ellipsoids: Ellipsoids, first: int, unit: float) -> tuple["EmbreeScene", NDArray[np.float32]]:
