@@ -35,7 +35,7 @@ class Space:
         self._surfaces = surfaces
         balls = surfaces.balls
         reach = np.abs(balls.centres).max(axis=0, initial=0.0) + balls.reach
-        self._extent = max(np.abs(surfaces.triangles.vertices).max(initial=0.0), reach.max(initial=0.0))
+        self._extent = max(surfaces.triangles.extent, reach.max(initial=0.0))
         self._sights: dict[str, _Sight] = {}
         self._building = threading.Lock()
 
