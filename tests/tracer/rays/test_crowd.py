@@ -111,14 +111,16 @@ def test_without_embree_it_is_met_too(monkeypatch, without_embree, stage_of, mak
 
 
 @pytest.mark.skipif(crowd.EmbreeScene is None, reason="without Embree there are no octahedra")
-def test_long_steps_skip_spheres(monkeypatch, stage_of, make_scene, make_spheres):
+def test_long_steps_skip_spheres(monkeypatch, without_kernels, stage_of, make_scene, make_spheres):
     monkeypatch.setattr(crowd, "_STEP", 0.1)
     spheres = cloud(make_spheres)
     assert wrong_distances(stage_of(make_scene(CAMERA, spheres)), spheres)[0] > 0
 
 
 @pytest.mark.skipif(crowd.EmbreeScene is None, reason="without Embree there are no octahedra")
-def test_octahedra_that_hold_the_start_are_left_even_where_something_is_met(monkeypatch, stage_of, make_scene, make_spheres):
+def test_octahedra_that_hold_the_start_are_left_even_where_something_is_met(
+    without_kernels, stage_of, make_scene, make_spheres
+):
     spheres = lattice(make_spheres)
     stage = stage_of(make_scene(CAMERA, spheres))
     assert wrong_distances(stage, spheres) == (0, 0)

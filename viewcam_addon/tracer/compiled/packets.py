@@ -89,7 +89,7 @@ def meet(scene, packet, count):
     for lane in range(LANES):
         bits[VALID, lane] = -1 if lane < count else 0
         packet[NEAR, lane], packet[TIME, lane] = 0, 0
-        bits[ID, lane], bits[FLAGS, lane] = 0, 0
+        bits[ID, lane], bits[FLAGS, lane] = lane, 0
         bits[PRIMITIVE, lane], bits[GEOMETRY, lane] = -1, -1
         bits[INSTANCE, lane], bits[INSTANCE_PRIMITIVE, lane] = -1, -1
     _intersect16(packet.ctypes.data + VALID * ALIGNMENT, scene, packet.ctypes.data, packet.ctypes.data + ARGUMENTS * ALIGNMENT)
@@ -102,7 +102,7 @@ def block(scene, packet, count):
     for lane in range(LANES):
         bits[VALID, lane] = -1 if lane < count else 0
         packet[NEAR, lane], packet[TIME, lane] = 0, 0
-        bits[ID, lane], bits[FLAGS, lane] = 0, 0
+        bits[ID, lane], bits[FLAGS, lane] = lane, 0
     _occluded16(packet.ctypes.data + VALID * ALIGNMENT, scene, packet.ctypes.data, packet.ctypes.data + ARGUMENTS * ALIGNMENT)
 
 

@@ -1,6 +1,7 @@
 """Kernels of rays/space.py: scattered rays and shadow rays, from the surface they leave to Embree's answer, in packets.
 
-Rays are sorted by direction, some thousand at a time, so that those of a packet keep together.
+Rays to lights are sorted by direction, some thousand at a time, so that those of a packet keep together. Scattered rays are not:
+it pays in some scenes as much as it costs in others.
 """
 
 import numpy as np
@@ -8,38 +9,9 @@ import numpy as np
 from ..rays import offset
 from .library import LANES, pointer_of
 from .packets import FARTHEST, aim, block, blocked, kernel, meet, met, new_packet
+from .sorting import KEYS, RAYS, sort
 
 _UNIT_OF_FLOAT32, _ROUNDING, _SLACK = offset.FLOAT32, offset.ROUNDING, offset.ARITHMETIC + offset.ENDING
-# Rays that are sorted at a time, and into how many cells of each half of an octahedron's shadow on a square of directions.
-_RAYS = 4096
-_CELLS = 8
-_KEYS = 2 * _CELLS * _CELLS
-
-
-@kernel
-def _key(x, y, z):
-    """Which cell of the sphere of directions this is in."""
-    size = (abs(x) + abs(y) + abs(z)) * (1 + 1e-9)
-    if not size > 0:
-        return 0
-    column, row = int((x / size + 1) * (_CELLS / 2)), int((y / size + 1) * (_CELLS / 2))
-    return (_CELLS * (z > 0) + column) * _CELLS + row
-
-
-@kernel
-def _sort(directions, begin, end, keys, places, order):
-    """Some rays in the order of their directions' cells: `order` of end − begin. keys, places : memory."""
-    places[:] = 0
-    for ray in range(begin, end):
-        key = _key(directions[0, ray], directions[1, ray], directions[2, ray])
-        keys[ray - begin] = key
-        places[key + 1] += 1
-    for key in range(_KEYS):
-        places[key + 1] += places[key]
-    for ray in range(begin, end):
-        key = keys[ray - begin]
-        order[places[key]] = ray
-        places[key] += 1
 
 
 @kernel
@@ -87,10 +59,13 @@ def _trace(scene, unit, positions, normals, offsets, directions, distances, whet
     """What rays meet, −1 for nothing; with `whether` only if they do, 0 for something. distances : to lights, or none."""
     to_lights = distances.size > 0
     packet = new_packet(to_lights)
-    keys, places, order = np.empty(_RAYS, np.int32), np.empty(_KEYS + 1, np.int32), np.empty(_RAYS, np.int32)
-    for begin in range(0, found.size, _RAYS):
-        end = min(begin + _RAYS, found.size)
-        _sort(directions, begin, end, keys, places, order)
+    keys, places, order = np.empty(RAYS, np.int32), np.empty(KEYS + 1, np.int32), np.empty(RAYS, np.int32)
+    for begin in range(0, found.size, RAYS):
+        end = min(begin + RAYS, found.size)
+        if to_lights:
+            sort(directions, begin, end, keys, places, order)
+        else:
+            order[: end - begin] = np.arange(begin, end)
         for first in range(0, end - begin, LANES):
             count = min(LANES, end - begin - first)
             for lane in range(count):

@@ -16,7 +16,7 @@ from .tables import in_camera_space
 from .view import View
 
 # |f|² − 1 below which the textbook's discriminant is better than the perpendicular's (ellipsoids.py).
-_NEAR = 1.0
+NEAR = 1.0
 # Spheres smaller or larger than this are not met: their squares leave float64's range.
 _SMALLEST, _LARGEST = 2.0**-450, 2.0**450
 
@@ -81,7 +81,7 @@ class Balls:
         with np.errstate(all="ignore"):  # a direction of 0
             foot = along / squared
             beside = [f - foot * d for f, d in zip(centre, way, strict=True)]
-            discriminant = np.where(tangent < _NEAR, along * foot - tangent, 1.0 - dot(beside, beside))
+            discriminant = np.where(tangent < NEAR, along * foot - tangent, 1.0 - dot(beside, beside))
             met = (discriminant >= 0) & (along > 0) & (tangent > 0)
             root = np.sqrt(np.where(met, discriminant, 0.0) * squared)
             return np.where(met, tangent / (along + root), np.inf)

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Indices, gather
+from ..compiled.standing import or_compiled
 from .balls import Balls
 from .embree import EmbreeScene, embree_scene, rows
 
@@ -31,6 +32,12 @@ _FAR = 1e37
 
 Hits = tuple[Indices, Indices, Floats]
 """Which spheres, or which one, which rays meet them, and how far off."""
+
+
+@or_compiled
+def crowd_of(balls: Balls, visible: NDArray[np.bool_], unit: float) -> "Crowd":
+    """Some of the spheres; the arguments are those of `Crowd`."""
+    return Crowd(balls, visible, unit)
 
 
 class Crowd:
@@ -76,6 +83,14 @@ class Crowd:
             yield ball, which, self._balls.distance(ball, gather(starts, which), gather(directions, which))
         if len(self._many):
             yield from self._many_met(starts, directions, leaving, limits)
+
+    def any(self, starts: Floats, directions: Floats, leaving: Indices, limits: Floats) -> NDArray[np.bool_]:
+        """Whether rays meet any sphere nearer than `limits`, (n,); as `met`, but that limits stay as they are."""
+        met, limits = np.zeros(len(limits), bool), limits.copy()
+        for _, which, distance in self.met(starts, directions, leaving, limits):
+            which = which[distance < limits[which]]
+            met[which], limits[which] = True, 0.0
+        return met
 
     def _many_met(self, starts: Floats, directions: Floats, leaving: Indices, limits: Floats) -> Iterator[Hits]:
         rays = np.flatnonzero(limits > 0)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Indices, dot, gather
 from ..compiled.standing import or_compiled
 from . import offset
-from .crowd import Crowd, Hits
+from .crowd import Hits, crowd_of
 from .embree import EmbreeScene, rows, scene_of, unit_of
 from .points import Points, Surfaces
 from .wide import Alone
@@ -99,7 +99,7 @@ class _Sight:
     def __init__(self, surfaces: Surfaces, hidden: list[NDArray[np.bool_]], unit: float) -> None:
         self.hidden, self._surfaces, self._unit = hidden, surfaces, unit
         triangles, (hidden_triangles, hidden_balls) = surfaces.triangles, hidden
-        self._crowd = Crowd(surfaces.balls, ~hidden_balls, unit)
+        self._crowd = crowd_of(surfaces.balls, ~hidden_balls, unit)
         if EmbreeScene is None:
             self._alone, self._embree = Alone(triangles, np.flatnonzero(~hidden_triangles)), None
         else:
@@ -131,9 +131,17 @@ class _Sight:
 
     def escaped(self, points: Points, directions: Floats) -> Indices:
         """Which rays meet nothing."""
-        if self._embree is None or not (self._alone.is_empty and self._crowd.is_empty):
-            return np.flatnonzero(self.first(points, directions) < 0)
-        return np.flatnonzero(~any_triangle(self._embree, self._unit, points, directions))
+        if self._embree is None:
+            met = np.zeros(points.count, bool)
+        else:
+            met = any_triangle(self._embree, self._unit, points, directions)
+        if not self._alone.is_empty:
+            starts = offset.start(points.position, points.normal, directions, points.offset)
+            limits = np.where(met, 0.0, np.inf)
+            met |= _any(self._alone.met(starts, directions, limits), limits)
+        if not self._crowd.is_empty:
+            met |= self._crowd.any(points.position, directions, self._left(points), np.where(met, 0.0, np.inf))
+        return np.flatnonzero(~met)
 
     def blocked(self, points: Points, directions: Floats, distances: Floats) -> NDArray[np.bool_]:
         """Whether anything stands before lights, (n,), at these finite distances."""
@@ -151,14 +159,18 @@ class _Sight:
             blocked |= _any(self._alone.met(starts, lights - starts, limits), limits)
         if not self._crowd.is_empty:
             limits = np.where(blocked, 0.0, lengths * distances)
-            blocked |= _any(self._balls(points, directions, limits), limits)
+            blocked |= self._crowd.any(points.position, directions, self._left(points), limits)
         return blocked
 
     def _balls(self, points: Points, directions: Floats, limits: Floats) -> Iterator[Hits]:
         """The spheres that rays meet nearer than limits, as primitives."""
         count = self._surfaces.triangles.count
-        for ball, which, distance in self._crowd.met(points.position, directions, points.primitive - count, limits):
+        for ball, which, distance in self._crowd.met(points.position, directions, self._left(points), limits):
             yield count + ball, which, distance
+
+    def _left(self, points: Points) -> Indices:
+        """The numbers of the spheres that points lie on, below 0 for triangles."""
+        return points.primitive - self._surfaces.triangles.count
 
 
 @or_compiled
