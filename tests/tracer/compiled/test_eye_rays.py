@@ -1,13 +1,15 @@
-"""Kernels of eye rays: the triangles that NumPy and embreex find, and the corners that NumPy suspects."""
+"""Kernels of eye rays: the triangles that embreex finds, the corners that NumPy suspects, the passes that it writes."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer import compiled
 from viewcam_addon.tracer.rays import corners, visibility
 from viewcam_addon.tracer.rays.corners import Corners
+from viewcam_addon.tracer.rays.surface import PASSES, unwritten, write_triangles
 from viewcam_addon.tracer.render import Tracer
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -60,3 +62,54 @@ def test_rays_that_are_off_by_a_thousandth_meet_something_else(random_scene):
     found = visibility.first_triangles(eye._triangles, 0.0, 1e37, x, y)
     moved = visibility.first_triangles.plain(eye._triangles, 0.0, 1e37, x * 1.001, y)
     assert (found != moved).any()
+
+
+def written(function, tracer, x, y, names):
+    """What a function writes of these rays."""
+    passes = unwritten(x.shape, names)
+    for values in passes.values():
+        values[...] = np.nan
+    function(tracer._surface, passes, tracer._visibility.first(x, y), x, y)
+    return passes
+
+
+@settings(max_examples=15)
+@given(seed=SEEDS, names=st.lists(st.sampled_from(list(PASSES)), min_size=1, unique=True))
+def test_passes_are_those_that_numpy_writes_bit_for_bit(random_scene, seed, names):
+    scene = random_scene(seed)
+    tracer = Tracer(scene)
+    x, y = rays(scene.camera, np.random.default_rng(seed), 300, 2.0)
+    kernel, plain = (written(function, tracer, x, y, names) for function in (write_triangles, write_triangles.plain))
+    for name in names:
+        differ = (kernel[name] != plain[name]).any(axis=-1)  # nothing is left unwritten: NaN differs from itself
+        assert not differ.any(), f"{name} differs in {differ.sum()} of {len(x)} rays"
+
+
+def test_a_face_without_normals_shows_its_own_in_both(make_mesh, make_scene):
+    mesh = make_mesh([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], [[0, 1, 2]], corner_normals=np.zeros((1, 3, 3)))
+    tracer = Tracer(make_scene(Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 100, 100, 100), mesh))
+    for function in (write_triangles, write_triangles.plain):
+        normal = written(function, tracer, np.zeros(1), np.zeros(1), ["Normal"])["Normal"]
+        assert np.array_equal(normal, [[0, 0, 1]])
+
+
+def test_passes_that_are_no_planes_are_written_all_the_same(random_scene):
+    scene = random_scene(1)
+    tracer = Tracer(scene)
+    x, y = rays(scene.camera, np.random.default_rng(1), 100, 2.0)
+    interleaved = {"Position": np.full((len(x), 3), np.nan, np.float32)}
+    write_triangles(tracer._surface, interleaved, tracer._visibility.first(x, y), x, y)
+    assert np.array_equal(interleaved["Position"], written(write_triangles, tracer, x, y, ["Position"])["Position"])
+
+
+def test_a_kernel_that_takes_another_triangle_is_found_out(random_scene):
+    scene = random_scene(0)
+    tracer = Tracer(scene)
+    x, y = rays(scene.camera, np.random.default_rng(0), 300, 2.0)
+    found = tracer._visibility.first(x, y)
+    assert (found > 0).any()
+    right, wrong = unwritten(x.shape), unwritten(x.shape)
+    write_triangles(tracer._surface, right, found, x, y)
+    write_triangles(tracer._surface, wrong, np.where(found > 0, found - 1, found), x, y)
+    for name in ("Depth", "Position", "Normal", "UV", "Magnitude", "Facing"):
+        assert (right[name] != wrong[name]).any(), name

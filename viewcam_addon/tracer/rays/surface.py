@@ -105,9 +105,9 @@ def _write_uv(target: Float32s, where: Where, triangles: Triangles, triangle: In
         target[where] = 0
         return
     third = 1.0 - first - second
-    a, b, c = (gather(uvs[corner : corner + 2], triangle) for corner in (0, 3, 6))
+    a, b, c = (gather(uvs[corner : corner + 2], triangle) for corner in (0, 2, 4))
     _store(target, where, (a[axis] * third + b[axis] * first + c[axis] * second for axis in range(2)))
-    target[..., 2][where] = gather(uvs[2], triangle)
+    target[..., 2][where] = 1 if triangles.mapped is None else gather(triangles.mapped, triangle)
 
 
 def _normal(triangles: Triangles, planes: Planes, triangle: Indices, first: Floats, second: Floats) -> Float32s:
