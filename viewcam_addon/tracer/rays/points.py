@@ -288,7 +288,7 @@ def _corner_colours(triangles: Triangles) -> NDArray[np.float32]:
 
 def _interpolated(corners: NDArray[np.float32], first: Floats, second: Floats) -> Floats:
     """(k, n) of what the (3k, n) values at the corners are at the barycentric coordinates."""
-    a, b, c = corners.reshape(3, -1, corners.shape[1])
+    a, b, c = corners.reshape(3, len(corners) // 3, corners.shape[1])
     values = a * (1.0 - first - second)
     values += b * first
     values += c * second
