@@ -2,7 +2,8 @@
 
 The noise that a difference is held against is the larger of what a pixel or tile shows itself and what its 3 × 3 neighbourhood
 shows in the mean. By itself, a place that rare light has missed so far looks both darker and quieter than it is, and an edge
-that crosses the corner of a pixel may have been missed by all of its samples.
+that crosses the corner of a pixel may have been missed by all of its samples. Where neighbours share their light, a tile shows
+less noise than its sum has: then what the samples of its pixels tell counts as well.
 
 What is within rounding is no difference: a pixel's is taken beyond the law's maximum, a tile's sum beyond the law's 99th
 percentile of each pixel, since a mean of rounding errors can't exceed what nearly all of them stay below. Nor is what Cycles'
@@ -134,7 +135,9 @@ def _answers(sides: Sides, allowed: Allowance, freedom: tuple[int, int], level: 
     for size in SIZES[1:]:
         total, square, allowance = (noise.tile_sums(values, size) for values in (difference, difference**2, rounding))
         allowance = allowance + shift * sum(np.abs(noise.tile_sums(slope, size)) for slope in across)
-        errors = _errors(_beyond(total, allowance), np.maximum(square, noise.mean_around(square)))
+        square = np.maximum(square, noise.mean_around(square))
+        square = np.maximum(square, noise.tile_sums(np.broadcast_to(sides.shared, difference.shape), size))
+        errors = _errors(_beyond(total, allowance), square)
         yield size, errors, np.full(errors.shape, noise.sign_critical(noise.sidak(level, errors.size)))
 
 

@@ -9,7 +9,7 @@ which on edges depends on the number of samples. So their products with Diffuse 
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,7 @@ class Sides:
 
     spread : variance of `test`, which is a mean, from the test pictures' differences; inf where there is one picture only.
     variance : variance of `reference`; inf where it is not known. broken : (height, width) bool, no number on one side or both;
-    there both are 0.
+    there both are 0. shared : variance of `reference` that its pixels may have shared with their neighbours, or 0.
     """
 
     name: str
@@ -42,6 +42,7 @@ class Sides:
     variance: Array
     spread: Array
     broken: NDArray[np.bool_]
+    shared: Array | float = 0.0
 
     @property
     def difference(self) -> Array:
@@ -79,12 +80,16 @@ def all_sides(reference: Image, tests: Sequence[Image]) -> Iterator[Sides]:
                 f"{image.source} has {image.size[0]} × {image.size[1]} pixels and {reference.source} "
                 f"{reference.size[0]} × {reference.size[1]}: compare pictures of the same size"
             )
-    combined = _sides("Combined", reference, tests, _variance(reference))
+    variance = _variance(reference)
+    # Where there are as many samples as a wanted error takes, neighbours' noise is not independent, but adds up to what it was.
+    shared = np.where(np.isfinite(variance), variance, 0.0) if "Sample Count" in reference.passes else 0.0
+    combined = replace(_sides("Combined", reference, tests, variance), shared=shared)
     yield combined
     known = quiet(combined.reference, combined.variance)
     for name in QUANTITIES[1:]:
         if all(_has(image, name) for image in (reference, *tests)):
-            yield _sides(name, reference, tests, np.where(known, 0.0, np.inf))
+            sides = _sides(name, reference, tests, np.where(known, 0.0, np.inf))
+            yield replace(sides, shared=shared) if name in _TIMES_COLOUR else sides
 
 
 def quiet(values: Array, variance: Array) -> NDArray[np.bool_]:

@@ -13,14 +13,19 @@ from .interior import CORRECTED, correction
 
 Mask = NDArray[np.bool_]
 
+# So many times the variance of light that is shared counts as its error's square: what bends the light by less than the noise
+# of the window before, which is twice as much, can not be told from noise.
+_HIDDEN = 4.0
+
 
 class Band:
     """n pixels.
 
     sums : over none of their samples. rows : of the picture. width : of the picture.
 
-    taken : (n,) samples of each. variance : (3, n), of their mean. spread : (n,), the samples' own. apart : (n,), how far their
-    halves' means are apart, as a variance. The latter two are means over the channels.
+    taken : (n,) samples of each. variance : (3, n), of their mean. The rest, (n,), are means over the channels. spread : of the
+    samples themselves. apart : how far the means of their halves are apart, as a variance. doubt : the variance of their mean,
+    with what they may have missed.
     """
 
     def __init__(self, sums: Sums, film: Film, rows: range, width: int) -> None:
@@ -29,7 +34,8 @@ class Band:
         self.shape = len(rows), width
         self._film, self._sums = film, sums
         self.taken = np.ones(sums.count, np.int32)
-        self._variance, self._spread, self._apart = (np.zeros((*rows, sums.count)) for rows in ((3,), (), ()))
+        self._variance = np.zeros((3, sums.count))
+        self._spread, self._apart, self._doubt = np.zeros((3, sums.count))
 
     def add_centres(self, part: slice, light: Light) -> None:
         """Add the light at some pixels' centres."""
@@ -86,7 +92,8 @@ class Band:
         factor = gather(efficiency(own, apart).ravel(), active)
         put(self._variance, active, gather(self._variance, active) * factor)
         unseen = gather(missed(self._spread.reshape(self.shape), samples).ravel(), active)
-        return np.maximum(gather(own.ravel(), active) * factor, unseen)
+        self._doubt[active] = np.maximum(gather(own.ravel(), active) * factor, unseen)
+        return gather(self._doubt, active)
 
     def shared(self, which: Mask, error: float) -> Floats:
         """(n,): the variances of the pixels' means, if those of `which` share the light that falls on them.
@@ -114,14 +121,18 @@ class Band:
         light = np.concatenate([without_colour(sums.mean(kind), colour) for kind in kinds])
         # Of one kind, if both have as much.
         share = np.where(which, bright, 1.0) * (self._film.exposure**2 * len(kinds))
-        own = self._variance.mean(axis=0)
         tolerance = error / np.sqrt(share[which].max(initial=1e-300))
         shape = (-1, *self.shape)
-        mean, left = shared(light.reshape(shape), (own / share).reshape(self.shape), which.reshape(self.shape), tolerance)
-        left = left.ravel() * share
-        better = which & (left < own)
+        mean, left = shared(
+            light.reshape(shape),
+            (self._variance.mean(axis=0) / share).reshape(self.shape),
+            which.reshape(self.shape),
+            tolerance,
+        )
+        left = left.ravel() * (share * _HIDDEN)
+        better = which & (left < self._doubt)
         more = np.where(better, mean.reshape(light.shape) - light, 0.0) * np.tile(colour, (len(kinds), 1))
-        return more, np.where(better, left, own), kinds
+        return more, np.where(better, left, self._doubt), kinds
 
     def write(self, passes: Passes, part: slice) -> None:
         """Write some pixels' passes."""
