@@ -41,7 +41,7 @@ def scene(make_lit, make_mesh, make_spheres, ball):
 
 
 def pictures(tracer):
-    return tracer.render(), tracer.render_light("direct", 2, 3)
+    return tracer.render(), tracer.render_light("direct", 2, 3), tracer.render_light("direct", 4, 3, error=0.01)
 
 
 def differing(kept, fresh):
@@ -82,7 +82,7 @@ def test_only_moving_the_camera_refits_and_zooming_makes_nothing_anew(scene, mon
     first = Tracer(scene)
     pictures(first)
     assert len(built) == 2, "what the eye sees, and what casts shadows"
-    planes, lit = first._planes, first._lit
+    planes, lit, joints = first._planes, first._lit, first._outlines.joints
     zoomed = Tracer(replace(copied(scene), camera=camera(distance=200.0, width=50)), kept=first)
     pictures(zoomed)
     assert zoomed._planes is planes and zoomed._lit is lit
@@ -90,8 +90,10 @@ def test_only_moving_the_camera_refits_and_zooming_makes_nothing_anew(scene, mon
     moved = Tracer(replace(scene, camera=camera(0.05)), kept=zoomed)
     pictures(moved)
     assert (len(built), len(refitted)) == (4, 0), "once, so that it can be refitted"
-    pictures(Tracer(replace(scene, camera=camera(0.08)), kept=moved))
+    moved = Tracer(replace(scene, camera=camera(0.08)), kept=moved)
+    pictures(moved)
     assert (len(built), len(refitted)) == ((4, 2) if embree._EMBREE else (6, 0))
+    assert moved._joints is joints
 
 
 def test_a_second_picture_of_light_prepares_nothing_again(scene):

@@ -17,6 +17,7 @@ from ..errors import InputError
 from .arrays import Floats, Indices
 from .rays.centres import Centres
 from .rays.ellipsoids import ellipsoids_of
+from .rays.joints import Joints
 from .rays.outlines import Outlines
 from .rays.surface import Passes, Surface, unwritten
 from .rays.tables import made_once
@@ -49,14 +50,16 @@ class Tracer:
         self._scene, self._camera = scene, scene.camera
         self._threads = threads or os.cpu_count() or 1
         self._view = View(scene.camera)
-        former = None if kept is None else kept._used_up()
-        if former is None or not same_things(scene, former._scene):
+        self._joints = None  # of the triangles, where another tracer found them
+        former = None if kept is None else kept._used_up(scene)
+        if former is None:
             self._triangles = triangles_of(_placed(scene, Mesh), self._view, self._threads)
         elif self._view.is_same(former._view):
             self._take_over(former)
             return
         else:
-            self._triangles = former._triangles.moved(self._view)
+            self._triangles, self._joints = former._triangles.moved(self._view), former._known_joints()
+            del former  # before there are as many tables again
         self._ellipsoids = ellipsoids_of(_placed(scene, Spheres), self._view)
         self._planes = Planes(self._triangles, self._view)
         self._see()
@@ -68,6 +71,7 @@ class Tracer:
     def _take_over(self, former: "Tracer") -> None:
         """Everything of a tracer whose camera stands where this one's does, before the same things."""
         self._triangles, self._ellipsoids, self._planes = former._triangles, former._ellipsoids, former._planes
+        self._joints = former._known_joints()
         if self._scene.clip == former._scene.clip:
             self._visibility, self._surface = former._visibility, former._surface
         else:
@@ -75,12 +79,16 @@ class Tracer:
         if "_lit" in vars(former) and same_materials(self._scene, former._scene):
             self._lit = former._lit
 
-    def _used_up(self) -> "Tracer":
-        """All that this tracer has, in another one; this one can't trace any more."""
+    def _used_up(self, scene: Scene) -> "Tracer | None":
+        """All that this tracer has, in another one, if the same things are in `scene`; this one can't trace any more."""
         heir = object.__new__(Tracer)
         vars(heir).update(vars(self))
         vars(self).clear()
-        return heir
+        return heir if same_things(scene, heir._scene) else None
+
+    def _known_joints(self) -> Joints | None:
+        outlines = vars(self).get("_outlines")
+        return self._joints if outlines is None else vars(outlines).get("joints")
 
     @made_once
     def _lit(self) -> Any:
@@ -91,7 +99,8 @@ class Tracer:
 
     @made_once
     def _outlines(self) -> Outlines:
-        return Outlines(self._scene, self._view, self._triangles, self._planes, self._ellipsoids, self._visibility)
+        things = self._triangles, self._planes, self._ellipsoids
+        return Outlines(self._scene, self._view, *things, self._visibility, joints=self._joints)
 
     def render(self, watcher: Watcher | None = None) -> Passes:
         """Pass name → (height, width, channels) float32, rows from the bottom: the surfaces at the pixel centres."""
