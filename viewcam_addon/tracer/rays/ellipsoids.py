@@ -25,7 +25,7 @@ from ..scene import Object, Spheres
 from .view import View
 
 # |f|² − 1 below which the textbook's discriminant, rounded by 2⁻⁵³ |f|² cos² at most, is not worse than the perpendicular's.
-_NEAR = 1.0
+NEAR = 1.0
 # Spheres whose squares come near the ends of float64's range, 1e±135 in size, are not seen: no pass of float32 could show them.
 _MOST = 2.0**900
 
@@ -71,7 +71,7 @@ class Ellipsoids:
         beside = [f - foot * d for f, d in zip(centre, direction, strict=True)]
         discriminant = 1.0 - dot(beside, beside)
         tangent = gather(self.tangent, sphere)
-        near = tangent < _NEAR
+        near = tangent < NEAR
         if near.any():
             discriminant = np.where(near, along * foot - tangent, discriminant)
         met = (discriminant >= 0) & (along > 0)

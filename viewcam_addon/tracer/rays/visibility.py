@@ -3,18 +3,13 @@
 A primitive is a number, triangles first and spheres after them; −1 is none. Rays are points (x, y) of the view plane at
 distance 1 (see view.py). Only depths within the clip range count: what lies before it is looked through.
 
-**Spheres** are found through cards: each hides behind a rectangle that covers its outline and stands before it, parallel to
-the view plane. Embree gives the first card, float64 the exact sphere behind it, and the ray goes on behind that card until the
-next one stands behind the best hit. Since cards are parallel and no two share a depth, all rays meet them in the same order
-and step over none. Rejected: closed boxes round the spheres, where a ray that continues behind one's entry skips, by float32's
-rounding, the entries of others. Spheres that reach behind the eye's plane have no card and are tested by all rays of a tile
-that they touch.
+**Spheres** are found in cards.py. Those that reach behind the eye's plane are tested by all rays of a tile that they touch.
 
 **Wide triangles**, which reach a hundred times as far as they come near to the eye, as a ground plane does, are tested by all
 rays in float64: Embree would round their distance with that of their corners, and show what stands behind them, or hides what
 lies on them.
 
-embreex knows no nearest distance, so a ray starts where the clip range does, or behind the last card.
+embreex knows no nearest distance, so a ray starts where the clip range does.
 
 **Corners** of triangles may let a ray slip through that passes close by (corners.py). Then four rays round it are traced
 too, and where three of them meet something before what the ray itself met, the nearest of that is what it meets.
@@ -27,16 +22,15 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Indices, gather
 from ..compiled.standing import or_compiled
+from .cards import cards_of
 from .corners import REACH, Corners
 from .edges import Edges
 from .ellipsoids import Ellipsoids
-from .embree import EmbreeScene, embree_scene, scene_of, unit_of
+from .embree import EmbreeScene, scene_of, unit_of
 from .triangles import Planes, Triangles
 
-# Cards overlap the outline by 16 units of float32's last place, more than card and ray are rounded by, and follow one another
-# as far apart in depth, so that a ray that starts half-way between two has one surely behind it and the other before it.
+# By how much bounds are widened, relative to 1 and themselves.
 _MARGIN = 2.0**-20
-_CARD_SPACING = 2.0**-20
 _FAR = 1e37
 
 # Where rays beside one that passes close by a corner go: eleven units of float32's last place away, twice as far as Embree was
@@ -67,7 +61,7 @@ def visibility(triangles: Triangles, planes: Planes, ellipsoids: Ellipsoids, cli
 
 
 class Embree:
-    """Embree finds triangles and cards in float32; depths are compared in float64."""
+    """Embree finds triangles and spheres in float32; depths are compared in float64."""
 
     def __init__(self, triangles: Triangles, planes: Planes, ellipsoids: Ellipsoids, clip: tuple[float, float]) -> None:
         self._planes, self._ellipsoids = planes, ellipsoids
@@ -82,10 +76,8 @@ class Embree:
         hidden[planes.wide] = True  # from Embree
         self._triangles = scene_of(triangles, hidden, self._unit)
         self._without_card = int(np.count_nonzero(np.isinf(ellipsoids.bounds[0])))
-        if ellipsoids.count > self._without_card:
-            self._cards, self._card_depth = _cards(ellipsoids, self._without_card, self._unit)
-        else:
-            self._cards = None
+        behind_cards = ellipsoids.count > self._without_card
+        self._cards = cards_of(ellipsoids, self._without_card, self._unit) if behind_cards else None
 
     def close(self, x: Floats, y: Floats) -> Indices | None:
         return self._corners.near_pixels(x, y)
@@ -148,23 +140,10 @@ class Embree:
             depth = self._ellipsoids.depth(np.array([sphere]), x, y)
             nearer = (depth < nearest) & (depth >= self._start)
             nearest[nearer], found[nearer] = depth[nearer], self._triangle_count + sphere
-        if self._cards is None:
-            return
-        directions = _directions(x, y)
-        rays, origin = np.arange(len(x)), np.zeros(len(x), np.float32)  # origins in Embree's unit
-        while len(rays):
-            ahead = directions[rays]
-            limits = np.minimum(nearest[rays] * self._unit - origin, _FAR).astype(np.float32)
-            card = self._cards.run(ahead * origin[:, None], ahead, dists=limits) >> 1
-            behind = np.flatnonzero(card >= 0)
-            rays, card = rays[behind], card[behind].astype(np.intp)
-            sphere = card + self._without_card
-            depth = self._ellipsoids.depth(sphere, x[rays], y[rays])
-            nearer = (depth < nearest[rays]) & (depth >= self._start)
-            nearest[rays[nearer]], found[rays[nearer]] = depth[nearer], self._triangle_count + sphere[nearer]
-            origin = self._card_depth[card] * np.float32(1 + _CARD_SPACING / 2)
-            onwards = np.flatnonzero(origin < nearest[rays] * self._unit)
-            rays, origin = rays[onwards], origin[onwards]
+        if self._cards is not None:
+            spheres = self._cards.before(nearest, self._start, x, y)
+            met = np.flatnonzero(spheres >= 0)
+            found[met] = self._triangle_count + spheres[met]
 
 
 @or_compiled
@@ -184,24 +163,6 @@ def _embree_unit(triangles: Triangles, ellipsoids: Ellipsoids) -> float:
     """Embree's units in one of the world."""
     extents = np.abs(ellipsoids.positions).max(axis=0, initial=0.0) + ellipsoids.reach
     return unit_of(max(triangles.extent, extents.max(initial=0.0)))
-
-
-def _cards(ellipsoids: Ellipsoids, first: int, unit: float) -> tuple["EmbreeScene", NDArray[np.float32]]:
-    """A card of two triangles before each sphere from `first` on, and the cards' depths, in Embree's unit."""
-    nearest = ellipsoids.nearest[first:] * unit
-    place = np.arange(len(nearest)) * _CARD_SPACING
-    # The greatest depths that are not behind the spheres and grow by the spacing from card to card.
-    depth = np.exp(np.minimum.accumulate((np.log(nearest) - place)[::-1])[::-1] + place) * (1 - _CARD_SPACING)
-    depth = depth.astype(np.float32)
-    x0, x1, y0, y1 = ellipsoids.bounds[:, first:]
-    margin = _MARGIN * (1 + np.abs([x0, x1, y0, y1]).max(axis=0))
-    x0, x1, y0, y1 = x0 - margin, x1 + margin, y0 - margin, y1 + margin
-    vertices = np.empty((len(depth), 4, 3))
-    vertices[:, :, 0] = np.stack([x0, x1, x1, x0], axis=1) * depth[:, None]
-    vertices[:, :, 1] = np.stack([y0, y0, y1, y1], axis=1) * depth[:, None]
-    vertices[:, :, 2] = depth[:, None]
-    corners = np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(len(depth))[:, None, None]
-    return embree_scene(vertices.reshape(-1, 3), corners.reshape(-1, 3).astype(np.int32)), depth
 
 
 class Plain:
