@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Floats, Indices, cross, dot, gather
 from ..scene.lamps import Lamp, Spot, Sun
@@ -22,7 +23,7 @@ from .joints import Edges, Joints, corners_of
 from .lamp_outlines import cone, place_of
 from .marks import Strokes
 from .points import Points, Surfaces
-from .rims import Rims, rims_lit_by_sun, rims_seen_from
+from .rims import BULGE, Rims, rims_lit_by_sun, rims_seen_from
 from .space import Space
 from .strokes import Canvas
 from .triangles import Planes, Triangles
@@ -85,7 +86,7 @@ class Light:
 class Straight:
     """Edges of triangles as curves. starts, ends, third : (3, n), the third corners. largest : (n,), of their coordinates."""
 
-    pieces, is_rim = 1, False
+    pieces, is_round, is_rim = 1, False, False
 
     def __init__(self, starts: Floats, ends: Floats, third: Floats) -> None:
         self._starts, self._ways, self._third = starts, ends - starts, third
@@ -108,7 +109,7 @@ class Straight:
 class Round:
     """Outlines of spheres as curves. primitives : (n,) of the spheres."""
 
-    pieces, is_rim = _CIRCLE, False
+    pieces, is_round, is_rim = _CIRCLE, True, False
 
     def __init__(self, rims: Rims, centres: Floats, primitives: Indices) -> None:
         self._rims, self._centres, self.primitives = rims, centres, primitives
@@ -197,12 +198,10 @@ class ShadowOutlines:
             pieces = pieces.some(self._may_matter(light, curves, pieces))
             if not len(pieces.which):
                 return
-            shadows = list(self._shadows(light, curves, pieces))
-            cuts = np.ones(len(pieces.which), np.intp) if last else self._cuts(curves, pieces, shadows)
+            parts = [*self._own(curves, pieces), *self._shadows(light, curves, pieces)]
+            cuts = np.ones(len(pieces.which), np.intp) if last else self._cuts(curves, pieces, parts)
             done = cuts == 1
-            own = [] if curves.is_rim else [(np.arange(len(cuts)), *(curves.at(pieces.which, part) for part in pieces.ends()))]
-            parts = [tuple(values[..., done[some]] for values in (some, *ends)) for some, *ends in own + shadows]
-            yield from self._lit(light, curves, pieces, parts)
+            yield from self._lit(light, curves, pieces, [part.of(done) for part in parts])
             if done.all():
                 return
             pieces = pieces.cut(np.flatnonzero(~done), cuts[~done])
@@ -230,8 +229,15 @@ class ShadowOutlines:
             ahead, _ = light.ways(past)
         return _points(past, ahead, gather(curves.primitives, pieces.which)), ahead
 
-    def _shadows(self, light: Light, curves: Curves, pieces: "_Pieces") -> Iterator[tuple[Indices, Floats, Floats]]:
-        """Which of the pieces have a shadow, and from where to where it goes, (3, k) each."""
+    def _own(self, curves: Curves, pieces: "_Pieces") -> "list[_Part]":
+        """Where pieces lie themselves."""
+        if curves.is_rim:
+            return []
+        start, end, middle = (curves.at(pieces.which, part) for part in (*pieces.ends(), pieces.first + pieces.width / 2))
+        return [_Part(np.arange(len(pieces.which)), start, end, middle, np.inf)]
+
+    def _shadows(self, light: Light, curves: Curves, pieces: "_Pieces") -> "Iterator[_Part]":
+        """Where their shadows lie."""
         if not (light.casts_shadow or curves.is_rim):
             return
         points, ahead = self._starts(light, curves, pieces)
@@ -248,10 +254,10 @@ class ShadowOutlines:
                 return
             primitive, which = found[met], which[met]
             reached, _ = self._surfaces.met(primitive, gather(some.position, met), gather(ahead, which))
-            yield (
-                which,
-                *(_on_planes(reached, gather(end, which), gather(way, which)) for end, way in zip(ends, ways, strict=True)),
+            start, end = (
+                _on_planes(reached, gather(end, which), gather(way, which)) for end, way in zip(ends, ways, strict=True)
             )
+            yield _Part(which, start, end, reached.position, STEP * (1 + 2 * _OVERLAP))
             goes_on = gather(self._shadowless, primitive) if light.casts_shadow else np.ones(len(met), bool)
             if not goes_on.any():
                 return
@@ -265,39 +271,64 @@ class ShadowOutlines:
             normals[:, which] = gather(reached.normal, onwards)
             points = replace(points, position=position, normal=normals, primitive=primitives, offset=offsets)
 
-    def _cuts(self, curves: Curves, pieces: "_Pieces", shadows: list[tuple[Indices, Floats, Floats]]) -> Indices:
-        """Into how many parts pieces are to be cut."""
+    def _cuts(self, curves: Curves, pieces: "_Pieces", parts: "list[_Part]") -> Indices:
+        """Into how many pieces each is to be cut."""
         cuts = pieces.lengths(curves) / (self._pixel * COARSE)
-        for which, starts, ends in shadows:
-            stroke, first, last = self._canvas.clipped(starts, ends)
-            length = np.hypot(last[0] - first[0], last[1] - first[1])
-            np.maximum.at(cuts, which[stroke], length / (STEP * (1 + 2 * _OVERLAP)))
-        return np.clip(np.ceil(np.minimum(np.nan_to_num(cuts), _MOST_AT_ONCE)), 1, _MOST_AT_ONCE).astype(np.intp)
+        for part in parts:
+            stroke, first, last = self._canvas.clipped(part.starts, part.ends)
+            way = last - first
+            length = np.hypot(way[0], way[1])
+            middle = self._canvas.place(gather(part.middles, stroke)) - first
+            with np.errstate(all="ignore"):
+                bulge = np.where(
+                    length > BULGE, np.abs(middle[0] * way[1] - middle[1] * way[0]) / length, np.hypot(middle[0], middle[1])
+                )
+            # A half of an arc bulges a fourth.
+            wanted = np.maximum(length / part.longest, np.sqrt(np.nan_to_num(bulge) / BULGE))
+            np.maximum.at(cuts, part.which[stroke], wanted)
+        return np.clip(np.ceil(np.minimum(cuts, _MOST_AT_ONCE)), 1, _MOST_AT_ONCE).astype(np.intp)
 
-    def _lit(
-        self, light: Light, curves: Curves, pieces: "_Pieces", parts: list[tuple[Indices, Floats, Floats]]
-    ) -> Iterator[Strokes]:
+    def _lit(self, light: Light, curves: Curves, pieces: "_Pieces", parts: "list[_Part]") -> Iterator[Strokes]:
         """Those strokes that lie in the picture and whose pieces the lamp shines on."""
-        shown = []
-        for which, starts, ends in parts:
-            stroke = self._canvas.clipped(starts, ends)[0]
-            shown.append((which[stroke], gather(starts, stroke), gather(ends, stroke)))
+        shown = [part.at(self._canvas.clipped(part.starts, part.ends)[0]) for part in parts]
         asked = np.zeros(len(pieces.which), bool)
-        for which, _, _ in shown:
-            asked[which] = True
+        for part in shown:
+            asked[part.which] = True
         lit = np.ones(len(asked), bool)
         if light.casts_shadow and not curves.is_rim and asked.any():
             some = np.flatnonzero(asked)
             for farther in (0.0, _ASIDE):
-                asked = pieces.some(some)
-                points, ahead = self._starts(light, curves, asked, farther * asked.lengths(curves))
+                again = pieces.some(some)
+                points, ahead = self._starts(light, curves, again, farther * again.lengths(curves))
                 dark = self._space.blocked(points, -ahead, light.ways(points.position)[1])
                 lit[some] = ~dark
                 some = some[dark]
-        for which, starts, ends in shown:
-            kept = np.flatnonzero(lit[which])
-            starts, ends = gather(starts, kept), gather(ends, kept)
-            yield Strokes(starts, ends, starts, np.minimum(starts[2], ends[2]) * (1 - _NEARER))
+        for part in shown:
+            part = part.of(lit)
+            nearest = np.minimum(part.starts[2], part.ends[2]) * (1 - _NEARER)
+            yield Strokes(part.starts, part.ends, part.starts, nearest, BULGE * curves.is_round)
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """What pieces of curves make in the picture, themselves or their shadows.
+
+    which : (n,) pieces. starts, ends, middles : (3, n). longest : pixels that it may be long.
+    """
+
+    which: Indices
+    starts: Floats
+    ends: Floats
+    middles: Floats
+    longest: float
+
+    def at(self, some: Indices) -> "_Part":
+        places = (gather(points, some) for points in (self.starts, self.ends, self.middles))
+        return _Part(self.which[some], *places, self.longest)
+
+    def of(self, pieces: NDArray[np.bool_]) -> "_Part":
+        """What some of the pieces make. pieces : whether, for each."""
+        return self.at(np.flatnonzero(pieces[self.which]))
 
 
 @dataclass(frozen=True, eq=False)
