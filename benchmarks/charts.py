@@ -173,7 +173,10 @@ def draw(chart: Chart, path: Path, command: str) -> None:
         _draw_axes(chart, axes)
         for curve, colour, marker in _styles(chart):
             _draw_curve(curve, axes, colour, marker)
-        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1), frameon=False, labelspacing=0.8, fontsize=8.5)
+        order = {_label(curve): place for place, curve in enumerate(chart.curves)}
+        lines = sorted(axes.get_legend_handles_labels()[0], key=lambda line: order[line.get_label()])
+        look = {"frameon": False, "labelspacing": 0.8, "handlelength": 3, "fontsize": 8.5}
+        axes.legend(handles=lines, loc="upper left", bbox_to_anchor=(1.01, 1), **look)
         figure.text(0.03, (caption - 0.5) * up, "\n".join(reading), va="top", linespacing=1.35)
         figure.text(0.03, 0.16 * up, f"{command}\n{machine()}", color=_FAINT, fontsize=7.5, linespacing=1.4)
         figure.savefig(temporary, format="svg", metadata={"Date": None, "Title": chart.title, "Description": chart.reading})
@@ -211,11 +214,13 @@ def _draw_axes(chart: Chart, axes: Axes) -> None:
 
 
 def _decades(chart: Chart) -> tuple[float, float]:
-    """The powers of ten about all that has a logarithm, and one more at each end for zeros and for crosses."""
-    values = np.concatenate([np.asarray(curve.y, float) for curve in chart.curves])
-    values = values[np.isfinite(values) & (values > 0)]
+    """The powers of ten about all that has a logarithm, and one more below for zeros and above for crosses."""
+    drawn = np.concatenate([chart.levels, *(np.asarray(curve.y, float) for curve in chart.curves)])
+    values = drawn[np.isfinite(drawn) & (drawn > 0)]
     low, high = (values.min(), values.max()) if len(values) else (chart.tie, chart.tie)
-    return 10.0 ** (math.floor(math.log10(low)) - 1), 10.0 ** (math.ceil(math.log10(high)) + 1)
+    below, above = bool((drawn == 0).any()), not np.isfinite(drawn).all()
+    first, last = math.floor(math.log10(low)) - below, math.ceil(math.log10(high)) + above
+    return 10.0**first, 10.0 ** max(last, first + 1)
 
 
 def _styles(chart: Chart) -> list[tuple[Curve, str, str]]:
@@ -235,12 +240,15 @@ def _draw_curve(curve: Curve, axes: Axes, colour: str, marker: str) -> None:
     style = {"linewidth": 2.8, "markersize": 5} if curve.ours else {"linewidth": 1.2, "markersize": 4}
     before = sum(line.get_color() == colour and line.get_marker() == marker for line in axes.lines)
     dash = {"linestyle": "--" if curve.limit else _OURS_LINES[before % len(_OURS_LINES)]}
-    name = textwrap.fill(curve.name, 27)
-    axes.plot(x, shown, color=colour, marker=marker, label=name, clip_on=False, **style, **dash)
+    axes.plot(x, shown, color=colour, marker=marker, label=_label(curve), clip_on=False, **style, **dash)
     if curve.spread:
         axes.hlines(shown, *np.transpose(curve.spread), color=colour, linewidth=1.2, alpha=0.6)
     if not answered.all():
         axes.plot(x[~answered], np.full((~answered).sum(), high), "x", color=colour, markersize=6, clip_on=False)
+
+
+def _label(curve: Curve) -> str:
+    return textwrap.fill(curve.name, 25)
 
 
 def run(

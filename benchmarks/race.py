@@ -8,10 +8,12 @@ import functools
 import multiprocessing
 import os
 import statistics
+import sys
 import time
 from collections import defaultdict
 from collections.abc import Callable, Mapping
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any
 from unittest import mock
 
@@ -36,7 +38,9 @@ class Contestant:
         context = multiprocessing.get_context("spawn")
         self._here, there = context.Pipe()
         self._process = context.Process(target=_serve, args=(there, prepare, arguments))
-        with mock.patch.dict(os.environ, environment or {}):
+        # Blender, as a module of this process, would add folders of its own in which another bpy stands.
+        search_path = [path for path in sys.path if "bpy" not in Path(path).parts]
+        with mock.patch.dict(os.environ, environment or {}), mock.patch.object(sys, "path", search_path):
             self._process.start()
         there.close()
         self.names: list[str] = self._answer()

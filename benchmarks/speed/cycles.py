@@ -18,6 +18,8 @@ from .. import race, suzannes
 
 SCENES = Path(__file__).resolve().parents[2] / "sample_scenes"
 
+_SUZANNES = {"suzannes": suzannes.six, "three suzannes": suzannes.three}
+
 # Of a pixel, where a noise threshold is asked for: Blender's own most.
 _MOST_SAMPLES = 4096
 
@@ -27,11 +29,12 @@ def prepare(
 ) -> dict[str, race.Runner]:
     """In Blender's process: write the scene, and offer renders.
 
-    scene_name : of a sample scene, or "suzannes". path : where the tracer's scene goes. box_filter : instead of the scene's.
+    scene_name : of a sample scene, "suzannes" for six of them or "three suzannes". path : where the tracer's scene goes.
+    box_filter : instead of the scene's.
     """
     viewcam_addon.register()
-    if scene_name == "suzannes":
-        suzannes.six(*size)
+    if scene_name in _SUZANNES:
+        _SUZANNES[scene_name](*size)
     else:
         job.open_blend(SCENES / f"{scene_name}.blend")
     scene, ledger = bpy.context.scene, Ledger()
@@ -39,10 +42,12 @@ def prepare(
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = *size, 100
     if box_filter:
         scene.cycles.pixel_filter_type = "BOX"
-    exported = export_scene(scene, view_layer, camera_object, ledger, lit=True)
+    exported = export_scene(scene, view_layer, camera_object, ledger, lit=level != "geometry")
     scene_file.write(exported, path)
 
-    def light(sampling: str, parameter: float, seed: int) -> cycles.Light:
+    def light(sampling: str, parameter: float, seed: int) -> cycles.Light | None:
+        if level == "geometry":
+            return None
         samples = int(parameter) if sampling == "samples" else _MOST_SAMPLES
         return cycles.Light(exported.film, NO_BOUNCES if level == "direct" else exported.bounces, samples, seed)
 

@@ -19,7 +19,7 @@ Sides = dict[str, dict[str, Runner]]
 class Still:
     """A picture. wanted : error → how many times as fast as the rivals, as (picture, job), None where nothing is asked for.
 
-    reference : side → samples of each half, of two sides.
+    pair : the sides that make the reference. seconds : that each of its four halves may take.
     """
 
     name: str
@@ -27,13 +27,14 @@ class Still:
     level: str
     size: tuple[int, int]
     wanted: Mapping[float, tuple[float | None, float | None]]
-    reference: Mapping[str, int]
+    pair: tuple[str, str]
+    seconds: float
 
     def small(self) -> "Still":
-        """A sixteenth of the pixels, and a reference of seconds."""
+        """A sixteenth of the pixels, ten times the error, and a reference of seconds."""
         width, height = self.size
-        reference = {side: min(samples, 128) for side, samples in self.reference.items()}
-        return dataclasses.replace(self, size=(width // 4, height // 4), reference=reference)
+        wanted = {10 * error: ratios for error, ratios in self.wanted.items()}
+        return dataclasses.replace(self, size=(width // 4, height // 4), wanted=wanted, seconds=self.seconds / 50)
 
 
 @dataclass(frozen=True)

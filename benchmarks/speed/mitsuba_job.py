@@ -1,4 +1,4 @@
-"""Mitsuba's whole job from a fresh process, and how it loads a scene. Nothing of this project is imported: that would take time.
+"""Mitsuba's whole job from a fresh process, and how it loads a scene. What this project would import takes time: nothing is.
 
 python mitsuba_job.py FOLDER VARIANT SAMPLER SAMPLES SEED THREADS OUT.exr
 """

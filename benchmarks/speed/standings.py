@@ -4,9 +4,13 @@ import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from ..charts import Chart, Curve
 from .contest import Method, Point, Tracks
+
+# How much smaller an error a curve may be followed on to.
+_FURTHEST = 4
 
 
 @dataclass(frozen=True)
@@ -50,10 +54,11 @@ class Standing:
 class Contested(Chart):
     """A chart of error against time, judged by its standings.
 
-    measured : all points, for JSON. judged : whether what is wanted and missed counts.
+    standings : each with ratio, wanted, told() and figures(). measured : all points, for JSON. judged : whether what is wanted
+    and missed counts.
     """
 
-    standings: tuple[Standing, ...] = ()
+    standings: tuple[Any, ...] = ()
     measured: Mapping[str, object] | None = None
     judged: bool = True
 
@@ -77,6 +82,8 @@ def reached(method: Method, points: Sequence[Point], target: float) -> Reached |
         if other.error <= target:
             return Reached(method, _followed(one, other, target), False)
     if len(known) < 2 or not (known[-1].error < known[-2].error and known[-1].time > known[-2].time):
+        return None
+    if target < known[-1].error / _FURTHEST:
         return None
     return Reached(method, _followed(*known[-2:], target), True)
 

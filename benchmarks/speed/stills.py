@@ -23,12 +23,13 @@ EVERY_OTHER = POWERS[::2]
 ERRORS = (0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0005)
 NOISE_THRESHOLDS = (0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002)
 
+_PAIR = (COMPILED, CYCLES)
 _DIRECT = {0.003: (8, 3), 0.001: (8, 3)}
 STILLS = (
-    Still("suzannes", "Six Suzannes, one sun", "direct", (640, 360), _DIRECT, {COMPILED: 2048, CYCLES: 1024}),
-    Still("studio", "Studio still", "direct", (640, 360), _DIRECT, {COMPILED: 4096, CYCLES: 2048}),
-    Still("spheres", "Sphere field", "direct", (640, 360), _DIRECT, {COMPILED: 4096, CYCLES: 2048}),
-    Still("cornell", "Cornell box", "path", (480, 480), {0.01: (1, 1)}, {COMPILED: 1024, CYCLES: 1024}),
+    Still("suzannes", "Six Suzannes, one sun", "direct", (640, 360), _DIRECT, _PAIR, 60),
+    Still("studio", "Studio still", "direct", (640, 360), _DIRECT, _PAIR, 150),
+    Still("spheres", "Sphere field", "direct", (640, 360), _DIRECT, _PAIR, 200),
+    Still("cornell", "Cornell box", "path", (480, 480), {0.01: (1, 1)}, _PAIR, 40),
 )
 OURS = (
     Method(f"{COMPILED}, adaptive", COMPILED, "error", ERRORS, ours=True, job=True),
@@ -60,7 +61,7 @@ def charts(still: Still, quick: bool) -> tuple[Chart, ...]:
         if still.name in SMALL:
             sides[ALONE] = start(tracer.prepare, scene, still.level, threads, False, environment=VARIANTS[PLAIN])
             methods += (WITHOUT_EMBREE,)
-        reference = references.reference(still.name, scene, sides, still.reference)
+        reference = references.reference(still.name, scene, sides, still.pair, still.seconds)
         return figures.charts(still, figures.WHOLE, sides, methods, reference, quick, Path(folder) / "picture.exr")
 
 

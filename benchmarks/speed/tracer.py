@@ -30,9 +30,12 @@ def prepare(scene_path: Path, level: str, threads: int, embree: bool = True) -> 
     def picture(sampling: str, parameter: float, seed: int, path: Path) -> float:
         with _sampler(sampling):
             started = time.perf_counter()
-            passes = tracer.render_light(level, seed=seed, **_effort(sampling, parameter))
+            if level == "geometry":
+                passes = tracer.render()
+            else:
+                passes = tracer.render_light(level, seed=seed, **_effort(sampling, parameter))
             seconds = time.perf_counter() - started
-        image.write(path, image.Image({"Combined": passes["Combined"]}, scene.camera))
+        image.write(path, image.Image(passes, scene.camera))
         return seconds
 
     def whole(sampling: str, parameter: float, seed: int, path: Path) -> float:
