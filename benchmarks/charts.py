@@ -111,7 +111,11 @@ class Chart:
                     sentences.append(f"{self.title}: at {x:.3g} {ours.name} is off by {error:.3g}, {name} by {best:.3g}")
         return sentences
 
-    def figures(self) -> dict[str, dict[str, list[float | None]]]:
+    def lines(self) -> list[str]:
+        """What the shell says beside the reading."""
+        return []
+
+    def figures(self) -> dict[str, Any]:
         """What the chart shows, for JSON: null where a method has no answer."""
         return {
             curve.name: {axis: [_or_none(value) for value in getattr(curve, axis)] for axis in "xy"} for curve in self.curves
@@ -291,7 +295,7 @@ def run_all(
         for chart in sweeps[sweep](quick):
             name = f"{subject}-{chart.name}"
             draw(chart, folder / f"{name}.svg", f"viewcam chart {subject} --only {sweep}{' --quick' if quick else ''}")
-            print(f"{name}: {chart.reading}", flush=True)
+            print(f"{name}: {chart.reading}", *chart.lines(), sep="\n", flush=True)
             measured[name] = chart.figures()
             behind += chart.behind()
     for sentence in behind:

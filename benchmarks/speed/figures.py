@@ -79,7 +79,8 @@ def _chart(
 ) -> Chart:
     tracks = {method: _with_half(method, points, reference) for method, points in tracks.items()}
     wanted = dict(zip(still.wanted, ratios, strict=True))
-    found = standings.standings(tracks, wanted, reference.error)
+    times = standings.times(tracks, wanted, reference.error)
+    found = standings.standings(times, wanted)
     told = [standing.told() for standing in found]
     told += [f"to {error:g} nobody can tell" for error in wanted if error not in {standing.target for standing in found}]
     width, height = still.size
@@ -94,6 +95,7 @@ def _chart(
         tie=0.0,
         levels=tuple(wanted),
         standings=found,
+        times=times,
         measured={"methods": standings.measured(tracks), "reference": reference.figures()},
         judged=not quick,
     )

@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from ..charts import Chart, Curve
@@ -24,6 +24,9 @@ class Reached:
     def told(self) -> str:
         return f"{self.method.name} {self.seconds:.3g} s{' (its curve followed on)' if self.beyond else ''}"
 
+    def figures(self) -> dict[str, object]:
+        return {"method": self.method.name, "seconds": self.seconds, "beyond its points": self.beyond}
+
 
 @dataclass(frozen=True)
 class Standing:
@@ -43,10 +46,7 @@ class Standing:
         return f"to {self.target:g} {self.ours.told()}, {self.rival.told()}: {self.ratio:.2f} times as fast{wanted}"
 
     def figures(self) -> dict[str, object]:
-        sides = {
-            who: {"method": reached.method.name, "seconds": reached.seconds, "beyond its points": reached.beyond}
-            for who, reached in (("ours", self.ours), ("rival", self.rival))
-        }
+        sides = {"ours": self.ours.figures(), "rival": self.rival.figures()}
         return {"error": self.target, **sides, "ratio": self.ratio, "wanted": self.wanted}
 
 
@@ -54,20 +54,32 @@ class Standing:
 class Contested(Chart):
     """A chart of error against time, judged by its standings.
 
-    standings : each with ratio, wanted, told() and figures(). measured : all points, for JSON. judged : whether what is wanted
-    and missed counts.
+    standings : each with ratio, wanted, told() and figures(). times : error → when each method reaches it. measured : all
+    points, for JSON. judged : whether what is wanted and missed counts.
     """
 
     standings: tuple[Any, ...] = ()
-    measured: Mapping[str, object] | None = None
+    times: Mapping[float, tuple[Reached, ...]] = field(default_factory=dict)
+    measured: Mapping[str, object] = field(default_factory=dict)
     judged: bool = True
 
     def behind(self) -> list[str]:
         missed = (standing for standing in self.standings if standing.wanted is not None and standing.ratio < standing.wanted)
         return [f"{self.title}: {standing.told()}" for standing in missed if self.judged]
 
+    def lines(self) -> list[str]:
+        """A table of the times of all methods, the fastest first."""
+        lines = []
+        for target, all_reached in self.times.items():
+            lines += [
+                f"  to {target:g}",
+                *(f"    {each.told()}" for each in sorted(all_reached, key=lambda each: each.seconds)),
+            ]
+        return lines
+
     def figures(self) -> dict[str, object]:
-        return {**(self.measured or {}), "standings": [standing.figures() for standing in self.standings]}
+        times = {f"{target:g}": [each.figures() for each in all_reached] for target, all_reached in self.times.items()}
+        return {**self.measured, "times": times, "standings": [standing.figures() for standing in self.standings]}
 
 
 def reached(method: Method, points: Sequence[Point], target: float) -> Reached | None:
@@ -94,20 +106,28 @@ def _followed(one: Point, other: Point, target: float) -> float:
     return one.time * (other.time / one.time) ** share
 
 
-def standings(tracks: Tracks, wanted: Mapping[float, float | None], reference_error: float) -> tuple[Standing, ...]:
-    """One for each error of `wanted` (error → times as fast) that the reference is good enough to tell."""
+def times(tracks: Tracks, targets: Iterable[float], reference_error: float) -> dict[float, tuple[Reached, ...]]:
+    """Error → when each method reaches it, of those errors that the reference is good enough to tell."""
+    return {
+        target: tuple(each for method, points in tracks.items() if (each := reached(method, points, target)))
+        for target in targets
+        if target >= reference_error
+    }
+
+
+def standings(times: Mapping[float, tuple[Reached, ...]], wanted: Mapping[float, float | None]) -> tuple[Standing, ...]:
+    """One for each error that both sides reach. wanted : error → times as fast."""
     found = []
-    for target, ratio in wanted.items():
-        ours = _best(tracks, target, (method for method in tracks if method.ours))
-        rival = _best(tracks, target, (method for method in tracks if method.rival))
-        if ours and rival and target >= reference_error:
-            found.append(Standing(target, ours, rival, ratio))
+    for target, all_reached in times.items():
+        ours = _best(each for each in all_reached if each.method.ours)
+        rival = _best(each for each in all_reached if each.method.rival)
+        if ours and rival:
+            found.append(Standing(target, ours, rival, wanted[target]))
     return tuple(found)
 
 
-def _best(tracks: Tracks, target: float, methods: Iterable[Method]) -> Reached | None:
-    """The fastest; whoever does not reach the target only where nobody does."""
-    all_reached = [each for method in methods if (each := reached(method, tracks[method], target))]
+def _best(all_reached: Iterable[Reached]) -> Reached | None:
+    """The fastest; whoever's curve had to be followed on only where all had to be."""
     return min(all_reached, key=lambda each: (each.beyond, each.seconds), default=None)
 
 

@@ -104,26 +104,34 @@ def test_the_best_of_each_side_is_compared_and_one_that_gets_there_is_better_tha
         fast: power_law(1.0, -0.5),
         short: power_law(0.5, -0.5, (1.0, 4.0)),
     }
-    (standing,) = standings.standings(tracks, {0.02: 8.0}, reference_error=0.001)
+    (standing,) = standings.standings(standings.times(tracks, [0.02], reference_error=0.001), {0.02: 8.0})
     assert standing.rival.method == fast
     assert standing.ratio == pytest.approx(10.0)
 
 
 def test_nobody_is_ahead_where_the_reference_can_not_tell():
     tracks = {OURS: power_law(0.1, -0.5), CYCLES: power_law(1.0, -0.5)}
-    assert standings.standings(tracks, {0.02: 8.0}, reference_error=0.03) == ()
+    assert standings.times(tracks, [0.02], reference_error=0.03) == {}
 
 
 def contested(wanted, judged=True):
     tracks = {OURS: power_law(0.1, -0.5), CYCLES: power_law(1.0, -0.5)}
-    found = standings.standings(tracks, {0.02: wanted}, 0.0)
+    times = standings.times(tracks, [0.02], 0.0)
+    found = standings.standings(times, {0.02: wanted})
     curves = standings.curves(tracks, 0.0)
-    return Contested("name", "A title", "x", "y", curves, "Read this.", 0.0, standings=found, judged=judged)
+    return Contested("name", "A title", "x", "y", curves, "Read this.", 0.0, standings=found, times=times, judged=judged)
 
 
 def test_a_ratio_that_is_less_than_wanted_is_told_in_a_sentence_with_both_times():
     (sentence,) = contested(11.0).behind()
     assert "A title: to 0.02 ours 2.5 s, Cycles 25 s: 10.00 times as fast, wanted 11" in sentence
+
+
+def test_the_times_of_all_methods_are_told_as_a_table_and_as_figures():
+    chart = contested(9.0)
+    assert chart.lines() == ["  to 0.02", "    ours 2.5 s", "    Cycles 25 s"]
+    assert [each["method"] for each in chart.figures()["times"]["0.02"]] == ["ours", "Cycles"]
+    assert chart.figures()["standings"][0]["ratio"] == pytest.approx(10.0)
 
 
 @pytest.mark.parametrize(("wanted", "judged"), [(9.0, True), (None, True), (11.0, False)])
