@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from viewcam_addon import exact
+from viewcam_addon import exact, pinhole
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole, basis, canonical_axes
 
@@ -157,6 +157,19 @@ def test_many_poses_at_once_give_the_axes_of_each_alone(poses):
     for i, (eye, look_at, up) in enumerate(poses):
         alone = Pinhole(eye, look_at, up, 500, 64, 48).basis()
         assert all(np.array_equal(a[0, i], b) for a, b in zip(together, alone, strict=True)), f"pose {i} differs"
+
+
+@pytest.mark.parametrize("count", [6, 7, 8, 20, 21])
+def test_how_many_poses_are_computed_at_a_time_changes_no_bit(monkeypatch, count):
+    """With poses at both sides of every border that take the way of singular ones."""
+    rng = np.random.default_rng(count)
+    eye, look_at, up = rng.normal(size=(3, count, 3))
+    for border in range(0, count, 7):
+        for i in (border - 1, border):
+            up[i] = eye[i] - look_at[i]
+    whole = np.array(basis(eye, look_at, up))
+    monkeypatch.setattr(pinhole, "_AT_ONCE", 7)
+    assert np.array_equal(whole, basis(eye, look_at, up))
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,7 @@ Pair = tuple[exact.Vector, exact.Vector]  # of vectors: high + low, unevaluated
 
 # Numbers between these two can be squared, or multiplied by an axis, without care.
 _SMALLEST_SAFE, _LARGEST_SAFE = 2.0**-500, 2.0**500
+_AT_ONCE = 8192  # poses: their numbers stay in a core's cache; more take twice as long each
 
 
 @dataclass(frozen=True)
@@ -273,13 +274,15 @@ def basis(eye: ArrayLike, look_at: ArrayLike, up: ArrayLike) -> tuple[Array, Arr
         return tuple(np.array(axis) for axis in _axes_of_one(pose[2], *_view_of_one(*pose)))
     leading, (e, l, up) = e.shape[:-1], (vector.reshape(-1, 3) for vector in (e, l, up))
     _check_poses(e, l, up)
+    axes, safe = np.empty((3, *e.shape)), np.empty(len(e), bool)
     with np.errstate(all="ignore"):  # what leaves float64's range here is done again, one by one, below
-        axes, safe = _basis_of_many(*(tuple(vector.T) for vector in (e, l, up)))
-    u, v, w = (np.stack(axis, axis=-1) for axis in axes)
+        for some in (slice(first, first + _AT_ONCE) for first in range(0, len(e), _AT_ONCE)):
+            poses = (tuple(vector[some].T.copy()) for vector in (e, l, up))
+            axes[:, some].swapaxes(1, 2)[:], safe[some] = _basis_of_many(*poses)
     for i in np.flatnonzero(~safe):
         pose = [tuple(vector[i].tolist()) for vector in (e, l, up)]
-        u[i], v[i], w[i] = _axes_of_one(pose[2], *_view_of_one(*pose))
-    return tuple(axis.reshape(*leading, 3) for axis in (u, v, w))
+        axes[:, i] = _axes_of_one(pose[2], *_view_of_one(*pose))
+    return tuple(axes.reshape(3, *leading, 3))
 
 
 def canonical_axes(up: Triple, looking_down: bool) -> tuple[Triple, Triple, Triple]:
@@ -287,8 +290,7 @@ def canonical_axes(up: Triple, looking_down: bool) -> tuple[Triple, Triple, Trip
 
     With up = (0, 1, 0) these are the text's: down u = (0, 0, 1), v = (1, 0, 0), w = (0, 1, 0); up u = (1, 0, 0), v = (0, 0, 1),
     w = (0, −1, 0). For any other up they are the text's, carried by the smallest rotation that takes (0, 1, 0) to up (for an up
-    in the lower half-space, after half a turn about the x axis). With up = (0, 0, 1) that is (x, y, z) → (x, −z, y), Blender's
-    world.
+    in the lower half-space, after half a turn about the x axis). In Blender, up = (0, 0, 1), that is (x, y, z) → (x, −z, y).
 
     Raises
     ------
