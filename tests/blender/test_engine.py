@@ -12,6 +12,7 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon import image
 from viewcam_addon.blender import engine, job, tracing, versions
+from viewcam_addon.tracer import render as renders
 from viewcam_addon.tracer.render import render
 
 LEVELS = ("geometry", "direct", "path")
@@ -91,6 +92,38 @@ def test_every_pass_is_what_the_tracer_computes_bit_for_bit(lit, write, level):
             assert np.array_equal(values, expected[name]), f"{name} differs by up to {np.abs(values - expected[name]).max()}"
         elif name != "Combined":
             assert not values.any(), f"level {level} has no {name}, and it is not empty"
+
+
+@pytest.fixture
+def prepared(monkeypatch):
+    """Of each tracer that is made, whether there was one before it, and whether the camera had moved."""
+    made = []
+    real = renders.Tracer.__init__
+
+    def init(self, scene, threads=None, kept=None):
+        before = None if kept is None else kept._triangles
+        real(self, scene, threads, kept)
+        made.append("new" if before is None else "same" if self._triangles is before else "moved")
+
+    monkeypatch.setattr(renders.Tracer, "__init__", init)
+    return made
+
+
+@pytest.mark.parametrize("persistent", [False, True])
+def test_persistent_data_keeps_what_frames_share(persistent, lit, prepared, tmp_path):
+    ask_for_all_passes(lit.view_layers[0])
+    lit.frame_end = 3
+    for frame in (1, 3):
+        lit.camera.location.x = frame / 4
+        lit.camera.keyframe_insert("location", frame=frame)
+    lit.render.use_persistent_data = persistent
+    lit.render.filepath = str(tmp_path / "frame")
+    bpy.ops.render.render(animation=True)
+    assert prepared == (["new", "same", "moved", "same", "moved", "same"] if persistent else ["new", "same"] * 3)
+    for frame in (1, 2, 3):
+        lit.frame_set(frame)
+        found = channels(tmp_path / f"frame{frame:04}.exr")
+        assert np.array_equal(written("Combined", found), traced()["Combined"]), f"frame {frame} is another picture"
 
 
 def test_another_seed_is_another_picture_and_another_number_of_threads_is_not(lit, write):

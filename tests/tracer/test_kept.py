@@ -8,7 +8,7 @@ import pytest
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.compiled import standing
 from viewcam_addon.tracer.rays import embree
-from viewcam_addon.tracer.render import Tracer
+from viewcam_addon.tracer.render import Keeper, Tracer, render
 from viewcam_addon.tracer.scene import Mesh
 from viewcam_addon.tracer.scene.film import NO_BOUNCES
 from viewcam_addon.tracer.scene.lamps import Point, Sun
@@ -202,6 +202,16 @@ def test_a_tracer_whose_structures_were_taken_over_traces_no_more(scene):
     Tracer(replace(scene, camera=camera(0.2)), kept=before)
     with pytest.raises(AttributeError):
         before.render()
+
+
+def test_a_keeper_hands_each_scene_what_the_one_before_had(scene):
+    keeper, frames = Keeper(), [replace(scene, camera=camera(turn)) for turn in (0.0, 0.1, 0.2)]
+    shown = [render(frame, "direct", 2, keeper=keeper) for frame in frames]
+    triangles = keeper._tracer._triangles
+    assert triangles.moving
+    assert not differing(shown, [render(frame, "direct", 2) for frame in frames])
+    render(frames[-1], keeper=keeper)
+    assert keeper._tracer._triangles is triangles
 
 
 def test_scenes_are_the_same_by_content(scene):

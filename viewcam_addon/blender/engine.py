@@ -5,6 +5,9 @@ What goes wrong is reported, which ends `blender -b` with status 1 and without a
 
 Level `geometry` knows no light: its Combined shows surfaces as a lamp at the eye would, by the cosine between ray and normal.
 
+What is prepared for one picture serves all passes of a frame, and the next frames as well where Blender's "Persistent Data" is
+on, which keeps the engine.
+
 Rejected: drawing in the viewport, which wants a quick preview where this engine is a reference; a result that is begun once and
 updated, which Blender would copy whole for each band of rows.
 """
@@ -51,6 +54,7 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
     bl_use_preview = False
     bl_use_eevee_viewport = True
     bl_use_shading_nodes_custom = False
+    _keeper = None
 
     def update_render_passes(self, scene: bpy.types.Scene, renderlayer: bpy.types.ViewLayer) -> None:
         for name in _asked_for(scene, renderlayer):
@@ -65,6 +69,9 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
             self.report({"ERROR"}, datablocks.sentence(error))
         except Exception as error:  # Blender would print a traceback and call the render finished
             self.report({"ERROR"}, f"Virtual Pinhole: {errors.bug(error)}")
+        finally:
+            if not depsgraph.scene.render.use_persistent_data:  # else Blender keeps this engine for the next frame
+                self._keeper = None
 
     def _render(self, depsgraph: bpy.types.Depsgraph) -> None:
         self.update_stats("", "Reading the scene")
@@ -105,8 +112,9 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
         """Trace the scene: the passes of some rows, and which they are. What is where is that at the pixels' centres."""
 
         def traced(level: str) -> Iterator[tuple[Passes, range]]:
-            return tracing.bands(scene, level, settings.samples, settings.seed, threads, self.test_break)
+            return tracing.bands(scene, level, settings.samples, settings.seed, threads, self.test_break, self._keeper)
 
+        self._keeper = self._keeper or tracing.keeper()
         settings, threads = depsgraph.scene_eval.virtual_pinhole_reference, depsgraph.scene.render.threads
         centres: Passes = {}
         if level != _GEOMETRY and set(GEOMETRY_PASSES) & set(_asked_for(depsgraph.scene_eval, depsgraph.view_layer)):

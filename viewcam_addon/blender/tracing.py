@@ -11,9 +11,13 @@ import threading
 import traceback
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING
 
 from ..tracer.rays.surface import Passes
 from ..tracer.scene import Scene
+
+if TYPE_CHECKING:
+    from ..tracer.render import Keeper
 
 _PATIENCE = 0.05
 """Seconds between two looks at whether it is cancelled."""
@@ -33,23 +37,37 @@ class _Watcher:
         return self.cancelled.is_set()
 
 
+def keeper() -> "Keeper":
+    """What `bands` needs to keep what pictures share."""
+    from ..tracer.render import Keeper  # brings Embree, which Blender's start need not wait for
+
+    return Keeper()
+
+
 def bands(
-    scene: Scene, level: str, samples: int, seed: int, threads: int, is_cancelled: Callable[[], bool]
+    scene: Scene,
+    level: str,
+    samples: int,
+    seed: int,
+    threads: int,
+    is_cancelled: Callable[[], bool],
+    keeper: "Keeper | None" = None,
 ) -> Iterator[tuple[Passes, range]]:
     """Trace a scene, and give what is finished: the passes of the whole picture, and the rows of them that are new.
 
     is_cancelled : asked in the caller's thread. When it says so, or when the caller takes no more, tracing ends at once.
+    keeper : as in tracer.render.render.
 
     Raises
     ------
     InputError
         as tracer.render.render does.
     """
-    from ..tracer.render import render  # brings Embree, which Blender's start need not wait for
+    from ..tracer.render import render
 
     watcher = _Watcher()
     with ThreadPoolExecutor(1, "viewcam") as pool:
-        tracing = pool.submit(render, scene, level, samples, seed, threads, watcher)
+        tracing = pool.submit(render, scene, level, samples, seed, threads, watcher, keeper=keeper)
         tracing.add_done_callback(lambda _: watcher.bands.put(None))
         try:
             while not is_cancelled():

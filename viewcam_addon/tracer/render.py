@@ -29,7 +29,7 @@ from .scene.film import LEVELS, SAMPLES
 from .scene.sameness import same_materials, same_things
 from .tiles import Stopped, Watcher, over_threads, tiles
 
-__all__ = ["Passes", "Stopped", "Tracer", "Watcher", "render"]
+__all__ = ["Keeper", "Passes", "Stopped", "Tracer", "Watcher", "render"]
 
 # Pixels. Small tiles make threads wait for one another's Python: with two, 16384 take a seventh longer than 65536, although
 # their arrays stay in a core's cache. A small picture is cut into several tiles for each thread.
@@ -137,9 +137,10 @@ class Tracer:
             trace_centres(passes, columns, rows)
             illumination.trace(passes, np.arange(tile.start, tile.stop), columns, rows, check)
 
-        if error is None:
+        if error is None or samples == 1:
             largest = illumination.largest_tile
-            return self._picture(dark, trace, min(largest, SMALLEST_TILE), largest, watcher)
+            blank = dark if error is None else counted
+            return self._picture(blank, trace, min(largest, SMALLEST_TILE), largest, watcher)
         primitives = np.empty((self._camera.height, self._camera.width), np.int32)
 
         def see(passes: Passes, tile: range) -> None:
@@ -214,6 +215,19 @@ class Tracer:
         return columns, rows
 
 
+class Keeper:
+    """Of scenes that are traced one after the other, what the next one may share with the one before: see `Tracer`."""
+
+    def __init__(self) -> None:
+        self._tracer: Tracer | None = None
+
+    def tracer(self, scene: Scene, threads: int | None = None) -> Tracer:
+        """That of a scene. The one before can't trace any more."""
+        former, self._tracer = self._tracer, None
+        self._tracer = Tracer(scene, threads, former)
+        return self._tracer
+
+
 def render(
     scene: Scene,
     level: str = "geometry",
@@ -222,12 +236,14 @@ def render(
     threads: int | None = None,
     watcher: Watcher | None = None,
     error: float | None = None,
+    keeper: Keeper | None = None,
 ) -> Passes:
     """Trace the scene: pass name → (height, width, channels) float32, rows from the bottom.
 
     level : one of film.LEVELS. samples : of each pixel, at the levels of light; the only one is at its centre.
     seed : another for other noise. error : the standard error that each pixel's Combined may have, scene-linear: the root of
     the mean of its channels' variances. Then pixels get as few samples as that takes, `samples` at most; Sample Count tells.
+    keeper : of what this scene may share with others that it has traced, or will.
 
     Raises
     ------
@@ -243,7 +259,7 @@ def render(
     if error is not None and not 0.0 < error < math.inf:
         raise InputError(f"the error is {error}: give a number above 0")
     try:
-        tracer = Tracer(scene, threads)
+        tracer = (keeper or Keeper()).tracer(scene, threads)
         if level == "geometry":
             return tracer.render(watcher)
         return tracer.render_light(level, samples, seed, watcher, error)
