@@ -266,7 +266,7 @@ def test_sums_over_tiles_stay_within_their_noise(name):
 
 
 def test_sums_that_nothing_gives_back_would_be_found(monkeypatch):
-    monkeypatch.setattr(sharing, "_spread", lambda planes, growths: np.zeros_like(planes))
+    monkeypatch.setattr(sharing, "_spread", lambda light, growths: np.zeros_like(light))
     assert abs(worst_sums("parabola")[0]) > 1
 
 

@@ -32,7 +32,6 @@ from numpy.typing import NDArray
 from ..arrays import Float32s, Floats
 
 Booleans = NDArray[np.bool_]
-_Growth = tuple[int, float, Booleans, Booleans]
 
 # The gap of each growth, and what it leaves of the variance along its axis: that of a tent over that of one half as wide.
 _GROWTHS = ((1, 0.375), (2, 0.4583), (4, 0.4886), (8, 0.4971))
@@ -69,39 +68,42 @@ def shared(light: Floats, variance: Floats, interior: Booleans, tolerance: float
 def _added(light: Float32s, noise: Float32s, pooled: Float32s, interior: Booleans, enough: float) -> tuple[Float32s, Float32s]:
     """What windows add to the light, and the variance that is left.
 
-    light : (c, h, w), 0 where it is not interior. noise, pooled : (h, w), what _noise tells. enough : of variance.
+    light : (c, h, w), 0 where it is not interior. noise, pooled : (h, w), what _noise tells. Light and noise change in place.
+    enough : of variance.
     """
-    planes, added, left = np.concatenate([light, noise[None]]), np.zeros_like(light), pooled
+    added, left = np.zeros_like(light), pooled
     growing, grown = interior & (pooled > enough) & (pooled < np.inf), np.zeros_like(interior)
     growths = []
     for gap, kept, down, across in _growths(interior):
         if not growing.any():
             break
-        before = planes.copy()
-        reached = _grow(planes, gap, kept, down, across)
-        growths.append((gap, kept, down, across))
-        step = planes[:-1] - before[:-1]
-        square, taken = _square(step), before[-1] - planes[-1]
-        growing &= reached & (square <= _STRAY**2 * (pooled if gap == 1 else before[-1]))
+        growths.append((gap, down, across))
+        before, known = light.copy(), noise.copy()
+        reached = _grow(light, gap, down, across)
+        # Of a variance the squares of the weights count, which are as 1 to 4 to 1.
+        _grow(noise[None], gap, down, across, 1 / 6, kept)
+        step, taken = light - before, known - noise
+        square = _square(step)
+        growing &= reached & (square <= _STRAY**2 * (pooled if gap == 1 else known))
         growing &= _around(np.where(growing, square - _EXPLAINED * taken, 0.0), 4 * gap - 1) <= 0.0
         grown |= growing
         step *= growing
         added += step
-        left = np.where(growing, planes[-1] + np.maximum(square - taken, 0.0), left)
-        growing &= planes[-1] > enough
-    spread = _spread(np.concatenate([added, noise[None]]), growths) * grown
-    return added - spread[:-1], np.minimum(left + spread[-1], pooled)
+        left = np.where(growing, noise + np.maximum(square - taken, 0.0), left)
+        growing &= noise > enough
+    spread = _spread(added.copy(), growths) * grown
+    return added - spread, np.where(grown, np.minimum(left + noise, pooled), left)
 
 
-def _spread(planes: Float32s, growths: list[_Growth]) -> Float32s:
-    """Light and its variance in windows that have all grown, wherever they can, as far as any has."""
+def _spread(light: Float32s, growths: list[tuple[int, Booleans, Booleans]]) -> Float32s:
+    """Light in windows that have all grown wherever they can, as far as any has."""
     for growth in growths:
-        _grow(planes, *growth)
-    return planes
+        _grow(light, *growth)
+    return light
 
 
-def _growths(interior: Booleans) -> Iterator[_Growth]:
-    """Gap, what is left of the variance, and where all is interior from one gap before a pixel to one behind.
+def _growths(interior: Booleans) -> Iterator[tuple[int, float, Booleans, Booleans]]:
+    """Gap, what is left of the variance along an axis, and where all is interior from one gap before a pixel to one behind.
 
     The latter twice: (h − 2 gap, w) along columns, (h, w − 2 gap) along rows.
     """
@@ -112,8 +114,11 @@ def _growths(interior: Booleans) -> Iterator[_Growth]:
         yield gap, kept, down, across
 
 
-def _grow(planes: Float32s, gap: int, kept: float, down: Booleans, across: Booleans) -> Booleans:
-    """Let windows grow, in place; (h, w), which do. planes : (c + 1, h, w), light and its variance."""
+def _grow(planes: Float32s, gap: int, down: Booleans, across: Booleans, side: float = 0.25, kept: float = 1.0) -> Booleans:
+    """Let windows grow along columns and along rows, in place; (h, w), which do.
+
+    planes : (c, h, w). gap, down, across : see _growths. side : the weight of a pixel one gap away. kept : of the sum.
+    """
     grown = np.zeros(planes.shape[1:], bool)
     for turned, reached, which in ((planes, down, grown), (planes.swapaxes(1, 2), across.T, grown.T)):
         which[gap:-gap] |= reached
@@ -121,11 +126,10 @@ def _grow(planes: Float32s, gap: int, kept: float, down: Booleans, across: Boole
         bend = turned[:, : -2 * gap] + turned[:, 2 * gap :]
         bend -= middle
         bend -= middle
-        bend *= reached * np.float32(0.25)
-        # Of a variance the squares of the weights count, which are as 1 to 4 to 1.
-        bend[-1] *= np.float32(2 / 3)
+        bend *= reached * np.float32(side)
         middle += bend
-        middle[-1] *= np.where(reached, np.float32(kept), np.float32(1.0))
+        if kept != 1.0:
+            middle *= np.where(reached, np.float32(kept), np.float32(1.0))
     return grown
 
 
