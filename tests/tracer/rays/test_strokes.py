@@ -88,7 +88,7 @@ def test_arcs_lie_as_close_to_a_circle_as_they_say(canvas, seed, size):
     _, starts, ends = rims.arcs(canvas)
     pieces = canvas.pieces(starts, ends, MARGIN + BULGE)
     found = set(zip((pieces.pixel // WIDTH).tolist(), (pieces.pixel % WIDTH).tolist(), strict=True))
-    points = rims.at(np.zeros(200001, int), np.linspace(0, 2 * np.pi, 200001))
+    points = rims.at(np.zeros(200001, int), np.linspace(0, 1, 200001))
     crossed = pixels_of(canvas.place(points[:, points[2] > 1e-9])[:2])
     assert crossed <= found, f"{len(crossed - found)} of {len(crossed)} pixels are missed"
 
@@ -101,7 +101,7 @@ def test_rays_touch_a_sphere_in_its_rim(radius, seed):
     centre /= np.linalg.norm(centre)
     away = centre / radius
     rims = rims_seen_from(radius * np.eye(3)[:, :, None], centre, away, (away * away).sum(axis=0) - 1)
-    points = rims.at(np.zeros(7, int), np.linspace(0, 6, 7))
+    points = rims.at(np.zeros(7, int), np.linspace(0, 1, 7))
     off = np.linalg.norm(points - centre, axis=0) / radius - 1
     slant = (points * (points - centre)).sum(axis=0) / radius
     # Roundings of the point, of length 1, against the radius.

@@ -33,8 +33,9 @@ class Rims:
     def count(self) -> int:
         return self.middle.shape[1]
 
-    def at(self, which: Indices, angle: Floats) -> Floats:
-        """(3, k) points."""
+    def at(self, which: Indices, part: Floats) -> Floats:
+        """(3, k) points. part : (k,) of the way round."""
+        angle = part * (2 * np.pi)
         point = np.cos(angle) * gather(self.cosine, which)
         point += np.sin(angle) * gather(self.sine, which)
         point += gather(self.middle, which)
@@ -42,24 +43,26 @@ class Rims:
 
     def arcs(self, canvas: Canvas) -> tuple[Indices, Floats, Floats]:
         """Strokes along what may be seen of the rims: of which, and from and to where, (3, k) each."""
-        which = np.repeat(np.arange(self.count), _ARCS)
-        first = np.tile(np.arange(_ARCS) * (2 * np.pi / _ARCS), self.count)
-        width = 2 * np.pi / _ARCS
+        which, middle = np.repeat(np.arange(self.count), _ARCS), np.tile((np.arange(_ARCS) + 0.5) / _ARCS, self.count)
+        width = 1.0 / _ARCS
+        starts = self.at(which, middle - width / 2)
+        ends = np.roll(starts.reshape(3, -1, _ARCS), -1, axis=2).reshape(3, -1)
         done = []
         for halving in range(_HALVINGS + 1):
-            starts, middles, ends = (self.at(which, first + part * width) for part in (0.0, 0.5, 1.0))
+            middles = self.at(which, middle)
             seen = np.flatnonzero(~_outside(canvas, starts, middles, ends))
-            which, first = which[seen], first[seen]
+            which, middle = which[seen], middle[seen]
             starts, middles, ends = (gather(points, seen) for points in (starts, middles, ends))
             bulging = _bulging(canvas, starts, middles, ends) if halving < _HALVINGS else np.zeros(len(which), bool)
-            flat = np.flatnonzero(~bulging)
+            flat, round_ones = np.flatnonzero(~bulging), np.flatnonzero(bulging)
             done.append((which[flat], gather(starts, flat), gather(ends, flat)))
-            which, first = which[bulging], first[bulging]
-            if not len(which):
+            if not len(round_ones):
                 break
             width /= 2
-            which, first = np.repeat(which, 2), np.repeat(first, 2)
-            first[1::2] += width
+            starts, middles, ends = (gather(points, round_ones) for points in (starts, middles, ends))
+            starts, ends = np.concatenate([starts, middles], axis=1), np.concatenate([middles, ends], axis=1)
+            which = np.tile(which[round_ones], 2)
+            middle = np.concatenate([middle[round_ones] - width / 2, middle[round_ones] + width / 2])
         return tuple(np.concatenate(parts, axis=-1) for parts in zip(*done, strict=True))
 
 

@@ -116,7 +116,7 @@ class Round:
         self.count = rims.count
 
     def at(self, which: Indices, part: Floats) -> Floats:
-        return self._rims.at(which, part * (2 * np.pi))
+        return self._rims.at(which, part)
 
     def past(self, which: Indices, points: Floats, ahead: Floats, farther: Floats | float = 0.0) -> Floats:
         """As of straight ones."""
