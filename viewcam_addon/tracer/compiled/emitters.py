@@ -5,7 +5,7 @@ import numpy as np
 from ..light import emitters as plain
 from .lamps import OBJECT, colour_of, estimate, kind_of, limited, over, sample, sample_object, table_of
 from .packets import kernel
-from .vectors import inlined, put, scaled, taken
+from .vectors import dot, inlined, put, scaled, taken
 
 _LONGEST_ODDS, _BELOW_1 = plain.LONGEST_ODDS, plain.BELOW_1
 _NONE = np.empty(0)
@@ -16,7 +16,7 @@ def _by_estimate(table, estimates, position, normal, u):
     """Emitters._choose where there are few."""
     total = 0.0
     for lamp in range(len(table)):
-        estimates[lamp] = estimate(table[lamp], position, normal)
+        estimates[lamp] = estimate(table, lamp, position, normal)
         total = total + estimates[lamp] if lamp else estimates[lamp]
     wanted = u * total
     which, share, before, reached = 0, estimates[0], 0.0, estimates[0]
@@ -50,15 +50,14 @@ def _aim(table, chances, reached_chances, objects, positions, normals, shadings,
             which, odds, rest = _by_chance(chances, reached_chances, u[0, point])
         elif count > 1:
             which, odds, rest = _by_estimate(table, estimates, position, normal, u[0, point])
-        row = table[which]
-        if kind_of(row) == OBJECT:
+        if kind_of(table, which) == OBJECT:
             ahead, distance, density, picked = sample_object(
                 shapes, densities, primitives, reached, last, which - first_object, position, rest, u[1, point], u[2, point]
             )
             colour, factor = taken(colours, picked), over(density)
         else:
-            ahead, distance, factor = sample(row, position, taken(shadings, point), u[1, point], u[2, point])
-            colour, factor, density = colour_of(row), limited(factor), np.inf
+            ahead, distance, factor = sample(table, which, position, taken(shadings, point), u[1, point], u[2, point])
+            colour, factor, density = colour_of(table, which), limited(factor), np.inf
         brought = scaled(colour, factor)
         if count > 1:
             brought = scaled(brought, odds)
@@ -86,6 +85,31 @@ def aimed(emitters, points, u):
     _aim(emitters.rows, chances, reached, objects, *given, number, directions, distances, light, pdf)
     shadowed = np.broadcast_to(True, count) if emitters.shadowed.all() else emitters.shadowed[number]
     return plain.Aimed(directions, distances, light, pdf, shadowed)
+
+
+@kernel
+def _receive(normals, shadings, directions, pdf, share, weighed, factors, bright):
+    """Write which of the points may be lit; how many they are."""
+    count = 0
+    for point in range(factors.size):
+        ahead = taken(directions, point)
+        factor = dot(taken(shadings, point), ahead) / np.pi
+        lit = factor > 0 and dot(taken(normals, point), ahead) > 0
+        if weighed:
+            ratio = np.fmax(share[point] * factor / pdf[point], 0.0)
+            factor *= 1.0 / (1.0 + ratio * ratio)
+        factors[point] = factor
+        if lit:
+            bright[count] = point
+            count += 1
+    return count
+
+
+def received(points, aimed, share, weighed):
+    factors, bright = np.empty(points.count), np.empty(points.count, np.intp)
+    of_ways = _NONE if not weighed else aimed.pdf
+    count = _receive(points.normal, points.shading, aimed.direction, of_ways, share, weighed, factors, bright)
+    return factors, slice(None) if count == len(bright) else bright[:count]
 
 
 _NO_OBJECTS = (np.empty((12, 0)), _NONE, np.empty(0, np.intp), _NONE, np.empty(0, np.intp), np.empty((3, 0)))

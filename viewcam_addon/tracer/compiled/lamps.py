@@ -3,10 +3,10 @@
 import numpy as np
 from numba.extending import register_jitable
 
-from ..light import bulbs, glowing, lamps, plates, scattering
+from ..light import bulbs, glowing, lamps, plates
 from ..light.bulbs import Bulbs, Suns
 from ..light.plates import Rectangles
-from .vectors import axes_about, cosine_direction, difference, divided, dot, inlined, scaled, sum_of, turned
+from .vectors import arcsine, axes_about, cosine_direction, difference, divided, dot, inlined, scaled, sum_of, turned
 
 SUN, BULB, RECTANGLE, ELLIPSE, OBJECT = range(5)
 
@@ -18,8 +18,6 @@ _SPOT, _INVERSE, _EDGE, _SLOPE, _AXIS, _OPENING = 23, 24, 33, 34, 35, 38
 _COLUMNS = 39
 
 _one_minus_cosine, _risen = register_jitable(bulbs.one_minus_cosine), register_jitable(bulbs.risen)
-_on_rectangle = register_jitable(plates.on_rectangle)
-register_jitable(scattering.turned)
 _MOST, _LARGEST = lamps.MOST, np.finfo(np.float64).max
 _QUARTER_SPHERE, _LEAST_DENSITY, _LEAST_OF_A_WIDE_SPOT = (
     bulbs.QUARTER_SPHERE,
@@ -76,48 +74,52 @@ def _fill_plates(part, table):
 
 
 @inlined
-def kind_of(row):
-    return row[_KIND]
+def kind_of(table, lamp):
+    return table[lamp, _KIND]
 
 
 @inlined
-def colour_of(row):
-    return row[_COLOUR], row[_COLOUR + 1], row[_COLOUR + 2]
+def colour_of(table, lamp):
+    return table[lamp, _COLOUR], table[lamp, _COLOUR + 1], table[lamp, _COLOUR + 2]
 
 
 @inlined
-def _vector(row, column):
-    return row[column], row[column + 1], row[column + 2]
+def _vector(table, lamp, column):
+    return table[lamp, column], table[lamp, column + 1], table[lamp, column + 2]
 
 
 @inlined
-def _attenuation(row, ahead):
-    x, y, z = dot(_vector(row, _INVERSE), ahead), dot(_vector(row, _INVERSE + 3), ahead), dot(_vector(row, _INVERSE + 6), ahead)
+def _attenuation(table, lamp, ahead):
+    x, y, z = (
+        dot(_vector(table, lamp, _INVERSE), ahead),
+        dot(_vector(table, lamp, _INVERSE + 3), ahead),
+        dot(_vector(table, lamp, _INVERSE + 6), ahead),
+    )
     cosine = z / np.sqrt(x * x + y * y + z * z)
-    rise = np.minimum(np.maximum((cosine - row[_EDGE]) * row[_SLOPE], 0.0), 1.0)
+    rise = np.minimum(np.maximum((cosine - table[lamp, _EDGE]) * table[lamp, _SLOPE], 0.0), 1.0)
     return rise * rise * (3 - 2 * rise)
 
 
 @inlined
-def estimate(row, position, normal):
+def estimate(table, lamp, position, normal):
     """About how much a lamp or an object brings to a point."""
-    kind, reach, brightness = row[_KIND], row[_REACH], row[_BRIGHTNESS]
+    kind, reach, brightness = table[lamp, _KIND], table[lamp, _REACH], table[lamp, _BRIGHTNESS]
     if kind == SUN:
-        return _risen(dot(normal, _vector(row, _PLACE)), 1.0, reach) * brightness
-    way = difference(_vector(row, _PLACE), position)
+        return _risen(dot(normal, _vector(table, lamp, _PLACE)), 1.0, reach) * brightness
+    way = difference(_vector(table, lamp, _PLACE), position)
     squared = dot(way, way)
     distance = np.sqrt(squared)
     if kind == BULB:
         falloff = brightness / (_QUARTER_SPHERE * np.maximum(distance, reach) ** 2)
         light = (falloff if distance + reach > 0 else 0.0) * _risen(dot(normal, way), distance, reach)
-        if row[_SPOT]:
-            seen = _attenuation(row, divided(way, distance))
+        if table[lamp, _SPOT]:
+            seen = _attenuation(table, lamp, divided(way, distance))
             light *= np.fmax(seen, _LEAST_OF_A_WIDE_SPOT if reach > 0 else 0.0)
         return light
     if kind == OBJECT:
         risen = np.fmax(dot(normal, way) + reach, 0.0)
         return risen * (brightness / ((squared + reach * reach / 2) * (distance + reach)))
-    before = -dot(way, _vector(row, _NORMAL))
+    before = -dot(way, _vector(table, lamp, _NORMAL))
     if not before > 0:
         return 0.0
     farthest = distance + reach
@@ -126,20 +128,20 @@ def estimate(row, position, normal):
 
 
 @inlined
-def sample(row, position, shading, u, v):
+def sample(table, lamp, position, shading, u, v):
     """A direction to a lamp, how far off, and what its colour is multiplied with."""
-    kind = row[_KIND]
+    kind = table[lamp, _KIND]
     if kind == SUN:
-        ahead = _vector(row, _PLACE)
-        if row[_SIZE] > 0:
-            ahead, _ = _within_cone(ahead, row[_SIZE], u, v)
-        return ahead, np.inf, row[_RADIANCE]
-    way = difference(_vector(row, _PLACE), position)
+        ahead = _vector(table, lamp, _PLACE)
+        if table[lamp, _SIZE] > 0:
+            ahead, _ = _within_cone(ahead, table[lamp, _SIZE], u, v)
+        return ahead, np.inf, table[lamp, _RADIANCE]
+    way = difference(_vector(table, lamp, _PLACE), position)
     if kind == BULB:
-        return _sample_bulb(row, way, shading, u, v)
+        return _sample_bulb(table, lamp, way, shading, u, v)
     if kind == RECTANGLE:
-        return _sample_rectangle(row, way, u, v)
-    return _sample_ellipse(row, way, u, v)
+        return _sample_rectangle(table, lamp, way, u, v)
+    return _sample_ellipse(table, lamp, way, u, v)
 
 
 @inlined
@@ -158,88 +160,119 @@ def _within_cone(axis, spread, u, v):
 
 
 @inlined
-def _sample_bulb(row, way, shading, u, v):
-    radius, soft = row[_REACH], row[_FLAG]
+def _sample_bulb(table, lamp, way, shading, u, v):
+    radius, soft = table[lamp, _REACH], table[lamp, _FLAG]
     squared = dot(way, way)
     distance = np.sqrt(squared)
     axis = divided(way, distance) if distance > 0 else (0.0, 0.0, 1.0)
     if radius == 0:
         factor = 1 / (_QUARTER_SPHERE * squared) if distance > 0 else 0.0
-        return axis, distance, factor * _attenuation(row, axis) if row[_SPOT] else factor
+        return axis, distance, factor * _attenuation(table, lamp, axis) if table[lamp, _SPOT] else factor
     if not soft and distance <= radius:
         ahead, density = cosine_direction(shading, u, v)
         along = dot(way, ahead)
         reached = along + np.sqrt(np.maximum(radius * radius - dot(way, way) + along * along, 0.0))
-        return ahead, reached, row[_RADIANCE] / np.maximum(density, _LEAST_DENSITY)
+        return ahead, reached, table[lamp, _RADIANCE] / np.maximum(density, _LEAST_DENSITY)
     radius_squared, squared = radius * radius, distance * distance
     to_edge = squared + (radius_squared if soft else 0.0)
     spread, factor = 0.0, 0.0
     if to_edge > 0:
         spread = _one_minus_cosine(np.minimum(radius_squared / to_edge, 1.0))
         factor = 1 / ((2 - spread) * (2 * np.pi * to_edge))
-    if not soft and row[_SPOT] and row[_OPENING] < spread:
-        ahead, _ = _within_cone(_vector(row, _AXIS), row[_OPENING], u, v)
+    if not soft and table[lamp, _SPOT] and table[lamp, _OPENING] < spread:
+        ahead, _ = _within_cone(_vector(table, lamp, _AXIS), table[lamp, _OPENING], u, v)
         along = dot(way, ahead)
         root = radius * radius - (dot(way, way) - along * along)
         hit = root >= 0 and along > 0
         reached = along - np.sqrt(np.maximum(root, 0.0))
-        factor = hit * row[_RADIANCE] * (2 * np.pi * row[_OPENING])
-        return ahead, reached, factor * _attenuation(row, ahead)
+        factor = hit * table[lamp, _RADIANCE] * (2 * np.pi * table[lamp, _OPENING])
+        return ahead, reached, factor * _attenuation(table, lamp, ahead)
     ahead, short = _within_cone(axis, spread, u, v)
     along = distance * (1 - short)
     if soft:
         reached = np.minimum(np.fmax(squared / along, 0.0), _LARGEST)
     else:
         reached = along - np.sqrt(np.maximum(radius_squared - squared * short * (2 - short), 0.0))
-    return ahead, reached, factor * _attenuation(row, ahead) if row[_SPOT] else factor
+    return ahead, reached, factor * _attenuation(table, lamp, ahead) if table[lamp, _SPOT] else factor
 
 
 @inlined
-def _by_area(row, way, across, along):
+def _by_area(table, lamp, way, across, along):
     """plates._by_area."""
-    first, second = scaled(_vector(row, _FIRST), row[_ACROSS] * across), scaled(_vector(row, _SECOND), row[_ALONG] * along)
+    first, second = (
+        scaled(_vector(table, lamp, _FIRST), table[lamp, _ACROSS] * across),
+        scaled(_vector(table, lamp, _SECOND), table[lamp, _ALONG] * along),
+    )
     to = sum_of(sum_of(way, first), second)
     squared = dot(to, to)
     distance = np.sqrt(squared)
     to = divided(to, distance)
-    factor = dot(_vector(row, _NORMAL), to) / squared
+    factor = dot(_vector(table, lamp, _NORMAL), to) / squared
     return to, distance, np.fmax(factor * (-1 / np.pi), 0.0)
 
 
 @inlined
-def _by_angle(row, way, u, v):
+def _by_angle(table, lamp, way, u, v):
     """plates._by_angle: also the coordinates along the half sides."""
-    first, second, normal = _vector(row, _FIRST), _vector(row, _SECOND), _vector(row, _NORMAL)
+    first, second, normal = _vector(table, lamp, _FIRST), _vector(table, lamp, _SECOND), _vector(table, lamp, _NORMAL)
     across, along, depth = dot(first, way), dot(second, way), dot(normal, way)
     x, y, solid_angle = _on_rectangle(
-        across - row[_ACROSS], across + row[_ACROSS], along - row[_ALONG], along + row[_ALONG], depth, (u, v)
+        across - table[lamp, _ACROSS],
+        across + table[lamp, _ACROSS],
+        along - table[lamp, _ALONG],
+        along + table[lamp, _ALONG],
+        depth,
+        u,
+        v,
     )
     distance = np.sqrt(x * x + y * y + depth * depth)
     ahead = divided(sum_of(sum_of(scaled(first, x), scaled(second, y)), scaled(normal, depth)), distance)
-    factor = solid_angle * row[_RADIANCE] if depth < 0 else 0.0
-    return ahead, distance, factor, (x - across) / row[_ACROSS], (y - along) / row[_ALONG]
+    factor = solid_angle * table[lamp, _RADIANCE] if depth < 0 else 0.0
+    return ahead, distance, factor, (x - across) / table[lamp, _ACROSS], (y - along) / table[lamp, _ALONG]
 
 
 @inlined
-def _sample_rectangle(row, way, u, v):
+def _on_rectangle(x0, x1, y0, y1, depth, u, v):
+    """plates.on_rectangle."""
+    squared = depth * depth
+    bottom, right = -y0 / np.sqrt(squared + y0 * y0), x1 / np.sqrt(squared + x1 * x1)
+    top, left = y1 / np.sqrt(squared + y1 * y1), -x0 / np.sqrt(squared + x0 * x0)
+    behind = arcsine(top * left) + arcsine(left * bottom)
+    solid_angle = arcsine(bottom * right) + arcsine(right * top) + behind
+    cosine, sine = turned((u * solid_angle - behind) / (2 * np.pi))
+    rest = cosine * bottom + top
+    slope = np.sqrt(np.maximum(rest * rest - sine * sine * (squared / (squared + y0 * y0)), 0.0))
+    x = np.minimum(np.fmax(np.copysign(depth, rest) * sine / slope, x0), x1)
+    squared = x * x + squared
+    low, high = y0 / np.sqrt(squared + y0 * y0), y1 / np.sqrt(squared + y1 * y1)
+    elevation = low + v * (high - low)
+    y = np.minimum(np.fmax(elevation * np.sqrt(squared / np.maximum(1 - elevation * elevation, 0.0)), y0), y1)
+    return x, y, np.fmax(solid_angle, 0.0)
+
+
+@inlined
+def _sample_rectangle(table, lamp, way, u, v):
     squared = dot(way, way)
-    apart = abs(dot(_vector(row, _FIRST), way)) * row[_ACROSS] + abs(dot(_vector(row, _SECOND), way)) * row[_ALONG]
-    near = apart > _SLANT * squared or squared < (_FAR * max(row[_ACROSS], row[_ALONG])) ** 2
-    if near and not row[_FLAG]:
-        ahead, distance, factor, _, _ = _by_angle(row, way, u, v)
-        if factor >= _SMALLEST_ANGLE * row[_RADIANCE]:
+    apart = (
+        abs(dot(_vector(table, lamp, _FIRST), way)) * table[lamp, _ACROSS]
+        + abs(dot(_vector(table, lamp, _SECOND), way)) * table[lamp, _ALONG]
+    )
+    near = apart > _SLANT * squared or squared < (_FAR * max(table[lamp, _ACROSS], table[lamp, _ALONG])) ** 2
+    if near and not table[lamp, _FLAG]:
+        ahead, distance, factor, _, _ = _by_angle(table, lamp, way, u, v)
+        if factor >= _SMALLEST_ANGLE * table[lamp, _RADIANCE]:
             return ahead, distance, factor
-    return _by_area(row, way, 2 * u - 1, 2 * v - 1)
+    return _by_area(table, lamp, way, 2 * u - 1, 2 * v - 1)
 
 
 @inlined
-def _sample_ellipse(row, way, u, v):
-    if dot(way, way) < (_FAR * row[_ACROSS]) ** 2:
-        ahead, distance, factor, across, along = _by_angle(row, way, u, v)
+def _sample_ellipse(table, lamp, way, u, v):
+    if dot(way, way) < (_FAR * table[lamp, _ACROSS]) ** 2:
+        ahead, distance, factor, across, along = _by_angle(table, lamp, way, u, v)
         return ahead, distance, factor if across * across + along * along <= 1 else 0.0
     radius = np.sqrt(u)
     x, y = turned(v)
-    return _by_area(row, way, radius * x, radius * y)
+    return _by_area(table, lamp, way, radius * x, radius * y)
 
 
 @inlined

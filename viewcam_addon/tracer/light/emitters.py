@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Indices, gather
+from ..arrays import Floats, Indices, Some, dot, gather, some
 from ..compiled.standing import or_compiled
 from ..rays.points import Points, Surfaces
 from ..rays.view import View
@@ -207,6 +207,21 @@ def aimed(emitters: Emitters, points: Points, u: Floats) -> Aimed:
     with np.errstate(divide="ignore", invalid="ignore"):
         found = [emitters.aim(points.at(part), u[:, part]) for part in parts]
     return found[0] if len(found) == 1 else Aimed(*(np.concatenate(values, axis=-1) for values in zip(*found, strict=True)))
+
+
+@or_compiled
+def received(points: Points, aimed: Aimed, share: Floats, weighed: bool) -> tuple[Floats, Some]:
+    """What white diffuse surfaces send on of the light that they get, (n,), and at which of them there is any.
+
+    share : (n,) how often paths are scattered diffusely. weighed : whether scattered rays may find that light, too.
+    """
+    factor = dot(points.shading, aimed.direction) / np.pi
+    up = factor > 0
+    if points.shading is not points.normal:
+        up &= dot(points.normal, aimed.direction) > 0
+    if weighed:
+        factor *= weight(aimed.pdf, share * factor)
+    return factor, some(up)
 
 
 def _extent(surfaces: Surfaces) -> float:

@@ -22,11 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Indices, Some, dot, gather, pick, some
+from ..compiled.standing import or_compiled
 from ..rays.points import Points, Surfaces
 from ..rays.space import Space
 from ..scene.film import Bounces
 from . import scattering
-from .emitters import Emitters, weight
+from .emitters import Emitters, received
 from .lobes import DIFFUSE, KINDS, Lobes, lobes_at
 from .sampler import FILM, SCATTERING, Sampler
 from .sums import BACKGROUND, COLOUR, DIRECT, EMITTED, INDIRECT, OTHER, Light
@@ -222,23 +223,10 @@ class Paths:
         points = arrivals.points.at(which)
         u = numbers(which, _EMITTER, 3) if self._emitters.random else np.zeros((3, points.count))
         aimed = self._emitters.sample(points, u)
-        factor = dot(points.shading, aimed.direction) / np.pi
-        up = factor > 0
-        if points.shading is not points.normal:
-            up &= dot(points.normal, aimed.direction) > 0
-        if self._emitters.weighed:
-            factor *= weight(aimed.pdf, pick(share, which) * factor)
-        bright = some(up)
+        factor, bright = received(points, aimed, pick(share, which), self._emitters.weighed)
         shadowed = points.at(bright), pick(aimed.direction, bright), pick(aimed.distance, bright)
-        reached = ~(self._space.blocked(*shadowed) & pick(aimed.shadowed, bright))
-        bright = np.flatnonzero(up)[reached]
-        radiance = gather(aimed.light, bright)
-        radiance *= gather(factor, bright)
-        which = np.flatnonzero(share > 0)[bright] if isinstance(which, np.ndarray) else bright
-        radiance *= gather(lobes.colour(DIFFUSE), which)
-        if arrivals.weight is not None:
-            radiance *= gather(arrivals.weight, which)
-        light.add(gather(places, which), radiance)
+        hidden = self._space.blocked(*shadowed) & pick(aimed.shadowed, bright)
+        add_received(light, places, which, bright, hidden, aimed.light, factor, lobes.colour(DIFFUSE), arrivals.weight)
 
     def _rays(
         self, arrivals: Arrivals, lobes: Lobes, chosen: Indices, kind: str, depth: int, places: Indices, numbers: Numbers
@@ -345,6 +333,33 @@ class Paths:
             rays.points.at(met), points, gather(rays.direction, met), distance, pick(rays.density, met), rays.kind
         )
         light.add(gather(rays.place, met), pick(rays.weight, met) * gather(radiance, bright) * shared)
+
+
+@or_compiled
+def add_received(
+    light: Light,
+    places: Indices,
+    which: Some,
+    bright: Some,
+    hidden: NDArray[np.bool_],
+    radiance: Floats,
+    factor: Floats,
+    colour: Floats,
+    weight: Floats | None,
+) -> None:
+    """Add what diffuse surfaces send on of the light of emitters that nothing hides.
+
+    places, colour, weight : of all paths. which : of these, those that have radiance, (3, n), times factor, (n,). bright :
+    which of those may be lit. hidden : of these, which are not.
+    """
+    bright = np.arange(len(factor))[bright][~hidden]
+    which = bright if isinstance(which, slice) else gather(which, bright)
+    brought = gather(radiance, bright)
+    brought *= gather(factor, bright)
+    brought *= gather(colour, which)
+    if weight is not None:
+        brought *= gather(weight, which)
+    light.add(gather(places, which), brought)
 
 
 def _made_up_for(weights: Floats, survival: Floats) -> Floats:

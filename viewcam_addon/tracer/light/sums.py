@@ -39,7 +39,7 @@ class Light:
         self.count = count
         self._rows = {category: row for row, category in enumerate(categories)}
         self.values = np.zeros((3, len(categories), count))
-        self._flat = self.values.reshape(3, -1)
+        self.flat = self.values.reshape(3, -1)
         self.covered = np.zeros(count, bool)
 
     def __contains__(self, category: str) -> bool:
@@ -54,7 +54,7 @@ class Light:
 
     def add(self, places: Indices, radiance: Floats) -> None:
         """Add (3, k) or (3, 1) to k different places."""
-        for total, component in zip(self._flat, radiance, strict=True):
+        for total, component in zip(self.flat, radiance, strict=True):
             total[places] += component
 
     def put(self, category: str, paths: Indices | slice, radiance: Floats) -> None:
@@ -128,6 +128,11 @@ class Sums:
                 self._before[:] = self._differences
         self.covered += light.covered.reshape(self.count, -1).sum(axis=1)
 
+    @property
+    def alpha(self) -> Floats:
+        """(count,): the part of the pixels that surfaces cover, so far; 1 where the film is opaque."""
+        return self.covered / self.taken if self._film.transparent else np.ones(self.count)
+
     def change(self, category: str, more: Floats) -> None:
         """Add (3, count) to the sum of a category that shows in the picture."""
         self._totals[:, self.categories.index(category)] += more
@@ -149,7 +154,7 @@ class Sums:
         exposure = self._film.exposure
         colour = self.mean(COLOUR)
         store(passes["Combined"], self.combined)
-        passes["Combined"][:, 3] = self.covered / self.taken if self._film.transparent else 1.0
+        passes["Combined"][:, 3] = self.alpha
         store(passes["Emission"], self.mean(EMITTED) * exposure)
         store(passes["Environment"], self.mean(BACKGROUND) * exposure)
         store(passes["Diffuse Direct"], without_colour(self.mean(DIRECT) * exposure, colour))
