@@ -4,7 +4,7 @@ from functools import partial
 
 from ..charts import Chart
 from . import growth, scenes
-from .point import DIRECT, FIRST, GEOMETRY, PREPARING, Work, measure
+from .point import DIRECT, FIRST_DIRECT, FIRST_GEOMETRY, GEOMETRY, PREPARING, Work, measure
 from .triangles import BYTES_A_TRIANGLE
 
 
@@ -12,7 +12,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
     counts = (1, 100) if quick else (1, 10, 100, 1_000, 10_000)
     size, work = ((160, 90), Work(once=True)) if quick else (scenes.SIZE, Work())
     sweep = [(count, measure(partial(scenes.instances, count, size), work)) for count in counts]
-    stages = (PREPARING, GEOMETRY, FIRST, DIRECT)
+    stages = (PREPARING, FIRST_GEOMETRY, GEOMETRY, FIRST_DIRECT, DIRECT)
     times, memory = growth.time_curves(sweep, stages), growth.memory_curves(sweep, stages)
     fixed, each = max(sweep[0][1].peak.values()), BYTES_A_TRIANGLE * sweep[0][1].triangles
     name = f"a fixed amount and {BYTES_A_TRIANGLE} bytes a triangle of each"

@@ -4,7 +4,7 @@ from functools import partial
 
 from ..charts import Chart
 from . import growth, scenes
-from .point import DIRECT, FIRST, Work, measure
+from .point import DIRECT, FIRST_DIRECT, Work, measure
 
 
 def charts(quick: bool = False) -> tuple[Chart, ...]:
@@ -13,7 +13,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
     curves = []
     for kind, make in (("points", scenes.under_points), ("squares", scenes.under_areas)):
         sweep = [(count, measure(partial(make, count, triangles, size), work)) for count in counts]
-        curves += growth.time_curves(sweep, (FIRST, DIRECT), f"{kind}: ")
+        curves += growth.time_curves(sweep, (FIRST_DIRECT, DIRECT), f"{kind}: ")
     return (
         growth.chart(
             "lamps-time",

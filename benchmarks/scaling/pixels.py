@@ -10,7 +10,7 @@ from viewcam_addon.tracer.light.illumination import CENTRES
 
 from ..charts import Chart
 from . import growth, scenes
-from .point import DIRECT, FILE, GEOMETRY, PREPARING, Work, measure
+from .point import ADAPTIVE, DIRECT, ERROR, FILE, GEOMETRY, PREPARING, Work, measure
 
 SIZES = ((426, 240), (640, 360), (1280, 720), (1920, 1080), (3840, 2160), (7680, 4320))
 TRIANGLES = 100_000
@@ -18,28 +18,30 @@ TRIANGLES = 100_000
 BYTES_A_PIXEL = {
     GEOMETRY: 4 * sum(len(CHANNELS[name]) for name in GEOMETRY_PASSES),
     DIRECT: 4 * sum(len(CHANNELS[name]) for name in (*LIGHT_PASSES, *CENTRES)),
+    ADAPTIVE: 4 * sum(len(CHANNELS[name]) for name in (*LIGHT_PASSES, *CENTRES, "Sample Count")),
 }
 """Of the passes of a picture, float32."""
 
-# Pictures of so many pixels fill the tiles of all threads; what they take beyond their passes is the tiles'.
-_FULL = 900_000
+# Pictures of so many pixels fill the tiles of all threads, or a band: what they take beyond their passes does not grow.
+_FULL = {GEOMETRY: 900_000, DIRECT: 900_000, ADAPTIVE: 2_000_000}
 
 
 def charts(quick: bool = False) -> tuple[Chart, ...]:
     sizes = SIZES[0:3:2] if quick else SIZES
-    work = Work(samples=1 if quick else 4, file=True, once=quick)
+    work = Work(samples=1 if quick else 4, file=True, adaptive=True, once=quick)
     make = partial(scenes.one_mesh, 1_000 if quick else TRIANGLES)
     sweep = [(width * height, measure(partial(make, (width, height)), work)) for width, height in sizes]
-    times = growth.time_curves(sweep, (PREPARING, GEOMETRY, FILE, DIRECT))
-    memory = [curve for stage in (GEOMETRY, DIRECT, FILE) for curve in growth.memory_curves(sweep, (stage,), league=stage)]
-    x = [x for x, _ in sweep]
-    first, full = next((pixels, measured) for pixels, measured in sweep if pixels > _FULL)
-    limits = [
-        growth.memory_limit(
-            x, full.peak[stage] - each * first, each, f"a fixed amount and {each} bytes a pixel: {stage}", stage
-        )
-        for stage, each in BYTES_A_PIXEL.items()
+    times = growth.time_curves(sweep, (PREPARING, GEOMETRY, FILE, DIRECT, ADAPTIVE))
+    memory = [
+        curve for stage in (GEOMETRY, DIRECT, ADAPTIVE, FILE) for curve in growth.memory_curves(sweep, (stage,), league=stage)
     ]
+    x = [x for x, _ in sweep]
+    limits = []
+    for stage, each in BYTES_A_PIXEL.items():
+        fixed = [measured.peak[stage] - each * pixels for pixels, measured in sweep if pixels > _FULL[stage]]
+        if fixed:
+            name = f"a fixed amount and {each} bytes a pixel: {stage}"
+            limits.append(growth.memory_limit(x, fixed[0], each, name, stage))
     return (
         growth.chart(
             "pixels-time",
@@ -47,7 +49,8 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             "pixels",
             growth.SECONDS,
             times,
-            f"Read that pictures grow as their pixels do, and preparing does not. {growth.told(times, 'the pixels')}",
+            "Read that pictures grow as their pixels do, and preparing does not. The adaptive one is asked for an error of "
+            f"{ERROR:g}. {growth.told(times, 'the pixels')}",
         ),
         growth.chart(
             "pixels-memory",
@@ -55,8 +58,8 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             "pixels",
             growth.MEGABYTES,
             [*memory, *limits],
-            "Read that both pictures stay below their dashed lines: what their tiles take at "
-            f"{first / 1e6:.1f} million pixels, a quarter more, and the bytes of their passes. The file is written from a "
-            f"geometry picture that is counted with it. {growth.told(memory, 'the pixels')}",
+            "Read that pictures stay below their dashed lines: what the first that fills the tiles of all threads takes beyond "
+            "its passes, a quarter more, and the bytes of the passes. The file is written from a geometry picture, counted with it. "
+            f"{growth.told(memory, 'the pixels')}",
         ),
     )

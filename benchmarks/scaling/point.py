@@ -10,7 +10,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -24,23 +24,28 @@ from . import scenes
 
 Result = TypeVar("Result")
 
-PREPARING, GEOMETRY, FILE, FIRST, DIRECT = "preparing", "geometry picture", "its file", "first direct picture", "direct picture"
+PREPARING, FIRST_GEOMETRY, GEOMETRY, FILE = "preparing", "first geometry picture", "geometry picture", "its file"
+FIRST_DIRECT, DIRECT, ADAPTIVE = "first direct picture", "direct picture", "adaptive picture"
+"""The stages. A first picture makes what later ones keep; an adaptive one has a wanted error."""
 
 # A stage is repeated as often, and as long, as it takes to know its time.
-_ROUNDS, _SECONDS = 9, 1.0
+_ROUNDS, _SECONDS = 9, 2.0
+# What an adaptive picture is asked for, scene-linear, and the samples that it may take.
+ERROR, _MOST = 0.01, 64
 
 
 @dataclass(frozen=True)
 class Work:
-    """What is measured: the stages PREPARING, GEOMETRY, FIRST and DIRECT, and FILE if that is wanted.
+    """What is measured, beside preparing and geometry pictures.
 
-    samples : of DIRECT pictures. threads : all cores if it is None. once : no stage is repeated.
+    samples : of direct pictures. threads : all cores if it is None. once : no stage is repeated.
     """
 
     samples: int = 4
     threads: int | None = None
     file: bool = False
     direct: bool = True
+    adaptive: bool = False
     once: bool = False
 
 
@@ -61,7 +66,7 @@ def measure(make: Callable[[], Scene], work: Work) -> Measured:
 
 
 def _measure(make: Callable[[], Scene], work: Work) -> Measured:
-    _stages(scenes.one_mesh(2, (64, 64)), Work(1, work.threads, work.file, work.direct, True), 0)  # what is loaded once is
+    _stages(scenes.one_mesh(2, (64, 64)), replace(work, samples=1, once=True), 0)  # what is loaded once is
     gc.collect()
     before = memory.resident()
     return _stages(make(), work, before)
@@ -84,13 +89,16 @@ def _stages(scene: Scene, work: Work, before: int) -> Measured:
         return result
 
     tracer = stage(PREPARING, lambda: Tracer(scene, work.threads))
+    stage(FIRST_GEOMETRY, tracer.render, once=True)
     picture = stage(GEOMETRY, tracer.render)
     if work.file:
         stage(FILE, partial(_write, image.Image(picture, scene.camera)))
     del picture  # so that light does not count it
     if work.direct:
-        stage(FIRST, lambda: tracer.render_light("direct", work.samples, 0), once=True)
+        stage(FIRST_DIRECT, lambda: tracer.render_light("direct", work.samples, 0), once=True)
         stage(DIRECT, lambda: tracer.render_light("direct", work.samples, 0))
+    if work.adaptive:
+        stage(ADAPTIVE, lambda: tracer.render_light("direct", _MOST, 0, error=ERROR))
     return measured
 
 

@@ -4,16 +4,16 @@ from functools import partial
 
 from ..charts import Chart
 from . import growth, scenes
-from .point import DIRECT, FIRST, GEOMETRY, PREPARING, Work, measure
+from .point import DIRECT, FIRST_DIRECT, FIRST_GEOMETRY, GEOMETRY, PREPARING, Work, measure
 
 
 def charts(quick: bool = False) -> tuple[Chart, ...]:
     counts = (100, 1_000) if quick else (100, 1_000, 10_000, 100_000)
     size, work = ((160, 90), Work(once=True)) if quick else (scenes.SIZE, Work())
     sweep = [(count, measure(partial(scenes.spheres, count, size), work)) for count in counts]
-    stages = (PREPARING, GEOMETRY, FIRST, DIRECT)
+    stages = (PREPARING, FIRST_GEOMETRY, GEOMETRY, FIRST_DIRECT, DIRECT)
     times, memory = growth.time_curves(sweep, stages), growth.memory_curves(sweep, stages)
-    each = (sweep[-1][1].peak[DIRECT] - sweep[0][1].peak[DIRECT]) / (counts[-1] - counts[0])
+    each = max(sweep[-1][1].peak[DIRECT] - sweep[0][1].peak[DIRECT], 0) / (counts[-1] - counts[0])
     return (
         growth.chart(
             "spheres-time",

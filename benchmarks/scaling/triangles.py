@@ -4,7 +4,7 @@ from functools import partial
 
 from ..charts import Chart
 from . import growth, scenes
-from .point import DIRECT, FIRST, GEOMETRY, PREPARING, Work, measure
+from .point import DIRECT, FIRST_DIRECT, FIRST_GEOMETRY, GEOMETRY, PREPARING, Work, measure
 
 # Beyond the scene's own arrays: hierarchy, camera space, planes, and the tables of light.
 BYTES_A_TRIANGLE = 300
@@ -17,15 +17,16 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
         [(measured.triangles, measured) for measured in (measure(partial(make, count, size), work) for count in counts)]
         for make in (scenes.one_mesh, scenes.many_meshes)
     )
-    times = growth.time_curves(one, (PREPARING, GEOMETRY, FIRST, DIRECT), "one mesh: ")
-    times += growth.time_curves(many, (PREPARING, FIRST, DIRECT), "many meshes: ")
-    memory = growth.memory_curves(one, (PREPARING, GEOMETRY, FIRST, DIRECT), "one mesh: ")
-    memory += growth.memory_curves(many, (PREPARING, FIRST, DIRECT), "many meshes: ")
+    times = growth.time_curves(one, (PREPARING, FIRST_GEOMETRY, GEOMETRY, FIRST_DIRECT, DIRECT), "one mesh: ")
+    times += growth.time_curves(many, (PREPARING, FIRST_DIRECT, DIRECT), "many meshes: ")
+    memory = growth.memory_curves(one, (PREPARING, FIRST_GEOMETRY, FIRST_DIRECT, DIRECT), "one mesh: ")
+    memory += growth.memory_curves(many, (PREPARING, FIRST_DIRECT, DIRECT), "many meshes: ")
     x, largest = [x for x, _ in one], one[-1][1]
     # What the least scene takes is the picture's and its tiles'.
     fixed = max(one[0][1].peak.values())
     limit = growth.memory_limit(x, fixed, BYTES_A_TRIANGLE, f"a fixed amount and {BYTES_A_TRIANGLE} bytes a triangle")
-    each = {stage: (largest.peak[stage] - one[0][1].peak[stage]) / largest.triangles for stage in (PREPARING, GEOMETRY, DIRECT)}
+    stages = PREPARING, FIRST_GEOMETRY, FIRST_DIRECT, DIRECT
+    each = {stage: (largest.peak[stage] - one[0][1].peak[stage]) / largest.triangles for stage in stages}
     told = ", ".join(f"{stage} {count:.0f}" for stage, count in each.items())
     return (
         growth.chart(

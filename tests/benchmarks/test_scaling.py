@@ -8,7 +8,7 @@ import pytest
 from benchmarks import memory
 from benchmarks.charts import Curve
 from benchmarks.scaling import growth, pixels, point, scenes
-from benchmarks.scaling.point import DIRECT, FILE, FIRST, GEOMETRY, PREPARING, Work, measure
+from benchmarks.scaling.point import ADAPTIVE, DIRECT, FILE, FIRST_DIRECT, FIRST_GEOMETRY, GEOMETRY, PREPARING, Work, measure
 
 X = np.array([1.0, 10.0, 100.0, 1000.0, 1e4])
 
@@ -87,18 +87,27 @@ def test_a_large_parent_is_not_seen_in_the_peak_of_its_child():
 
 @pytest.fixture(scope="module")
 def measured():
-    return measure(functools.partial(scenes.one_mesh, 100_000, (160, 90)), Work(samples=1, file=True, once=True))
+    return measure(functools.partial(scenes.one_mesh, 100_000, (160, 90)), Work(samples=1, file=True, adaptive=True, once=True))
 
 
 def test_a_point_tells_time_and_memory_of_each_stage(measured):
-    assert set(measured.seconds) == set(measured.peak) == {PREPARING, GEOMETRY, FILE, FIRST, DIRECT}
+    assert (
+        set(measured.seconds)
+        == set(measured.peak)
+        == {PREPARING, FIRST_GEOMETRY, GEOMETRY, FILE, FIRST_DIRECT, DIRECT, ADAPTIVE}
+    )
     assert min(measured.seconds.values()) > 0
     assert measured.triangles == 2 * 224**2
 
 
 def test_the_passes_of_a_picture_take_what_the_limit_says():
     tracer = point.Tracer(scenes.one_mesh(2, (40, 20)))
-    for passes, stage in ((tracer.render(), GEOMETRY), (tracer.render_light("direct", 1, 0), DIRECT)):
+    pictures = {
+        GEOMETRY: tracer.render(),
+        DIRECT: tracer.render_light("direct", 1, 0),
+        ADAPTIVE: tracer.render_light("direct", 1, 0, error=1.0),
+    }
+    for stage, passes in pictures.items():
         assert sum(values.nbytes for values in passes.values()) == 800 * pixels.BYTES_A_PIXEL[stage], stage
 
 
