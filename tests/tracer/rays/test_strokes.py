@@ -68,10 +68,10 @@ def test_the_place_of_a_piece_lies_in_its_pixel_on_the_stroke_at_its_depth(canva
     starts = rng.normal(size=(3, 20), loc=1.5 * AHEAD)
     ends = starts + rng.normal(size=(3, 20))
     pieces = canvas.pieces(starts, ends, MARGIN)
-    column, row = pieces.pixel % WIDTH, pieces.pixel // WIDTH
-    beside = np.maximum(np.abs(pieces.column - column - 0.5), np.abs(pieces.row - row - 0.5)) - 0.5
+    column, row = places = pieces.places(np.arange(len(pieces.pixel)))
+    beside = np.abs(places - [pieces.pixel % WIDTH + 0.5, pieces.pixel // WIDTH + 0.5]).max(axis=0) - 0.5
     assert beside.max(initial=0) <= 3 * MARGIN, f"{beside.max()} pixels outside of its pixel"
-    x, y = (pieces.column - 14) / 30, (pieces.row - 11) / 25
+    x, y = (column - 14) / 30, (row - 11) / 25
     point = np.stack([x, y, np.ones_like(x)]) / pieces.nearness
     begin, way = starts[:, pieces.stroke], (ends - starts)[:, pieces.stroke]
     part = ((point - begin) * way).sum(axis=0) / (way * way).sum(axis=0)

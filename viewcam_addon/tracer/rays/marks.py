@@ -49,7 +49,7 @@ class Strokes:
 
     def outwards(self, pieces: Pieces, some: Indices, distance: tuple[float, float]) -> Floats:
         """(2, k) unit vectors of the picture, across some of the pieces and away from their surfaces."""
-        which, across = pieces.stroke[some], gather(pieces.across, some)
+        which, across = pieces.stroke[some], pieces.across(some)
         plane = cross(gather(self.starts, which), gather(self.ends, which))  # through the eye and the stroke
         inside = dot(plane, gather(self.within, which))
         turned = plane[0] * across[0] / distance[0] + plane[1] * across[1] / distance[1]
@@ -84,7 +84,7 @@ class Marks:
             # Nearer than the outline's own surface, and than where it was computed to be.
             hides = np.minimum(nearest[asked], 1.0 / np.maximum(nearness[asked], _FARTHEST)) * (1 - _NEARER)
             aside = strokes.outwards(pieces, asked, self._canvas.distance) * (2 * self._margin + strokes.bulge)
-            found = self._depths(pieces.column[asked] + aside[0], pieces.row[asked] + aside[1])
+            found = self._depths(*(pieces.places(asked) + aside))
             self.mask[pieces.pixel[asked[found >= hides]]] = True
 
     def fill(self, bounds: Floats, nearest: Floats) -> None:

@@ -8,6 +8,7 @@ margin three. Every square that comes within the margin of the stroke is found, 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...pinhole import Pinhole
 from ..arrays import Floats, Indices, gather
@@ -18,18 +19,31 @@ LEAST_MARGIN = 2.0**-20
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """The parts of strokes that lie in one pixel each.
+    """The parts of strokes that lie in one pixel each, and a place on each of them.
 
-    stroke : (k,) which. pixel : (k,) row · width + column. column, row : (k,) float64, a place on the part. nearness : (k,)
-    float64, one over its depth. across : (2, k) float64, a unit vector of the picture at right angles to the stroke.
+    stroke : (k,) which. pixel : (k,) row · width + column. nearness : (k,) float64, one over the depth of the place.
+    along, aside : (k,) float64, where it is, along the picture's axis that the stroke runs along, and along the other. slope :
+    (k,) of the one against the other, from −1 to 1. steep : (k,) bool, whether the stroke runs along columns.
     """
 
     stroke: Indices
     pixel: Indices
-    column: Floats
-    row: Floats
     nearness: Floats
-    across: Floats
+    along: Floats
+    aside: Floats
+    slope: Floats
+    steep: NDArray[np.bool_]
+
+    def places(self, some: Indices) -> Floats:
+        """(2, n) columns and rows."""
+        along, aside, steep = self.along[some], self.aside[some], self.steep[some]
+        return np.where(steep, [aside, along], [along, aside])
+
+    def across(self, some: Indices) -> Floats:
+        """(2, n) unit vectors of the picture at right angles to the strokes."""
+        slope, steep = self.slope[some], self.steep[some]
+        one = np.ones_like(slope)
+        return np.where(steep, [one, -slope], [-slope, one]) / np.sqrt(1 + slope * slope)
 
 
 class Canvas:
@@ -86,53 +100,31 @@ class Canvas:
         stroke, first, last = self.clipped(starts, ends)
         margin = np.broadcast_to(margin, starts.shape[1:])[stroke]
         steep = np.abs(last[1] - first[1]) > np.abs(last[0] - first[0])
-        along = np.where(steep, [first[1], last[1]], [first[0], last[0]])
-        aside = np.where(steep, [first[0], last[0]], [first[1], last[1]])
-        long_side = np.where(steep, self.height, self.width)
-        least = np.clip(np.floor(along.min(axis=0) - margin), 0, long_side).astype(np.intp)
-        most = np.clip(np.floor(along.max(axis=0) + margin), -1, long_side - 1).astype(np.intp)
-        count = np.maximum(most - least + 1, 0)
-        which = np.repeat(np.arange(len(count)), count)
-        cell = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count) + np.repeat(least, count)
-        a, b = gather(along, which)
-        c, d = gather(aside, which)
-        with np.errstate(all="ignore"):
-            per_step = 1.0 / (b - a)
-        point = np.isinf(per_step)
-        per_step[point] = 0.0
-        enters = np.clip((cell - a) * per_step, 0.0, 1.0)
-        leaves = np.clip((cell + 1 - a) * per_step, 0.0, 1.0)
-        leaves[point] = 1.0
-        height = d - c
-        at_entry, at_exit = c + enters * height, c + leaves * height
-        margin = gather(margin, which) * 2  # aslant by 45° at most, with some to spare
-        low, high = np.minimum(at_entry, at_exit), np.maximum(at_entry, at_exit)
-        lowest, highest = np.floor(low - margin).astype(np.intp), np.floor(high + margin).astype(np.intp)
-        parts = []
-        for row in range(int((highest - lowest).max(initial=0)) + 1):
-            some = np.flatnonzero(lowest + row <= highest) if row else np.arange(len(which))
-            square = lowest[some] + row
-            # The middle of what lies in the square, or the nearest to it.
-            middle = (np.maximum(low[some], square) + np.minimum(high[some], square + 1.0)) / 2
-            middle = np.minimum(np.maximum(middle, low[some]), high[some])
-            with np.errstate(all="ignore"):
-                part = (middle - c[some]) / height[some]
-            part = np.where(np.isfinite(part), part, (enters[some] + leaves[some]) / 2)
-            part = np.minimum(np.maximum(part, np.minimum(enters, leaves)[some]), np.maximum(enters, leaves)[some])
-            parts.append((which[some], cell[some], square, part))
-        which, cell, square, part = (np.concatenate(values) for values in zip(*parts, strict=True))
+        way = last - first
+        turned = np.where(steep, way[1], way[0]) < 0
+        first, way = np.where(turned, last, first), np.where(turned, -way, way)
+        begin, length = np.where(steep, first[1], first[0]), np.where(steep, way[1], way[0])
+        per_step = 1.0 / np.where(length > 0, length, np.inf)
+        slope = np.where(steep, way[0], way[1]) * per_step
+        lines = begin, begin + length, np.where(steep, first[0], first[1]), slope, first[2], way[2] * per_step, margin
+        which, cell = _cells(*lines[:2], margin, np.where(steep, self.height, self.width))
+        place, square, along = _squares(cell, *(gather(values, which) for values in (*lines[:4], margin)))
+        which, cell = which[place], cell[place]
         steep = steep[which]
         column, row = np.where(steep, square, cell), np.where(steep, cell, square)
         kept = np.flatnonzero((column >= 0) & (column < self.width) & (row >= 0) & (row < self.height))
-        which, column, row, part = which[kept], column[kept], row[kept], part[kept]
-        begin = gather(first, which)
-        way = gather(last, which) - begin
-        at = begin + part * way
-        length = np.hypot(way[0], way[1])
-        length = np.where(length > 0, length, 1.0)
-        across = np.stack([-way[1] / length, way[0] / length])
-        across[0, (across[0] == 0) & (across[1] == 0)] = 1.0
-        return Pieces(stroke[which], row * self.width + column, at[0], at[1], at[2], across)
+        which, along = which[kept], along[kept]
+        begin, _, aside, slope, nearness, deepening, _ = (gather(values, which) for values in lines)
+        onwards = along - begin
+        return Pieces(
+            stroke[which],
+            row[kept] * self.width + column[kept],
+            nearness + onwards * deepening,
+            along,
+            aside + onwards * slope,
+            slope,
+            steep[kept],
+        )
 
     def clipped(self, starts: Floats, ends: Floats) -> tuple[Indices, Floats, Floats]:
         """Which strokes reach into the picture, and the places of both ends of what does, (3, k) each."""
@@ -163,3 +155,43 @@ class Canvas:
             kept = np.flatnonzero(kept)
             stroke, first, last = stroke[kept], gather(first, kept), gather(last, kept)
         return stroke, self.place(first), self.place(last)
+
+
+def _cells(begin: Floats, end: Floats, margin: Floats, size: Indices) -> tuple[Indices, Indices]:
+    """The columns, or rows, that lines run through from `begin` to `end` along it: of which line, and which column."""
+    least = np.clip(np.floor(begin - margin), 0, size).astype(np.intp)
+    most = np.clip(np.floor(end + margin), -1, size - 1).astype(np.intp)
+    count = np.maximum(most - least + 1, 0)
+    which = np.repeat(np.arange(len(count)), count)
+    return which, np.arange(len(which)) + np.repeat(least - (np.cumsum(count) - count), count)
+
+
+def _squares(
+    cell: Indices, begin: Floats, end: Floats, aside: Floats, slope: Floats, margin: Floats
+) -> tuple[Indices, Indices, Floats]:
+    """The squares of columns that lines cross: in which column, their numbers in it, and a place in them, along the line.
+
+    cell : (n,), of a line that runs along it from `begin` to `end`, and begins at `aside` with a slope. All (n,).
+    """
+    enters, leaves = np.clip(cell, begin, end), np.clip(cell + 1, begin, end)
+    one, other = aside + (enters - begin) * slope, aside + (leaves - begin) * slope
+    low, high = np.minimum(one, other), np.maximum(one, other)
+    margin = 2 * margin  # aslant by 45° at most, with some to spare
+    lowest, highest = np.floor(low - margin).astype(np.intp), np.floor(high + margin).astype(np.intp)
+    parts = [(np.flatnonzero(lowest == highest), lowest)]
+    for row in range(int((highest - lowest).max(initial=-1)) + 1):
+        parts.append((np.flatnonzero((lowest + row <= highest) & (lowest < highest)), lowest + row))
+    places, squares, alongs = [], [], []
+    for number, (some, square) in enumerate(parts):
+        square = square[some]
+        along = (enters[some] + leaves[some]) / 2
+        if number:
+            # The middle of what lies in the square, or the nearest to it.
+            middle = np.clip((np.maximum(low[some], square) + np.minimum(high[some], square + 1.0)) / 2, low[some], high[some])
+            with np.errstate(all="ignore"):
+                there = begin[some] + (middle - aside[some]) / slope[some]
+            along = np.clip(np.where(np.isfinite(there), there, along), enters[some], leaves[some])
+        places.append(some)
+        squares.append(square)
+        alongs.append(along)
+    return np.concatenate(places), np.concatenate(squares), np.concatenate(alongs)
