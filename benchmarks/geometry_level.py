@@ -4,8 +4,9 @@
 
 Three subdivided Suzannes (190k triangles), one sample, the same passes on both sides, each in a process of its own; the tracer
 twice, with its loops compiled and with NumPy and Embree alone. The picture: both sides have kept what they built for the frame
-before (Cycles' persistent data), and write no file. The whole job: from the loaded scene to the EXR, nothing kept. What is
-wanted is said beside each figure; the exit status is 1 if one is missed.
+before (Cycles' persistent data), and write no file. The whole job: from the loaded scene to the EXR, nothing kept; as one
+picture is too little to load numba for, both variants do that with NumPy. What is wanted is said beside each figure; the exit
+status is 1 if one is missed.
 
 Needs bpy, embreex and OpenEXR, and numba for the compiled loops.
 """

@@ -4,11 +4,26 @@ A function that a kernel stands in for is marked with `@or_compiled`. Its kernel
 the module of the same name in this folder, and returns the same arrays, to a few roundings. Nothing else knows of kernels.
 """
 
+import contextlib
 import functools
 import importlib
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
 
 from . import AVAILABLE
+
+_of_thread = threading.local()
+
+
+@contextlib.contextmanager
+def uncompiled(so: bool) -> Iterator[None]:
+    """Let this thread use NumPy's functions only, if so: where too little is to be done to wait for numba."""
+    before = getattr(_of_thread, "uncompiled", False)
+    _of_thread.uncompiled = so
+    try:
+        yield
+    finally:
+        _of_thread.uncompiled = before
 
 
 def or_compiled(plain: Callable) -> Callable:
@@ -21,7 +36,7 @@ def or_compiled(plain: Callable) -> Callable:
 
     @functools.wraps(plain)
     def chosen(*arguments):
-        return (kernel() if AVAILABLE else plain)(*arguments)
+        return (kernel() if AVAILABLE and not getattr(_of_thread, "uncompiled", False) else plain)(*arguments)
 
     chosen.plain = plain
     return chosen

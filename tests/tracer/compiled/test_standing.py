@@ -1,0 +1,46 @@
+"""When kernels stand in: not for one small picture, which would be finished before numba has started."""
+
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.tracer import compiled
+from viewcam_addon.tracer.compiled import standing
+from viewcam_addon.tracer.scene import scene_file
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+@pytest.mark.skipif(not compiled.AVAILABLE, reason="numba or embreex is not installed, or turned off")
+@pytest.mark.parametrize(
+    ("traced", "loads"), [("render(scene)", False), ("Tracer(scene).render()", True), ("render(scene, 'direct', 2)", True)]
+)
+def test_one_picture_of_level_geometry_is_not_worth_loading_numba(ball, make_scene, tmp_path, traced, loads):
+    camera = Pinhole((0, -5, 1), (0, 0, 0), (0, 0, 1), 40, 48, 48)
+    scene_file.write(make_scene(camera, ball(6)), tmp_path / "scene.json")
+    program = (
+        "import sys; from viewcam_addon.tracer.render import Tracer, render; from viewcam_addon.tracer.scene import scene_file;"
+        f"scene = scene_file.read(sys.argv[1]); {traced}; print('numba' in sys.modules)"
+    )
+    command = [sys.executable, "-c", program, tmp_path / "scene.json"]
+    outcome = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert outcome.stdout.strip() == str(loads), outcome.stderr
+
+
+def test_what_is_uncompiled_is_so_in_its_thread_and_until_its_end(monkeypatch):
+    monkeypatch.setattr(standing, "AVAILABLE", True)
+    monkeypatch.setattr(standing.importlib, "import_module", lambda name: SimpleNamespace(answer=lambda: "kernel"))
+
+    @standing.or_compiled
+    def answer():
+        return "NumPy"
+
+    with standing.uncompiled(True):
+        with standing.uncompiled(False):
+            assert answer() == "kernel"
+        assert answer() == "NumPy"
+    assert answer() == "kernel" and answer.plain() == "NumPy"
