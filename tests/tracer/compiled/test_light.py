@@ -15,11 +15,12 @@ from viewcam_addon.tracer import compiled
 from viewcam_addon.tracer.compiled import standing
 from viewcam_addon.tracer.light import emitters, filters, paths, sampler
 from viewcam_addon.tracer.light.sampler import Sampler
-from viewcam_addon.tracer.light.sums import DIRECT, EMITTED, Light
+from viewcam_addon.tracer.light.sums import COLOUR, DIRECT, EMITTED, Light, Sums, add_samples
 from viewcam_addon.tracer.rays import points, space
 from viewcam_addon.tracer.rays.points import Surfaces
 from viewcam_addon.tracer.rays.space import Space
 from viewcam_addon.tracer.render import Tracer
+from viewcam_addon.tracer.scene.film import Film
 from viewcam_addon.tracer.scene.lamps import Area, Point, Spot, Sun, World
 from viewcam_addon.tracer.scene.materials import Colour, Material
 
@@ -215,3 +216,15 @@ def test_a_picture_is_the_same_to_float32_but_for_what_a_rounding_decides(make_l
     apart = np.abs(found - expected).max(axis=-1) / expected[..., :3].max()
     assert (apart > 2.0**-23).sum() <= 1, (apart.max(), (apart > 2.0**-23).sum())
     assert expected[..., :3].any()
+
+
+@pytest.mark.parametrize("samples", [1, 3, 16])
+def test_sums_are_the_same_bit_for_bit(samples):
+    found, expected = (Sums(50, [EMITTED, COLOUR, DIRECT], Film(), 40) for _ in range(2))
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        values, covered = rng.random((3, 3, 50, samples)), rng.random(50 * samples) < 0.5
+        for sums, add in ((found, add_samples), (expected, add_samples.plain)):
+            add(sums, values, covered)
+            sums.taken += samples
+        assert np.array_equal(found.state, expected.state), seed

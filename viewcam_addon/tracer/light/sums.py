@@ -14,8 +14,10 @@ from collections.abc import Sequence
 from copy import copy
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Floats, Indices, Some, pick, put
+from ..compiled.standing import or_compiled
 from ..rays.surface import Passes
 from ..scene.film import Film
 
@@ -73,19 +75,19 @@ class Sums:
         self._film, self.count = film, count
         self.taken: int | Indices = 0
         # A power of two, since that is how many points together fill their space.
-        self._batch_size = 1 << max(samples // _BATCHES, 1).bit_length() - 1
+        self.batch_size = 1 << max(samples // _BATCHES, 1).bit_length() - 1
         self.categories = list(categories)
         hidden = (COLOUR, BACKGROUND) if film.transparent else (COLOUR,)
-        self._shown = [row for row, category in enumerate(categories) if category not in hidden]
+        self.shown = [row for row, category in enumerate(categories) if category not in hidden]
         self._hold(np.zeros((3 * len(categories) + 13, count)))
 
     def _hold(self, state: Floats) -> None:
         """Keep all that is known of the pixels in the columns of one table, and names for its rows."""
         self.state = state
-        self._totals = state[:-13].reshape(3, len(self.categories), -1)
-        self.covered, self._first = state[-13], state[-12:-9]
+        self.totals = state[:-13].reshape(3, len(self.categories), -1)
+        self.covered, self.first = state[-13], state[-12:-9]
         # The sum of the differences from the first sample, and when the last batch began; of the batches' own sums, squared.
-        self._differences, self._before, self._squares = state[-9:-6], state[-6:-3], state[-3:]
+        self.differences, self.before, self.squares = state[-9:-6], state[-6:-3], state[-3:]
 
     @property
     def means(self) -> int:
@@ -106,27 +108,12 @@ class Sums:
     @property
     def combined(self) -> Floats:
         """(3, count): the mean so far of what the pixels show."""
-        return (self._first + self._differences / self.taken) * self._film.exposure
+        return (self.first + self.differences / self.taken) * self._film.exposure
 
     def add(self, light: Light) -> None:
         """Add some samples of every pixel: the paths are those of all samples of a pixel, pixel after pixel."""
-        values = light.values.reshape(3, len(self.categories), self.count, -1).transpose(0, 1, 3, 2).copy()
-        combined = np.zeros((3, values.shape[2], self.count))
-        for row in self._shown:
-            combined += values[:, row]
-        if self.taken == 0:
-            self._first[:] = combined[:, 0]
-        combined -= self._first[:, None]
-        for sample in range(values.shape[2]):
-            self._totals += values[:, :, sample]
-            self._differences += combined[:, sample]
-            self.taken += 1
-            if self.taken % self._batch_size == 0:
-                of_batch = self._differences - self._before
-                of_batch *= of_batch
-                self._squares += of_batch
-                self._before[:] = self._differences
-        self.covered += light.covered.reshape(self.count, -1).sum(axis=1)
+        add_samples(self, light.values.reshape(3, len(self.categories), self.count, -1), light.covered)
+        self.taken += light.count // self.count
 
     @property
     def alpha(self) -> Floats:
@@ -135,8 +122,8 @@ class Sums:
 
     def change(self, category: str, more: Floats) -> None:
         """Add (3, count) to the sum of a category that shows in the picture."""
-        self._totals[:, self.categories.index(category)] += more
-        self._differences += more
+        self.totals[:, self.categories.index(category)] += more
+        self.differences += more
 
     def write(self, passes: Passes, random: bool) -> None:
         """Write the means into passes, name → (count, channels).
@@ -165,14 +152,35 @@ class Sums:
         """(3, count): of the light that belongs to a category, so far, without exposure."""
         if category not in self.categories:
             return np.zeros((3, self.count))
-        return self._totals[:, self.categories.index(category)] / self.taken
+        return self.totals[:, self.categories.index(category)] / self.taken
 
     @property
     def variance(self) -> Floats:
         """(3, count), of `combined`: that of the batches' means over their number, as if one that has begun had ended."""
-        batches = self.taken // self._batch_size
-        of_sums = (self._squares - self._before * self._before / batches) / (batches - 1)
-        return np.maximum(of_sums, 0.0) / self._batch_size / self.taken * self._film.exposure**2
+        batches = self.taken // self.batch_size
+        of_sums = (self.squares - self.before * self.before / batches) / (batches - 1)
+        return np.maximum(of_sums, 0.0) / self.batch_size / self.taken * self._film.exposure**2
+
+
+@or_compiled
+def add_samples(sums: Sums, values: Floats, covered: NDArray[np.bool_]) -> None:
+    """Add some samples of every pixel, one after the other. values : (3, categories, count, samples)."""
+    values = values.transpose(0, 1, 3, 2).copy()
+    combined = np.zeros((3, *values.shape[2:]))
+    for row in sums.shown:
+        combined += values[:, row]
+    if sums.taken == 0:
+        sums.first[:] = combined[:, 0]
+    combined -= sums.first[:, None]
+    for sample in range(values.shape[2]):
+        sums.totals += values[:, :, sample]
+        sums.differences += combined[:, sample]
+        if (sums.taken + sample + 1) % sums.batch_size == 0:
+            of_batch = sums.differences - sums.before
+            of_batch *= of_batch
+            sums.squares += of_batch
+            sums.before[:] = sums.differences
+    sums.covered += covered.reshape(sums.count, -1).sum(axis=1)
 
 
 def without_colour(light: Floats, colour: Floats) -> Floats:
