@@ -25,9 +25,10 @@ from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.arrays import dot, gather
 from viewcam_addon.tracer.rays import offset
 from viewcam_addon.tracer.rays.ellipsoids import Ellipsoids, ellipsoids_of
+from viewcam_addon.tracer.rays.embree import embree_scene
 from viewcam_addon.tracer.rays.triangles import Planes, Triangles, triangles_of
 from viewcam_addon.tracer.rays.view import View
-from viewcam_addon.tracer.rays.visibility import embree_scene, visibility
+from viewcam_addon.tracer.rays.visibility import visibility
 from viewcam_addon.tracer.scene import Mesh, Object, Spheres
 
 from ..charts import Chart, Curve

@@ -12,9 +12,9 @@ pytest.importorskip("embreex")
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.rays import offset
 from viewcam_addon.tracer.rays.ellipsoids import ellipsoids_of
+from viewcam_addon.tracer.rays.embree import embree_scene
 from viewcam_addon.tracer.rays.triangles import triangles_of
 from viewcam_addon.tracer.rays.view import View
-from viewcam_addon.tracer.rays.visibility import embree_scene
 from viewcam_addon.tracer.scene import Object
 
 SEEDS = st.integers(0, 2**32 - 1)
