@@ -59,7 +59,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             growth.MEGABYTES,
             [*memory, *limits],
             "Read that pictures stay below their dashed lines: what the first that fills the tiles of all threads takes beyond "
-            "its passes, a quarter more, and the bytes of the passes. The file is written from a geometry picture, counted with it. "
+            "its passes, a quarter more, and the bytes of the passes. A file is counted with the geometry picture in it. "
             f"{growth.told(memory, 'the pixels')}",
         ),
     )

@@ -93,7 +93,9 @@ def _stages(scene: Scene, work: Work, before: int) -> Measured:
     picture = stage(GEOMETRY, tracer.render)
     if work.file:
         stage(FILE, partial(_write, image.Image(picture, scene.camera)))
-    del picture  # so that light does not count it
+    del picture, tracer  # so that light does not count them
+    gc.collect()
+    tracer = Tracer(scene, work.threads)
     if work.direct:
         stage(FIRST_DIRECT, lambda: tracer.render_light("direct", work.samples, 0), once=True)
         stage(DIRECT, lambda: tracer.render_light("direct", work.samples, 0))
