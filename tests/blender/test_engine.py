@@ -100,9 +100,9 @@ def prepared(monkeypatch):
     made = []
     real = renders.Tracer.__init__
 
-    def init(self, scene, threads=None, kept=None):
+    def init(self, scene, threads=None, kept=None, rays=0):
         before = None if kept is None else kept._triangles
-        real(self, scene, threads, kept)
+        real(self, scene, threads, kept, rays)
         made.append("new" if before is None else "same" if self._triangles is before else "moved")
 
     monkeypatch.setattr(renders.Tracer, "__init__", init)

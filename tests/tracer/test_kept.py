@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.tracer import render as renders
 from viewcam_addon.tracer.compiled import standing
 from viewcam_addon.tracer.rays import embree
 from viewcam_addon.tracer.render import Keeper, Tracer, render
@@ -204,14 +205,32 @@ def test_a_tracer_whose_structures_were_taken_over_traces_no_more(scene):
         before.render()
 
 
+MANY_OR_FEW = [
+    ("geometry", 64, None, True),
+    ("direct", 9, None, True),
+    ("direct", 11, None, False),
+    ("direct", 11, 0.1, True),
+]
+
+
 def test_a_keeper_hands_each_scene_what_the_one_before_had(scene):
     keeper, frames = Keeper(), [replace(scene, camera=camera(turn)) for turn in (0.0, 0.1, 0.2)]
     shown = [render(frame, "direct", 2, keeper=keeper) for frame in frames]
     triangles = keeper._tracer._triangles
-    assert triangles.moving
+    assert not triangles.moving, "many samples of few triangles: hierarchies are built"
     assert not differing(shown, [render(frame, "direct", 2) for frame in frames])
     render(frames[-1], keeper=keeper)
     assert keeper._tracer._triangles is triangles
+
+
+@pytest.mark.parametrize(("level", "samples", "error", "refits"), MANY_OR_FEW)
+def test_hierarchies_are_refitted_where_few_rays_follow(level, samples, error, refits, scene, monkeypatch):
+    rays = WIDTH * HEIGHT  # and 598 triangles
+    monkeypatch.setattr(renders, "_MANY_RAYS", 20 * rays / 598)
+    keeper = Keeper()
+    for turn in (0.0, 0.1):
+        render(replace(scene, camera=camera(turn)), level, samples, keeper=keeper, error=error)
+    assert keeper._tracer._triangles.moving is refits
 
 
 def test_scenes_are_the_same_by_content(scene):

@@ -22,7 +22,7 @@ from .rays.joints import Joints
 from .rays.outlines import Outlines
 from .rays.surface import Passes, Surface, unwritten
 from .rays.tables import made_once
-from .rays.triangles import Planes, triangles_of
+from .rays.triangles import Planes, Triangles, triangles_of
 from .rays.view import View
 from .rays.visibility import visibility
 from .scene import Mesh, Object, Scene, Spheres
@@ -39,17 +39,25 @@ TILE, SMALLEST_TILE = 65536, 4096
 WORTH_COMPILING = 1 << 23
 
 
+# For each triangle. A turned hierarchy's boxes are wider than those of a new one, so that a ray takes 17 ns longer, a tenth; to
+# build takes 240 ns a triangle longer than to refit.
+_MANY_RAYS = 14
+# Of each sample at the levels of light, and samples of a pixel where their number is not known.
+_RAYS, _USUAL_SAMPLES = 2, 8
+
+
 class Tracer:
     """A scene made ready for tracing from its camera.
 
     scene : what to trace. threads : how many threads to trace with, all cores if it is None. kept : the tracer of another
     scene, as a frame before this one, which is used up. Where the same things stand before the same camera, however long its
-    lens and however large its picture, nothing is made anew; where the camera was moved, Embree's hierarchy is refitted.
+    lens and however large its picture, nothing is made anew; where the camera was moved, Embree's hierarchy is refitted, unless
+    so many rays are expected that a new one pays. rays : how many, about.
 
     No array of a scene may be changed while there is a tracer of it.
     """
 
-    def __init__(self, scene: Scene, threads: int | None = None, kept: "Tracer | None" = None) -> None:
+    def __init__(self, scene: Scene, threads: int | None = None, kept: "Tracer | None" = None, rays: int = 0) -> None:
         self._scene, self._camera = scene, scene.camera
         self._threads = threads or os.cpu_count() or 1
         self._view = View(scene.camera)
@@ -61,7 +69,7 @@ class Tracer:
             self._take_over(former)
             return
         else:
-            self._triangles, self._joints = former._triangles.moved(self._view), former._known_joints()
+            self._triangles, self._joints = former._moved(self._view, rays), former._known_joints()
             del former  # before there are as many tables again
         self._ellipsoids = ellipsoids_of(_placed(scene, Spheres), self._view)
         self._planes = Planes(self._triangles, self._view)
@@ -88,6 +96,9 @@ class Tracer:
         vars(heir).update(vars(self))
         vars(self).clear()
         return heir if same_things(scene, heir._scene) else None
+
+    def _moved(self, view: View, rays: int) -> Triangles:
+        return self._triangles.moved(view, refit=rays < _MANY_RAYS * self._triangles.count)
 
     def _known_joints(self) -> Joints | None:
         outlines = vars(self).get("_outlines")
@@ -229,10 +240,10 @@ class Keeper:
     def __init__(self) -> None:
         self._tracer: Tracer | None = None
 
-    def tracer(self, scene: Scene, threads: int | None = None) -> Tracer:
+    def tracer(self, scene: Scene, threads: int | None = None, rays: int = 0) -> Tracer:
         """That of a scene. The one before can't trace any more."""
         former, self._tracer = self._tracer, None
-        self._tracer = Tracer(scene, threads, former)
+        self._tracer = Tracer(scene, threads, former, rays)
         return self._tracer
 
 
@@ -267,7 +278,10 @@ def render(
     if error is not None and not 0.0 < error < math.inf:
         raise InputError(f"the error is {error}: give a number above 0")
     try:
-        tracer = (keeper or Keeper()).tracer(scene, threads)
+        rays = scene.camera.width * scene.camera.height
+        if level != "geometry":
+            rays *= _RAYS * (samples if error is None else min(samples, _USUAL_SAMPLES))
+        tracer = (keeper or Keeper()).tracer(scene, threads, rays)
         if level == "geometry":
             return tracer.render(watcher, once=keeper is None)
         return tracer.render_light(level, samples, seed, watcher, error)

@@ -68,11 +68,12 @@ class Triangles:
         """(m,): which triangles a kind of rays does not see (lights.RAYS)."""
         return np.repeat(np.array([ray in placed.hidden_from for placed, _ in self.placed], bool), self.counts)
 
-    def moved(self, view: View) -> "Triangles":
-        """The same triangles seen by another camera. Of Embree's scenes it takes possession: these have to stand elsewhere."""
+    def moved(self, view: View, refit: bool = True) -> "Triangles":
+        """The same triangles seen by another camera. refit : whether Embree's scenes are to stand elsewhere, instead of new
+        ones: then this takes possession of them."""
         vertices = in_camera_space(self.placed, [mesh.vertices for _, mesh in self.placed], view, self.threads)
-        former = self.embree_scenes if self.moving else {}
-        moved = replace(self, vertices=vertices, moving=True, embree_scenes={}, former_scenes=former)
+        former = self.embree_scenes if refit and self.moving else {}
+        moved = replace(self, vertices=vertices, moving=refit, embree_scenes={}, former_scenes=former)
         vars(moved).update({name: table for name, table in vars(self).items() if name in _OF_THE_WORLD})
         return moved
 
