@@ -189,10 +189,13 @@ class Tracer:
             self._surface.write({name: values[tile] for name, values in passes.items()}, primitives, x, y)
         return passes
 
-    def _eye(self, column: Floats, row: Floats) -> tuple[Floats, Floats, Indices]:
-        """The rays (x, y, 1) through points of the film, and the primitives that they meet."""
+    def _eye(self, column: Floats, row: Floats, careful: bool = True) -> tuple[Floats, Floats, Indices]:
+        """The rays (x, y, 1) through points of the film, and the primitives that they meet.
+
+        careful : whether some may aim at corners of triangles.
+        """
         x, y = self._camera.view_plane(column, row)
-        return x, y, self._visibility.first(x, y)
+        return x, y, self._visibility.first(x, y, None if careful else np.empty(0, np.intp))
 
     def _picture(
         self,
