@@ -8,7 +8,7 @@ from ...rays.surface import Passes
 from ...scene.film import Film
 from ..sharing import shared
 from ..sums import COLOUR, DIRECT, INDIRECT, Light, Sums, store, without_colour
-from .estimate import efficiency, missed
+from .estimate import efficiency, mean_around, missed
 from .interior import CORRECTED, correction
 
 Mask = NDArray[np.bool_]
@@ -21,11 +21,11 @@ _HIDDEN = 4.0
 class Band:
     """n pixels.
 
-    sums : over none of their samples. rows : of the picture. width : of the picture.
+    sums : over none of their samples. rows, width : of the picture.
 
-    taken : (n,) samples of each. variance : (3, n), of their mean. The rest, (n,), are means over the channels. spread : of the
-    samples themselves. apart : how far the means of their halves are apart, as a variance. doubt : the variance of their mean,
-    with what they may have missed.
+    taken : (n,) samples of each. variance : (3, n), of their mean. The rest, (n,), are means over red, green and blue, with
+    alpha's own on top. spread : of the samples themselves. apart : how far the means of their halves are apart, as a variance.
+    doubt : the variance of their mean, with what they may have missed.
     """
 
     def __init__(self, sums: Sums, film: Film, rows: range, width: int) -> None:
@@ -50,12 +50,9 @@ class Band:
 
     @property
     def shown(self) -> Floats:
-        """(channels, height, width): what the centres show, with alpha where not all is opaque."""
+        """(4, height, width): what the centres show."""
         self._sums.taken = 1
-        shown = self._sums.combined
-        if self._film.transparent:
-            shown = np.concatenate([shown, self._sums.covered[None]])
-        return shown.reshape(-1, *self.shape)
+        return shown_by(self._sums).reshape(-1, *self.shape)
 
     def smooth(self, done: Mask, row: int) -> None:
         """Make of the centres' light the filter's mean where pixels are done, and nothing elsewhere, in one row of the sums."""
@@ -75,13 +72,14 @@ class Band:
         return sums
 
     def put(self, which: Indices, sums: Sums, before: Floats, half: int) -> None:
-        """Put sums back. before : their mean when so many samples were taken, about half of those that are now."""
+        """Put sums back. before : `shown_by` them when so many samples were taken, about half of those that are now."""
         self._sums.put(which, sums)
         self.taken[which] = sums.taken
-        variance = sums.variance
+        variance, alpha = sums.variance, sums.alpha
         put(self._variance, which, variance)
-        self._spread[which] = variance.mean(axis=0) * sums.taken
-        self._apart[which] = ((sums.combined - before) ** 2).mean(axis=0) * (half / (sums.taken - half))
+        self._spread[which] = variance.mean(axis=0) * sums.taken + alpha * (1.0 - alpha)
+        apart = (shown_by(sums) - before) ** 2 * (half / (sums.taken - half))
+        self._apart[which] = apart[:3].mean(axis=0) + apart[3]
 
     def estimated(self, active: Indices) -> Floats:
         """The variances of the means of pixels that have just got samples, as many each."""
@@ -93,6 +91,8 @@ class Band:
         put(self._variance, active, gather(self._variance, active) * factor)
         unseen = gather(missed(self._spread.reshape(self.shape), samples).ravel(), active)
         self._doubt[active] = np.maximum(gather(own.ravel(), active) * factor, unseen)
+        around = mean_around(self._doubt.reshape(self.shape))
+        self._doubt[active] = np.maximum(gather(self._doubt, active), gather(around.ravel(), active))
         return gather(self._doubt, active)
 
     def shared(self, which: Mask, error: float) -> Floats:
@@ -142,3 +142,8 @@ class Band:
         sums.write_means(passes)
         store(passes["Variance"], self._variance[:, part])
         passes["Sample Count"][:, 0] = sums.taken
+
+
+def shown_by(sums: Sums) -> Floats:
+    """(4, n): colour and alpha so far."""
+    return np.concatenate([sums.combined, sums.alpha[None]])

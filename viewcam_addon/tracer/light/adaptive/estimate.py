@@ -7,10 +7,12 @@ single pixel that is one number, and as often far too small as too large. So s²
 8 × 8 pixels, over what s²/N is there.
 
 Where all of N samples miss something, s² is too small. Its part of the pixel is then about 1/N or less, and its contrast is no
-greater than what a neighbour saw, so that the pixel is off by about that contrast over N.
+greater than what a neighbour saw, so that the pixel is off by less than that contrast over N. And no pixel stops because it is
+quieter than those around it are in the mean.
 
 Rejected: stopping a pixel by its own s² or D² alone. What has missed a bright thing looks both darker and quieter than it
-is, and would stop for that very reason.
+is, and would stop for that very reason. It still does where all around have missed it, too: of pictures of an area lamp and a
+sky, whose pixels get 26 samples for an error of 0.015, the mean is off by 1e-4 (by 3e-4 without what is said above).
 """
 
 import numpy as np
@@ -22,9 +24,8 @@ BLOCK = 8
 
 # The weight in each block of what is measured over all of them.
 _SHARED = 0.1
-# Of the largest variance around over N²: a contrast c has a variance of c²/4 at most, and a part of the pixel that is anything
-# from 0 to 1/N, whose mean square is 1/3N².
-_MISSED = 4.0 / 3.0
+# Of the largest variance around over N²: one of a contrast c is c²/4 at most.
+_MISSED = 4.0
 
 
 def efficiency(own: Floats, apart: Floats) -> Floats:
@@ -52,12 +53,17 @@ def missed(spread: Floats, samples: int) -> Floats:
 def largest_around(values: Floats) -> Floats:
     """The largest in the 3 × 3 pixels round each."""
     for axis in (0, 1):
-        largest = values.copy()
-        here, there = [slice(None)] * 2, [slice(None)] * 2
-        here[axis], there[axis] = slice(1, None), slice(None, -1)
-        np.maximum(largest[tuple(here)], values[tuple(there)], out=largest[tuple(here)])
-        np.maximum(largest[tuple(there)], values[tuple(here)], out=largest[tuple(there)])
-        values = largest
+        padded = np.pad(values, [(1, 1) if axis == i else (0, 0) for i in (0, 1)])
+        before, after = np.split(padded, [-2], axis)[0], np.split(padded, [2], axis)[1]
+        values = np.maximum(np.maximum(before, after), values)
+    return values
+
+
+def mean_around(values: Floats) -> Floats:
+    """The mean of the 3 × 3 pixels round each, those beside the picture being 0."""
+    for axis in (0, 1):
+        padded = np.pad(values, [(1, 1) if axis == i else (0, 0) for i in (0, 1)])
+        values = (np.split(padded, [-2], axis)[0] + np.split(padded, [2], axis)[1] + values) / 3.0
     return values
 
 

@@ -19,7 +19,7 @@ from ...rays.outlines import Outlines
 from ...rays.surface import Passes
 from ..illumination import Illumination
 from ..sums import DIRECT, Light
-from .band import Band
+from .band import Band, shown_by
 from .estimate import BLOCK
 from .interior import interior, within
 
@@ -124,12 +124,12 @@ class Rounds:
         def trace(part: slice) -> None:
             which = active[part]
             sums = band.sums_of(which, taken)
-            means = []
+            shown = []
             for half in halves:
                 for first in range(sums.taken, half, _AT_A_TIME):
                     some = np.arange(first, min(first + _AT_A_TIME, half))
                     self._light.add(sums, some, band.pixels[which], band.columns[which], band.rows[which], self._check)
-                means.append(sums.combined)
-            band.put(which, sums, means[0], halves[0])
+                shown.append(shown_by(sums))
+            band.put(which, sums, shown[0], halves[0])
 
         self._parts(trace, len(active), self._light.paths_at_a_time // min(more - taken, _AT_A_TIME))
