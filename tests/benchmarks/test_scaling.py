@@ -9,6 +9,7 @@ from benchmarks import memory
 from benchmarks.charts import Curve
 from benchmarks.scaling import growth, pixels, point, scenes
 from benchmarks.scaling.point import ADAPTIVE, DIRECT, FILE, FIRST_DIRECT, FIRST_GEOMETRY, GEOMETRY, PREPARING, Work, measure
+from benchmarks.scaling.triangles import BYTES_A_TRIANGLE
 
 X = np.array([1.0, 10.0, 100.0, 1000.0, 1e4])
 
@@ -126,3 +127,13 @@ def _wasteful(triangles, size, waste):
 def test_waste_is_seen(measured):
     wasteful = measure(functools.partial(_wasteful, 100_000, (160, 90), 2000), Work(direct=False, once=True))
     assert wasteful.peak[PREPARING] > 2000 * 100_000 * 0.95 > 2 * measured.peak[PREPARING]
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("make", [scenes.one_mesh, scenes.many_meshes])
+def test_a_triangle_takes_less_than_300_bytes_beyond_the_scenes_own(make):
+    """Beyond what a picture of as good as nothing takes, at the peak of every stage; of so many that malloc keeps none."""
+    counts, work = (1_000, 2_000_000), Work(samples=1, once=True)
+    least, most = (measure(functools.partial(make, count, (160, 90)), work) for count in counts)
+    each = {stage: (peak - least.peak[stage]) / most.triangles for stage, peak in most.peak.items()}
+    assert max(each.values()) < BYTES_A_TRIANGLE, f"bytes a triangle: {each}"
