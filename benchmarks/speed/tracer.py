@@ -1,4 +1,4 @@
-"""This project's tracer as a contestant, in a process of its own: compiled or not, with Embree or without."""
+"""This project's tracer as a contestant, in a process of its own: compiled or not."""
 
 import contextlib
 import os
@@ -10,20 +10,19 @@ from pathlib import Path
 from unittest import mock
 
 from viewcam_addon import image
+from viewcam_addon.tracer.light import illumination
+from viewcam_addon.tracer.render import Tracer, render
 from viewcam_addon.tracer.scene import scene_file
 from viewcam_addon.tracer.scene.film import MOST_SAMPLES
 
 from .. import race
+from ..noise import Noise
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def prepare(scene_path: Path, level: str, threads: int, embree: bool = True) -> dict[str, race.Runner]:
+def prepare(scene_path: Path, level: str, threads: int) -> dict[str, race.Runner]:
     """In the contestant's process."""
-    if not embree:
-        sys.modules["embreex"] = None  # as if it were not installed
-    from viewcam_addon.tracer.render import Tracer, render
-
     scene = scene_file.read(scene_path)
     tracer = Tracer(scene, threads)
 
@@ -71,9 +70,5 @@ def _effort(sampling: str, parameter: float) -> dict[str, float]:
 @contextlib.contextmanager
 def _sampler(sampling: str) -> Iterator[None]:
     """Random numbers in the place of the sampler's, if that is the sampling."""
-    from viewcam_addon.tracer.light import illumination
-
-    from ..noise import Noise
-
     with mock.patch.object(illumination, "Sampler", Noise) if sampling == "random" else contextlib.nullcontext():
         yield
