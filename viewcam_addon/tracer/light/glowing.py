@@ -25,15 +25,7 @@ class Glowing:
 
     def __init__(self, scene: Scene, surfaces: Surfaces, palette: Palette) -> None:
         self._surfaces, self._palette = surfaces, palette
-        numbers = {"": 0, **{name: number for number, name in enumerate(scene.materials, start=1)}}
-        shining, first = [], 0
-        for placed, mesh in surfaces.triangles.placed if palette.has("emission") else ():
-            names = placed.materials + ("",) * len(placed.material_indices)
-            colours = np.array([palette.mean("emission", numbers[name]) for name in names])[mesh.materials]
-            primitives = first + np.flatnonzero(colours.any(axis=1))
-            if len(primitives) and "diffuse" not in placed.hidden_from:
-                shining.append((primitives, colours[primitives - first].T))
-            first += len(mesh.triangles)
+        shining = _shining(surfaces, palette) if palette.has("emission") else []
         self.count = len(shining)
         if shining:
             spheres = sum(len(spheres.radii) for _, spheres in surfaces.balls.placed)
@@ -118,3 +110,15 @@ class Glowing:
             return np.nan_to_num(
                 gather(self.densities, points.primitive) * distance * distance / np.abs(dot(points.normal, ahead))
             )
+
+
+def _shining(surfaces: Surfaces, palette: Palette) -> list[tuple[Indices, Floats]]:
+    """Of each object that shines, the triangles that do, and their mean colours (3, n)."""
+    triangles = surfaces.triangles
+    colours = np.array([palette.mean("emission", number) for number in range(len(palette.having("emission")))]).T
+    shines = gather(colours.any(axis=0), surfaces.material[: triangles.count])
+    shines &= ~triangles.hidden_from("diffuse")
+    primitives = np.flatnonzero(shines)
+    objects = np.searchsorted(np.cumsum(triangles.counts), primitives, side="right")
+    each = np.split(primitives, np.flatnonzero(np.diff(objects)) + 1) if len(primitives) else []
+    return [(some, gather(colours, gather(surfaces.material, some))) for some in each]

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from ...exact import difference, sum_terms, two_product, two_sum
 from ..arrays import Float32s, Floats, Indices, dot, gather, linear
 from ..scene import Object, Spheres
+from .tables import by_material
 from .view import View
 
 # |f|² − 1 below which the textbook's discriminant, rounded by 2⁻⁵³ |f|² cos² at most, is not worse than the perpendicular's.
@@ -136,7 +137,7 @@ def ellipsoids_of(pairs: list[tuple[Object, Spheres]], view: View) -> Ellipsoids
     seen = np.flatnonzero((solid & shown)[owner] & held & (tangent > 0) & (positions[2] + reach > 0))
     seen = seen[np.lexsort((nearest[seen], np.isfinite(bounds[0, seen])))]
     objects = np.array([placed.object_index for placed, _ in pairs], np.float32)
-    materials = [np.array(placed.material_indices, np.float32)[spheres.materials] for placed, spheres in pairs]
+    materials = by_material(pairs, [placed.material_indices for placed, _ in pairs], np.float32)
     return Ellipsoids(
         inverse=gather(inverses, seen),
         centres=gather(centres, seen),
@@ -147,7 +148,7 @@ def ellipsoids_of(pairs: list[tuple[Object, Spheres]], view: View) -> Ellipsoids
         bounds=gather(bounds, seen),
         number=seen.astype(np.int32),
         object_index=gather(gather(objects, owner), seen),
-        material_index=gather(np.concatenate([np.empty(0, np.float32), *materials]), seen),
+        material_index=gather(materials, seen),
         magnitude=gather(magnitude, seen),
     )
 

@@ -17,7 +17,7 @@ from ..arrays import Floats
 from ..scene import Mesh, Object, Spheres
 from .view import View
 
-AT_A_TIME = 8192
+AT_A_TIME = 16384
 """Entries."""
 
 Things = Sequence[tuple[Object, Mesh | Spheres]]
