@@ -10,6 +10,7 @@ from viewcam_addon.tracer import compiled
 from viewcam_addon.tracer.rays import corners, visibility
 from viewcam_addon.tracer.rays.corners import Corners
 from viewcam_addon.tracer.rays.surface import PASSES, unwritten, write_triangles
+from viewcam_addon.tracer.rays.view import View
 from viewcam_addon.tracer.render import Tracer
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -37,7 +38,8 @@ def test_packets_of_eye_rays_meet_what_embreex_meets_ray_by_ray(random_scene, se
     scene = random_scene(seed)
     eye = Tracer(scene)._visibility
     x, y = rays(scene.camera, np.random.default_rng(seed), count, 2.0)
-    found, expected = both(visibility.first_triangles, eye._triangles, scene.clip[0] * eye._unit, 1e37, x, y)
+    run = int(np.random.default_rng(seed).choice([1, 5, 16, len(x)]))
+    found, expected = both(visibility.first_triangles, eye._triangles, scene.clip[0] * eye._unit, 1e37, x, y, run)
     assert np.array_equal(found, expected), f"{(found != expected).sum()} of {len(x)} rays meet something else"
 
 
@@ -59,8 +61,8 @@ def test_rays_that_are_off_by_a_thousandth_meet_something_else(random_scene):
     scene = random_scene(0)
     eye = Tracer(scene)._visibility
     x, y = rays(scene.camera, np.random.default_rng(0), 20_000, 2.0)
-    found = visibility.first_triangles(eye._triangles, 0.0, 1e37, x, y)
-    moved = visibility.first_triangles.plain(eye._triangles, 0.0, 1e37, x * 1.001, y)
+    found = visibility.first_triangles(eye._triangles, 0.0, 1e37, x, y, len(x))
+    moved = visibility.first_triangles.plain(eye._triangles, 0.0, 1e37, x * 1.001, y, len(x))
     assert (found != moved).any()
 
 
@@ -113,3 +115,39 @@ def test_a_kernel_that_takes_another_triangle_is_found_out(random_scene):
     write_triangles(tracer._surface, wrong, np.where(found > 0, found - 1, found), x, y)
     for name in ("Depth", "Position", "Normal", "UV", "Magnitude", "Facing"):
         assert (right[name] != wrong[name]).any(), name
+
+
+def two_at_one_place(ball, make_scene):
+    """A ball twice, so that all rays that meet it meet two triangles at one depth; and rays at its vertices."""
+    shell = ball(30)
+    scene = make_scene(Pinhole((0.3, -3, 0.2), (0, 0, 0), (0, 0, 1), 100, 100, 100), shell, shell)
+    x, y, z = View(scene.camera).points(np.eye(4), shell.vertices)
+    return scene, x / z, y / z
+
+
+def test_of_two_things_at_one_depth_the_one_that_is_met_depends_on_its_own_run_only(ball, make_scene):
+    scene, x, y = two_at_one_place(ball, make_scene)
+    eye = Tracer(scene)._visibility
+
+    def differ(rows: int, run: int) -> int:
+        """How many rays meet something else if those of some rows of the ball's vertices are not traced."""
+        without = slice(61 * rows, None)
+        traced = (
+            visibility.first_triangles(eye._triangles, 0.0, 1e37, x[part], y[part], run) for part in (slice(None), without)
+        )
+        whole, part = traced
+        return int((whole[without] != part).sum())
+
+    assert [differ(rows, 61) for rows in (1, 3, 8)] == [0, 0, 0]
+    assert differ(3, len(x)) > 0, "packets that reach beyond a row change nothing here"
+
+
+def test_on_edges_the_depth_is_the_same_whichever_triangle_is_met(ball, make_scene):
+    scene, x, y = two_at_one_place(ball, make_scene)
+    tracer = Tracer(scene)
+    eye = tracer._visibility
+    found, expected = both(visibility.first_triangles, eye._triangles, 0.0, 1e37, x, y, len(x))
+    assert (found != expected).any(), "no ray finds two things at one depth"
+    assert np.array_equal(found < 0, expected < 0)
+    # Embree's depths are the same to 2⁻²⁴, and rounded by some of these; those of float64 on either triangle differ by as much.
+    assert np.allclose(eye._depth(found, x, y), eye._depth(expected, x, y), rtol=8 * 2.0**-24, atol=0)

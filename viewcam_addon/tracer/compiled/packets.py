@@ -4,7 +4,8 @@ The rays of a packet are traced together, so it pays when they run side by side:
 neighbours to one lamp. A packet is one array, `new_packet()`. A loop puts rays into lanes with `aim`, has `meet` or `block`
 trace the first `count` of them, and reads `met` or `blocked` lane by lane. `intersect` and `occluded` do that for whole arrays.
 
-Answers are those of `EmbreeScene.run`, ray by ray: Embree computes the same in lanes as one by one.
+Answers are those of `EmbreeScene.run`, ray by ray: Embree computes the same in lanes as one by one. Only which of two triangles
+is met whose depths are the same to the last bit of float32, as on an edge of both, depends on the other rays of the packet.
 
 A kernel's machine code is kept in numba's cache, beside the module or in the user's cache folder; numba looks only at the file
 the kernel itself stands in, so after a change here the kernels that call these must be changed or their cache emptied.

@@ -8,20 +8,23 @@ from .visibility import Visibility
 
 
 class Centres:
-    """Those of one camera, and which of them want care."""
+    """Those of one camera, and which of them want care.
+
+    width : how many there are in a row.
+    """
 
     def __init__(self, camera: Pinhole, visibility: Visibility) -> None:
         self._x, _ = camera.view_plane(np.arange(camera.width) + 0.5, 0.5)
         _, self._y = camera.view_plane(0.5, np.arange(camera.height) + 0.5)
+        self.width = camera.width
         self._close = visibility.close(self._x, self._y)
 
     def rays(self, tile: range) -> tuple[Floats, Floats, Indices | None]:
         """The rays (x, y, 1) of a run of pixels, (n,) each, and which of them want care, if that is known."""
-        width = len(self._x)
-        first, last = tile.start // width, (tile.stop - 1) // width + 1
-        part = slice(tile.start - first * width, tile.stop - first * width)
+        first, last = tile.start // self.width, (tile.stop - 1) // self.width + 1
+        part = slice(tile.start - first * self.width, tile.stop - first * self.width)
         x = np.tile(self._x, last - first)[part]
-        y = np.repeat(self._y[first:last], width)[part]
+        y = np.repeat(self._y[first:last], self.width)[part]
         if self._close is None:
             return x, y, None
         begin, end = np.searchsorted(self._close, [tile.start, tile.stop])

@@ -42,10 +42,12 @@ _OVERLAP = 2.0**-21
 
 
 class Visibility(Protocol):
-    def first(self, x: Floats, y: Floats, close: Indices | None = None) -> Indices:
+    def first(self, x: Floats, y: Floats, close: Indices | None = None, run: int | None = None) -> Indices:
         """The primitive that each ray meets first, or −1.
 
-        x, y : (n,) float64. close : which of them `close` found, if these are rays of pixel centres.
+        x, y : (n,) float64. close : which of them `close` found, if these are rays of pixel centres. run : how many of them
+        belong together, a row of pixels for example. Which of two triangles at the very same depth a ray meets can depend on
+        the rays that it is traced with: on those of its run only, if that is given.
         """
 
     def close(self, x: Floats, y: Floats) -> Indices | None:
@@ -82,11 +84,11 @@ class Embree:
     def close(self, x: Floats, y: Floats) -> Indices | None:
         return self._corners.near_pixels(x, y)
 
-    def first(self, x: Floats, y: Floats, close: Indices | None = None) -> Indices:
+    def first(self, x: Floats, y: Floats, close: Indices | None = None, run: int | None = None) -> Indices:
         if self._triangles is None:
             found = np.full(len(x), -1, np.intp)
         else:
-            found = self._first_triangle(x, y)
+            found = self._first_triangle(x, y, run or len(x))
             if close is None:
                 close = self._corners.near(x, y)
             if len(close):
@@ -97,9 +99,9 @@ class Embree:
             self._spheres_before(found, x, y)
         return found
 
-    def _first_triangle(self, x: Floats, y: Floats) -> Indices:
+    def _first_triangle(self, x: Floats, y: Floats, run: int) -> Indices:
         length = min((self._end - self._start) * self._unit, _FAR)
-        return first_triangles(self._triangles, self._start * self._unit, length, x, y)
+        return first_triangles(self._triangles, self._start * self._unit, length, x, y, run)
 
     def _without_slips(self, found: Indices, x: Floats, y: Floats) -> Indices:
         """What rays that pass close by a corner meet, from what they found and what four rays round each of them find.
@@ -109,7 +111,7 @@ class Embree:
         distance = np.maximum(np.abs(x), np.abs(y))
         aside = distance * np.maximum(distance, 1.0)
         around = (x + _AROUND[0] * aside).ravel(), (y + _AROUND[1] * aside).ravel()
-        beside = self._first_triangle(*around)
+        beside = self._first_triangle(*around, run=1)
         depths = self._depth(beside, *around).reshape(4, -1)
         nearest, _, third, _ = np.sort(depths, axis=0)
         with np.errstate(invalid="ignore"):  # where three see nothing, it is no slip
@@ -147,8 +149,11 @@ class Embree:
 
 
 @or_compiled
-def first_triangles(embree: "EmbreeScene", start: float, length: float, x: Floats, y: Floats) -> Indices:
-    """The triangle that each ray (x, y, 1) meets first, or −1, from the depth `start` on as far as `length` behind it."""
+def first_triangles(embree: "EmbreeScene", start: float, length: float, x: Floats, y: Floats, run: int) -> Indices:
+    """The triangle that each ray (x, y, 1) meets first, or −1, from the depth `start` on as far as `length` behind it.
+
+    run : as in `Visibility.first`. Here each ray is traced by itself.
+    """
     directions = _directions(x, y)
     return embree.run(directions * np.float32(start), directions, dists=length).astype(np.intp)
 
@@ -183,7 +188,7 @@ class Plain:
     def close(self, x: Floats, y: Floats) -> None:
         """None wants care."""
 
-    def first(self, x: Floats, y: Floats, close: Indices | None = None) -> Indices:
+    def first(self, x: Floats, y: Floats, close: Indices | None = None, run: int | None = None) -> Indices:
         found = np.full(len(x), -1, np.intp)
         nearest = np.full(len(x), np.inf)
         near_all = self._candidates(np.arange(self._bounds.shape[1]), x, y)
