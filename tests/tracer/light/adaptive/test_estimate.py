@@ -10,7 +10,7 @@ SHAPE = (40, 56)
 
 
 def halves(samples, rate, spread):
-    """(own, apart) of pixels the errors of whose halves fall as samples to the power of −rate / 2, independent of each other."""
+    """(own, apart) of pixels the errors of whose halves are independent and fall as samples to the power of −rate / 2."""
     one, other = RNG.normal(size=(2, *SHAPE)) * spread * (samples / 2) ** (-rate / 2)
     return np.full(SHAPE, spread**2 / samples), (one - other) ** 2 / 4
 
@@ -49,7 +49,7 @@ def test_nothing_known_is_no_gain():
 def test_what_a_neighbour_saw_may_have_been_missed():
     spread = np.zeros(SHAPE)
     spread[10, 10] = 0.25  # half black, half white
-    found = missed(spread, 16)
+    found = missed(spread, np.zeros(SHAPE), 16)
     assert np.sqrt(found[9:12, 9:12]) == pytest.approx(1 / 16)
     assert np.count_nonzero(found) == 9
 

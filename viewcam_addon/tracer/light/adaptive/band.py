@@ -21,18 +21,19 @@ _HIDDEN = 4.0
 class Band:
     """n pixels.
 
-    sums : over none of their samples. rows, width : of the picture.
+    sums : over none of their samples. glints : (rows, width), see glints.py. rows : of the picture.
 
     taken : (n,) samples of each. variance : (3, n), of their mean. The rest, (n,), are means over red, green and blue, with
     alpha's own on top. spread : of the samples themselves. apart : how far the means of their halves are apart, as a variance.
     doubt : the variance of their mean, with what they may have missed.
     """
 
-    def __init__(self, sums: Sums, film: Film, rows: range, width: int) -> None:
+    def __init__(self, sums: Sums, film: Film, glints: Floats, rows: range) -> None:
+        width = glints.shape[1]
         self.pixels = np.arange(rows.start * width, rows.stop * width)
         self.rows, self.columns = np.divmod(self.pixels, width)
         self.shape = len(rows), width
-        self._film, self._sums = film, sums
+        self._film, self._sums, self._glints = film, sums, glints * film.exposure**2
         self.taken = np.ones(sums.count, np.int32)
         self._variance = np.zeros((3, sums.count))
         self._spread, self._apart, self._doubt = np.zeros((3, sums.count))
@@ -89,7 +90,7 @@ class Band:
         apart.ravel()[active] = gather(self._apart, active)
         factor = gather(efficiency(own, apart).ravel(), active)
         put(self._variance, active, gather(self._variance, active) * factor)
-        unseen = gather(missed(self._spread.reshape(self.shape), samples).ravel(), active)
+        unseen = gather(missed(self._spread.reshape(self.shape), self._glints, samples).ravel(), active)
         self._doubt[active] = np.maximum(gather(own.ravel(), active) * factor, unseen)
         around = mean_around(self._doubt.reshape(self.shape))
         self._doubt[active] = np.maximum(gather(self._doubt, active), gather(around.ravel(), active))

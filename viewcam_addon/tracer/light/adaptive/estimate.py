@@ -42,12 +42,12 @@ def efficiency(own: Floats, apart: Floats) -> Floats:
     return np.repeat(np.repeat(by_block, BLOCK, axis=0), BLOCK, axis=1)[: own.shape[0], : own.shape[1]]
 
 
-def missed(spread: Floats, samples: int) -> Floats:
+def missed(spread: Floats, glints: Floats, samples: int) -> Floats:
     """(height, width): the variance of what so many samples may not have seen.
 
-    spread : (height, width), the variance of each pixel's samples.
+    spread : (height, width), the variance of each pixel's samples. glints : (height, width), see glints.py.
     """
-    return largest_around(spread) * (_MISSED / samples**2)
+    return np.maximum(largest_around(spread) * _MISSED, glints) / samples**2
 
 
 def largest_around(values: Floats) -> Floats:

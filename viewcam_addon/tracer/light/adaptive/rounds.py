@@ -21,6 +21,7 @@ from ..illumination import Illumination
 from ..sums import DIRECT, Light
 from .band import Band, shown_by
 from .estimate import BLOCK
+from .glints import glints
 from .interior import interior, within
 
 Mask = NDArray[np.bool_]
@@ -55,6 +56,8 @@ class Rounds:
         self._parts, self._check = parts, check
         self._certain = illumination.paths_by_lamp()
         self._edges = illumination.edges(outlines, depth, primitives)
+        self._material = illumination.surfaces.materials_seen(primitives.ravel()).reshape(primitives.shape)
+        self._glints = glints(illumination.camera, illumination.surfaces, illumination.palette, depth, self._material)
 
     def bands(self) -> list[range]:
         """Rows that are traced together: as many whole blocks as make no more than `_BAND` pixels, but at least one."""
@@ -64,8 +67,8 @@ class Rounds:
 
     def trace(self, passes: Passes, rows: range) -> None:
         """Write the light of some rows into passes, name → (rows, width, channels)."""
-        width = self._primitives.shape[1]
-        band = Band(self._light.sums(len(rows) * width, 1), self._light.film, rows, width)
+        part = self._glints[rows.start : rows.stop]
+        band = Band(self._light.sums(part.size, 1), self._light.film, part, rows)
         alone = self._alone(band)
         active = np.flatnonzero(~self._by_centres(band, alone))
         taken = 0
@@ -89,8 +92,7 @@ class Rounds:
         unsteady = self._light.palette.specular
         if self._certain is not None:
             unsteady = unsteady | self._light.palette.patterned
-        made_of = self._light.surfaces.materials_seen(self._primitives[rows].ravel())
-        alone = self._edges[rows] | gather(unsteady, made_of).reshape(band.shape)
+        alone = self._edges[rows] | gather(unsteady, self._material[rows])
         return within(alone, self._light.film).ravel()
 
     def _by_centres(self, band: Band, alone: Mask) -> Mask:
