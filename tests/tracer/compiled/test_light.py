@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer import compiled
 from viewcam_addon.tracer.compiled import standing
-from viewcam_addon.tracer.light import emitters, filters, paths, sampler
+from viewcam_addon.tracer.light import emitters, filters, paths, sampler, scattering
 from viewcam_addon.tracer.light.sampler import Sampler
 from viewcam_addon.tracer.light.sums import COLOUR, DIRECT, EMITTED, Light, Sums, add_samples
 from viewcam_addon.tracer.rays import points, space
@@ -184,6 +184,19 @@ def test_random_numbers_are_the_same_bits(seed, samples, first, count):
     assert np.array_equal(*both(sampler.scrambled, made, pixels, some, first, count))
     assert np.array_equal(*both(sampler.scrambled, made, pixels, int(some[0]), first, count))
     assert np.array_equal(*both(sampler.scrambled_grid, made, pixels, some[:5], first, count))
+
+
+@settings(max_examples=20)
+@given(seed=SEEDS)
+def test_directions_by_lamberts_law_are_the_same_to_a_few_roundings(seed):
+    rng = np.random.default_rng(seed)
+    normal = rng.normal(size=(3, 200))
+    normal /= np.sqrt((normal**2).sum(axis=0))
+    u = np.concatenate([rng.random((2, 197)), [[0, 1 - 2.0**-53, 0.5], [0, 0.5, 1 - 2.0**-53]]], axis=1)
+    (found, density), (expected, as_often) = both(scattering.cosine_direction, normal, u)
+    # Where the sum of the normal and a point of the sphere nearly vanishes, its direction is as uncertain as it is short.
+    assert (np.abs(found - expected) <= SERIES * 2 / (2 * np.pi * as_often)).all()
+    assert (np.abs(density - as_often) <= SERIES).all()
 
 
 def test_places_on_the_film_are_the_same_bits():

@@ -9,6 +9,7 @@ in glass, and normals bent as in `specular_normal`.
 import numpy as np
 
 from ..arrays import Floats, dot
+from ..compiled.standing import or_compiled
 
 # Cycles': how far a mirror's ray rises above the surface at least, or this part of how far the ray rises that comes.
 _LEAST_RISE, _RISE_SHARE = 0.01, 0.9
@@ -47,6 +48,7 @@ def turned(u: Floats) -> tuple[Floats, Floats]:
     return chord - 1.0, chord * slope
 
 
+@or_compiled
 def cosine_direction(normal: Floats, u: Floats) -> tuple[Floats, Floats]:
     """Directions as often as the cosine of their angle to the normal is large, and how often that is.
 
