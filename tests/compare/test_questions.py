@@ -217,3 +217,20 @@ def test_a_shift_of_the_picture_is_no_excuse_for_a_bias_of_noisy_light():
     sides = sides_of(grey, np.random.default_rng(9), 256, 32, 8)
     right, wrong = (questions.ask(replace(sides, test=factor * sides.test), allowed, (255, 7), LEVEL) for factor in (1.0, 1.02))
     assert right[-1].errors.all() and right[-1].ok and not wrong[-1].ok
+
+
+def test_pixels_that_share_their_noise_are_judged_by_that_of_their_samples():
+    """Each pixel is the mean of a window: its own noise is a fifth, and that of a tile's sum what it was."""
+    rng = np.random.default_rng(8)
+    found = sides_of(even, rng, 64, 1024, 8)
+    noise = found.reference - TRUTH
+    for axis in (0, 1):
+        noise = sum(np.roll(noise, shift, axis) for shift in range(-2, 3)) / 5.0
+    smooth = replace(found, reference=TRUTH + noise)
+    failing = [question.name for question in ask(smooth, 64, 8) if not question.ok]
+    assert failing, "sums of what is not independent look certain"
+    told = replace(smooth, shared=found.variance)
+    assert all(question.ok for question in ask(told, 64, 8)), [
+        question.name for question in ask(told, 64, 8) if not question.ok
+    ]
+    assert not all(question.ok for question in ask(replace(told, test=told.test * 1.02), 64, 8)), "2 % is not found"

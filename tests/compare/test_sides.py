@@ -107,3 +107,15 @@ def test_pictures_of_other_sizes_or_none_are_refused():
         list(all_sides(picture(), []))
     with pytest.raises(InputError, match="no pass 'Combined'"):
         list(all_sides(picture(), [Image({"Depth": np.zeros((*SHAPE, 1), np.float32)})]))
+
+
+def test_light_may_be_shared_where_samples_are_counted_and_nowhere_else():
+    variance = drawn(3)
+    variance[1, 2] = np.inf
+    passes = {"Variance": variance, "Diffuse_Direct": drawn(3), "Diffuse_Color": drawn(3)}
+    for counted in ({}, {"Sample_Count": drawn(1)}):
+        reference = picture(**passes, **counted)
+        found = {each.name: each.shared for each in all_sides(reference, [picture(**passes)])}
+        expected = np.where(np.isfinite(variance), variance, 0.0) if counted else 0.0
+        assert np.all(found["Combined"] == expected) and np.all(found["Diffuse Direct"] == expected)
+        assert not np.any(found["Diffuse Color"])
