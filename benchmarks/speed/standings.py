@@ -9,8 +9,8 @@ from typing import Any
 from ..charts import Chart, Curve
 from .contest import Method, Point, Tracks
 
-# How much smaller an error a curve may be followed on to.
-_FURTHEST = 4
+# How much smaller an error a curve may be followed on to, and how much it must have fallen just before.
+_FURTHEST, _STEEP = 4, 1.3
 
 
 @dataclass(frozen=True)
@@ -93,9 +93,9 @@ def reached(method: Method, points: Sequence[Point], target: float) -> Reached |
     for one, other in itertools.pairwise(known):
         if other.error <= target:
             return Reached(method, _followed(one, other, target), False)
-    if len(known) < 2 or not (known[-1].error < known[-2].error and known[-1].time > known[-2].time):
+    if len(known) < 2 or target < known[-1].error / _FURTHEST:
         return None
-    if target < known[-1].error / _FURTHEST:
+    if known[-1].error * _STEEP > known[-2].error or known[-1].time <= known[-2].time:
         return None
     return Reached(method, _followed(*known[-2:], target), True)
 
