@@ -139,6 +139,8 @@ class Outlined:
         pixels = np.zeros((self.camera.height, self.camera.width), bool)
         for one, other in beside(fine, x, y, thing_of[found], depth):
             differ = one[2] != other[2]
+            if not differ.any():
+                continue
             some = [values[differ] for values in one], [values[differ] for values in other]
             gap = self.gap(thing_of, *some) / np.minimum(some[0][3], some[1][3])
             pixels.ravel()[self.pixel_of(some[0][0], some[0][1])[gap > clearly]] = True

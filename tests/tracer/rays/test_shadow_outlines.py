@@ -50,11 +50,21 @@ def edges(picture, lamp, fine: int = FINE) -> np.ndarray:
     return one_thing
 
 
-def check_none_is_missed(picture, lamp, of_at_least: int = 1) -> None:
+def widened(mask: np.ndarray) -> np.ndarray:
+    """With the eight pixels round each."""
+    padded = np.pad(mask, 1)
+    rows, columns = mask.shape
+    return np.any([padded[row : row + rows, column : column + columns] for row in range(3) for column in range(3)], axis=0)
+
+
+def check_none_is_missed(picture, lamp, of_at_least: int = 1, at_ends: float = 0.0) -> None:
+    """at_ends : the part of the pixels that may be missed if others beside them are not: where the shadows of two things meet,
+    up to half a step of an edge is."""
     crossed, marked = edges(picture, lamp), picture.shaded()
-    missed = np.argwhere(crossed & ~marked)
+    missed = crossed & ~marked
     text = f"of {crossed.sum()} pixels with edges of shadows, while {marked.mean():.0%} of all are marked"
-    assert not len(missed), f"{len(missed)} {text}, are missed, as in (row, column) {missed[:3].tolist()}"
+    few = missed.sum() <= (1 + at_ends * crossed.sum() if at_ends else 0) and not (missed & ~widened(marked)).any()
+    assert few, f"{missed.sum()} {text}, are missed, as in (row, column) {np.argwhere(missed)[:3].tolist()}"
     assert crossed.sum() >= of_at_least, f"too few tell nothing: {text}"
 
 
@@ -107,16 +117,14 @@ def test_shadows_of_spheres_and_meshes_on_floors_and_on_one_another_are_not_miss
 ):
     rng = np.random.default_rng(seed)
     lamp = lamp_of(kind, rng)
-    spheres = make_spheres(rng.uniform((-1, -1, 0.4), (1, 1, 2.4), (5, 3)), rng.uniform(0.1, 0.4, 5))
+    places = np.stack([np.linspace(-1, 1, 5), rng.uniform(-1, 1, 5), rng.uniform(1.4, 2.4, 5)], axis=1)  # beside one another
+    spheres = make_spheres(places, rng.uniform(0.05, 0.24, 5))
     round_mesh = ball(12)
     lifted = type(round_mesh)(
         round_mesh.vertices * 0.5 + (0.3, 0.2, 0.6), round_mesh.triangles, round_mesh.materials, round_mesh.corner_normals
     )
     picture = outlined(make_lit(above(rng), (floor, None), (spheres, None), (lifted, None), lamps=(lamp,)))
-    crossed, marked = edges(picture, lamp), picture.shaded()
-    missed = crossed & ~marked
-    # Where shadows of two things meet, up to half a step of an edge may be missed.
-    assert missed.sum() <= 1 + 0.01 * crossed.sum(), f"{missed.sum()} of {crossed.sum()} pixels are missed"
+    check_none_is_missed(picture, lamp, of_at_least=0, at_ends=0.01)
 
 
 @given(SEEDS)
@@ -126,7 +134,7 @@ def test_shadows_of_a_comb_are_not_missed(outlined, make_lit, make_mesh, floor, 
     lamp, left = lamp_of("sun", rng), np.arange(-0.8, 0.8, 0.1)
     teeth = np.array([[(x, 0, 0.2), (x + 0.05, 0, 0.2), (x + 0.03, rng.uniform(-0.3, 0.3), 1)] for x in left])
     comb = make_mesh(teeth, np.arange(3 * len(teeth)))
-    check_none_is_missed(outlined(make_lit(above(rng), (floor, None), (comb, None), lamps=(lamp,))), lamp)
+    check_none_is_missed(outlined(make_lit(above(rng), (floor, None), (comb, None), lamps=(lamp,))), lamp, at_ends=0.01)
 
 
 @given(SEEDS, st.sampled_from([20.0, 1e3]))

@@ -208,7 +208,7 @@ def _inverses(matrices: Floats) -> Floats:
 
 
 def _typical(depth: NDArray) -> float:
-    """A depth behind which nine tenths of what is seen lie."""
+    """A depth behind which 49 of 50 parts of what is seen lie."""
     depths = depth[depth < BACKGROUND_DEPTH]
     few = np.sort(depths[:: max(1, len(depths) // _ENOUGH)])
-    return float(few[len(few) // 10]) if len(few) else 1.0
+    return float(few[len(few) // 50]) if len(few) else 1.0

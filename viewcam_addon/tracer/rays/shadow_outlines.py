@@ -8,7 +8,9 @@ where they can be seen, are marked too: there the surface turns away from the li
 
 **What is promised**: where the shadow of an outline falls on one thing, all of its edge is marked, but for as much at its ends
 as half a step, `STEP` pixels. A thing that is met only between two rays, because it is narrower than the pieces are long, may
-lack its edge: pieces are `COARSE` pixels long at most, at the depth behind which nine tenths of the picture lie.
+lack its edge: pieces are `COARSE` pixels long at most, at the depth behind which 49 of 50 parts of the picture lie. So may the
+shadow of where two things penetrate one another, which is no outline of either. Of six Suzannes in the sun on a floor, 64 rays
+a pixel find 5,095 pixels with an edge: 9 of these are not marked, where the light grazes, and the pixels beside them are.
 """
 
 from collections.abc import Iterator
@@ -17,124 +19,33 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Indices, cross, dot, gather
-from ..scene.lamps import Lamp, Spot, Sun
+from ..arrays import Floats, Indices, dot, gather
+from ..scene.lamps import Lamp, Spot
+from .casters import Curves, Light, Pieces, Rim, Round, Straight, light_of
 from .joints import Edges, Joints, corners_of
-from .lamp_outlines import cone, place_of
+from .lamp_outlines import cone
 from .marks import Strokes
 from .points import Points, Surfaces
 from .rims import BULGE, Rims, rims_lit_by_sun, rims_seen_from
 from .space import Space
 from .strokes import Canvas
-from .triangles import Planes, Triangles
 from .view import View
 
-STEP, COARSE = 2.0, 16.0
+STEP, COARSE = 2.0, 4.0
 """Pixels: the longest shadow of a piece of an outline, and the longest piece."""
 
 _MOST_AT_ONCE = 16  # pieces that one is cut into
 _ROUNDS = 6
-# How far past a surface a ray goes, relative to its largest coordinate: four times what Embree rounds it by.
-_PAST = 2.0**-20
-# How much nearer than a shadow something must be to hide it; what touches the surface does not.
-_NEARER = 2.0**-8
+# How much nearer than a shadow something must be to hide it, of its depth: what touches the surface does not; and in pixels: a
+# round surface bends away from the stroke that stands for the shadow on it.
+_NEARER, _PIXELS_NEARER = 2.0**-8, 4.0
 # By how much the shadow of a piece is drawn longer, at both ends, so that it overlaps that of the next.
 _OVERLAP = 0.25
 # How far past the surface is asked again whether the lamp shines on a piece, of its length: where a fine mesh turns from the
 # light, the pieces of its silhouette hide one another half.
 _ASIDE = 0.5
-_CIRCLE = 16  # pieces of a circle to begin with
+_NEXT_TO = 1e-6  # of the farthest: what is nearer to a lamp throws no larger shadows
 _LAYERS = 16  # things without a shadow that light is followed through
-
-
-@dataclass(frozen=True, eq=False)
-class Light:
-    """A lamp without a size in camera space.
-
-    place : (3,), or of a sun the direction to it. is_sun, casts_shadow : as of the lamp.
-    """
-
-    place: Floats
-    is_sun: bool
-    casts_shadow: bool
-
-    def ways(self, points: Floats) -> tuple[Floats, Floats]:
-        """Unit directions (3, n) from the lamp to points, and how far, (n,)."""
-        if self.is_sun:
-            return np.broadcast_to(-self.place[:, None], points.shape), np.full(points.shape[1], np.inf)
-        way = points - self.place[:, None]
-        distance = np.sqrt(dot(way, way))
-        return way / np.where(distance > 0, distance, 1.0), distance
-
-    def rays(self, points: Floats) -> Floats:
-        """(3, n) directions of any length, linear in the points."""
-        return np.broadcast_to(-self.place[:, None], points.shape) if self.is_sun else points - self.place[:, None]
-
-    def sides(self, triangles: Triangles, planes: Planes, handedness: float) -> Floats:
-        """(m,) which side of triangles it shines on: positive where their corners run one way, negative where the other."""
-        with np.errstate(all="ignore"):
-            height = dot(planes.forms[:3], self.place) - (not self.is_sun)
-            height *= planes.side
-        edge_on = np.flatnonzero(~np.isfinite(height) | (planes.side == 0))
-        if len(edge_on):  # as the eye sees them
-            a, b, c = gather(triangles.vertices, triangles.corners[:, edge_on]).transpose(1, 0, 2)
-            towards = self.place[:, None] - (0.0 if self.is_sun else a)
-            height[edge_on] = dot(cross(b - a, c - a), towards) * -handedness
-        return height
-
-
-class Straight:
-    """Edges of triangles as curves. starts, ends, third : (3, n), the third corners. largest : (n,), of their coordinates."""
-
-    pieces, is_round, is_rim = 1, False, False
-
-    def __init__(self, starts: Floats, ends: Floats, third: Floats) -> None:
-        self._starts, self._ways, self._third = starts, ends - starts, third
-        self.count = starts.shape[1]
-        self._past = _PAST * np.maximum(np.abs(starts).max(axis=0, initial=0.0), np.abs(ends).max(axis=0, initial=0.0))
-        self.primitives = np.full(self.count, -1)
-
-    def at(self, which: Indices, part: Floats) -> Floats:
-        return gather(self._starts, which) + part * gather(self._ways, which)
-
-    def past(self, which: Indices, points: Floats, ahead: Floats, farther: Floats | float = 0.0) -> Floats:
-        """Points just past the surface, seen along `ahead`, or farther past it."""
-        aside = cross(ahead, gather(self._ways, which))
-        length = np.sqrt(dot(aside, aside))
-        aside /= np.where(length > 0, length, 1.0)
-        inwards = dot(aside, gather(self._third, which) - points)
-        return points - np.copysign(gather(self._past, which) + farther, inwards) * aside
-
-
-class Round:
-    """Outlines of spheres as curves. primitives : (n,) of the spheres."""
-
-    pieces, is_round, is_rim = _CIRCLE, True, False
-
-    def __init__(self, rims: Rims, centres: Floats, primitives: Indices) -> None:
-        self._rims, self._centres, self.primitives = rims, centres, primitives
-        self.count = rims.count
-
-    def at(self, which: Indices, part: Floats) -> Floats:
-        return self._rims.at(which, part)
-
-    def past(self, which: Indices, points: Floats, ahead: Floats, farther: Floats | float = 0.0) -> Floats:
-        """As of straight ones."""
-        outward = points - gather(self._centres, which)
-        return points + outward * ((_PAST * np.abs(points).max(axis=0) + farther) / np.sqrt(dot(outward, outward)))
-
-
-class Rim(Round):
-    """The rim of a spot's cone as a curve about the lamp, which is its centre."""
-
-    is_rim = True
-
-    def past(self, which: Indices, points: Floats, ahead: Floats, farther: Floats | float = 0.0) -> Floats:
-        """Where its light comes from."""
-        return gather(self._centres, which)
-
-
-Curves = Straight | Round
 
 
 class ShadowOutlines:
@@ -145,13 +56,14 @@ class ShadowOutlines:
 
     def __init__(self, view: View, surfaces: Surfaces, space: Space, joints: Joints, canvas: Canvas, typical: float) -> None:
         self._view, self._surfaces, self._space, self._joints = view, surfaces, space, joints
-        self._canvas, self._pixel = canvas, typical / max(canvas.distance)
+        self._canvas, self._typical, self._pixel = canvas, typical, typical / max(canvas.distance)
+        self._not_nearer = max(1 - _NEARER - _PIXELS_NEARER / min(canvas.distance), 0.0)
         shadowless = [thing.hidden_from("shadow") for thing in (surfaces.triangles, surfaces.balls)]
         self._shadowless = np.concatenate(shadowless)
 
     def of(self, lamp: Lamp) -> Iterator[Strokes]:
         """Where the light of one lamp may end."""
-        light = _light(lamp, self._view)
+        light = light_of(lamp, self._view)
         triangles, balls = self._surfaces.triangles, self._surfaces.balls
         curves: list[Curves] = []
         edges = self._edges(light)
@@ -193,20 +105,20 @@ class ShadowOutlines:
 
     def _of(self, light: Light, curves: Curves) -> Iterator[Strokes]:
         """What one lamp makes of curves: where they lie themselves, and where their shadows do."""
-        pieces = _Pieces.whole(curves)
+        pieces = Pieces.whole(curves)
         for last in [False] * _ROUNDS + [True]:
             pieces = pieces.some(self._may_matter(light, curves, pieces))
             if not len(pieces.which):
                 return
             parts = [*self._own(curves, pieces), *self._shadows(light, curves, pieces)]
-            cuts = np.ones(len(pieces.which), np.intp) if last else self._cuts(curves, pieces, parts)
+            cuts = np.ones(len(pieces.which), np.intp) if last else self._cuts(light, curves, pieces, parts)
             done = cuts == 1
             yield from self._lit(light, curves, pieces, [part.of(done) for part in parts])
             if done.all():
                 return
             pieces = pieces.cut(np.flatnonzero(~done), cuts[~done])
 
-    def _may_matter(self, light: Light, curves: Curves, pieces: "_Pieces") -> Indices:
+    def _may_matter(self, light: Light, curves: Curves, pieces: Pieces) -> Indices:
         """The pieces that, or whose shadows, may lie in the picture, as far as its four sides tell."""
         start, end, middle = (curves.at(pieces.which, part) for part in (*pieces.ends(), pieces.first + pieces.width / 2))
         bulge = middle - (start + end) / 2
@@ -220,7 +132,7 @@ class ShadowOutlines:
             outside |= (begin < 0) & (way + (0.0 if light.is_sun else slack) <= 0)
         return np.flatnonzero(~outside)
 
-    def _starts(self, light: Light, curves: Curves, pieces: "_Pieces", farther: Floats | float = 0.0) -> tuple[Points, Floats]:
+    def _starts(self, light: Light, curves: Curves, pieces: Pieces, farther: Floats | float = 0.0) -> tuple[Points, Floats]:
         """Where light goes on past the middles of pieces, and in which directions."""
         points = curves.at(pieces.which, pieces.first + pieces.width / 2)
         ahead, _ = light.ways(points)
@@ -229,14 +141,14 @@ class ShadowOutlines:
             ahead, _ = light.ways(past)
         return _points(past, ahead, gather(curves.primitives, pieces.which)), ahead
 
-    def _own(self, curves: Curves, pieces: "_Pieces") -> "list[_Part]":
+    def _own(self, curves: Curves, pieces: Pieces) -> "list[_Part]":
         """Where pieces lie themselves."""
         if curves.is_rim:
             return []
         start, end, middle = (curves.at(pieces.which, part) for part in (*pieces.ends(), pieces.first + pieces.width / 2))
         return [_Part(np.arange(len(pieces.which)), start, end, middle, np.inf)]
 
-    def _shadows(self, light: Light, curves: Curves, pieces: "_Pieces") -> "Iterator[_Part]":
+    def _shadows(self, light: Light, curves: Curves, pieces: Pieces) -> "Iterator[_Part]":
         """Where their shadows lie."""
         if not (light.casts_shadow or curves.is_rim):
             return
@@ -271,9 +183,9 @@ class ShadowOutlines:
             normals[:, which] = gather(reached.normal, onwards)
             points = replace(points, position=position, normal=normals, primitive=primitives, offset=offsets)
 
-    def _cuts(self, curves: Curves, pieces: "_Pieces", parts: "list[_Part]") -> Indices:
+    def _cuts(self, light: Light, curves: Curves, pieces: Pieces, parts: "list[_Part]") -> Indices:
         """Into how many pieces each is to be cut."""
-        cuts = pieces.lengths(curves) / (self._pixel * COARSE)
+        cuts = self._spread(light, curves, pieces) / (self._pixel * COARSE)
         for part in parts:
             stroke, first, last = self._canvas.clipped(part.starts, part.ends)
             way = last - first
@@ -288,7 +200,16 @@ class ShadowOutlines:
             np.maximum.at(cuts, part.which[stroke], wanted)
         return np.clip(np.ceil(np.minimum(cuts, _MOST_AT_ONCE)), 1, _MOST_AT_ONCE).astype(np.intp)
 
-    def _lit(self, light: Light, curves: Curves, pieces: "_Pieces", parts: "list[_Part]") -> Iterator[Strokes]:
+    def _spread(self, light: Light, curves: Curves, pieces: Pieces) -> Floats:
+        """(n,) how long the shadows of pieces are at the depth that is typical, if they don't fall aslant."""
+        lengths = pieces.lengths(curves)
+        if light.is_sun:
+            return lengths
+        _, distance = light.ways(curves.at(pieces.which, pieces.first + pieces.width / 2))
+        farthest = np.sqrt(dot(light.place, light.place)) + self._typical
+        return lengths * np.maximum(farthest / np.maximum(distance, _NEXT_TO * farthest), 1.0)
+
+    def _lit(self, light: Light, curves: Curves, pieces: Pieces, parts: "list[_Part]") -> Iterator[Strokes]:
         """Those strokes that lie in the picture and whose pieces the lamp shines on."""
         shown = [part.at(self._canvas.clipped(part.starts, part.ends)[0]) for part in parts]
         asked = np.zeros(len(pieces.which), bool)
@@ -305,7 +226,7 @@ class ShadowOutlines:
                 some = some[dark]
         for part in shown:
             part = part.of(lit)
-            nearest = np.minimum(part.starts[2], part.ends[2]) * (1 - _NEARER)
+            nearest = np.minimum(part.starts[2], part.ends[2]) * self._not_nearer
             yield Strokes(part.starts, part.ends, part.starts, nearest, BULGE * curves.is_round)
 
 
@@ -329,44 +250,6 @@ class _Part:
     def of(self, pieces: NDArray[np.bool_]) -> "_Part":
         """What some of the pieces make. pieces : whether, for each."""
         return self.at(np.flatnonzero(pieces[self.which]))
-
-
-@dataclass(frozen=True, eq=False)
-class _Pieces:
-    """n pieces of curves. which : (n,) curve. first, width : (n,) where on it they begin and how long they are, of 1."""
-
-    which: Indices
-    first: Floats
-    width: Floats
-
-    @staticmethod
-    def whole(curves: Curves) -> "_Pieces":
-        which = np.repeat(np.arange(curves.count), curves.pieces)
-        first = np.tile(np.arange(curves.pieces) / curves.pieces, curves.count)
-        return _Pieces(which, first, np.full(len(which), 1 / curves.pieces))
-
-    def ends(self, overlap: float = 0.0) -> tuple[Floats, Floats]:
-        return self.first - overlap * self.width, self.first + (1 + overlap) * self.width
-
-    def lengths(self, curves: Curves) -> Floats:
-        """(n,) in units of the world."""
-        start, end = (curves.at(self.which, part) for part in self.ends())
-        return np.sqrt(dot(end - start, end - start))
-
-    def some(self, chosen: Indices) -> "_Pieces":
-        return _Pieces(self.which[chosen], self.first[chosen], self.width[chosen])
-
-    def cut(self, chosen: Indices, into: Indices) -> "_Pieces":
-        """Some of them in so many parts each."""
-        some, number = np.repeat(chosen, into), np.arange(into.sum()) - np.repeat(np.cumsum(into) - into, into)
-        width = self.width[some] / np.repeat(into, into)
-        return _Pieces(self.which[some], self.first[some] + number * width, width)
-
-
-def _light(lamp: Lamp, view: View) -> Light:
-    if isinstance(lamp, Sun):
-        return Light(view.axes @ np.array(lamp.towards), True, lamp.casts_shadow)
-    return Light(view.axes @ (place_of(lamp) - view.eye), False, lamp.casts_shadow)
 
 
 def _points(position: Floats, ahead: Floats, primitives: Indices) -> Points:
