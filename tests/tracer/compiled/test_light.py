@@ -2,7 +2,7 @@
 
 They compute the same operations in the same order, so most agree bit for bit. Sine, cosine and arcsine are series of their own,
 off by up to 3 units in the last place, as NumPy's are by up to 4: SERIES is what becomes of these in a direction, three sums of
-products. Where a rectangle is sampled by its solid angle, a sum known to some 1e-15, all that follows is relative to that angle.
+products. Where a rectangle is sampled by its solid angle, a sum known to some 1e-15, all that follows is relative to it.
 """
 
 import mpmath
