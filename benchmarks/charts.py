@@ -11,6 +11,7 @@ no matplotlib.
 import functools
 import importlib
 import importlib.metadata
+import itertools
 import math
 import os
 import platform
@@ -33,7 +34,7 @@ from viewcam_addon.terminal import silent_libraries
 _COLOURS = ("tab:orange", "tab:green", "tab:red", "tab:purple", "tab:brown", "tab:pink", "tab:olive", "tab:cyan")
 _MARKERS = "osv^Dd<>"
 _OURS = "#0b3d91"
-_OURS_LINES = ("-", "--", "-.", ":")
+_OURS_STYLES = tuple((_OURS, marker, line) for marker, line in zip("osD^", ("-", "--", "-.", ":"), strict=True))
 _INK, _PAPER, _FAINT, _GRID = "#1f2328", "#ffffff", "#656d76", "#e5e8eb"
 # What these are where pages are dark. A picture on a page knows what its reader prefers, and not the page's own colours: so it
 # brings its paper along.
@@ -175,8 +176,8 @@ def draw(chart: Chart, path: Path, command: str) -> None:
         up = 1 / figure.get_figheight()
         axes = figure.add_axes((0.085, (caption + 0.14) * up, 0.655, 4.2 * up))
         _draw_axes(chart, axes)
-        for curve, colour, marker in _styles(chart):
-            _draw_curve(curve, axes, colour, marker)
+        for curve, *style in _styles(chart):
+            _draw_curve(curve, axes, *style)
         order = {_label(curve): place for place, curve in enumerate(chart.curves)}
         lines = sorted(axes.get_legend_handles_labels()[0], key=lambda line: order[line.get_label()])
         look = {"frameon": False, "labelspacing": 0.8, "handlelength": 3, "fontsize": 8.5}
@@ -227,24 +228,24 @@ def _decades(chart: Chart) -> tuple[float, float]:
     return 10.0**first, 10.0 ** max(last, first + 1)
 
 
-def _styles(chart: Chart) -> list[tuple[Curve, str, str]]:
-    """Each curve with its colour and marker; those in use last, so that they lie on top."""
+def _styles(chart: Chart) -> list[tuple[Curve, str, str, str]]:
+    """Each curve with its colour, marker and line; those in use last, so that they lie on top."""
+    ours = itertools.cycle(_OURS_STYLES)
     others = iter(zip(_COLOURS, _MARKERS, strict=True))
     styled = [
-        (curve, *((_OURS, "o") if curve.ours else (_FAINT, "") if curve.limit else next(others))) for curve in chart.curves
+        (curve, *(next(ours) if curve.ours else (_FAINT, "", "--") if curve.limit else (*next(others), "-")))
+        for curve in chart.curves
     ]
     return sorted(styled, key=lambda style: style[0].ours)
 
 
-def _draw_curve(curve: Curve, axes: Axes, colour: str, marker: str) -> None:
+def _draw_curve(curve: Curve, axes: Axes, colour: str, marker: str, line: str) -> None:
     x, y = np.asarray(curve.x, float), np.asarray(curve.y, float)
     low, high = axes.get_ylim()
     answered = np.isfinite(y)
     shown = np.where(answered, np.clip(y, low, high) if axes.get_yscale() == "log" else y, np.nan)
     style = {"linewidth": 2.8, "markersize": 5} if curve.ours else {"linewidth": 1.2, "markersize": 4}
-    before = sum(line.get_color() == colour and line.get_marker() == marker for line in axes.lines)
-    dash = {"linestyle": "--" if curve.limit else _OURS_LINES[before % len(_OURS_LINES)]}
-    axes.plot(x, shown, color=colour, marker=marker, label=_label(curve), clip_on=False, **style, **dash)
+    axes.plot(x, shown, color=colour, marker=marker, linestyle=line, label=_label(curve), clip_on=False, **style)
     if curve.spread:
         axes.hlines(shown, *np.transpose(curve.spread), color=colour, linewidth=1.2, alpha=0.6)
     if not answered.all():

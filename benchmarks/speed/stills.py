@@ -44,7 +44,7 @@ OURS = (
 )
 METHODS = (
     *OURS,
-    Method("the same, random numbers", PLAIN, "random", EVERY_OTHER),
+    Method("ours with random numbers", PLAIN, "random", EVERY_OTHER),
     Method(CYCLES, CYCLES, "samples", POWERS, rival=True, job=True),
     Method(f"{CYCLES}, adaptive", CYCLES, "error", NOISE_THRESHOLDS, rival=True, job=True),
 )

@@ -84,3 +84,21 @@ def test_a_chart_in_a_place_that_is_none_is_an_error_in_one_sentence(tmp_path):
 def test_figures_are_plain_numbers_and_null():
     figures = chart_of(Curve("ours", np.array(X), (1.0, math.nan, math.inf), ours=True)).figures()
     assert figures == {"ours": {"x": [1.0, 0.1, 0.01], "y": [1.0, None, None]}}
+
+
+def test_a_chart_brings_its_paper_along_and_turns_dark_where_the_reader_prefers_that(tmp_path):
+    charts.draw(chart_of(Curve("ours", X, X, ours=True), levels=(0.05,)), tmp_path / "chart.svg", "viewcam chart something")
+    text = (tmp_path / "chart.svg").read_text(encoding="utf-8")
+    dark = text.partition("prefers-color-scheme: dark")[2].partition("</style>")[0]
+    drawn = text.partition("</style>")[0].partition("<style")[0] + text.partition("</style>")[2]
+    for colour in charts._IN_THE_DARK:
+        assert f"fill: {colour}" in drawn or f"stroke: {colour}" in drawn, f"nothing is {colour}: the rule for it does nothing"
+        assert f'[style*="fill: {colour}"]' in dark and f'[style*="stroke: {colour}"]' in dark
+
+
+def test_how_far_measurements_spread_is_drawn(tmp_path):
+    spread = [(0.9, 1.2), (0.09, 0.12), (0.009, 0.012)]
+    for name, curve in (("with", Curve("ours", X, X, ours=True, spread=spread)), ("without", Curve("ours", X, X, ours=True))):
+        charts.draw(chart_of(curve), tmp_path / f"{name}.svg", "viewcam chart something")
+    sizes = [(tmp_path / f"{name}.svg").read_text(encoding="utf-8").count("<path") for name in ("with", "without")]
+    assert sizes[0] >= sizes[1] + len(spread)
