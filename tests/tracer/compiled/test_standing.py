@@ -17,9 +17,15 @@ ROOT = Path(__file__).resolve().parents[3]
 
 @pytest.mark.skipif(not compiled.AVAILABLE, reason="numba or embreex is not installed, or turned off")
 @pytest.mark.parametrize(
-    ("traced", "loads"), [("render(scene)", False), ("Tracer(scene).render()", True), ("render(scene, 'direct', 2)", True)]
+    ("traced", "loads"),
+    [
+        ("render(scene)", False),
+        ("render(scene, 'direct', 2)", False),
+        ("Tracer(scene).render()", True),
+        ("Tracer(scene).render_light('direct', 2, 0)", True),
+    ],
 )
-def test_one_picture_of_level_geometry_is_not_worth_loading_numba(ball, make_scene, tmp_path, traced, loads):
+def test_one_small_picture_is_not_worth_loading_numba(ball, make_scene, tmp_path, traced, loads):
     camera = Pinhole((0, -5, 1), (0, 0, 0), (0, 0, 1), 40, 48, 48)
     scene_file.write(make_scene(camera, ball(6)), tmp_path / "scene.json")
     program = (
