@@ -11,7 +11,7 @@ from viewcam_addon.errors import InputError
 from viewcam_addon.tracer.light.adaptive import rounds
 from viewcam_addon.tracer.render import Stopped, Tracer, render
 from viewcam_addon.tracer.scene.film import Film
-from viewcam_addon.tracer.scene.lamps import Point, Sun
+from viewcam_addon.tracer.scene.lamps import Point, Sun, World
 from viewcam_addon.tracer.scene.materials import Colour, Material
 
 FLOAT32 = 2.0**-24
@@ -198,6 +198,21 @@ def test_the_variance_told_is_that_of_pictures_with_other_seeds_or_more(sunny):
     told = np.mean([passes["Variance"].astype(float).mean() for passes in pictures])
     # 1.3 to 2 by halves that complete one another (estimate.py).
     assert 0.9 <= told / true <= 3, f"{told / true:.2f}"
+
+
+@pytest.mark.parametrize("exposure", [0.0, 1e-3, 1e6])
+def test_any_exposure(soft, exposure):
+    scene = replace(soft, film=Film(exposure=exposure))
+    passes = render(scene, "direct", 32, error=0.02 * (exposure or 1))
+    assert all(np.isfinite(values).all() for values in passes.values())
+    assert (counts(passes) == counts(render(soft, "direct", 32, error=0.02))).mean() > 0.99 or not exposure
+
+
+def test_glass_and_nothing_that_light_falls_on(sunny):
+    scene = sunny(world=World((0.5, 0.6, 0.7)))
+    clear = dict.fromkeys(scene.materials, Material(glass=Colour((1.0,) * 3)))
+    passes = render(replace(scene, materials=clear, lamps=()), "path", 16, error=0.05)
+    assert np.isfinite(shown(passes)).all() and shown(passes).any()
 
 
 class Impatient:

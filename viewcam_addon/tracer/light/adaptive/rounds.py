@@ -55,6 +55,8 @@ class Rounds:
         self._light, self._error, self._primitives = illumination, error, primitives
         self._parts, self._check = parts, check
         self._certain = illumination.paths_by_lamp()
+        # Where light is random and falls on anything.
+        self._shares = self._certain is None and DIRECT in illumination.paths.categories and illumination.film.exposure > 0
         self._edges = illumination.edges(outlines, depth, primitives)
         self._material = illumination.surfaces.materials_seen(primitives.ravel()).reshape(primitives.shape)
         self._glints = glints(illumination.camera, illumination.surfaces, illumination.palette, depth, self._material)
@@ -77,11 +79,11 @@ class Rounds:
             self._sample(band, active, taken, more)
             taken = more
             variance = band.estimated(active)
-            if self._certain is None:
+            if self._shares:
                 shared = band.shared(~alone, self._error)
                 variance = np.where(gather(alone, active), variance, gather(shared, active))
             active = active[variance > self._error**2]
-        if self._certain is None:
+        if self._shares:
             band.share(~alone, self._error)
         flat = {name: values.reshape(-1, values.shape[2]) for name, values in passes.items()}
         self._parts(lambda part: band.write(flat, part), len(band.pixels), _WRITTEN)
