@@ -10,7 +10,7 @@ where they can be seen, are marked too: there the surface turns away from the li
 as half a step, `STEP` pixels. A thing that is met only between two rays, because it is narrower than the pieces are long, may
 lack its edge: pieces are `COARSE` pixels long at most, at the depth behind which 49 of 50 parts of the picture lie. So may the
 shadow of where two things penetrate one another, which is no outline of either. Of six Suzannes in the sun on a floor, 64 rays
-a pixel find 5,095 pixels with an edge: 9 of these are not marked, where the light grazes, and the pixels beside them are.
+a pixel find 5,095 pixels with an edge: 9 of these are not marked, mostly where light grazes, and pixels beside them are.
 """
 
 from collections.abc import Iterator
