@@ -11,7 +11,7 @@ compared, and the times, which are those of ordinary poses.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,15 +46,16 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
     return tuple(_chart(name, title, measured, make(trials, None), make(trials, _Z)) for name, (title, make) in KINDS.items())
 
 
-def _chart(name: str, title: str, measured: Mapping[str, Mapping[str, float]], any_up: Poses, z_up: Poses) -> Chart:
+def _chart(name: str, title: str, measured: Mapping[str, Mapping[str, Sequence[float]]], any_up: Poses, z_up: Poses) -> Chart:
     curves = []
     for method, ways in measured.items():
         poses = z_up if method in WORLD_Z else any_up
         with np.errstate(all="ignore"):
             error = poses.error(METHODS[method](poses.eye, poses.look_at, poses.up))
-        nanoseconds = sorted(1e9 * seconds for seconds in ways.values())
-        curves.append(Curve(method, nanoseconds, [error] * len(ways), ours=method == OURS))
-    told = ", ".join(f"{1e-6 / seconds:.3g} million {way}" for way, seconds in measured[OURS].items())
+        times = sorted((1e9 * np.median(rounds), (1e9 * min(rounds), 1e9 * max(rounds))) for rounds in ways.values())
+        medians, spread = zip(*times, strict=True)
+        curves.append(Curve(method, medians, [error] * len(times), ours=method == OURS, spread=spread))
+    told = ", ".join(f"{1e-6 / np.median(rounds):.3g} million {way}" for way, rounds in measured[OURS].items())
     return Chart(
         f"basis-{name}",
         f"The basis of {title}",

@@ -121,8 +121,8 @@ METHODS: dict[str, Method] = {
 }
 
 
-def times(divisor: int, rounds: int) -> dict[str, dict[str, float]]:
-    """Method → way to call it → seconds of a pose, medians. divisor : of the numbers of poses."""
+def times(divisor: int, rounds: int) -> dict[str, dict[str, list[float]]]:
+    """Method → way to call it → seconds of a pose in each round. divisor : of the numbers of poses."""
     rng = np.random.default_rng(4)
     many = rng.normal(size=(3, _AT_ONCE // divisor, 3))
     one, objects, truths = (many[:, : max(10, count // divisor)] for count in (_ONE_AT_A_TIME, _OBJECTS, _TRUTHS))
@@ -150,8 +150,8 @@ def times(divisor: int, rounds: int) -> dict[str, dict[str, float]]:
         (TRACK_TO, f"{len(objects[0]):,} at once"): (update, objects[0]),
         (TRUTH, single): (loop(oracle.axes, list(truths.transpose(1, 0, 2))), truths[0]),
     }
-    medians = race.medians(race.run({way: race.timed(work) for way, (work, _) in ways.items()}, rounds))
-    measured: dict[str, dict[str, float]] = {}
+    seconds = race.run({way: race.timed(work) for way, (work, _) in ways.items()}, rounds)
+    measured: dict[str, dict[str, list[float]]] = {}
     for (method, way), (_, poses) in ways.items():
-        measured.setdefault(method, {})[way] = medians[method, way] / len(poses)
+        measured.setdefault(method, {})[way] = [each / len(poses) for each in seconds[method, way]]
     return measured
