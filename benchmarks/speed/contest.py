@@ -4,6 +4,7 @@ In every round all methods take their turn at one effort before any goes on to t
 drifts; each round has a seed of its own. A method goes on until it is good enough, or takes too long.
 """
 
+import functools
 import math
 import statistics
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -52,6 +53,9 @@ class Point:
         return math.sqrt(statistics.fmean(error * error for error in self.errors))
 
 
+# How many times the longest picture a method's first may take.
+_HOPELESS = 3
+
 Tracks = dict[Method, list[Point]]
 
 
@@ -73,15 +77,25 @@ def measure(
     sides : side → figure → a function of sampling, parameter, seed and path, that returns its seconds and leaves a picture at
     the path. path : where pictures may be written.
     """
-    tracks: Tracks = {method: [] for method in methods}
-    for method in methods:  # what is loaded, compiled or built the first time
-        sides[method.side][figure](method.sampling, method.parameters[0], 0, path)
+    tracks: Tracks = {}
+    for method in methods:
+        least = functools.partial(sides[method.side][figure], method.sampling, method.parameters[0], 0, path)
+        if _takes_part(method, least, effort):
+            tracks[method] = []
     for number in range(effort.rounds):
         for method, point in _turns(tracks, number == 0, effort):
             seconds = sides[method.side][figure](method.sampling, point.parameter, number + 1, path)
             point.seconds.append(seconds)
             point.errors.append(error(path))
     return tracks
+
+
+def _takes_part(method: Method, least: Callable[[], float], effort: Effort) -> bool:
+    """Warm up; whether a method can be measured in a reasonable time, once what it loads, compiles or builds is there."""
+    if least() <= _HOPELESS * effort.longest or (seconds := least()) <= _HOPELESS * effort.longest:
+        return True
+    print(f"{method.name} is left out: {seconds:.0f} s for its least effort", flush=True)
+    return False
 
 
 def _turns(tracks: Tracks, first: bool, effort: Effort) -> Iterator[tuple[Method, Point]]:

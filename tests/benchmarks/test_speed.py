@@ -58,6 +58,13 @@ def test_a_method_stops_after_a_picture_that_takes_too_long():
     assert [point.parameter for point in tracks[OURS]] == [1.0, 2.0, 4.0]
 
 
+def test_a_method_whose_least_effort_takes_far_too_long_is_left_out_and_named(capsys):
+    sides = contestants([], lambda side, parameter: 100.0 if side == "Cycles" else 0.1)
+    tracks = contest.measure(sides, (OURS, CYCLES), "picture", lambda _: 1.0, Effort(1, 0.0, longest=3.0), None)
+    assert list(tracks) == [OURS]
+    assert "Cycles is left out: 100 s" in capsys.readouterr().out
+
+
 def test_the_parameters_near_a_target_are_those_on_both_sides_of_it():
     points = power_law(1.0, -0.5)  # errors 0.1, 0.05, 0.025, 0.0125
     assert contest.near(points, [0.03]) == (4.0, 16.0)
