@@ -55,7 +55,7 @@ def _chart(name: str, title: str, measured: Mapping[str, Mapping[str, Sequence[f
         times = sorted((1e9 * np.median(rounds), (1e9 * min(rounds), 1e9 * max(rounds))) for rounds in ways.values())
         medians, spread = zip(*times, strict=True)
         curves.append(Curve(method, medians, [error] * len(times), ours=method == OURS, spread=spread))
-    told = ", ".join(f"{1e-6 / np.median(rounds):.3g} million {way}" for way, rounds in measured[OURS].items())
+    told = ", ".join(f"{1 / np.median(rounds):,.0f} ({way})" for way, rounds in measured[OURS].items())
     return Chart(
         f"basis-{name}",
         f"The basis of {title}",

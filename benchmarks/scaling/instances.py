@@ -24,7 +24,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             "instances",
             growth.SECONDS,
             times,
-            f"Read that each instance costs what its triangles do. {growth.told(times, 'the instances')}",
+            f"Read beside the chart of triangles, since an instance has a thousand. {growth.told(times, 'the instances')}",
         ),
         growth.chart(
             "instances-memory",
@@ -32,7 +32,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             "instances",
             growth.MEGABYTES,
             [*memory, limit],
-            "Read that nothing exceeds the dashed line, though instances share their mesh: each has its triangles in camera "
-            f"space. {growth.told(memory, 'the instances')}",
+            "The dashed line is what is allowed. Instances share their mesh in the scene; each has its triangles in "
+            f"camera space. {growth.told(memory, 'the instances')}",
         ),
     )

@@ -21,7 +21,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             "lamps",
             growth.SECONDS,
             curves,
-            "Read how little a picture of many lamps takes beyond that of one: each sample asks one of them. The first picture "
-            f"prepares them. {growth.told(curves, 'the lamps')}",
+            "Read what a picture of many lamps takes beyond that of one. The first picture prepares them. "
+            f"{growth.told(curves, 'the lamps')}",
         ),
     )

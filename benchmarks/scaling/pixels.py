@@ -49,7 +49,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             "pixels",
             growth.SECONDS,
             times,
-            "Read that pictures grow as their pixels do, and preparing does not. The adaptive one is asked for an error of "
+            "Read what a pixel more costs. The adaptive one is asked for an error of "
             f"{ERROR:g}. {growth.told(times, 'the pixels')}",
         ),
         growth.chart(
@@ -58,7 +58,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             "pixels",
             growth.MEGABYTES,
             [*memory, *limits],
-            "Read that pictures stay below their dashed lines: what the first that fills the tiles of all threads takes beyond "
+            "The dashed lines are what is allowed: what the first picture that fills the tiles of all threads takes beyond "
             "its passes, a quarter more, and the bytes of the passes. A file is counted with the geometry picture in it. "
             f"{growth.told(memory, 'the pixels')}",
         ),

@@ -21,7 +21,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             "spheres",
             growth.SECONDS,
             times,
-            f"Read that pictures grow far slower than the number of spheres. {growth.told(times, 'the spheres')}",
+            f"Read what pictures of more spheres take. {growth.told(times, 'the spheres')}",
         ),
         growth.chart(
             "spheres-memory",

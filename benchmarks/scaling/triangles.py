@@ -19,13 +19,13 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
     )
     times = growth.time_curves(one, (PREPARING, FIRST_GEOMETRY, GEOMETRY, FIRST_DIRECT, DIRECT), "one mesh: ")
     times += growth.time_curves(many, (PREPARING, FIRST_DIRECT, DIRECT), "many meshes: ")
-    memory = growth.memory_curves(one, (PREPARING, FIRST_GEOMETRY, FIRST_DIRECT, DIRECT), "one mesh: ")
-    memory += growth.memory_curves(many, (PREPARING, FIRST_DIRECT, DIRECT), "many meshes: ")
+    memory = growth.memory_curves(one, (PREPARING, FIRST_GEOMETRY, GEOMETRY, FIRST_DIRECT, DIRECT), "one mesh: ")
+    memory += growth.memory_curves(many, (PREPARING, FIRST_DIRECT), "many meshes: ")
     x, largest = [x for x, _ in one], one[-1][1]
     # What the least scene takes is the picture's and its tiles'.
     fixed = max(one[0][1].peak.values())
     limit = growth.memory_limit(x, fixed, BYTES_A_TRIANGLE, f"a fixed amount and {BYTES_A_TRIANGLE} bytes a triangle")
-    stages = PREPARING, FIRST_GEOMETRY, FIRST_DIRECT, DIRECT
+    stages = PREPARING, FIRST_GEOMETRY, GEOMETRY, FIRST_DIRECT, DIRECT
     each = {stage: (largest.peak[stage] - one[0][1].peak[stage]) / largest.triangles for stage in stages}
     told = ", ".join(f"{stage} {count:.0f}" for stage, count in each.items())
     return (
@@ -35,7 +35,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             "triangles",
             growth.SECONDS,
             times,
-            f"Read that preparing grows with the triangles, and a picture hardly. {growth.told(times, 'the triangles')}",
+            f"Read what a picture of more triangles takes beyond preparing. {growth.told(times, 'the triangles')}",
         ),
         growth.chart(
             "triangles-memory",
@@ -43,7 +43,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             "triangles",
             growth.MEGABYTES,
             [*memory, limit],
-            "Read that nothing exceeds the dashed line, which is what the least scene's picture takes, a quarter more, and "
+            "The dashed line is what is allowed: what the least scene's picture takes, a quarter more, and "
             f"{BYTES_A_TRIANGLE} bytes a triangle. Bytes a triangle, of {largest.triangles:,} in one mesh: {told}.",
         ),
     )
