@@ -1,7 +1,7 @@
 """Kernels of rays/space.py: scattered rays and shadow rays, from the surface they leave to Embree's answer, in packets.
 
-Rays to lights are sorted by direction, some thousand at a time, so that those of a packet keep together. Scattered rays are not:
-it pays in some scenes as much as it costs in others.
+Rays to lights are sorted by direction, some thousand at a time, so that those of a packet keep together. Scattered rays are
+not: it pays in some scenes as much as it costs in others.
 """
 
 import numpy as np

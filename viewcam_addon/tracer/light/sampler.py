@@ -82,8 +82,8 @@ class Sampler:
         return scrambled_grid(self, pixels, samples, first, count)
 
     def words(self, first: int, count: int) -> tuple[Words, Words, np.uint32] | None:
-        """What makes the numbers of dimensions: the digits of all samples' points, (count, samples), the dimensions' random words
-        and the seed's; None where there are too many samples, or dimensions of more than one scattering."""
+        """What makes the numbers of dimensions: the digits of all samples' points, (count, samples), the dimensions' random
+        words and the seed's; None where there are too many samples, or dimensions of more than one scattering."""
         (scattering, row), (last, _) = _place(first), _place(first + count - 1)
         if scattering != last or len(self._first) == 1 << _LOW:
             return None
