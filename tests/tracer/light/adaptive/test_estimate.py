@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from viewcam_addon.tracer.light.adaptive.estimate import BLOCK, efficiency, largest_around, mean_around, missed
+from viewcam_addon.tracer.light.adaptive.estimate import BLOCK, efficiency, mean_around
+from viewcam_addon.tracer.light.adaptive.glints import largest_around
 
 RNG = np.random.default_rng(5)
 SHAPE = (40, 56)
@@ -46,17 +47,22 @@ def test_nothing_known_is_no_gain():
     assert (efficiency(np.zeros(SHAPE), np.zeros(SHAPE)) == 1).all()
 
 
-def test_what_a_neighbour_saw_may_have_been_missed():
-    spread = np.zeros(SHAPE)
-    spread[10, 10] = 0.25  # half black, half white
-    found = missed(spread, np.zeros(SHAPE), 16)
-    assert np.sqrt(found[9:12, 9:12]) == pytest.approx(1 / 16)
-    assert np.count_nonzero(found) == 9
+def test_a_pixel_has_no_say_in_how_noisy_it_is():
+    values = RNG.random(SHAPE)
+    other = values.copy()
+    other[10, 10] = 1e6
+    there, elsewhere = mean_around(values, np.ones(SHAPE, bool)), mean_around(other, np.ones(SHAPE, bool))
+    assert elsewhere[10, 10] == pytest.approx(there[10, 10], rel=1e-9)
+    assert (np.abs(elsewhere - there) > 1000).sum() == 24
 
 
 def test_surroundings():
-    values = RNG.random((5, 7))
-    padded = np.pad(values, 1)
-    around = np.lib.stride_tricks.sliding_window_view(padded, (3, 3))
+    values, known = RNG.random((9, 11)), RNG.random((9, 11)) < 0.7
+    window = np.lib.stride_tricks.sliding_window_view
+    around = window(np.pad(values, 1), (3, 3))
     np.testing.assert_array_equal(largest_around(values), around.max(axis=(2, 3)))
-    np.testing.assert_allclose(mean_around(values), around.mean(axis=(2, 3)), rtol=1e-12)
+    sums, counts = (
+        window(np.pad(each, 2), (5, 5)).sum(axis=(2, 3)) - each for each in (np.where(known, values, 0.0), known.astype(float))
+    )
+    np.testing.assert_allclose(mean_around(values, known), sums / np.maximum(counts, 1), rtol=1e-12, atol=1e-15)
+    assert (mean_around(values, np.zeros_like(known)) == 0).all()

@@ -8,7 +8,7 @@ from ...rays.surface import Passes
 from ...scene.film import Film
 from ..sharing import shared
 from ..sums import COLOUR, DIRECT, INDIRECT, Light, Sums, store, without_colour
-from .estimate import efficiency, mean_around, missed
+from .estimate import efficiency, mean_around
 from .interior import CORRECTED, correction
 
 Mask = NDArray[np.bool_]
@@ -21,18 +21,19 @@ _HIDDEN = 4.0
 class Band:
     """n pixels.
 
-    sums : over none of their samples. glints : (rows, width), see glints.py. rows : of the picture.
+    sums : over none of their samples. glints : (rows, width), see glints.py. rows : of the picture. random : whether paths
+    through the same point of the film may bring different light.
 
     taken : (n,) samples of each. variance : (3, n), of their mean. The rest, (n,), are means over red, green and blue, with
     alpha's own on top. spread : of the samples themselves. apart : how far the means of their halves are apart, as a variance.
-    doubt : the variance of their mean, with what they may have missed.
+    doubt : the variance of their mean, as those around tell it, with what they may have missed.
     """
 
-    def __init__(self, sums: Sums, film: Film, glints: Floats, rows: range) -> None:
+    def __init__(self, sums: Sums, film: Film, glints: Floats, rows: range, random: bool) -> None:
         width = glints.shape[1]
         self.pixels = np.arange(rows.start * width, rows.stop * width)
         self.rows, self.columns = np.divmod(self.pixels, width)
-        self.shape = len(rows), width
+        self.shape, self._random = (len(rows), width), random
         self._film, self._sums, self._glints = film, sums, glints * film.exposure**2
         self.taken = np.ones(sums.count, np.int32)
         self._variance = np.zeros((3, sums.count))
@@ -90,10 +91,11 @@ class Band:
         apart.ravel()[active] = gather(self._apart, active)
         factor = gather(efficiency(own, apart).ravel(), active)
         put(self._variance, active, gather(self._variance, active) * factor)
-        unseen = gather(missed(self._spread.reshape(self.shape), self._glints, samples).ravel(), active)
-        self._doubt[active] = np.maximum(gather(own.ravel(), active) * factor, unseen)
-        around = mean_around(self._doubt.reshape(self.shape))
-        self._doubt[active] = np.maximum(gather(self._doubt, active), gather(around.ravel(), active))
+        spread = gather(mean_around(self._spread.reshape(self.shape), self.taken.reshape(self.shape) > 1).ravel(), active)
+        if not self._random:
+            spread = np.maximum(spread, gather(self._spread, active))
+        unseen = gather(self._glints.ravel(), active) / samples**2
+        self._doubt[active] = np.maximum(spread / samples * factor, unseen)
         return gather(self._doubt, active)
 
     def shared(self, which: Mask, error: float) -> Floats:
@@ -131,9 +133,8 @@ class Band:
             tolerance,
         )
         left = left.ravel() * (share * _HIDDEN)
-        better = which & (left < self._doubt)
-        more = np.where(better, mean.reshape(light.shape) - light, 0.0) * np.tile(colour, (len(kinds), 1))
-        return more, np.where(better, left, self._doubt), kinds
+        more = np.where(which, mean.reshape(light.shape) - light, 0.0) * np.tile(colour, (len(kinds), 1))
+        return more, np.where(which, np.minimum(left, self._doubt), self._doubt), kinds
 
     def write(self, passes: Passes, part: slice) -> None:
         """Write some pixels' passes."""

@@ -13,7 +13,6 @@ from ....pinhole import Pinhole
 from ...arrays import Float32s, Floats, dot, gather
 from ...rays.points import Surfaces
 from ..textures import Palette
-from .estimate import largest_around
 
 # So much farther than the farthest that is seen around, it is hidden.
 _BEHIND = 1.01
@@ -50,3 +49,12 @@ def _places(surfaces: Surfaces, shining: NDArray[np.bool_], radiance: Floats) ->
     places = [*gather(triangles.vertices, triangles.corners[:, some]).transpose(1, 0, 2), gather(balls.centres, others)]
     found = np.concatenate([np.tile(gather(of_triangles, some), 3), gather(of_balls, others)])
     return np.concatenate(places, axis=1), gather(radiance, found)
+
+
+def largest_around(values: Floats) -> Floats:
+    """The largest in the 3 × 3 pixels round each."""
+    for axis in (0, 1):
+        padded = np.pad(values, [(1, 1) if axis == i else (0, 0) for i in (0, 1)])
+        before, after = np.split(padded, [-2], axis)[0], np.split(padded, [2], axis)[1]
+        values = np.maximum(np.maximum(before, after), values)
+    return values

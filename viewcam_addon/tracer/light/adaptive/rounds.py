@@ -70,7 +70,7 @@ class Rounds:
     def trace(self, passes: Passes, rows: range) -> None:
         """Write the light of some rows into passes, name → (rows, width, channels)."""
         part = self._glints[rows.start : rows.stop]
-        band = Band(self._light.sums(part.size, 1), self._light.film, part, rows)
+        band = Band(self._light.sums(part.size, 1), self._light.film, part, rows, self._certain is None)
         alone = self._alone(band)
         active = np.flatnonzero(~self._by_centres(band, alone))
         taken = 0
@@ -79,7 +79,7 @@ class Rounds:
             self._sample(band, active, taken, more)
             taken = more
             variance = band.estimated(active)
-            if self._shares:
+            if self._shares and not gather(alone, active).all():
                 shared = band.shared(~alone, self._error)
                 variance = np.where(gather(alone, active), variance, gather(shared, active))
             active = active[variance > self._error**2]
