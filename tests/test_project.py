@@ -31,7 +31,7 @@ FLOORS = [
     "cli",
 ]
 # The same inside the tracer.
-TRACER_FLOORS = ["arrays", "compiled", "scene", "rays", "light", "tiles", "render"]
+TRACER_FLOORS = ["arrays", "compiled", "scene", "rays", "light", "kernels", "tiles", "render"]
 ROOF = {"__init__", "__main__"}
 
 # What exists inside Blender only.
@@ -49,7 +49,7 @@ BLENDER_MODULES = {
     "idprop",
 }
 NEEDS_BLENDER = PACKAGE / "blender"
-NEEDS_NUMBA = PACKAGE / "tracer" / "compiled"
+NEEDS_NUMBA = PACKAGE / "tracer" / "kernels"
 
 TOP_LEVEL = {"blender_manifest.toml", "viewcam_addon", "tests", "sample_scenes", "README.md", "docs", "benchmarks"}
 BUILD_FILES = {"__init__.py", "pyproject.toml", "Makefile", "LICENSE"}

@@ -66,6 +66,7 @@ class Tracer:
         self._threads = threads or os.cpu_count() or 1
         self._view = View(scene.camera)
         self._joints = None  # of the triangles, where another tracer found them
+        self._edges = None  # the pixels that they may cross, once they are asked for
         former = None if kept is None else kept._used_up(scene)
         if former is None:
             self._triangles = triangles_of(_placed(scene, Mesh), self._view, self._threads)
@@ -179,7 +180,10 @@ class Tracer:
             _, _, primitives.ravel()[tile.start : tile.stop] = trace_centres(passes, *self._corners(tile))
 
         passes = self._picture(counted, see, SMALLEST_TILE, TILE, None)
-        rounds = Rounds(illumination, error, self._outlines, passes["Depth"][..., 0], primitives, self._in_parts, check)
+        depth = passes["Depth"][..., 0]
+        if self._edges is None:
+            self._edges = illumination.edges(self._outlines, depth, primitives)
+        rounds = Rounds(illumination, error, self._edges, depth, primitives, self._in_parts, check)
         for rows in rounds.bands():
             rounds.trace({name: values[rows.start : rows.stop] for name, values in passes.items()}, rows)
             if watcher is not None:

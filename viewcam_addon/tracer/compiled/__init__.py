@@ -1,11 +1,10 @@
-"""Loops over rays that numba compiles: an optional extra that changes no result, only how fast it comes.
+"""What chooses between NumPy and loops that numba compiles: an optional extra that changes no result, only how fast it comes.
 
 NumPy calls Embree ray by ray and writes whole arrays between any two steps. Compiled, the steps of a ray follow one another in
-registers, and Embree is asked about sixteen rays at a time. Everything here stands in for functions of rays/ and light/, takes
-and returns the same arrays, and is used where `AVAILABLE` says so; those functions stay, and are what tests compare it with.
-
-`AVAILABLE` costs a millisecond: numba itself is imported with the first kernel, by importing the module it stands in
-(packets.py is the ground of them). VIEWCAM_COMPILED=0 in the environment turns all of it off.
+registers, and Embree is asked about sixteen rays at a time. What is in kernels/ stands in for functions of rays/ and light/,
+takes and returns the same arrays, and is used where `AVAILABLE` says so; those functions stay, and are what tests compare it
+with. `AVAILABLE` costs a millisecond: numba itself is imported with the first kernel. VIEWCAM_COMPILED=0 in the environment
+turns all of it off.
 
 Rejected: a C extension of our own, which needs a wheel for every Python and machine; numba's parallel loops, since tiles have
 threads already; fastmath, which makes results depend on the machine.

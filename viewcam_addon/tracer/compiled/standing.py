@@ -1,7 +1,8 @@
 """How a function of arrays is replaced by its kernel, everywhere in the same way.
 
 A function that a kernel stands in for is marked with `@or_compiled`. Its kernel has the same name and the same arguments, in
-the module of the same name in this folder, and returns the same arrays, to a few roundings. Nothing else knows of kernels.
+the module of the same name in kernels/, and returns the same arrays, to a few roundings. Nothing else knows of kernels, and
+they are imported when they are first called, so that they may stand above what they stand in for.
 """
 
 import contextlib
@@ -28,7 +29,7 @@ def uncompiled(so: bool) -> Iterator[None]:
 
 def or_compiled(plain: Callable) -> Callable:
     """The function, or its kernel where those can be used. `plain` is the function itself, which tests compare with."""
-    module = f"{__package__}.{plain.__module__.rpartition('.')[2]}"
+    module = f"{__package__.rpartition('.')[0]}.kernels.{plain.__module__.rpartition('.')[2]}"
 
     @functools.cache
     def kernel() -> Callable:

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Float32s, Floats, Indices, gather
-from ...rays.outlines import Outlines
 from ...rays.surface import Passes
 from ..illumination import Illumination
 from ..sums import DIRECT, Light
@@ -38,15 +37,15 @@ Parts = Callable[[Callable[[slice], None], int, int], None]
 class Rounds:
     """Samples one band of a picture after the other.
 
-    error : that is wanted of each pixel's Combined, a standard error. depth, primitives : (height, width), what is seen at the
-    pixels' centres. parts : see above. check : called often; what it raises ends the work.
+    error : that is wanted of each pixel's Combined, a standard error. edges : `Illumination.edges`. depth, primitives :
+    (height, width), what is seen at the pixels' centres. parts : see above. check : called often; what it raises ends the work.
     """
 
     def __init__(
         self,
         illumination: Illumination,
         error: float,
-        outlines: Outlines,
+        edges: Mask,
         depth: Float32s,
         primitives: Indices,
         parts: Parts,
@@ -57,7 +56,7 @@ class Rounds:
         self._certain = illumination.paths_by_lamp()
         # Where light is random and falls on anything.
         self._shares = self._certain is None and DIRECT in illumination.paths.categories and illumination.film.exposure > 0
-        self._edges = illumination.edges(outlines, depth, primitives)
+        self._edges = edges
         self._material = illumination.surfaces.materials_seen(primitives.ravel()).reshape(primitives.shape)
         self._glints = glints(illumination.camera, illumination.surfaces, illumination.palette, depth, self._material)
 

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Indices, gather
+from ..compiled.library import LANES, pointer_of
 from ..rays.balls import NEAR, Balls
 from ..rays.crowd import Hits
-from .library import LANES, pointer_of
 from .packets import FARTHEST, aim, kernel, meet, met, new_packet
 from .sorting import KEYS, RAYS, sort
 from .spheres import OUTWARDS, RAY, REACH, SPHERE, UNIT, answer, new_rays, questions, ray_of, root, scene_of, table_of

@@ -6,8 +6,8 @@ not: it pays in some scenes as much as it costs in others.
 
 import numpy as np
 
+from ..compiled.library import LANES, pointer_of
 from ..rays import offset
-from .library import LANES, pointer_of
 from .packets import FARTHEST, aim, block, blocked, kernel, meet, met, new_packet
 from .sorting import KEYS, RAYS, sort
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .library import LANES, pointer_of
+from ..compiled.library import LANES, pointer_of
 from .packets import aim, kernel, meet, met, new_packet
 
 

@@ -18,7 +18,7 @@ import numba
 import numpy as np
 from numba.core import types
 
-from .library import (
+from ..compiled.library import (
     ALIGNMENT,
     ARGUMENTS,
     COHERENT,

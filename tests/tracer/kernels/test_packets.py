@@ -24,7 +24,7 @@ def packets():
     """The module of packets, where it can be used."""
     pytest.importorskip("numba")
     assert library.PROVEN, "numba and embreex are installed, but packets were not proven"
-    from viewcam_addon.tracer.compiled import packets
+    from viewcam_addon.tracer.kernels import packets
 
     return packets
 
@@ -84,7 +84,7 @@ def test_the_environment_turns_kernels_off(value):
 def test_kernels_work_where_no_cache_can_be_written(packets):
     program = (
         "from numba.core import caching; caching.CacheImpl._locator_classes = [];"
-        "from viewcam_addon.tracer.compiled import packets;"
+        "from viewcam_addon.tracer.kernels import packets;"
         "print(packets.new_packet(True).shape, type(packets.new_packet._cache).__name__)"
     )
     outcome = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True)

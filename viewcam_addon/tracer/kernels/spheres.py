@@ -16,7 +16,7 @@ from numba.core import cgutils, types
 from numba.extending import intrinsic
 
 from ..arrays import Floats
-from .library import ARGUMENTS, FAR, GEOMETRY, ID, LANES, PRIMITIVE, pointer_of, shared
+from ..compiled.library import ARGUMENTS, FAR, GEOMETRY, ID, LANES, PRIMITIVE, pointer_of, shared
 
 _USER_GEOMETRY, _ROBUST = 120, 4
 

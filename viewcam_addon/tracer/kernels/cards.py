@@ -4,8 +4,8 @@ import numba
 import numpy as np
 
 from ..arrays import Floats, Indices
+from ..compiled.library import LANES, pointer_of
 from ..rays.ellipsoids import NEAR, Ellipsoids
-from .library import LANES, pointer_of
 from .packets import FARTHEST, aim, kernel, meet, met, new_packet
 from .spheres import OUTWARDS, RAY, REACH, SPHERE, UNIT, answer, new_rays, questions, ray_of, root, scene_of, table_of
 

@@ -85,7 +85,7 @@ def test_embree_asks_for_all_spheres_that_a_ray_may_meet(seed, count):
 
 def test_boxes_without_a_margin_lose_spheres(monkeypatch):
     """What the first test would see if float32's rounding of a ray were forgotten: small spheres far away are missed."""
-    from viewcam_addon.tracer.compiled import spheres as kernels
+    from viewcam_addon.tracer.kernels import spheres as kernels
 
     rng = np.random.default_rng(0)
     spheres = spheres_at(rng.uniform((-1, 49, -1), (1, 51, 1), (2000, 3)), np.full(2000, 1e-6))

@@ -138,7 +138,7 @@ def test_lamps_of_all_kinds_are_sampled_the_same_to_a_few_roundings(make_lightin
 @settings(max_examples=10, deadline=None)
 @given(seed=SEEDS)
 def test_a_lamp_that_is_a_millionth_too_bright_or_beside_its_place_is_told(make_lighting, seed):
-    from viewcam_addon.tracer.compiled.lamps import table_of
+    from viewcam_addon.tracer.kernels.lamps import table_of
 
     lighting = make_lighting(*lamps_of(np.random.default_rng(seed), 2))
     rows = table_of(lighting.emitters.lamps, lighting.emitters.glowing)
@@ -206,7 +206,7 @@ def test_places_on_the_film_are_the_same_bits():
 
 
 def test_series_of_sine_cosine_and_arcsine_are_right_to_three_units():
-    from viewcam_addon.tracer.compiled.vectors import arcsine, turned
+    from viewcam_addon.tracer.kernels.vectors import arcsine, turned
 
     numbers = [*np.random.default_rng(0).uniform(-1, 1, 2000), 0.0, 0.25, 0.5, 0.75, -1.0, 1.0, 1e-300]
     with mpmath.workprec(100):
