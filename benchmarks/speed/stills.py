@@ -31,9 +31,9 @@ NOISE_THRESHOLDS = (0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002)
 _PAIR = (COMPILED, CYCLES)
 _DIRECT = {0.003: (8, 3), 0.001: (8, 3)}
 STILLS = (
-    Still("suzannes", "Six Suzannes, one sun", "direct", (640, 360), _DIRECT, _PAIR, 60),
-    Still("studio", "Studio still", "direct", (640, 360), _DIRECT, _PAIR, 150),
-    Still("spheres", "Sphere field", "direct", (640, 360), _DIRECT, _PAIR, 200),
+    Still("suzannes", "Six Suzannes, one sun", "direct", (640, 360), _DIRECT, _PAIR, 40),
+    Still("studio", "Studio still", "direct", (640, 360), _DIRECT, _PAIR, 60),
+    Still("spheres", "Sphere field", "direct", (640, 360), _DIRECT, _PAIR, 45),
     Still("cornell", "Cornell box", "path", (480, 480), {0.01: (1, 1)}, _PAIR, 40),
 )
 OURS = (

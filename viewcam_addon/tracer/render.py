@@ -126,6 +126,7 @@ class Tracer:
 
         once : whether this picture is the only one, so that compiled loops have to save more time than it takes to load them.
         """
+        passes = self._blank(unwritten)
         centres = Centres(self._camera, self._visibility)
         small = once and self._camera.width * self._camera.height < WORTH_COMPILING
 
@@ -134,7 +135,7 @@ class Tracer:
             with uncompiled(small):
                 self._surface.write(passes, self._visibility.first(x, y, close, centres.width), x, y)
 
-        return self._picture(unwritten, trace, SMALLEST_TILE, TILE, watcher)
+        return self._traced(passes, trace, SMALLEST_TILE, TILE, watcher)
 
     def render_light(
         self,
@@ -152,34 +153,36 @@ class Tracer:
         from .light.adaptive.rounds import Rounds
         from .light.illumination import CENTRES, Illumination, counted, dark
 
+        passes = self._blank(dark if error is None else counted)
         illumination = Illumination(self._scene, self._view, self._lit, self._eye, level, samples, seed)
+        centres = Centres(self._camera, self._visibility)
         small = once and self._camera.width * self._camera.height * samples < PATHS_WORTH_COMPILING
 
         def check() -> None:
             _stop_if_asked(watcher)
 
-        def trace_centres(passes: Passes, columns: Indices, rows: Indices) -> tuple[Floats, Floats, Indices]:
-            x, y, primitives = self._eye(columns + 0.5, rows + 0.5)
+        def trace_centres(passes: Passes, tile: range) -> Indices:
+            x, y, close = centres.rays(tile)
+            primitives = self._visibility.first(x, y, close, centres.width)
             self._surface.write({name: passes[name] for name in CENTRES}, primitives, x, y)
-            return x, y, primitives
+            return primitives
 
         def trace(passes: Passes, tile: range) -> None:
             columns, rows = self._corners(tile)
             with uncompiled(small):
-                trace_centres(passes, columns, rows)
+                trace_centres(passes, tile)
                 illumination.trace(passes, np.arange(tile.start, tile.stop), columns, rows, check)
 
         if error is None or samples == 1:
             largest = illumination.largest_tile
-            blank = dark if error is None else counted
-            return self._picture(blank, trace, min(largest, SMALLEST_TILE), largest, watcher)
+            return self._traced(passes, trace, min(largest, SMALLEST_TILE), largest, watcher)
         primitives = np.empty((self._camera.height, self._camera.width), np.int32)
 
         def see(passes: Passes, tile: range) -> None:
             check()
-            _, _, primitives.ravel()[tile.start : tile.stop] = trace_centres(passes, *self._corners(tile))
+            primitives.ravel()[tile.start : tile.stop] = trace_centres(passes, tile)
 
-        passes = self._picture(counted, see, SMALLEST_TILE, TILE, None)
+        self._traced(passes, see, SMALLEST_TILE, TILE, None)
         depth = passes["Depth"][..., 0]
         if self._edges is None:
             self._edges = illumination.edges(self._outlines, depth, primitives)
@@ -213,22 +216,21 @@ class Tracer:
         x, y = self._camera.view_plane(column, row)
         return x, y, self._visibility.first(x, y, None if careful else np.empty(0, np.intp))
 
-    def _picture(
-        self,
-        blank: Callable[[tuple[int, int]], Passes],
-        trace: Callable[[Passes, range], None],
-        smallest: int,
-        largest: int,
-        watcher: Watcher | None,
-    ) -> Passes:
-        """Passes that `trace` has written into, tile by tile."""
+    def _blank(self, make: Callable[[tuple[int, int]], Passes]) -> Passes:
+        """A picture's passes, before anything else takes memory for it."""
         width, height = self._camera.width, self._camera.height
         try:
-            passes = blank((height, width))
+            return make((height, width))
         except (MemoryError, ValueError) as error:
             raise InputError(
                 f"a picture of {width} × {height} pixels needs more memory than there is: choose a size"
             ) from error
+
+    def _traced(
+        self, passes: Passes, trace: Callable[[Passes, range], None], smallest: int, largest: int, watcher: Watcher | None
+    ) -> Passes:
+        """Passes that `trace` has written into, tile by tile."""
+        width, height = self._camera.width, self._camera.height
         flat = {name: values.reshape(width * height, -1) for name, values in passes.items()}
 
         def work(tile: range) -> None:

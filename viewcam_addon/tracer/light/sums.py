@@ -41,7 +41,7 @@ class Light:
         self.count = count
         self._rows = {category: row for row, category in enumerate(categories)}
         self.values = np.zeros((3, len(categories), count))
-        self.flat = self.values.reshape(3, -1)
+        self.flat = self.values.reshape(3, len(categories) * count)
         self.covered = np.zeros(count, bool)
 
     def __contains__(self, category: str) -> bool:
@@ -84,7 +84,7 @@ class Sums:
     def _hold(self, state: Floats) -> None:
         """Keep all that is known of the pixels in the columns of one table, and names for its rows."""
         self.state = state
-        self.totals = state[:-13].reshape(3, len(self.categories), -1)
+        self.totals = state[:-13].reshape(3, len(self.categories), state.shape[1])
         self.covered, self.first = state[-13], state[-12:-9]
         # The sum of the differences from the first sample, and when the last batch began; of the batches' own sums, squared.
         self.differences, self.before, self.squares = state[-9:-6], state[-6:-3], state[-3:]
@@ -112,8 +112,9 @@ class Sums:
 
     def add(self, light: Light) -> None:
         """Add some samples of every pixel: the paths are those of all samples of a pixel, pixel after pixel."""
-        add_samples(self, light.values.reshape(3, len(self.categories), self.count, -1), light.covered)
-        self.taken += light.count // self.count
+        samples = light.count // self.count
+        add_samples(self, light.values.reshape(3, len(self.categories), self.count, samples), light.covered)
+        self.taken += samples
 
     @property
     def alpha(self) -> Floats:

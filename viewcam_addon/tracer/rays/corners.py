@@ -39,6 +39,10 @@ _BIT = np.array([1, 2, 4, 8, 16, 32, 64, 128], np.uint8)
 MIXER = np.uint64(0x9E3779B97F4A7C15)  # 2⁶⁴ over the golden ratio, whose multiples spread evenly
 
 
+# Corners at a time, which stay in a core's cache.
+_PIECE = 1 << 15
+
+
 class Corners:
     """The corners of triangles, as cells of the view plane.
 
@@ -80,13 +84,20 @@ class Corners:
         farthest = max(np.abs(x).max(), np.abs(y).max())
         if not (farthest <= FARTHEST and _reach(farthest) < 0.4 * min(across, above)):
             return None
-        right, up = _seen(self._vertices, 2 * farthest)
-        column, row = np.rint((right - x[0]) / across).astype(np.intp), np.rint((up - y[0]) / above).astype(np.intp)
-        inside = np.flatnonzero((column >= 0) & (column < len(x)) & (row >= 0) & (row < len(y)))
-        column, row, right, up = column[inside], row[inside], right[inside], up[inside]
-        reach = _reach(np.maximum(np.abs(right), np.abs(up)))
-        close = (np.abs(x[column] - right) <= reach) & (np.abs(y[row] - up) <= reach)
-        return np.unique(row[close] * len(x) + column[close])
+        parts = (self._vertices[:, first : first + _PIECE] for first in range(0, self._vertices.shape[1], _PIECE))
+        return np.unique(np.concatenate([np.empty(0, np.intp), *(_close_pixels(part, x, y, farthest) for part in parts)]))
+
+
+def _close_pixels(vertices: Floats, x: Floats, y: Floats, farthest: float) -> Indices:
+    """Those of `near_pixels` that pass close by some of the corners. farthest : from the view axis."""
+    across, above = (x[-1] - x[0]) / (len(x) - 1), (y[-1] - y[0]) / (len(y) - 1)
+    right, up = _seen(vertices, 2 * farthest)
+    column, row = np.rint((right - x[0]) / across).astype(np.intp), np.rint((up - y[0]) / above).astype(np.intp)
+    inside = np.flatnonzero((column >= 0) & (column < len(x)) & (row >= 0) & (row < len(y)))
+    column, row, right, up = column[inside], row[inside], right[inside], up[inside]
+    reach = _reach(np.maximum(np.abs(right), np.abs(up)))
+    close = (np.abs(x[column] - right) <= reach) & (np.abs(y[row] - up) <= reach)
+    return row[close] * len(x) + column[close]
 
 
 def _seen(vertices: Floats, farthest: float) -> tuple[Floats, Floats]:

@@ -55,12 +55,10 @@ def mean_around(values: Floats, known: NDArray[np.bool_]) -> Floats:
 
 
 def _sum_around(values: Floats) -> Floats:
-    total = values
-    for axis in (0, 1):
-        length = values.shape[axis]
-        padded = np.pad(total, [(_AROUND, _AROUND) if axis == i else (0, 0) for i in (0, 1)])
-        total = sum(np.take(padded, range(shift, shift + length), axis) for shift in range(2 * _AROUND + 1))
-    return total - values
+    size, (height, width) = 2 * _AROUND + 1, values.shape
+    padded = np.pad(values, _AROUND)
+    rows = sum(padded[shift : shift + height] for shift in range(size))
+    return sum(rows[:, shift : shift + width] for shift in range(size)) - values
 
 
 def _over_blocks(values: Floats) -> Floats:
