@@ -12,6 +12,8 @@ from ..charts import Chart, Curve
 from .point import Measured
 
 _SEEN, _SLACK = 1e6, 1.25  # bytes; part of them
+# Linux's allocator keeps freed memory of pieces smaller than this (tracer/tiles.py).
+_KEPT = 32 << 20
 
 Sweep = Sequence[tuple[float, Measured]]
 """x and what was measured there, x rising."""
@@ -62,8 +64,8 @@ def memory_curves(sweep: Sweep, stages: Sequence[str], prefix: str = "", league:
 
 
 def memory_limit(x: Sequence[float], fixed: float, each: float, name: str, league: str = "") -> Curve:
-    """What may be taken: some bytes in any case, and a quarter more for what the allocator holds; and some for each of x."""
-    return Curve(name, x, [(_SLACK * fixed + each * number) / 1e6 for number in x], limit=True, league=league)
+    """What may be taken: some bytes in any case, a quarter more, and what the allocator may keep; and some for each of x."""
+    return Curve(name, x, [(_SLACK * fixed + _KEPT + each * number) / 1e6 for number in x], limit=True, league=league)
 
 
 def chart(name: str, title: str, x_label: str, y_label: str, curves: Sequence[Curve], reading: str) -> Chart:

@@ -63,7 +63,8 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             growth.MEGABYTES,
             [*memory, *limits],
             "The dashed lines are what is allowed: what the first picture that fills the tiles of all threads takes beyond "
-            "its passes, a quarter more, and the bytes of the passes. A file is counted with the geometry picture in it. "
+            "its passes, a quarter more, 32 MiB that the allocator may keep, and the bytes of the passes. A file is counted "
+            "with the geometry picture in it. "
             f"{growth.told(memory, 'the pixels')}",
         ),
     )

@@ -32,9 +32,9 @@ _PAIR = (COMPILED, CYCLES)
 _DIRECT = {0.003: (8, 3), 0.001: (8, 3)}
 STILLS = (
     Still("suzannes", "Six Suzannes, one sun", "direct", (640, 360), _DIRECT, _PAIR, 40),
-    Still("studio", "Studio still", "direct", (640, 360), _DIRECT, _PAIR, 60),
-    Still("spheres", "Sphere field", "direct", (640, 360), _DIRECT, _PAIR, 45),
-    Still("cornell", "Cornell box", "path", (480, 480), {0.01: (1, 1)}, _PAIR, 40),
+    Still("studio", "Studio still", "direct", (640, 360), _DIRECT, _PAIR, 35),
+    Still("spheres", "Sphere field", "direct", (640, 360), _DIRECT, _PAIR, 30),
+    Still("cornell", "Cornell box", "path", (480, 480), {0.01: (1, 1)}, _PAIR, 30),
 )
 OURS = (
     Method(f"{COMPILED}, adaptive", COMPILED, "error", ERRORS, ours=True, job=True),
