@@ -62,7 +62,7 @@ def render(options: argparse.Namespace) -> Result:
     level = told.get("level", options.level)
     started = time.perf_counter()
     samples = MOST_SAMPLES if options.error else options.samples
-    passes = trace(scene, level, samples, options.seed, options.threads, **({"error": options.error} if options.error else {}))
+    passes = trace(scene, level, samples, options.seed, options.threads, error=options.error)
     seconds = time.perf_counter() - started
     attributes = {"software": "Virtual Pinhole", "level": level}
     if level != "geometry":
