@@ -128,10 +128,7 @@ def intersect(scene, origins, directions, lengths, coherent, found):
     packet = new_packet(coherent)
     for start in range(0, found.size, LANES):
         count = min(LANES, found.size - start)
-        for lane in range(count):
-            ray = start + lane
-            x, y, z = origins[0, ray], origins[1, ray], origins[2, ray]
-            aim(packet, lane, x, y, z, directions[0, ray], directions[1, ray], directions[2, ray], lengths[ray])
+        _aim_all(packet, start, count, origins, directions, lengths)
         meet(scene, packet, count)
         for lane in range(count):
             found[start + lane] = met(packet, lane)
@@ -143,10 +140,15 @@ def occluded(scene, origins, directions, lengths, coherent, found):
     packet = new_packet(coherent)
     for start in range(0, found.size, LANES):
         count = min(LANES, found.size - start)
-        for lane in range(count):
-            ray = start + lane
-            x, y, z = origins[0, ray], origins[1, ray], origins[2, ray]
-            aim(packet, lane, x, y, z, directions[0, ray], directions[1, ray], directions[2, ray], lengths[ray])
+        _aim_all(packet, start, count, origins, directions, lengths)
         block(scene, packet, count)
         for lane in range(count):
             found[start + lane] = blocked(packet, lane)
+
+
+@kernel
+def _aim_all(packet, start, count, origins, directions, lengths):
+    for lane in range(count):
+        ray = start + lane
+        x, y, z = origins[0, ray], origins[1, ray], origins[2, ray]
+        aim(packet, lane, x, y, z, directions[0, ray], directions[1, ray], directions[2, ray], lengths[ray])
