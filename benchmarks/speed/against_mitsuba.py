@@ -22,8 +22,7 @@ STILL = Still(
     "direct",
     (640, 360),
     {0.003: (None, 1), 0.001: (None, None)},
-    (COMPILED, LLVM),
-    20,
+    {COMPILED: 1024, LLVM: 2048},
 )
 _SQUARES = (4.0, 9.0, 25.0, 49.0, 121.0, 289.0)  # of primes, as the orthogonal sampler wants them
 _POWERS = (4.0, 16.0, 64.0, 256.0)
@@ -60,5 +59,5 @@ def charts(quick: bool) -> tuple[Chart, ...]:
             sides[variant] = start_contestant(processes, mitsuba3.prepare, scene, theirs, variant, threads)
             sides[variant]["fresh"] = mitsuba3.fresh(theirs, variant, threads)
         methods = tuple(method for method in METHODS if method.side in sides)
-        reference = references.reference(still.name, scene, sides, still.pair, still.seconds)
+        reference = references.reference(still.name, scene, sides, still.samples)
         return figures.charts(still, figures.FRESH, sides, methods, reference, quick, path)

@@ -19,7 +19,7 @@ Sides = dict[str, dict[str, Runner]]
 class Still:
     """A picture. wanted : error → how many times as fast as the rivals, as (picture, job), None where nothing is asked for.
 
-    pair : the sides that make the reference. seconds : that each of its four halves may take.
+    samples : a pixel, of each half of the reference, of the two sides that make it.
     """
 
     name: str
@@ -27,14 +27,14 @@ class Still:
     level: str
     size: tuple[int, int]
     wanted: Mapping[float, tuple[float | None, float | None]]
-    pair: tuple[str, str]
-    seconds: float
+    samples: Mapping[str, int]
 
     def small(self) -> "Still":
-        """A sixteenth of the pixels, ten times the error, and a reference of seconds."""
+        """A sixteenth of the pixels, ten times the error, and a reference of few samples."""
         width, height = self.size
         wanted = {10 * error: ratios for error, ratios in self.wanted.items()}
-        return dataclasses.replace(self, size=(width // 4, height // 4), wanted=wanted, seconds=self.seconds / 50)
+        samples = {side: max(number // 16, 16) for side, number in self.samples.items()}
+        return dataclasses.replace(self, size=(width // 4, height // 4), wanted=wanted, samples=samples)
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,6 @@ from ..race import Runner
 
 FOLDER = Path.home() / ".cache" / "virtual-pinhole" / "references"
 _SEEDS = (7001, 7002)
-# Of two, the samples of a half: Mitsuba holds the state of all samples at a time.
-_MOST = 12
 
 
 @dataclass(frozen=True)
@@ -70,27 +68,24 @@ def reference(
     name: str,
     scene: Path,
     sides: Mapping[str, Mapping[str, Runner]],
-    pair: tuple[str, str],
-    seconds: float,
+    samples: Mapping[str, int],
     folder: Path | None = None,
 ) -> Reference:
     """The reference of a scene file, made now or kept from before.
 
-    pair : the two sides. seconds : that each half may take.
+    samples : a pixel, of each half, of the two sides.
     """
-    kept = (folder or FOLDER) / f"{name}-{_fingerprint(scene, pair, seconds)}.npz"
+    kept = (folder or FOLDER) / f"{name}-{_fingerprint(scene, samples)}.npz"
     if not kept.is_file():
         started = time.perf_counter()
         arrays = {}
-        for side in pair:
-            samples = _affordable(sides[side]["picture"], seconds, scene)
-            arrays |= {side: _halves(sides[side]["picture"], samples, scene), f"{side} samples": samples}
+        for side, number in samples.items():
+            arrays |= {side: _halves(sides[side]["picture"], number, scene)}
         with written_whole(kept) as temporary:
             np.savez(temporary, **arrays)
         print(f"{name}: the reference took {time.perf_counter() - started:.0f} s and is kept as {kept}", flush=True)
     with np.load(kept) as file:
-        halves = {side: file[side].astype(np.float64) for side in pair}
-        return combine(halves, {side: int(file[f"{side} samples"]) for side in pair})
+        return combine({side: file[side].astype(np.float64) for side in samples}, samples)
 
 
 def combine(halves: Mapping[str, NDArray[np.float64]], samples: Mapping[str, int]) -> Reference:
@@ -125,17 +120,8 @@ def _halves(picture: Runner, samples: int, scene: Path) -> NDArray[np.float32]:
     return np.stack(pictures)
 
 
-def _affordable(picture: Runner, seconds: float, scene: Path) -> int:
-    """The power of two of samples that takes about as long; at least a few, at most what memory is sure to hold."""
-    few = 8
-    path = scene.with_name("half.exr")
-    least, most = (min(picture("samples", count, 0, path) for _ in range(2)) for count in (few, 2 * few))
-    share = max(most - least, 1e-3 * most) / few  # of a sample, without what any picture takes
-    return 1 << max(min(int(math.log2(seconds / share)), _MOST), 4)
-
-
-def _fingerprint(scene: Path, pair: tuple[str, str], seconds: float) -> str:
-    digest = hashlib.sha256(repr((pair, seconds)).encode())
+def _fingerprint(scene: Path, samples: Mapping[str, int]) -> str:
+    digest = hashlib.sha256(repr(sorted(samples.items())).encode())
     for path in (scene, scene.with_suffix(".npz")):
         if path.is_file():
             digest.update(path.read_bytes())

@@ -28,13 +28,12 @@ EVERY_OTHER = POWERS[::2]
 ERRORS = (0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0005)
 NOISE_THRESHOLDS = (0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002)
 
-_PAIR = (COMPILED, CYCLES)
 _DIRECT = {0.003: (8, 3), 0.001: (8, 3)}
 STILLS = (
-    Still("suzannes", "Six Suzannes, one sun", "direct", (640, 360), _DIRECT, _PAIR, 40),
-    Still("studio", "Studio still", "direct", (640, 360), _DIRECT, _PAIR, 35),
-    Still("spheres", "Sphere field", "direct", (640, 360), _DIRECT, _PAIR, 30),
-    Still("cornell", "Cornell box", "path", (480, 480), {0.01: (1, 1)}, _PAIR, 30),
+    Still("suzannes", "Six Suzannes, one sun", "direct", (640, 360), _DIRECT, {COMPILED: 2048, CYCLES: 256}),
+    Still("studio", "Studio still", "direct", (160, 90), _DIRECT, {COMPILED: 8192, CYCLES: 2048}),
+    Still("spheres", "Sphere field", "direct", (160, 90), _DIRECT, {COMPILED: 8192, CYCLES: 4096}),
+    Still("cornell", "Cornell box", "path", (120, 120), {0.01: (1, 1)}, {COMPILED: 4096, CYCLES: 4096}),
 )
 OURS = (
     Method(f"{COMPILED}, adaptive", COMPILED, "error", ERRORS, ours=True, job=True),
@@ -59,7 +58,7 @@ def charts(still: Still, quick: bool) -> tuple[Chart, ...]:
         start = functools.partial(start_contestant, processes)
         sides = {CYCLES: start(prepare_cycles, still.name, still.level, still.size, scene, threads)}  # writes the scene
         sides |= {side: start(tracer.prepare, scene, still.level, threads, environment=env) for side, env in VARIANTS.items()}
-        reference = references.reference(still.name, scene, sides, still.pair, still.seconds)
+        reference = references.reference(still.name, scene, sides, still.samples)
         return figures.charts(still, figures.WHOLE, sides, METHODS, reference, quick, Path(folder) / "picture.exr")
 
 

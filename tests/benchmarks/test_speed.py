@@ -197,17 +197,16 @@ def test_a_reference_is_made_once_for_each_scene(tmp_path):
         asked.append((seed, samples))
         pixels = np.random.default_rng(seed).random((4, 5, 4)).astype(np.float32)
         image.write(path, image.Image({"Combined": pixels}))
-        return 0.1 + 0.01 * samples
+        return 1.0
 
     scene = tmp_path / "scene.json"
     sides = {side: {"picture": picture} for side in ("one", "other")}
     for text, made in (("a scene", 1), ("a scene", 1), ("another", 2)):
         scene.write_text(text)
-        found = references.reference("name", scene, sides, ("one", "other"), 3.0, tmp_path / "kept")
-        halves = [each for each in asked if each[0]]
-        assert len(halves) == 4 * made
-    assert {samples for _, samples in halves} == {found.halves[0].samples} == {256}  # 3 s at 0.01 s a sample: 300
-    assert len({seed for seed, _ in halves}) == 2
+        found = references.reference("name", scene, sides, {"one": 256, "other": 64}, tmp_path / "kept")
+        assert len(asked) == 4 * made
+    assert {samples for _, samples in asked} == {half.samples for half in found.halves} == {256, 64}
+    assert len({seed for seed, _ in asked}) == 2
 
 
 # Contestants.
@@ -253,7 +252,8 @@ def test_a_scene_is_raced_from_the_blend_to_the_charts(tmp_path, monkeypatch):
     few = [dataclasses.replace(each, parameters=each.parameters[:3]) for each in stills.METHODS if each.name in chosen]
     monkeypatch.setattr(stills, "METHODS", tuple(few))
     studio = next(still for still in stills.STILLS if still.name == "studio")
-    small = dataclasses.replace(studio, size=(384, 216), wanted={0.005: (8, 3)}, pair=(stills.PLAIN, stills.CYCLES), seconds=15)
+    samples = {stills.PLAIN: 1024, stills.CYCLES: 512}
+    small = dataclasses.replace(studio, size=(384, 216), wanted={0.005: (8, 3)}, samples=samples)
     picture, job = stills.charts(small, quick=True)
     assert picture.name == "studio-picture" and job.name == "studio-whole-job"
     assert {curve.name for curve in picture.curves} == chosen
