@@ -22,6 +22,7 @@ FLOORS = [
     "exact",
     "pinhole",
     "roll",
+    "moves",
     "image",
     "intrinsics",
     "compare",
