@@ -25,6 +25,7 @@ FLOORS = [
     "moves",
     "image",
     "intrinsics",
+    "camera_text",
     "compare",
     "tracer",
     "blender",
