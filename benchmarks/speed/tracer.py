@@ -11,7 +11,7 @@ from unittest import mock
 
 from viewcam_addon import image
 from viewcam_addon.tracer.light import illumination
-from viewcam_addon.tracer.render import Tracer, render
+from viewcam_addon.tracer.render import Keeper, Tracer, render
 from viewcam_addon.tracer.scene import scene_file
 from viewcam_addon.tracer.scene.film import MOST_SAMPLES
 
@@ -40,7 +40,8 @@ def prepare(scene_path: Path, level: str, threads: int) -> dict[str, race.Runner
     def whole(sampling: str, parameter: float, seed: int, path: Path) -> float:
         with _sampler(sampling):
             started = time.perf_counter()
-            passes = render(scene, level, seed=seed, threads=threads, **_effort(sampling, parameter))
+            # A keeper tells that pictures follow, for which numba is loaded; this one has nothing to take over.
+            passes = render(scene, level, seed=seed, threads=threads, keeper=Keeper(), **_effort(sampling, parameter))
             image.write(path, image.Image(passes, scene.camera))
             return time.perf_counter() - started
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from .arrays import Floats, Indices
-from .compiled.standing import uncompiled
+from .compiled.standing import PATHS_WORTH_COMPILING, PIXELS_WORTH_COMPILING, uncompiled
 from .rays.centres import Centres
 from .rays.ellipsoids import ellipsoids_of
 from .rays.joints import Joints
@@ -37,12 +37,6 @@ __all__ = ["Keeper", "Passes", "Stopped", "Tracer", "Watcher", "render"]
 TILE, SMALLEST_TILE = 65536, 4096
 # Pixels that get samples as long as their error is too large, some at a time.
 SMALLEST_PART = 256
-# Pixels. Compiled loops save 56 ns of a core's time a pixel of level geometry, and numba takes a third of a second to start.
-WORTH_COMPILING = 1 << 23
-# The same of light, whose paths take 300 ns less and more, and whose loops take a tenth of a second to load as well.
-PATHS_WORTH_COMPILING = 1 << 20
-
-
 # For each triangle. A turned hierarchy's boxes are wider than those of a new one, so that a ray takes 17 ns longer, a tenth; to
 # build takes 240 ns a triangle longer than to refit.
 _MANY_RAYS = 14
@@ -121,19 +115,14 @@ class Tracer:
         things = self._triangles, self._planes, self._ellipsoids
         return Outlines(self._scene, self._view, *things, self._visibility, joints=self._joints)
 
-    def render(self, watcher: Watcher | None = None, once: bool = False) -> Passes:
-        """Pass name → (height, width, channels) float32, rows from the bottom: the surfaces at the pixel centres.
-
-        once : whether this picture is the only one, so that compiled loops have to save more time than it takes to load them.
-        """
+    def render(self, watcher: Watcher | None = None) -> Passes:
+        """Pass name → (height, width, channels) float32, rows from the bottom: the surfaces at the pixel centres."""
         passes = self._blank(unwritten)
         centres = Centres(self._camera, self._visibility)
-        small = once and self._camera.width * self._camera.height < WORTH_COMPILING
 
         def trace(passes: Passes, tile: range) -> None:
             x, y, close = centres.rays(tile)
-            with uncompiled(small):
-                self._surface.write(passes, self._visibility.first(x, y, close, centres.width), x, y)
+            self._surface.write(passes, self._visibility.first(x, y, close, centres.width), x, y)
 
         return self._traced(passes, trace, SMALLEST_TILE, TILE, watcher)
 
@@ -144,7 +133,6 @@ class Tracer:
         seed: int,
         watcher: Watcher | None = None,
         error: float | None = None,
-        once: bool = False,
     ) -> Passes:
         """The same of light, and what is at the pixel centres: Depth and Object Index.
 
@@ -156,7 +144,6 @@ class Tracer:
         passes = self._blank(dark if error is None else counted)
         illumination = Illumination(self._scene, self._view, self._lit, self._eye, level, samples, seed)
         centres = Centres(self._camera, self._visibility)
-        small = once and self._camera.width * self._camera.height * samples < PATHS_WORTH_COMPILING
 
         def check() -> None:
             _stop_if_asked(watcher)
@@ -169,9 +156,8 @@ class Tracer:
 
         def trace(passes: Passes, tile: range) -> None:
             columns, rows = self._corners(tile)
-            with uncompiled(small):
-                trace_centres(passes, tile)
-                illumination.trace(passes, np.arange(tile.start, tile.stop), columns, rows, check)
+            trace_centres(passes, tile)
+            illumination.trace(passes, np.arange(tile.start, tile.stop), columns, rows, check)
 
         if error is None or samples == 1:
             largest = illumination.largest_tile
@@ -298,14 +284,15 @@ def render(
         raise InputError(f"the number of samples is {samples}: give at least 1")
     if error is not None and not 0.0 < error < math.inf:
         raise InputError(f"the error is {error}: give a number above 0")
+    pixels = scene.camera.width * scene.camera.height
+    paths = pixels * (samples if error is None else min(samples, _USUAL_SAMPLES))
     try:
-        rays = scene.camera.width * scene.camera.height
-        if level != "geometry":
-            rays *= _RAYS * (samples if error is None else min(samples, _USUAL_SAMPLES))
-        tracer = (keeper or Keeper()).tracer(scene, threads, rays)
         if level == "geometry":
-            return tracer.render(watcher, once=keeper is None)
-        return tracer.render_light(level, samples, seed, watcher, error, once=keeper is None)
+            with uncompiled(keeper is None and pixels < PIXELS_WORTH_COMPILING):
+                return (keeper or Keeper()).tracer(scene, threads, pixels).render(watcher)
+        with uncompiled(keeper is None and paths < PATHS_WORTH_COMPILING):
+            tracer = (keeper or Keeper()).tracer(scene, threads, _RAYS * paths)
+            return tracer.render_light(level, samples, seed, watcher, error)
     except MemoryError as error:
         raise InputError("the scene needs more memory than there is: take some of it out, or give fewer threads") from error
 

@@ -4,6 +4,7 @@ A tile is a run of pixels, row after row: the memory that a render takes beside 
 picture. Whoever computes it computes every pixel alone, so that threads and tiles change no bit of the result.
 """
 
+import contextvars
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from typing import Protocol
@@ -43,7 +44,7 @@ def tiles(pixels: int, width: int, threads: int, smallest: int, largest: int) ->
 
 
 def over_threads(work: Callable[[range], None], tiles: Iterator[range], threads: int) -> Iterator[range]:
-    """Call `work` with each tile, in some thread; the tiles that are done.
+    """Call `work` with each tile, in some thread and this one's context; the tiles that are done.
 
     What `work` raises is raised here, when those that are under way have ended; the others are not begun.
     """
@@ -52,7 +53,7 @@ def over_threads(work: Callable[[range], None], tiles: Iterator[range], threads:
         under_way = {}
         try:
             for tile in tiles:
-                under_way[pool.submit(work, tile)] = tile
+                under_way[pool.submit(contextvars.copy_context().run, work, tile)] = tile
                 if len(under_way) > 2 * threads:
                     yield from _done(under_way)
             while under_way:

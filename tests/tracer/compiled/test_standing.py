@@ -8,8 +8,9 @@ from types import SimpleNamespace
 import pytest
 
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer import compiled
+from viewcam_addon.tracer import compiled, tiles
 from viewcam_addon.tracer.compiled import standing
+from viewcam_addon.tracer.rays import tables
 from viewcam_addon.tracer.scene import scene_file
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -21,6 +22,7 @@ ROOT = Path(__file__).resolve().parents[3]
     [
         ("render(scene)", False),
         ("render(scene, 'direct', 2)", False),
+        ("render(scene, 'direct', 16, error=0.01)", False),
         ("Tracer(scene).render()", True),
         ("Tracer(scene).render_light('direct', 2, 0)", True),
     ],
@@ -37,7 +39,39 @@ def test_one_small_picture_is_not_worth_loading_numba(ball, make_scene, tmp_path
     assert outcome.stdout.strip() == str(loads), outcome.stderr
 
 
-def test_what_is_uncompiled_is_so_in_its_thread_and_until_its_end(monkeypatch):
+def test_kernels_are_used_where_a_small_picture_turns_out_to_need_many_paths(monkeypatch):
+    monkeypatch.setattr(standing, "PATHS_WORTH_COMPILING", 1000)
+    answer = _answering(monkeypatch)
+    with standing.uncompiled(True):
+        with standing.compiled_for(paths=1000):
+            assert answer() == "kernel"
+        with standing.compiled_for(paths=999):
+            assert answer() == "NumPy"
+    with standing.compiled_for(paths=999):
+        assert answer() == "kernel"
+
+
+def test_what_is_uncompiled_is_so_in_the_threads_that_it_starts_and_until_its_end(monkeypatch):
+    answer = _answering(monkeypatch)
+
+    def in_threads():
+        found = tables.each(lambda _: answer(), range(2), threads=2)
+
+        def work(tile):
+            found.append(answer())
+
+        list(tiles.over_threads(work, iter([range(1)]), threads=2))
+        return set(found)
+
+    with standing.uncompiled(True):
+        with standing.uncompiled(False):
+            assert answer() == "kernel" and in_threads() == {"kernel"}
+        assert answer() == "NumPy" and in_threads() == {"NumPy"}
+    assert answer() == "kernel" and in_threads() == {"kernel"} and answer.plain() == "NumPy"
+
+
+def _answering(monkeypatch):
+    """A function that tells whether its kernel stood in for it."""
     monkeypatch.setattr(standing, "AVAILABLE", True)
     monkeypatch.setattr(standing.importlib, "import_module", lambda name: SimpleNamespace(answer=lambda: "kernel"))
 
@@ -45,8 +79,4 @@ def test_what_is_uncompiled_is_so_in_its_thread_and_until_its_end(monkeypatch):
     def answer():
         return "NumPy"
 
-    with standing.uncompiled(True):
-        with standing.uncompiled(False):
-            assert answer() == "kernel"
-        assert answer() == "NumPy"
-    assert answer() == "kernel" and answer.plain() == "NumPy"
+    return answer

@@ -5,6 +5,7 @@ of NumPy takes as long as some hundred of its numbers; a large one is filled in 
 is the same however the work is cut.
 """
 
+import contextvars
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -117,9 +118,9 @@ def by_material(things: Things, values: Sequence[Sequence], kind: type) -> NDArr
 
 
 def each(work: Callable, items: Iterable, threads: int) -> list:
-    """What `work` makes of each item, over threads."""
+    """What `work` makes of each item, over threads with this one's context."""
     items = list(items)
     if threads == 1 or len(items) < 2:
         return [work(item) for item in items]
     with ThreadPoolExecutor(threads, "viewcam") as pool:
-        return list(pool.map(work, items))
+        return [made.result() for made in [pool.submit(contextvars.copy_context().run, work, item) for item in items]]

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Float32s, Floats, Indices, gather
+from ...compiled.standing import compiled_for
 from ...rays.surface import Passes
 from ..illumination import Illumination
 from ..sums import DIRECT, Light
@@ -135,4 +136,5 @@ class Rounds:
                 shown.append(shown_by(sums))
             band.put(which, sums, shown[0], halves[0])
 
-        self._parts(trace, len(active), self._light.paths_at_a_time // min(more - taken, _AT_A_TIME))
+        with compiled_for(len(active) * (more - taken)):
+            self._parts(trace, len(active), self._light.paths_at_a_time // min(more - taken, _AT_A_TIME))
