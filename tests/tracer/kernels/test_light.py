@@ -15,6 +15,7 @@ from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer import compiled
 from viewcam_addon.tracer.compiled import standing
 from viewcam_addon.tracer.light import emitters, filters, paths, sampler, scattering
+from viewcam_addon.tracer.light.adaptive import estimate, interior
 from viewcam_addon.tracer.light.sampler import Sampler
 from viewcam_addon.tracer.light.sums import COLOUR, DIRECT, EMITTED, Light, Sums, add_samples
 from viewcam_addon.tracer.rays import points, space
@@ -239,8 +240,22 @@ def test_sums_are_the_same_bit_for_bit(samples):
     found, expected = (Sums(50, [EMITTED, COLOUR, DIRECT], Film(), 40) for _ in range(2))
     for seed in range(3):
         rng = np.random.default_rng(seed)
-        values, covered = rng.random((3, 3, 50, samples)), rng.random(50 * samples) < 0.5
+        values, covered = rng.random((3, 3, 50, samples)), rng.random((50, samples)) < 0.5
         for sums, add in ((found, add_samples), (expected, add_samples.plain)):
             add(sums, values, covered)
             sums.taken += samples
         assert np.array_equal(found.state, expected.state), seed
+
+
+@pytest.mark.parametrize("film", [Film("BOX"), Film()])
+def test_second_differences_are_the_same_bit_for_bit(film):
+    light = np.random.default_rng(3).normal(size=(4, 13, 17))
+    assert np.array_equal(*both(interior.bends, light))
+    assert np.array_equal(*both(interior.correction, light[0], film))
+
+
+def test_what_is_around_pixels_is_the_same_to_a_few_roundings():
+    rng = np.random.default_rng(4)
+    values, known, pixels = rng.random((13, 17)), rng.random((13, 17)) < 0.6, rng.integers(0, 13 * 17, 40)
+    found, expected = both(estimate.mean_around, values, known, pixels)
+    assert found == pytest.approx(expected, rel=32 * 2.0**-53, abs=32 * 2.0**-53), "sums of 25"

@@ -33,11 +33,10 @@ def _add(values, shown, taken, batch_size, totals, firsts, differences, befores,
 
 @kernel
 def _count(covered, totals):
-    samples = covered.size // totals.size
     for pixel in range(totals.size):
         number = 0
-        for sample in range(samples):
-            number += covered[pixel * samples + sample]
+        for sample in range(covered.shape[1]):
+            number += covered[pixel, sample]
         totals[pixel] += number
 
 

@@ -26,7 +26,7 @@ from .emitters import Emitters
 from .filters import offsets
 from .paths import Paths
 from .sampler import Sampler
-from .sums import Sums
+from .sums import Light, Sums
 from .textures import Palette
 
 # Paths that are traced at a time, twice as many where light bounces, and of how many samples of a pixel if there are as many.
@@ -131,8 +131,12 @@ class Illumination:
         self, sums: Sums, samples: Indices, pixels: Indices, columns: Floats, rows: Floats, check: Callable[[], None]
     ) -> None:
         """Trace some samples, given by their numbers, of the sums' pixels, and add them; the rest as in `trace`."""
+        sums.add(self.light(samples, pixels, columns, rows, check))
+
+    def light(self, samples: Indices, pixels: Indices, columns: Floats, rows: Floats, check: Callable[[], None]) -> Light:
+        """The light of some samples, given by their numbers, of pixels, pixel after pixel; the rest as in `trace`."""
         some, count = len(samples), len(pixels)
         spread = self.samples > 1
         px, py = offsets(self.film, self.sampler.grid(pixels, samples, 0, 2)) if spread else (0.5, 0.5)
         x, y, primitives = self.eye(np.repeat(columns, some) + px, np.repeat(rows, some) + py, not spread)
-        sums.add(self.paths.trace(np.repeat(pixels, some), np.tile(samples, count), primitives, x, y, check))
+        return self.paths.trace(np.repeat(pixels, some), np.tile(samples, count), primitives, x, y, check)

@@ -95,9 +95,9 @@ class Sums:
         return len(self.state) - 9
 
     def at(self, which: Some) -> "Sums":
-        """A copy of some pixels."""
+        """Some of the pixels: a view of a slice, a copy of others."""
         some = copy(self)
-        some._hold(np.array(pick(self.state, which)))
+        some._hold(pick(self.state, which))
         some.count = some.state.shape[1]
         return some
 
@@ -110,11 +110,12 @@ class Sums:
         """(3, count): the mean so far of what the pixels show."""
         return (self.first + self.differences / self.taken) * self._film.exposure
 
-    def add(self, light: Light) -> None:
-        """Add some samples of every pixel: the paths are those of all samples of a pixel, pixel after pixel."""
+    def add(self, light: Light, some: slice = slice(None)) -> None:
+        """Add some of the light's samples of every pixel: its paths are those of all samples of a pixel, pixel after pixel."""
         samples = light.count // self.count
-        add_samples(self, light.values.reshape(3, len(self.categories), self.count, samples), light.covered)
-        self.taken += samples
+        values = light.values.reshape(3, len(self.categories), self.count, samples)[..., some]
+        add_samples(self, values, light.covered.reshape(self.count, samples)[:, some])
+        self.taken += values.shape[3]
 
     @property
     def alpha(self) -> Floats:
@@ -138,16 +139,19 @@ class Sums:
             passes["Variance"][:] = np.inf if random else 0.0
 
     def write_means(self, passes: Passes) -> None:
-        """The same but for Variance."""
+        """The same but for Variance. What no category of these sums belongs to stays as it is: dark."""
         exposure = self._film.exposure
         colour = self.mean(COLOUR)
         store(passes["Combined"], self.combined)
         passes["Combined"][:, 3] = self.alpha
-        store(passes["Emission"], self.mean(EMITTED) * exposure)
-        store(passes["Environment"], self.mean(BACKGROUND) * exposure)
-        store(passes["Diffuse Direct"], without_colour(self.mean(DIRECT) * exposure, colour))
-        store(passes["Diffuse Indirect"], without_colour(self.mean(INDIRECT) * exposure, colour))
-        store(passes["Diffuse Color"], colour)
+        if COLOUR in self.categories:
+            store(passes["Diffuse Color"], colour)
+        for name, category in (("Emission", EMITTED), ("Environment", BACKGROUND)):
+            if category in self.categories:
+                store(passes[name], self.mean(category) * exposure)
+        for name, category in (("Diffuse Direct", DIRECT), ("Diffuse Indirect", INDIRECT)):
+            if category in self.categories:
+                store(passes[name], without_colour(self.mean(category) * exposure, colour))
 
     def mean(self, category: str) -> Floats:
         """(3, count): of the light that belongs to a category, so far, without exposure."""
@@ -165,7 +169,10 @@ class Sums:
 
 @or_compiled
 def add_samples(sums: Sums, values: Floats, covered: NDArray[np.bool_]) -> None:
-    """Add some samples of every pixel, one after the other. values : (3, categories, count, samples)."""
+    """Add some samples of every pixel, one after the other.
+
+    values : (3, categories, count, samples). covered : (count, samples).
+    """
     values = values.transpose(0, 1, 3, 2).copy()
     combined = np.zeros((3, *values.shape[2:]))
     for row in sums.shown:
@@ -181,7 +188,7 @@ def add_samples(sums: Sums, values: Floats, covered: NDArray[np.bool_]) -> None:
             of_batch *= of_batch
             sums.squares += of_batch
             sums.before[:] = sums.differences
-    sums.covered += covered.reshape(sums.count, -1).sum(axis=1)
+    sums.covered += covered.sum(axis=1)
 
 
 def without_colour(light: Floats, colour: Floats) -> Floats:

@@ -8,7 +8,7 @@ from ...rays.surface import Passes
 from ...scene.film import Film
 from ..sharing import shared
 from ..sums import COLOUR, DIRECT, INDIRECT, Light, Sums, store, without_colour
-from .estimate import efficiency, mean_around
+from .estimate import blocks, efficiency, mean_around
 from .interior import CORRECTED, correction
 
 Mask = NDArray[np.bool_]
@@ -30,20 +30,20 @@ class Band:
     """
 
     def __init__(self, sums: Sums, film: Film, glints: Floats, rows: range, random: bool) -> None:
-        width = glints.shape[1]
-        self.pixels = np.arange(rows.start * width, rows.stop * width)
-        self.rows, self.columns = np.divmod(self.pixels, width)
-        self.shape, self._random = (len(rows), width), random
+        self.shape, self.rows, self._random = glints.shape, rows, random
         self._film, self._sums, self._glints = film, sums, glints * film.exposure**2
         self.taken = np.ones(sums.count, np.int32)
         self._variance = np.zeros((3, sums.count))
         self._spread, self._apart, self._doubt = np.zeros((3, sums.count))
 
+    def places(self, pixels: Indices) -> tuple[Indices, Indices, Indices]:
+        """Where pixels of the band are in the picture: row · width + column, columns and rows, (n,) each."""
+        rows, columns = np.divmod(pixels, self.shape[1])
+        return pixels + self.rows.start * self.shape[1], columns, rows + self.rows.start
+
     def add_centres(self, part: slice, light: Light) -> None:
         """Add the light at some pixels' centres."""
-        sums = self._sums.at(part)
-        sums.add(light)
-        self._sums.put(part, sums)
+        self._sums.at(part).add(light)
 
     @property
     def means(self) -> int:
@@ -52,26 +52,23 @@ class Band:
 
     @property
     def shown(self) -> Floats:
-        """(4, height, width): what the centres show."""
-        self._sums.taken = 1
-        return shown_by(self._sums).reshape(-1, *self.shape)
+        """(channels, height, width): what the centres show, with alpha where there is any."""
+        shown = self._sums.first * self._film.exposure
+        if self._film.transparent:
+            shown = np.concatenate([shown, self._sums.covered[None]])
+        return shown.reshape(-1, *self.shape)
 
     def smooth(self, done: Mask, row: int) -> None:
-        """Make of the centres' light the filter's mean where pixels are done, and nothing elsewhere, in one row of the sums."""
+        """Make of the centres' light the filter's mean where pixels are done, in one row of the sums.
+
+        What may be wrong with that, of what the pixels show, is taken for their variance.
+        """
         values = self._sums.state[row].reshape(self.shape)
-        values[:] = np.where(done, values + correction(values, self._film), 0.0)
-
-    def doubt(self, done: Mask) -> None:
-        """Take for the variance of pixels that are done what may be wrong with their correction."""
-        for variance, shown in zip(self._variance, self.shown, strict=False):
-            off = CORRECTED * correction(shown, self._film)
-            variance[:] = np.where(done, off * off, 0.0).ravel()
-
-    def sums_of(self, which: Indices, taken: int) -> Sums:
-        """A copy of the sums of some pixels, of which so many samples were taken."""
-        sums = self._sums.at(which)
-        sums.taken = taken
-        return sums
+        more = correction(values, self._film) * done
+        values += more
+        channel = row - (self.means - 3)
+        if channel >= 0:
+            self._variance[channel] = (CORRECTED * self._film.exposure * more.ravel()) ** 2
 
     def put(self, which: Indices, sums: Sums, before: Floats, half: int) -> None:
         """Put sums back. before : `shown_by` them when so many samples were taken, about half of those that are now."""
@@ -85,15 +82,12 @@ class Band:
 
     def estimated(self, active: Indices) -> Floats:
         """The variances of the means of pixels that have just got samples, as many each."""
-        own, apart = np.zeros((2, *self.shape))
-        samples = self.taken[active[0]]
-        own.ravel()[active] = gather(self._spread, active) / samples
-        apart.ravel()[active] = gather(self._apart, active)
-        factor = gather(efficiency(own, apart).ravel(), active)
+        samples, own = self.taken[active[0]], gather(self._spread, active)
+        factor = efficiency(own / samples, gather(self._apart, active), blocks(active, self.shape[1]))
         put(self._variance, active, gather(self._variance, active) * factor)
-        spread = gather(mean_around(self._spread.reshape(self.shape), self.taken.reshape(self.shape) > 1).ravel(), active)
+        spread = mean_around(self._spread.reshape(self.shape), self.taken.reshape(self.shape) > 1, active)
         if not self._random:
-            spread = np.maximum(spread, gather(self._spread, active))
+            spread = np.maximum(spread, own)
         unseen = gather(self._glints.ravel(), active) / samples**2
         self._doubt[active] = np.maximum(spread / samples * factor, unseen)
         return gather(self._doubt, active)

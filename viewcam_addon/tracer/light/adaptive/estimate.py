@@ -23,7 +23,8 @@ Rejected: stopping a pixel by its own s² or D² alone.
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Floats
+from ...arrays import Floats, Indices, gather
+from ...compiled.standing import or_compiled
 
 BLOCK = 8
 """Rows and columns over which the efficiency of samples is measured, counted from the picture's corner."""
@@ -31,37 +32,37 @@ BLOCK = 8
 # The weight in each block of what is measured over all of them.
 _SHARED = 0.1
 # Pixels to either side that tell what a pixel's variance is.
-_AROUND = 2
+AROUND = 2
 
 
-def efficiency(own: Floats, apart: Floats) -> Floats:
-    """(height, width): the variance of a mean over s²/N, 1 at most.
+def blocks(pixels: Indices, width: int) -> Indices:
+    """(n,): the blocks that pixels lie in, which are numbered along the rows of a picture of this width."""
+    rows, columns = np.divmod(pixels, width)
+    return rows // BLOCK * -(-width // BLOCK) + columns // BLOCK
 
-    own, apart : (height, width), s²/N and D²/4, 0 where they are not known.
-    """
+
+def efficiency(own: Floats, apart: Floats, block: Indices) -> Floats:
+    """(n,): the variance of pixels' means over s²/N, 1 at most. own, apart : (n,), s²/N and D²/4. block : (n,), theirs."""
     total, known = own.sum(), np.count_nonzero(own)
     if total == 0.0:
-        return np.ones(own.shape)
+        return np.ones(len(own))
     weight = _SHARED * BLOCK**2 * total / known
-    there = _over_blocks(apart) + weight * (apart.sum() / total)
-    by_block = np.minimum(there / (_over_blocks(own) + weight), 1.0)
-    return np.repeat(np.repeat(by_block, BLOCK, axis=0), BLOCK, axis=1)[: own.shape[0], : own.shape[1]]
+    there = np.bincount(block, apart) + weight * (apart.sum() / total)
+    return gather(np.minimum(there / (np.bincount(block, own) + weight), 1.0), block)
 
 
-def mean_around(values: Floats, known: NDArray[np.bool_]) -> Floats:
-    """(height, width): the mean of the known ones round each, without itself; 0 where none is known."""
+@or_compiled
+def mean_around(values: Floats, known: NDArray[np.bool_], pixels: Indices) -> Floats:
+    """(n,): the mean of the known values round pixels, without their own; 0 where none is known.
+
+    values, known : (height, width). pixels : (n,), row · width + column.
+    """
     total, number = _sum_around(np.where(known, values, 0.0)), _sum_around(known.astype(np.float64))
-    return np.maximum(total, 0.0) / np.maximum(number, 1.0)
+    return gather(np.maximum(total, 0.0) / np.maximum(number, 1.0), pixels)
 
 
 def _sum_around(values: Floats) -> Floats:
-    size, (height, width) = 2 * _AROUND + 1, values.shape
-    padded = np.pad(values, _AROUND)
+    size, (height, width) = 2 * AROUND + 1, values.shape
+    padded = np.pad(values, AROUND)
     rows = sum(padded[shift : shift + height] for shift in range(size))
-    return sum(rows[:, shift : shift + width] for shift in range(size)) - values
-
-
-def _over_blocks(values: Floats) -> Floats:
-    """Sums over blocks; those at the far borders are smaller."""
-    down, across = (np.arange(0, length, BLOCK) for length in values.shape)
-    return np.add.reduceat(np.add.reduceat(values, down, axis=0), across, axis=1)
+    return (sum(rows[:, shift : shift + width] for shift in range(size)) - values).ravel()

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Floats
+from ...compiled.standing import or_compiled
 from ...scene.film import Film
 from ..filters import beyond, reach, variance
 
@@ -32,15 +33,16 @@ def interior(light: Floats, alone: Mask, film: Film, error: float) -> Mask:
     light : (channels, height, width), at the centres. alone : (height, width), pixels within whose reach something may change
     unseen by the centres. error : that is wanted of a pixel.
     """
-    bends = _bends(light)
+    bent = bends(light)
     doubtful = alone.copy()
     doubtful[[0, -1]] = doubtful[:, [0, -1]] = True  # what is beside the picture is not known
     for distance in range(int(np.ceil(reach(film)))):
-        changed = bends * beyond(film, distance) > _UNSEEN * error
+        changed = bent * beyond(film, distance) > _UNSEEN * error
         doubtful |= widened(changed, distance)
     return ~doubtful
 
 
+@or_compiled
 def correction(values: Floats, film: Film) -> Floats:
     """(height, width): what the filter's mean is more than the centre's value, where all is smooth; 0 at the border."""
     correction = np.zeros_like(values)
@@ -72,14 +74,15 @@ def within(mask: Mask, film: Film) -> Mask:
     return widened(mask, max(int(np.ceil(reach(film) - 0.5)), 0))
 
 
-def _bends(light: Floats) -> Floats:
+@or_compiled
+def bends(light: Floats) -> Floats:
     """(height, width): the largest second difference through each pixel along rows, columns and diagonals, of any channel."""
-    bends = np.zeros(light.shape[1:])
+    largest = np.zeros(light.shape[1:])
     middle = light[:, 1:-1, 1:-1]
     for down, across in _LINES:
         one, other = (
             light[:, 1 + side * down : light.shape[1] - 1 + side * down, 1 + side * across : light.shape[2] - 1 + side * across]
             for side in (1, -1)
         )
-        np.maximum(bends[1:-1, 1:-1], np.abs(one + other - 2.0 * middle).max(axis=0), out=bends[1:-1, 1:-1])
-    return bends
+        np.maximum(largest[1:-1, 1:-1], np.abs(one + other - 2.0 * middle).max(axis=0), out=largest[1:-1, 1:-1])
+    return largest

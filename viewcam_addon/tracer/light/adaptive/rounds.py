@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Float32s, Floats, Indices, gather
-from ...compiled.standing import compiled_for
 from ...rays.surface import Passes
 from ..illumination import Illumination
-from ..sums import DIRECT, Light
+from ..sums import DIRECT, Light, Sums
 from .band import Band, shown_by
 from .estimate import BLOCK
 from .glints import glints
@@ -29,7 +28,7 @@ Mask = NDArray[np.bool_]
 # Samples of each pixel that its centre does not tell all of, and how many are traced at a time.
 _FIRST, _AT_A_TIME = 8, 16
 # Pixels of a band: some hundred bytes of each are kept between the rounds. And of a part, when passes are written.
-_BAND, _WRITTEN = 1 << 19, 1 << 15
+_BAND, _WRITTEN = 1 << 18, 1 << 15
 
 Parts = Callable[[Callable[[slice], None], int, int], None]
 """Calls a function with slices of so many things, each of no more than so many, in some thread."""
@@ -73,24 +72,23 @@ class Rounds:
         band = Band(self._light.sums(part.size, 1), self._light.film, part, rows, self._certain is None)
         alone = self._alone(band)
         active = np.flatnonzero(~self._by_centres(band, alone))
-        taken = 0
-        while len(active) and taken < self._light.samples:
-            more = min(2 * taken or _FIRST, self._light.samples)
-            self._sample(band, active, taken, more)
-            taken = more
+        sums = self._light.sums(len(active), 1)
+        while len(active) and sums.taken < self._light.samples:
+            self._sample(band, active, sums, min(2 * sums.taken or _FIRST, self._light.samples))
             variance = band.estimated(active)
             if self._shares and not gather(alone, active).all():
                 shared = band.shared(~alone, self._error)
                 variance = np.where(gather(alone, active), variance, gather(shared, active))
-            active = active[variance > self._error**2]
+            going = np.flatnonzero(variance > self._error**2)
+            active, sums = active[going], sums.at(going)
         if self._shares:
             band.share(~alone, self._error)
         flat = {name: values.reshape(-1, values.shape[2]) for name, values in passes.items()}
-        self._parts(lambda part: band.write(flat, part), len(band.pixels), _WRITTEN)
+        self._parts(lambda part: band.write(flat, part), len(alone), _WRITTEN)
 
     def _alone(self, band: Band) -> Mask:
         """(n,): the pixels in which something may change that their neighbours don't show."""
-        rows = slice(band.rows[0], band.rows[-1] + 1)
+        rows = slice(band.rows.start, band.rows.stop)
         unsteady = self._light.palette.specular
         if self._certain is not None:
             unsteady = unsteady | self._light.palette.patterned
@@ -100,16 +98,15 @@ class Rounds:
     def _by_centres(self, band: Band, alone: Mask) -> Mask:
         """Which of the pixels their centres are enough for, (n,), whose light there is then traced."""
         if self._certain is None:
-            return np.zeros(len(band.pixels), bool)
+            return np.zeros(len(alone), bool)
 
         def trace(part: slice) -> None:
-            primitives = self._primitives[band.rows[part], band.columns[part]]
-            x, y = self._light.camera.view_plane(band.columns[part] + 0.5, band.rows[part] + 0.5)
-            band.add_centres(part, self._certain_light(band.pixels[part], primitives, x, y))
+            pixels, columns, rows = band.places(np.arange(part.start, part.stop))
+            x, y = self._light.camera.view_plane(columns + 0.5, rows + 0.5)
+            band.add_centres(part, self._certain_light(pixels, gather(self._primitives.ravel(), pixels), x, y))
 
-        self._parts(trace, len(band.pixels), self._light.paths_at_a_time)
+        self._parts(trace, len(alone), self._light.paths_at_a_time)
         done = interior(band.shown, alone.reshape(band.shape), self._light.film, self._error)
-        band.doubt(done)
         self._parts(lambda part: band.smooth(done, part.start), band.means, 1)
         return done.ravel()
 
@@ -121,20 +118,24 @@ class Rounds:
             light.of(DIRECT)[:] += other.of(DIRECT)
         return light
 
-    def _sample(self, band: Band, active: Indices, taken: int, more: int) -> None:
-        """Take samples of the active pixels, of which they have `taken` so far, until they have `more`."""
-        halves = (taken or more // 2, more)
+    def _sample(self, band: Band, active: Indices, sums: Sums, more: int) -> None:
+        """Take samples of the active pixels and add them to their sums, until they have so many."""
+        taken = sums.taken
+        half = taken or more // 2
 
         def trace(part: slice) -> None:
-            which = active[part]
-            sums = band.sums_of(which, taken)
-            shown = []
-            for half in halves:
-                for first in range(sums.taken, half, _AT_A_TIME):
-                    some = np.arange(first, min(first + _AT_A_TIME, half))
-                    self._light.add(sums, some, band.pixels[which], band.columns[which], band.rows[which], self._check)
-                shown.append(shown_by(sums))
-            band.put(which, sums, shown[0], halves[0])
+            which, some = active[part], sums.at(part)
+            before = shown_by(some) if taken else None
+            for first in range(taken, more, _AT_A_TIME):
+                numbers = np.arange(first, min(first + _AT_A_TIME, more))
+                light = self._light.light(numbers, *band.places(which), self._check)
+                if before is None:
+                    some.add(light, slice(half))
+                    before = shown_by(some)
+                    some.add(light, slice(half, None))
+                else:
+                    some.add(light)
+            band.put(which, some, before, half)
 
-        with compiled_for(len(active) * (more - taken)):
-            self._parts(trace, len(active), self._light.paths_at_a_time // min(more - taken, _AT_A_TIME))
+        self._parts(trace, len(active), self._light.paths_at_a_time // min(more - taken, _AT_A_TIME))
+        sums.taken = more
