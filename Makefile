@@ -32,7 +32,7 @@ test: lint
 	$(call PARALLEL,.venv)
 
 test-exhaustive: .venv/test
-	$(call PARALLEL,.venv) -m exhaustive
+	$(call PARALLEL,.venv) --dist=worksteal -m exhaustive
 
 lint: .venv/test
 	.venv/bin/python -m ruff check .
