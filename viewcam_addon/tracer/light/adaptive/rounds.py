@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Float32s, Floats, Indices, gather
+from ...compiled.standing import compiled_for
 from ...rays.surface import Passes
 from ..illumination import Illumination
 from ..sums import DIRECT, Light, Sums
@@ -137,5 +138,6 @@ class Rounds:
                     some.add(light)
             band.put(which, some, before, half)
 
-        self._parts(trace, len(active), self._light.paths_at_a_time // min(more - taken, _AT_A_TIME))
+        with compiled_for(len(active) * (more - taken)):
+            self._parts(trace, len(active), self._light.paths_at_a_time // min(more - taken, _AT_A_TIME))
         sums.taken = more
