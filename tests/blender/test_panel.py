@@ -4,7 +4,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import datablocks, panel
+from viewcam_addon.blender import datablocks, moving, panel
 
 
 def contents(camera_object, scene):
@@ -97,3 +97,45 @@ def test_an_up_in_doubt_comes_with_a_better_one_and_a_certain_one_does_not(posed
 def test_the_camera_datas_panel_stays_away_from_the_data_of_a_lamp(posed_camera):
     shown = [panel.VIEWCAM_PT_data.poll(SimpleNamespace(camera=data)) for data in (posed_camera.data, None)]
     assert shown == [True, False]
+
+
+class Layout:
+    """Stands in for Blender's, which draws in a window only: keeps the buttons of all layouts inside it."""
+
+    def __init__(self, buttons):
+        self.buttons = buttons
+
+    def row(self, align=False):
+        return Layout(self.buttons)
+
+    column = row
+
+    def split(self, factor=0.0):
+        return Layout(self.buttons)
+
+    def label(self, text):
+        pass
+
+    def operator(self, name, **look):
+        self.buttons.append((name, look, SimpleNamespace()))
+        return self.buttons[-1][-1]
+
+
+def test_both_panels_have_a_closed_sub_panel(posed_camera):
+    for each, parent in (
+        (panel.VIEWCAM_PT_data_move, "VIEWCAM_PT_data"),
+        (panel.VIEWCAM_PT_sidebar_move, "VIEWCAM_PT_sidebar"),
+    ):
+        assert each.bl_parent_id == parent and "DEFAULT_CLOSED" in each.bl_options and each.poll(bpy.context)
+
+
+def test_the_sub_panel_has_every_move_for_the_camera_that_is_shown(posed_camera):
+    buttons = []
+    panel.VIEWCAM_PT_sidebar_move.draw(SimpleNamespace(layout=Layout(buttons)), bpy.context)
+    assert {name for name, _, _ in buttons} == {each.bl_idname for each in moving.CLASSES}
+    icons = bpy.types.UILayout.bl_rna.functions["operator"].parameters["icon"].enum_items
+    for name, look, properties in buttons:
+        assert properties.camera == "Camera"
+        known = getattr(bpy.ops.viewcam, name.split(".")[1]).get_rna_type().properties
+        assert set(vars(properties)) <= set(known.keys()), f"{name} knows not all of {vars(properties)}"
+        assert look.get("icon", "NONE") in icons

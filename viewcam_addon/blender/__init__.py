@@ -9,13 +9,14 @@ def register() -> None:
     """Classes, properties and handlers, in this order: a panel needs its operators, an operator its properties."""
     import bpy
 
-    from . import animation, engine, operators, panel, properties, render_panels, render_settings
+    from . import animation, clipboard, engine, file_menu, moving, operators, panel, properties, render_panels, render_settings
 
     properties.register()
     render_settings.register()
-    for each in (*operators.CLASSES, *panel.CLASSES, *engine.CLASSES):
+    for each in (*operators.CLASSES, *moving.CLASSES, *clipboard.CLASSES, *panel.CLASSES, *engine.CLASSES):
         bpy.utils.register_class(each)
     render_panels.register()
+    file_menu.register()
     animation.register()
 
 
@@ -31,11 +32,12 @@ def unregister() -> None:
     """The same, in reverse."""
     import bpy
 
-    from . import animation, engine, operators, panel, properties, render_panels, render_settings
+    from . import animation, clipboard, engine, file_menu, moving, operators, panel, properties, render_panels, render_settings
 
     animation.unregister()
+    file_menu.unregister()
     render_panels.unregister()
-    for each in reversed((*operators.CLASSES, *panel.CLASSES, *engine.CLASSES)):
+    for each in reversed((*operators.CLASSES, *moving.CLASSES, *clipboard.CLASSES, *panel.CLASSES, *engine.CLASSES)):
         bpy.utils.unregister_class(each)
     render_settings.unregister()
     properties.unregister()

@@ -16,6 +16,7 @@ negative scale mirrors the picture, as in Cycles; its sign changes only if the P
 """
 
 import math
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -49,7 +50,7 @@ def apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Sc
     _place_closely(camera_object, pinhole, scene)
     frame = datablocks.frame_of(scene)
     camera_object.virtual_pinhole.state(
-        pinhole.eye, pinhole.look_at, pinhole.up, pinhole.distance[0] * frame.resolution_x / frame.size[0], frame.size
+        pinhole.eye, pinhole.look_at, pinhole.up, pinhole.distance[0] * (frame.resolution_x / frame.size[0]), frame.size
     )
     return check(camera_object, pinhole, scene)
 
@@ -228,26 +229,42 @@ def adopt(camera_object: bpy.types.Object, scene: bpy.types.Scene, keep: frozens
     InputError
         as `read` does.
     """
-    found = read(camera_object, scene)
     group = camera_object.virtual_pinhole
-    _, v, w = found.basis()
+    standing = as_it_stands(camera_object, scene, in_use=group.enabled and not keep)
     eye, look_at, up, distance = group.numbers()
-    reach = math.dist(eye, look_at) if group.enabled and not keep else 0.0
-    if not 0 < reach < math.inf:
-        reach = _focus_distance(camera_object, found, datablocks.depsgraph_of(scene))
     frame = datablocks.frame_of(scene)
     if "eye" not in keep:
-        eye = found.eye
+        eye = standing.eye
     if "look_at" not in keep:
-        look_at = tuple((np.array(found.eye) - reach * w).tolist())
+        look_at = standing.look_at
     if "up" not in keep:
-        up = _simplest_up(eye, look_at, v)
+        up = simplest_up(eye, look_at, read(camera_object, scene).basis()[1])
     if "distance" not in keep:
-        distance = found.distance[0] * frame.resolution_x / frame.size[0]
+        distance = standing.distance[0] * frame.resolution_x / frame.size[0]
     group.state(eye, look_at, up, distance, frame.size)
 
 
-def _simplest_up(eye: tuple, look_at: tuple, v: Array) -> tuple[float, float, float]:
+def as_it_stands(camera_object: bpy.types.Object, scene: bpy.types.Scene, in_use: bool) -> Pinhole:
+    """What `adopt` states, unstated: the camera as it stands, with a look-at point and an up that people would choose.
+
+    in_use : whether the look-at point has the distance from the eye that the values say, if they say any.
+
+    Raises
+    ------
+    InputError
+        as `read` does.
+    """
+    found = read(camera_object, scene)
+    _, v, w = found.basis()
+    eye, look_at, _, _ = camera_object.virtual_pinhole.numbers()
+    reach = math.dist(eye, look_at) if in_use else 0.0
+    if not 0 < reach < math.inf:
+        reach = _focus_distance(camera_object, found, datablocks.depsgraph_of(scene))
+    look_at = tuple((np.array(found.eye) - reach * w).tolist())
+    return replace(found, look_at=look_at, up=simplest_up(found.eye, look_at, v))
+
+
+def simplest_up(eye: tuple, look_at: tuple, v: Array) -> tuple[float, float, float]:
     """(0, 0, 1) where its v is the given one but for the rounding of a float32 matrix, else v."""
     vertical = (0.0, 0.0, 1.0)
     pinhole = Pinhole(eye, look_at, vertical, 1.0, 1, 1)

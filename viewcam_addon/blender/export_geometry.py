@@ -26,10 +26,10 @@ def mesh_of(mesh: bpy.types.Mesh, slot_count: int, colours: str | None = None) -
     along, "" being the one that is active for rendering, or None.
     """
     mesh.calc_loop_triangles()
-    vertices = _read(mesh.vertices, "co", np.float32, 3).astype(np.float64)
-    corner_vertices = _read(mesh.loops, "vertex_index", np.int32)
-    corners = _read(mesh.loop_triangles, "loops", np.int32, 3)
-    faces = _read(mesh.loop_triangles, "polygon_index", np.int32)
+    vertices = read(mesh.vertices, "co", np.float32, 3).astype(np.float64)
+    corner_vertices = read(mesh.loops, "vertex_index", np.int32)
+    corners = read(mesh.loop_triangles, "loops", np.int32, 3)
+    faces = read(mesh.loop_triangles, "polygon_index", np.int32)
     triangles = corner_vertices[corners]
     finite = np.isfinite(vertices).all(axis=1)
     if not finite.all():  # Cycles draws no triangle that is nowhere
@@ -72,8 +72,8 @@ def _corner_normals(mesh: bpy.types.Mesh, vertices: Array, triangles: Array, cor
     if mesh.normals_domain == "FACE":
         return None
     if not (versions.CYCLES_KEEPS_FLAT_FACES and _only_faces_are_sharp(mesh)):
-        return _read(mesh.corner_normals, "vector", np.float32, 3)[corners]
-    normals = _read(mesh.vertex_normals, "vector", np.float32, 3)[triangles]
+        return read(mesh.corner_normals, "vector", np.float32, 3)[corners]
+    normals = read(mesh.vertex_normals, "vector", np.float32, 3)[triangles]
     flat = _attribute(mesh, "sharp_face", "value", np.bool_, domain="FACE")[faces]
     first, second, third = np.moveaxis(vertices[triangles[flat]], 1, 0)
     across = np.cross(second - first, third - first)
@@ -93,7 +93,7 @@ def _only_faces_are_sharp(mesh: bpy.types.Mesh) -> bool:
 def _corner_uvs(mesh: bpy.types.Mesh, corners: Array) -> Array | None:
     """(triangles, 3, 2) float32: the UV map that is active for rendering, or None where there is none."""
     layer = next((layer for layer in mesh.uv_layers if layer.active_render), None)
-    return None if layer is None else _read(layer.uv, "vector", np.float32, 2)[corners]
+    return None if layer is None else read(layer.uv, "vector", np.float32, 2)[corners]
 
 
 def _corner_colours(mesh: bpy.types.Mesh, name: str, triangles: Array, corners: Array) -> Array:
@@ -104,17 +104,17 @@ def _corner_colours(mesh: bpy.types.Mesh, name: str, triangles: Array, corners: 
     attribute = attributes.get(name)
     if attribute is None:
         return np.zeros((*corners.shape, 3), np.float32)
-    colours = np.ascontiguousarray(_read(attribute.data, "color", np.float32, 4)[:, :3])
+    colours = np.ascontiguousarray(read(attribute.data, "color", np.float32, 4)[:, :3])
     return colours[corners if attribute.domain == "CORNER" else triangles]
 
 
 def _attribute(owner: bpy.types.ID, name: str, field: str, dtype: type, width: int = 1, domain: str = "POINT") -> Array | None:
     """An attribute's values, or None where there is none of this name and domain."""
     attribute = owner.attributes.get(name)
-    return _read(attribute.data, field, dtype, width) if attribute and attribute.domain == domain else None
+    return read(attribute.data, field, dtype, width) if attribute and attribute.domain == domain else None
 
 
-def _read(collection: bpy.types.bpy_prop_collection, field: str, dtype: type, width: int = 1) -> Array:
+def read(collection: bpy.types.bpy_prop_collection, field: str, dtype: type, width: int = 1) -> Array:
     """(items,) or (items, width) of `dtype`."""
     values = np.empty(len(collection) * width, dtype)
     collection.foreach_get(field, values)

@@ -14,7 +14,9 @@ from . import camera as cameras
 from . import datablocks, readouts
 
 
-class _CameraOperator:
+class CameraOperator:
+    """What all of them share. A subclass says in `work(camera_object, scene)` what it does."""
+
     bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
 
     camera: bpy.props.StringProperty(
@@ -42,7 +44,7 @@ class _CameraOperator:
         return {"FINISHED"}
 
 
-class VIEWCAM_OT_apply_camera(_CameraOperator, bpy.types.Operator):
+class VIEWCAM_OT_apply_camera(CameraOperator, bpy.types.Operator):
     bl_idname = "viewcam.apply_camera"
     bl_label = "Apply Again"
     bl_description = "Set the camera by its eye, look-at, up and distance"
@@ -54,7 +56,7 @@ class VIEWCAM_OT_apply_camera(_CameraOperator, bpy.types.Operator):
             self.report({"WARNING"}, finding)
 
 
-class VIEWCAM_OT_adopt_camera(_CameraOperator, bpy.types.Operator):
+class VIEWCAM_OT_adopt_camera(CameraOperator, bpy.types.Operator):
     bl_idname = "viewcam.adopt_camera"
     bl_label = "Adopt Camera"
     bl_description = "Take eye, look-at, up and distance from the camera as it stands. It does not move"
@@ -63,7 +65,7 @@ class VIEWCAM_OT_adopt_camera(_CameraOperator, bpy.types.Operator):
         cameras.adopt(camera_object, scene)
 
 
-class VIEWCAM_OT_choose_up(_CameraOperator, bpy.types.Operator):
+class VIEWCAM_OT_choose_up(CameraOperator, bpy.types.Operator):
     bl_idname = "viewcam.choose_up"
     bl_label = "Use a Certain Up"
     bl_description = "Replace up by the one that gives the same picture and leaves no doubt about its roll"

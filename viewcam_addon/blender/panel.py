@@ -1,13 +1,14 @@
 """The panel "Virtual Pinhole": in Properties › Camera data, and in the 3D viewport's sidebar."""
 
 import math
+from typing import ClassVar
 
 import bpy
 
 from ..errors import InputError
 from ..pinhole import Triple
 from . import camera as cameras
-from . import datablocks, hold, readouts
+from . import clipboard, datablocks, hold, readouts
 from .properties import VALUES
 
 
@@ -38,6 +39,7 @@ class _CameraPanel:
             button = buttons.row(align=True)
             button.enabled = group.enabled or operator != "viewcam.apply_camera"
             button.operator(operator).camera = camera_object.name
+        clipboard.draw(layout, camera_object)
         rows, warnings = contents(camera_object, scene)
         self._draw_warnings(warnings, context)
         up = better_up(camera_object, scene)
@@ -51,6 +53,57 @@ class _CameraPanel:
             column = self.layout.column(align=True)
             for i, line in enumerate(readouts.wrapped(sentence, width)):
                 column.label(text=line, icon="BLANK1" if i else "ERROR")
+
+
+class _MovePanel:
+    bl_label = "Move"
+    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return datablocks.camera_in(context) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        name = datablocks.camera_in(context).name
+        column = self.layout.column()
+        for label, buttons in _MOVES.items():
+            split = column.split(factor=0.25)
+            heading = split.row()
+            heading.alignment = "RIGHT"
+            heading.label(text=label)
+            row = split.row(align=True)
+            for operator, look, properties in buttons:
+                button = row.operator(operator, **look)
+                button.camera = name
+                for key, value in properties.items():
+                    setattr(button, key, value)
+
+
+_STEP = math.radians(15)  # as Blender's own view orbits by Numpad 4, 6, 8 and 2
+# The rows: label → (operator, how its button looks, the operator's properties) from left to right.
+_MOVES = {
+    "From": (("viewcam.adopt_view", {"text": "Current View"}, {}),),
+    "Look At": (
+        ("viewcam.look_at_selection", {"text": "Selection"}, {}),
+        ("viewcam.look_at_cursor", {"text": "Cursor"}, {}),
+        ("viewcam.look_at_active", {"text": "Active"}, {}),
+    ),
+    "Frame by": (
+        ("viewcam.frame_selection", {"text": "Eye"}, {"by": "EYE"}),
+        ("viewcam.frame_selection", {"text": "Distance"}, {"by": "DISTANCE"}),
+    ),
+    "Orbit": (
+        ("viewcam.orbit_camera", {"text": "", "icon": "TRIA_LEFT"}, {"around": -_STEP}),
+        ("viewcam.orbit_camera", {"text": "", "icon": "TRIA_RIGHT"}, {"around": _STEP}),
+        ("viewcam.orbit_camera", {"text": "", "icon": "TRIA_UP"}, {"around": 0.0, "upwards": _STEP}),
+        ("viewcam.orbit_camera", {"text": "", "icon": "TRIA_DOWN"}, {"around": 0.0, "upwards": -_STEP}),
+    ),
+    "Eye": (
+        ("viewcam.dolly_camera", {"text": "Dolly"}, {}),
+        ("viewcam.swap_camera", {"text": "Swap"}, {}),
+    ),
+    "Up": (("viewcam.level_camera", {"text": "Level"}, {}),),
+}
 
 
 def _draw_rows(rows: list[tuple[str, ...]], layout: bpy.types.UILayout) -> None:
@@ -110,4 +163,18 @@ class VIEWCAM_PT_sidebar(_CameraPanel, bpy.types.Panel):
     bl_category = "Pinhole"
 
 
-CLASSES = (VIEWCAM_PT_data, VIEWCAM_PT_sidebar)
+class VIEWCAM_PT_data_move(_MovePanel, bpy.types.Panel):
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "data"
+    bl_parent_id = "VIEWCAM_PT_data"
+
+
+class VIEWCAM_PT_sidebar_move(_MovePanel, bpy.types.Panel):
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Pinhole"
+    bl_parent_id = "VIEWCAM_PT_sidebar"
+
+
+CLASSES = (VIEWCAM_PT_data, VIEWCAM_PT_sidebar, VIEWCAM_PT_data_move, VIEWCAM_PT_sidebar_move)
