@@ -1,6 +1,7 @@
 import json
 import math
 import time
+from pathlib import Path
 
 import pytest
 from hypothesis import example, given
@@ -224,6 +225,18 @@ def test_pov_ray_turns_its_camera_by_the_sky(text, mirrored):
 def test_pov_rays_sky_is_y_unless_given():
     assert read("camera { location <1, 2, 3> look_at <0, 0, 0> }").up == (0, 1, 0)
     assert read("camera { location <1, 2, 3> }").up is None
+
+
+def test_each_line_of_the_page_is_the_same_camera():
+    page = Path(__file__).parent.parent.joinpath("docs", "scene-file.md").read_text(encoding="utf-8")
+    lines = page.split("```text\n")[1].split("```")[0].splitlines()
+    assert len(lines) == 7
+    for line in lines:
+        camera = read(line)
+        assert (camera.eye, camera.look_at, camera.up) == tuple(POSE.values()), line
+        # Sixteen digits of an angle, its tangent, a quotient.
+        assert camera.distance_in(FRAME) == pytest.approx(960, rel=1e-14), line
+        assert camera.notes == (), line
 
 
 @pytest.mark.parametrize(
