@@ -113,12 +113,12 @@ def lamps_of(rng, count):
     return [make[rng.integers(len(make))]() for _ in range(count)]
 
 
-def samples_apart(lighting, seed, rows=None):
+def samples_apart(lighting, seed, rows=None, asked=lambda *_: ()):
     """How far the kernel's samples of 200 points are from NumPy's: name → (3, n) or (n,), relative to 1 or to what they are."""
     rng = np.random.default_rng(seed)
     at, u = lighting.points(rng.normal(size=(3, 200)) * 2, rng.normal(size=(3, 200)), 200), rng.random((3, 200))
     lighting.emitters.rows = rows
-    found, expected = both(emitters.aimed, lighting.emitters, at, u)
+    found, expected = both(emitters.aimed, lighting.emitters, at, u, *asked(lighting.emitters, at))
     assert np.array_equal(found.shadowed, expected.shadowed) and np.array_equal(found.pdf, expected.pdf)
     apart = {}
     for name in ("direction", "distance", "light"):
@@ -134,6 +134,20 @@ def test_lamps_of_all_kinds_are_sampled_the_same_to_a_few_roundings(make_lightin
     lighting = make_lighting(*lamps_of(np.random.default_rng(seed), count))
     for name, apart in samples_apart(lighting, seed).items():
         assert np.median(apart) <= SERIES and (apart <= ANGLE).mean() > 0.999, (name, np.median(apart), apart.max())
+
+
+def one_of_them(lamp):
+    return lambda all_emitters, at: (lamp, all_emitters.brightest(at))
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=SEEDS, count=st.sampled_from([1, 2, 4]))
+def test_a_lamp_that_is_asked_by_itself_is_sampled_the_same_to_a_few_roundings(make_lighting, seed, count):
+    lighting = make_lighting(*lamps_of(np.random.default_rng(seed), count))
+    for lamp in range(lighting.emitters.count):
+        for name, apart in samples_apart(lighting, seed, asked=one_of_them(lamp)).items():
+            # Of points whose chance is within a rounding of their number, one side leaves the lamp out and the other does not.
+            assert np.median(apart) <= SERIES and (apart <= ANGLE).mean() > 0.999, (name, np.median(apart), apart.max())
 
 
 @settings(max_examples=10, deadline=None)

@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from viewcam_addon.tracer.arrays import dot
 from viewcam_addon.tracer.light import emitters
 from viewcam_addon.tracer.light.emitters import weight
+from viewcam_addon.tracer.light.sampler import Sampler
 from viewcam_addon.tracer.scene.lamps import Area, Point, Sun, World
 from viewcam_addon.tracer.scene.materials import Colour, Material
 
@@ -68,6 +70,26 @@ def test_of_a_few_lamps_without_a_size_each_is_chosen_by_what_it_gives_and_nothi
     lamps, alone = spread(np.random.default_rng(1), count)
     mean, error = make_lighting(*lamps).irradiance((0, 0, 0), UP, 64)
     assert mean == pytest.approx(alone.sum(), rel=1e-12) and error <= 1e-12 * mean
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.1])
+def test_lamps_that_are_asked_one_by_one_together_give_the_sum_of_each(make_lighting, off_by, radius):
+    """The weakest gives a hundredth of the brightest and is asked at every 25th sample only, unless it has no size."""
+    lamps = [Point(str(power), position=(0.3, 0.2, 2), power=(power,) * 3, radius=radius) for power in (1.0, 30.0, 0.3)]
+    lighting = make_lighting(*lamps)
+    all_emitters, points = lighting.emitters, lighting.points((0, 0, 0), UP, 16384)
+    numbers = Sampler(1, 16384).numbers(np.zeros(16384, np.int64), np.arange(16384), 2, 3)
+    total, sent = np.zeros(16384), []
+    for lamp in range(3):
+        aimed = all_emitters.sample(points, numbers, lamp, all_emitters.brightest(points))
+        cosine = np.maximum(dot(points.normal, aimed.direction), 0.0)
+        total += aimed.light[0] * cosine
+        sent.append((cosine > 0).mean())
+    squared = 0.3**2 + 0.2**2 + 2**2
+    expected = 31.3 / (4 * np.pi * squared) * 2 / np.sqrt(squared)
+    # A small sphere gives what a point does, but for a part of (radius / distance)² = 0.0025 at most.
+    assert abs(off_by((total.mean(), max(total.std() / 128, 0.0025 * expected)), expected)) <= 3
+    assert sorted(np.round(sent, 2)) == ([0.04, 0.13, 1.0] if radius else [1.0, 1.0, 1.0])
 
 
 def test_five_thousand_lamps_are_all_found(make_lighting, off_by):

@@ -56,6 +56,20 @@ def assert_close(passes, expected, precision):
     assert abs(off) <= 3, f"{off:+.1f} standard errors of {error:.3%} off"
 
 
+# Lamps and a sky that is darker
+
+
+@pytest.mark.parametrize("count", [1, 2, 4, 5])
+@pytest.mark.parametrize("level", ["direct", "path"])
+def test_suns_and_a_much_darker_sky_add_up(make_mesh, make_lit, count, level):
+    """The sky gets a ray of few samples only, where lamps are asked one by one; from five on they are not."""
+    suns = tuple(replace(SUN, name=str(number), angle=0.2, irradiance=(3 / 2**number,) * 3) for number in range(count))
+    scene = make_lit(DOWN, (square(make_mesh, 9.0), lambert(0.5)), lamps=suns, world=World((0.1, 0.1, 0.1)))
+    # The mean cosine over a sun's disc is that of its middle, less a part of 0.1²/4 of which the tests' 1 % is four times.
+    received = sum(sun.irradiance[0] for sun in suns) * 3 / np.sqrt(14) / np.pi
+    assert_close(render(scene, level, 64, threads=1), 0.5 * (received + 0.1), 0.002)
+
+
 # Furnaces
 
 

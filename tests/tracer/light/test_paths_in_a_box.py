@@ -141,8 +141,8 @@ def sabotaged(light):
     """Emitters whose light has something wrong with it: light(points, aimed) → factor."""
     sample = Emitters.sample
 
-    def wrong(self, points, u):
-        aimed = sample(self, points, u)
+    def wrong(self, points, u, *others):
+        aimed = sample(self, points, u, *others)
         return aimed._replace(light=aimed.light * light(points, aimed))
 
     return wrong

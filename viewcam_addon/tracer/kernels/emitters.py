@@ -67,12 +67,57 @@ def _aim(table, chances, reached_chances, objects, positions, normals, shadings,
         distances[point], pdf[point], number[point] = distance, density, which
 
 
-def aimed(emitters, points, u):
+@kernel
+def _find_brightest(table, positions, normals, brightest):
+    for point in range(brightest.size):
+        position, normal = taken(positions, point), taken(normals, point)
+        most = 0.0
+        for lamp in range(len(table)):
+            most = max(most, estimate(table, lamp, position, normal))
+        brightest[point] = most
+
+
+def brightest_of(emitters, points):
+    brightest = np.empty(points.count)
+    _find_brightest(_rows(emitters), points.position, points.normal, brightest)
+    return brightest
+
+
+@kernel
+def _aim_at(table, lamp, worth, positions, normals, shadings, u, brightest, directions, distances, light):
+    """Emitters._aim_at."""
+    nothing = (0.0, 0.0, 0.0)
+    for point in range(distances.size):
+        position = taken(positions, point)
+        chance = np.minimum(estimate(table, lamp, position, taken(normals, point)) / (brightest[point] * worth), 1.0)
+        if u[0, point] < chance:
+            ahead, distance, factor = sample(table, lamp, position, taken(shadings, point), u[1, point], u[2, point])
+            brought = scaled(colour_of(table, lamp), limited(factor))
+            put(directions, point, ahead)
+            put(light, point, scaled(brought, np.minimum(1.0 / chance, _LONGEST_ODDS)))
+            distances[point] = distance
+        else:
+            put(directions, point, nothing)
+            put(light, point, nothing)
+            distances[point] = 1.0
+
+
+def _rows(emitters):
+    if emitters.rows is None:
+        emitters.rows = table_of(emitters.lamps, emitters.glowing)
+    return emitters.rows
+
+
+def aimed(emitters, points, u, lamp=None, brightest=None):
     glowing = emitters.glowing
     if glowing.count and not glowing.plain:  # what textures make of each point is no loop
-        return plain.aimed.plain(emitters, points, u)
-    if emitters.rows is None:
-        emitters.rows = table_of(emitters.lamps, glowing)
+        return plain.aimed.plain(emitters, points, u, lamp, brightest)
+    if lamp is not None:
+        directions, light = np.empty((2, 3, points.count))
+        distances, pdf = np.empty(points.count), np.broadcast_to(np.inf, points.count)
+        given = points.position, points.normal, points.shading, u, brightest
+        _aim_at(_rows(emitters), lamp, emitters.worth(lamp), *given, directions, distances, light)
+        return plain.Aimed(directions, distances, light, pdf, np.broadcast_to(emitters.shadowed[lamp], points.count))
     objects = _NO_OBJECTS
     if glowing.count:
         objects = (glowing.shapes, glowing.densities, glowing.primitives, glowing.reached, glowing.last, glowing.colours)
@@ -82,7 +127,7 @@ def aimed(emitters, points, u):
     directions, light = np.empty((2, 3, count))
     distances, pdf = np.empty((2, count))
     given = points.position, points.normal, points.shading, u
-    _aim(emitters.rows, chances, reached, objects, *given, number, directions, distances, light, pdf)
+    _aim(_rows(emitters), chances, reached, objects, *given, number, directions, distances, light, pdf)
     shadowed = np.broadcast_to(True, count) if emitters.shadowed.all() else emitters.shadowed[number]
     return plain.Aimed(directions, distances, light, pdf, shadowed)
 

@@ -35,7 +35,8 @@ _KINDS = (
 class Lamps:
     """Lamps of all kinds, numbered kind after kind.
 
-    shadowed : (k,) bool, whether they cast shadows. sized : whether rays can run into any.
+    shadowed : (k,) bool, whether they cast shadows. with_size : (k,) bool, whether rays can run into them. sized : whether they
+    can into any.
     """
 
     def __init__(self, lamps: Sequence[Lamp], view: View) -> None:
@@ -48,7 +49,8 @@ class Lamps:
                 shadowed += [lamp.casts_shadow for lamp in some]
         self.shadowed = np.array(shadowed, bool)
         self.count = len(shadowed)
-        self.sized = any(table.sized.any() for table in self.tables)
+        self.with_size = np.concatenate([np.zeros(0, bool), *(table.sized for table in self.tables)])
+        self.sized = bool(self.with_size.any())
 
     def sample(self, which: Indices, position: Floats, shading: Floats, u: Floats) -> Sampled:
         """Directions, distances, and radiances over densities, of one lamp for each point."""

@@ -200,15 +200,18 @@ class Paths:
 
         lobes = lobes_at(self._palette, arrivals.points, arrivals.direction)
         places = _places(light, arrivals, depth)
+        brightest = self._emitters.brightest(arrivals.points) if depth == 1 and self._emitters.asked else None
         if DIFFUSE in lobes and self._emitters.sampled("diffuse"):
-            self._add_emitters(light, arrivals, lobes, places["diffuse"], numbers)
+            self._add_emitters(light, arrivals, lobes, places["diffuse"], numbers, brightest)
         leading = [kind for kind in self._kinds if self._leads_on(kind, depth)]
         if not leading:
             return []
         everyone = len(arrivals.path)
         chosen = lobes.chosen(numbers(slice(None), _WAY, 1)[0] if len(lobes.ways) > 1 else np.zeros(everyone))
         made = (
-            self._rays(arrivals, lobes, chosen, kind, depth, places[kind], numbers) for kind in leading if lobes.leads_on(kind)
+            self._rays(arrivals, lobes, chosen, kind, depth, places[kind], numbers, brightest)
+            for kind in leading
+            if lobes.leads_on(kind)
         )
         return [rays for rays in made if rays is not None]
 
@@ -216,31 +219,56 @@ class Paths:
         """Whether rays of a kind can bring anything after so many scatterings."""
         return depth < self._most or self._emitters.meets(kind)
 
-    def _add_emitters(self, light: Light, arrivals: Arrivals, lobes: Lobes, places: Indices, numbers: Numbers) -> None:
-        """Add the light that diffuse surfaces get from one emitter for each path."""
+    def _add_emitters(
+        self, light: Light, arrivals: Arrivals, lobes: Lobes, places: Indices, numbers: Numbers, brightest: Floats | None
+    ) -> None:
+        """Add the light that diffuse surfaces get from one emitter for each path, or from every lamp: see `Emitters.sample`."""
         share = lobes.share(DIFFUSE)
         which = some(share > 0)
         points = arrivals.points.at(which)
         u = numbers(which, _EMITTER, 3) if self._emitters.random else np.zeros((3, points.count))
-        aimed = self._emitters.sample(points, u)
-        factor, bright = received(points, aimed, pick(share, which), self._emitters.weighed)
-        shadowed = points.at(bright), pick(aimed.direction, bright), pick(aimed.distance, bright)
-        hidden = self._space.blocked(*shadowed) & pick(aimed.shadowed, bright)
-        add_received(light, places, which, bright, hidden, aimed.light, factor, lobes.colour(DIFFUSE), arrivals.weight)
+        asked = [None]
+        if brightest is not None and self._emitters.count > 1:
+            asked, brightest = range(self._emitters.count), pick(brightest, which)
+        for lamp in asked:
+            aimed = self._emitters.sample(points, u, lamp, brightest)
+            factor, bright = received(points, aimed, pick(share, which), self._emitters.weighed)
+            shadowed = points.at(bright), pick(aimed.direction, bright), pick(aimed.distance, bright)
+            hidden = self._space.blocked(*shadowed) & pick(aimed.shadowed, bright)
+            add_received(light, places, which, bright, hidden, aimed.light, factor, lobes.colour(DIFFUSE), arrivals.weight)
 
     def _rays(
-        self, arrivals: Arrivals, lobes: Lobes, chosen: Indices, kind: str, depth: int, places: Indices, numbers: Numbers
+        self,
+        arrivals: Arrivals,
+        lobes: Lobes,
+        chosen: Indices,
+        kind: str,
+        depth: int,
+        places: Indices,
+        numbers: Numbers,
+        brightest: Floats | None,
     ) -> Rays | None:
-        """The rays of one kind that leave where paths have come to; None where none can bring anything."""
+        """The rays of one kind that leave where paths have come to; None where none can bring anything.
+
+        brightest : about what the brightest lamp brings to all points, where rays to the sky may be saved beside it.
+        """
         which = lobes.of_kind(chosen, kind)
         counts, last = self._counted(arrivals, which, kind, depth)
         if not self._emitters.meets(kind) and last.any():
             which = np.arange(len(chosen))[which][~last]
             counts, last = self._counted(arrivals, which, kind, depth)
+        chance = None
+        if kind == "diffuse" and brightest is not None and last.all() and not self._emitters.lamps_met_by(kind):
+            chance = self._emitters.sky_chance(pick(brightest, which), kind)
+            sent = np.flatnonzero(numbers(which, _SURVIVAL, 1)[0] < chance)
+            which, chance = np.arange(len(chosen))[which][sent], chance[sent]
+            counts, last = self._counted(arrivals, which, kind, depth)
         points = arrivals.points.at(which)
         if not points.count:
             return None
         weights = lobes.weights(chosen, which, kind)
+        if chance is not None:
+            weights = _made_up_for(weights, chance)
         if arrivals.weight is not None:
             weights = np.minimum(weights * pick(arrivals.weight, which), _MOST_WEIGHT)
         if kind == "diffuse":
