@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Indices, dot, gather
 from ..scene import Mesh
+from .tables import each
 from .triangles import Triangles
 
 Edges = NDArray[np.int32]
@@ -48,14 +49,13 @@ class Joints:
     """
 
     def __init__(self, triangles: Triangles, bend: float) -> None:
-        found: dict[int, _Joints] = {}
+        meshes = {id(mesh): mesh for _, mesh in triangles.placed}
+        found = dict(zip(meshes, each(_joints, meshes.values(), triangles.threads), strict=True))
         creased: dict[tuple[int, float], Indices] = {}
         pairs, twisted, borders, creases = [np.empty((2, 0), np.int32)], [np.empty(0, bool)], [np.empty(0, np.int32)], []
         triangle, pair = 0, 0
         for (_, mesh), stretch in zip(triangles.placed, _stretches(triangles), strict=True):
             key = id(mesh)
-            if key not in found:
-                found[key] = _joints(mesh)
             joints = found[key]
             if (key, stretch) not in creased:
                 creased[key, stretch] = np.flatnonzero(joints.bends * stretch > bend).astype(np.int32)

@@ -15,7 +15,7 @@ crease are no outlines.
 """
 
 from collections.abc import Iterator
-from functools import cached_property
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ from .rims import BULGE, rims_seen_from
 from .shadow_outlines import ShadowOutlines
 from .space import Space
 from .strokes import LEAST_MARGIN, Canvas
+from .tables import each, made_once
 from .triangles import Planes, Triangles
 from .view import View
 from .visibility import Visibility
@@ -72,10 +73,19 @@ class Outlines:
         if joints is not None:
             self.joints = joints
 
-    @cached_property
+    @made_once
     def joints(self) -> Joints:
         """How the triangles join; found when first asked for."""
         return Joints(self._triangles, self._crease)
+
+    def edges(self, depth: NDArray, surfaces: Surfaces, space: Space, primitives: NDArray | None = None) -> NDArray[np.bool_]:
+        """(height, width): `seen` or `shadows`, of the whole picture, found side by side."""
+        found = [
+            partial(self.seen, depth, primitives),
+            partial(self.shadows, depth, surfaces, space, primitives),
+        ]
+        seen, shadows = each(lambda find: find(), found, self._triangles.threads)
+        return seen | shadows
 
     def seen(self, depth: NDArray, primitives: NDArray | None = None, first_row: int = 0) -> NDArray[np.bool_]:
         """(height, width): the pixels whose squares a visible outline may cross, rows from the bottom.
