@@ -65,6 +65,14 @@ def test_looks_at_the_selected_vertices_in_edit_mode(selected_cube, stated):
     assert stated().look_at == (POINT[0], POINT[1], POINT[2] + 1)
 
 
+@pytest.mark.parametrize("mode", ["SCULPT", "VERTEX_PAINT", "WEIGHT_PAINT", "TEXTURE_PAINT"])
+def test_in_modes_that_select_nothing_the_selected_object_counts(selected_cube, stated, mode):
+    bpy.ops.object.mode_set(mode=mode)
+    assert bpy.context.mode != "OBJECT"
+    bpy.ops.viewcam.look_at_selection()
+    assert stated().look_at == POINT
+
+
 def test_looks_at_the_cursor(stated, scene):
     scene.cursor.location = POINT
     bpy.ops.viewcam.look_at_cursor()
@@ -215,6 +223,34 @@ def test_what_does_not_stick_is_reported(posed_camera, scene, capfd):
     posed_camera.driver_add("location", 0).driver.expression = "1.0 + 1.0"
     bpy.ops.viewcam.swap_camera()
     assert "A driver sets 'location'" in capfd.readouterr().out
+
+
+def test_keyed_values_can_be_moved_and_keyed_again(posed_camera, scene):
+    group = posed_camera.virtual_pinhole
+    for frame in (1, 10):
+        group.keyframe_insert("eye", frame=frame)
+    bpy.ops.viewcam.swap_camera()
+    bpy.context.view_layer.update()
+    assert tuple(group.eye) == (0, 0, 1) and cameras.read(posed_camera, scene).eye == (0, 0, 1)
+    group.keyframe_insert("eye", frame=5)
+    scene.frame_set(10)
+    assert tuple(group.eye) == (7, -6, 5)
+    scene.frame_set(5)
+    assert cameras.read(posed_camera, scene).eye == (0, 0, 1)
+
+
+def test_a_linked_camera_is_moved_and_it_is_said_that_this_is_not_saved(posed_camera, fresh_blender, tmp_path, capfd):
+    bpy.data.libraries.write(str(tmp_path / "library.blend"), {posed_camera})
+    fresh_blender.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, target):
+        target.objects = ["Camera"]
+    linked = target.objects[0]
+    bpy.context.scene.collection.objects.link(linked)
+    bpy.context.scene.camera = linked
+    bpy.context.view_layer.update()
+    bpy.ops.viewcam.swap_camera()
+    assert tuple(linked.location) == (0, 0, 1)
+    assert "what is set here is not saved" in capfd.readouterr().out
 
 
 def test_a_held_roll_becomes_a_part_of_up(held_camera, scene, over_the_top):

@@ -9,7 +9,19 @@ def register() -> None:
     """Classes, properties and handlers, in this order: a panel needs its operators, an operator its properties."""
     import bpy
 
-    from . import animation, clipboard, engine, file_menu, moving, operators, panel, properties, render_panels, render_settings
+    from . import (
+        animation,
+        clipboard,
+        engine,
+        file_menu,
+        moving,
+        operators,
+        panel,
+        properties,
+        render_panels,
+        render_settings,
+        view_menu,
+    )
 
     properties.register()
     render_settings.register()
@@ -17,6 +29,7 @@ def register() -> None:
         bpy.utils.register_class(each)
     render_panels.register()
     file_menu.register()
+    view_menu.register()
     animation.register()
 
 
@@ -32,9 +45,22 @@ def unregister() -> None:
     """The same, in reverse."""
     import bpy
 
-    from . import animation, clipboard, engine, file_menu, moving, operators, panel, properties, render_panels, render_settings
+    from . import (
+        animation,
+        clipboard,
+        engine,
+        file_menu,
+        moving,
+        operators,
+        panel,
+        properties,
+        render_panels,
+        render_settings,
+        view_menu,
+    )
 
     animation.unregister()
+    view_menu.unregister()
     file_menu.unregister()
     render_panels.unregister()
     for each in reversed((*operators.CLASSES, *moving.CLASSES, *clipboard.CLASSES, *panel.CLASSES, *engine.CLASSES)):

@@ -61,10 +61,10 @@ def median(points: Array) -> Triple:
 
 
 def _points_of_objects(blocks: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Iterator[Array]:
-    empty = dict.fromkeys(blocks)
+    wanted, empty = set(blocks), dict.fromkeys(blocks)
     for instance in depsgraph.object_instances:
         owner = (instance.parent if instance.is_instance else instance.object).original
-        if owner in blocks:
+        if owner in wanted:
             local = _local_points(instance.object)
             if len(local):
                 empty.pop(owner, None)

@@ -1,0 +1,35 @@
+"""View › Cameras › Virtual Pinhole, in the 3D viewport: all buttons of the panel once more.
+
+Blender's search (F3) looks through menus; what stands in none is found by developers alone.
+"""
+
+import bpy
+
+from . import clipboard, moving, operators
+
+
+class VIEWCAM_MT_cameras(bpy.types.Menu):
+    bl_idname = "VIEWCAM_MT_cameras"
+    bl_label = "Virtual Pinhole"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        for group in (moving.CLASSES, operators.CLASSES, clipboard.CLASSES):
+            for each in group:
+                self.layout.operator(each.bl_idname)
+            if group != clipboard.CLASSES:
+                self.layout.separator()
+
+
+def _draw(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    menu.layout.separator()
+    menu.layout.menu(VIEWCAM_MT_cameras.bl_idname)
+
+
+def register() -> None:
+    bpy.utils.register_class(VIEWCAM_MT_cameras)
+    bpy.types.VIEW3D_MT_view_cameras.append(_draw)
+
+
+def unregister() -> None:
+    bpy.types.VIEW3D_MT_view_cameras.remove(_draw)
+    bpy.utils.unregister_class(VIEWCAM_MT_cameras)
