@@ -102,6 +102,7 @@ def _chart(
 
 
 def _with_half(method: Method, points: list[contest.Point], reference: Reference) -> list[contest.Point]:
-    """A rival's curve goes on with what the reference's own halves tell of it."""
-    half = next((half for half in reference.halves if method.rival and method.name == half.side), None)
+    """The curves of numbers of samples go on with what the reference's own halves tell of those who made it."""
+    uniform = method.sampling == "samples" and (method.ours or method.rival)
+    half = next((half for half in reference.halves if uniform and method.side == half.side), None)
     return standings.with_point_by_line(points, half.samples, half.error) if half else points

@@ -23,7 +23,7 @@ from .figures import Still
 COMPILED, PLAIN, CYCLES = "ours, compiled", "ours, NumPy and Embree", "Cycles"
 VARIANTS = {COMPILED: {"VIEWCAM_COMPILED": "1"}, PLAIN: {"VIEWCAM_COMPILED": "0"}}
 """The tracer's sides, and the environment that each is started in."""
-POWERS = tuple(2.0**power for power in range(9))
+POWERS = tuple(2.0**power for power in range(13))
 EVERY_OTHER = POWERS[::2]
 ERRORS = (0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0005)
 NOISE_THRESHOLDS = (0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002)

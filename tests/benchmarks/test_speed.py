@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks import race
-from benchmarks.speed import contest, references, standings
+from benchmarks.speed import contest, figures, references, standings
 from benchmarks.speed.contest import Effort, Method, Point
 from benchmarks.speed.standings import Contested, reached
 from viewcam_addon import image
@@ -207,6 +207,16 @@ def test_a_reference_is_made_once_for_each_scene(tmp_path):
         assert len(asked) == 4 * made
     assert {samples for _, samples in asked} == {half.samples for half in found.halves} == {256, 64}
     assert len({seed for seed, _ in asked}) == 2
+
+
+def test_uniform_curves_of_both_sides_go_on_with_the_reference_s_halves_and_no_other_does():
+    halves = tuple(references.Half(side, 256, 0.001) for side in ("ours", "Cycles"))
+    made = references.Reference(np.zeros((1, 1, 3)), 0.0007, 0.001, 0.001, halves)
+    adaptive = dataclasses.replace(OURS, name="adaptive", sampling="error")
+    for method, more in ((OURS, 1), (CYCLES, 1), (adaptive, 0), (dataclasses.replace(CYCLES, rival=False), 0)):
+        points = figures._with_half(method, power_law(1.0, -0.5), made)
+        assert len(points) == 4 + more, method
+        assert not more or (points[-1].time, points[-1].error) == (pytest.approx(256.0), 0.001)
 
 
 # Contestants.
