@@ -50,10 +50,13 @@ def spread(u: Floats, width: float) -> Floats:
     scaled = u * _STEPS
     step = scaled.astype(np.intp)
     scaled -= step
-    places, lengths = inverse()
-    offset = gather(lengths, step)
+    places = inverse()
+    begin = gather(places, step)
+    step += 1
+    offset = gather(places, step)
+    offset -= begin
     offset *= scaled
-    offset += gather(places, step)
+    offset += begin
     offset *= width
     offset += 0.5
     return offset
@@ -95,13 +98,12 @@ def variance(film: Film) -> float:
 
 
 @functools.cache
-def inverse() -> tuple[Floats, Floats]:
-    """Where each step of the mass begins, and how far it reaches, in widths."""
+def inverse() -> Floats:
+    """Where each step of the mass begins, and the last one ends, in widths."""
     u = np.arange(_STEPS // 2 + 1) / _STEPS
     x = np.linspace(-1.0, 0.0, 8193)
     x = np.interp(u, mass(x), x)
     for _ in range(4):  # Newton's, from a start that is good to four digits
         x = np.clip(x - (mass(x) - u) * 2 * _COEFFICIENTS[0] / density(x), -1.0, 0.0)
     x[0], x[-1] = -1.0, 0.0
-    places = np.concatenate([x, -x[-2::-1]])
-    return places[:-1], np.diff(places)
+    return np.concatenate([x, -x[-2::-1]])

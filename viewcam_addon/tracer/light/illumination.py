@@ -26,7 +26,7 @@ from .emitters import Emitters
 from .filters import offsets
 from .paths import Paths
 from .sampler import Sampler
-from .sums import Light, Sums
+from .sums import Light, Means, Sums
 from .textures import Palette
 
 # Paths that are traced at a time, twice as many where light bounces, and of how many samples of a pixel if there are as many.
@@ -105,7 +105,7 @@ class Illumination:
 
         depth, primitives : (height, width), what is seen at the pixels' centres.
         """
-        return outlines.edges(depth, self.surfaces, self._space, primitives)
+        return outlines.seen(depth, primitives) | outlines.shadows(depth, self.surfaces, self._space, primitives)
 
     @property
     def largest_tile(self) -> int:
@@ -122,6 +122,10 @@ class Illumination:
         for first in range(0, self.samples, at_a_time):
             self.add(sums, np.arange(first, min(first + at_a_time, self.samples)), pixels, columns, rows, check)
         sums.write(passes, self.paths.random)
+
+    def means(self, count: int) -> Means:
+        """Means of so many pixels, none of which has samples yet."""
+        return Means(count, self.paths.categories, self.film)
 
     def sums(self, count: int, samples: int) -> Sums:
         """Sums over no samples of so many pixels so far. samples : how many there will be."""

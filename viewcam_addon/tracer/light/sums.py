@@ -12,6 +12,7 @@ Rejected: batches that are scrambled each on its own, which makes the estimate r
 
 from collections.abc import Sequence
 from copy import copy
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,81 +66,76 @@ class Light:
             total[paths] = component
 
 
-class Sums:
-    """The sums over the samples of `count` pixels.
+class Means:
+    """The means over the samples of `count` pixels, which have none until `begin` or `put`.
 
-    samples : how many there will be. categories : of light. taken : how many samples there are, of all pixels alike or of each.
+    categories : of light. taken : how many samples there are, of all pixels alike or of each.
     """
 
-    def __init__(self, count: int, categories: Sequence[str], film: Film, samples: int) -> None:
+    _ROWS = 7  # of the state, beside those of the categories
+
+    def __init__(self, count: int, categories: Sequence[str], film: Film) -> None:
         self._film, self.count = film, count
         self.taken: int | Indices = 0
-        # A power of two, since that is how many points together fill their space.
-        self.batch_size = 1 << max(samples // _BATCHES, 1).bit_length() - 1
         self.categories = list(categories)
         hidden = (COLOUR, BACKGROUND) if film.transparent else (COLOUR,)
         self.shown = [row for row, category in enumerate(categories) if category not in hidden]
-        self._hold(np.zeros((3 * len(categories) + 13, count)))
+        self._hold(np.empty((3 * len(categories) + self._ROWS, count)))
 
     def _hold(self, state: Floats) -> None:
         """Keep all that is known of the pixels in the columns of one table, and names for its rows."""
+        rows = 3 * len(self.categories)
         self.state = state
-        self.totals = state[:-13].reshape(3, len(self.categories), state.shape[1])
-        self.covered, self.first = state[-13], state[-12:-9]
-        # The sum of the differences from the first sample, and when the last batch began; of the batches' own sums, squared.
-        self.differences, self.before, self.squares = state[-9:-6], state[-6:-3], state[-3:]
+        self.totals = state[:rows].reshape(3, len(self.categories), state.shape[1])
+        # The sum of the differences from the first sample is the last.
+        self.covered, self.first, self.differences = state[rows], state[rows + 1 : rows + 4], state[rows + 4 : rows + 7]
 
     @property
     def means(self) -> int:
         """How many of the state's first rows are sums of what the pixels show, of categories or of all."""
-        return len(self.state) - 9
+        return 3 * len(self.categories) + 4
 
-    def at(self, which: Some) -> "Sums":
+    def at(self, which: Some) -> Self:
         """Some of the pixels: a view of a slice, a copy of others."""
         some = copy(self)
         some._hold(pick(self.state, which))
         some.count = some.state.shape[1]
         return some
 
-    def put(self, which: Indices | slice, some: "Sums") -> None:
-        """Put some pixels back."""
-        put(self.state, which, some.state)
+    def put(self, which: Indices, some: "Means") -> None:
+        """Put some pixels here."""
+        put(self.state, which, some.state[: len(self.state)])
+
+    def begin(self, light: Light) -> None:
+        """Take the first sample of every pixel."""
+        self.totals[:], self.covered[:] = light.values, light.covered
+        self.first[:] = sum(light.values[:, row] for row in self.shown)
+        self.differences[:] = 0.0
+        self.taken = 1
 
     @property
     def combined(self) -> Floats:
         """(3, count): the mean so far of what the pixels show."""
         return (self.first + self.differences / self.taken) * self._film.exposure
 
-    def add(self, light: Light, some: slice = slice(None)) -> None:
-        """Add some of the light's samples of every pixel: its paths are those of all samples of a pixel, pixel after pixel."""
-        samples = light.count // self.count
-        values = light.values.reshape(3, len(self.categories), self.count, samples)[..., some]
-        add_samples(self, values, light.covered.reshape(self.count, samples)[:, some])
-        self.taken += values.shape[3]
-
     @property
     def alpha(self) -> Floats:
         """(count,): the part of the pixels that surfaces cover, so far; 1 where the film is opaque."""
         return self.covered / self.taken if self._film.transparent else np.ones(self.count)
+
+    def mean(self, category: str) -> Floats:
+        """(3, count): of the light that belongs to a category, so far, without exposure."""
+        if category not in self.categories:
+            return np.zeros((3, self.count))
+        return self.totals[:, self.categories.index(category)] / self.taken
 
     def change(self, category: str, more: Floats) -> None:
         """Add (3, count) to the sum of a category that shows in the picture."""
         self.totals[:, self.categories.index(category)] += more
         self.differences += more
 
-    def write(self, passes: Passes, random: bool) -> None:
-        """Write the means into passes, name → (count, channels).
-
-        random : whether another seed would give another picture; if so, the variance of a single sample is infinite.
-        """
-        self.write_means(passes)
-        if self.taken > 1:
-            store(passes["Variance"], self.variance)
-        else:
-            passes["Variance"][:] = np.inf if random else 0.0
-
     def write_means(self, passes: Passes) -> None:
-        """The same but for Variance. What no category of these sums belongs to stays as it is: dark."""
+        """Write all but Variance into passes, name → (count, channels), which are dark and stay so where there is no light."""
         exposure = self._film.exposure
         colour = self.mean(COLOUR)
         store(passes["Combined"], self.combined)
@@ -153,11 +149,40 @@ class Sums:
             if category in self.categories:
                 store(passes[name], without_colour(self.mean(category) * exposure, colour))
 
-    def mean(self, category: str) -> Floats:
-        """(3, count): of the light that belongs to a category, so far, without exposure."""
-        if category not in self.categories:
-            return np.zeros((3, self.count))
-        return self.totals[:, self.categories.index(category)] / self.taken
+
+class Sums(Means):
+    """The same with the sums that tell variance. samples : how many there will be."""
+
+    _ROWS = Means._ROWS + 6
+
+    def __init__(self, count: int, categories: Sequence[str], film: Film, samples: int) -> None:
+        super().__init__(count, categories, film)
+        self.state.fill(0.0)
+        # A power of two, since that is how many points together fill their space.
+        self.batch_size = 1 << max(samples // _BATCHES, 1).bit_length() - 1
+
+    def _hold(self, state: Floats) -> None:
+        super()._hold(state)
+        # The sum of the differences when the last batch began, and the batches' own sums, squared.
+        self.before, self.squares = state[-6:-3], state[-3:]
+
+    def add(self, light: Light, some: slice = slice(None)) -> None:
+        """Add some of the light's samples of every pixel: its paths are those of all samples of a pixel, pixel after pixel."""
+        samples = light.count // self.count
+        values = light.values.reshape(3, len(self.categories), self.count, samples)[..., some]
+        add_samples(self, values, light.covered.reshape(self.count, samples)[:, some])
+        self.taken += values.shape[3]
+
+    def write(self, passes: Passes, random: bool) -> None:
+        """Write means and variances into passes, as in `write_means`.
+
+        random : whether another seed would give another picture; if so, the variance of a single sample is infinite.
+        """
+        self.write_means(passes)
+        if self.taken > 1:
+            store(passes["Variance"], self.variance)
+        else:
+            passes["Variance"][:] = np.inf if random else 0.0
 
     @property
     def variance(self) -> Floats:

@@ -7,7 +7,7 @@ from ...arrays import Floats, Indices, gather, put
 from ...rays.surface import Passes
 from ...scene.film import Film
 from ..sharing import shared
-from ..sums import COLOUR, DIRECT, INDIRECT, Light, Sums, store, without_colour
+from ..sums import COLOUR, DIRECT, INDIRECT, Light, Means, Sums, store, without_colour
 from .estimate import blocks, efficiency, mean_around
 from .interior import CORRECTED, correction
 
@@ -21,7 +21,7 @@ _HIDDEN = 4.0
 class Band:
     """n pixels.
 
-    sums : over none of their samples. glints : (rows, width), see glints.py. rows : of the picture. random : whether paths
+    means : that have no samples yet. glints : (rows, width), see glints.py. rows : of the picture. random : whether paths
     through the same point of the film may bring different light.
 
     taken : (n,) samples of each. variance : (3, n), of their mean. The rest, (n,), are means over red, green and blue, with
@@ -29,12 +29,12 @@ class Band:
     doubt : the variance of their mean, as those around tell it, with what they may have missed.
     """
 
-    def __init__(self, sums: Sums, film: Film, glints: Floats, rows: range, random: bool) -> None:
+    def __init__(self, means: Means, film: Film, glints: Floats, rows: range, random: bool) -> None:
         self.shape, self.rows, self._random = glints.shape, rows, random
-        self._film, self._sums, self._glints = film, sums, glints * film.exposure**2
-        self.taken = np.ones(sums.count, np.int32)
-        self._variance = np.zeros((3, sums.count))
-        self._spread, self._apart, self._doubt = np.zeros((3, sums.count))
+        self._film, self._means, self._glints = film, means, glints * film.exposure**2
+        self.taken = np.ones(means.count, np.int32)
+        self._variance = np.zeros((3, means.count))
+        self._spread, self._apart, self._doubt = np.zeros((3, means.count))
 
     def places(self, pixels: Indices) -> tuple[Indices, Indices, Indices]:
         """Where pixels of the band are in the picture: row · width + column, columns and rows, (n,) each."""
@@ -43,19 +43,19 @@ class Band:
 
     def add_centres(self, part: slice, light: Light) -> None:
         """Add the light at some pixels' centres."""
-        self._sums.at(part).add(light)
+        self._means.at(part).begin(light)
 
     @property
     def means(self) -> int:
-        """How many rows of the sums' state are to be smooth where the light is."""
-        return self._sums.means
+        """How many rows of the means' state are to be smooth where the light is."""
+        return self._means.means
 
     @property
     def shown(self) -> Floats:
         """(channels, height, width): what the centres show, with alpha where there is any."""
-        shown = self._sums.first * self._film.exposure
+        shown = self._means.first * self._film.exposure
         if self._film.transparent:
-            shown = np.concatenate([shown, self._sums.covered[None]])
+            shown = np.concatenate([shown, self._means.covered[None]])
         return shown.reshape(-1, *self.shape)
 
     def smooth(self, done: Mask, row: int) -> None:
@@ -63,7 +63,7 @@ class Band:
 
         What may be wrong with that, of what the pixels show, is taken for their variance.
         """
-        values = self._sums.state[row].reshape(self.shape)
+        values = self._means.state[row].reshape(self.shape)
         more = correction(values, self._film) * done
         values += more
         channel = row - (self.means - 3)
@@ -72,7 +72,7 @@ class Band:
 
     def put(self, which: Indices, sums: Sums, before: Floats, half: int) -> None:
         """Put sums back. before : `shown_by` them when so many samples were taken, about half of those that are now."""
-        self._sums.put(which, sums)
+        self._means.put(which, sums)
         self.taken[which] = sums.taken
         variance, alpha = sums.variance, sums.alpha
         put(self._variance, which, variance)
@@ -105,17 +105,17 @@ class Band:
         more, _, kinds = self._shared(which, error)
         more *= self.taken
         for number, kind in enumerate(kinds):
-            self._sums.change(kind, more[3 * number : 3 * number + 3])
+            self._means.change(kind, more[3 * number : 3 * number + 3])
 
     def _shared(self, which: Mask, error: float) -> tuple[Floats, Floats, list[str]]:
         """What sharing adds to the means, (3 kinds, n), their variance, (n,), and the kinds of light that are shared."""
-        sums = self._sums
-        sums.taken = self.taken
-        colour = sums.mean(COLOUR)
+        means = self._means
+        means.taken = self.taken
+        colour = means.mean(COLOUR)
         bright = (colour * colour).mean(axis=0)
         which = which & (bright > 0)
-        kinds = [kind for kind in (DIRECT, INDIRECT) if kind in sums.categories]
-        light = np.concatenate([without_colour(sums.mean(kind), colour) for kind in kinds])
+        kinds = [kind for kind in (DIRECT, INDIRECT) if kind in means.categories]
+        light = np.concatenate([without_colour(means.mean(kind), colour) for kind in kinds])
         # Of one kind, if both have as much.
         share = np.where(which, bright, 1.0) * (self._film.exposure**2 * len(kinds))
         tolerance = error / np.sqrt(share[which].max(initial=1e-300))
@@ -133,13 +133,13 @@ class Band:
     def write(self, passes: Passes, part: slice) -> None:
         """Write some pixels' passes."""
         passes = {name: values[part] for name, values in passes.items()}
-        sums = self._sums.at(part)
-        sums.taken = self.taken[part]
-        sums.write_means(passes)
+        means = self._means.at(part)
+        means.taken = self.taken[part]
+        means.write_means(passes)
         store(passes["Variance"], self._variance[:, part])
-        passes["Sample Count"][:, 0] = sums.taken
+        passes["Sample Count"][:, 0] = means.taken
 
 
-def shown_by(sums: Sums) -> Floats:
+def shown_by(sums: Means) -> Floats:
     """(4, n): colour and alpha so far."""
     return np.concatenate([sums.combined, sums.alpha[None]])

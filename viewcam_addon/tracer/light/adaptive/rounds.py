@@ -70,7 +70,7 @@ class Rounds:
     def trace(self, passes: Passes, rows: range) -> None:
         """Write the light of some rows into passes, name → (rows, width, channels)."""
         part = self._glints[rows.start : rows.stop]
-        band = Band(self._light.sums(part.size, 1), self._light.film, part, rows, self._certain is None)
+        band = Band(self._light.means(part.size), self._light.film, part, rows, self._certain is None)
         alone = self._alone(band)
         active = np.flatnonzero(~self._by_centres(band, alone))
         sums = self._light.sums(len(active), 1)
