@@ -105,7 +105,7 @@ class Illumination:
 
         depth, primitives : (height, width), what is seen at the pixels' centres.
         """
-        return outlines.seen(depth, primitives) | outlines.shadows(depth, self.surfaces, self._space, primitives)
+        return outlines.edges(depth, self.surfaces, self._space, primitives)
 
     @property
     def largest_tile(self) -> int:
