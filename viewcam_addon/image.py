@@ -176,6 +176,8 @@ def write(path: str | os.PathLike[str], image: Image) -> None:
     header = {"compression": OpenEXR.RLE_COMPRESSION, "type": OpenEXR.scanlineimage, **image.attributes}
     if image.camera is not None:
         header |= _camera_attributes(image.camera)
+    if hasattr(OpenEXR, "set_global_thread_count"):  # which is 0: it would compress in this thread alone
+        OpenEXR.set_global_thread_count(os.cpu_count() or 1)
     with written_whole(path) as temporary:
         try:
             with silent_libraries():

@@ -1,6 +1,7 @@
 """Six Suzannes beside Mitsuba 3, where it is installed: in a process where all is loaded and compiled, and from a fresh one.
 
-Both see the scene through a box filter, each with the best of its samplers.
+Both see the scene through a box filter, each with the best of its samplers. A fresh process finds on the disk what an earlier
+one compiled: Python's bytecode, Dr.Jit's kernels (~/.drjit), numba's.
 """
 
 import contextlib

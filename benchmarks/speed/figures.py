@@ -48,7 +48,7 @@ class Figure:
 
 PICTURE = Figure("picture", "picture", "structures built and kept, no file")
 WHOLE = Figure("whole", "whole job", "from the loaded scene to the EXR on the disk")
-FRESH = Figure("fresh", "fresh process", "from a fresh process to the EXR on the disk")
+FRESH = Figure("fresh", "fresh process", "from a fresh process, its code compiled before, to the EXR on the disk")
 
 
 def charts(
