@@ -197,7 +197,8 @@ def use_another_up():
     _, y = yield from find("pole", -1)
     before, doubtful = state(), tuple(values().up)
     _, sidebar = region("VIEW_3D", "UI")
-    for below in range(2 * BELOW, 6 * BELOW, ROW):  # how many lines the warning takes is not known
+    # Below both rows of buttons; how many lines the warning takes is not known.
+    for below in range(3 * BELOW, 7 * BELOW, ROW):
         yield from click(sidebar.x + sidebar.width * 0.5, y - below)
         if tuple(values().up) != doubtful:
             break
