@@ -86,6 +86,8 @@ def test_packets_of_scattered_rays_meet_what_embreex_meets_ray_by_ray(stage, see
     for function, more in ((space.first_triangles, ()), (space.any_triangle, ()), (space.triangle_before, (distances,))):
         found, expected = both(function, *given_rays, *more)
         assert np.array_equal(found, expected), f"{function.__name__}: {(found != expected).sum()} of 1000"
+    lengths, as_long = both(space.shadow_lengths, sight._unit, *given_rays[2:], distances)
+    assert np.array_equal(lengths, as_long), f"{(lengths != as_long).sum()} of 1000 lengths"
 
 
 def lamps_of(rng, count):

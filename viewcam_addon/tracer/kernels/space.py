@@ -6,7 +6,7 @@ not: it pays in some scenes as much as it costs in others.
 
 import numpy as np
 
-from ..compiled.library import LANES, pointer_of
+from ..compiled.library import FAR, LANES, pointer_of
 from ..rays import offset
 from .packets import FARTHEST, aim, block, blocked, kernel, meet, met, new_packet
 from .sorting import KEYS, RAYS, sort
@@ -84,6 +84,14 @@ def _trace(scene, unit, positions, normals, offsets, directions, distances, whet
                     found[order[first + lane]] = met(packet, lane)
 
 
+@kernel
+def _measure(unit, positions, normals, offsets, directions, distances, lengths):
+    packet = new_packet(True)
+    for ray in range(lengths.size):
+        _aim_at_light(packet, 0, unit, positions, normals, offsets, directions, distances[ray], ray)
+        lengths[ray] = packet[FAR, 0]
+
+
 def _traced(scene, unit, points, directions, distances, whether):
     found = np.empty(points.count, np.intp)
     _trace(pointer_of(scene), unit, points.position, points.normal, points.offset, directions, distances, whether, found)
@@ -103,3 +111,9 @@ def any_triangle(scene, unit, points, directions):
 
 def triangle_before(scene, unit, points, directions, distances):
     return _traced(scene, unit, points, directions, distances, whether=True) >= 0
+
+
+def shadow_lengths(unit, points, directions, distances):
+    lengths = np.empty(points.count, np.float32)
+    _measure(unit, points.position, points.normal, points.offset, directions, distances, lengths)
+    return lengths

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Indices, Some, cross, dot, gather, pick
+from ..arrays import Floats, Indices, Some, cross, dot, gather, pick, put
 from ..compiled.standing import or_compiled
 from ..scene import Scene, Spheres
 from ..scene.materials import PLAIN, Material
@@ -325,5 +325,5 @@ def _merged(count: int, parts: list[tuple[Indices, Points]]) -> Points:
             continue
         values[field.name] = np.empty((*first.shape[:-1], count), first.dtype)
         for which, value in given:
-            values[field.name][..., which] = value
+            put(values[field.name], which, value)
     return Points(**values)

@@ -151,10 +151,10 @@ class _Sight:
             blocked = triangle_before(self._embree, self._unit, points, directions, distances)
         if self._alone.is_empty and self._crowd.is_empty:
             return blocked
-        starts = offset.start(points.position, points.normal, directions, points.offset)
-        lights = points.position + directions * distances
-        *_, lengths = offset.shadow_rays(starts * self._unit, lights * self._unit)
+        lengths = shadow_lengths(self._unit, points, directions, distances)
         if not self._alone.is_empty:
+            starts = offset.start(points.position, points.normal, directions, points.offset)
+            lights = points.position + directions * distances
             limits = np.where(blocked, 0.0, lengths)
             blocked |= _any(self._alone.met(starts, lights - starts, limits), limits)
         if not self._crowd.is_empty:
@@ -195,6 +195,13 @@ def triangle_before(
     starts = offset.start(points.position, points.normal, directions, points.offset)
     origins, ways, lengths = offset.shadow_rays(starts * unit, (points.position + directions * distances) * unit)
     return embree.run(origins, ways, dists=lengths, query="OCCLUDED") >= 0
+
+
+@or_compiled
+def shadow_lengths(unit: float, points: Points, directions: Floats, distances: Floats) -> NDArray[np.float32]:
+    """How far the rays of `triangle_before` go, in lengths of what is between them and their lights."""
+    starts = offset.start(points.position, points.normal, directions, points.offset)
+    return offset.shadow_rays(starts * unit, (points.position + directions * distances) * unit)[2]
 
 
 def _any(hits: Iterator[Hits], limits: Floats) -> NDArray[np.bool_]:
