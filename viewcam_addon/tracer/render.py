@@ -111,6 +111,10 @@ class Tracer:
         return Lit.by(self._scene, self._view, self._triangles, self._planes, self._ellipsoids)
 
     @made_once
+    def _centres(self) -> Centres:
+        return Centres(self._camera, self._visibility)
+
+    @made_once
     def _outlines(self) -> Outlines:
         things = self._triangles, self._planes, self._ellipsoids
         return Outlines(self._scene, self._view, *things, self._visibility, joints=self._joints)
@@ -118,7 +122,7 @@ class Tracer:
     def render(self, watcher: Watcher | None = None) -> Passes:
         """Pass name → (height, width, channels) float32, rows from the bottom: the surfaces at the pixel centres."""
         passes = self._blank(unwritten)
-        centres = Centres(self._camera, self._visibility)
+        centres = self._centres
 
         def trace(passes: Passes, tile: range) -> None:
             x, y, close = centres.rays(tile)
@@ -143,7 +147,7 @@ class Tracer:
 
         passes = self._blank(dark if error is None else counted)
         illumination = Illumination(self._scene, self._view, self._lit, self._eye, level, samples, seed)
-        centres = Centres(self._camera, self._visibility)
+        centres = self._centres
 
         def check() -> None:
             _stop_if_asked(watcher)
