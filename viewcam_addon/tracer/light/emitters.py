@@ -110,8 +110,9 @@ class Emitters:
 
     @property
     def asked(self) -> bool:
-        """Whether lamps are asked one by one where the eye sees points."""
-        return 0 < self.count <= _ASKED and not self.glowing.count
+        """Whether lamps and the sky are asked one by one where the eye sees points."""
+        several = self.count > 1 or any(self._world.radiance)
+        return several and 0 < self.count <= _ASKED and not self.glowing.count
 
     def brightest(self, points: Points) -> Floats:
         """(n,): about how much that lamp brings to each point which brings most."""

@@ -16,7 +16,6 @@ and splitting a path at glass, which makes work where light is faint.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +26,7 @@ from ..rays.points import Points, Surfaces
 from ..rays.space import Space
 from ..scene.film import Bounces
 from . import scattering
+from .arrivals import Arrivals, Rays, joined, places_of
 from .emitters import Emitters, received
 from .lobes import DIFFUSE, KINDS, Lobes, lobes_at
 from .sampler import FILM, SCATTERING, Sampler
@@ -42,46 +42,6 @@ Numbers = Callable[[Some, int, int], Floats]
 _MOST_WEIGHT = 1e40
 # Scatterings before a path may be ended by chance. Sooner, it costs more noise than it saves time.
 _CERTAIN = 3
-
-
-@dataclass(slots=True)
-class Arrivals:
-    """Where k paths have come to.
-
-    path : which of the batch's paths. place : where in `Light` that which they bring belongs, or None for the eye's own rays.
-    weight : (3, k) how much of the light from there reaches the eye, or None where all does. counts : (kinds, k) scatterings
-    so far, or None where there is but one kind. direction : (3, k), unit, in which they came, or None where nobody asks.
-    """
-
-    path: Indices
-    place: Indices | None
-    weight: Floats | None
-    counts: NDArray[np.int16] | None
-    direction: Floats | None
-    points: Points
-
-    def at(self, which: Some) -> "Arrivals":
-        """Some of them."""
-        given = (self.path, self.place, self.weight, self.counts, self.direction)
-        return Arrivals(*(None if values is None else pick(values, which) for values in given), self.points.at(which))
-
-
-@dataclass(slots=True)
-class Rays:
-    """k rays of one kind that leave `points`. density : (k,) of the direction's choice, per solid angle, infinite for mirrors.
-
-    last : (k,) whether only what shines where they come to counts. The rest as in `Arrivals`.
-    """
-
-    kind: str
-    path: Indices
-    place: Indices
-    weight: Floats
-    counts: NDArray[np.int16] | None
-    direction: Floats
-    points: Points
-    density: Floats
-    last: NDArray[np.bool_]
 
 
 class Paths:
@@ -148,7 +108,7 @@ class Paths:
             check()
             depth += 1
             rays = [rays for alike in self._apart(arrivals) for rays in self._scattered(light, alike, depth, pixels, samples)]
-            arrivals = _joined([self._arrived(light, some) for some in rays])
+            arrivals = joined([self._arrived(light, some) for some in rays])
         return light
 
     def _apart(self, arrivals: Arrivals) -> list[Arrivals]:
@@ -199,7 +159,7 @@ class Paths:
             return self._sampler.numbers(gather(pixels, path), gather(samples, path), first + dimension, count)
 
         lobes = lobes_at(self._palette, arrivals.points, arrivals.direction)
-        places = _places(light, arrivals, depth)
+        places = places_of(light, arrivals, depth)
         brightest = self._emitters.brightest(arrivals.points) if depth == 1 and self._emitters.asked else None
         if DIFFUSE in lobes and self._emitters.sampled("diffuse"):
             self._add_emitters(light, arrivals, lobes, places["diffuse"], numbers, brightest)
@@ -393,27 +353,3 @@ def add_received(
 def _made_up_for(weights: Floats, survival: Floats) -> Floats:
     """The weights of paths that went on by this chance: they stand for those that did not."""
     return weights / np.where(survival > 0, survival, 1.0)
-
-
-def _places(light: Light, arrivals: Arrivals, depth: int) -> dict[str, Indices]:
-    """Where that belongs which rays of each kind bring after the depth-th scattering."""
-    if arrivals.place is None:
-        categories = {"diffuse": DIRECT, "glossy": OTHER, "transmission": OTHER}
-        return {kind: arrivals.path + light.place(category) for kind, category in categories.items() if category in light}
-    if depth > 2 or DIRECT not in light:
-        return dict.fromkeys(KINDS, arrivals.place)
-    was_direct = (arrivals.place >= light.place(DIRECT)) & (arrivals.place < light.place(DIRECT) + light.count)
-    return dict.fromkeys(KINDS, arrivals.place + was_direct * (light.place(INDIRECT) - light.place(DIRECT)))
-
-
-def _joined(parts: list[Arrivals | None]) -> Arrivals | None:
-    """All paths that go on, in one; None where none does."""
-    parts = [part for part in parts if part is not None]
-    if len(parts) < 2:
-        return parts[0] if parts else None
-    arrays = (
-        np.concatenate([getattr(part, field.name) for part in parts], axis=-1)
-        for field in fields(Arrivals)
-        if field.name != "points"
-    )
-    return Arrivals(*arrays, Points.joined([part.points for part in parts]))
