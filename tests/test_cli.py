@@ -230,6 +230,17 @@ def test_a_picture_that_can_not_grow_leaves_nothing_behind(tmp_path):
         assert list(out.iterdir()) == []
 
 
+def test_lines_that_nobody_reads_change_no_status_and_the_picture_is_there(tmp_path):
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "viewcam_addon.cli", "render", write_scene(tmp_path), tmp_path / "picture.exr"]
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent.parent), "PYTHONUNBUFFERED": ""}
+    done = subprocess.run(command, env=environment, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert image.read(tmp_path / "picture.exr").size
+
+
 def mounted(options, script, *arguments):
     """Run a shell script beside a small file system mounted at $1, in a mount namespace of its own."""
     mount = f'mount -t tmpfs -o {options} tmpfs "$1" && shift && '

@@ -16,7 +16,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -46,13 +45,11 @@ def export(options: argparse.Namespace) -> Result:
 
 
 def render(options: argparse.Namespace) -> Result:
-    from .tracer.scene import scene_file
-
-    ThreadPoolExecutor(1).submit(_load, options.level)
-    scene = scene_file.read(options.scene)
     from . import image
     from .tracer.render import render as trace
+    from .tracer.scene import scene_file
 
+    scene = scene_file.read(options.scene)
     if options.stated:
         if scene.stated_camera is None:
             raise InputError(
@@ -76,14 +73,6 @@ def render(options: argparse.Namespace) -> Result:
     image.write(options.image, image.Image(passes, scene.camera, attributes))
     print(f"traced {scene.camera.width} × {scene.camera.height} pixels in {seconds:.2f} s")
     return 0, {"image": str(options.image), "seconds": seconds} | told
-
-
-def _load(level: str) -> None:
-    """Import, while the scene is read and made ready, what will be needed then."""
-    modules = [".tracer.render"] + [".tracer.light.illumination", ".tracer.light.adaptive.rounds"] * (level != "geometry")
-    for module in modules:
-        importlib.import_module(module, __package__)
-    importlib.import_module("OpenEXR")
 
 
 def cycles(options: argparse.Namespace) -> Result:
