@@ -32,7 +32,7 @@ _DIRECT = {0.003: (8, 3), 0.001: (8, 3)}
 STILLS = (
     Still("suzannes", "Six Suzannes, one sun", "direct", (640, 360), _DIRECT, {COMPILED: 2048, CYCLES: 256}),
     Still("studio", "Studio still", "direct", (160, 90), _DIRECT, {COMPILED: 4096, CYCLES: 1024}),
-    Still("spheres", "Sphere field", "direct", (160, 90), _DIRECT, {COMPILED: 8192, CYCLES: 4096}),
+    Still("spheres", "Sphere field", "direct", (160, 90), _DIRECT, {COMPILED: 4096, CYCLES: 4096}),
     Still("cornell", "Cornell box", "path", (120, 120), {0.01: (1, 1)}, {COMPILED: 2048, CYCLES: 2048}),
 )
 OURS = (
