@@ -49,17 +49,6 @@ def test_the_picture_shows_all_that_the_viewport_shows_and_no_more_than_it_must(
     assert (pictured / shown).min() == pytest.approx(1, rel=1e-15)
 
 
-def test_the_lens_is_that_of_the_viewports_own_matrix(area, scene):
-    """The factory's view, whose matrix of the lens is made."""
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    area = viewport.area_in(bpy.context)
-    view, region = area.spaces.active.region_3d, region_of(area)
-    like = dataclasses.replace(LIKE, width=region.width, height=region.height, principal_point=None)
-    found = viewport.pinhole_of(area, like, bpy.context.scene)
-    across = view.window_matrix[0][0] * region.width / 2
-    assert found.distance[0] == pytest.approx(across, rel=4 * 2**-24)
-
-
 def test_a_tilted_view_takes_its_own_up(area, scene):
     area.spaces.active.region_3d.view_rotation = (0.5, 0.5, 0.5, 0.5)
     found = viewport.pinhole_of(area, LIKE, scene)

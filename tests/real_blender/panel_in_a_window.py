@@ -190,6 +190,22 @@ def press_the_buttons():
     is_at_its_values()
 
 
+def take_the_view_of_the_viewport():
+    """Its lens is that of the matrix with which the viewport was drawn, and nothing but a window draws one."""
+    view, drawn = region("VIEW_3D", "WINDOW")
+    with bpy.context.temp_override(window=window(), area=view, region=drawn):
+        bpy.ops.viewcam.adopt_view()
+    yield
+    yield
+    is_at_its_values()
+    shown, size = view.spaces.active.region_3d, (1920, 1080)
+    lens = [shown.window_matrix[i][i] * pixels / 2 for i, pixels in enumerate(size)]
+    # float32: the matrix, its lens and sensor, and the property.
+    np.testing.assert_allclose(values().distance, min(lens), rtol=8 * 2**-24)
+    # A few roundings of float32 on both sides, of coordinates below 20.
+    np.testing.assert_allclose(state()[1], np.array(shown.view_matrix.inverted()), atol=8 * 20 * 2**-24)
+
+
 def use_another_up():
     """Close to up the panel offers another one, in a button below the warning. It leaves the picture as it is."""
     stated = tuple(values().eye), tuple(values().look_at), tuple(values().up)
@@ -256,6 +272,7 @@ def steps():
         zoom,
         fly_over_the_top,
         press_the_buttons,
+        take_the_view_of_the_viewport,
         use_another_up,
         play_keyframes,
         draw_a_warning,

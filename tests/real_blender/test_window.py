@@ -13,6 +13,7 @@ PARTS = (
     "zoom",
     "fly_over_the_top",
     "press_the_buttons",
+    "take_the_view_of_the_viewport",
     "use_another_up",
     "play_keyframes",
     "draw_a_warning",

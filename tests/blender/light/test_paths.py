@@ -1,4 +1,4 @@
-"""Light that is scattered many times or comes from large things: in all, it is Cycles' within three standard errors.
+"""Light that is scattered many times or comes from large things: in all, it is Cycles' within a few standard errors.
 
 The pictures are small and of few samples: what is random averages out over their pixels, and what is wrong does not.
 """
@@ -10,7 +10,8 @@ bpy = pytest.importorskip("bpy")
 
 # Cycles' pictures of a scene, for their spread tells Cycles' noise, and the samples of each.
 SCENES, COUNT, SAMPLES = 4, 2, 16
-MOST = 3.0  # standard errors
+# Standard errors. One set of random numbers in a hundred goes beyond by chance somewhere in 64 comparisons, with four Blenders.
+MOST = 3.8
 
 
 @pytest.fixture(autouse=True)
