@@ -42,7 +42,8 @@ def charts(quick: bool) -> tuple[Chart, ...]:
     variants = mitsuba3.variants()
     if LLVM not in variants:
         print(
-            "speed-mitsuba: left out, since Mitsuba's llvm variant does not run here: pip install mitsuba, and LLVM 16 or newer"
+            "speed-mitsuba: left out, since Mitsuba's llvm variant does not run here: "
+            "pip install virtual-pinhole[mitsuba], and LLVM 16 or newer"
         )
         return ()
     still = STILL.small() if quick else STILL
