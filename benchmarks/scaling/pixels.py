@@ -38,14 +38,13 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
     memory = [
         curve for stage in (GEOMETRY, DIRECT, ADAPTIVE, FILE) for curve in growth.memory_curves(sweep, (stage,), league=stage)
     ]
-    x = [x for x, _ in sweep]
     limits = []
     for stage, each in BYTES_A_PIXEL.items():
         each += _KEPT.get(stage, 0)
-        fixed = [measured.peak[stage] - each * pixels for pixels, measured in sweep if pixels > _FULL[stage]]
-        if fixed:
+        full = [(pixels, measured.peak[stage] - each * pixels) for pixels, measured in sweep if pixels > _FULL[stage]]
+        if full:
             name = f"a fixed amount and {each} bytes a pixel: {stage}"
-            limits.append(growth.memory_limit(x, fixed[0], each, name, stage))
+            limits.append(growth.memory_limit([pixels for pixels, _ in full], full[0][1], each, name, stage))
     return (
         growth.chart(
             "pixels-time",
@@ -62,9 +61,9 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             "pixels",
             growth.MEGABYTES,
             [*memory, *limits],
-            "The dashed lines are what is allowed: what the first picture that fills the tiles of all threads takes beyond "
-            "its passes, a quarter more, 32 MiB that the allocator may keep, and the bytes of the passes. A file is counted "
-            "with the geometry picture in it. "
+            "The dashed lines are what is allowed from the first picture on that fills the tiles of all threads: what this one "
+            "takes beyond its passes, a quarter more, 32 MiB that the allocator may keep, and the bytes of the passes. A file "
+            "is counted with the geometry picture in it. "
             f"{growth.told(memory, 'the pixels')}",
         ),
     )

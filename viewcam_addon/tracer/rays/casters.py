@@ -128,7 +128,7 @@ class Pieces:
         start, end = (curves.at(self.which, part) for part in self.ends())
         return np.sqrt(dot(end - start, end - start))
 
-    def some(self, chosen: Indices) -> "Pieces":
+    def some(self, chosen: Indices | slice) -> "Pieces":
         return Pieces(self.which[chosen], self.first[chosen], self.width[chosen])
 
     def cut(self, chosen: Indices, into: Indices) -> "Pieces":

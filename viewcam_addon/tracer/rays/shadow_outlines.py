@@ -36,6 +36,7 @@ STEP, COARSE = 2.0, 4.0
 
 _MOST_AT_ONCE = 16  # pieces that one is cut into
 _ROUNDS = 6
+_PIECES = 1 << 17  # at a time
 # How much nearer than a shadow something must be to hide it, of its depth: what touches the surface does not; and in pixels: a
 # round surface bends away from the stroke that stands for the shadow on it.
 _NEARER, _PIXELS_NEARER = 2.0**-8, 4.0
@@ -103,20 +104,24 @@ class ShadowOutlines:
         rays, place = cone(lamp, self._view), light.place[:, None]
         return Rim(Rims(place + rays.middle, rays.cosine, rays.sine), place, np.array([-1]))
 
-    def _of(self, light: Light, curves: Curves) -> Iterator[Strokes]:
-        """What one lamp makes of curves: where they lie themselves, and where their shadows do."""
-        pieces = Pieces.whole(curves)
-        for last in [False] * _ROUNDS + [True]:
-            pieces = pieces.some(self._may_matter(light, curves, pieces))
-            if not len(pieces.which):
-                return
-            parts = [*self._own(curves, pieces), *self._shadows(light, curves, pieces)]
-            cuts = np.ones(len(pieces.which), np.intp) if last else self._cuts(light, curves, pieces, parts)
+    def _of(self, light: Light, curves: Curves, pieces: Pieces | None = None, cut: int = 0) -> Iterator[Strokes]:
+        """What one lamp makes of curves: where they lie themselves, and where their shadows do.
+
+        pieces : of them, all if it is None. cut : how many times they have been.
+        """
+        pieces = Pieces.whole(curves) if pieces is None else pieces
+        for first in range(0, len(pieces.which), _PIECES):
+            some = pieces.some(slice(first, first + _PIECES))
+            some = some.some(self._may_matter(light, curves, some))
+            if not len(some.which):
+                continue
+            parts = [*self._own(curves, some), *self._shadows(light, curves, some)]
+            cuts = self._cuts(light, curves, some, parts) if cut < _ROUNDS else np.ones(len(some.which), np.intp)
             done = cuts == 1
-            yield from self._lit(light, curves, pieces, [part.of(done) for part in parts])
-            if done.all():
-                return
-            pieces = pieces.cut(np.flatnonzero(~done), cuts[~done])
+            yield from self._lit(light, curves, some, [part.of(done) for part in parts])
+            if not done.all():
+                del parts
+                yield from self._of(light, curves, some.cut(np.flatnonzero(~done), cuts[~done]), cut + 1)
 
     def _may_matter(self, light: Light, curves: Curves, pieces: Pieces) -> Indices:
         """The pieces that, or whose shadows, may lie in the picture, as far as its four sides tell."""
