@@ -1,14 +1,13 @@
 """Everything that touches Blender. Importing this package needs no Blender; its modules do."""
 
 from collections.abc import Callable
+from types import ModuleType
 
 _command = None
 
 
-def register() -> None:
-    """Classes, properties and handlers, in this order: a panel needs its operators, an operator its properties."""
-    import bpy
-
+def _rooms() -> list[ModuleType]:
+    """Who has CLASSES for Blender or more to tell it, in order: a panel needs its operators, an operator its properties."""
     from . import (
         animation,
         clipboard,
@@ -23,14 +22,19 @@ def register() -> None:
         view_menu,
     )
 
-    properties.register()
-    render_settings.register()
-    for each in (*operators.CLASSES, *moving.CLASSES, *clipboard.CLASSES, *panel.CLASSES, *engine.CLASSES):
-        bpy.utils.register_class(each)
-    render_panels.register()
-    file_menu.register()
-    view_menu.register()
-    animation.register()
+    buttons = [operators, moving, clipboard]
+    return [properties, render_settings, *buttons, panel, engine, render_panels, file_menu, view_menu, animation]
+
+
+def register() -> None:
+    """Classes, properties, menu entries and handlers."""
+    import bpy
+
+    for room in _rooms():
+        for each in getattr(room, "CLASSES", ()):
+            bpy.utils.register_class(each)
+        if hasattr(room, "register"):
+            room.register()
 
 
 def ensure_registered() -> None:
@@ -45,28 +49,11 @@ def unregister() -> None:
     """The same, in reverse."""
     import bpy
 
-    from . import (
-        animation,
-        clipboard,
-        engine,
-        file_menu,
-        moving,
-        operators,
-        panel,
-        properties,
-        render_panels,
-        render_settings,
-        view_menu,
-    )
-
-    animation.unregister()
-    view_menu.unregister()
-    file_menu.unregister()
-    render_panels.unregister()
-    for each in reversed((*operators.CLASSES, *moving.CLASSES, *clipboard.CLASSES, *panel.CLASSES, *engine.CLASSES)):
-        bpy.utils.unregister_class(each)
-    render_settings.unregister()
-    properties.unregister()
+    for room in reversed(_rooms()):
+        if hasattr(room, "unregister"):
+            room.unregister()
+        for each in reversed(getattr(room, "CLASSES", ())):
+            bpy.utils.unregister_class(each)
 
 
 def register_command(name: str, run: Callable[[list[str]], int]) -> None:

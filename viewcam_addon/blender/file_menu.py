@@ -94,11 +94,12 @@ def _draw_export(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     menu.layout.operator("viewcam.export_scene", text="Virtual Pinhole Scene (.json)")
 
 
+CLASSES = (VIEWCAM_OT_export_scene,)
+
+
 def register() -> None:
-    bpy.utils.register_class(VIEWCAM_OT_export_scene)
     bpy.types.TOPBAR_MT_file_export.append(_draw_export)
 
 
 def unregister() -> None:
     bpy.types.TOPBAR_MT_file_export.remove(_draw_export)
-    bpy.utils.unregister_class(VIEWCAM_OT_export_scene)

@@ -165,8 +165,6 @@ CLASSES = (
 
 
 def register() -> None:
-    for each in CLASSES:
-        bpy.utils.register_class(each)
     for each in _blenders_panels():
         each.COMPAT_ENGINES.add(ENGINE)
 
@@ -174,8 +172,6 @@ def register() -> None:
 def unregister() -> None:
     for each in _blenders_panels():
         each.COMPAT_ENGINES.discard(ENGINE)
-    for each in reversed(CLASSES):
-        bpy.utils.unregister_class(each)
 
 
 def _blenders_panels() -> Iterator[type[bpy.types.Panel]]:

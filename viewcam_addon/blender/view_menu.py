@@ -25,11 +25,12 @@ def _draw(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     menu.layout.menu(VIEWCAM_MT_cameras.bl_idname)
 
 
+CLASSES = (VIEWCAM_MT_cameras,)
+
+
 def register() -> None:
-    bpy.utils.register_class(VIEWCAM_MT_cameras)
     bpy.types.VIEW3D_MT_view_cameras.append(_draw)
 
 
 def unregister() -> None:
     bpy.types.VIEW3D_MT_view_cameras.remove(_draw)
-    bpy.utils.unregister_class(VIEWCAM_MT_cameras)
