@@ -9,6 +9,7 @@ more a triangle. So a scene is built for that when its camera moves for the firs
 
 import ctypes
 import math
+import sys
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,8 +56,13 @@ _FUNCTIONS = {
 
 
 def _embree() -> ctypes.CDLL | None:
-    """Embree's own functions, or None where they were not found."""
-    if not library.PROVEN:
+    """Embree's own functions, or None where they were not found.
+
+    Nor inside Blender's program, which brings an Embree and a TBB of its own: a large hierarchy that is built by a call from
+    outside of embreex never ends there (5.2.2). embreex's own way does, and it does in bpy as a module.
+    """
+    blender = sys.modules.get("bpy")
+    if not library.PROVEN or (blender and not blender.app.module):
         return None
     functions = library.shared()
     for name, (result, *arguments) in _FUNCTIONS.items():
