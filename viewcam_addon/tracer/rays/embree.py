@@ -59,10 +59,10 @@ def _embree() -> ctypes.CDLL | None:
     """Embree's own functions, or None where they were not found.
 
     Nor inside Blender's program, which brings an Embree and a TBB of its own: a large hierarchy that is built by a call from
-    outside of embreex never ends there (5.2.2). embreex's own way does, and it does in bpy as a module.
+    outside of embreex never ends there (5.2.2). embreex's own way does; and both do where bpy is a module, which has no program.
     """
     blender = sys.modules.get("bpy")
-    if not library.PROVEN or (blender and not blender.app.module):
+    if not library.PROVEN or (blender and blender.app.binary_path):
         return None
     functions = library.shared()
     for name, (result, *arguments) in _FUNCTIONS.items():
