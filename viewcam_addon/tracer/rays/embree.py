@@ -59,7 +59,7 @@ def _embree() -> ctypes.CDLL | None:
     """Embree's own functions, or None where they were not found.
 
     Nor inside Blender's program, which brings an Embree and a TBB of its own: a large hierarchy that is built by a call from
-    outside of embreex never ends there (5.2.2). embreex's own way does; and both do where bpy is a module, which has no program.
+    outside of embreex never ends there (5.2.2). embreex's own way does, and where bpy is a module (without a program) both do.
     """
     blender = sys.modules.get("bpy")
     if not library.PROVEN or (blender and blender.app.binary_path):
