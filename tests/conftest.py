@@ -41,6 +41,10 @@ def fresh_blender(registered_addon):
     """bpy with an empty file open, factory settings, and the add-on still registered."""
     bpy = pytest.importorskip("bpy")
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    for area in (area for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D"):
+        # Blender without a window keeps the last file's viewports.
+        space = area.spaces.active
+        space.region_3d.view_perspective, space.lock_cursor, space.use_local_camera = "PERSP", False, False
     return bpy
 
 
