@@ -16,6 +16,7 @@ def _rooms() -> list[ModuleType]:
         moving,
         operators,
         panel,
+        preferences,
         properties,
         render_panels,
         render_settings,
@@ -23,7 +24,7 @@ def _rooms() -> list[ModuleType]:
     )
 
     buttons = [operators, moving, clipboard]
-    return [properties, render_settings, *buttons, panel, engine, render_panels, file_menu, view_menu, animation]
+    return [preferences, properties, render_settings, *buttons, panel, engine, render_panels, file_menu, view_menu, animation]
 
 
 def register() -> None:

@@ -7,6 +7,13 @@ import bpy
 
 from ..tracer.scene.film import SAMPLES
 
+LEVELS = (
+    ("AUTO", "Automatic", "The least level that the scene needs"),
+    ("GEOMETRY", "Geometry", "Surfaces without materials and light, one sample, shown as a lamp at the eye would"),
+    ("DIRECT", "Direct Light", "Light that comes straight from lamps, glowing surfaces and the world, with shadows"),
+    ("PATH", "Light Paths", "Light that is scattered from surface to surface, mirrors and glass, up to the bounces' limits"),
+)
+
 
 def _update_passes(_group: "ReferenceSettings", context: bpy.types.Context) -> None:
     """The compositor's sockets follow."""
@@ -17,16 +24,7 @@ class ReferenceSettings(bpy.types.PropertyGroup):
     level: bpy.props.EnumProperty(
         name="Level",
         description="How much of the scene is modelled",
-        items=[
-            ("AUTO", "Automatic", "The least level that the scene needs"),
-            ("GEOMETRY", "Geometry", "Surfaces without materials and light, one sample, shown as a lamp at the eye would"),
-            ("DIRECT", "Direct Light", "Light that comes straight from lamps, glowing surfaces and the world, with shadows"),
-            (
-                "PATH",
-                "Light Paths",
-                "Light that is scattered from surface to surface, mirrors and glass, up to the bounces' limits",
-            ),
-        ],
+        items=LEVELS,
     )
     samples: bpy.props.IntProperty(
         name="Samples",
