@@ -83,6 +83,33 @@ def test_a_roll_that_is_no_angle_is_refused(angle):
         roll.turned(Pinhole((0, -1, 0), (0, 0, 0), UP, 1.0, 1, 1), angle)
 
 
+@given(vectors(4), angles)
+@example(np.array([[0, 0, 5.0], [0, 0, 0], [0, 0, 1], [0, 0, 1]]), 0.5)
+@example(np.array([[0, 0, 5.0], [0, 0, 0], [1, 0, 0], [0, 0, 1]]), 0.0)
+def test_a_roll_that_is_set_against_another_up_is_read_again(numbers, angle):
+    eye, look_at, up, reference = map(tuple, numbers)
+    assume(math.dist(eye, look_at) > 1e-3 and math.hypot(*up) > 1e-3 and math.hypot(*reference) > 1e-3)
+    pinhole = Pinhole(eye, look_at, up, 700.0, 40, 30)
+    rolled = roll.rolled(pinhole, reference, angle)
+    assert abs(math.remainder(roll.angle_from(reference, rolled) - angle, 2 * math.pi)) <= 2 * TURN
+    assert (rolled.eye, rolled.look_at, rolled.distance) == (pinhole.eye, pinhole.look_at, pinhole.distance)
+    back = roll.rolled(rolled, reference, roll.angle_from(reference, pinhole))
+    assert np.abs(np.array(back.basis()) - pinhole.basis()).max() <= 3 * TURN
+
+
+@pytest.mark.parametrize("eye", [(0, 0, 5), (0, 0, -5)])
+def test_a_view_along_the_up_that_roll_counts_from_has_the_canonical_axes_at_0(eye):
+    pinhole = Pinhole(eye, (0, 0, 0), (0.3, 0.1, 0.2), 700.0, 40, 30)
+    level = roll.rolled(pinhole, (0, 0, 1), 0.0)
+    assert not level.is_singular
+    np.testing.assert_array_equal(level.basis(), Pinhole(eye, (0, 0, 0), (0, 0, 1), 700.0, 40, 30).basis())
+
+
+def test_no_roll_from_another_up_is_that_very_up():
+    pinhole = Pinhole((1, 2, 3), (0, 0, 0), (0.1, 1e-9, 7.0), 1.0, 1, 1)
+    assert roll.rolled(pinhole, (0, 0, 1), 0.0).up == (0, 0, 1)
+
+
 @given(vectors(2), vectors(1))
 def test_a_step_that_is_carried_does_not_turn_about_the_view(w, up):
     assume(np.linalg.norm(w, axis=-1).min() > 1e-3 and np.linalg.norm(up) > 1e-3)

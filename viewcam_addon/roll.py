@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import InputError
-from .pinhole import Pinhole, basis
+from .pinhole import Pinhole, Triple, basis
 
 Array = NDArray[np.float64]
 
@@ -41,6 +41,36 @@ def turned(pinhole: Pinhole, angle: float) -> Pinhole:
         return pinhole
     u, v, _ = pinhole.basis()
     return replace(pinhole, up=tuple((math.cos(angle) * v - math.sin(angle) * u).tolist()))
+
+
+def angle_from(up: Triple, pinhole: Pinhole) -> float:
+    """The roll of a pinhole against another up: radians, in [−π, π], by which its picture is turned from what that up gives.
+
+    up : three floats, world space, of any length but zero. Where the view is parallel to it, its canonical axes count.
+
+    Raises
+    ------
+    InputError
+        if that up is 0 or no finite vector.
+    """
+    u, _, _ = pinhole.axes()
+    level_u, level_v, _ = replace(pinhole, up=up).axes()
+    sine, cosine = (sum(a * b for a, b in zip(u, axis, strict=True)) for axis in (level_v, level_u))
+    return math.atan2(sine, cosine)
+
+
+def rolled(pinhole: Pinhole, up: Triple, angle: float) -> Pinhole:
+    """The same view with its picture turned by `angle` radians from what another up gives: the way back from `angle_from`.
+
+    At 0 its up is that very one, unless the view is parallel to it: then v, which gives the same picture for certain.
+
+    Raises
+    ------
+    InputError
+        if that up is 0 or no finite vector, or if the angle is not finite.
+    """
+    level = replace(pinhole, up=up)
+    return turned(replace(level, up=level.axes()[1]) if level.is_singular else level, angle)
 
 
 def steps(eye: ArrayLike, look_at: ArrayLike, up: ArrayLike, within: float) -> tuple[Array, NDArray[np.bool_]]:

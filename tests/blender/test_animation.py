@@ -42,6 +42,46 @@ def test_it_follows_a_driver(posed_camera, scene):
     assert posed_camera.matrix_world.translation.z == pytest.approx(18)
 
 
+@pytest.fixture
+def zooming_camera(posed_camera):
+    """The zoom goes from 1 at frame 1 to 3 at frame 11."""
+    group = posed_camera.virtual_pinhole
+    for frame, zoom in ((1, 1), (11, 3)):
+        group.zoom = zoom
+        group.keyframe_insert("zoom", frame=frame)
+    return posed_camera
+
+
+def test_it_follows_a_keyed_zoom_at_frames_and_sub_frames(zooming_camera, scene):
+    group = zooming_camera.virtual_pinhole
+    for frame, subframe in ((1, 0.0), (6, 0.0), (6, 0.5), (11, 0.0)):
+        scene.frame_set(frame, subframe=subframe)
+        assert zooming_camera.data.lens == pytest.approx(group.zoom * 1500 * 36 / 1920, rel=2.0**-22)
+        assert findings.differences(cameras.stated(zooming_camera, scene), cameras.read(zooming_camera, scene), reach=10) == {}
+    assert (group.distance, group.zoom) == (1500, 3)
+    scene.frame_set(6)
+    assert group.zoom == pytest.approx(2)
+
+
+def test_it_follows_a_driven_zoom(posed_camera, scene):
+    posed_camera.virtual_pinhole.driver_add("zoom").driver.expression = "frame / 2.0"
+    scene.frame_set(5)
+    assert posed_camera.data.lens == pytest.approx(2.5 * 1500 * 36 / 1920, rel=2.0**-22)
+
+
+def test_a_zoom_rendered_in_one_go_is_that_of_each_frame(zooming_camera, scene, render_positions, picture_error):
+    expected = {}
+    for frame in (1, 11):
+        scene.frame_set(frame)
+        expected[frame] = cameras.stated(zooming_camera, scene)
+    scene.frame_start, scene.frame_end, scene.frame_step = 1, 11, 10
+    for frame, positions in render_positions(animation=True).items():
+        error, tolerance = picture_error(expected[frame], positions)
+        assert error <= tolerance, f"frame {frame}: {error:.1e} px, and {tolerance:.1e} are rounding"
+        other, _ = picture_error(expected[12 - frame], positions)
+        assert other > 100 * tolerance, f"frame {frame}: the other frame's zoom would pass, {other:.1e} px"
+
+
 def test_a_camera_whose_values_stand_still_is_left_to_its_artist(posed_camera, scene):
     posed_camera.location = (1, 1, 1)
     scene.frame_set(5)

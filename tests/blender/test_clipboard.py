@@ -107,7 +107,7 @@ def test_copying_says_what_it_copied(posed_camera, capfd):
 
 def test_a_held_roll_is_copied_as_the_up_of_the_same_picture(posed_camera, add_camera, scene):
     group = posed_camera.virtual_pinhole
-    group.pole, group.roll = "HOLD", 0.3
+    group.pole, group.held_roll = "HOLD", 0.3
     before = cameras.stated(posed_camera, scene)
     other = add_camera("Other")
     paste(clipboard.text_of(posed_camera, scene), camera="Other")

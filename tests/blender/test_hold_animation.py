@@ -29,7 +29,7 @@ def key_a_loop(over_the_top):
         for frame in range(1, 42):
             group.eye = over_the_top(frame - 21, miss)
             group.keyframe_insert("eye", frame=frame, **options)
-        group.roll = 0.0
+        group.held_roll = 0.0
 
     return key
 
@@ -111,7 +111,7 @@ def test_an_edit_that_is_not_keyed_yet_is_one_step_more(looping_camera, scene, o
     scene.frame_set(19)
     before, group = axes(looping_camera), looping_camera.virtual_pinhole
     group.eye = over_the_top(2)
-    assert group.roll == 0.0
+    assert group.held_roll == 0.0
     assert turn_between(before, axes(looping_camera)) == pytest.approx(math.radians(4), abs=4 * TURN)
     assert findings.differences(cameras.stated(looping_camera, scene), cameras.read(looping_camera, scene), reach=10) == {}
     group.eye = over_the_top(-2)
@@ -132,11 +132,11 @@ def test_a_keyframed_roll_is_added(looping_camera, scene):
     plain = rolls_of(looping_camera, scene, range(1, 42))
     group = looping_camera.virtual_pinhole
     for frame, roll in ((1, 0.5), (41, -0.5)):
-        group.roll = roll
-        group.keyframe_insert("roll", frame=frame)
+        group.held_roll = roll
+        group.keyframe_insert("held_roll", frame=frame)
     for frame, value in rolls_of(looping_camera, scene, range(1, 42)).items():
         scene.frame_set(frame)
-        assert value == plain[frame] + group.roll
+        assert value == plain[frame] + group.held_roll
     assert value == plain[41] - 0.5
 
 
@@ -217,10 +217,10 @@ def test_a_driver_of_the_distance_or_the_roll_is_no_obstacle(looping_camera, sce
     group = looping_camera.virtual_pinhole
     plain = rolls_of(looping_camera, scene, [41])[41]
     group.driver_add("distance").driver.expression = "1000 + frame"
-    group.driver_add("roll").driver.expression = "0.5 + 0 * frame"
+    group.driver_add("held_roll").driver.expression = "0.5 + 0 * frame"
     assert hold.obstacle(looping_camera) is None
-    assert rolls_of(looping_camera, scene, [41])[41] == plain + group.roll
-    assert group.roll == pytest.approx(0.5)
+    assert rolls_of(looping_camera, scene, [41])[41] == plain + group.held_roll
+    assert group.held_roll == pytest.approx(0.5)
 
 
 def test_canonical_axes_know_no_obstacle(looping_camera):

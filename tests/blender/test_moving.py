@@ -256,12 +256,12 @@ def test_a_linked_camera_is_moved_and_it_is_said_that_this_is_not_saved(posed_ca
 def test_a_held_roll_becomes_a_part_of_up(held_camera, scene, over_the_top):
     for degrees in (-10, 0, 10, 20):
         held_camera.virtual_pinhole.eye = over_the_top(degrees, 1.0)
-    assert abs(held_camera.virtual_pinhole.roll) > 1
+    assert abs(held_camera.virtual_pinhole.held_roll) > 1
     bpy.context.view_layer.update()
     before = cameras.read(held_camera, scene)
     bpy.ops.viewcam.dolly_camera(reach=20.0)
     after = cameras.stated(held_camera, scene)
-    assert held_camera.virtual_pinhole.roll == 0
+    assert held_camera.virtual_pinhole.held_roll == 0
     np.testing.assert_allclose(after.basis(), before.basis(), atol=32 * 2**-24)
     assert cameras.check(held_camera, after, scene) == []
 

@@ -7,7 +7,8 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import findings
+from viewcam_addon.blender import findings, preferences
+from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 
 
@@ -106,6 +107,124 @@ def test_whatever_stands_in_the_hidden_text_the_shown_values_count(posed_camera,
     group.exact = text
     assert group.numbers() == ((7, -6, 5), (0, 0, 1), (0, 0, 1), 1500)
     assert group.precision() == 2.0**-24
+
+
+@pytest.mark.parametrize("zoom", [0.25, 1.0, 3.0])
+def test_zoom_is_a_factor_on_the_distance(posed_camera, scene, zoom):
+    group = posed_camera.virtual_pinhole
+    group.zoom = zoom
+    assert group.distance == 1500 and group.numbers()[3] == 1500 * zoom
+    assert posed_camera.data.lens == pytest.approx(zoom * 1500 * 36 / 1920, rel=2.0**-23)
+    assert findings.differences(cameras.stated(posed_camera, scene), cameras.read(posed_camera, scene), reach=10) == {}
+
+
+@pytest.mark.parametrize(("zoom", "sentence"), [(0.0, "zoom is 0"), (-2.0, "zoom is -2"), (math.nan, "zoom is nan")])
+def test_a_zoom_that_makes_no_camera_leaves_it_and_is_named(posed_camera, scene, zoom, sentence):
+    before = pose(posed_camera)
+    posed_camera.virtual_pinhole.zoom = zoom
+    assert pose(posed_camera) == before
+    with pytest.raises(InputError, match=sentence):
+        cameras.stated(posed_camera, scene)
+
+
+@pytest.mark.parametrize(
+    ("zoom", "distance", "kept"),
+    [(2.0, 1000.0, 2.0), (1 / 3, 1234.56789, 1 / 3), (0.0, 700.0, 1), (math.nan, 700.0, 1), (1e-30, 1e10, 1), (3e38, 1e-5, 1)],
+)
+def test_stating_a_distance_keeps_a_zoom_that_is_one(posed_camera, scene, zoom, distance, kept):
+    group = posed_camera.virtual_pinhole
+    group.zoom = zoom
+    cameras.apply(posed_camera, Pinhole((0, -5, 0), (0, 0, 0), (0, 0, 1), distance, 1920, 1080), scene)
+    assert group.zoom == np.float32(kept)
+    # A quotient and a product, each rounded once: nothing where the zoom is 1.
+    assert abs(group.numbers()[3] - distance) <= (0 if kept == 1 else 2.0**-52 * distance)
+    assert findings.differences(cameras.stated(posed_camera, scene), cameras.read(posed_camera, scene), reach=10) == {}
+
+
+# Up is known in float64 once roll is set, and the axes and the angle cost a dozen roundings; the angle itself is float32.
+ROLL = 2.0**-48
+ANGLES = [np.float32(angle) for angle in (0.5, -0.5, 3.0, -3.0, 1e-6)]
+
+
+@pytest.mark.parametrize("eye", [(7, -6, 5), (0, 0, 9), (0, 0, -9), (1e-7, 0, 9)])
+@pytest.mark.parametrize("angle", ANGLES)
+def test_roll_turns_up_about_the_view(posed_camera, scene, eye, angle):
+    group = posed_camera.virtual_pinhole
+    group.eye = eye
+    u, v, w = cameras.stated(posed_camera, scene).basis()
+    group.roll = angle
+    rolled, angle = cameras.stated(posed_camera, scene), float(angle)
+    expected = [math.cos(angle) * u + math.sin(angle) * v, math.cos(angle) * v - math.sin(angle) * u, w]
+    assert np.abs(np.array(rolled.basis()) - expected).max() <= ROLL
+    assert group.roll == np.float32(angle)
+    assert findings.differences(rolled, cameras.read(posed_camera, scene), reach=10) == {}
+    group.roll = 0.0
+    assert np.abs(np.array(cameras.stated(posed_camera, scene).basis()) - (u, v, w)).max() <= ROLL
+
+
+def test_typing_no_roll_gives_back_the_worlds_z_as_up(posed_camera):
+    group = posed_camera.virtual_pinhole
+    group.up = (1, 2, 3)
+    assert abs(group.roll) > 0.1
+    group.roll = 0.0
+    assert group.numbers()[2] == (0, 0, 1) and group.roll == 0.0
+
+
+def test_roll_says_how_far_a_stated_up_leans(posed_camera):
+    group = posed_camera.virtual_pinhole
+    group.eye, group.look_at, group.up = (0, -5, 0), (0, 0, 0), (-1, 0, 1)
+    assert group.roll == pytest.approx(math.pi / 4, abs=2.0**-24)
+
+
+def test_roll_counts_from_the_preferred_axis(posed_camera, monkeypatch):
+    group = posed_camera.virtual_pinhole
+    group.eye, group.look_at, group.up = (0, 0, 5), (0, 0, 0), (0, 1, 0)
+    monkeypatch.setattr(preferences, "up_axis", lambda: (0.0, 1.0, 0.0))
+    assert group.roll == 0.0
+    group.up = (1, 0, 0)
+    assert group.roll == pytest.approx(-math.pi / 2, abs=2.0**-23)
+    group.roll = 0.0
+    assert group.numbers()[2] == (0, 1, 0)
+
+
+def test_roll_keeps_the_digits_of_the_other_values(posed_camera, scene):
+    pinhole = Pinhole((0.1, 1e-9, 1 / 3), (0.1, 0, -1), (0, 0, 1), 1234.56789, 1920, 1080)
+    cameras.apply(posed_camera, pinhole, scene)
+    posed_camera.virtual_pinhole.roll = 0.5
+    eye, look_at, _, distance = posed_camera.virtual_pinhole.numbers()
+    assert (eye, look_at, distance) == (pinhole.eye, pinhole.look_at, 1234.56789)
+    assert posed_camera.virtual_pinhole.precision() == 2.0**-53
+
+
+def test_roll_of_a_held_camera_changes_what_is_held(held_camera, scene):
+    group = held_camera.virtual_pinhole
+    up, before = tuple(group.up), group.roll
+    group.roll = before + 0.25
+    assert tuple(group.up) == up
+    assert group.held_roll == pytest.approx(0.25, abs=2.0**-23)
+    assert group.roll == pytest.approx(before + 0.25, abs=2.0**-23)
+
+
+@pytest.mark.parametrize(("name", "value"), [("eye", (0, 0, 1)), ("up", (0, 0, 0)), ("eye", (math.nan, 0, 0))])
+def test_roll_of_values_that_make_no_camera_is_0_and_can_not_be_set(posed_camera, name, value):
+    group = posed_camera.virtual_pinhole
+    setattr(group, name, value)
+    before = group.numbers()
+    group.roll = 0.5
+    assert group.roll == 0.0
+    np.testing.assert_array_equal(np.hstack(group.numbers()), np.hstack(before))
+
+
+def test_roll_of_a_camera_that_is_not_enabled_turns_up_and_leaves_it(camera_object):
+    group = camera_object.virtual_pinhole
+    group.eye, before = (0, -5, 0), pose(camera_object)
+    group.roll = 0.5
+    assert group.roll == pytest.approx(0.5) and pose(camera_object) == before and not group.enabled
+
+
+def test_roll_can_not_be_keyed_since_up_can(posed_camera):
+    with pytest.raises(TypeError, match="not animatable"):
+        posed_camera.virtual_pinhole.keyframe_insert("roll")
 
 
 def test_percentage_shows_the_same_picture(posed_camera, scene):

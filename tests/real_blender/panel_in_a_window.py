@@ -158,18 +158,18 @@ def fly_over_the_top():
     before = state()
     yield from type_into("eye", 0, "-1")
     after = state()
-    assert abs(abs(values().roll) - np.pi) < 1e-6, f"the roll is {values().roll}"
+    assert abs(abs(values().held_roll) - np.pi) < 1e-6, f"the roll is {values().held_roll}"
     assert np.abs(after[1] - before[1])[:3, 1].max() < 0.5, "v flipped"
     press("Z", *NOWHERE, ctrl=True)
     yield
     yield
-    assert same(state(), before) and values().roll == 0, "undo did not bring values, roll and camera back"
+    assert same(state(), before) and values().held_roll == 0, "undo did not bring values, roll and camera back"
     press("Z", *NOWHERE, ctrl=True, shift=True)
     yield
     yield
     assert same(state(), after), "redo did not bring values, roll and camera back"
-    yield from type_into("roll", -1, "0")
-    assert values().roll == 0 and np.abs(state()[1] - before[1])[:3, 1].max() > 1.5, "typing 0 did not level the picture"
+    yield from type_into("held_roll", -1, "0")
+    assert values().held_roll == 0 and np.abs(state()[1] - before[1])[:3, 1].max() > 1.5, "typing 0 did not level the picture"
     values().pole, values().eye, values().look_at = "CANONICAL", *stated
     yield
 
@@ -282,7 +282,7 @@ def steps():
         print(f"done: {part.__name__}", flush=True)
 
 
-def take_a_step(running):
+def take_a_step(running, interval):
     try:
         next(running)
     except StopIteration:
@@ -291,14 +291,17 @@ def take_a_step(running):
         traceback.print_exc()
         sys.stderr.flush()
         os._exit(5)
-    return 0.05
+    return interval
 
 
-def start(steps):
-    """Take one step after another from when Blender's window is there, whatever file is opened meanwhile."""
+def start(steps, interval=0.05):
+    """Take one step after another from when Blender's window is there, whatever file is opened meanwhile.
+
+    interval : seconds for Blender to handle what has happened, and to draw.
+    """
     bpy.context.preferences.view.show_splash = False
     running = steps()
-    bpy.app.timers.register(lambda: take_a_step(running), first_interval=1.0, persistent=True)
+    bpy.app.timers.register(lambda: take_a_step(running, interval), first_interval=1.0, persistent=True)
 
 
 if __name__ == "__main__":

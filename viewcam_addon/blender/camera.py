@@ -22,11 +22,11 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import intrinsics
+from .. import checks, intrinsics
 from .. import roll as rolls
 from ..errors import InputError
-from ..pinhole import Pinhole
-from . import datablocks, findings, hold, pose, rotation, suspects
+from ..pinhole import Pinhole, Triple
+from . import datablocks, findings, hold, pose, preferences, rotation, suspects
 
 Array = NDArray[np.float64]
 
@@ -65,7 +65,7 @@ def follow(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
     """
     group = camera_object.virtual_pinhole
     level = _level(camera_object, scene)
-    roll, angle = group.roll, hold.roll(camera_object, scene)
+    roll, angle = group.held_roll, hold.roll(camera_object, scene)
     if hold.is_written_by_edits(camera_object):
         before = _stood_at(camera_object, scene)
         roll = angle = hold.after_edit(before, level, roll, group.hold_within) if before else roll
@@ -187,7 +187,10 @@ def _level(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
     evaluated = camera_object if camera_object.is_evaluated else camera_object.evaluated_get(datablocks.depsgraph_of(scene))
     frame = datablocks.frame_of(scene)
     plane = intrinsics.view_plane(datablocks.camera_data_of(evaluated.data), frame)
-    eye, look_at, up, distance = camera_object.virtual_pinhole.numbers()
+    group = camera_object.virtual_pinhole
+    if checks.number("zoom", group.zoom) <= 0:
+        raise InputError(f"zoom is {group.zoom:g}: give a factor above 0")
+    eye, look_at, up, distance = group.numbers()
     distance *= frame.size[0] / frame.resolution_x
     return Pinhole(
         eye,
@@ -211,7 +214,7 @@ def _stood_at(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhol
         before, found = Pinhole(*numbers, 1.0, 1, 1), read(camera_object, scene)
     except InputError:
         return None
-    off = np.subtract(rolls.turned(before, group.roll).basis(), found.basis())
+    off = np.subtract(rolls.turned(before, group.held_roll).basis(), found.basis())
     return before if np.abs(off).max() <= findings.LARGEST_TURN else None
 
 
@@ -264,9 +267,9 @@ def as_it_stands(camera_object: bpy.types.Object, scene: bpy.types.Scene, in_use
     return replace(found, look_at=look_at, up=simplest_up(found.eye, look_at, v))
 
 
-def simplest_up(eye: tuple, look_at: tuple, v: Array) -> tuple[float, float, float]:
-    """(0, 0, 1) where its v is the given one but for the rounding of a float32 matrix, else v."""
-    vertical = (0.0, 0.0, 1.0)
+def simplest_up(eye: tuple, look_at: tuple, v: Array) -> Triple:
+    """The preferred up where its v is the given one but for the rounding of a float32 matrix, else v."""
+    vertical = preferences.up_axis()
     pinhole = Pinhole(eye, look_at, vertical, 1.0, 1, 1)
     if np.abs(pinhole.basis()[1] - v).max() <= findings.LARGEST_TURN:
         return vertical

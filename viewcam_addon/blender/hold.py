@@ -2,12 +2,12 @@
 
 While the artist edits, it is the pose that the camera stands in: each edit carries its axes along (roll.py) and writes the new
 roll beside the values. In an animation it is every whole frame since the range's first, read from the curves: the roll at a
-frame is `roll` plus what all steps up to it have carried, backwards before the first frame. A frame's roll so depends on the
-file alone, not on the frames that were shown before, and is the same in a window, in `blender -b` and at the sub-frames of
+frame is `held_roll` plus what all steps up to it have carried, backwards before the first frame. A frame's roll so depends on
+the file alone, not on the frames that were shown before, and is the same in a window, in `blender -b` and at the sub-frames of
 motion blur, where a last step leads from the whole frame before. Values that differ from the curves, edited and not keyed yet,
 are one step more.
 
-`roll` may be keyframed, and is added as it is at each frame. `pole` and `hold_within` may not: they count for all frames
+`held_roll` may be keyframed, and is added as it is at each frame. `pole` and `hold_within` may not: they count for all frames
 alike.
 
 Rejected: a cache of rolls by frame (stale after any edit of a curve; 10,000 frames take some 30 ms), baking the roll into
@@ -52,8 +52,8 @@ def roll(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> float:
         return 0.0
     curves = _view_curves(versions.action_curves(camera_object.original))
     if not curves or obstacle(camera_object.original):
-        return group.roll
-    return group.roll + _carried_since_first_frame(group, curves, scene)
+        return group.held_roll
+    return group.held_roll + _carried_since_first_frame(group, curves, scene)
 
 
 def is_written_by_edits(camera_object: bpy.types.Object) -> bool:

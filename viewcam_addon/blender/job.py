@@ -243,8 +243,8 @@ def _borrow_size(borrow: Borrower, scene: bpy.types.Scene, camera: bpy.types.Obj
         borrow.afterwards(setattr, group, "size", tuple(group.size))
         borrow.afterwards(setattr, group, "exact", group.exact)
         borrow.afterwards(setattr, group, "when_set", group.when_set)
-        borrow.afterwards(group.state, *pose, distance, tuple(group.size), group.roll)
-        group.state(*pose, distance * _distance_at_full_size(scene, camera) / before, size, group.roll)
+        borrow.afterwards(group.state, *pose, distance, tuple(group.size), group.held_roll)
+        group.state(*pose, distance * _distance_at_full_size(scene, camera) / before, size, group.held_roll)
 
 
 def _distance_at_full_size(scene: bpy.types.Scene, camera: bpy.types.Object) -> float:

@@ -30,10 +30,11 @@ class _CameraPanel:
         column.active = group.enabled
         for name in VALUES:
             column.prop(group, name)
+        column.prop(group, "zoom")
+        column.prop(group, "held_roll" if group.pole == "HOLD" else "roll")
         column.prop(group, "pole")
         if group.pole == "HOLD":
             column.prop(group, "hold_within")
-            column.prop(group, "roll")
         buttons = layout.row(align=True)
         for operator in ("viewcam.apply_camera", "viewcam.adopt_camera"):
             button = buttons.row(align=True)

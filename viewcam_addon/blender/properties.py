@@ -7,6 +7,9 @@ properties for the values themselves (float64, but without update callbacks, uni
 Where the roll is held through the pole (hold.py), an edit also writes the new roll. `when_set` remembers the view of the
 camera as it was last set, from which the next edit sets out: a callback hears of an edit only when the old value is gone.
 
+`zoom` is a factor on d of its own, so that a zoom can be keyed and taken off again: `numbers` gives the product. `roll` is not
+stored. It is read off the axes, and setting it turns up, or where the roll is held, `held_roll`.
+
 Undo, redo and opening a file bring values and camera back together and call nothing. Callbacks raise nothing: values that make
 no camera (eye = look-at) leave it where it was, and the panel says so.
 """
@@ -20,16 +23,19 @@ import bpy
 import numpy as np
 
 from .. import checks
+from .. import roll as rolls
 from ..errors import InputError
+from ..pinhole import Pinhole
 from . import camera as cameras
-from . import datablocks
+from . import datablocks, hold, preferences
 
 VALUES = ("eye", "look_at", "up", "distance")
 _stating = False
 
 
 @contextlib.contextmanager
-def _without_callbacks() -> Iterator[None]:
+def without_callbacks() -> Iterator[None]:
+    """Values may be written in here without moving the camera."""
     global _stating
     _stating = True
     try:
@@ -61,9 +67,31 @@ def _on_edited(group: "VirtualPinhole", _context: bpy.types.Context) -> None:
 
 def _on_pole(group: "VirtualPinhole", context: bpy.types.Context) -> None:
     if group.pole != "HOLD":
-        with _without_callbacks():
-            group.roll = 0.0
+        with without_callbacks():
+            group.held_roll = 0.0
     _on_edited(group, context)
+
+
+def _roll(group: "VirtualPinhole") -> float:
+    """Radians by which the picture is turned from what the preferred up says; 0 where the values make no camera."""
+    with contextlib.suppress(InputError):
+        return rolls.angle_from(preferences.up_axis(), _view(group))
+    return 0.0
+
+
+def _set_roll(group: "VirtualPinhole", angle: float) -> None:
+    with contextlib.suppress(InputError):  # the panel finds the same error and shows it
+        view = _view(group)
+        if group.pole == "HOLD":
+            group.held_roll += angle - rolls.angle_from(preferences.up_axis(), view)
+        else:
+            group.set_up(rolls.rolled(view, preferences.up_axis(), angle).up)
+
+
+def _view(group: "VirtualPinhole") -> Pinhole:
+    """Where the values look and how the picture is turned, whatever its size."""
+    *pose, _ = group.numbers()
+    return rolls.turned(Pinhole(*pose, 1.0, 1, 1), hold.roll(group.id_data, datablocks.scene_of(group.id_data)))
 
 
 class VirtualPinhole(bpy.types.PropertyGroup):
@@ -112,6 +140,28 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         update=_on_edited,
         override={"LIBRARY_OVERRIDABLE"},
     )
+    # No minimum either.
+    zoom: bpy.props.FloatProperty(
+        name="Zoom",
+        description="A factor on the distance, to key or drive a zoom apart from it: 2 shows everything twice as large",
+        default=1.0,
+        soft_min=0.1,
+        soft_max=10.0,
+        step=1,
+        precision=3,
+        update=_on_edited,
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    # Not overridable: an override keeps the up, or the held roll, that it stands for.
+    roll: bpy.props.FloatProperty(
+        name="Roll",
+        description="By how much the picture is turned about the view, against what the preferred axis, the world's Z, would give as "
+        "up. Setting it turns up. Type 0 to level the picture",
+        subtype="ANGLE",
+        get=_roll,
+        set=_set_roll,
+        options=set(),
+    )
     pole: bpy.props.EnumProperty(
         name="At the Pole",
         description="What the picture does where the view comes close to up or down",
@@ -138,12 +188,39 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         options=set(),
         override={"LIBRARY_OVERRIDABLE"},
     )
-    roll: bpy.props.FloatProperty(
+    held_roll: bpy.props.FloatProperty(
         name="Roll",
         description="By how much the camera is turned about its view from what up says, in an animation at the first frame. "
         "Type 0 to level the picture",
         subtype="ANGLE",
         update=_on_edited,
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    show_overlay: bpy.props.BoolProperty(
+        name="Diagram",
+        description="Draw view plane, pyramid, axes and the line to the look-at point in the 3D viewport, "
+        "while the camera is selected or active",
+        default=True,
+        options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    show_handles: bpy.props.BoolProperty(
+        name="Handles",
+        description="Handles that drag eye, look-at and up in the 3D viewport, while the camera is active",
+        default=True,
+        options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    plane_at: bpy.props.FloatProperty(
+        name="View Plane At",
+        description="Where the view plane is drawn on the way from the eye to the look-at point. d pixels would be far away; "
+        "at 100 % the picture is as large as what it shows of the world there",
+        subtype="FACTOR",
+        default=0.4,
+        min=1e-4,
+        soft_min=0.05,
+        max=1.0,
+        options=set(),
         override={"LIBRARY_OVERRIDABLE"},
     )
     exact: bpy.props.StringProperty(options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE"})
@@ -156,18 +233,30 @@ class VirtualPinhole(bpy.types.PropertyGroup):
     )
 
     def state(self, eye: tuple, look_at: tuple, up: tuple, distance: float, size: tuple[int, int], roll: float = 0.0) -> None:
-        """Set the four values in float64 and enable them; the camera stays where it is."""
-        with _without_callbacks():
+        """Set the four values in float64 and enable them; the camera stays where it is.
+
+        distance : the effective one, zoom included. A zoom that can be kept stays, any other becomes 1.
+        """
+        with without_callbacks():
+            if not _can_divide(self.zoom, distance):
+                self.zoom = 1.0
+            distance /= self.zoom
             self.eye, self.look_at, self.up, self.distance = eye, look_at, up, distance
             self.exact = json.dumps([*eye, *look_at, *up, distance])
             self.enabled = True
         self.settle(size, roll)
 
+    def set_up(self, up: tuple) -> None:
+        """Set up alone, in float64, as an edit does."""
+        eye, look_at, _, distance = self._values()
+        self.exact = json.dumps([*eye, *look_at, *up, distance])
+        self.up = up
+
     def settle(self, size: tuple[int, int], roll: float) -> None:
         """Take note that the camera has been set by the values as they are, for a picture of that size."""
         eye, look_at, up, _ = self.numbers()
-        with _without_callbacks():
-            self.roll, self.size, self.when_set = roll, size, json.dumps([*eye, *look_at, *up])
+        with without_callbacks():
+            self.held_roll, self.size, self.when_set = roll, size, json.dumps([*eye, *look_at, *up])
 
     def numbers_when_set(self) -> tuple[tuple, tuple, tuple] | None:
         """Eye, look-at and up as they were when the camera was last set, or None if that is not known."""
@@ -175,23 +264,32 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         return (tuple(numbers[0:3]), tuple(numbers[3:6]), tuple(numbers[6:9])) if numbers else None
 
     def numbers(self) -> tuple[tuple, tuple, tuple, float]:
-        """Eye, look-at, up and distance in float64."""
-        values = self._values()
-        return tuple(values[0:3]), tuple(values[3:6]), tuple(values[6:9]), values[9]
+        """Eye, look-at, up and the effective distance, zoom included, in float64."""
+        eye, look_at, up, distance = self._values()
+        return eye, look_at, up, distance * self.zoom
 
     def precision(self) -> float:
         """The relative rounding of the values: 2⁻⁵³ where all are known in float64, else float32's 2⁻²⁴."""
-        return 2.0**-53 if self._exact() == self._values() else 2.0**-24
+        eye, look_at, up, distance = self._values()
+        return 2.0**-53 if self._exact() == [*eye, *look_at, *up, distance] else 2.0**-24
 
-    def _values(self) -> list[float]:
-        shown = [*self.eye, *self.look_at, *self.up, self.distance]
+    def _values(self) -> tuple[tuple, tuple, tuple, float]:
+        """The four values, without zoom."""
+        exact, shown = self._exact(), [*self.eye, *self.look_at, *self.up, self.distance]
         with np.errstate(over="ignore"):
-            rounded = np.array(self._exact(), dtype=np.float32).tolist()
-        return [number if short == value else value for number, short, value in zip(self._exact(), rounded, shown, strict=True)]
+            rounded = np.array(exact, dtype=np.float32).tolist()
+        values = [number if short == value else value for number, short, value in zip(exact, rounded, shown, strict=True)]
+        return tuple(values[0:3]), tuple(values[3:6]), tuple(values[6:9]), values[9]
 
     def _exact(self) -> list[float]:
         """Ten numbers in float64, NaN where none is known."""
         return _parsed(self.exact, 10) or [math.nan] * 10
+
+
+def _can_divide(zoom: float, distance: float) -> bool:
+    """Whether a zoom is a factor above 0 that leaves of the distance a number which Blender stores with all its digits."""
+    float32 = np.finfo(np.float32)
+    return 0 < zoom < math.inf and float(float32.tiny) <= distance / zoom <= float(float32.max)
 
 
 def _parsed(text: str, count: int) -> list[float] | None:

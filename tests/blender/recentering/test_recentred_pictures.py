@@ -209,7 +209,7 @@ def test_a_held_roll_is_held(look, camera_object, check, add_map):
     look(UTM)
     add_map(UTM)
     group = camera_object.virtual_pinhole
-    group.pole, group.roll = "HOLD", 0.4
+    group.pole, group.held_roll = "HOLD", 0.4
     sides = check()
     tilt = sides.exported.camera.basis()[0][2]  # u of a level camera is horizontal
     assert abs(tilt) > 0.2 and sides.comparison.conversion.largest < 1e-3
