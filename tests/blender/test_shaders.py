@@ -270,6 +270,20 @@ def test_the_stand_in_of_everything_is_read_as_what_it_stands_for(diffuse, image
     assert exactly(diffuse) == Material(diffuse=Colour(RED))
 
 
+def test_products_of_colours_are_read_as_what_they_stand_for(diffuse, image):
+    made = Material(
+        diffuse=Colour((0.5, 0.25, 0.0), image.name_full, closest=True, vertex=True),
+        emission=Colour((4.0, 2.0, 1.0), vertex=True),
+        mirror=Colour((0.5, 0.5, 0.5), image.name_full),
+    )
+    with borrowed() as borrow:
+        materials.stand_in(borrow, diffuse, shaders.Reading(made, {image.name_full: image}, "Paint"))
+        assert exactly(diffuse) == made and shaders.read(diffuse).vertex == "Paint"
+        (multiply, *_) = [node for node in diffuse.node_tree.nodes if node.type == "VECT_MATH"]
+        multiply.operation = "ADD"
+        approximately(diffuse, f"'{multiply.name}'", "not modelled")
+
+
 def test_the_plain_material_is_the_tracers(fresh_blender):
     with borrowed() as borrow:
         assert exactly(materials.plain(borrow)).diffuse.rgb == pytest.approx(PLAIN.diffuse.rgb, rel=2.0**-24)

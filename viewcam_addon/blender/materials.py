@@ -19,6 +19,7 @@ from .borrowing import Borrower
 _TRANSPARENT = {"BSDF_TRANSPARENT", "HOLDOUT"}
 _TURNING = {"BUMP", "NORMAL_MAP", "BEVEL"}
 _UNKNOWN = {"SCRIPT"}
+_WHITE = (1.0, 1.0, 1.0)
 # The shaders of the tracer's components.
 _SHADERS = {
     "diffuse": "ShaderNodeBsdfDiffuse",
@@ -62,6 +63,11 @@ def make_plain(borrow: Borrower, material: bpy.types.Material) -> None:
 def stand_in(borrow: Borrower, material: bpy.types.Material, reading: shaders.Reading) -> None:
     """Let Cycles see the components of a tracer's material until the loan ends."""
     output, adder = nodes.borrow_output(borrow, material.node_tree, "ShaderNodeOutputMaterial")
+    add_surface(adder, output, reading)
+
+
+def add_surface(adder: nodes.Adder, output: bpy.types.Node, reading: shaders.Reading) -> None:
+    """Add the nodes that shaders.read would read so, and link them to a material's output."""
     made = reading.material
     total = None
     for component, colour in made.colours.items():
@@ -80,8 +86,7 @@ def _colour(adder: nodes.Adder, socket: bpy.types.NodeSocket, colour: Colour, re
     if colour.image is None and not colour.vertex:
         socket.default_value = (*colour.rgb, 1.0)
         return
-    factor = adder.add("ShaderNodeCombineXYZ", X=colour.rgb[0], Y=colour.rgb[1], Z=colour.rgb[2])
-    factors = [factor.outputs[0]]
+    factors = []
     if colour.image is not None:
         texture = adder.add("ShaderNodeTexImage")
         texture.image = reading.images[colour.image]
@@ -93,10 +98,18 @@ def _colour(adder: nodes.Adder, socket: bpy.types.NodeSocket, colour: Colour, re
         factors.append(attribute.outputs["Color"])
     product = factors[0]
     for other in factors[1:]:
-        multiply = adder.add("ShaderNodeVectorMath", product, other)
-        multiply.operation = "MULTIPLY"
+        product = _times(adder, product, other).outputs[0]
+    if colour.rgb != _WHITE:
+        multiply = _times(adder, product)
+        multiply.inputs[1].default_value = colour.rgb
         product = multiply.outputs[0]
     adder.link(product, socket)
+
+
+def _times(adder: nodes.Adder, *factors: bpy.types.NodeSocket) -> bpy.types.Node:
+    multiply = adder.add("ShaderNodeVectorMath", *factors)
+    multiply.operation = "MULTIPLY"
+    return multiply
 
 
 def _set(node: bpy.types.Node, name: str, value: float) -> None:

@@ -1,6 +1,6 @@
 """A Blender material as the tracer's: the components that its shader nodes add up to, or the nearest ones and why.
 
-Exact are, with constant factors, textures and vertex colours: Emission, a Diffuse BSDF without roughness, a Principled BSDF
+Exact are, with constants, textures, vertex colours and their products: Emission, a Diffuse BSDF without roughness, a Principled BSDF
 whose gloss has no strength, and Glossy, Glass and Refraction BSDFs without roughness, mixed and added. Measured in 4.2, 4.5,
 5.0 and 5.2: with a specular IOR level of 0, or an IOR of 1, a Principled BSDF gives the Diffuse BSDF's pixels to the last bit,
 whatever its roughness, anisotropy and tint, unless a weight or the thin film below is not 0.
@@ -167,11 +167,11 @@ class _Reader:
             return Colour((0.0, 0.0, 0.0))
         return Colour(rgb, colour.image, colour.closest, colour.vertex)
 
-    def _colour(self, output: Output, name: str) -> Colour:
+    def _colour(self, output: Output, name: str | int) -> Colour:
         rgb = constant_colour(output, name)
         if rgb is not None:
             if possible(rgb) is None:
-                self._reason(output, f"has the {name} {', '.join(f'{value:g}' for value in rgb)}")
+                self._reason(output, f"has the {output.node.inputs[name].name} {', '.join(f'{value:g}' for value in rgb)}")
             return Colour(rgb) if possible(rgb) else self.viewport
         source = nodes.source(output.input(name))
         node = source.node
@@ -179,8 +179,23 @@ class _Reader:
             return self._image(source)
         if node.type in ("VERTEX_COLOR", "ATTRIBUTE") and source.socket.name == "Color":
             return self._vertex(source)
+        if node.type == "VECT_MATH" and node.operation == "MULTIPLY":
+            return self._product(source)
         self._reason(source, "is not modelled")
         return self.viewport
+
+    def _product(self, output: Output) -> Colour:
+        """What a Vector Math node makes of two colours."""
+        first, second = self._colour(output, 0), self._colour(output, 1)
+        if (first.image and second.image) or (first.vertex and second.vertex):
+            self._reason(output, "multiplies two colours that vary alike")
+            return first
+        rgb = possible(tuple(a * b for a, b in zip(first.rgb, second.rgb, strict=True)))
+        if rgb is None:
+            self._reason(output, "multiplies colours beyond what light can have")
+            return self.viewport
+        textured = first if first.image else second
+        return Colour(rgb, textured.image, textured.closest, first.vertex or second.vertex)
 
     def _image(self, output: Output) -> Colour:
         node = output.node
@@ -269,7 +284,7 @@ def constant_number(output: Output, name: str | int) -> float | None:
     return sum(factor * each for factor, each in zip(_LUMINANCE, _rgb(value), strict=True))
 
 
-def constant_colour(output: Output, name: str) -> RGB | None:
+def constant_colour(output: Output, name: str | int) -> RGB | None:
     """The same for a colour."""
     of = output.input(name)
     value = of and _constant(of)
