@@ -23,6 +23,7 @@ FLOORS = [
     "pinhole",
     "roll",
     "moves",
+    "diagram",
     "image",
     "intrinsics",
     "camera_text",

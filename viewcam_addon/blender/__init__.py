@@ -13,8 +13,10 @@ def _rooms() -> list[ModuleType]:
         clipboard,
         engine,
         file_menu,
+        gizmos,
         moving,
         operators,
+        overlay,
         panel,
         preferences,
         properties,
@@ -24,7 +26,8 @@ def _rooms() -> list[ModuleType]:
     )
 
     buttons = [operators, moving, clipboard]
-    return [preferences, properties, render_settings, *buttons, panel, engine, render_panels, file_menu, view_menu, animation]
+    shown = [panel, overlay, gizmos]
+    return [preferences, properties, render_settings, *buttons, *shown, engine, render_panels, file_menu, view_menu, animation]
 
 
 def register() -> None:
