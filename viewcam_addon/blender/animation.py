@@ -1,43 +1,59 @@
-"""Keyframed values of `object.virtual_pinhole` move the camera, in the window and in a render.
+"""Keyframed values and targets of `object.virtual_pinhole` move the camera, in the window and in a render.
 
 Animation calls no update callback, and a render's dependency graph never writes what it evaluates back to the datablocks. So on
 each frame the *evaluated* values place the *original* camera, and for a render it is tagged with its animation (TIME): without
-the tag the camera's other animated channels would stay at the last frame. Driven values are followed at updates as well.
-Rejected: `frame_change_pre` and `depsgraph_update_post` alone (the camera stands still in a render), writing to evaluated
+the tag the camera's other animated channels would stay at the last frame. Driven values and targets are followed at updates as
+well. Rejected: `frame_change_pre` and `depsgraph_update_post` alone (the camera stands still in a render), writing to evaluated
 copies (children do not follow), drivers (without the add-on the camera falls to the origin).
 
-Cameras whose values are not animated are left alone: their artist may have moved them.
+Only the cameras that Blender has just evaluated are looked at, of whichever scene, so that the others cost nothing. Cameras
+whose values are not animated are left alone: their artist may have moved them.
 """
 
 import sys
+from collections.abc import Iterator
 
 import bpy
 from bpy.app.handlers import persistent
 
 from ..errors import InputError
 from . import camera as cameras
-from . import versions
-from .hold import is_animated
+from . import targets, versions
+from .datablocks import is_animated
 
 
 @persistent
 def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
     depsgraph = depsgraph or bpy.context.evaluated_depsgraph_get()
-    for camera_object in scene.objects:
-        if camera_object.type == "CAMERA" and is_animated(camera_object):
+    for camera_object in _updated_cameras(depsgraph):
+        if is_animated(camera_object):
             _follow(camera_object, scene, depsgraph)
 
 
 @persistent
 def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """Values with a driver change between frames too, as what the driver reads is moved.
+    """Values with a driver or a target change between frames too, as what they depend on is moved.
 
     Blender evaluates what this sets without calling it again, so that a constraint in the way makes no endless loop.
     """
+    for camera_object in _updated_cameras(depsgraph):
+        if _is_driven(camera_object):
+            _follow(camera_object, scene, depsgraph)
+
+
+@persistent
+def on_load(_path: str, _more: object = None) -> None:
+    """Blender does not save the drivers of an overridden camera's own targets."""
+    for camera_object in bpy.data.objects:
+        if camera_object.type == "CAMERA" and camera_object.override_library:
+            targets.connect(camera_object)
+
+
+def _updated_cameras(depsgraph: bpy.types.Depsgraph) -> Iterator[bpy.types.Object]:
     for update in depsgraph.updates:
         evaluated = update.id
-        if isinstance(evaluated, bpy.types.Object) and evaluated.type == "CAMERA" and _is_driven(evaluated.original):
-            _follow(evaluated.original, scene, depsgraph)
+        if isinstance(evaluated, bpy.types.Object) and evaluated.type == "CAMERA":
+            yield evaluated.original
 
 
 def _is_driven(camera_object: bpy.types.Object) -> bool:
@@ -56,13 +72,18 @@ def _follow(camera_object: bpy.types.Object, scene: bpy.types.Scene, depsgraph: 
     if depsgraph.mode == "RENDER":
         camera_object.update_tag(refresh={"OBJECT", "DATA", "TIME"})
         camera_object.data.update_tag(refresh={"TIME"})
+    else:
+        targets.connect(camera_object)  # one that was removed from the file leaves its driver
+        camera_object.virtual_pinhole.mirror(evaluated.virtual_pinhole)
 
 
 def register() -> None:
     bpy.app.handlers.frame_change_post.append(on_frame_change)
     bpy.app.handlers.depsgraph_update_post.append(on_update)
+    bpy.app.handlers.load_post.append(on_load)
 
 
 def unregister() -> None:
+    bpy.app.handlers.load_post.remove(on_load)
     bpy.app.handlers.depsgraph_update_post.remove(on_update)
     bpy.app.handlers.frame_change_post.remove(on_frame_change)

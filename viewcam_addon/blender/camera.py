@@ -26,7 +26,7 @@ from .. import checks, intrinsics
 from .. import roll as rolls
 from ..errors import InputError
 from ..pinhole import Pinhole, Triple
-from . import datablocks, findings, hold, pose, preferences, rotation, suspects
+from . import datablocks, findings, hold, pose, preferences, rotation, suspects, targets
 
 Array = NDArray[np.float64]
 
@@ -49,10 +49,13 @@ def apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Sc
     _check_storable(camera_object, look_at=pinhole.look_at, up=pinhole.up, distance=pinhole.distance)
     _place_closely(camera_object, pinhole, scene)
     frame = datablocks.frame_of(scene)
+    followed = targets.names(camera_object)
     camera_object.virtual_pinhole.state(
         pinhole.eye, pinhole.look_at, pinhole.up, pinhole.distance[0] * (frame.resolution_x / frame.size[0]), frame.size
     )
-    return check(camera_object, pinhole, scene)
+    kept = targets.names(camera_object)
+    left = [f"The {words} no longer follows {name!r}" for words, name in followed.items() if words not in kept]
+    return left + check(camera_object, pinhole, scene)
 
 
 def follow(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:

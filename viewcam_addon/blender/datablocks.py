@@ -6,6 +6,7 @@ import bpy
 
 from .. import intrinsics
 from ..errors import InputError
+from . import versions
 
 # Metres: what is shorter, Blender calls zero.
 _SHORTEST_WORD = 1e-6
@@ -21,6 +22,12 @@ def check_perspective(camera_object: bpy.types.Object) -> None:
         raise InputError(
             f"camera {camera_object.name!r} is {_KINDS.get(kind, kind)}, no pinhole: set its lens type to Perspective"
         )
+
+
+def is_animated(camera_object: bpy.types.Object) -> bool:
+    """Whether a keyframe, an NLA strip or a driver changes one of the values of the Virtual Pinhole, or a target does."""
+    curves = [*versions.animation_curves(camera_object), *versions.drivers(camera_object)]
+    return any(curve.data_path.startswith("virtual_pinhole.") for curve in curves)
 
 
 def frame_of(scene: bpy.types.Scene) -> intrinsics.Frame:

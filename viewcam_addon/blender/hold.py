@@ -24,17 +24,13 @@ from numpy.typing import NDArray
 from .. import roll as rolls
 from ..pinhole import Pinhole
 from . import versions
+from .datablocks import is_animated
+from .targets import POINTS, target_of
 
 Array = NDArray[np.float64]
 
 # The values that decide the view, as nine columns.
 _COLUMNS = {f"virtual_pinhole.{name}": 3 * i for i, name in enumerate(("eye", "look_at", "up"))}
-
-
-def is_animated(camera_object: bpy.types.Object) -> bool:
-    """Whether a keyframe, an NLA strip or a driver changes one of the group's values."""
-    curves = [*versions.animation_curves(camera_object), *versions.drivers(camera_object)]
-    return any(curve.data_path.startswith("virtual_pinhole.") for curve in curves)
 
 
 def roll(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> float:
@@ -63,8 +59,15 @@ def is_written_by_edits(camera_object: bpy.types.Object) -> bool:
 
 def obstacle(camera_object: bpy.types.Object) -> str | None:
     """The sentence that says why an animation's roll can't be held, or None where it can."""
-    if camera_object.virtual_pinhole.pole != "HOLD":
+    group = camera_object.virtual_pinhole
+    if group.pole != "HOLD":
         return None
+    for point, words in POINTS.items():
+        if target := target_of(group, point):
+            return (
+                f"The {words} follows {target.name!r}, whose place at other frames can't be known, so that the roll is not "
+                "held: clear the target, or choose Canonical Axes"
+            )
     for what, curves in (("A driver", versions.drivers(camera_object)), ("An NLA strip", versions.strip_curves(camera_object))):
         if found := _view_curves(curves):
             name = found[0].data_path.removeprefix("virtual_pinhole.").replace("_", "-")

@@ -27,7 +27,7 @@ from .. import roll as rolls
 from ..errors import InputError
 from ..pinhole import Pinhole
 from . import camera as cameras
-from . import datablocks, hold, preferences
+from . import datablocks, hold, preferences, targets
 
 VALUES = ("eye", "look_at", "up", "distance")
 _stating = False
@@ -69,6 +69,14 @@ def _on_pole(group: "VirtualPinhole", context: bpy.types.Context) -> None:
     if group.pole != "HOLD":
         with without_callbacks():
             group.held_roll = 0.0
+    _on_edited(group, context)
+
+
+def _on_target(group: "VirtualPinhole", context: bpy.types.Context) -> None:
+    if _stating:
+        return
+    targets.connect(group.id_data)
+    group.mirror(group)
     _on_edited(group, context)
 
 
@@ -127,6 +135,27 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         precision=4,
         update=_on_edited,
         override={"LIBRARY_OVERRIDABLE"},
+    )
+    eye_target: bpy.props.PointerProperty(
+        name="Eye Target",
+        description="An object in whose origin the camera stands, wherever it is moved. Empty: the point above counts",
+        type=bpy.types.Object,
+        poll=targets.can_be_target,
+        update=_on_target,
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    look_at_target: bpy.props.PointerProperty(
+        name="Look-At Target",
+        description="An object at whose origin the camera looks, wherever it is moved. Empty: the point above counts",
+        type=bpy.types.Object,
+        poll=targets.can_be_target,
+        update=_on_target,
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    followed: bpy.props.FloatVectorProperty(
+        description="Driven by the targets of eye and look-at, so that Blender keeps them up to date. The values say nothing",
+        size=2,
+        options={"HIDDEN", "ANIMATABLE"},
     )
     # No minimum: Blender would clamp without a word, and so the panel says what is wrong with d ≤ 0.
     distance: bpy.props.FloatProperty(
@@ -236,8 +265,12 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         """Set the four values in float64 and enable them; the camera stays where it is.
 
         distance : the effective one, zoom included. A zoom that can be kept stays, any other becomes 1.
+        A target that stands exactly where the point is stated stays, any other is cleared.
         """
+        released = [point for point, at in (("eye", eye), ("look_at", look_at)) if targets.place(self, point) != tuple(at)]
         with without_callbacks():
+            for point in released:
+                targets.release(self, point)
             if not _can_divide(self.zoom, distance):
                 self.zoom = 1.0
             distance /= self.zoom
@@ -245,6 +278,14 @@ class VirtualPinhole(bpy.types.PropertyGroup):
             self.exact = json.dumps([*eye, *look_at, *up, distance])
             self.enabled = True
         self.settle(size, roll)
+
+    def mirror(self, evaluated: "VirtualPinhole") -> None:
+        """Store where the targets stand, so that the camera stays in place when they are cleared."""
+        with without_callbacks():
+            for point in targets.POINTS:
+                at = targets.place(evaluated, point)
+                if at is not None and at != tuple(getattr(self, point)):
+                    setattr(self, point, at)
 
     def set_up(self, up: tuple) -> None:
         """Set up alone, in float64, as an edit does."""
@@ -264,14 +305,15 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         return (tuple(numbers[0:3]), tuple(numbers[3:6]), tuple(numbers[6:9])) if numbers else None
 
     def numbers(self) -> tuple[tuple, tuple, tuple, float]:
-        """Eye, look-at, up and the effective distance, zoom included, in float64."""
+        """Eye, look-at, up and the effective distance, zoom included, in float64. A followed point is where its target is."""
         eye, look_at, up, distance = self._values()
         return eye, look_at, up, distance * self.zoom
 
     def precision(self) -> float:
         """The relative rounding of the values: 2⁻⁵³ where all are known in float64, else float32's 2⁻²⁴."""
         eye, look_at, up, distance = self._values()
-        return 2.0**-53 if self._exact() == [*eye, *look_at, *up, distance] else 2.0**-24
+        is_exact = self._exact() == [*eye, *look_at, *up, distance] and not (self.eye_target or self.look_at_target)
+        return 2.0**-53 if is_exact else 2.0**-24
 
     def _values(self) -> tuple[tuple, tuple, tuple, float]:
         """The four values, without zoom."""
@@ -279,7 +321,8 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         with np.errstate(over="ignore"):
             rounded = np.array(exact, dtype=np.float32).tolist()
         values = [number if short == value else value for number, short, value in zip(exact, rounded, shown, strict=True)]
-        return tuple(values[0:3]), tuple(values[3:6]), tuple(values[6:9]), values[9]
+        eye, look_at = (targets.place(self, point) for point in targets.POINTS)
+        return eye or tuple(values[0:3]), look_at or tuple(values[3:6]), tuple(values[6:9]), values[9]
 
     def _exact(self) -> list[float]:
         """Ten numbers in float64, NaN where none is known."""

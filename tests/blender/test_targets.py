@@ -1,0 +1,291 @@
+"""Eye and look-at as objects: followed as they are moved, over frames and in renders, wherever Blender hides them."""
+
+import math
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from viewcam_addon.blender import camera as cameras
+from viewcam_addon.blender import findings, hold, targets
+from viewcam_addon.pinhole import Pinhole
+
+POINTS = ("eye", "look_at")
+
+
+def update():
+    bpy.context.view_layer.update()
+
+
+def is_where_stated(camera_object, scene):
+    return findings.differences(cameras.stated(camera_object, scene), cameras.read(camera_object, scene), reach=50) == {}
+
+
+def follow(camera_object, point, target):
+    setattr(camera_object.virtual_pinhole, f"{point}_target", target)
+
+
+def number_of(camera_object, point):
+    return camera_object.virtual_pinhole.numbers()[POINTS.index(point)]
+
+
+@pytest.fixture
+def target(empty):
+    """An empty at (1, 2, 3)."""
+    return empty("Target", (1, 2, 3))
+
+
+@pytest.fixture
+def watching_camera(posed_camera, target):
+    """The posed camera, whose look-at point is the target."""
+    follow(posed_camera, "look_at", target)
+    return posed_camera
+
+
+@pytest.fixture
+def moving_target(target, empty):
+    """The target on a parent that goes from x = 0 at frame 1 to x = 10 at frame 11, at a constant speed."""
+    carrier = empty("Carrier")
+    target.parent = carrier
+    driver = carrier.driver_add("location", 0).driver
+    driver.expression = "frame - 1.0"
+    return target
+
+
+@pytest.mark.parametrize("point", POINTS)
+def test_setting_a_target_moves_the_camera_at_once(posed_camera, scene, target, point):
+    follow(posed_camera, point, target)
+    assert number_of(posed_camera, point) == (1, 2, 3)
+    assert is_where_stated(posed_camera, scene)
+
+
+@pytest.mark.parametrize("point", POINTS)
+def test_a_target_moved_by_hand_is_followed(posed_camera, scene, target, point):
+    follow(posed_camera, point, target)
+    for x in (4, 5.25):
+        target.location.x = x
+        update()
+        assert number_of(posed_camera, point) == (x, 2, 3)
+        assert is_where_stated(posed_camera, scene)
+    assert (posed_camera.matrix_world.translation.x == 5.25) == (point == "eye")
+
+
+def carried_by_a_parent(target, empty):
+    carrier = empty("Carrier")
+    target.parent, target.parent_type = carrier, "OBJECT"
+    return carrier
+
+
+def held_by_a_constraint(target, empty):
+    carrier = empty("Carrier")
+    target.constraints.new("CHILD_OF").target = carrier
+    return carrier
+
+
+def set_by_a_driver(target, empty):
+    carrier = empty("Carrier")
+    driver = target.driver_add("location", 0).driver
+    driver.type = "SUM"
+    variable = driver.variables.new()
+    variable.targets[0].id, variable.targets[0].data_path = carrier, "location.x"
+    return carrier
+
+
+@pytest.mark.parametrize("carry", [carried_by_a_parent, held_by_a_constraint, set_by_a_driver])
+def test_a_target_is_followed_through_what_moves_it(watching_camera, scene, target, empty, carry):
+    carrier = carry(target, empty)
+    update()
+    before = number_of(watching_camera, "look_at")
+    carrier.location.x = before[0] + 8
+    update()
+    assert number_of(watching_camera, "look_at") != before
+    assert number_of(watching_camera, "look_at") == tuple(target.matrix_world.translation)
+    assert is_where_stated(watching_camera, scene)
+
+
+def test_a_target_is_followed_over_frames_and_between_them(watching_camera, scene, moving_target):
+    for frame in (1, 6, 6.5, 3.25):
+        scene.frame_set(math.floor(frame), subframe=frame % 1.0)
+        assert number_of(watching_camera, "look_at") == pytest.approx((frame, 2, 3), rel=1e-6)
+        assert is_where_stated(watching_camera, scene)
+
+
+def test_the_stored_point_goes_along_so_that_clearing_leaves_the_camera(watching_camera, scene, moving_target):
+    scene.frame_set(6)
+    group, before = watching_camera.virtual_pinhole, watching_camera.matrix_world.copy()
+    assert tuple(group.look_at) == number_of(watching_camera, "look_at") == (6, 2, 3)
+    group.look_at_target = None
+    update()
+    assert watching_camera.matrix_world == before
+    assert not hold.is_animated(watching_camera)
+    moving_target.parent.driver_remove("location")
+    scene.frame_set(1)
+    assert watching_camera.matrix_world == before
+
+
+def test_the_precision_of_a_followed_point_is_that_of_float32(camera_object, scene, target):
+    cameras.apply(camera_object, Pinhole((7, -6, 5), (1, 2, 3), (0, 0, 1), 1500.0, 1920, 1080), scene)
+    assert camera_object.virtual_pinhole.precision() == 2.0**-53
+    follow(camera_object, "look_at", target)
+    assert camera_object.virtual_pinhole.precision() == 2.0**-24
+
+
+@settings(max_examples=30)
+@given(st.lists(st.floats(-1e6, 1e6, width=32), min_size=3, max_size=3))
+def test_the_eye_is_where_its_target_is_to_the_last_bit(location):
+    scene = bpy.context.scene
+    camera_object = bpy.data.objects.get("Follower") or bpy.data.objects.new("Follower", bpy.data.cameras.new("Follower"))
+    target = bpy.data.objects.get("Place") or bpy.data.objects.new("Place", None)
+    for block in (camera_object, target):
+        if block.name not in scene.collection.objects:
+            scene.collection.objects.link(block)
+    group = camera_object.virtual_pinhole
+    group.enabled, group.look_at, group.eye_target = True, (0, 0, 2e6), target
+    target.location = location
+    update()
+    assert tuple(camera_object.matrix_world.translation) == tuple(target.matrix_world.translation) == group.numbers()[0]
+
+
+# How Blender may leave an object out of the viewport, of the render, or of both.
+
+
+def hidden_in_viewports(target):
+    target.hide_viewport = target.parent.hide_viewport = True
+
+
+def hidden_by_the_eye(target):
+    target.hide_set(True)
+    target.parent.hide_set(True)
+
+
+def hidden_in_renders(target):
+    target.hide_render = target.parent.hide_render = True
+
+
+def move_to(collection, target):
+    for block in (target, target.parent):
+        bpy.context.scene.collection.objects.unlink(block)
+        collection.objects.link(block)
+
+
+def excluded(target):
+    collection = bpy.data.collections.new("Excluded")
+    bpy.context.scene.collection.children.link(collection)
+    move_to(collection, target)
+    update()
+    bpy.context.view_layer.layer_collection.children["Excluded"].exclude = True
+
+
+def in_another_scene(target):
+    move_to(bpy.data.scenes.new("Other").collection, target)
+
+
+def in_no_scene(target):
+    for block in (target, target.parent):
+        bpy.context.scene.collection.objects.unlink(block)
+
+
+LEFT_OUT = [hidden_in_viewports, hidden_by_the_eye, hidden_in_renders, excluded, in_another_scene, in_no_scene]
+
+
+@pytest.mark.parametrize("leave_out", LEFT_OUT)
+def test_a_target_that_blender_leaves_out_is_followed_all_the_same(watching_camera, scene, moving_target, leave_out):
+    leave_out(moving_target)
+    scene.frame_set(6)
+    assert number_of(watching_camera, "look_at") == (6, 2, 3)
+    assert is_where_stated(watching_camera, scene)
+    moving_target.location.z = 9
+    update()
+    assert number_of(watching_camera, "look_at") == (6, 2, 9)
+    assert is_where_stated(watching_camera, scene)
+
+
+@pytest.mark.parametrize("leave_out", [lambda target: None, *LEFT_OUT])
+def test_a_render_sees_the_target_where_it_is_at_each_frame(
+    watching_camera, scene, moving_target, render_positions, picture_error, leave_out
+):
+    """The originals stand at frame 11 all the time."""
+    leave_out(moving_target)
+    expected = {}
+    for frame in (6, 11):
+        scene.frame_set(frame)
+        expected[frame] = cameras.stated(watching_camera, scene)
+    scene.frame_start, scene.frame_end, scene.frame_step = 6, 11, 5
+    for frame, positions in render_positions(animation=True).items():
+        error, tolerance = picture_error(expected[frame], positions)
+        assert error <= tolerance, f"frame {frame}: {error:.1e} px, and {tolerance:.1e} are rounding"
+    error, tolerance = picture_error(expected[6], positions)
+    assert error > 100 * tolerance, "a target that stood still would not have been noticed"
+
+
+def test_a_still_by_f12_sees_a_target_that_only_its_own_graph_moves(
+    watching_camera, scene, moving_target, render_positions, picture_error
+):
+    scene.frame_set(6)
+    expected = cameras.stated(watching_camera, scene)
+    error, tolerance = picture_error(expected, render_positions())
+    assert error <= tolerance, f"{error:.1e} px, and {tolerance:.1e} are rounding"
+
+
+def test_motion_blur_sees_the_target_at_its_sub_frames(watching_camera, scene, moving_target, render_positions):
+    seen = {}
+
+    def look(scene, depsgraph):
+        if depsgraph.mode == "RENDER":
+            seen[scene.frame_current_final] = cameras.stated(watching_camera.evaluated_get(depsgraph), scene).look_at[0]
+
+    scene.render.use_motion_blur = True
+    scene.frame_start = scene.frame_end = 6
+    bpy.app.handlers.frame_change_post.append(look)
+    try:
+        render_positions(animation=True)
+    finally:
+        bpy.app.handlers.frame_change_post.remove(look)
+    assert {5.75, 6.0, 6.25} <= set(seen), f"the render looked at {sorted(seen)}"
+    assert seen == pytest.approx({frame: frame for frame in seen}, rel=1e-6)
+
+
+def test_a_render_leaves_the_stored_point_as_the_viewport_has_it(watching_camera, scene, moving_target, render_positions):
+    scene.frame_set(1)
+    before = tuple(watching_camera.virtual_pinhole.look_at), watching_camera.matrix_world.copy()
+    scene.frame_start = scene.frame_end = 6
+    render_positions(animation=True)
+    update()
+    assert (tuple(watching_camera.virtual_pinhole.look_at), watching_camera.matrix_world) == before
+
+
+def test_the_camera_of_another_scene_is_followed_in_a_render(
+    watching_camera, scene, moving_target, render_positions, picture_error
+):
+    """It is the camera of a scene that it does not belong to."""
+    scene.frame_set(6)
+    expected = cameras.stated(watching_camera, scene)
+    other = bpy.data.scenes.new("Other")
+    scene.collection.objects.unlink(watching_camera)
+    other.collection.objects.link(watching_camera)
+    scene.frame_set(1)
+    scene.frame_start = scene.frame_end = 6
+    error, tolerance = picture_error(expected, render_positions(animation=True)[6])
+    assert error <= tolerance, f"{error:.1e} px, and {tolerance:.1e} are rounding"
+
+
+def test_what_cycles_is_compared_with_follows_the_target(watching_camera, scene, moving_target, both_sides):
+    hidden_in_renders(moving_target)
+    bpy.ops.mesh.primitive_monkey_add(size=6, location=(6, 2, 3))
+    found = both_sides(frame=6)
+    assert found.exported.stated_camera.look_at == (6, 2, 3)
+    found.check()
+    assert targets.target_of(watching_camera.virtual_pinhole, "look_at") == moving_target
+
+
+def test_a_comparison_in_another_size_keeps_the_target(watching_camera, scene, target):
+    from viewcam_addon.blender import job
+
+    job.export(job.Request(size=(64, 48)))
+    assert watching_camera.virtual_pinhole.look_at_target == target
+    target.location.x = 3
+    update()
+    assert number_of(watching_camera, "look_at") == (3, 2, 3)

@@ -1,0 +1,159 @@
+"""Eye and look-at as objects: the point is where its target stands, as long as one is set.
+
+That is the place of the target's evaluated origin: through parents, constraints, drivers and animation, at sub-frames, and in a
+render as the render has it. In Blender's float32, as all that is evaluated.
+
+**Being told.** Blender evaluates an object that is hidden, excluded, kept out of the render or in another scene only where
+something visible depends on it, and a pointer in a property is no dependency: such a target would stand still, in the render
+alone even. So each target also feeds a driver, of an element of the hidden property `followed`, whose value says nothing. By
+it Blender keeps the target up to date, and tells animation.py of the camera whenever the target has moved. Rejected: drivers
+of eye and look-at themselves (0 where the target is deleted), a constraint without influence (it stands among the artist's
+own, and makes a loop of a target that hangs on the camera), looking at all cameras of the scene at every update.
+
+**Loops.** A target that the camera itself moves is not followed: the stored point counts, and `warnings` says how one hangs on
+the other. A target that is such a camera stands at its own eye, so that two cameras may look at each other.
+"""
+
+from collections.abc import Iterator
+
+import bpy
+
+from ..pinhole import Triple
+from . import datablocks, versions
+
+POINTS = {"eye": "eye", "look_at": "look-at"}  # property → as a sentence says it
+_HOOK = "virtual_pinhole.followed"
+
+
+def target_of(group: bpy.types.PropertyGroup, point: str) -> bpy.types.Object | None:
+    """The object that a point ("eye" or "look_at") is set to follow."""
+    return getattr(group, f"{point}_target")
+
+
+def place(group: bpy.types.PropertyGroup, point: str) -> Triple | None:
+    """World space: where the target of a point stands, or None where there is none to be followed.
+
+    group : of an original object, or of the evaluated one of any depsgraph, which has evaluated targets.
+    """
+    target = target_of(group, point)
+    if target is None or _chain(target.original, group.id_data.original):
+        return None
+    if _is_led(target):
+        return target.virtual_pinhole.numbers()[0]
+    if not target.is_evaluated:
+        target = target.evaluated_get(datablocks.depsgraph_of(datablocks.scene_of(group.id_data)))
+    return tuple(target.matrix_world.translation)
+
+
+def connect(camera_object: bpy.types.Object) -> None:
+    """Make the drivers of `followed` those of the targets that are set."""
+    for index, point in enumerate(POINTS):
+        target = target_of(camera_object.virtual_pinhole, point)
+        curve = next((each for each in _hooks(camera_object) if each.array_index == index), None)
+        if target is None:
+            if curve:
+                camera_object.driver_remove(_HOOK, index)
+            continue
+        driver = (curve or camera_object.driver_add(_HOOK, index)).driver
+        variable = driver.variables[0] if driver.variables else driver.variables.new()
+        if variable.targets[0].id != target:
+            driver.type, variable.type = "SUM", "TRANSFORMS"
+            variable.targets[0].id = target
+
+
+def names(camera_object: bpy.types.Object) -> dict[str, str]:
+    """The targets' names by the words for the point: {"look-at": "Empty"}."""
+    found = ((words, target_of(camera_object.virtual_pinhole, point)) for point, words in POINTS.items())
+    return {words: target.name for words, target in found if target}
+
+
+def release(group: bpy.types.PropertyGroup, point: str) -> None:
+    """Clear a target; the point stays as it is stored. To be called without callbacks."""
+    setattr(group, f"{point}_target", None)
+    connect(group.id_data)
+
+
+def warnings(camera_object: bpy.types.Object) -> list[str]:
+    """One sentence for each target that can't be followed as one would expect."""
+    sentences = []
+    for point, words in POINTS.items():
+        target = target_of(camera_object.virtual_pinhole, point)
+        if target is None:
+            continue
+        start = f"The {words} target {target.name!r}"
+        if chain := _chain(target, camera_object):
+            through = "".join(f" by {each.name!r}," for each in chain[1:-1])
+            fault = "is the camera itself" if len(chain) == 1 else f"is moved{through} by the camera itself"
+            sentences.append(f"{start} {fault}, and is not followed: choose another, or clear it")
+        elif not target.users_scene:
+            sentences.append(f"{start} is in no scene, deleted perhaps: clear it, or choose another")
+        elif late := None if _is_led(target) else next(filter(_is_led, _carriers(target, set())), None):
+            sentences.append(
+                f"{start} is moved by {late.name!r}, whose own values are animated, and is followed a step late: "
+                f"make {late.name!r} the target, or let it not be moved by that camera"
+            )
+    return sentences
+
+
+def can_be_target(group: bpy.types.PropertyGroup, candidate: bpy.types.Object) -> bool:
+    """Whether an object may be chosen: the camera does not move it."""
+    return not _chain(candidate, group.id_data)
+
+
+def _hooks(camera_object: bpy.types.Object) -> list[bpy.types.FCurve]:
+    return [curve for curve in versions.drivers(camera_object) if curve.data_path == _HOOK]
+
+
+def _is_led(block: bpy.types.Object) -> bool:
+    """Whether it is a camera that its values place anew, so that Blender's dependency graph does not know where it will be."""
+    return block.type == "CAMERA" and block.virtual_pinhole.enabled and datablocks.is_animated(block)
+
+
+def _chain(target: bpy.types.Object, camera_object: bpy.types.Object) -> list[bpy.types.Object]:
+    """From the target to the camera, each moved by the next; empty where the camera does not move it. Originals."""
+    if target == camera_object:
+        return [target]
+    seen = {target}
+    waiting = [[target, each] for each in _movers(target, is_place=True)]
+    while waiting:
+        path = waiting.pop()
+        if path[-1] == camera_object:
+            return path
+        if path[-1] not in seen:
+            seen.add(path[-1])
+            waiting += [[*path, each] for each in _movers(path[-1])]
+    return []
+
+
+def _carriers(target: bpy.types.Object, seen: set[bpy.types.Object]) -> Iterator[bpy.types.Object]:
+    """All that moves a target, near ones first."""
+    waiting = [target]
+    for block in waiting:
+        new = [each for each in _movers(block) if each not in seen]
+        seen.update(new)
+        waiting += new
+        yield from new
+
+
+def _movers(block: bpy.types.Object, is_place: bool = False) -> Iterator[bpy.types.Object]:
+    """What an object's pose depends on directly. is_place : its place alone counts, not where it looks."""
+    if _is_led(block):
+        points = ("eye",) if is_place else POINTS
+        yield from filter(None, (target_of(block.virtual_pinhole, point) for point in points))
+    else:
+        if block.parent:
+            yield block.parent
+        yield from _aims(block.constraints)
+        if block.type == "ARMATURE" and block.pose:
+            for bone in block.pose.bones:
+                yield from _aims(bone.constraints)
+    for curve in versions.drivers(block):
+        if curve.data_path != _HOOK:
+            ids = (each.id for variable in curve.driver.variables for each in variable.targets)
+            yield from (each for each in ids if isinstance(each, bpy.types.Object) and each != block)
+
+
+def _aims(constraints: bpy.types.bpy_prop_collection) -> Iterator[bpy.types.Object]:
+    for constraint in constraints:
+        several = getattr(constraint, "targets", ())
+        yield from filter(None, (getattr(each, "target", None) for each in (constraint, *several)))
