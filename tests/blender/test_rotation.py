@@ -82,3 +82,51 @@ def test_nearest_leaves_a_rotation_alone_and_keeps_a_mirroring():
 
 def test_skew_is_the_cosine_of_the_worst_pair_of_axes():
     assert rotation.skew(np.array([[1.0, 0.6, 0.0], [0.0, 0.8, 0.0], [0.0, 0.0, 5.0]])) == pytest.approx(0.6)
+
+
+MODES = [*ORDERS, "QUATERNION", "AXIS_ANGLE"]
+
+
+def rotation_of(numbers, mode):
+    if mode == "QUATERNION":
+        return rotation.from_quaternion(numbers)
+    return rotation_about(numbers[0], numbers[1:]) if mode == "AXIS_ANGLE" else rotation.from_euler(numbers, mode)
+
+
+@pytest.mark.parametrize("mode", MODES)
+@given(given_angles=angles, angle=st.floats(-20, 20), axis=st.sampled_from([(1, 0, 0), (0, 0.6, -0.8), (0, 0, 1)]))
+def test_numbers_near_others_give_the_same_rotation(mode, given_angles, angle, axis):
+    matrix = rotation.from_euler(given_angles, "XYZ")
+    before = (0.5, 0.5, -0.5, 0.5) if mode == "QUATERNION" else (angle, *axis) if mode == "AXIS_ANGLE" else (angle, 1, -9)
+    found = rotation.numbers(matrix, mode, before)
+    # A turn of 2⁻²⁶ about another axis, and an angle that begins elsewhere that close to gimbal lock: twice that, at most π.
+    error = np.abs(rotation_of(found, mode) - matrix).max()
+    assert error <= math.pi * 2.0**-26 + ROUNDING * 8, f"{mode} {found}: off by {error:.1e}"
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("axis", [(0, 0, 1), (1, 0, 0), (0.48, -0.6, 0.64)])
+def test_numbers_that_continue_others_never_jump(mode, axis):
+    """Three turns about an axis, and through gimbal lock in the orders that have it there, a degree at a time."""
+    tilt = rotation_about(0.4, (0.6, 0.8, 0))
+    before = rotation.numbers(tilt, mode)
+    for degree in range(1, 3 * 360):
+        after = rotation.numbers(rotation_about(math.radians(degree), axis) @ tilt, mode, before)
+        # Euler angles run as the cosine of the middle one gets small, and are within 0.03 of gimbal lock at the closest here.
+        assert np.abs(np.subtract(after, before)).max() < math.radians(1) / 0.03, f"at {degree}°: {before} → {after}"
+        before = after
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_in_gimbal_lock_the_free_angle_stays_as_it_was(order):
+    given_angles = [0.3, 0.3, 2.2]
+    given_angles["XYZ".index(order[1])] = math.pi / 2
+    found = rotation.numbers(rotation.from_euler(given_angles, order), order, given_angles)
+    np.testing.assert_allclose(found, given_angles, atol=1e-7)
+
+
+def test_without_numbers_before_a_rotation_is_the_plainest():
+    matrix = rotation_about(math.pi - 0.1, (0, 0, 1))
+    assert rotation.numbers(matrix, "QUATERNION") == rotation.quaternion(matrix)
+    assert rotation.numbers(matrix, "AXIS_ANGLE") == rotation.axis_angle(matrix)
+    assert rotation.numbers(matrix, "ZYX") == rotation.euler(matrix, "ZYX")

@@ -10,6 +10,7 @@ def _rooms() -> list[ModuleType]:
     """Who has CLASSES for Blender or more to tell it, in order: a panel needs its operators, an operator its properties."""
     from . import (
         animation,
+        baking,
         clipboard,
         engine,
         file_menu,
@@ -19,15 +20,17 @@ def _rooms() -> list[ModuleType]:
         overlay,
         panel,
         preferences,
+        proof,
         properties,
         render_panels,
         render_settings,
+        resolution,
         view_menu,
     )
 
-    buttons = [operators, moving, clipboard]
-    shown = [panel, overlay, gizmos]
-    return [preferences, properties, render_settings, *buttons, *shown, engine, render_panels, file_menu, view_menu, animation]
+    buttons = [operators, moving, clipboard, baking]
+    shown = [panel, proof, overlay, gizmos]
+    return [preferences, properties, render_settings, *buttons, *shown, engine, render_panels, file_menu, view_menu, animation, resolution]
 
 
 def register() -> None:

@@ -8,7 +8,7 @@ import bpy
 from ..errors import InputError
 from ..pinhole import Triple
 from . import camera as cameras
-from . import clipboard, datablocks, hold, readouts
+from . import baking, clipboard, datablocks, hold, readouts
 from .properties import VALUES
 
 
@@ -47,6 +47,7 @@ class _CameraPanel:
         if up:
             layout.operator("viewcam.choose_up", text=f"Use Up {readouts.vector(up)}").camera = camera_object.name
         _draw_rows(rows, layout)
+        baking.draw(layout, camera_object)
 
     def _draw_warnings(self, warnings: list[str], context: bpy.types.Context) -> None:
         width = context.region.width / context.preferences.system.ui_scale - 60

@@ -10,7 +10,7 @@ make the right matrix: 1.9e-7 rad at most in every mode. Rejected: Blender's flo
 rounding differs from one processor to another).
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import bpy
 import numpy as np
@@ -50,17 +50,20 @@ def channels(
     return tuple(location.tolist()), _delta_rotation(camera_object).T @ turn, tuple(scale.tolist())
 
 
-def set_rotation(camera_object: bpy.types.Object, turn: Array) -> None:
-    """Rotate the camera, in its own mode, by the (3, 3) rotation that `channels` gives; its scale is set already."""
-    mode = camera_object.rotation_mode
-    if mode == "QUATERNION":
-        name, numbers = "rotation_quaternion", rotation.quaternion(turn)
-    elif mode == "AXIS_ANGLE":
-        name, numbers = "rotation_axis_angle", rotation.axis_angle(turn)
-    else:
-        name, numbers = "rotation_euler", rotation.euler(turn, mode)
+def rotation_channel(camera_object: bpy.types.Object) -> str:
+    """The property that rotates the object in the mode it has."""
+    names = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
+    return names.get(camera_object.rotation_mode, "rotation_euler")
+
+
+def set_rotation(camera_object: bpy.types.Object, turn: Array, before: Sequence[float] | None = None) -> None:
+    """Rotate the camera, in its own mode, by the (3, 3) rotation that `channels` gives; its scale is set already.
+
+    before : the numbers of the frame before, to be as near to as the rotation allows.
+    """
+    name = rotation_channel(camera_object)
     wanted = _delta_rotation(camera_object) @ turn * _signs(camera_object)
-    candidates = rotation.neighbours(numbers)
+    candidates = rotation.neighbours(rotation.numbers(turn, camera_object.rotation_mode, before))
     made = []
     for candidate in candidates:
         setattr(camera_object, name, candidate)

@@ -17,23 +17,31 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+# Radians: in so small a turn the axis, and so close to gimbal lock one of the angles, may be any, within float32's rounding.
+_FREE = 2.0**-26
+
 
 def euler(rotation: Array, order: str) -> tuple[float, float, float]:
     """The angles about x, y and z in radians, applied in `order` ("XYZ": about x first), of a rotation matrix.
 
     Of the two triples of angles that give the same rotation, the one of the smaller sum, which float32 also stores better.
     """
+    return min(_triples(rotation, order), key=lambda triple: sum(map(abs, triple)))
+
+
+def _triples(m: Array, order: str, before: Sequence[float] | None = None) -> list[tuple[float, float, float]]:
+    """Both triples of angles in [−π, π] that give a rotation; in gimbal lock those that begin with the angle of `before`."""
     i, j, k, sign = _axes(order)
-    m = rotation
-    first = math.atan2(m[k, j], m[k, k])
-    second = math.atan2(-m[k, i], math.hypot(m[i, i], m[j, i]))
+    from_lock = math.hypot(m[i, i], m[j, i])
+    is_locked = before is not None and from_lock <= _FREE
+    first = sign * before[i] if is_locked else math.atan2(m[k, j], m[k, k])
+    second = math.atan2(-m[k, i], from_lock)
     sine, cosine = math.sin(first), math.cos(first)
     third = math.atan2(sine * m[i, k] - cosine * m[i, j], cosine * m[j, j] - sine * m[j, k])
-    angles = [0.0, 0.0, 0.0]
+    angles, other = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
     angles[i], angles[j], angles[k] = sign * first, sign * second, sign * third
-    other = [0.0, 0.0, 0.0]
     other[i], other[j], other[k] = (sign * angle for angle in (_opposite(first), _opposite(-second), _opposite(third)))
-    return min(tuple(angles), tuple(other), key=lambda triple: sum(map(abs, triple)))
+    return [tuple(angles), tuple(other)]
 
 
 def _opposite(angle: float) -> float:
@@ -97,6 +105,37 @@ def axis_angle(rotation: Array) -> tuple[float, float, float, float]:
     if sine == 0:
         return 0.0, 0.0, 1.0, 0.0
     return 2 * math.atan2(sine, w), *(component / sine for component in axis)
+
+
+def numbers(rotation: Array, mode: str, before: Sequence[float] | None = None) -> tuple[float, ...]:
+    """What a rotation is in one of Blender's modes: an order of Euler angles, "QUATERNION" or "AXIS_ANGLE".
+
+    before : the numbers of another rotation. Those nearest to them are given then, so that what is interpolated between the two
+        neither flips nor takes the long way round: the other triple of Euler angles, the quaternion of the other sign, the
+        opposite axis, and whole turns more or less.
+    """
+    if mode == "QUATERNION":
+        found = quaternion(rotation)
+        return found if before is None or np.dot(found, before) >= 0 else tuple(-number for number in found)
+    if mode == "AXIS_ANGLE":
+        return axis_angle(rotation) if before is None else _continued_axis_angle(*axis_angle(rotation), before=before)
+    if before is None:
+        return euler(rotation, mode)
+    triples = [map(_wound, triple, before) for triple in _triples(rotation, mode, before)]
+    return min(map(tuple, triples), key=lambda triple: math.dist(triple, before))
+
+
+def _continued_axis_angle(angle: float, *axis: float, before: Sequence[float]) -> tuple[float, ...]:
+    if angle <= _FREE:
+        axis = before[1:]
+    elif np.dot(axis, before[1:]) < 0:
+        angle, axis = -angle, [-component for component in axis]
+    return _wound(angle, before[0]), *axis
+
+
+def _wound(angle: float, near: float) -> float:
+    """The angle with as many whole turns more or less as bring it nearest to another."""
+    return angle + 2 * math.pi * round((near - angle) / (2 * math.pi))
 
 
 def neighbours(numbers: Sequence[float]) -> NDArray[np.float32]:

@@ -1,0 +1,408 @@
+"""Bake: plain keyframes that give the live camera's picture without the add-on."""
+
+import math
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+import viewcam_addon
+from viewcam_addon.blender import baking, versions
+from viewcam_addon.blender import camera as cameras
+from viewcam_addon.errors import InputError
+
+MODES = ("XYZ", "ZYX", "QUATERNION", "AXIS_ANGLE")
+CHANNELS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
+
+
+@pytest.fixture
+def over_the_target(posed_camera, scene, over_the_top):
+    """A camera that flies over the origin from frame 1 to 21, is straight above it at frame 11, and zooms all the way."""
+    scene.render.resolution_x, scene.render.resolution_y = 64, 36
+    group = posed_camera.virtual_pinhole
+    group.look_at = (0, 0, 0)
+    for frame in range(1, 22):
+        group.eye, group.up, group.distance = over_the_top(6 * (frame - 11)), (0, 0.01 * frame, 1), 30 + frame
+        for name in ("eye", "up", "distance"):
+            group.keyframe_insert(name, frame=frame)
+    # Exactly straight above, up included.
+    group.eye, group.up = (0, 0, 10), (0, 0, 1)
+    for name in ("eye", "up"):
+        group.keyframe_insert(name, frame=11)
+    scene.frame_start, scene.frame_end = 1, 21
+    scene.frame_set(1)
+    return posed_camera
+
+
+@pytest.fixture
+def without_the_addon():
+    """A function that takes the add-on out of Blender until the test ends."""
+    yield viewcam_addon.unregister
+    if not hasattr(bpy.types.Object, "virtual_pinhole"):
+        viewcam_addon.register()
+
+
+def curves(block):
+    return {(curve.data_path, curve.array_index): curve for curve in versions.action_curves(block)}
+
+
+def everything(camera_object):
+    """All that a bake may touch, in numbers: channels, data, values and curves."""
+    blocks = (camera_object, camera_object.data)
+    keys = {
+        (type(block).__name__, *name): [(*point.co, point.interpolation) for point in curve.keyframe_points]
+        for block in blocks
+        for name, curve in curves(block).items()
+    }
+    data, group = camera_object.data, camera_object.virtual_pinhole
+    return (
+        [tuple(getattr(camera_object, name)) for name in CHANNELS],
+        (data.lens, data.sensor_width, data.sensor_height, data.shift_x, data.shift_y),
+        (group.enabled, group.numbers()),
+        keys,
+        tuple(getattr(block.animation_data, "action", None) is None for block in blocks),
+    )
+
+
+@pytest.mark.parametrize("pole", ["CANONICAL", "HOLD"])
+def test_a_baked_flight_over_the_pole_renders_the_live_picture_without_the_addon(
+    over_the_target, scene, render_positions, picture_error, without_the_addon, pole
+):
+    over_the_target.virtual_pinhole.pole = pole
+    scene.frame_step, expected = 2, {}
+    for frame in range(1, 22, 2):
+        scene.frame_set(frame)
+        expected[frame] = cameras.stated(over_the_target, scene)
+    pictures = [render_positions(animation=True)]
+    assert bpy.ops.viewcam.bake_camera() == {"FINISHED"}
+    without_the_addon()
+    scene.frame_set(500)
+    pictures.append(render_positions(animation=True))
+    for frame, pinhole in expected.items():
+        for name, positions in zip(("live", "baked"), pictures, strict=True):
+            error, tolerance = picture_error(pinhole, positions[frame])
+            assert error <= tolerance, f"{name}, frame {frame}: {error:.1e} px, and {tolerance:.1e} are rounding"
+    error, tolerance = picture_error(expected[13], pictures[1][11])
+    assert error > 100 * tolerance, "keyframes of another frame would not have been noticed"
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_keyframes_are_within_rounding_of_the_live_camera_and_never_flip(over_the_target, scene, mode):
+    over_the_target.rotation_mode = mode
+    over_the_target.virtual_pinhole.pole = "HOLD"
+    (found,) = baking.bake([over_the_target], scene, 1, 21)
+    assert found.ok
+    # 40 px from the axis at d = 40: the storage of a rotation, at most 4e-7 on both sides, shows as 4e-7 · 40 · 2.
+    assert found.at_keys < 1e-4, found.sentence()
+    # 6° a frame about the look-at point, ten away: half-way a straight line is 10 (1 − cos 3°) off, 0.014 of a length of 10.
+    assert found.between < 0.05 * 40, found.sentence()
+    name = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}.get(mode, "rotation_euler")
+    for index in range(len(getattr(over_the_target, name))):
+        steps = np.diff([point.co[1] for point in curves(over_the_target)[name, index].keyframe_points])
+        assert (np.abs(steps) < 0.5).all(), f"{name} {index} jumps by {np.abs(steps).max():.2g}"
+
+
+def test_a_flip_that_up_asks_for_is_told_between_the_keyframes(over_the_target, scene):
+    (found,) = baking.bake([over_the_target], scene, 1, 21)
+    assert found.ok and found.between > 10 and found.frame in (10.5, 11.5), found.sentence()
+
+
+def test_more_keys_a_frame_follow_the_flight_more_closely(over_the_target, scene):
+    over_the_target.virtual_pinhole.pole = "HOLD"
+    (one,) = baking.bake([over_the_target], scene, 1, 9)
+    over_the_target.virtual_pinhole.enabled = True
+    (four,) = baking.bake([over_the_target], scene, 1, 9, keys_per_frame=4)
+    assert len(curves(over_the_target)["location", 0].keyframe_points) == 33
+    # What a straight line is off goes with the square of its length; a corner of the keyed values goes with the length.
+    assert four.between < one.between / 3.5, f"{one.sentence()}; {four.sentence()}"
+
+
+@pytest.mark.parametrize("path", ["location", "rotation_euler", "lens"])
+def test_the_report_notices_keyframes_that_are_wrong(over_the_target, scene, monkeypatch, path):
+    write = baking._write
+
+    def spoil(flight):
+        write(flight)
+        block = over_the_target.data if path == "lens" else over_the_target
+        curve = curves(block)[path, 0]
+        for point in curve.keyframe_points:
+            point.co[1] *= 1.001
+        curve.update()
+
+    monkeypatch.setattr(baking, "_write", spoil)
+    (found,) = baking.bake([over_the_target], scene, 1, 21)
+    assert not found.ok
+
+
+def test_the_values_are_kept_and_turned_off_and_the_frame_is_restored(over_the_target, scene):
+    scene.frame_set(7, subframe=0.25)
+    before = over_the_target.virtual_pinhole.numbers()
+    place = tuple(over_the_target.location)
+    bpy.ops.viewcam.bake_camera()
+    assert (scene.frame_current, scene.frame_subframe) == (7, 0.25)
+    group = over_the_target.virtual_pinhole
+    assert group.numbers() == before and not group.enabled
+    assert {path for path, _ in curves(over_the_target)} >= {"virtual_pinhole.eye", "virtual_pinhole.up", "location"}
+    # A quarter of the way along a straight line, and not along the curve.
+    assert 0 < math.dist(over_the_target.location, place) < 0.05
+    scene.frame_set(7)
+    assert tuple(over_the_target.location) == pytest.approx(tuple(group.eye), rel=1e-6)
+
+
+def test_undo_brings_everything_back_bit_for_bit(over_the_target, scene):
+    over_the_target.data.lens = 33
+    over_the_target.data.keyframe_insert("lens", frame=3)
+    curves(over_the_target.data)["lens", 0].mute = True  # or it would win over the values as soon as Blender plays it
+    scene.frame_set(5)
+    before = everything(over_the_target)
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.viewcam.bake_camera()
+    after = everything(over_the_target)
+    assert after != before
+    bpy.ops.ed.undo_push(message="baked")
+    bpy.ops.ed.undo()
+    assert everything(bpy.data.objects["Camera"]) == before
+    bpy.ops.ed.redo()
+    assert everything(bpy.data.objects["Camera"]) == after
+
+
+def test_curves_of_these_channels_are_replaced_and_all_others_are_left_alone(over_the_target, scene):
+    camera = over_the_target.data
+    for block, path in ((over_the_target, "location"), (over_the_target, "scale"), (camera, "lens"), (camera, "shift_x")):
+        for frame in (1, 100):
+            block.keyframe_insert(path, frame=frame)
+    curves(over_the_target)["location", 0].modifiers.new("NOISE")
+    curves(camera)["lens", 0].mute = True
+    kept = [
+        [tuple(point.co) for point in curves(block)[path, 0].keyframe_points]
+        for block, path in ((over_the_target, "scale"), (camera, "shift_x"))
+    ]
+    (found,) = baking.bake([over_the_target], scene, 1, 21)
+    assert found.ok, found.sentence()
+    assert [
+        [tuple(point.co) for point in curves(block)[path, 0].keyframe_points]
+        for block, path in ((over_the_target, "scale"), (camera, "shift_x"))
+    ] == kept
+    assert [point.co[0] for point in curves(camera)["lens", 0].keyframe_points] == list(range(1, 22))
+    names = [(curve.data_path, curve.array_index) for curve in versions.action_curves(over_the_target)]
+    assert len(names) == len(set(names))
+
+
+def test_what_stands_still_gets_a_single_keyframe(posed_camera, scene):
+    group = posed_camera.virtual_pinhole
+    for frame, distance in ((1, 500), (11, 600)):
+        group.distance = distance
+        group.keyframe_insert("distance", frame=frame)
+    baking.bake([posed_camera], scene, 1, 11)
+    counts = {name: len(curve.keyframe_points) for name, curve in curves(posed_camera).items() if name[0][0] != "v"}
+    assert counts == {(path, i): 1 for path in ("location", "rotation_euler") for i in range(3)}
+    assert len(curves(posed_camera.data)["lens", 0].keyframe_points) == 11
+    assert ("sensor_width", 0) not in curves(posed_camera.data)
+
+
+def test_a_sensor_that_must_grow_has_one_size_for_all_frames(posed_camera, scene):
+    """1920 px at d = 20 ask for a lens of 0.375 mm, at d = 200 for one of 3.75 mm."""
+    group = posed_camera.virtual_pinhole
+    for frame, distance in ((1, 20), (5, 200)):
+        group.distance = distance
+        group.keyframe_insert("distance", frame=frame)
+    for point in curves(posed_camera)["virtual_pinhole.distance", 0].keyframe_points:
+        point.interpolation = "LINEAR"
+    scene.frame_set(5)
+    assert posed_camera.data.sensor_width == 36
+    (found,) = baking.bake([posed_camera], scene, 1, 5)
+    assert found.ok and posed_camera.data.sensor_width == 4 * 36
+    assert ("sensor_width", 0) not in curves(posed_camera.data)
+    # The lens goes along a straight line as d does: 960 px from the middle, three roundings of float32 on both sides.
+    assert found.between < 6 * 960 * 2.0**-24, found.sentence()
+    group.enabled = True
+    scene.frame_set(5)
+    assert posed_camera.data.sensor_width == 36  # live again, with the artist's own
+
+
+def test_an_animated_sensor_is_followed(over_the_target, scene):
+    camera = over_the_target.data
+    for frame, width in ((1, 36), (21, 18)):
+        camera.sensor_width = width
+        camera.keyframe_insert("sensor_width", frame=frame)
+    (found,) = baking.bake([over_the_target], scene, 1, 21)
+    assert found.ok, found.sentence()
+    assert len(curves(camera)["sensor_width", 0].keyframe_points) == 21
+
+
+def test_time_that_is_stretched_is_followed(over_the_target, scene):
+    scene.render.frame_map_old, scene.render.frame_map_new = 100, 200
+    (found,) = baking.bake([over_the_target], scene, 1, 42)
+    assert found.ok, found.sentence()
+    assert curves(over_the_target)["location", 0].keyframe_points[-1].co[0] == 21
+
+
+def test_motion_blur_gets_keyframes_before_and_behind_the_range(over_the_target, scene):
+    scene.render.use_motion_blur = True
+    baking.bake([over_the_target], scene, 5, 9)
+    assert [point.co[0] for point in curves(over_the_target)["location", 0].keyframe_points] == list(range(4, 11))
+
+
+def test_an_animated_parent_and_a_constraint_that_carries_are_taken_into_account(over_the_target, scene):
+    dolly, crane = (bpy.data.objects.new(name, None) for name in ("Dolly", "Crane"))
+    for item in (dolly, crane):
+        scene.collection.objects.link(item)
+        for frame, x in ((1, -3.0), (21, 4.0)):
+            item.location, item.rotation_euler = (x, 1, 2), (x / 9, x / 5, 0.3)
+            item.keyframe_insert("location", frame=frame)
+            item.keyframe_insert("rotation_euler", frame=frame)
+    over_the_target.parent = dolly
+    (found,) = baking.bake([over_the_target], scene, 1, 21)
+    assert found.ok, found.sentence()
+    over_the_target.virtual_pinhole.enabled = True
+    constraint = over_the_target.constraints.new("CHILD_OF")
+    constraint.target = crane
+    (found,) = baking.bake([over_the_target], scene, 1, 21)
+    assert found.ok, found.sentence()
+
+
+def test_a_constraint_in_the_way_acts_on_keyframes_as_on_the_live_camera(over_the_target, scene):
+    constraint = over_the_target.constraints.new("LIMIT_LOCATION")
+    constraint.use_max_z, constraint.max_z = True, 8
+    (found,) = baking.bake([over_the_target], scene, 1, 21)
+    assert found.ok, found.sentence()
+
+
+def test_values_in_the_nla_are_baked_into_an_action_above_it(over_the_target, scene):
+    data = over_the_target.animation_data
+    track, action, slot = data.nla_tracks.new(), data.action, getattr(data, "action_slot", None)
+    strip = track.strips.new("Strip", 1, action)
+    if slot:
+        strip.action_slot = slot
+    data.action = None
+    scene.frame_set(1)
+    (found,) = baking.bake([over_the_target], scene, 1, 21)
+    assert found.ok, found.sentence()
+    assert data.action != action and len(action_paths(over_the_target)) == 2
+
+
+def action_paths(block):
+    return {path for path, _ in curves(block)}
+
+
+def test_all_selected_cameras_are_baked_in_one_go(over_the_target, scene, add_camera):
+    other, plain = add_camera("Other"), add_camera("Plain")
+    group = other.virtual_pinhole
+    group.enabled = True
+    for frame in (1, 9):
+        group.eye = (frame, 5, 1)
+        group.keyframe_insert("eye", frame=frame)
+    for item in (over_the_target, other, plain):
+        item.select_set(True)
+    bpy.context.view_layer.objects.active = over_the_target
+    bpy.ops.viewcam.bake_camera(frame_start=2, frame_end=6, selected=True)
+    for item in (over_the_target, other):
+        assert [point.co[0] for point in curves(item)["location", 0].keyframe_points] == [2, 3, 4, 5, 6], item.name
+    assert plain.animation_data is None
+
+
+def test_a_linked_camera_is_refused_and_a_library_override_is_baked_and_saved(over_the_target, scene, tmp_path):
+    library, file = tmp_path / "library.blend", tmp_path / "shot.blend"
+    bpy.data.libraries.write(str(library), {over_the_target})
+    bpy.data.objects.remove(over_the_target)
+    bpy.data.cameras.remove(bpy.data.cameras["Camera"])
+    with bpy.data.libraries.load(str(library), link=True) as (_, into):
+        into.objects = ["Camera"]
+    (linked,) = into.objects
+    scene.collection.objects.link(linked)
+    with pytest.raises(InputError, match=r"'Camera' is linked from 'library.blend': make a local copy, or a library override"):
+        baking.bake([linked], scene, 1, 21)
+    override = linked.override_create(remap_local_usages=True)
+    with pytest.raises(InputError, match=r"'CameraAction' is linked from"):
+        baking.bake([override], scene, 1, 21)
+    override.animation_data.action = override.animation_data.action.copy()
+    with pytest.raises(InputError, match=r"'Camera' is linked from"):  # the data still is
+        baking.bake([override], scene, 1, 21)
+    override.data.override_create(remap_local_usages=True)
+    (found,) = baking.bake([override], scene, 1, 21)
+    assert found.ok, found.sentence()
+    before = everything(override)
+    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    bpy.ops.wm.open_mainfile(filepath=str(file))
+    override = next(item for item in bpy.context.scene.objects if item.type == "CAMERA")
+    assert override.override_library and everything(override) == before
+
+
+def spoil_driver(camera_object, _scene):
+    camera_object.data.driver_add("lens")
+
+
+def spoil_enabled(camera_object, _scene):
+    camera_object.virtual_pinhole.keyframe_insert("enabled", frame=1)
+
+
+def spoil_shared_data(camera_object, scene):
+    scene.collection.objects.link(bpy.data.objects.new("Twin", camera_object.data))
+
+
+def spoil_shared_action(camera_object, scene):
+    twin = bpy.data.objects.new("Twin", bpy.data.cameras.new("Twin"))
+    scene.collection.objects.link(twin)
+    twin.animation_data_create().action = camera_object.animation_data.action
+    if hasattr(twin.animation_data, "action_slot"):
+        twin.animation_data.action_slot = camera_object.animation_data.action_slot
+
+
+def spoil_nla(camera_object, _scene):
+    camera_object.animation_data.nla_tracks.new()
+    camera_object.animation_data.action_blend_type = "ADD"
+
+
+def spoil_type(camera_object, _scene):
+    camera_object.data.type = "ORTHO"
+
+
+def spoil_values(camera_object, _scene):
+    group = camera_object.virtual_pinhole
+    group.eye = group.look_at
+    group.keyframe_insert("eye", frame=7)
+
+
+def spoil_animation(camera_object, _scene):
+    camera_object.animation_data_clear()
+
+
+def spoil_switch(camera_object, _scene):
+    camera_object.virtual_pinhole.enabled = False
+
+
+@pytest.mark.parametrize(
+    ("spoil", "sentence"),
+    [
+        (spoil_driver, "A driver sets 'lens' of 'Camera', and would win over keyframes: remove it"),
+        (spoil_enabled, "'enabled' of 'Camera' is animated, and would turn it on again: delete its keyframes"),
+        (spoil_shared_data, "The camera data 'Camera' is shared with 'Twin', which keyframes of the lens would zoom too: "),
+        (spoil_shared_action, " of 'Camera' moves 'Twin' too: make the action single-user"),
+        (spoil_nla, "The NLA would mix the keyframes of 'Camera' with its tracks: "),
+        (spoil_type, "Camera 'Camera' is orthographic, no pinhole: "),
+        (spoil_values, "Frame 7: eye and look_at are the same point "),
+        (spoil_animation, "The values of camera 'Camera' are not animated, and its pose and lens are plain Blender already: "),
+        (spoil_switch, "The Virtual Pinhole of camera 'Camera' is not enabled, and the camera is plain Blender: enable it"),
+    ],
+)
+def test_what_can_not_be_baked_is_refused_in_a_sentence_and_nothing_changes(over_the_target, scene, spoil, sentence):
+    scene.frame_set(3)
+    spoil(over_the_target, scene)
+    scene.frame_set(3)
+    before = everything(over_the_target)
+    with pytest.raises(RuntimeError) as error:
+        bpy.ops.viewcam.bake_camera(camera="Camera")
+    assert sentence in str(error.value) and "Traceback" not in str(error.value)
+    assert everything(over_the_target) == before
+    assert scene.frame_current == 3
+
+
+def test_a_range_that_runs_backwards_is_refused(over_the_target):
+    with pytest.raises(RuntimeError, match="The last frame 2 is before the first frame 5"):
+        bpy.ops.viewcam.bake_camera(frame_start=5, frame_end=2)
+
+
+def test_a_single_frame_is_baked(over_the_target, scene):
+    (found,) = baking.bake([over_the_target], scene, 4, 4)
+    assert found.ok and "between" not in found.sentence()
