@@ -262,6 +262,25 @@ def test_an_animated_parent_and_a_constraint_that_carries_are_taken_into_account
     assert found.ok, found.sentence()
 
 
+def test_a_target_on_a_moving_object_is_followed_and_kept(over_the_target, scene):
+    dolly, target = (bpy.data.objects.new(name, None) for name in ("Dolly", "Target"))
+    for item in (dolly, target):
+        scene.collection.objects.link(item)
+    target.parent, target.location = dolly, (1, 0, 0)
+    for frame, x in ((1, -2.0), (21, 2.0)):
+        dolly.location, dolly.rotation_euler = (x, 0.5, 0), (0, x, x)
+        dolly.keyframe_insert("location", frame=frame)
+        dolly.keyframe_insert("rotation_euler", frame=frame)
+    over_the_target.virtual_pinhole.look_at_target = target
+    scene.frame_set(13)
+    live = cameras.read(over_the_target, scene)
+    (found,) = baking.bake([over_the_target], scene, 1, 21)
+    assert found.ok, found.sentence()
+    assert over_the_target.virtual_pinhole.look_at_target == target
+    np.testing.assert_allclose(cameras.read(over_the_target, scene).basis(), live.basis(), atol=1e-6)
+    assert abs(live.project(tuple(target.matrix_world.translation))[0] - 32) < 1e-3  # in the middle of 64 px
+
+
 def test_a_constraint_in_the_way_acts_on_keyframes_as_on_the_live_camera(over_the_target, scene):
     constraint = over_the_target.constraints.new("LIMIT_LOCATION")
     constraint.use_max_z, constraint.max_z = True, 8

@@ -25,7 +25,7 @@ from ..compare.cameras import conversion_error
 from ..errors import InputError
 from ..pinhole import Pinhole
 from . import camera as cameras
-from . import datablocks, hold, pose, versions
+from . import datablocks, pose, versions
 from .operators import CameraOperator
 
 Array = NDArray[np.float64]
@@ -192,7 +192,7 @@ def _check(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
     name, camera = camera_object.name, camera_object.data
     if not camera_object.virtual_pinhole.enabled:
         raise InputError(f"the Virtual Pinhole of camera {name!r} is not enabled, and the camera is plain Blender: enable it")
-    if not hold.is_animated(camera_object):
+    if not datablocks.is_animated(camera_object):
         raise InputError(
             f"the values of camera {name!r} are not animated, and its pose and lens are plain Blender already: "
             "animate them, or leave it as it is"
