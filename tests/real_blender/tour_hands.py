@@ -1,0 +1,206 @@
+"""What an artist's hand does in a real Blender with a window: finds a button and clicks it, types, drags, looks at the screen.
+
+Everything is a generator that a timer steps (panel_in_a_window.py), so that Blender handles the events and draws in between. No
+coordinate of a button is assumed: the mouse moves over the panel, and Blender is asked which property or operator it is on.
+Where a button stood the last time is looked at first.
+"""
+
+import subprocess
+
+import bpy
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
+from panel_in_a_window import NOWHERE, click, move, press, region, window
+
+SIDEBAR, PROPERTIES, VIEWPORT = ("VIEW_3D", "UI"), ("PROPERTIES", "WINDOW"), ("VIEW_3D", "WINDOW")
+SCREEN_HEIGHT = 1000
+_HEADER = 60  # pixels from the panel's top within which its checkbox stands
+_PATIENCE = 4  # looks
+_ROW = 14  # pixels between two looks, less than a button's height
+# Where in a row its buttons are looked for, as shares of the panel's width; of operators there are many in a row.
+_MIDDLE, _CHECKBOX, _OPERATORS = 0.6, 0.13, (0.31, 0.38, 0.46, 0.53, 0.72, 0.85)
+_KEYS = {"-": "MINUS", ".": "PERIOD", " ": "SPACE", "/": "SLASH", "=": "EQUAL", ",": "COMMA"}
+_DIGITS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE")
+
+_found = {}
+
+
+def under_the_mouse(where):
+    """What the button under the mouse is for: 'virtual_pinhole.eye[2]', 'viewcam.dolly_camera(camera="Camera")' or ''."""
+    area, part = region(*where)
+    with bpy.context.temp_override(window=window(), area=area, region=part):
+        if found := bpy.context.property:
+            _, path, index = found
+            return path if index < 0 else f"{path}[{index}]"
+        if bpy.ops.ui.copy_python_command_button.poll():
+            clipboard = bpy.context.window_manager.clipboard
+            bpy.ops.ui.copy_python_command_button()
+            command = bpy.context.window_manager.clipboard
+            bpy.context.window_manager.clipboard = clipboard
+            return command.removeprefix("bpy.ops.")
+    return ""
+
+
+def look(x, y, where):
+    """Steps that end with what stands there; Blender notices the mouse in the second."""
+    move(x, y)
+    yield
+    yield
+    return under_the_mouse(where)
+
+
+def find(button, where=SIDEBAR):
+    """Steps that end with the window coordinates of a button: its property, or how its operator's call begins."""
+    place = yield from seek(button, where)
+    assert place, f"there is no button {button} in the {where[1]} of the {where[0]}, but {sorted(_map(where))}"
+    return place
+
+
+def seek(button, where):
+    """As `find`, or None if there is no such button."""
+    if place := _remembered(button, where):
+        for _ in range(_PATIENCE):  # the button that the mouse comes from may want to be left first
+            if (yield from look(*place, where)).startswith(button):
+                return place
+    print(f"looking for {button}", flush=True)
+    _, part = region(*where)
+    _map(where).clear()
+    yield from survey(part.y + part.height, part.y, where)
+    return _remembered(button, where)
+
+
+def survey(top, bottom, where):
+    """Look at all rows between two heights and remember their buttons; whether there are any."""
+    _, part = region(*where)
+    before = len(_map(where))
+    move(*NOWHERE)
+    yield
+    for y in range(int(top) - _ROW, int(bottom), -_ROW):
+        columns = [_MIDDLE]
+        for share in columns:
+            x = part.x + part.width * share
+            there = yield from look(x, y, where)
+            if there and there not in _map(where):
+                _map(where)[there] = (x, y)
+            if share == _MIDDLE and not there:
+                columns += [_OPERATORS[0], _CHECKBOX] if y > part.y + part.height - _HEADER else [_OPERATORS[0]]
+            elif len(columns) < len(_OPERATORS) and there.startswith("viewcam."):
+                columns += sorted(set(_OPERATORS) - set(columns))
+    return len(_map(where)) > before
+
+
+def _map(where):
+    return _found.setdefault(where, {})
+
+
+def _remembered(button, where):
+    return next((place for there, place in _map(where).items() if there.startswith(button)), None)
+
+
+def push(button, where=SIDEBAR):
+    """Click a button."""
+    x, y = yield from find(button, where)
+    yield from click(x, y)
+
+
+def unfold(button, where=SIDEBAR):
+    """Open the sub-panels, from the first on, until the button is there: headers are rows in which nothing answers."""
+    if _remembered(button, where) and (yield from seek(button, where)):
+        return
+    _, part = region(*where)
+    y = min((y for _, y in _map(where).values()), default=part.y + part.height) - _ROW
+    while y > part.y and not _remembered(button, where):
+        yield from click(part.x + part.width * 0.35, y)
+        if (yield from survey(y - _ROW / 2, max(y - 6 * _ROW, part.y), where)):
+            yield from survey(y - 5 * _ROW, part.y, where)
+            y = min(y for _, y in _map(where).values())
+        y -= _ROW / 2
+    assert _remembered(button, where), f"no sub-panel opens on {button}, only on {sorted(_map(where))}"
+
+
+def type_into(button, text, where=SIDEBAR):
+    """Click a field, replace what stands in it and confirm."""
+    x, y = yield from find(button, where)
+    yield from click(x, y)
+    yield from write(text)
+    press("RET", x, y)
+    yield
+    yield
+
+
+def write(text):
+    """Replace the text of the field that is being edited."""
+    press("A", *NOWHERE, ctrl=True)
+    for character in text:
+        key = _DIGITS[int(character)] if character.isdigit() else _KEYS.get(character, character.upper())
+        for value in ("PRESS", "RELEASE"):
+            letter = {"unicode": character} if value == "PRESS" else {}
+            window().event_simulate(type=key, value=value, x=NOWHERE[0], y=NOWHERE[1], **letter)
+    yield
+
+
+def key_over(button, key, where=SIDEBAR, **modifiers):
+    """Press a key with the mouse over a button, as I for a keyframe."""
+    x, y = yield from find(button, where)
+    press(key, x, y, **modifiers)
+    yield
+    yield
+
+
+def undo():
+    press("Z", *NOWHERE, ctrl=True)
+    yield
+    yield
+
+
+def redo():
+    press("Z", *NOWHERE, ctrl=True, shift=True)
+    yield
+    yield
+
+
+def on_screen(place):
+    """Window coordinates of a point of the world in the 3D viewport."""
+    area, part = region(*VIEWPORT)
+    x, y = location_3d_to_region_2d(part, area.spaces.active.region_3d, Vector(place))
+    return part.x + x, part.y + y
+
+
+def drag(start, by, **modifiers):
+    """Steps that drag from one place of the window by so many pixels."""
+    x, y = start
+    move(x - 3, y)
+    yield
+    move(x, y)
+    yield
+    yield
+    window().event_simulate(type="LEFTMOUSE", value="PRESS", x=int(x), y=int(y))
+    yield
+    for share in (0.25, 0.5, 0.75, 1.0, 1.0):
+        move(x + by[0] * share, y + by[1] * share)
+        yield
+    window().event_simulate(type="LEFTMOUSE", value="RELEASE", x=int(x + by[0]), y=int(y + by[1]), **modifiers)
+    yield
+    yield
+
+
+def call(operator, where=VIEWPORT, **properties):
+    """Run an operator as its key or its place in a menu does, in a part of the window."""
+    area, part = region(*where)
+    with bpy.context.temp_override(window=window(), area=area, region=part):
+        return operator("INVOKE_DEFAULT", **properties)
+
+
+def lowest_button(where=SIDEBAR):
+    """The height in the window of the lowest button that was found."""
+    return min(y for _, y in _map(where).values())
+
+
+def photograph(where, path, share=100):
+    """Save what the screen shows of (left, bottom, width, height), in percent of its size and few colours."""
+    left, bottom, width, height = map(int, where)
+    crop = f"{width}x{height}+{left}+{SCREEN_HEIGHT - bottom - height}"
+    few = ("+dither", "-colors", "96") if path.suffix == ".png" else ("-quality", "85")
+    subprocess.run(
+        ["import", "-window", "root", "-crop", crop, "+repage", "-resize", f"{share}%", *few, "-strip", str(path)], check=True
+    )

@@ -1,0 +1,83 @@
+"""Runs inside a real Blender with a window: takes the tour (tour.py) by mouse and keys, and undoes and redoes each step.
+
+blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python tour_in_a_window.py -- [FOLDER]
+
+FOLDER : where the pictures of docs/artists.md go; without it none are taken. Leaves with status 0, or 5 and a traceback.
+"""
+
+import sys
+import time
+from pathlib import Path
+
+import bpy
+
+sys.path.append(str(Path(__file__).parent))
+import tour
+import tour_step
+from panel_in_a_window import move, open_the_panels, region, start, window
+from tour_hands import lowest_button, photograph, redo, undo
+
+FOLDER = next(map(Path, sys.argv[sys.argv.index("--") + 1 :]), None)
+MOUSE_AWAY = (200, 700)
+BELOW_BUTTONS = 45  # pixels below the lowest button of a panel that a picture of it shows
+
+
+def push_undo(message):
+    with bpy.context.temp_override(window=window()):
+        bpy.ops.ed.undo_push(message=message)
+
+
+def take(step):
+    """The steps of a step: prepare, by hand, check, undo and redo."""
+    step.prepare()
+    yield
+    push_undo("before")
+    yield
+    before = tour_step.state()
+    yield from step.by_hand()
+    yield
+    step.check()
+    after = tour_step.state()
+    if FOLDER and step.picture:
+        yield from step.pose_for_the_picture()
+        move(*MOUSE_AWAY)
+        yield
+        yield
+        part, share = _shown(step.shows)
+        photograph(part, FOLDER / step.picture, share)
+    for _ in range(step.edits):
+        yield from undo()
+    assert not (lost := tour_step.differing(before, tour_step.state())), f"undo leaves {lost}"
+    for _ in range(step.edits):
+        yield from redo()
+    assert not (lost := tour_step.differing(after, tour_step.state())), f"redo leaves {lost}"
+    step.tidy()
+    yield
+
+
+def _shown(name):
+    """(left, bottom, width, height) of what a picture shows, and in how many percent of its size."""
+    view, _ = region("VIEW_3D", "WINDOW")
+    _, sidebar = region("VIEW_3D", "UI")
+    bottom = max(sidebar.y, lowest_button() - BELOW_BUTTONS)
+    return {
+        "sidebar": ((sidebar.x, bottom, sidebar.width, sidebar.y + sidebar.height - bottom), 100),
+        "view": ((view.x, view.y, view.width, view.height), 60),
+        "window": ((0, 0, window().width, window().height), 50),
+    }[name]
+
+
+def steps():
+    yield
+    tour_step.make_the_scene()
+    view, _ = region("VIEW_3D", "WINDOW")
+    view.spaces.active.shading.color_type = "MATERIAL"
+    yield from open_the_panels()
+    for each in tour.STEPS:
+        started = time.perf_counter()
+        yield from take(each())
+        print(f"done: {each.__name__} in {time.perf_counter() - started:.1f} s", flush=True)
+    print("done: the tour", flush=True)
+
+
+start(steps, interval=0.01)

@@ -1,0 +1,115 @@
+"""The tour: the buttons that move the camera."""
+
+import math
+
+import bpy
+import numpy as np
+from tour_hands import push, unfold
+from tour_step import Step, axes, camera, is_at_its_values, select, values
+
+
+class _Move(Step):
+    """By hand a button of the panel, by script its operator with the same properties."""
+
+    operator, properties = "", {}
+    button = None  # how the button's call begins, where the operator has several
+
+    def by_hand(self):
+        yield from unfold(f"viewcam.{self.operator}(")
+        yield from push(self.button or f"viewcam.{self.operator}(")
+
+    def by_script(self):
+        getattr(bpy.ops.viewcam, self.operator)(camera="Camera", **self.properties)
+
+    def check(self):
+        is_at_its_values()
+
+
+class LookAtSelection(_Move):
+    """The middle of what is selected comes into the middle of the picture."""
+
+    operator = "look_at_selection"
+
+    def prepare(self):
+        select("Camera", "Ball")
+
+    def check(self):
+        np.testing.assert_allclose(values().look_at, (2, -1, 0.5), atol=1e-6)
+        is_at_its_values()
+
+
+class LookAtCursor(_Move):
+    operator = "look_at_cursor"
+
+    def prepare(self):
+        bpy.context.scene.cursor.location = (-2, 0.5, 1)
+
+    def check(self):
+        assert tuple(values().look_at) == (-2, 0.5, 1)
+        is_at_its_values()
+
+
+class FrameByDistance(_Move):
+    """All of Suzanne fills the picture, by zooming."""
+
+    picture = "frame.png"
+    operator, properties = "frame_selection", {"by": "DISTANCE"}
+    button = "viewcam.frame_selection(camera=\"Camera\", by='DISTANCE'"
+
+    def prepare(self):
+        select("Camera", "Suzanne")
+        values().look_at = (0, 0, 1)
+
+    def check(self):
+        from bpy_extras.object_utils import world_to_camera_view
+
+        is_at_its_values()
+        graph = bpy.context.evaluated_depsgraph_get()
+        monkey = bpy.data.objects["Suzanne"]
+        seen = [
+            world_to_camera_view(bpy.context.scene, camera(), monkey.matrix_world @ each.co) for each in monkey.data.vertices
+        ]
+        room = min(min(x, y, 1 - x, 1 - y) for x, y, _ in seen)
+        assert abs(room - 0.05) < 1e-5, f"the margin is {room:.5f} of the picture and not 5 % ({graph.mode})"
+
+
+class OrbitToTheRight(_Move):
+    operator, properties = "orbit_camera", {"around": math.radians(15)}
+    button = 'viewcam.orbit_camera(camera="Camera", around=0'
+
+    def prepare(self):
+        self.eye = np.array(values().eye)
+
+    def check(self):
+        arms = [np.subtract(eye, values().look_at)[:2] for eye in (self.eye, values().eye)]
+        turned = math.atan2(arms[0][0] * arms[1][1] - arms[0][1] * arms[1][0], arms[0] @ arms[1])
+        assert abs(turned - math.radians(15)) < 1e-6, f"orbited by {math.degrees(turned):.4f}°"
+        is_at_its_values()
+
+
+class Swap(_Move):
+    operator = "swap_camera"
+
+    def prepare(self):
+        self.eye, self.look_at = tuple(values().eye), tuple(values().look_at)
+
+    def check(self):
+        assert (tuple(values().eye), tuple(values().look_at)) == (self.look_at, self.eye)
+        is_at_its_values()
+
+
+class Level(_Move):
+    """The horizon is level again."""
+
+    picture = "level.png"
+    operator = "level_camera"
+
+    def prepare(self):
+        values().eye, values().look_at, values().up = (4, -6, 3.5), (0, 0, 1), (0.3, 0, 1)
+
+    def check(self):
+        assert tuple(values().up) == (0, 0, 1) and abs(axes()[2, 0]) < 1e-7
+        is_at_its_values()
+
+
+STEPS = [LookAtSelection, LookAtCursor, FrameByDistance, OrbitToTheRight, Swap, Level]
