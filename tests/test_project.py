@@ -19,6 +19,7 @@ FLOORS = [
     "checks",
     "files",
     "terminal",
+    "children",
     "exact",
     "pinhole",
     "roll",

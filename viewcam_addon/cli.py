@@ -114,6 +114,8 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
 
     def report(added: argparse.ArgumentParser) -> None:
         added.add_argument("--report", metavar="DIR", type=Path, help="write an HTML report there")
+        added.add_argument("--difference", metavar="FILE.png", type=Path, help="draw there what differs, pixel by pixel")
+        added.add_argument("--repeat", help=argparse.SUPPRESS)  # what the report shall name as its command
 
     added = command(commands.export, "export", "Write the scene of a .blend as the tracer reads it.")
     blend(added)
@@ -144,7 +146,6 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     added.add_argument(
         "--scene", metavar="SCENE.json", type=Path, help="the reference's scene: explains silhouettes, brings the ledger"
     )
-    added.add_argument("--repeat", help=argparse.SUPPRESS)  # what the report shall name as its command
     added.add_argument("--test-samples", type=_positive, help=argparse.SUPPRESS)  # Cycles' file counts one that is left out
     report(added)
 
@@ -156,6 +157,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
 
     added = command(commands.demo, "demo", "Check the studio still that comes with the project, and write the report.")
     added.set_defaults(blend=commands.DEMO_SCENE, camera=None, frame=None, size=None, strict=False, recenter=False, clay=False)
+    added.set_defaults(difference=None, repeat=None)
     light(added)
     error(added, "the tracer takes")
     added.add_argument(

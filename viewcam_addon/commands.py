@@ -10,7 +10,6 @@ import argparse
 import dataclasses
 import importlib
 import importlib.util
-import os
 import subprocess
 import sys
 import tempfile
@@ -19,16 +18,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from . import children
 from .errors import InputError
 from .terminal import silent_libraries
-from .tracer.scene.film import MOST_SAMPLES
+from .tracer.scene.film import MOST_SAMPLES, seeds
 
 PACKAGE = Path(__file__).parent
 DEMO_SCENE = PACKAGE.parent / "sample_scenes" / "studio.blend"
-
-# Cycles' noise is measured by rendering with several seeds: eight have a spread that tells it within a third or so, and cost
-# little beside their samples.
-SEEDS = 8
 
 Result = tuple[int, dict[str, Any]]
 
@@ -84,7 +80,7 @@ def cycles(options: argparse.Namespace) -> Result:
 
 def compare(options: argparse.Namespace) -> Result:
     from . import image
-    from .compare import light_report, radiance, report
+    from .compare import difference, light_report, radiance, report
     from .tracer.scene import scene_file
 
     reference, tests = image.read(options.reference), [image.read(path) for path in options.tests]
@@ -108,7 +104,10 @@ def compare(options: argparse.Namespace) -> Result:
     print(*_ledger_lines(ledger), *comparison.lines(), sep="\n")
     if options.report:
         print(f"report: {write_report(comparison, reference, tests, options.report, ledger, words)}")
-    return 0 if comparison.passed else 1, {**comparison.to_json(), "ledger": _ledger_json(ledger)}
+    result = {**comparison.to_json(), "ledger": _ledger_json(ledger)}
+    if options.difference:
+        result["difference"] = difference.write(comparison, options.difference)
+    return 0 if comparison.passed else 1, result
 
 
 def _compare_geometry(reference: Any, test: Any, camera: Any, scene: Any, threads: int | None) -> Any:
@@ -127,8 +126,7 @@ def check(options: argparse.Namespace) -> Result:
     with tempfile.TemporaryDirectory(prefix="viewcam-") as temporary:
         folder = options.report or Path(temporary)
         scene, reference = folder / "scene.json", folder / "reference.exr"
-        # A picture of a single sample would be that of the pixels' centres.
-        count = 1 if options.level == "geometry" else max(min(SEEDS, options.samples // 2), 1)
+        count = seeds(options.level, options.samples)
         tests = [folder / f"cycles-{i + 1}.exr" for i in range(count)] if count > 1 else [folder / "cycles.exr"]
         level = _export_and_render(options, scene, tests)
         threads = ["--threads", str(options.threads)] if options.threads else []
@@ -137,12 +135,17 @@ def check(options: argparse.Namespace) -> Result:
         status = run_beside("render", scene, reference, *light, *threads)
         if status:
             return status, {"error": "the reference could not be traced"}
-        outputs = [word for flag in ("json", "report") if (to := getattr(options, flag)) for word in (f"--{flag}", str(to))]
+        outputs = [
+            word
+            for flag in ("json", "report", "difference")
+            if (to := getattr(options, flag))
+            for word in (f"--{flag}", str(to))
+        ]
+        outputs += ["--test-samples", str(max(options.samples // count, 1)), "--repeat", options.repeat or options.words]
         if level == "geometry":
             tests = tests[:1]
-        outputs += ["--test-samples", str(max(options.samples // count, 1))]
         # The child has written the JSON: there is nothing to add.
-        return run_beside("compare", reference, *tests, "--scene", scene, "--repeat", options.words, *threads, *outputs), {}
+        return run_beside("compare", reference, *tests, "--scene", scene, *threads, *outputs), {}
 
 
 def demo(options: argparse.Namespace) -> Result:
@@ -215,10 +218,8 @@ def _job() -> Any:
 
 def run_beside(*arguments: str | Path) -> int:
     """Run a sub-command in a Python process of its own, with the same modules in reach as here."""
-    search_path = os.pathsep.join([str(PACKAGE.parent), *filter(None, sys.path)])
-    command = [sys.executable, "-m", f"{PACKAGE.name}.cli", *map(str, arguments)]
     sys.stdout.flush()
-    return subprocess.run(command, env=os.environ | {"PYTHONPATH": search_path}, check=False).returncode
+    return subprocess.run(children.viewcam(*arguments), env=children.environment(), check=False).returncode
 
 
 def _ledger_lines(ledger: Sequence[Any]) -> list[str]:

@@ -36,7 +36,7 @@ def test_an_enabled_add_on_has_preferences_of_its_own(fresh_blender):
     addons = fresh_blender.context.preferences.addons
     addon = addons.new()
     try:
-        addon.module = preferences._PACKAGE
+        addon.module = preferences.PACKAGE
         addon.preferences.default_up = "Y"
         assert preferences.up_axis() == (0, 1, 0)
         assert preferences.get().default_level == "GEOMETRY"

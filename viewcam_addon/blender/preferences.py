@@ -12,7 +12,7 @@ import bpy
 from ..pinhole import Triple
 from .render_settings import LEVELS
 
-_PACKAGE = __package__.rpartition(".viewcam_addon")[0] or __package__.partition(".")[0]
+PACKAGE = __package__.rpartition(".viewcam_addon")[0] or __package__.partition(".")[0]
 
 _AXES = {
     "X": (1.0, 0.0, 0.0),
@@ -38,7 +38,7 @@ _DEFAULTS = Defaults()
 
 
 class VIEWCAM_preferences(bpy.types.AddonPreferences):
-    bl_idname = _PACKAGE
+    bl_idname = PACKAGE
 
     default_up: bpy.props.EnumProperty(
         name="Up Axis",
@@ -88,7 +88,7 @@ class VIEWCAM_preferences(bpy.types.AddonPreferences):
 
 def get() -> VIEWCAM_preferences | Defaults:
     """The preferences, or their defaults where Blender keeps none."""
-    addon = bpy.context.preferences.addons.get(_PACKAGE)
+    addon = bpy.context.preferences.addons.get(PACKAGE)
     return addon.preferences if addon and addon.preferences else _DEFAULTS
 
 

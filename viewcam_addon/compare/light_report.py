@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..image import Image
-from . import charts, page, pictures
+from . import charts, difference, page, pictures
 from .charts import figure
 from .law import PERCENTILES, ROUNDINGS
 from .light_verdict import change_words, edge_words, place_words, samples_words
@@ -121,8 +121,7 @@ def _add_map(viewer: page.Viewer, comparison: RadianceComparison, name: str, val
         viewer.add(view, words, caption + legend, image=pictures.on_scale(values, 1e-2, high))
     elif kind == "difference":
         caption = f"Test minus reference: {_COLOURS}."
-        limit = max(float(np.percentile(np.abs(values), 99.5)), 1e-12)
-        _add_signed(viewer, view, words, caption, values, limit, "radiance")
+        _add_signed(viewer, view, words, caption, values, difference.spread(values), "radiance")
     else:
         question = row.questions[1 if kind == "tiles" else 0]
         what = {"tiles": f"The difference of each of the {question.name}"}.get(kind, "The difference of each pixel")

@@ -1,6 +1,5 @@
 """The report of a comparison of geometry; page.py has what it shares with that of light."""
 
-import math
 import os
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..image import Image
-from . import charts, page, pictures
+from . import charts, difference, page, pictures
 from .charts import figure
 from .geometry import Comparison
 from .law import PERCENTILES
@@ -94,7 +93,7 @@ def _views(comparison: Comparison, shades: tuple, reference: Image, test: Image)
         viewer.add("combined", "As rendered", caption, image=lit[0])
     for row in comparison.rows:
         if row.count:
-            low, high = _range(row)
+            low, high = difference.decades(row)
             picture = pictures.on_scale(comparison.maps[row.name], low, high)
             viewer.add(row.name.lower().replace(" ", "-"), f"{row.name} error", _legend(row, low, high), image=picture)
     return viewer.parts()
@@ -106,13 +105,6 @@ def _marks(comparison: Comparison) -> str:
     if len(comparison.mismatches.kinds) <= charts.MOST_MARKED:
         return drawn
     return f'<img class="marks" alt="" src="{pictures.png_uri(pictures.stain(comparison.mismatches, size))}">'
-
-
-def _range(row: Row) -> tuple[float, float]:
-    """Whole decades from a hundredth of the median's tolerance up to the largest error."""
-    high = math.ceil(math.log10(max(row.values[-1], row.tolerances[-1])))
-    low = math.floor(math.log10(row.tolerances[0] / 100))
-    return 10.0**low, 10.0 ** max(high, low + 2)
 
 
 def _legend(row: Row, low: float, high: float) -> str:

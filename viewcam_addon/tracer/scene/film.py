@@ -16,6 +16,17 @@ SAMPLES = 64
 MOST_SAMPLES = 4096
 """The most that a pixel gets where an error is wanted in place of a number of samples."""
 
+_SEEDS = 8
+
+
+def seeds(level: str, samples: int) -> int:
+    """In how many pictures of Cycles its samples are shared out, each with another seed, so that they tell their noise.
+
+    Eight have a spread that tells it within a third or so, and cost little beside their samples. A picture of a single sample
+    would be that of the pixels' centres, as that of geometry is.
+    """
+    return 1 if level == LEVELS[0] else max(min(_SEEDS, samples // 2), 1)
+
 
 @dataclass(frozen=True)
 class Film:

@@ -1,0 +1,63 @@
+"""Processes of our own: a whole family ends, whoever in it was started by whom."""
+
+import os
+import sys
+import time
+
+import pytest
+
+from viewcam_addon import children
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and /proc are Linux's")
+
+# A parent that starts a child which would sleep for a minute, and tells both numbers.
+FAMILY = """
+import os, subprocess, sys, time
+child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+print(os.getpid(), child.pid, flush=True)
+time.sleep(60)
+"""
+
+
+def is_there(process):
+    """Whether a process runs; one that has ended and whom nobody has asked for its status does not."""
+    try:
+        with open(f"/proc/{process}/stat") as file:
+            return file.read().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def wait_until(is_so, seconds=20):
+    ends = time.monotonic() + seconds
+    while not (found := is_so()) and time.monotonic() < ends:
+        time.sleep(0.02)
+    return found
+
+
+def test_grandchildren_end_with_the_child(tmp_path):
+    said = tmp_path / "said.txt"
+    family = children.Family([sys.executable, "-c", FAMILY], said, os.environ)
+    assert wait_until(lambda: said.read_text().endswith("\n")), "the family has not started"
+    members = [int(word) for word in said.read_text().split()]
+    assert all(map(is_there, members)) and family.status() is None
+    family.end()
+    assert wait_until(lambda: not any(map(is_there, members))), "a member runs on"
+    assert family.status() == -9
+    family.end()  # twice does no harm
+
+
+def test_what_a_child_says_stands_in_its_file(tmp_path):
+    program = "import sys; print('out'); print('err', file=sys.stderr); sys.exit(3)"
+    family = children.Family([sys.executable, "-c", program], tmp_path / "said.txt", os.environ)
+    family.wait()
+    assert family.status() == 3
+    assert sorted((tmp_path / "said.txt").read_text().split()) == ["err", "out"]
+
+
+def test_a_child_has_our_modules_in_reach_and_what_else_it_is_told(tmp_path):
+    variables = children.environment(TMPDIR=str(tmp_path))
+    program = "import tempfile, viewcam_addon.cli, numpy; print(tempfile.gettempdir())"
+    family = children.Family([sys.executable, "-c", program], tmp_path / "said.txt", variables)
+    family.wait()
+    assert (tmp_path / "said.txt").read_text().strip() == str(tmp_path)

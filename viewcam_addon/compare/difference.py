@@ -1,0 +1,72 @@
+"""The one picture of what differs, for a viewer of images such as Blender's: a PNG in colours, and words for its scale.
+
+Geometry is drawn as the error of each position, light as Combined's difference, both in the scales of the report; what sees
+another surface is marked. Rejected: the bare errors as an EXR, a ten-thousandth of a pixel being black on every screen.
+"""
+
+import math
+import os
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..files import written_whole
+from . import pictures
+from .charts import figure
+from .geometry import Comparison
+from .radiance import RadianceComparison
+from .statistics import Row
+
+# sRGB, where nothing was compared.
+_NOTHING = np.full((1, 3), 64, np.uint8)
+
+
+def write(comparison: Comparison | RadianceComparison, path: str | os.PathLike[str]) -> dict[str, str]:
+    """Write the PNG; returns its path and what its colours say, as plain JSON values.
+
+    Raises
+    ------
+    InputError
+        if the file can't be written.
+    """
+    picture, words = _of_light(comparison) if isinstance(comparison, RadianceComparison) else _of_geometry(comparison)
+    with written_whole(path) as temporary:
+        temporary.write_bytes(pictures.png(picture))
+    return {"image": str(path), "colours": words}
+
+
+def decades(row: Row) -> tuple[float, float]:
+    """The ends of a scale for a pass's errors: from a hundredth of the median's tolerance up to the largest error."""
+    high = math.ceil(math.log10(max(row.values[-1], row.tolerances[-1])))
+    low = math.floor(math.log10(row.tolerances[0] / 100))
+    return 10.0**low, 10.0 ** max(high, low + 2)
+
+
+def spread(values: NDArray) -> float:
+    """The end of a signed scale: what all but some outliers stay below."""
+    return max(float(np.percentile(np.abs(values), 99.5)), 1e-12)
+
+
+def _of_geometry(comparison: Comparison) -> tuple[pictures.Picture, str]:
+    row, size = comparison.rows[0], (comparison.pinhole.width, comparison.pinhole.height)
+    low, high = decades(row) if row.count else (1e-6, 1.0)
+    levels = pictures.on_scale(comparison.maps[row.name], low, high) if row.count else None
+    marks = pictures.stain(comparison.mismatches, size)
+    drawn = np.zeros(marks.shape[:2], np.uint8) if levels is None else levels
+    colours = _painted(drawn, pictures.colour_scale())
+    marks = marks[: len(colours), : len(colours[0])]
+    share = marks[..., 3:] / 255.0
+    blended = np.round(colours * (1 - share) + marks[..., :3] * share).astype(np.uint8)
+    words = f"Dark {figure(low)} px off, light {figure(high)} px. Another surface seen: red, or teal where explained"
+    return blended, words
+
+
+def _of_light(comparison: RadianceComparison) -> tuple[pictures.Picture, str]:
+    values = comparison.maps["Combined: difference"]
+    limit = spread(values)
+    words = f"Orange where Cycles is brighter, by {figure(limit)} at the full colour, blue where it is darker"
+    return _painted(pictures.signed(values, limit), pictures.signed_scale()), words
+
+
+def _painted(levels: pictures.Picture, scale: NDArray[np.uint8]) -> pictures.Picture:
+    return np.concatenate([_NOTHING, scale])[levels]
