@@ -219,6 +219,12 @@ def camera_data(plane: ViewPlane, frame: Frame, sensor_width: float, sensor_heig
     )
 
 
+def growth(sensor_fit: str, before: Frame, after: Frame) -> float:
+    """The factor by which d, in pixel widths at 100 %, grows from one picture to another where lens and sensor stay."""
+    was, now = (_fitted_pixels(sensor_fit, replace(frame, percentage=100))[0] for frame in (before, after))
+    return now / was
+
+
 def _beyond_blender(name: str, pixels: float, of_blender: str, value: float) -> str:
     problem = "too small" if abs(value) < 1 else "too large"
     return f"the {name} of {pixels:g} pixels needs a {of_blender} of {value:g}, {problem} for Blender's numbers: choose another"

@@ -105,10 +105,15 @@ def test_hostile_text_in_a_hidden_property_changes_nothing(posed_camera, scene, 
     assert np.isfinite(numbers_of(posed_camera)).all()
 
 
-@pytest.mark.parametrize("size", [(0, 0), (-5, 2**31 - 1), (1, -(2**31))])
-def test_a_hostile_size_when_set_is_borne(posed_camera, scene, capfd, size):
-    posed_camera.virtual_pinhole.size = size
-    use(posed_camera, scene, capfd)
+@pytest.mark.parametrize("keeps", ["PIXELS", "FIELD_OF_VIEW"])
+@pytest.mark.parametrize("value", HOSTILE)
+def test_a_hostile_picture_when_set_is_borne(posed_camera, scene, capfd, value, keeps):
+    group = posed_camera.virtual_pinhole
+    group.keeps = keeps
+    for stored in ((value,) * 5, (1920, value, 100, 1, 1), (1920, 1080, 100, value, 1)):
+        group.picture = group.counted_in = stored
+        use(posed_camera, scene, capfd)
+        assert np.isfinite(numbers_of(posed_camera)).all()
 
 
 @pytest.mark.parametrize("value", HOSTILE)

@@ -129,12 +129,6 @@ def test_blenders_clamp_is_told_with_what_was_done_about_it(posed_camera, scene)
     )
 
 
-def test_a_changed_size_of_the_picture_is_told(posed_camera, scene):
-    scene.render.resolution_x = 1280
-    (finding,) = findings_later(posed_camera, scene)
-    assert finding.startswith("The picture was 1920 × 1080 px and is 1280 × 1080 now")
-
-
 def test_a_changed_size_that_leaves_the_camera_right_is_not_told(posed_camera, scene):
     scene.render.resolution_percentage = 50
     assert findings_later(posed_camera, scene) == []

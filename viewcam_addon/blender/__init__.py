@@ -30,7 +30,8 @@ def _rooms() -> list[ModuleType]:
 
     buttons = [operators, moving, clipboard, baking]
     shown = [panel, proof, overlay, gizmos]
-    return [preferences, properties, render_settings, *buttons, *shown, engine, render_panels, file_menu, view_menu, animation, resolution]
+    followers = [animation, resolution]
+    return [preferences, properties, render_settings, *buttons, *shown, engine, render_panels, file_menu, view_menu, *followers]
 
 
 def register() -> None:

@@ -27,6 +27,10 @@ class Borrower:
             self.afterwards(setattr, owner, name, before)
             setattr(owner, name, value)
 
+    def enter(self, context: contextlib.AbstractContextManager) -> None:
+        """Enter a context, and leave it when the loan ends."""
+        self._stack.enter_context(context)
+
     def afterwards(self, undo: Callable[..., Any], *arguments: Any, **options: Any) -> None:
         """Call `undo` when the loan ends; what was borrowed last is given back first."""
         self._stack.callback(undo, *arguments, **options)

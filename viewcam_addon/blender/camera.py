@@ -22,11 +22,12 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import checks, intrinsics
+from .. import intrinsics
 from .. import roll as rolls
 from ..errors import InputError
 from ..pinhole import Pinhole, Triple
 from . import datablocks, findings, hold, pose, preferences, rotation, suspects, targets
+from . import picture as pictures
 
 Array = NDArray[np.float64]
 
@@ -51,8 +52,10 @@ def apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Sc
     frame = datablocks.frame_of(scene)
     followed = targets.names(camera_object)
     camera_object.virtual_pinhole.state(
-        pinhole.eye, pinhole.look_at, pinhole.up, pinhole.distance[0] * (frame.resolution_x / frame.size[0]), frame.size
+        pinhole.eye, pinhole.look_at, pinhole.up, pinhole.distance[0] * (frame.resolution_x / frame.size[0]), frame
     )
+    if followed:  # being asked where these are, Blender has brought the camera back to them
+        _place_closely(camera_object, pinhole, scene)
     kept = targets.names(camera_object)
     left = [f"The {words} no longer follows {name!r}" for words, name in followed.items() if words not in kept]
     return left + check(camera_object, pinhole, scene)
@@ -73,7 +76,7 @@ def follow(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
         before = _stood_at(camera_object, scene)
         roll = angle = hold.after_edit(before, level, roll, group.hold_within) if before else roll
     _place_closely(camera_object, rolls.turned(level, angle), scene)
-    group.settle(datablocks.frame_of(scene).size, roll)
+    group.settle(datablocks.frame_of(scene), roll)
 
 
 def place(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
@@ -90,7 +93,31 @@ def place(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Sc
     if scale != tuple(camera_object.scale):
         camera_object.scale = scale
     pose.set_rotation(camera_object, turn)
-    camera.lens, camera.shift_x, camera.shift_y = data.lens, data.shift_x, data.shift_y
+    camera.shift_x, camera.shift_y = data.shift_x, data.shift_y
+    _set_lens(camera, data, sensor)
+
+
+def refit(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
+    """Set the lens anew, which the values ask for in the picture as the scene renders it now; the pose stays as it is.
+
+    Raises
+    ------
+    InputError
+        as `follow` does. Nothing has changed then.
+    """
+    datablocks.check_perspective(camera_object)
+    camera, frame = camera_object.data, datablocks.frame_of(scene)
+    plane = intrinsics.view_plane(datablocks.camera_data_of(camera), frame)
+    distance = _distances(camera_object.virtual_pinhole, frame)
+    sensor = datablocks.own_sensor(camera)
+    data = intrinsics.camera_data(replace(plane, distance=distance), frame, *sensor, camera.sensor_fit)
+    _check_storable(camera_object, distance=(data.lens, data.sensor_width))
+    _set_lens(camera, data, sensor)
+
+
+def _set_lens(camera: bpy.types.Camera, data: intrinsics.CameraData, sensor: tuple[float, float]) -> None:
+    """Lens and sensor, and beside them the artist's own sensor if it had to grow."""
+    camera.lens = data.lens
     if (camera.sensor_width, camera.sensor_height) != (data.sensor_width, data.sensor_height):
         camera.sensor_width, camera.sensor_height = data.sensor_width, data.sensor_height
     camera.virtual_pinhole_sensor = sensor if data.sensor_width != sensor[0] else (0.0, 0.0)
@@ -191,20 +218,23 @@ def _level(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
     frame = datablocks.frame_of(scene)
     plane = intrinsics.view_plane(datablocks.camera_data_of(evaluated.data), frame)
     group = camera_object.virtual_pinhole
-    if checks.number("zoom", group.zoom) <= 0:
-        raise InputError(f"zoom is {group.zoom:g}: give a factor above 0")
-    eye, look_at, up, distance = group.numbers()
-    distance *= frame.size[0] / frame.resolution_x
+    eye, look_at, up, _ = group.numbers()
     return Pinhole(
         eye,
         look_at,
         up,
-        (distance, distance * (frame.pixel_aspect_x / frame.pixel_aspect_y)),
+        _distances(group, frame),
         plane.width,
         plane.height,
         plane.principal_point,
         pose.mirrors(evaluated.matrix_world),
     )
+
+
+def _distances(group: bpy.types.PropertyGroup, frame: intrinsics.Frame) -> tuple[float, float]:
+    """(d_x, d_y) as the values ask for them in the picture of `frame`."""
+    distance = pictures.distance(group, frame) * (frame.size[0] / frame.resolution_x)
+    return distance, distance * (frame.pixel_aspect_x / frame.pixel_aspect_y)
 
 
 def _stood_at(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole | None:
@@ -237,7 +267,7 @@ def adopt(camera_object: bpy.types.Object, scene: bpy.types.Scene, keep: frozens
     """
     group = camera_object.virtual_pinhole
     standing = as_it_stands(camera_object, scene, in_use=group.enabled and not keep)
-    eye, look_at, up, distance = group.numbers()
+    eye, look_at, up, _ = group.numbers()
     frame = datablocks.frame_of(scene)
     if "eye" not in keep:
         eye = standing.eye
@@ -245,9 +275,8 @@ def adopt(camera_object: bpy.types.Object, scene: bpy.types.Scene, keep: frozens
         look_at = standing.look_at
     if "up" not in keep:
         up = simplest_up(eye, look_at, read(camera_object, scene).basis()[1])
-    if "distance" not in keep:
-        distance = standing.distance[0] * frame.resolution_x / frame.size[0]
-    group.state(eye, look_at, up, distance, frame.size)
+    at_full_size = standing.distance[0] * frame.resolution_x / frame.size[0]
+    group.state(eye, look_at, up, pictures.distance(group, frame) if "distance" in keep else at_full_size, frame)
 
 
 def as_it_stands(camera_object: bpy.types.Object, scene: bpy.types.Scene, in_use: bool) -> Pinhole:

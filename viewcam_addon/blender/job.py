@@ -12,12 +12,11 @@ from pathlib import Path
 
 import bpy
 
-from .. import intrinsics
 from ..errors import InputError
 from ..tracer.scene import LedgerEntry, Scene
 from ..tracer.scene.film import LEVELS, NO_BOUNCES, SAMPLES
 from ..tracer.scene.levels import least_level
-from . import cycles, datablocks, ensure_registered, indices, materials, recentering
+from . import cycles, datablocks, ensure_registered, indices, materials, recentering, resolution
 from .borrowing import Borrower, borrowed
 from .export import Light, export_scene, survey
 from .ledger import Ledger
@@ -233,22 +232,6 @@ def _borrow_size(borrow: Borrower, scene: bpy.types.Scene, camera: bpy.types.Obj
     """Another number of pixels for the same lens; the stated distance counts pixels and goes with the lens."""
     if not all(4 <= number <= 65536 for number in size):
         raise InputError(f"Blender can't render {size[0]} × {size[1]} pixels: choose from 4 to 65536 each way")
-    before = _distance_at_full_size(scene, camera)
+    borrow.enter(resolution.lens_kept(camera, scene))
     for name, value in zip(("resolution_x", "resolution_y", "resolution_percentage"), (*size, 100), strict=True):
         borrow.set(scene.render, name, value)
-    group = camera.virtual_pinhole
-    if group.enabled:
-        *pose, distance = group.numbers()
-        # Last borrowed, first given back: the values are stated anew, then their digits and their size as they were.
-        borrow.afterwards(setattr, group, "size", tuple(group.size))
-        borrow.afterwards(setattr, group, "exact", group.exact)
-        borrow.afterwards(setattr, group, "when_set", group.when_set)
-        borrow.afterwards(group.state, *pose, distance, tuple(group.size), group.held_roll)
-        group.state(*pose, distance * _distance_at_full_size(scene, camera) / before, size, group.held_roll)
-
-
-def _distance_at_full_size(scene: bpy.types.Scene, camera: bpy.types.Object) -> float:
-    """The lens in pixels of the picture at 100 %."""
-    frame = datablocks.frame_of(scene)
-    plane = intrinsics.view_plane(datablocks.camera_data_of(camera.data), frame)
-    return plane.distance[0] * frame.resolution_x / frame.size[0]

@@ -8,7 +8,9 @@ Where the roll is held through the pole (hold.py), an edit also writes the new r
 camera as it was last set, from which the next edit sets out: a callback hears of an edit only when the old value is gone.
 
 `zoom` is a factor on d of its own, so that a zoom can be keyed and taken off again: `numbers` gives the product. `roll` is not
-stored. It is read off the axes, and setting it turns up, or where the roll is held, `held_roll`.
+stored (rolling.py).
+
+`keeps` says what the camera keeps when the picture gets another resolution (picture.py, resolution.py).
 
 Undo, redo and opening a file bring values and camera back together and call nothing. Callbacks raise nothing: values that make
 no camera (eye = look-at) leave it where it was, and the panel says so.
@@ -22,12 +24,10 @@ from collections.abc import Iterator
 import bpy
 import numpy as np
 
-from .. import checks
-from .. import roll as rolls
+from .. import checks, intrinsics
 from ..errors import InputError
-from ..pinhole import Pinhole
 from . import camera as cameras
-from . import datablocks, hold, preferences, targets
+from . import datablocks, picture, rolling, targets
 
 VALUES = ("eye", "look_at", "up", "distance")
 _stating = False
@@ -50,8 +50,12 @@ def _on_enabled(group: "VirtualPinhole", context: bpy.types.Context) -> None:
         return
     keep = frozenset(name for name in VALUES if group.is_property_set(name))
     if keep != frozenset(VALUES):
+        with without_callbacks():
+            group.enabled = False  # else a target would move the camera before it is read
         with contextlib.suppress(InputError):
             cameras.adopt(group.id_data, datablocks.scene_of(group.id_data), keep)
+        with without_callbacks():
+            group.enabled = True
     if keep:
         _on_edited(group, context)
 
@@ -63,6 +67,24 @@ def _on_edited(group: "VirtualPinhole", _context: bpy.types.Context) -> None:
     scene = datablocks.scene_of(camera_object)
     with contextlib.suppress(InputError):  # the panel finds the same error and shows it
         cameras.follow(camera_object, scene)
+
+
+def _on_distance(group: "VirtualPinhole", context: bpy.types.Context) -> None:
+    """Who states a distance means the pixels of the picture as it is now."""
+    if not _stating and not picture.is_counted_in_earlier(group):
+        _count_in_present_picture(group)
+    _on_edited(group, context)
+
+
+def _on_keeps(group: "VirtualPinhole", context: bpy.types.Context) -> None:
+    if not _stating:
+        _count_in_present_picture(group)
+    _on_edited(group, context)
+
+
+def _count_in_present_picture(group: "VirtualPinhole") -> None:
+    with contextlib.suppress(InputError):  # the panel finds the same error and shows it
+        group.counted_in = picture.shape(datablocks.frame_of(datablocks.scene_of(group.id_data)))
 
 
 def _on_pole(group: "VirtualPinhole", context: bpy.types.Context) -> None:
@@ -78,28 +100,6 @@ def _on_target(group: "VirtualPinhole", context: bpy.types.Context) -> None:
     targets.connect(group.id_data)
     group.mirror(group)
     _on_edited(group, context)
-
-
-def _roll(group: "VirtualPinhole") -> float:
-    """Radians by which the picture is turned from what the preferred up says; 0 where the values make no camera."""
-    with contextlib.suppress(InputError):
-        return rolls.angle_from(preferences.up_axis(), _view(group))
-    return 0.0
-
-
-def _set_roll(group: "VirtualPinhole", angle: float) -> None:
-    with contextlib.suppress(InputError):  # the panel finds the same error and shows it
-        view = _view(group)
-        if group.pole == "HOLD":
-            group.held_roll += angle - rolls.angle_from(preferences.up_axis(), view)
-        else:
-            group.set_up(rolls.rolled(view, preferences.up_axis(), angle).up)
-
-
-def _view(group: "VirtualPinhole") -> Pinhole:
-    """Where the values look and how the picture is turned, whatever its size."""
-    *pose, _ = group.numbers()
-    return rolls.turned(Pinhole(*pose, 1.0, 1, 1), hold.roll(group.id_data, datablocks.scene_of(group.id_data)))
 
 
 class VirtualPinhole(bpy.types.PropertyGroup):
@@ -166,7 +166,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         soft_min=1.0,
         soft_max=100000.0,
         precision=3,
-        update=_on_edited,
+        update=_on_distance,
         override={"LIBRARY_OVERRIDABLE"},
     )
     # No minimum either.
@@ -181,14 +181,29 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         update=_on_edited,
         override={"LIBRARY_OVERRIDABLE"},
     )
+    keeps: bpy.props.EnumProperty(
+        name="Resolution Keeps",
+        description="What the camera keeps when the picture gets another resolution",
+        items=(
+            ("PIXELS", "Distance", "The distance in pixels: a larger picture shows more, and each pixel as much as before"),
+            (
+                "FIELD_OF_VIEW",
+                "Field of View",
+                "The lens: a larger picture shows as much, and the distance in pixels grows with it",
+            ),
+        ),
+        update=_on_keeps,
+        options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
+    )
     # Not overridable: an override keeps the up, or the held roll, that it stands for.
     roll: bpy.props.FloatProperty(
         name="Roll",
-        description="By how much the picture is turned about the view, against what the preferred axis, the world's Z, would give as "
-        "up. Setting it turns up. Type 0 to level the picture",
+        description="By how much the picture is turned about the view, from how it is where up is the world's Z, or the axis "
+        "in the preferences. Setting it turns up. Type 0 to level the picture",
         subtype="ANGLE",
-        get=_roll,
-        set=_set_roll,
+        get=rolling.angle,
+        set=rolling.turn,
         options=set(),
     )
     pole: bpy.props.EnumProperty(
@@ -254,20 +269,29 @@ class VirtualPinhole(bpy.types.PropertyGroup):
     )
     exact: bpy.props.StringProperty(options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE"})
     when_set: bpy.props.StringProperty(options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE"})
-    size: bpy.props.IntVectorProperty(
-        description="The picture's size in pixels when the camera was set",
-        size=2,
+    picture: bpy.props.FloatVectorProperty(
+        description="Resolution, percentage and pixel aspect of the picture for which the camera was set",
+        size=5,
+        options={"HIDDEN"},
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    counted_in: bpy.props.FloatVectorProperty(
+        description="Resolution, percentage and pixel aspect of the picture whose pixels the distance counts",
+        size=5,
         options={"HIDDEN"},
         override={"LIBRARY_OVERRIDABLE"},
     )
 
-    def state(self, eye: tuple, look_at: tuple, up: tuple, distance: float, size: tuple[int, int], roll: float = 0.0) -> None:
+    def state(self, eye: tuple, look_at: tuple, up: tuple, distance: float, frame: intrinsics.Frame, roll: float = 0.0) -> None:
         """Set the four values in float64 and enable them; the camera stays where it is.
 
-        distance : the effective one, zoom included. A zoom that can be kept stays, any other becomes 1.
+        distance : the effective one in the picture of `frame`, zoom included. A zoom that can be kept stays, others become 1.
         A target that stands exactly where the point is stated stays, any other is cleared.
         """
         released = [point for point, at in (("eye", eye), ("look_at", look_at)) if targets.place(self, point) != tuple(at)]
+        if not picture.is_counted_in_earlier(self):
+            self.counted_in = picture.shape(frame)
+        distance /= picture.growth(self, frame)
         with without_callbacks():
             for point in released:
                 targets.release(self, point)
@@ -277,7 +301,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
             self.eye, self.look_at, self.up, self.distance = eye, look_at, up, distance
             self.exact = json.dumps([*eye, *look_at, *up, distance])
             self.enabled = True
-        self.settle(size, roll)
+        self.settle(frame, roll)
 
     def mirror(self, evaluated: "VirtualPinhole") -> None:
         """Store where the targets stand, so that the camera stays in place when they are cleared."""
@@ -289,15 +313,23 @@ class VirtualPinhole(bpy.types.PropertyGroup):
 
     def set_up(self, up: tuple) -> None:
         """Set up alone, in float64, as an edit does."""
-        eye, look_at, _, distance = self._values()
+        eye, look_at, _, distance = self.stored()
         self.exact = json.dumps([*eye, *look_at, *up, distance])
         self.up = up
 
-    def settle(self, size: tuple[int, int], roll: float) -> None:
-        """Take note that the camera has been set by the values as they are, for a picture of that size."""
+    def multiply_distance(self, factor: float) -> None:
+        """Set the distance alone, in float64; the camera stays where it is."""
+        eye, look_at, up, distance = self.stored()
+        with without_callbacks():
+            self.distance = factor * distance
+            self.exact = json.dumps([*eye, *look_at, *up, factor * distance])
+
+    def settle(self, frame: intrinsics.Frame, roll: float) -> None:
+        """Take note that the camera has been set by the values as they are, for the picture of `frame`."""
         eye, look_at, up, _ = self.numbers()
         with without_callbacks():
-            self.held_roll, self.size, self.when_set = roll, size, json.dumps([*eye, *look_at, *up])
+            self.held_roll, self.when_set = roll, json.dumps([*eye, *look_at, *up])
+        picture.settle(self, frame)
 
     def numbers_when_set(self) -> tuple[tuple, tuple, tuple] | None:
         """Eye, look-at and up as they were when the camera was last set, or None if that is not known."""
@@ -306,23 +338,23 @@ class VirtualPinhole(bpy.types.PropertyGroup):
 
     def numbers(self) -> tuple[tuple, tuple, tuple, float]:
         """Eye, look-at, up and the effective distance, zoom included, in float64. A followed point is where its target is."""
-        eye, look_at, up, distance = self._values()
+        eye, look_at, up, distance = self.stored()
+        eye, look_at = targets.place(self, "eye") or eye, targets.place(self, "look_at") or look_at
         return eye, look_at, up, distance * self.zoom
 
     def precision(self) -> float:
         """The relative rounding of the values: 2⁻⁵³ where all are known in float64, else float32's 2⁻²⁴."""
-        eye, look_at, up, distance = self._values()
+        eye, look_at, up, distance = self.stored()
         is_exact = self._exact() == [*eye, *look_at, *up, distance] and not (self.eye_target or self.look_at_target)
         return 2.0**-53 if is_exact else 2.0**-24
 
-    def _values(self) -> tuple[tuple, tuple, tuple, float]:
-        """The four values, without zoom."""
+    def stored(self) -> tuple[tuple, tuple, tuple, float]:
+        """The four values without zoom, and as they are where no target is followed."""
         exact, shown = self._exact(), [*self.eye, *self.look_at, *self.up, self.distance]
         with np.errstate(over="ignore"):
             rounded = np.array(exact, dtype=np.float32).tolist()
         values = [number if short == value else value for number, short, value in zip(exact, rounded, shown, strict=True)]
-        eye, look_at = (targets.place(self, point) for point in targets.POINTS)
-        return eye or tuple(values[0:3]), look_at or tuple(values[3:6]), tuple(values[6:9]), values[9]
+        return tuple(values[0:3]), tuple(values[3:6]), tuple(values[6:9]), values[9]
 
     def _exact(self) -> list[float]:
         """Ten numbers in float64, NaN where none is known."""

@@ -172,8 +172,16 @@ def test_without_units_a_length_is_a_bare_number(posed_camera, scene, odd):
     odd.check(posed_camera, then=lambda: setattr(posed_camera, "location", (7, -6, 7)))
 
 
-def test_another_resolution_leaves_the_lens_and_so_another_distance(posed_camera, scene, odd):
+def test_another_resolution_keeps_the_distance_in_pixels(posed_camera, scene, odd):
     odd.check(posed_camera, then=lambda: setattr(scene.render, "resolution_x", 1280))
+    assert bpy.data.objects["Camera"].virtual_pinhole.distance == 1500
+
+
+def test_another_resolution_keeps_the_field_of_view_if_it_shall(posed_camera, scene, odd):
+    posed_camera.virtual_pinhole.keeps = "FIELD_OF_VIEW"
+    lens = posed_camera.data.lens
+    odd.check(posed_camera, then=lambda: setattr(scene.render, "resolution_x", 1280))
+    assert bpy.data.cameras["Camera"].lens == lens
 
 
 def test_another_percentage_shows_the_same_picture(posed_camera, scene, odd):
@@ -192,7 +200,7 @@ def test_pixels_that_become_wider_keep_the_distance(posed_camera, scene, odd):
     odd.check(posed_camera, then=lambda: setattr(scene.render, "pixel_aspect_x", 2))
 
 
-def test_pixels_that_become_much_higher_change_the_distance(posed_camera, scene, odd):
+def test_pixels_that_become_much_higher_keep_the_distance(posed_camera, scene, odd):
     odd.check(posed_camera, then=lambda: setattr(scene.render, "pixel_aspect_y", 2))
 
 

@@ -1,0 +1,99 @@
+"""The camera follows the picture's resolution, percentage and pixel aspect as they change.
+
+Blender tells of such a change in `depsgraph_update_post`, whoever makes it: the scene is among the updates (measured: 4.2, 5.0
+and 5.2), in the window, at a script's next evaluation, and before a render. A scene that is not the window's is told of by its
+render only, in `frame_change_post`. Only the lens is set anew: the pose does not depend on the picture, and the artist may have
+moved the camera. Rejected: message-bus subscriptions (they hear of the window's edits only, and not of scripts).
+
+Whether a camera is set for the present picture is stored beside its values (picture.py), so that undo needs no care. A camera
+that is set for another one of its scenes stays so, and the panel says it: one lens can't serve both.
+"""
+
+import contextlib
+from collections.abc import Iterator
+
+import bpy
+from bpy.app.handlers import persistent
+
+from .. import intrinsics
+from ..errors import InputError
+from . import camera as cameras
+from . import datablocks, picture
+from .properties import without_callbacks
+
+# The picture for which all cameras of a scene have been looked at, by the scene's name, with the scene's address: it is another
+# scene after undo and in another file. Without it every change of a scene's settings would look at every object.
+_seen: dict[str, tuple] = {}
+_is_paused = False
+
+
+@persistent
+def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    if depsgraph.id_type_updated("SCENE") and not _is_paused:
+        follow(scene)
+
+
+@contextlib.contextmanager
+def lens_kept(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[None]:
+    """For a picture of another size within the block: no camera follows it, and this one's values go with its lens."""
+    global _is_paused
+    group = camera_object.virtual_pinhole
+    before, was_paused = (group.keeps, tuple(group.counted_in)), _is_paused
+    _is_paused = True
+    try:
+        if group.keeps == "PIXELS":
+            with without_callbacks():
+                group.keeps, group.counted_in = "FIELD_OF_VIEW", picture.shape(datablocks.frame_of(scene))
+        yield
+    finally:
+        _is_paused = was_paused
+        with without_callbacks():
+            group.keeps, group.counted_in = before
+
+
+def follow(scene: bpy.types.Scene) -> None:
+    """Set the lenses of the scene's cameras for its picture, if it is another one than last time."""
+    with contextlib.suppress(InputError):  # no picture at all: the panel says so
+        frame = datablocks.frame_of(scene)
+        now = (scene.as_pointer(), picture.shape(frame))
+        if _seen.get(scene.name_full) != now:
+            _seen[scene.name_full] = now
+            for camera_object in _set_for_another(scene, frame):
+                with contextlib.suppress(InputError):
+                    cameras.refit(camera_object, scene)
+                    picture.settle(camera_object.virtual_pinhole, frame)
+
+
+@persistent
+def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
+    """In a render nothing but the lens is touched: the values are counted anew when the scene is next looked at."""
+    if depsgraph is None or depsgraph.mode != "RENDER" or _is_paused:
+        return
+    with contextlib.suppress(InputError):
+        for camera_object in _set_for_another(scene, datablocks.frame_of(scene)):
+            with contextlib.suppress(InputError):
+                cameras.refit(camera_object, scene)
+                camera_object.data.update_tag()
+
+
+def _set_for_another(scene: bpy.types.Scene, frame: intrinsics.Frame) -> list[bpy.types.Object]:
+    """The enabled cameras of a scene that were set for another picture, and for none of another of their scenes."""
+    return [
+        each
+        for each in scene.objects
+        if each.type == "CAMERA"
+        and each.virtual_pinhole.enabled
+        and tuple(each.virtual_pinhole.picture) != picture.shape(frame)
+        and not picture.scenes_it_is_set_for(each, scene)
+    ]
+
+
+def register() -> None:
+    bpy.app.handlers.depsgraph_update_post.append(on_update)
+    bpy.app.handlers.frame_change_post.append(on_frame_change)
+
+
+def unregister() -> None:
+    bpy.app.handlers.frame_change_post.remove(on_frame_change)
+    bpy.app.handlers.depsgraph_update_post.remove(on_update)
+    _seen.clear()
