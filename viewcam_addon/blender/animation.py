@@ -43,10 +43,13 @@ def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
 @persistent
 def on_load(_path: str, _more: object = None) -> None:
-    """Blender does not save the drivers of an overridden camera's own targets."""
-    for camera_object in bpy.data.objects:
-        if camera_object.type == "CAMERA" and camera_object.override_library:
-            targets.connect(camera_object)
+    """Targets may have moved where the add-on was not, and Blender does not save the drivers of an override's own targets."""
+    scene = bpy.context.scene
+    watching = [each for each in scene.objects if each.type == "CAMERA" and targets.names(each)]
+    for camera_object in watching:
+        targets.connect(camera_object)
+    for camera_object in watching:
+        _follow(camera_object, scene, bpy.context.evaluated_depsgraph_get())
 
 
 def _updated_cameras(depsgraph: bpy.types.Depsgraph) -> Iterator[bpy.types.Object]:

@@ -39,7 +39,8 @@ def place(group: bpy.types.PropertyGroup, point: str) -> Triple | None:
     if target is None or _chain(target.original, group.id_data.original):
         return None
     if _is_led(target):
-        return target.virtual_pinhole.numbers()[0]
+        theirs = target.virtual_pinhole
+        return place(theirs, "eye") or theirs.stored()[0]
     if not target.is_evaluated:
         target = target.evaluated_get(datablocks.depsgraph_of(datablocks.scene_of(group.id_data)))
     return tuple(target.matrix_world.translation)
@@ -54,11 +55,21 @@ def connect(camera_object: bpy.types.Object) -> None:
             if curve:
                 camera_object.driver_remove(_HOOK, index)
             continue
-        driver = (curve or camera_object.driver_add(_HOOK, index)).driver
-        variable = driver.variables[0] if driver.variables else driver.variables.new()
-        if variable.targets[0].id != target:
-            driver.type, variable.type = "SUM", "TRANSFORMS"
-            variable.targets[0].id = target
+        if curve and curve.driver.variables[0].targets[0].id != target:
+            camera_object.driver_remove(_HOOK, index)
+            curve = None
+        if curve is None:
+            _depend(camera_object.driver_add(_HOOK, index).driver, target)
+
+
+def _depend(driver: bpy.types.Driver, target: bpy.types.Object) -> None:
+    driver.type = "SUM"
+    variable = driver.variables.new()
+    variable.type, variable.targets[0].id = "TRANSFORMS", target
+    if target.type == "CAMERA":  # where it will be, its eye and its eye's target tell earlier than its transform
+        for path in ("virtual_pinhole.eye[0]", f"{_HOOK}[0]"):
+            aim = driver.variables.new().targets[0]
+            aim.id, aim.data_path = target, path
 
 
 def names(camera_object: bpy.types.Object) -> dict[str, str]:
