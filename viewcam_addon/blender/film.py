@@ -12,9 +12,9 @@ BOUNCES = {
     "glossy": "glossy_bounces",
     "transmission": "transmission_bounces",
 }
-_CAUSTICS = ("caustics_reflective", "caustics_refractive")
+CAUSTICS = ("caustics_reflective", "caustics_refractive")
 
-CYCLES_SETTINGS = ("pixel_filter_type", "filter_width", "film_exposure", *BOUNCES.values(), *_CAUSTICS)
+CYCLES_SETTINGS = ("pixel_filter_type", "filter_width", "film_exposure", *BOUNCES.values(), *CAUSTICS)
 """Those of `scene.cycles` that are read here."""
 
 
@@ -36,6 +36,6 @@ def bounces_of(scene: bpy.types.Scene, ledger: Ledger) -> Bounces:
     cycles = getattr(scene, "cycles", None)
     if cycles is None:
         return Bounces()
-    if not all(getattr(cycles, name) for name in _CAUSTICS):
+    if not all(getattr(cycles, name) for name in CAUSTICS):
         ledger.note(scene.name, "approximated", "caustics are on on both sides")
     return Bounces(**{ours: getattr(cycles, theirs) for ours, theirs in BOUNCES.items()})

@@ -1,9 +1,9 @@
 """A Blender material as the tracer's: the components that its shader nodes add up to, or the nearest ones and why.
 
-Exact are, with constants, textures, vertex colours and their products: Emission, a Diffuse BSDF without roughness, a Principled BSDF
-whose gloss has no strength, and Glossy, Glass and Refraction BSDFs without roughness, mixed and added. Measured in 4.2, 4.5,
-5.0 and 5.2: with a specular IOR level of 0, or an IOR of 1, a Principled BSDF gives the Diffuse BSDF's pixels to the last bit,
-whatever its roughness, anisotropy and tint, unless a weight or the thin film below is not 0.
+Exact are, with constants, textures, vertex colours and their products: Emission, a Diffuse BSDF without roughness, a
+Principled BSDF whose gloss has no strength, and Glossy, Glass and Refraction BSDFs without roughness, mixed and added.
+Measured in 4.2, 4.5, 5.0 and 5.2: with a specular IOR level of 0, or an IOR of 1, a Principled BSDF gives the Diffuse BSDF's
+pixels to the last bit, whatever its roughness, anisotropy and tint, unless a weight or the thin film below is not 0.
 
 Whatever else is met becomes a Lambert surface of its base colour. Then Cycles is shown the same for the time of a comparison
 (materials.stand_in): an approximation is never a difference between the two sides. Rejected: matching roughness by a mixture of
