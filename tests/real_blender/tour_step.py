@@ -1,6 +1,6 @@
 """What a step of the tour is, the scene that it starts in, and what is compared.
 
-A step is done by hand in a real window (tour_in_a_window.py) and by script in a Blender without one (tests/blender/test_tour.py);
+A step is done by hand in a window (tour_in_a_window.py) and by script in a Blender without one (tests/blender/test_tour.py);
 the check is the same. So the mouse and the operators can't drift apart, and docs/artists.md shows what is tested.
 """
 

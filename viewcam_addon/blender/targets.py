@@ -96,7 +96,7 @@ def warnings(camera_object: bpy.types.Object) -> list[str]:
             through = "".join(f" by {each.name!r}," for each in chain[1:-1])
             fault = "is the camera itself" if len(chain) == 1 else f"is moved{through} by the camera itself"
             sentences.append(f"{start} {fault}, and is not followed: choose another, or clear it")
-        elif not target.users_scene:
+        elif not target.users_scene and not target.library:  # a linked one may well be in its own file's scene alone
             sentences.append(f"{start} is in no scene, deleted perhaps: clear it, or choose another")
         elif late := None if _is_led(target) else next(filter(_is_led, _carriers(target, set())), None):
             sentences.append(

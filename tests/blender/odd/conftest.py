@@ -1,11 +1,93 @@
 """What holds docs/odd-blender.md to its word: its rows, each with the stages through which a test takes its scene."""
 
 import dataclasses
+import inspect
 import math
+from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
+
+class _Layout:
+    """Takes all that a panel puts into Blender's layout, which draws in a window only."""
+
+    def __getattr__(self, name):
+        return lambda *arguments, **looks: _Layout()
+
+    def prop(self, block, name, **looks):
+        assert hasattr(block, name), f"{block} has no {name}"
+
+    def panel(self, name, **looks):
+        return _Layout(), _Layout()
+
+
+class _Panel:
+    """Stands in for an instance of a panel's class, which Blender makes itself."""
+
+    def __init__(self, kind):
+        self.kind, self.layout = kind, _Layout()
+
+    def __getattr__(self, name):
+        found = inspect.getattr_static(self.kind, name)
+        return found.__get__(self, self.kind) if hasattr(found, "__get__") else found
+
+
+class _Over:
+    """What Blender has, with something that only a window adds to it."""
+
+    def __init__(self, blenders, **more):
+        self._blenders = blenders
+        vars(self).update(more)
+
+    def __getattr__(self, name):
+        return getattr(self._blenders, name)
+
+
+@pytest.fixture
+def draw_panels():
+    """A function that draws the add-on's panels for the active object, as far as they are shown: their names.
+
+    camera : the data that the properties editor shows, if it is another's than the active object's.
+    """
+    import bpy
+
+    from viewcam_addon import blender
+
+    def draw(camera=None):
+        active, preferences = bpy.context.active_object, bpy.context.preferences
+        context = _Over(
+            bpy.context,
+            camera=camera or (active.data if active and active.type == "CAMERA" else None),
+            region=SimpleNamespace(width=300),
+            preferences=_Over(preferences, system=SimpleNamespace(ui_scale=1.0, pixel_size=1.0)),
+        )
+        drawn = []
+        for kind in (each for room in blender._rooms() for each in getattr(room, "CLASSES", ())):
+            if issubclass(kind, bpy.types.Panel) and kind.__name__.startswith("VIEWCAM_PT") and _is_shown(kind, context, drawn):
+                for part in ("draw_header", "draw"):
+                    if hasattr(kind, part):
+                        getattr(_Panel(kind), part)(context)
+                drawn.append(kind.__name__)
+        return drawn
+
+    return draw
+
+
+def _is_shown(kind, context, drawn):
+    parent = getattr(kind, "bl_parent_id", None)
+    return (parent is None or parent in drawn) and (not hasattr(kind, "poll") or kind.poll(context))
+
+
+@pytest.fixture(autouse=True)
+def no_traceback(capfd):
+    """Whatever is done, nothing that a handler or a callback raises stands in the console."""
+    yield
+    said = "".join(capfd.readouterr())
+    print(said)
+    assert "Traceback" not in said
 
 
 @dataclasses.dataclass(frozen=True)
@@ -13,12 +95,13 @@ class OddRow:
     """A row of docs/odd-blender.md, and the scene that holds it to its word.
 
     sticks : whether the pose sticks right after `apply`, later, in the render; None where nothing is said of it.
-    sentences : what the panel says in the end. folder : for files.
+    sentences : what the panel says in the end. folder : for files. draw : draws the panels of what is active.
     """
 
     sticks: tuple[bool | None, bool | None, bool | None]
     sentences: list[str]
     folder: Path
+    draw: Callable[[], object] = list
 
     def check(self, camera_object, then=None, scene=None, reopened=True):
         """Apply the four values; let `then` happen, four frames pass; render; save and open again. Another file is open then.
@@ -62,7 +145,8 @@ class OddRow:
         for _ in range(2):  # what a handler changes in one update shows in the next
             bpy.context.view_layer.update()
         self._compare(1, _off_by(camera_object, scene, datablocks.depsgraph_of(scene)), moment)
-        said = panel.contents(camera_object, scene)[1]
+        self.draw()
+        said = [notice.sentence for notice in panel.notices(camera_object, scene)]
         assert said == self.sentences, f"{moment} the panel says\n" + "\n".join(said)
 
     def render(self, camera_object, scene):
@@ -112,7 +196,7 @@ def _off_by(camera_object, scene, graph):
 
 
 @pytest.fixture
-def odd_rows(tmp_path):
+def odd_rows(tmp_path, draw_panels):
     """The rows of docs/odd-blender.md by the name of their test."""
     rows = {}
     page = Path(__file__).resolve().parent.parent.parent.parent / "docs" / "odd-blender.md"
@@ -122,7 +206,7 @@ def odd_rows(tmp_path):
             _, *sticks, said, test = cells
             assert test not in rows and len(sticks) == 3, f"one row, three cells of yes or no for {test}"
             sticks = tuple({"yes": True, "no": False, "—": None}[cell] for cell in sticks)
-            rows[test.strip("`")] = OddRow(sticks, [] if said == "nothing" else said.split("<br>"), tmp_path)
+            rows[test.strip("`")] = OddRow(sticks, [] if said == "nothing" else said.split("<br>"), tmp_path, draw_panels)
     return rows
 
 

@@ -117,7 +117,7 @@ def test_local_view_and_another_objects_edit_mode_do_no_harm(posed_camera, odd):
 def test_two_scenes_of_one_resolution_share_a_camera(posed_camera, other_scene, odd):
     other_scene(1920, 1080)
     odd.check(posed_camera)
-    assert panel.contents(bpy.data.objects["Camera"], bpy.data.scenes["Other"])[1] == []
+    assert panel.notices(bpy.data.objects["Camera"], bpy.data.scenes["Other"]) == []
 
 
 def test_in_a_second_scene_of_another_resolution_the_lens_is_wrong(posed_camera, other_scene, scene, odd):
@@ -162,8 +162,8 @@ def test_a_smaller_scale_of_units_changes_nothing_but_the_words(posed_camera, sc
 
 def test_feet_change_nothing_but_the_words(posed_camera, scene, odd):
     scene.unit_settings.system, scene.unit_settings.length_unit = "IMPERIAL", "FEET"
-    rows = dict(row[:2] for row in panel.contents(posed_camera, scene)[0])
-    assert rows["To Look-At"] == "32.972'"  # √(7² + 6² + 4²) m
+    rows = {row.label: row.shown for row in panel.shown(posed_camera, scene)}
+    assert rows["To Look-At"] == ("32.972'",)  # √(7² + 6² + 4²) m
     odd.check(posed_camera, then=lambda: setattr(posed_camera, "location", (7, -6, 7)))
 
 
