@@ -20,6 +20,7 @@ def _rooms() -> list[ModuleType]:
         overlay,
         panel,
         preferences,
+        presets,
         proof,
         properties,
         render_panels,
@@ -28,7 +29,7 @@ def _rooms() -> list[ModuleType]:
         view_menu,
     )
 
-    buttons = [operators, moving, clipboard, baking]
+    buttons = [operators, moving, clipboard, baking, presets]
     shown = [panel, proof, overlay, gizmos]
     followers = [animation, resolution]
     return [preferences, properties, render_settings, *buttons, *shown, engine, render_panels, file_menu, view_menu, *followers]
