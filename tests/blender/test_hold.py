@@ -90,7 +90,7 @@ def test_a_roll_that_is_no_number_leaves_the_camera_where_it_is_and_the_panel_sa
     before = axes(held_camera)
     held_camera.virtual_pinhole.held_roll = math.nan
     np.testing.assert_array_equal(axes(held_camera), before)
-    assert panel.contents(held_camera, scene)[1] == ["Roll is nan: give a finite angle"]
+    assert panel.notices(held_camera, scene) == [panel.Notice("Roll is nan: give a finite angle")]
 
 
 def test_canonical_axes_level_the_picture_at_once(held_camera):

@@ -192,7 +192,7 @@ def test_a_driver_can_not_be_held_and_the_panel_says_so(looping_camera, scene, n
     looping_camera.virtual_pinhole.driver_add(name, 0).driver.expression = "0.25 * frame"
     scene.frame_set(41)
     assert hold.roll(looping_camera, scene) == 0
-    (sentence,) = (warning for warning in panel.contents(looping_camera, scene)[1] if "not held" in warning)
+    (sentence,) = (each.sentence for each in panel.notices(looping_camera, scene) if "not held" in each.sentence)
     assert sentence.startswith(f"A driver sets the {name.replace('_', '-')}, ")
 
 
@@ -206,7 +206,7 @@ def test_an_nla_strip_can_not_be_held_and_the_panel_says_so(looping_camera, scen
     scene.frame_set(41)
     assert hold.is_animated(looping_camera)
     assert hold.roll(looping_camera, scene) == 0
-    assert sum(warning.startswith("An NLA strip sets the eye, ") for warning in panel.contents(looping_camera, scene)[1]) == 1
+    assert sum(each.sentence.startswith("An NLA strip sets the eye, ") for each in panel.notices(looping_camera, scene)) == 1
     track.mute = True
     assert hold.obstacle(looping_camera) is None
     track.mute, data.use_nla = False, False

@@ -57,20 +57,25 @@ def operate(operator, camera_object):
         assert_sentence(str(error).removeprefix("Error: ").rstrip("\n"))
 
 
+def warnings_of(camera_object, scene):
+    """What the panel warns of."""
+    return [notice.sentence for notice in panel.notices(camera_object, scene)]
+
+
 def use(camera_object, scene, capfd):
     """Everything that an artist may do next. Returns what the panel says first."""
     bpy.context.view_layer.update()
-    rows, said = panel.contents(camera_object, scene)
+    said, rows = warnings_of(camera_object, scene), panel.shown(camera_object, scene)
     for sentence in said:
         assert_sentence(sentence)
-    assert said or not any("nan" in text for row in rows for text in row), rows
+    assert said or not any("nan" in text for row in rows for text in (*row.shown, row.exact)), rows
     operate(bpy.ops.viewcam.apply_camera, camera_object)
     scene.frame_set(scene.frame_current + 1)
     operate(bpy.ops.viewcam.adopt_camera, camera_object)
     for enabled in (False, True):
         camera_object.virtual_pinhole.enabled = enabled
     bpy.context.view_layer.update()
-    panel.contents(camera_object, scene)
+    warnings_of(camera_object, scene)
     printed = "".join(capfd.readouterr())
     assert "Traceback" not in printed and "RuntimeWarning" not in printed, printed
     return said
@@ -255,7 +260,7 @@ def test_a_hostile_blender_camera_is_read_or_refused_in_a_sentence(posed_camera,
 def test_applying_the_values_mends_a_camera_whose_own_channels_are_not_finite(posed_camera, scene):
     wanted = cameras.stated(posed_camera, scene)
     posed_camera.location, posed_camera.rotation_euler = (math.nan,) * 3, (math.nan,) * 3
-    assert "'Camera' holds a number that is not finite" in panel.contents(posed_camera, scene)[1][0]
+    assert "'Camera' holds a number that is not finite" in warnings_of(posed_camera, scene)[0]
     assert cameras.apply(posed_camera, wanted, scene) == []
     assert cameras.read(posed_camera, scene).eye == wanted.eye
 

@@ -200,7 +200,7 @@ def test_a_target_without_a_place_leaves_the_camera_where_it_was_and_says_so(wat
     target.location.x = float("nan")
     update()
     assert watching_camera.matrix_world == before
-    assert "Look_at is (nan, 2.0, 3.0)" in panel.contents(watching_camera, scene)[1][0]
+    assert "Look_at is (nan, 2.0, 3.0)" in panel.notices(watching_camera, scene)[0].sentence
 
 
 # Stating

@@ -10,12 +10,14 @@ import dataclasses
 from typing import ClassVar
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface
+from bpy.app.translations import pgettext_tip as tip
 
 from .. import camera_text
 from ..errors import InputError
 from ..pinhole import Pinhole
 from . import camera as cameras
-from . import datablocks
+from . import datablocks, picture
 from .operators import CameraOperator
 
 _NAMES = {"eye": "eye", "look_at": "look-at", "up": "up"}
@@ -53,6 +55,25 @@ class VIEWCAM_OT_paste_camera(CameraOperator, bpy.types.Operator):
             self.report({"WARNING"}, finding)
 
 
+class VIEWCAM_OT_copy_readout(bpy.types.Operator):
+    bl_idname = "viewcam.copy_readout"
+    bl_label = "Copy Read-Out"
+    bl_description = "Copy this number with all its digits, angles in degrees, lengths in world units"
+    bl_options: ClassVar[set[str]] = {"INTERNAL"}
+
+    label: bpy.props.StringProperty(options={"SKIP_SAVE"})
+    text: bpy.props.StringProperty(options={"SKIP_SAVE"})
+
+    @classmethod
+    def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+        return f"{tip(cls.bl_description)}: {properties.text}"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        context.window_manager.clipboard = self.text
+        self.report({"INFO"}, f"{iface(self.label)} {self.text}")
+        return {"FINISHED"}
+
+
 def text_of(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> str:
     """The four values of a camera as text; where they are not in use, those that `adopt` would state.
 
@@ -64,7 +85,7 @@ def text_of(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> str:
     group, frame = camera_object.virtual_pinhole, datablocks.frame_of(scene)
     stated = cameras.stated(camera_object, scene)
     shown = stated or cameras.as_it_stands(camera_object, scene, in_use=False)
-    distance = group.numbers()[3] if stated else shown.distance[0] * (frame.resolution_x / frame.size[0])
+    distance = picture.distance(group, frame) if stated else shown.distance[0] * (frame.resolution_x / frame.size[0])
     return camera_text.written(shown.eye, shown.look_at, shown.up, distance)
 
 
@@ -117,4 +138,4 @@ def draw(layout: bpy.types.UILayout, camera_object: bpy.types.Object) -> None:
     row.operator("viewcam.paste_camera", text="Paste", icon="PASTEDOWN").camera = camera_object.name
 
 
-CLASSES = (VIEWCAM_OT_copy_camera, VIEWCAM_OT_paste_camera)
+CLASSES = (VIEWCAM_OT_copy_camera, VIEWCAM_OT_paste_camera, VIEWCAM_OT_copy_readout)

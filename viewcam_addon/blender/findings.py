@@ -28,7 +28,8 @@ _SHIFT_ROUNDINGS = 2
 
 EYE, VIEW, DISTANCE, CENTRE = "eye", "view", "distance", "centre"
 POSE, LENS = frozenset({EYE, VIEW}), frozenset({DISTANCE, CENTRE})
-REMEDY = "apply the values again, or adopt the camera as it stands"
+APPLY_AGAIN = "apply the values again"
+REMEDY = f"{APPLY_AGAIN}, or adopt the camera as it stands"
 
 
 @dataclass(frozen=True)

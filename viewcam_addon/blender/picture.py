@@ -1,7 +1,7 @@
 """For which picture a camera was set, and in the pixels of which picture its distance counts.
 
 `virtual_pinhole.picture` is the one for which it was set last, so that a new resolution is noticed (resolution.py). Where
-`keeps` is FIELD_OF_VIEW the distance grows with the picture: it counts pixels of the one in `counted_in`, and each time that the
+`keeps` is FIELD_OF_VIEW the distance grows with the picture: it counts pixels of the one in `counted_in`, and each time the
 camera is set it is counted anew in the present one. A distance with curves or a driver of its own stays as they say, and
 `counted_in` with it. Rejected: to scale the curves (the artist's, and perhaps shared or linked), and never to count anew (the
 panel would show a distance in pixels that are no longer those of the picture).

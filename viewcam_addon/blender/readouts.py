@@ -3,40 +3,41 @@
 import math
 import textwrap
 from itertools import product
+from typing import NamedTuple
 
 from ..compare import law
 from ..pinhole import Pinhole, Triple
 from . import findings
 
 
-def readouts(camera: Pinhole, lens: float, look_at_distance: str | None) -> list[tuple[str, ...]]:
-    """(label, text) of the camera as Blender has it; three texts for the vectors u, v and w.
+class Readout(NamedTuple):
+    """A row. shown : one text, or three for the vectors. exact : what is copied, with all digits and without units."""
 
-    lens : mm. look_at_distance : with its unit, or None where no look-at point is stated.
+    label: str
+    shown: tuple[str, ...]
+    exact: str
+
+
+def readouts(camera: Pinhole, lens: float, distance: float, to_look_at: tuple[str, float] | None) -> list[Readout]:
+    """The camera as Blender has it.
+
+    lens : mm. distance : pixels of the picture at 100 %. to_look_at : with its unit, and in world units; None where no look-at
+    point is stated.
     """
-    across, upright, diagonal = (math.degrees(angle) for angle in camera.field_of_view())
     rows = [
-        ("Focal Length", f"{lens:.6g} mm"),
-        ("Horizontal FOV", f"{across:.4f}°"),
-        ("Vertical FOV", f"{upright:.4f}°"),
-        ("Diagonal FOV", f"{diagonal:.4f}°"),
+        Readout("Focal Length", (f"{lens:.6g} mm",), repr(lens)),
+        Readout("View Plane", (f"{distance:.8g} px",), repr(distance)),
     ]
-    rows += [(name, *_components(axis)) for name, axis in zip("uvw", camera.axes(), strict=True)]
-    if look_at_distance is not None:
-        rows.append(("To Look-At", look_at_distance))
+    for name, angle in zip(("Horizontal FOV", "Vertical FOV", "Diagonal FOV"), camera.field_of_view(), strict=True):
+        rows.append(Readout(name, (f"{math.degrees(angle):.4f}°",), repr(math.degrees(angle))))
+    rows += [Readout(name, _components(axis), repr(axis)) for name, axis in zip("uvw", camera.axes(), strict=True)]
+    if to_look_at is not None:
+        rows.append(Readout("To Look-At", to_look_at[:1], repr(to_look_at[1])))
     return rows
 
 
 def _components(axis: Triple) -> tuple[str, ...]:
     return tuple(f"{round(component, 5) + 0.0:+.5f}" for component in axis)
-
-
-def pose_warnings(stated: Pinhole, precision: float) -> list[str]:
-    """Sentences on what the rounding of numbers does to the picture, where that is visible.
-
-    precision : the relative rounding of the values.
-    """
-    return [sentence for sentence in (roll_warning(stated, precision), distance_warning(stated)) if sentence]
 
 
 def roll_warning(stated: Pinhole, precision: float) -> str | None:

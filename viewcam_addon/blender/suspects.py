@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import bpy
 
 from . import datablocks, picture, pose, versions
-from .findings import CENTRE, DISTANCE, EYE, LENS, POSE, REMEDY, VIEW, Suspect
+from .findings import APPLY_AGAIN, CENTRE, DISTANCE, EYE, LENS, POSE, REMEDY, VIEW, Suspect
 from .hold import is_animated
 
 
@@ -33,7 +33,7 @@ def _constraints(camera_object: bpy.types.Object) -> Iterator[Suspect]:
     for constraint in pose.active_constraints(camera_object):
         name, camera = repr(constraint.name), repr(camera_object.name)
         if is_carried:  # what is set now takes it into account
-            yield Suspect(f"The constraint {name} has carried {camera} along", POSE, "apply the values again, or animate them")
+            yield Suspect(f"The constraint {name} has carried {camera} along", POSE, f"{APPLY_AGAIN}, or animate them")
         else:
             acts_on = _CONSTRAINTS.get(constraint.type, POSE)
             yield Suspect(f"The constraint {name} moves {camera}", acts_on, "disable it, or the Virtual Pinhole")
