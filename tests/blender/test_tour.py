@@ -16,7 +16,7 @@ import tour_step
 def test_every_step_does_what_it_is_for_and_is_undone_and_redone(fresh_blender):
     bpy.context.preferences.edit.use_global_undo = True
     tour_step.make_the_scene()
-    for step in (each() for each in tour.STEPS):
+    for step in (each() for each in tour.STEPS if not each.needs_a_window):
         name = type(step).__name__
         step.prepare()
         bpy.context.view_layer.update()

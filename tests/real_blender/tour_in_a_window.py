@@ -45,6 +45,7 @@ def take(step):
         yield
         part, share = _shown(step.shows)
         photograph(part, FOLDER / step.picture, share)
+        yield from step.after_the_picture()
     for _ in range(step.edits):
         yield from undo()
     assert not (lost := tour_step.differing(before, tour_step.state())), f"undo leaves {lost}"

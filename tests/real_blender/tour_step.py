@@ -4,6 +4,7 @@ A step is done by hand in a window (tour_in_a_window.py) and by script in a Blen
 the check is the same. So the mouse and the operators can't drift apart, and docs/artists.md shows what is tested.
 """
 
+import importlib
 import math
 
 import bpy
@@ -16,12 +17,13 @@ class Step:
     """One thing that an artist does.
 
     picture : file in docs/images/artists, taken when the step is done. shows : the part of the window in it.
-    edits : how many undo steps it makes; each is undone and redone in the window and on the wheels.
+    edits : how many undo steps it makes; each is undone and redone. needs_a_window : there is nothing to it without one.
     """
 
     picture: str | None = None
     shows = "sidebar"
     edits = 1
+    needs_a_window = False
 
     def prepare(self):
         """By script: what was there before."""
@@ -40,6 +42,10 @@ class Step:
         """Steps that bring what the picture is of onto the screen; nothing in them is checked or undone."""
         yield
 
+    def after_the_picture(self):
+        """Steps that take it from the screen again."""
+        yield
+
     def tidy(self):
         """By script: leave the window as the next step wants it."""
 
@@ -50,6 +56,12 @@ def camera():
 
 def values():
     return camera().virtual_pinhole
+
+
+def room(name):
+    """A module of viewcam_addon.blender, whatever the name is under which Blender has the add-on."""
+    package = bpy.types.VIEWCAM_PT_sidebar.__module__.rpartition(".")[0]
+    return importlib.import_module(f"{package}.{name}")
 
 
 def is_at_its_values():
@@ -140,6 +152,7 @@ def _mesh(add, name, colour, **where):
 
 def select(*names):
     """Select these objects; the first becomes the active one."""
+    bpy.context.view_layer.update()  # it may hold on to what was removed
     for block in bpy.context.view_layer.objects:
         block.select_set(block.name in names)
     bpy.context.view_layer.objects.active = bpy.data.objects[names[0]]

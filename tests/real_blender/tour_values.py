@@ -1,9 +1,11 @@
 """The tour: enabling, the four values, text."""
 
+import math
+
 import bpy
 import numpy as np
-from tour_hands import push, type_into
-from tour_step import Step, axes, camera, is_at_its_values, values
+from tour_hands import key_over, push, type_into
+from tour_step import SIZE, Step, axes, camera, is_at_its_values, room, values
 
 TEXT = "eye=4,-6,3.5 look_at=0,0,1 up=0,0,1 d=700"
 
@@ -73,9 +75,7 @@ class Copy(Step):
 
     def by_script(self):
         bpy.ops.viewcam.copy_camera()
-        from viewcam_addon.blender import clipboard
-
-        self.copied = clipboard.text_of(camera(), bpy.context.scene)
+        self.copied = room("clipboard").text_of(camera(), bpy.context.scene)
 
     def check(self):
         assert '"eye": [4.0, -7.0, 3.0]' in self.copied, f"copied {self.copied}"
@@ -100,4 +100,58 @@ class Paste(Step):
         is_at_its_values()
 
 
-STEPS = [Enable, TypeTheFourValues, TypeUp, Copy, Paste]
+class Zoom(Step):
+    """A factor on the distance, apart from it."""
+
+    picture = "zoom.png"
+
+    def by_hand(self):
+        yield from type_into("virtual_pinhole.zoom", "1.5")
+
+    def by_script(self):
+        values().zoom = 1.5
+
+    def check(self):
+        assert (values().distance, values().numbers()[3]) == (700, 1050), "zoom is no factor on the distance"
+        is_at_its_values()
+
+
+class Roll(Step):
+    """An angle that turns up about the view."""
+
+    picture = "roll.png"
+    shows = "view"
+
+    def by_hand(self):
+        yield from type_into("virtual_pinhole.roll", "20")
+
+    def by_script(self):
+        values().roll = math.radians(20)
+
+    def check(self):
+        w = axes()[:, 2]
+        level = np.cross((0, 0, 1), w)
+        turned = math.acos(axes()[:, 0] @ level / np.linalg.norm(level))
+        # The angle is a float32, and so are the matrix's nine numbers.
+        assert abs(turned - math.radians(20)) < 1e-6, f"the picture is turned by {math.degrees(turned):.5f}°"
+        is_at_its_values()
+
+
+class KeepTheFieldOfView(Step):
+    """What the camera keeps when the picture gets another resolution, by the mouse wheel over the choice."""
+
+    def by_hand(self):
+        yield from key_over("virtual_pinhole.keeps", "WHEELDOWNMOUSE", ctrl=True)
+
+    def by_script(self):
+        values().keeps = "FIELD_OF_VIEW"
+
+    def check(self):
+        render, before = bpy.context.scene.render, camera().data.lens
+        for size in ((1280, 720), SIZE):
+            render.resolution_x, render.resolution_y = size
+            bpy.context.view_layer.update()
+            assert abs(camera().data.lens - before) < before * 3 * 2**-24, f"the lens was {before} and is {camera().data.lens}"
+
+
+STEPS = [Enable, TypeTheFourValues, TypeUp, Copy, Paste, Zoom, Roll, KeepTheFieldOfView]

@@ -1,0 +1,181 @@
+"""The tour: the proof in one click, scene files, presets, preferences."""
+
+import tempfile
+from pathlib import Path
+
+import bpy
+import numpy as np
+from panel_in_a_window import press, region, window
+from tour_hands import VIEWPORT, call, push, unfold
+from tour_step import Step, camera, is_at_its_values, room, select, values
+
+FILE = Path(tempfile.gettempdir(), "virtual_pinhole_tour.json")
+
+
+class CompareWithCycles(Step):
+    """Both renders in the background, the verdict in the panel, the difference in an image editor."""
+
+    picture = "proof.png"
+    shows = "window"
+    edits = 0
+
+    def prepare(self):
+        camera().animation_data_clear()
+        camera().data.animation_data_clear()
+        values().enabled = True
+        values().eye, values().look_at, values().distance = (4, -6, 3.5), (0, 0, 1), 700
+        if not bpy.app.background:
+            region("PROPERTIES", "WINDOW")[0].type = "IMAGE_EDITOR"
+
+    def by_hand(self):
+        yield from unfold("viewcam.compare_with_cycles(")
+        yield from push("viewcam.compare_with_cycles(")
+        while room("proof").running():
+            yield
+        for _ in range(6):
+            yield
+
+    def by_script(self):
+        bpy.ops.viewcam.compare_with_cycles(camera="Camera")
+
+    def check(self):
+        outcome = room("proof").latest()
+        assert outcome is not None and outcome.passed, f"the verdict is {outcome and outcome.verdict}"
+        is_at_its_values()
+
+    def tidy(self):
+        if not bpy.app.background:
+            region("IMAGE_EDITOR", "WINDOW")[0].type = "PROPERTIES"
+
+
+class Export(Step):
+    """File › Export › Virtual Pinhole Scene."""
+
+    picture = "export.png"
+    shows = "window"
+    edits = 0
+
+    def by_hand(self):
+        call(bpy.ops.viewcam.export_scene, filepath=str(FILE))
+        for _ in range(8):
+            yield
+
+    def by_script(self):
+        bpy.ops.viewcam.export_scene(filepath=str(FILE))
+
+    def finish(self):
+        """In the window the file browser is photographed before it is confirmed."""
+        area = next(area for area in window().screen.areas if area.type == "FILE_BROWSER")
+        with bpy.context.temp_override(window=window(), area=area, region=area.regions[-1]):
+            bpy.ops.file.execute()
+
+    def check(self):
+        if bpy.app.background:
+            self.is_written()
+
+    def tidy(self):
+        if not bpy.app.background:
+            self.finish()
+        self.is_written()
+
+    def is_written(self):
+        assert '"eye"' in FILE.read_text(encoding="utf-8")
+
+
+class Import(Step):
+    """File › Import: the same scene once more, in a collection of its own."""
+
+    def prepare(self):
+        self.before = set(bpy.data.objects.keys())
+
+    def by_hand(self):
+        area, part = region(*VIEWPORT)
+        with bpy.context.temp_override(window=window(), area=area, region=part):
+            bpy.ops.viewcam.import_scene(filepath=str(FILE))
+        yield
+        yield
+
+    def by_script(self):
+        bpy.ops.viewcam.import_scene(filepath=str(FILE))
+
+    def check(self):
+        new = [block for block in bpy.data.objects if block.name not in self.before]
+        found = [block for block in new if block.type == "CAMERA"]
+        assert len(found) == 1 and found[0].virtual_pinhole.enabled
+        np.testing.assert_allclose(found[0].virtual_pinhole.numbers()[0], values().numbers()[0])
+
+    def tidy(self):
+        for block in [block for block in bpy.data.objects if block.name not in self.before]:
+            bpy.data.objects.remove(block)
+        FILE.unlink()
+        select("Camera")
+
+
+class Preset(Step):
+    """A lens from the list."""
+
+    picture = "presets.png"
+    shows = "window"
+
+    def by_hand(self):
+        call(bpy.ops.viewcam.execute_preset, filepath=self.path())
+        yield
+        yield
+
+    def by_script(self):
+        bpy.ops.viewcam.execute_preset(filepath=self.path())
+
+    def path(self):
+        return next(path for path in bpy.utils.preset_paths("virtual_pinhole") for path in [str(Path(path, "Lens_85_mm.py"))])
+
+    def check(self):
+        assert abs(camera().data.lens - 85) < 85 * 3 * 2**-24, f"the lens is {camera().data.lens} mm"
+        is_at_its_values()
+
+    def pose_for_the_picture(self):
+        call(bpy.ops.wm.call_panel, name="VIEWCAM_PT_presets", keep_open=True)
+        for _ in range(4):
+            yield
+
+    def after_the_picture(self):
+        press("ESC", 300, 300)
+        yield
+        yield
+
+
+class Preferences(Step):
+    """Another axis is up by default, and Level knows it."""
+
+    picture = "preferences.png"
+    shows = "window"
+    edits, needs_a_window = 0, True
+
+    def by_hand(self):
+        self.mine = room("preferences").get()
+        self.mine.default_up = "Y"
+        yield
+
+    def check(self):
+        assert room("preferences").up_axis() == (0, 1, 0)
+
+    def pose_for_the_picture(self):
+        view, _ = region(*VIEWPORT)
+        view.type = "PREFERENCES"
+        bpy.context.preferences.active_section = "ADDONS"
+        bpy.context.window_manager.addon_search = "Virtual Pinhole"
+        with bpy.context.temp_override(window=window(), area=view):
+            bpy.ops.preferences.addon_expand(module=room("preferences").PACKAGE)
+        for _ in range(6):
+            yield
+
+    def after_the_picture(self):
+        area, _ = region("PREFERENCES", "WINDOW")
+        area.type = "VIEW_3D"
+        yield
+        yield
+
+    def tidy(self):
+        self.mine.default_up = "Z"
+
+
+STEPS = [CompareWithCycles, Export, Import, Preset, Preferences]
