@@ -1,16 +1,21 @@
-"""The panel in a window, used by mouse and keyboard on a virtual screen."""
+"""The panel, the handles and Compare with Cycles in a window, used by mouse and keyboard on a virtual screen."""
 
+import contextlib
 import os
 import subprocess
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SCRIPT = Path(__file__).with_name("panel_in_a_window.py")
+HANDLES_SCRIPT = Path(__file__).with_name("handles_in_a_window.py")
+PROOF_SCRIPT = Path(__file__).with_name("proof_in_a_window.py")
 PARTS = (
     "open_the_panels",
     "enable",
     "edit_undo_redo",
     "zoom",
+    "roll",
+    "change_the_resolution",
     "fly_over_the_top",
     "press_the_buttons",
     "take_the_view_of_the_viewport",
@@ -25,11 +30,11 @@ PARTS = (
 ATTEMPTS = 2
 
 
-def use_the_panel(real_blender):
+def run_in_a_window(real_blender, script, *arguments, size=("1600", "1000")):
     return subprocess.run(
         [
             *(ROOT / ".ci" / "blender-window", "--factory-startup", "--addons", "bl_ext.user_default.virtual_pinhole"),
-            *("--enable-event-simulate", "-p", "0", "0", "1600", "1000", "--python", SCRIPT),
+            *("--enable-event-simulate", "-p", "0", "0", *size, "--python", script, "--", *arguments),
         ],
         env={**os.environ, "BLENDER_USER_RESOURCES": str(real_blender.user_folder)},
         cwd=ROOT,
@@ -41,10 +46,44 @@ def use_the_panel(real_blender):
 
 def test_the_panel_moves_the_camera_and_undoes_it(real_blender):
     for _ in range(ATTEMPTS):
-        outcome = use_the_panel(real_blender)
+        outcome = run_in_a_window(real_blender, SCRIPT)
         if outcome.returncode == 0:
             break
     said = outcome.stdout + outcome.stderr
     assert outcome.returncode == 0, said
     assert [part for part in PARTS if f"done: {part}" not in said] == []
     assert "Traceback" not in said, said  # what fails in a panel's draw() is only printed
+
+
+def test_handles_drag_eye_look_at_and_up_and_the_diagram_is_drawn_where_it_belongs(real_blender):
+    for _ in range(ATTEMPTS):
+        outcome = run_in_a_window(real_blender, HANDLES_SCRIPT, size=("1000", "700"))
+        if outcome.returncode == 0:
+            break
+    said = outcome.stdout + outcome.stderr
+    assert outcome.returncode == 0 and "done: disable_and_enable" in said, said
+    assert "Traceback" not in said, said  # what fails in a drawing or a handle is only printed
+
+
+def test_compare_with_cycles_comes_to_a_verdict_and_ends_in_every_other_way_without_a_trace(real_blender, tmp_path):
+    """With the extension as it is installed, wheels and all; the last one is on its way when Blender is quit."""
+    real_blender.run_inside("make", tmp_path / "scene.blend")
+    for _ in range(ATTEMPTS):
+        outcome = run_in_a_window(real_blender, PROOF_SCRIPT, tmp_path / "scene.blend", tmp_path)
+        if outcome.returncode == 0:
+            break
+    said = outcome.stdout + outcome.stderr
+    assert outcome.returncode == 0 and "done: quit_while_it_runs" in said, said
+    assert "Traceback" not in said, said
+    folder = (tmp_path / "last.txt").read_text()
+    assert not Path(folder).exists()
+    assert [line for line in _command_lines() if folder in line] == []
+
+
+def _command_lines():
+    """Of the processes that run."""
+    lines = []
+    for file in Path("/proc").glob("[0-9]*/cmdline"):
+        with contextlib.suppress(OSError):  # it has just ended
+            lines.append(file.read_bytes().decode(errors="replace"))
+    return lines

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 
 from .. import children
 from ..errors import InputError
@@ -216,8 +217,8 @@ def figures(result: dict[str, Any]) -> list[tuple[str, str]]:
     position = next((row for row in result.get("passes", ()) if row["name"] == "Position"), None)
     if position and position["percentiles"]:
         worst = position["percentiles"]
-        rows.append(("Median", f"{worst['p50']['value']:.1g} px"))
-        rows.append(("99.9 % within", f"{worst['p99.9']['value']:.1g} px"))
+        rows.append(("Median", f"{_plain(worst['p50']['value'])} px"))
+        rows.append(("99.9 % within", f"{_plain(worst['p99.9']['value'])} px"))
     if "mismatches" in result:
         kinds = result["mismatches"]["kinds"].values()
         count, explained = (sum(kind[name] for kind in kinds) for name in ("count", "explained"))
@@ -281,6 +282,11 @@ def _remove(path: Path) -> None:
         shutil.rmtree(path, ignore_errors=True)
     else:
         path.unlink(missing_ok=True)
+
+
+def _plain(value: float) -> str:
+    """Two significant digits without powers of ten: 0.000052."""
+    return np.format_float_positional(float(f"{value:.1e}"), trim="-")
 
 
 def _of_all(part: int, whole: int) -> str:

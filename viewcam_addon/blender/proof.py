@@ -319,7 +319,9 @@ def _draw_outcome(
 
 def _draw_status_bar(header: bpy.types.Header, _context: bpy.types.Context) -> None:
     if _running:
-        _draw_progress(header.layout, timed=False)
+        row = header.layout.row()
+        row.ui_units_x = 14
+        _draw_progress(row, timed=False)
 
 
 def _draw_render_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:

@@ -1,0 +1,233 @@
+"""Runs inside a real Blender with a window: Compare with Cycles by mouse and keys, to its verdict and to every other end.
+
+blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python proof_in_a_window.py -- FILE FOLDER [PICTURES]
+
+FILE : a small scene with a camera, saved. FOLDER : where the script writes which temporary folder the last comparison had, when
+it quits Blender. PICTURES : where pictures of the window go; without it none are taken.
+Leaves through Blender's own door with status 0, or with 5 and a traceback.
+"""
+
+import importlib
+import sys
+import time
+import webbrowser
+from pathlib import Path
+
+import bpy
+
+sys.path.append(str(Path(__file__).parent))
+from panel_in_a_window import NOWHERE, click, move, press, region, start, window
+from tour_hands import SIDEBAR, look, photograph
+
+FILE, FOLDER, *PICTURES = map(Path, sys.argv[sys.argv.index("--") + 1 :])
+PROOF = "bl_ext.user_default.virtual_pinhole.viewcam_addon.blender.proof"
+ROW = 12  # pixels between two looks for a button, less than its height
+PATIENCE = 60  # seconds that one comparison may take on a busy machine
+LEFT, MIDDLE, RIGHT, CANCEL = 0.3, 0.5, 0.7, 0.83  # shares of the sidebar's width
+
+opened = []
+found = {}  # where each button stood the last time, without a verdict below and with one
+proof = None  # the module PROOF, once the add-on is enabled
+
+
+def button(operator, across=MIDDLE):
+    """Steps that end with where the button stands, looked for from the bottom of the sidebar."""
+    there = operator, proof.latest() is None
+    if there in found and (yield from look(*found[there], SIDEBAR)).startswith(operator):
+        return found[there]
+    area, part = region(*SIDEBAR)
+    with bpy.context.temp_override(window=window(), area=area, region=part):
+        for _ in range(10):
+            bpy.ops.view2d.scroll_down(deltay=100)
+    x = part.x + part.width * across
+    move(*NOWHERE)
+    yield
+    for y in range(part.y + ROW, part.y + part.height, ROW):
+        if (yield from look(x, y, SIDEBAR)).startswith(operator):
+            found[there] = x, y + ROW / 3
+            return found[there]
+    raise AssertionError(f"no button of {operator}")
+
+
+def push(operator, across=MIDDLE):
+    """Steps that click a button, and end with where it stands."""
+    x, y = yield from button(operator, across)
+    yield from click(x, y)
+    return x, y
+
+
+def picture(name):
+    if PICTURES:
+        photograph((0, 0, window().width, window().height), PICTURES[0] / name)
+
+
+def begin():
+    """Steps that end with the comparison that a click has begun, and the height at which its progress is shown."""
+    _, y = yield from push("viewcam.compare_with_cycles")
+    ends = time.monotonic() + 5
+    while not proof.running() and time.monotonic() < ends:
+        yield
+    assert proof.running(), "the click has begun nothing"
+    return proof.running(), y
+
+
+def ended(comparison):
+    """Steps until it has gone, without a trace."""
+    ends = time.monotonic() + 5
+    while proof.running() and time.monotonic() < ends:
+        yield
+    assert proof.running() is None and not comparison.folder.exists()
+    assert comparison._family.status() is not None
+
+
+def open_the_panel():
+    """The file, the sidebar's tab, and the sub-panel unfolded from the start."""
+    bpy.ops.wm.open_mainfile(filepath=str(FILE), load_ui=False)
+    yield
+    panel = proof.VIEWCAM_PT_sidebar_proof
+    bpy.utils.unregister_class(panel)
+    panel.bl_options = set()
+    bpy.utils.register_class(panel)
+    view, sidebar = region(*SIDEBAR)
+    view.spaces.active.show_region_ui = True
+    window().view_layer.objects.active = bpy.context.scene.camera
+    yield
+    sidebar.active_panel_category = "Pinhole"
+    view.tag_redraw()
+    yield
+    yield
+
+
+def compare_to_the_verdict():
+    with bpy.context.temp_override(window=window()):
+        bpy.ops.ed.undo_push(message="before")
+        bpy.context.scene.objects["Suzanne"].location.x = 0.25
+        bpy.ops.ed.undo_push(message="an edit")
+    yield
+    before = _of_the_session()
+    areas = [area.ui_type for area in window().screen.areas]
+    started, told = time.monotonic(), set()
+    yield from begin()
+    while proof.running() and time.monotonic() < started + PATIENCE:
+        words = proof.running().progress()[1]
+        if words == "Tracing" and words not in told:
+            yield
+            picture("running.png")
+        told.add(words)
+        yield
+    outcome = proof.latest()
+    assert outcome and outcome.passed, outcome or "no verdict"
+    print(f"verdict after {time.monotonic() - started:.1f} s: {outcome.verdict}", flush=True)
+    assert "Rendering with Cycles" in told, told
+    assert _of_the_session() == before
+    assert [area.ui_type for area in window().screen.areas] == areas, "the artist's layout has changed"
+    _, other = bpy.context.window_manager.windows
+    assert other.screen.areas[0].spaces.active.image.name == "Virtual Pinhole Difference"
+    yield
+    yield
+    picture("difference.png")
+    with bpy.context.temp_override(window=other):
+        bpy.ops.wm.window_close()
+    yield
+    yield
+    picture("verdict.png")
+
+
+def _of_the_session():
+    """Name and state of the file, and the list of recent ones."""
+    recent = Path(bpy.utils.user_resource("CONFIG"), "recent-files.txt")
+    return bpy.data.filepath, bpy.data.is_dirty, recent.read_text() if recent.exists() else ""
+
+
+def open_the_report():
+    webbrowser.open = lambda url, *_, **__: opened.append(url) or True
+    yield from push("viewcam.open_report", across=RIGHT)
+    yield
+    assert opened == [proof.latest().report.as_uri()], opened
+
+
+def take_the_edit_back_and_show_the_difference_again():
+    """The history has no step of ours: one undo takes back the edit. The image that came after it goes and comes again."""
+    press("Z", *NOWHERE, ctrl=True)
+    yield
+    yield
+    assert bpy.context.scene.objects["Suzanne"].location.x == 0, "one undo did not take back the edit"
+    area = next(area for area in window().screen.areas if area.type == "DOPESHEET_EDITOR")
+    area.ui_type = "IMAGE_EDITOR"
+    yield
+    yield from push("viewcam.show_difference", across=LEFT)
+    yield
+    assert len(bpy.context.window_manager.windows) == 1, "there was an Image Editor"
+    assert area.spaces.active.image.name == "Virtual Pinhole Difference"
+
+
+def press_escape():
+    comparison, _ = yield from begin()
+    yield
+    press("ESC", *NOWHERE)
+    yield from ended(comparison)
+    assert proof.latest().passed, "the verdict before is forgotten"
+
+
+def press_cancel():
+    comparison, y = yield from begin()
+    yield
+    _, part = region(*SIDEBAR)
+    there = yield from look(part.x + part.width * CANCEL, y, SIDEBAR)
+    assert there.startswith("viewcam.cancel_comparison"), f"where Cancel should be there is {there!r}"
+    yield from click(part.x + part.width * CANCEL, y)
+    yield from ended(comparison)
+
+
+def undo_while_it_runs():
+    comparison, _ = yield from begin()
+    press("Z", *NOWHERE, ctrl=True, shift=True)
+    yield
+    press("Z", *NOWHERE, ctrl=True)
+    yield
+    yield
+    assert proof.running() is comparison and comparison._family.status() is None
+    press("ESC", *NOWHERE)
+    yield from ended(comparison)
+
+
+def open_a_file_while_it_runs():
+    comparison, _ = yield from begin()
+    kept = proof.latest().temporary
+    bpy.ops.wm.open_mainfile(filepath=str(FILE), load_ui=False)
+    yield
+    yield from ended(comparison)
+    assert proof.latest() is None and not kept.exists()
+
+
+def quit_while_it_runs():
+    comparison, _ = yield from begin()
+    (FOLDER / "last.txt").write_text(str(comparison.folder))
+    yield
+
+
+def steps():
+    global proof
+    yield
+    proof = importlib.import_module(PROOF)
+    for part in (
+        open_the_panel,
+        compare_to_the_verdict,
+        open_the_report,
+        take_the_edit_back_and_show_the_difference_again,
+        press_escape,
+        press_cancel,
+        undo_while_it_runs,
+        open_a_file_while_it_runs,
+        open_the_panel,
+        quit_while_it_runs,
+    ):
+        yield from part()
+        print(f"done: {part.__name__}", flush=True)
+    with bpy.context.temp_override(window=window()):
+        bpy.ops.wm.quit_blender()
+    while True:
+        yield
+
+
+start(steps)
