@@ -25,6 +25,8 @@ from . import datablocks, overlay, properties, versions
 _TWEAK = "GIZMOGROUP_OT_gizmo_tweak"
 _LOOKED_AT = 0.01  # seconds between two looks at whether a drag has ended
 _LABELS = {"eye": "Eye", "look_at": "Look-At", "up": "Up"}
+# Which handle the mouse takes where they cover each other: seen from above, up's tip is over the eye.
+_PRIORITY = {"eye": 2000, "look_at": 1000, "up": 0}
 # What moving a camera changes besides its values.
 _CHANNELS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
 _LENS = ("lens", "shift_x", "shift_y", "sensor_width", "sensor_height", "virtual_pinhole_sensor")
@@ -182,6 +184,7 @@ class VIEWCAM_GGT_handles(bpy.types.GizmoGroup):
             handle.use_snap = name != "up"
             handle.use_tooltip = handle.use_draw_modal = True
             handle.scale_basis = 0.12
+            handle.select_bias = _PRIORITY[name]
 
     def draw_prepare(self, context: bpy.types.Context) -> None:
         camera_object, theme = camera_in(context), context.preferences.themes[0].user_interface

@@ -1,0 +1,386 @@
+"""Runs inside a real Blender with a window: drags the camera's handles in the viewport, and reads the diagram's pixels.
+
+blender --enable-event-simulate -p 0 0 1000 700 --addons … --python handles_in_a_window.py
+
+A timer takes one step at a time, as in panel_in_a_window.py. The window is small, since it is drawn in software.
+Leaves with status 0, or 5 and a traceback.
+"""
+
+import importlib
+import sys
+import time
+from pathlib import Path
+
+import bpy
+import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
+
+sys.path.append(str(Path(__file__).parent))
+from panel_in_a_window import NOWHERE, camera, is_at_its_values, move, press, region, start, state, values, window
+
+ADDON = "bl_ext.user_default.virtual_pinhole"
+NAMES = ("eye", "look_at", "up")
+# float32, in which Blender keeps its view and the handle's place: a few roundings of lengths below 40.
+CLOSE = 8 * 40 * 2**-24
+SHARP = 0.01  # pixels: float32 costs Blender's view 0.002
+CORNER = (1.0, -1.0, 1.0)  # of the cube
+FRAMES = 100
+
+
+def room(name):
+    return importlib.import_module(f"{ADDON}.viewcam_addon.blender.{name}")
+
+
+def place(name):
+    return room("gizmos").place(camera(), name)
+
+
+def views():
+    """The regions of the 3D viewport that show the scene: four in a quad view."""
+    area, _ = region("VIEW_3D", "WINDOW")
+    return [each for each in area.regions if each.type == "WINDOW"]
+
+
+def pixel_of(point, view=None):
+    """Window coordinates of a point in world space, whole pixels as a mouse has them."""
+    view = view or views()[-1]
+    found = location_3d_to_region_2d(view, view.data, Vector(point))
+    return round(view.x + found.x), round(view.y + found.y)
+
+
+def carried(point, from_pixel, to_pixel):
+    """Where a mouse carries a point of the user's view: in the plane that faces the viewer.
+
+    In float64: what bpy_extras gives is off by up to 0.06 pixels.
+    """
+    view = views()[-1]
+    matrix = np.array(view.data.perspective_matrix, dtype=np.float64)
+    pixels = np.subtract(to_pixel, from_pixel)
+    return np.array(point) + np.linalg.inv(matrix)[:3, :2] @ (
+        2 * pixels / (view.width, view.height) * (matrix[3] @ (*point, 1.0))
+    )
+
+
+def button(value, at, **modifiers):
+    window().event_simulate(type="LEFTMOUSE", value=value, x=at[0], y=at[1], **modifiers)
+
+
+def grip(at):
+    """Steps: Blender draws a handle under the mouse as such before it takes the press."""
+    move(*at)
+    yield
+    yield
+    button("PRESS", at)
+    yield
+
+
+def pull(start, end, **modifiers):
+    for share in (0.5, 1):
+        x, y = (round(a + share * (b - a)) for a, b in zip(start, end, strict=True))
+        window().event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y, **modifiers)
+        yield
+
+
+def let_go(at):
+    """Steps: the drag becomes a step of undo a moment later."""
+    button("RELEASE", at)
+    while room("gizmos")._drag:
+        yield
+    yield
+
+
+def drag(start, end):
+    yield from grip(start)
+    yield from pull(start, end)
+    yield from let_go(end)
+
+
+def undo(**modifiers):
+    press("Z", *NOWHERE, ctrl=True, **modifiers)
+    yield
+    yield
+    yield
+
+
+def everything():
+    return values().exact, values().when_set, *map(tuple, (values().eye, values().look_at, values().up)), str(state())
+
+
+def view_by(operator, **properties):
+    area, _ = region("VIEW_3D", "WINDOW")
+    with bpy.context.temp_override(window=window(), area=area, region=views()[-1]):
+        getattr(bpy.ops.view3d, operator)(**properties)
+
+
+def push_undo():
+    with bpy.context.temp_override(window=window()):
+        bpy.ops.ed.undo_push(message="Stated by the script")
+
+
+def state_the_values():
+    values().eye, values().look_at, values().up = (6.0, -6.0, 4.0), (0.0, 0.5, 0.25), (0.0, 0.0, 1.0)
+    push_undo()
+
+
+def open_the_view():
+    """The cube, and a camera before it that is active. Nothing that takes time and shows nothing: smooth views and edges."""
+    bpy.context.preferences.view.smooth_view = 0
+    bpy.context.preferences.system.viewport_aa = "OFF"
+    window().view_layer.objects.active = camera()
+    for each in window().view_layer.objects:
+        each.select_set(each == camera())
+    values().enabled = True
+    state_the_values()
+    views()[-1].data.view_distance = 22
+    yield
+    yield
+
+
+def drag_each_handle():
+    for name in NAMES:
+        before, gripped = everything(), place(name)
+        start = pixel_of(gripped)
+        end = start[0] + 60, start[1] - 35
+        expected = carried(gripped, start, end)
+        yield from drag(start, end)
+        is_at_its_values()
+        after = everything()
+        close = SHARP * np.linalg.norm(carried(gripped, (0, 0), (1, 0)) - gripped)
+        if name == "up":
+            arrow = expected - np.array(values().eye)
+            length = np.linalg.norm(arrow)
+            expected, close = arrow / length, close / length
+        np.testing.assert_allclose(getattr(values(), name), expected, rtol=0, atol=close, err_msg=name)
+        yield from undo()
+        assert everything() == before, f"undo did not bring back what was before the {name} was dragged"
+        yield from undo(shift=True)
+        assert everything() == after, f"redo did not bring back the dragged {name}"
+
+
+def cancel_each_handle():
+    """The camera is not at its values: there it has to come back to, and not to where they would put it."""
+    camera().location.x += 0.123
+    push_undo()
+    yield
+    for key, name in (("ESC", "eye"), ("ESC", "look_at"), ("ESC", "up"), ("RIGHTMOUSE", "eye")):
+        before, start = everything(), pixel_of(place(name))
+        end = start[0] + 40, start[1] + 25
+        yield from grip(start)
+        yield from pull(start, end)
+        assert everything() != before, f"the {name} was not dragged"
+        press(key, *end)
+        yield
+        yield from let_go(end)
+        assert everything() == before, f"{key} did not bring back what was before the {name} was dragged"
+    camera().location.y += 1
+    moved = everything()
+    yield
+    yield from undo()
+    assert everything() != moved and everything() != before, "a cancelled drag has pushed a step of undo"
+    yield from undo(shift=True)
+
+
+def snap_to_a_corner():
+    start, corner = pixel_of(place("look_at")), pixel_of(CORNER)
+    yield from grip(start)
+    window().event_simulate(type="LEFT_CTRL", value="PRESS", x=start[0], y=start[1], ctrl=True)
+    yield from pull(start, (corner[0] + 3, corner[1] + 2), ctrl=True)
+    is_at_its_values()
+    assert tuple(values().look_at) == CORNER, f"with Ctrl the look-at point is at {tuple(values().look_at)}"
+    window().event_simulate(type="LEFT_CTRL", value="RELEASE", x=corner[0] + 3, y=corner[1] + 2)
+    yield
+    press("ESC", *corner)
+    yield
+    yield from let_go(corner)
+
+
+def drag_in_a_quad_view():
+    """Seen from above, up's tip lies over the eye, and it is the eye that is dragged."""
+    state_the_values()
+    area, _ = region("VIEW_3D", "WINDOW")
+    with bpy.context.temp_override(window=window(), area=area, region=views()[-1]):
+        bpy.ops.screen.region_quadview()
+    yield
+    yield
+    yield
+    for view in views():
+        before = values().numbers()
+        start = pixel_of(place("eye"), view)
+        yield from drag(start, (start[0] + 20, start[1] + 10))
+        after = values().numbers()
+        assert after[0] != before[0] and after[1:] == before[1:], f"{view.data.view_rotation}: {before} became {after}"
+        along = np.array(view.data.view_rotation.to_matrix())[:, 2]
+        assert abs(np.dot(np.subtract(after[0], before[0]), along)) < CLOSE, "the eye was dragged towards the viewer"
+    with bpy.context.temp_override(window=window(), area=area, region=views()[-1]):
+        bpy.ops.screen.region_quadview()
+    yield
+    yield
+
+
+def frame_point():
+    """The middle of the view plane's lower edge."""
+    group = values()
+    stated = room("camera").stated(camera(), bpy.context.scene)
+    figure = room("overlay").diagrams.diagram(stated, tuple(group.up), group.plane_at)
+    return np.add(stated.eye, figure.plane[:2].mean(axis=0))
+
+
+def is_drawn(point):
+    """Steps that end with whether the view plane's frame is drawn there: blue, where everything else is grey."""
+    import gpu
+
+    found = []
+
+    def look():
+        at = location_3d_to_region_2d(bpy.context.region, bpy.context.region_data, Vector(point))
+        pixels = gpu.state.active_framebuffer_get().read_color(round(at.x) - 1, round(at.y) - 1, 3, 3, 4, 0, "FLOAT")
+        pixels.dimensions = 9 * 4
+        found.append(np.array(pixels).reshape(-1, 4))
+
+    handler = bpy.types.SpaceView3D.draw_handler_add(look, (), "WINDOW", "POST_PIXEL")
+    region("VIEW_3D", "WINDOW")[0].tag_redraw()
+    while not found:
+        yield
+    bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")
+    return bool((found[-1][:, 2] - found[-1][:, 0] > 0.25).any())
+
+
+def hide_the_diagram():
+    group, (area, _) = values(), region("VIEW_3D", "WINDOW")
+    state_the_values()
+    space = area.spaces.active
+    other = bpy.data.objects["Cube"]
+    yield
+    point = frame_point()
+    switches = {
+        "overlays": lambda on: setattr(space.overlay, "show_overlays", on),
+        "show_overlay": lambda on: setattr(group, "show_overlay", on),
+        "enabled": lambda on: setattr(group, "enabled", on),
+        "visible": lambda on: camera().hide_set(not on),
+        "kind": lambda on: setattr(space, "show_object_viewport_camera", on),
+        "meant": lambda on: (
+            camera().select_set(on),
+            setattr(window().view_layer.objects, "active", camera() if on else other),
+        ),
+    }
+    assert (yield from is_drawn(point)), "the view plane is not drawn"
+    for name, switch in switches.items():
+        switch(False)
+        yield
+        assert not (yield from is_drawn(point)), f"the view plane is drawn though {name} is off"
+        switch(True)
+        yield
+        assert (yield from is_drawn(point)), f"the view plane is not drawn again when {name} is on"
+
+
+def look_through_the_camera():
+    view = views()[-1].data
+    drawn, before = room("overlay"), room("overlay")._batches.cache_info()
+    view.view_perspective = "CAMERA"
+    yield
+    yield
+    values().eye[0] += 0.01
+    yield
+    yield
+    assert drawn._batches.cache_info() == before, "a viewport that looks through the camera draws its diagram"
+    view.view_perspective = "PERSP"
+    yield
+    yield
+
+
+def look_into_local_view():
+    camera().select_set(False)
+    bpy.data.objects["Cube"].select_set(True)
+    point = frame_point()
+    view_by("localview", frame_selected=False)
+    yield
+    yield
+    assert not (yield from is_drawn(point)), "the diagram is drawn in the local view of something else"
+    view_by("localview", frame_selected=False)
+    yield
+    yield
+    assert (yield from is_drawn(point))
+
+
+def count_what_is_made():
+    """Lines are sent to the graphics card once, however often they are drawn, and nothing draws while nothing changes."""
+    batches, drawings = room("overlay")._batches, []
+    handler = bpy.types.SpaceView3D.draw_handler_add(lambda: drawings.append(1), (), "WINDOW", "POST_PIXEL")
+    move(*NOWHERE)
+    for _ in range(6):
+        yield
+    drawings.clear()
+    for _ in range(20):
+        yield
+    assert not drawings, f"the viewport was drawn {len(drawings)} times while nothing happened"
+    before = batches.cache_info().misses
+    for _ in range(20):
+        region("VIEW_3D", "WINDOW")[0].tag_redraw()
+        yield
+    assert len(drawings) >= 10 and batches.cache_info().misses == before
+    values().eye[0] += 0.25
+    for _ in range(3):
+        region("VIEW_3D", "WINDOW")[0].tag_redraw()
+        yield
+    made = batches.cache_info().misses - before
+    assert made == 1, f"the lines were made {made} times for one change"
+    bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")
+
+
+def measure_a_drag():
+    """The whole update of a camera for one move of the mouse; what it costs on a quiet machine is in the README."""
+    gizmos, first = room("gizmos"), place("eye")
+    before, times = everything(), []
+    for step in range(1, FRAMES):
+        begun = time.perf_counter()
+        gizmos.drag(camera(), "eye", (first[0] + 0.01 * step, *first[1:]))
+        window().view_layer.update()
+        times.append(time.perf_counter() - begun)
+    gizmos.drag(camera(), "eye", tuple(np.float32(first).tolist()))
+    assert everything() == before
+    while gizmos._drag:
+        yield
+    print(f"a move of the mouse takes {1e3 * np.median(times):.2f} ms, at most {1e3 * max(times):.2f} ms", flush=True)
+    assert np.median(times) < 5e-3
+
+
+def disable_and_enable():
+    for _ in range(3):
+        bpy.ops.preferences.addon_disable(module=ADDON)
+        yield
+        yield
+        assert not hasattr(bpy.types.WindowManager, "virtual_pinhole_handles")
+        bpy.ops.preferences.addon_enable(module=ADDON)
+        yield
+        yield
+    assert (yield from is_drawn(frame_point())), "the diagram is gone after disabling and enabling"
+    state_the_values()
+    yield
+    yield from drag_each_handle()
+
+
+PARTS = (
+    open_the_view,
+    drag_each_handle,
+    cancel_each_handle,
+    snap_to_a_corner,
+    drag_in_a_quad_view,
+    hide_the_diagram,
+    look_through_the_camera,
+    look_into_local_view,
+    count_what_is_made,
+    measure_a_drag,
+    disable_and_enable,
+)
+
+
+def steps():
+    yield
+    for part in PARTS:
+        yield from part()
+        print(f"done: {part.__name__}", flush=True)
+
+
+if __name__ == "__main__":
+    start(steps)
