@@ -18,7 +18,7 @@ import numpy as np
 KEYS = {"-": "MINUS", "0": "ZERO", "1": "ONE", "3": "THREE", "5": "FIVE", "7": "SEVEN", ".": "PERIOD"}
 NOWHERE = (600, 500)  # a place in the 3D viewport
 ROW = 9  # pixels between two looks for a button, less than half its height
-BELOW = 27  # pixels from the middle of the choice at the pole to the middle of the buttons
+BELOW = 27  # pixels from the middle of the choice at the pole to that of the first row of buttons, and to the next row
 
 
 def window():
@@ -131,6 +131,11 @@ def edit_undo_redo():
     after = state()
     assert values().eye[2] == 3.5, f"typed 3.5, and the eye's z is {values().eye[2]}"
     is_at_its_values()
+    yield from undo_and_redo(before, after)
+
+
+def undo_and_redo(before, after):
+    """Steps that take the last edit back and do it again."""
     press("Z", *NOWHERE, ctrl=True)
     yield
     yield
@@ -145,6 +150,41 @@ def zoom():
     yield from type_into("distance", -1, "750")
     assert values().distance == 750, f"typed 750, and the distance is {values().distance}"
     is_at_its_values()
+    before = state()
+    yield from type_into("zoom", -1, "3")
+    assert (values().distance, values().zoom) == (750, 3), f"typed 3, and the zoom is {values().zoom}"
+    is_at_its_values()
+    yield from undo_and_redo(before, state())
+    yield from type_into("zoom", -1, "1")
+
+
+def roll():
+    before = state()
+    yield from type_into("roll", -1, "30")
+    assert abs(values().roll - np.radians(30)) < 1e-6, f"typed 30, and the roll is {values().roll}"
+    is_at_its_values()
+    after = state()
+    rolled = np.cos(np.pi / 6) * before[1][:3, 0] + np.sin(np.pi / 6) * before[1][:3, 1]
+    np.testing.assert_allclose(after[1][:3, 0], rolled, atol=1e-6)
+    yield from undo_and_redo(before, after)
+    yield from type_into("roll", -1, "0")
+    assert tuple(values().up) == (0, 0, 1), f"typed 0, and up is {tuple(values().up)}"
+    np.testing.assert_allclose(state()[1], before[1], atol=1e-6)
+
+
+def change_the_resolution():
+    render, lens, distance = bpy.context.scene.render, camera().data.lens, values().distance
+    for keeps, kept in (("PIXELS", (2 * lens, distance)), ("FIELD_OF_VIEW", (lens, distance / 2))):
+        values().keeps = keeps
+        render.resolution_x, render.resolution_y = 960, 540
+        yield
+        yield
+        np.testing.assert_allclose((camera().data.lens, values().distance), kept, rtol=1e-6)
+        render.resolution_x, render.resolution_y = 1920, 1080
+        yield
+        yield
+        is_at_its_values()
+    values().keeps = "PIXELS"
 
 
 def fly_over_the_top():
@@ -180,12 +220,12 @@ def press_the_buttons():
     stated = values().numbers()
     camera().location = (1, 2, 3)
     yield
-    yield from click(sidebar.x + sidebar.width * 0.2, y - BELOW)
+    yield from click(sidebar.x + sidebar.width * 0.2, y - 3 * BELOW)
     assert values().numbers() == stated
     is_at_its_values()
     camera().location = (1, 2, 3)
     yield
-    yield from click(sidebar.x + sidebar.width * 0.65, y - BELOW)
+    yield from click(sidebar.x + sidebar.width * 0.65, y - 3 * BELOW)
     assert tuple(values().eye) == (1, 2, 3), f"after Adopt Camera the eye is {tuple(values().eye)}"
     is_at_its_values()
 
@@ -213,8 +253,8 @@ def use_another_up():
     _, y = yield from find("pole", -1)
     before, doubtful = state(), tuple(values().up)
     _, sidebar = region("VIEW_3D", "UI")
-    # Below both rows of buttons; how many lines the warning takes is not known.
-    for below in range(3 * BELOW, 7 * BELOW, ROW):
+    # Below the rows of buttons; how many lines the warning takes is not known.
+    for below in range(4 * BELOW, 9 * BELOW, ROW):
         yield from click(sidebar.x + sidebar.width * 0.5, y - below)
         if tuple(values().up) != doubtful:
             break
@@ -270,6 +310,8 @@ def steps():
         enable,
         edit_undo_redo,
         zoom,
+        roll,
+        change_the_resolution,
         fly_over_the_top,
         press_the_buttons,
         take_the_view_of_the_viewport,

@@ -182,7 +182,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         override={"LIBRARY_OVERRIDABLE"},
     )
     keeps: bpy.props.EnumProperty(
-        name="Resolution Keeps",
+        name="Resize Keeps",
         description="What the camera keeps when the picture gets another resolution",
         items=(
             ("PIXELS", "Distance", "The distance in pixels: a larger picture shows more, and each pixel as much as before"),
