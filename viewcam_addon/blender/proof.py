@@ -296,8 +296,10 @@ def _draw_outcome(
     lines = [(headline, "CHECKMARK" if outcome.passed else "ERROR")]
     if not outcome.passed:
         lines.append((rest[:1].upper() + rest[1:], "BLANK1"))
-    if not outcome.is_of(camera_object, context.scene):
-        lines.append((f"Not of this camera as it is now: {outcome.what}", "INFO"))
+    if camera_object.name != outcome.camera:
+        lines.append((f"Of another camera: {outcome.what}", "INFO"))
+    elif not outcome.is_of(camera_object, context.scene):
+        lines.append((f"The camera has changed since: {outcome.what}", "INFO"))
     column = layout.column(align=True)
     for sentence, icon in lines:
         for i, line in enumerate(readouts.wrapped(sentence, width)):
