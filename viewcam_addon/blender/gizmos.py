@@ -49,8 +49,6 @@ _drag: _Drag | None = None
 
 def camera_in(context: bpy.types.Context) -> bpy.types.Object | None:
     """The camera that has handles in the context's viewport: the active object, if its values are in use and can be edited."""
-    if context.space_data is None or context.space_data.type != "VIEW_3D":
-        return None
     found = context.view_layer.objects.active
     is_meant = found and found.is_editable and overlay.is_shown(found, context) and found.virtual_pinhole.show_handles
     return found if is_meant else None
@@ -123,7 +121,7 @@ def end_drag() -> None:
     """What was dragged becomes a keyframe, where auto keying asks for one, and a step of undo; what was cancelled does not."""
     global _drag
     ended, _drag = _drag, None
-    camera_object = bpy.data.objects.get(ended.camera_name) if ended else None
+    camera_object = bpy.data.objects.get((ended.camera_name, None)) if ended else None
     if camera_object is None or _state(camera_object) == ended.before:
         return
     path = f"virtual_pinhole.{ended.name}"

@@ -33,6 +33,8 @@ def is_shown(camera_object: bpy.types.Object, context: bpy.types.Context) -> boo
     """Whether a 3D viewport shows this object as an enabled camera, and does not look through it."""
     if camera_object.type != "CAMERA" or not camera_object.virtual_pinhole.enabled:
         return False
+    if not _is_viewport(context):
+        return False
     space = context.space_data
     looks_through = space.camera if space.use_local_camera else context.scene.camera
     if context.region_data.view_perspective == "CAMERA" and camera_object == looks_through:
@@ -40,13 +42,18 @@ def is_shown(camera_object: bpy.types.Object, context: bpy.types.Context) -> boo
     return camera_object.visible_get(view_layer=context.view_layer, viewport=space)
 
 
+def _is_viewport(context: bpy.types.Context) -> bool:
+    """Whether it is a window's: File › Render › Viewport draws one from anywhere."""
+    return context.space_data is not None and context.space_data.type == "VIEW_3D" and context.region_data is not None
+
+
 def _cameras(context: bpy.types.Context) -> list[bpy.types.Object]:
     """The cameras whose diagram is drawn in the context's viewport."""
-    if not context.space_data.overlay.show_overlays:
+    if not _is_viewport(context) or not context.space_data.overlay.show_overlays:
         return []
     layer = context.view_layer
-    meant = {block.name: block for block in (*layer.objects.selected, layer.objects.active) if block}
-    return [block for block in meant.values() if is_shown(block, context) and block.virtual_pinhole.show_overlay]
+    meant = dict.fromkeys((*layer.objects.selected, layer.objects.active))  # once each
+    return [block for block in meant if block and is_shown(block, context) and block.virtual_pinhole.show_overlay]
 
 
 def _figures(context: bpy.types.Context) -> Iterator[tuple[Pinhole, Triple, float]]:
@@ -107,6 +114,7 @@ def _draw_lines() -> None:
     pens |= {name: (color, 2.5) for name, color in _axis_colors(context).items()}
     lines, flat = (gpu.shader.from_builtin(name) for name in ("POLYLINE_UNIFORM_COLOR", "UNIFORM_COLOR"))
     state = gpu.state
+    before = state.blend_get(), state.depth_test_get(), state.depth_mask_get()
     state.blend_set("ALPHA")
     state.depth_test_set("LESS_EQUAL")
     state.depth_mask_set(False)
@@ -124,9 +132,8 @@ def _draw_lines() -> None:
                     lines.uniform_float("lineWidth", width * pixel)
                     lines.uniform_float("color", color)
                     batches[name].draw(lines)
-    state.depth_mask_set(True)
-    state.depth_test_set("NONE")
-    state.blend_set("NONE")
+    for restore, value in zip((state.blend_set, state.depth_test_set, state.depth_mask_set), before, strict=True):
+        restore(value)
 
 
 def _draw_letters() -> None:
@@ -165,7 +172,7 @@ class _ShowPanel:
     def draw(self, context: bpy.types.Context) -> None:
         group, layout = datablocks.camera_in(context).virtual_pinhole, self.layout
         layout.use_property_split = True
-        column = layout.column(heading="In the Viewport")
+        column = layout.column(heading="Viewport")
         column.active = group.enabled
         column.prop(group, "show_handles")
         column.prop(group, "show_overlay")

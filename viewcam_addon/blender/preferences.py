@@ -5,7 +5,6 @@ Where the package is registered from Python, without an add-on of that name, the
 """
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import bpy
 
@@ -26,7 +25,7 @@ _AXES = {
 
 @dataclass(frozen=True)
 class Defaults:
-    """The preferences as they are before anybody has changed them. Colours are red, green, blue and opacity."""
+    """The preferences as they are before anybody has changed them. Colours are sRGB, with opacity."""
 
     default_up: str = "Z"
     default_level: str = "GEOMETRY"
@@ -41,47 +40,42 @@ class VIEWCAM_preferences(bpy.types.AddonPreferences):
     bl_idname = PACKAGE
 
     default_up: bpy.props.EnumProperty(
-        name="Up Axis",
+        name="Default Up",
         description="Up of new cameras where it gives the same picture, and of levelled ones. Roll is counted from it",
         items=[(name, name.replace("-", "−"), f"The world's {name.replace('-', '−')} axis") for name in _AXES],
         default=_DEFAULTS.default_up,
     )
     default_level: bpy.props.EnumProperty(
-        name="Level",
+        name="Default Level",
         description="How much of the scene is modelled when it is compared with Cycles, unless it is said there",
         items=LEVELS,
         default=_DEFAULTS.default_level,
     )
     plane_color: bpy.props.FloatVectorProperty(
-        name="View Plane",
+        name="View Plane Colour",
         description="Colour of the view plane in the 3D viewport",
-        subtype="COLOR",
+        subtype="COLOR_GAMMA",
         size=4,
         min=0.0,
         max=1.0,
         default=_DEFAULTS.plane_color,
     )
     line_color: bpy.props.FloatVectorProperty(
-        name="Lines",
+        name="Line Colour",
         description="Colour of the view plane's pixels, the pyramid and the line to the look-at point. "
         "The axes have the theme's colours",
-        subtype="COLOR",
+        subtype="COLOR_GAMMA",
         size=4,
         min=0.0,
         max=1.0,
         default=_DEFAULTS.line_color,
     )
 
-    _rows: ClassVar[dict[str, tuple[str, ...]]] = {
-        "Defaults": ("default_up", "default_level"),
-        "Overlay": ("plane_color", "line_color"),
-    }
-
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
-        for heading, names in self._rows.items():
-            column = layout.column(heading=heading)
+        for names in (("default_up", "default_level"), ("plane_color", "line_color")):
+            column = layout.column()
             for name in names:
                 column.prop(self, name)
 
