@@ -290,6 +290,37 @@ def test_the_sentence_is_the_childs_own_where_it_has_one(said, status, sentence)
     assert comparing.failure(said, status) == sentence
 
 
+@pytest.mark.parametrize(
+    ("result", "rows"),
+    [
+        (
+            {
+                "passes": [{"name": "Position", "percentiles": {"p50": {"value": 5.23e-5}, "p99.9": {"value": 0.00276}}}],
+                "mismatches": {"kinds": {"surface": {"count": 1200, "explained": 7}, "coverage": {"count": 0, "explained": 0}}},
+                "ledger": [{"status": "exported"}, {"status": "skipped"}],
+            },
+            [
+                ("Median", "0.000052 px"),
+                ("99.9 % within", "0.0028 px"),
+                ("Mismatches", "1,200, 7 explained"),
+                ("Modelled", "1 of 2 objects"),
+            ],
+        ),
+        ({"passes": [{"name": "Position", "percentiles": {}}], "ledger": []}, [("Modelled", "0 of 0 objects")]),
+        (
+            {"quantities": [{"ratio": 1.000123, "ratio_error": 3.1e-4, "steady": None}], "ledger": []},
+            [("Light, to Tracer's", "1.00012 ± 0.00031"), ("Modelled", "0 of 0 objects")],
+        ),
+        (
+            {"quantities": [{"steady": {"percentiles": {"p50": {"value": 0.0}, "p99.9": {"value": 2e-7}}}}], "ledger": []},
+            [("Median", "0 of the light"), ("99.9 % within", "0.0000002 of the light"), ("Modelled", "0 of 0 objects")],
+        ),
+    ],
+)
+def test_the_panel_tells_the_figures_that_tell_most(result, rows):
+    assert comparing.figures(result) == rows
+
+
 def test_what_can_not_be_compared_is_refused_at_once_in_one_sentence(seen, monkeypatch):
     there = set(Path(bpy.app.tempdir).iterdir())
     with monkeypatch.context() as patch:
@@ -340,32 +371,3 @@ def test_the_copy_finds_what_the_file_finds_and_the_file_keeps_its_ways(seen, tm
     assert bpy.data.objects["Suzanne"].location.x == 3
     found = bpy.data.images["Picture"].filepath
     assert os.path.samefile(bpy.path.abspath(found), tmp_path / "picture.png")
-
-
-def test_the_level_is_the_preferred_one_until_another_is_chosen(fresh_blender, monkeypatch):
-    settings = bpy.context.window_manager.virtual_pinhole_proof
-    assert settings.level == "GEOMETRY"
-    from viewcam_addon.blender import preferences
-
-    monkeypatch.setattr(preferences, "get", lambda: preferences.Defaults(default_level="PATH"))
-    assert settings.level == "PATH"
-    settings.level = "AUTO"
-    assert settings.level == "AUTO"
-    settings.said = ""
-
-
-def test_the_render_menu_and_the_status_bar_are_as_before_without_the_add_on(registered_addon):
-    def entries():
-        return [
-            *bpy.types.TOPBAR_MT_render._dyn_ui_initialize(),
-            *bpy.types.STATUSBAR_HT_header._dyn_ui_initialize(),
-            *bpy.app.handlers.load_pre,
-        ]
-
-    ours = {proof._draw_render_menu, proof._draw_status_bar, proof._on_load}
-    assert ours <= set(entries())
-    for _ in range(3):
-        registered_addon.unregister()
-        without = [each for each in entries() if each in ours]
-        registered_addon.register()
-        assert without == [] and len([each for each in entries() if each in ours]) == 3

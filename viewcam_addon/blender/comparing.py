@@ -214,18 +214,17 @@ def camera_seen(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinh
 def figures(result: dict[str, Any]) -> list[tuple[str, str]]:
     """(label, text) of what `viewcam check` wrote as JSON, for a panel."""
     rows = []
-    position = next((row for row in result.get("passes", ()) if row["name"] == "Position"), None)
-    if position and position["percentiles"]:
-        worst = position["percentiles"]
-        rows.append(("Median", f"{_plain(worst['p50']['value'])} px"))
-        rows.append(("99.9 % within", f"{_plain(worst['p99.9']['value'])} px"))
+    for row in (row for row in result.get("passes", ()) if row["name"] == "Position"):
+        rows += _percentiles(row, "px")
     if "mismatches" in result:
         kinds = result["mismatches"]["kinds"].values()
         count, explained = (sum(kind[name] for kind in kinds) for name in ("count", "explained"))
         rows.append(("Mismatches", f"{count:,}" + (f", {_of_all(explained, count)} explained" if count else "")))
-    for quantity in result.get("quantities", ())[:1]:
-        error = f" ± {quantity['ratio_error']:.1g}" if quantity["ratio_error"] else ""
-        rows.append(("Light, to Tracer's", f"{quantity['ratio']:.5f}{error}"))
+    for light in result.get("quantities", ())[:1]:  # Combined
+        if light["steady"]:
+            rows += _percentiles(light["steady"], "of the light")
+        else:
+            rows.append(("Light, to Tracer's", f"{light['ratio']:.5f} ± {_plain(light['ratio_error'])}"))
     ledger = result["ledger"]
     whole = sum(entry["status"] == "exported" for entry in ledger)
     return [*rows, ("Modelled", f"{whole} of {len(ledger)} objects")]
@@ -282,6 +281,13 @@ def _remove(path: Path) -> None:
         shutil.rmtree(path, ignore_errors=True)
     else:
         path.unlink(missing_ok=True)
+
+
+def _percentiles(row: dict[str, Any], unit: str) -> list[tuple[str, str]]:
+    """Of a row of a table that has any, as JSON has it."""
+    names = (("Median", "p50"), ("99.9 % within", "p99.9"))
+    found = row["percentiles"]
+    return [(label, f"{_plain(found[name]['value'])} {unit}") for label, name in names if name in found]
 
 
 def _plain(value: float) -> str:

@@ -253,7 +253,9 @@ class _ProofPanel:
         else:
             self.layout.operator("viewcam.compare_with_cycles", icon="PLAY").camera = camera_object.name
         if _latest:
-            _draw_outcome(self.layout, _latest, camera_object, context)
+            column = self.layout.column()
+            column.active = _running is None
+            _draw_outcome(column, _latest, camera_object, context)
 
 
 class VIEWCAM_PT_data_proof(_ProofPanel, bpy.types.Panel):
