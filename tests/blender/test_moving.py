@@ -8,7 +8,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import moving, viewport
+from viewcam_addon.blender import moving, preferences, viewport
 
 POINT = (1.5, -2.25, 3.125)  # numbers that float32 holds
 
@@ -153,6 +153,12 @@ def test_levelling_makes_up_the_worlds_z(posed_camera, stated):
     posed_camera.virtual_pinhole.up = (1, 0.2, 0.3)
     bpy.ops.viewcam.level_camera()
     assert stated().up == (0, 0, 1)
+
+
+def test_levelling_makes_up_the_axis_that_the_preferences_say(posed_camera, stated, monkeypatch):
+    monkeypatch.setattr(preferences, "get", lambda: preferences.Defaults(default_up="-Y"))
+    bpy.ops.viewcam.level_camera()
+    assert stated().up == (0, -1, 0)
 
 
 @pytest.mark.parametrize("up", [(0, 0, 1), (0, 1, 0), (1, 1, 0)])

@@ -17,7 +17,7 @@ from .. import moves
 from ..errors import InputError
 from ..pinhole import Pinhole
 from . import camera as cameras
-from . import datablocks, pose, readouts, selection, viewport
+from . import datablocks, pose, preferences, readouts, selection, viewport
 from .operators import CameraOperator
 
 
@@ -205,12 +205,12 @@ class VIEWCAM_OT_level_camera(_Move, bpy.types.Operator):
     bl_idname = "viewcam.level_camera"
     bl_label = "Level"
     bl_description = (
-        "Make up the world's Z, so that the horizon is level. Where the view is so close to vertical that this leaves the roll "
-        "in doubt, the up that says the same for certain"
+        "Make up the preferred axis, the world's Z, so that the horizon is level. Where the view is so close to it that this "
+        "leaves the roll in doubt, the up that says the same for certain"
     )
 
     def moved(self, pinhole: Pinhole, _camera_object: bpy.types.Object, _scene: bpy.types.Scene) -> Pinhole:
-        level = replace(pinhole, up=(0.0, 0.0, 1.0))
+        level = replace(pinhole, up=preferences.up_axis())
         in_doubt = readouts.roll_warning(level, precision=2.0**-24)
         return replace(level, up=readouts.certain_up(level)) if in_doubt else level
 
