@@ -75,6 +75,29 @@ def test_it_installs_from_the_preferences_and_registers(host, extension_zip):
     host.run_inside("install", extension_zip)
 
 
+@pytest.mark.parametrize(
+    ("sabotage", "told"),
+    [
+        ("", "0 left behind after 10 rounds"),
+        (
+            "bpy.types.TOPBAR_MT_file.append(addon.register)",
+            "more: bl_ext.user_default.virtual_pinhole.viewcam_addon.register in",
+        ),
+        (
+            "bpy.app.timers.register(addon.register, first_interval=1e6)",
+            "alive: bl_ext.user_default.virtual_pinhole.viewcam_addon",
+        ),
+    ],
+)
+def test_installing_and_removing_it_ten_times_leaves_nothing_behind(real_blender, extension_zip, tmp_path, sabotage, told):
+    """tests/test_leftovers.py does the same with wheels."""
+    script = [ROOT / "tests" / "leftovers.py", "--", extension_zip, "1" if sabotage else "10", sabotage]
+    fresh = dataclasses.replace(real_blender, user_folder=tmp_path)
+    outcome = fresh.run("-b", "--factory-startup", "--python", *script)
+    assert told in outcome.stdout, outcome.stdout + outcome.stderr
+    assert outcome.returncode == bool(sabotage), outcome.stdout + outcome.stderr
+
+
 def test_a_checkout_linked_into_the_extensions_folder_works_without_wheels(real_blender, tmp_path):
     folder = tmp_path / "extensions" / "user_default"
     folder.mkdir(parents=True)
