@@ -57,6 +57,16 @@ def test_a_scene_written_by_hand_is_traced_and_compared_with_itself(tmp_path, ca
     assert capfd.readouterr().err == ""
 
 
+def test_what_differs_is_drawn_where_it_is_wanted(tmp_path):
+    scene, picture, drawn = write_scene(tmp_path), tmp_path / "out.exr", tmp_path / "new" / "difference.png"
+    assert main(["render", str(scene), str(picture)]) == 0
+    result = tmp_path / "compare.json"
+    assert main(["compare", str(picture), str(picture), "--difference", str(drawn), "--json", str(result)]) == 0
+    assert drawn.read_bytes().startswith(b"\x89PNG")
+    told = json.loads(result.read_text())["difference"]
+    assert told["image"] == str(drawn) and "px off" in told["colours"]
+
+
 def test_two_cameras_a_pixel_apart_are_not_the_same_picture(tmp_path, capfd):
     for name, look_at in (("a", [0, 0, 0]), ("b", [0.05, 0, 0])):
         (tmp_path / name).mkdir()

@@ -1,4 +1,4 @@
-"""The sub-panel Proof: what it starts from, and what of it is there without the add-on. What it does is in test_comparing.py."""
+"""The sub-panel Proof: what it starts from, and what is left without the add-on. What it does is in test_comparing.py."""
 
 import pytest
 
