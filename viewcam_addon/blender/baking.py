@@ -96,19 +96,24 @@ def bake(
     steps = 2 * keys_per_frame  # every other time is a keyframe's
     times = [first - margin + i / steps for i in range(steps * (last - first + 2 * margin) + 1)]
     flights = [_Flight(camera_object) for camera_object in camera_objects]
+    progress = bpy.context.window_manager
     before = scene.frame_current, scene.frame_subframe
+    progress.progress_begin(0, 2 * len(times))
     try:
         for i, time in enumerate(times):
             _go_to(scene, time)
             for flight in flights:
                 _look(flight, scene, is_key=i % 2 == 0)
+            progress.progress_update(i)
         for flight in flights:
             _write(flight)
         baked = []
-        for time in times:
+        for i, time in enumerate(times):
             _go_to(scene, time)
             baked.append([cameras.read(flight.camera_object, scene) for flight in flights])
+            progress.progress_update(len(times) + i)
     finally:
+        progress.progress_end()
         scene.frame_set(before[0], subframe=before[1])
     return [_agreement(flight, stood, times) for flight, stood in zip(flights, zip(*baked, strict=True), strict=True)]
 

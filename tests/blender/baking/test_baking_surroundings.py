@@ -1,6 +1,5 @@
 """What stands around a camera that is baked: parents, constraints, targets, NLA, libraries; and what is refused."""
 
-
 import numpy as np
 import pytest
 
@@ -66,6 +65,29 @@ def test_values_in_the_nla_are_baked_into_an_action_above_it(over_the_target, sc
     (found,) = baking.bake([over_the_target], scene, 1, 21)
     assert found.ok, found.sentence()
     assert data.action != action and {path for path, _ in curves(over_the_target)} == {"location", "rotation_euler"}
+
+
+def test_a_camera_of_another_scene_is_baked_in_its_own(over_the_target, scene, curves):
+    other = bpy.data.scenes.new("Other")
+    other.collection.objects.link(over_the_target)
+    other.render.resolution_x, other.render.resolution_y = 64, 36
+    other.frame_start, other.frame_end = 3, 7
+    scene.collection.objects.unlink(over_the_target)
+    scene.frame_set(19)
+    bpy.ops.viewcam.bake_camera(camera="Camera")
+    assert [point.co[0] for point in curves(over_the_target)["location", 0].keyframe_points] == [3, 4, 5, 6, 7]
+    assert scene.frame_current == 19
+    other.frame_set(5)
+    assert over_the_target.location.z == pytest.approx(over_the_target.virtual_pinhole.eye[2])
+
+
+def test_a_hidden_camera_is_refused_and_named_unless_the_scene_needs_it(over_the_target, add_camera, scene):
+    add_camera("Other")  # the scene's camera now
+    over_the_target.hide_viewport = True
+    with pytest.raises(RuntimeError, match="Frame 1: camera 'Camera' takes no part in scene 'Scene': enable it"):
+        bpy.ops.viewcam.bake_camera(camera="Camera")
+    scene.camera = over_the_target
+    assert bpy.ops.viewcam.bake_camera(camera="Camera") == {"FINISHED"}
 
 
 def test_all_selected_cameras_are_baked_in_one_go(over_the_target, scene, add_camera, curves):
