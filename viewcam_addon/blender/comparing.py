@@ -11,6 +11,7 @@ windows, and so another scene may be the current one).
 import importlib.util
 import json
 import re
+import shlex
 import shutil
 import tempfile
 import time
@@ -104,26 +105,30 @@ class Comparison:
         words = ["--camera", camera_object.name, "--level", level]
         words += ["--samples", str(samples)] if level != LEVELS[0] else []
         words += ["--clay"] if clay else []
-        repeat = " ".join(["check", _quoted(Path(bpy.data.filepath).name or "untitled.blend"), *map(_quoted, words)])
         try:
             self.folder = Path(tempfile.mkdtemp(prefix="viewcam-", dir=bpy.app.tempdir or None))
         except OSError as error:
             raise InputError(f"no folder for the comparison can be made ({error.strerror}): free some space") from error
         try:
             save_copy(self.folder / _COPY)
-            report = self.folder / _REPORT
-            words += ["--json", str(self.folder / _RESULT), "--report", str(report)]
-            words += ["--difference", str(report / _DIFFERENCE), "--repeat", repeat]
-            # Blender's own scripts hold what the inside of a `bpy` looks like, which hides the module from a new process.
-            scripts = bpy.utils.system_resource("SCRIPTS")
-            variables = children.environment(scripts, **{name: str(self.folder) for name in ("TMPDIR", "TMP", "TEMP")})
-            self._family = children.Family(_command(self.folder / _COPY, scene, words), self.folder / _SAID, variables)
+            self._family = self._child(scene, words)
         except OSError as error:
             _remove(self.folder)
             raise InputError(f"the comparison can't be started ({error.strerror}): free some space") from error
         except InputError:
             _remove(self.folder)
             raise
+
+    def _child(self, scene: bpy.types.Scene, words: Sequence[str]) -> children.Family:
+        """`viewcam check` with these words, on its way; the report names them and the artist's file."""
+        report = self.folder / _REPORT
+        repeat = shlex.join(["check", Path(bpy.data.filepath).name or "untitled.blend", *words])
+        written = ["--json", str(self.folder / _RESULT), "--report", str(report), "--difference", str(report / _DIFFERENCE)]
+        command = _command(self.folder / _COPY, scene, [*words, *written, "--repeat", repeat])
+        # Blender's own scripts hold what the inside of a `bpy` looks like, which hides the module from a new process.
+        scripts = bpy.utils.system_resource("SCRIPTS")
+        variables = children.environment(scripts, **{name: str(self.folder) for name in ("TMPDIR", "TMP", "TEMP")})
+        return children.Family(command, self.folder / _SAID, variables)
 
     def progress(self) -> tuple[float, str]:
         """How far it is, from 0 to 1 in steps of unequal length, and what it is doing."""
@@ -297,8 +302,3 @@ def _plain(value: float) -> str:
 
 def _of_all(part: int, whole: int) -> str:
     return "all" if part == whole else f"{part:,}"
-
-
-def _quoted(word: str) -> str:
-    """As a shell takes it, on any system."""
-    return f'"{word}"' if re.search(r"[^\w./:-]", word) else word
