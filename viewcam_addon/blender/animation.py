@@ -11,7 +11,6 @@ whose values are not animated are left alone: their artist may have moved them.
 """
 
 import sys
-from collections.abc import Iterator
 
 import bpy
 from bpy.app.handlers import persistent
@@ -52,11 +51,9 @@ def on_load(_path: str, _more: object = None) -> None:
         _follow(camera_object, scene, bpy.context.evaluated_depsgraph_get())
 
 
-def _updated_cameras(depsgraph: bpy.types.Depsgraph) -> Iterator[bpy.types.Object]:
-    for update in depsgraph.updates:
-        evaluated = update.id
-        if isinstance(evaluated, bpy.types.Object) and evaluated.type == "CAMERA":
-            yield evaluated.original
+def _updated_cameras(depsgraph: bpy.types.Depsgraph) -> list[bpy.types.Object]:
+    updated = (update.id for update in depsgraph.updates)
+    return [each.original for each in updated if isinstance(each, bpy.types.Object) and each.type == "CAMERA"]
 
 
 def _is_driven(camera_object: bpy.types.Object) -> bool:

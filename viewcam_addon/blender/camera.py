@@ -33,6 +33,11 @@ Array = NDArray[np.float64]
 
 _LARGEST_FLOAT32 = float(np.finfo(np.float32).max)
 
+# What `place` was asked for lately, with the state that it left: Blender tells of each edit once more when it evaluates it, and
+# a camera that follows something would be placed where it stands already.
+_in_place: set[tuple] = set()
+_MOST_IN_PLACE = 256
+
 
 def apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene) -> list[str]:
     """State `pinhole` in the camera's four values, move the camera there, and read it back.
@@ -82,19 +87,30 @@ def follow(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
 def place(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Move the camera to `pinhole` without stating it and without reading back; otherwise as `apply`."""
     datablocks.check_perspective(camera_object)
-    camera = camera_object.data
+    camera, frame = camera_object.data, datablocks.frame_of(scene)
+    order = (pinhole, frame, pose.parent_matrix(camera_object, depsgraph).tobytes())
+    if (*order, *_state(camera_object)) in _in_place:
+        return
     plane = intrinsics.ViewPlane(pinhole.distance, pinhole.principal_point, pinhole.width, pinhole.height)
     sensor = datablocks.own_sensor(camera)
-    data = intrinsics.camera_data(plane, datablocks.frame_of(scene), *sensor, camera.sensor_fit)
+    data = intrinsics.camera_data(plane, frame, *sensor, camera.sensor_fit)
     location, turn, scale = pose.channels(camera_object, pinhole, depsgraph)
     _check_storable(camera_object, distance=(data.lens, data.sensor_width), shift=(data.shift_x, data.shift_y), eye=location)
     # Nothing fails from here on.
-    camera_object.location = location
-    if scale != tuple(camera_object.scale):
-        camera_object.scale = scale
+    _store(camera_object, location=location, scale=scale)
     pose.set_rotation(camera_object, turn)
-    camera.shift_x, camera.shift_y = data.shift_x, data.shift_y
+    _store(camera, shift_x=data.shift_x, shift_y=data.shift_y)
     _set_lens(camera, data, sensor)
+    if len(_in_place) == _MOST_IN_PLACE:
+        _in_place.clear()
+    _in_place.add((*order, *_state(camera_object)))
+
+
+def _state(camera_object: bpy.types.Object) -> tuple:
+    """All of a camera that `place` reads or sets, what carries it aside."""
+    camera = camera_object.data
+    sensor = (camera.sensor_fit, camera.sensor_width, camera.sensor_height, *camera.virtual_pinhole_sensor)
+    return *pose.state(camera_object), camera.lens, camera.shift_x, camera.shift_y, *sensor
 
 
 def refit(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
@@ -117,10 +133,15 @@ def refit(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
 
 def _set_lens(camera: bpy.types.Camera, data: intrinsics.CameraData, sensor: tuple[float, float]) -> None:
     """Lens and sensor, and beside them the artist's own sensor if it had to grow."""
-    camera.lens = data.lens
-    if (camera.sensor_width, camera.sensor_height) != (data.sensor_width, data.sensor_height):
-        camera.sensor_width, camera.sensor_height = data.sensor_width, data.sensor_height
+    _store(camera, lens=data.lens, sensor_width=data.sensor_width, sensor_height=data.sensor_height)
     camera.virtual_pinhole_sensor = sensor if data.sensor_width != sensor[0] else (0.0, 0.0)
+
+
+def _store(block: bpy.types.ID, **properties: float | tuple[float, ...]) -> None:
+    """Set what Blender does not hold already. It evaluates and draws anew what is set, and for a lens looks at all objects."""
+    for name, value in properties.items():
+        if not np.array_equal(np.float32(value), getattr(block, name)):
+            setattr(block, name, value)
 
 
 def _place_closely(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene) -> None:

@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 # shear.
 LARGEST_SKEW = 32 * 4 * 2.0**-24
 
+_NO_PARENT = np.eye(4)
+
 
 def float64(numbers: Iterable) -> Array:
     """The numbers of a Blender matrix or vector. From 5.0 on NumPy takes these for float32, and would compute in it."""
@@ -37,17 +39,28 @@ def channels(
 ) -> tuple[tuple[float, ...], Array, tuple[float, ...]]:
     """Location, (3, 3) rotation and scale that bring the camera to the pose, relative to its parent and its delta transform."""
     parent = parent_matrix(camera_object, depsgraph)
-    if not _has_inverse(parent):
+    is_free = np.array_equal(parent, _NO_PARENT)  # as most cameras are, which need no linear algebra
+    if not is_free and not _has_inverse(parent):
         raise no_size(camera_object)
     u, v, w = pinhole.basis()
     wanted = np.column_stack([-u if pinhole.mirrored else u, v, w])
     scale, signs = float64(camera_object.scale), _signs(camera_object)
-    local = np.linalg.solve(parent[:3, :3], wanted)
-    if np.linalg.det(local) * signs.prod() < 0:
+    local = wanted if is_free else np.linalg.solve(parent[:3, :3], wanted)
+    if (pinhole.mirrored if is_free else np.linalg.det(local) < 0) != (signs.prod() < 0):
         scale[0], signs[0] = -scale[0], -signs[0]
-    turn = rotation.nearest(local / np.linalg.norm(local, axis=0) * signs)
-    location = np.linalg.solve(parent[:3, :3], np.array(pinhole.eye) - parent[:3, 3]) - float64(camera_object.delta_location)
+    turn = local * signs if is_free else rotation.nearest(local / np.linalg.norm(local, axis=0) * signs)
+    eye = np.array(pinhole.eye)
+    location = eye if is_free else np.linalg.solve(parent[:3, :3], eye - parent[:3, 3])
+    location = location - float64(camera_object.delta_location)
     return tuple(location.tolist()), _delta_rotation(camera_object).T @ turn, tuple(scale.tolist())
+
+
+def state(camera_object: bpy.types.Object) -> tuple:
+    """All that says where the camera stands relative to what carries it."""
+    block = camera_object
+    triples = (block.location, block.scale, block.delta_location, block.delta_scale, block.delta_rotation_euler)
+    turns = (block.rotation_euler, block.rotation_quaternion, block.rotation_axis_angle, block.delta_rotation_quaternion)
+    return block.rotation_mode, *map(tuple, triples), *map(tuple, turns)
 
 
 def rotation_channel(camera_object: bpy.types.Object) -> str:
@@ -63,7 +76,8 @@ def set_rotation(camera_object: bpy.types.Object, turn: Array, before: Sequence[
     """
     name = rotation_channel(camera_object)
     wanted = _delta_rotation(camera_object) @ turn * _signs(camera_object)
-    candidates = rotation.neighbours(rotation.numbers(turn, camera_object.rotation_mode, before))
+    numbers = rotation.numbers(turn, camera_object.rotation_mode, before)
+    candidates = rotation.neighbours(numbers)
     made = []
     for candidate in candidates:
         setattr(camera_object, name, candidate)
@@ -108,7 +122,7 @@ def parent_matrix(camera_object: bpy.types.Object, depsgraph: bpy.types.Depsgrap
     parent = camera_object.parent
     inverse = float64(camera_object.matrix_parent_inverse)
     if not is_told_by_its_pose(camera_object):
-        return float64(parent.evaluated_get(depsgraph).matrix_world) @ inverse if parent else np.eye(4)
+        return float64(parent.evaluated_get(depsgraph).matrix_world) @ inverse if parent else _NO_PARENT
     evaluated = camera_object.evaluated_get(depsgraph)
     if is_carried_by_constraints(camera_object):
         own = float64(evaluated.matrix_basis)

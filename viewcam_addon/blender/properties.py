@@ -17,6 +17,7 @@ no camera (eye = look-at) leave it where it was, and the panel says so.
 """
 
 import contextlib
+import functools
 import json
 import math
 from collections.abc import Iterator
@@ -37,11 +38,11 @@ _stating = False
 def without_callbacks() -> Iterator[None]:
     """Values may be written in here without moving the camera."""
     global _stating
-    _stating = True
+    before, _stating = _stating, True
     try:
         yield
     finally:
-        _stating = False
+        _stating = before
 
 
 def _on_enabled(group: "VirtualPinhole", context: bpy.types.Context) -> None:
@@ -345,7 +346,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
     def precision(self) -> float:
         """The relative rounding of the values: 2⁻⁵³ where all are known in float64, else float32's 2⁻²⁴."""
         eye, look_at, up, distance = self.stored()
-        is_exact = self._exact() == [*eye, *look_at, *up, distance] and not (self.eye_target or self.look_at_target)
+        is_exact = self._exact() == (*eye, *look_at, *up, distance) and not (self.eye_target or self.look_at_target)
         return 2.0**-53 if is_exact else 2.0**-24
 
     def stored(self) -> tuple[tuple, tuple, tuple, float]:
@@ -356,9 +357,9 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         values = [number if short == value else value for number, short, value in zip(exact, rounded, shown, strict=True)]
         return tuple(values[0:3]), tuple(values[3:6]), tuple(values[6:9]), values[9]
 
-    def _exact(self) -> list[float]:
+    def _exact(self) -> tuple[float, ...]:
         """Ten numbers in float64, NaN where none is known."""
-        return _parsed(self.exact, 10) or [math.nan] * 10
+        return _parsed(self.exact, 10) or (math.nan,) * 10
 
 
 def _can_divide(zoom: float, distance: float) -> bool:
@@ -367,10 +368,11 @@ def _can_divide(zoom: float, distance: float) -> bool:
     return 0 < zoom < math.inf and float(float32.tiny) <= distance / zoom <= float(float32.max)
 
 
-def _parsed(text: str, count: int) -> list[float] | None:
+@functools.lru_cache(maxsize=256)
+def _parsed(text: str, count: int) -> tuple[float, ...] | None:
     """So many finite numbers from JSON, None if it holds anything else."""
     with contextlib.suppress(ValueError, RecursionError):  # InputError is a ValueError
-        return list(checks.vector("the text", json.loads(text), count))
+        return tuple(checks.vector("the text", json.loads(text), count))
     return None
 
 
