@@ -117,6 +117,16 @@ def test_a_drag_is_one_step_of_undo(posed_camera, steps):
     assert steps == ["Drag Eye", "Drag Look-At"]
 
 
+def test_the_next_drag_ends_one_whose_end_nobody_has_seen_yet(posed_camera, steps):
+    gizmos.drag(posed_camera, "eye", ELSEWHERE)
+    start = gizmos.place(posed_camera, "look_at")
+    gizmos.drag(posed_camera, "look_at", (1, 2, 3))
+    assert steps == ["Drag Eye"]
+    gizmos.drag(posed_camera, "look_at", start)
+    group = posed_camera.virtual_pinhole
+    assert (tuple(group.eye), tuple(group.look_at)) == (ELSEWHERE, start)
+
+
 def test_a_drag_that_leads_nowhere_is_no_step_of_undo(posed_camera, steps):
     start = gizmos.place(posed_camera, "eye")
     gizmos.drag(posed_camera, "eye", start)

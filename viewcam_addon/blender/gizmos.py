@@ -72,11 +72,14 @@ def place(camera_object: bpy.types.Object, name: str) -> Triple | None:
 def drag(camera_object: bpy.types.Object, name: str, value: Triple) -> None:
     """Bring a handle to a place in world space. A drag's first call keeps what was; the place at that time brings it back."""
     global _drag
+    if _drag and (_drag.camera_name, _drag.name) != (camera_object.name, name):  # over, and the timer has not looked yet
+        end_drag()
     if _drag is None:
         start = tuple(np.float32(place(camera_object, name)).tolist())
         length = math.hypot(*camera_object.virtual_pinhole.up)
         _drag = _Drag(camera_object.name, name, start, length, _state(camera_object), bpy.context.window)
-        bpy.app.timers.register(_end_if_over, first_interval=_LOOKED_AT)
+        if not bpy.app.timers.is_registered(_end_if_over):
+            bpy.app.timers.register(_end_if_over, first_interval=_LOOKED_AT)
     group = camera_object.virtual_pinhole
     if tuple(value) == _drag.start:
         _restore(camera_object, _drag.before)
@@ -134,7 +137,8 @@ def end_drag() -> None:
 
 
 def _push_undo(message: str, window: bpy.types.Window) -> None:
-    with bpy.context.temp_override(window=window):
+    windows = list(bpy.context.window_manager.windows)
+    with bpy.context.temp_override(window=window if window in windows else windows[0]):
         bpy.ops.ed.undo_push(message=message)
 
 
