@@ -5,14 +5,15 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 import viewcam_addon
-from viewcam_addon.blender import clipboard, moving, operators, view_menu
+from viewcam_addon.blender import baking, clipboard, moving, operators, view_menu
 
 
 def test_every_button_of_a_camera_stands_in_the_menu_which_the_search_reads(registered_addon):
     entries = []
     layout = SimpleNamespace(operator=entries.append, separator=lambda: None)
     view_menu.VIEWCAM_MT_cameras.draw(SimpleNamespace(layout=layout), bpy.context)
-    assert set(entries) == {each.bl_idname for each in (*moving.CLASSES, *operators.CLASSES, *clipboard.CLASSES)}
+    rooms = (moving, operators, baking, clipboard)
+    assert set(entries) == {each.bl_idname for room in rooms for each in room.CLASSES}
     assert all(getattr(bpy.ops.viewcam, entry.split(".")[1]).get_rna_type() for entry in entries)
 
 

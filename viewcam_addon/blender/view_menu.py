@@ -5,7 +5,7 @@ Blender's search (F3) looks through menus; what stands in none is found by devel
 
 import bpy
 
-from . import clipboard, moving, operators
+from . import baking, clipboard, moving, operators
 
 
 class VIEWCAM_MT_cameras(bpy.types.Menu):
@@ -13,7 +13,7 @@ class VIEWCAM_MT_cameras(bpy.types.Menu):
     bl_label = "Virtual Pinhole"
 
     def draw(self, _context: bpy.types.Context) -> None:
-        for group in (moving.CLASSES, operators.CLASSES, clipboard.CLASSES):
+        for group in (moving.CLASSES, operators.CLASSES, baking.CLASSES, clipboard.CLASSES):
             for each in group:
                 self.layout.operator(each.bl_idname)
             if group != clipboard.CLASSES:
