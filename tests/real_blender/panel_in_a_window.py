@@ -16,6 +16,7 @@ import bpy
 import numpy as np
 
 KEYS = {"-": "MINUS", "0": "ZERO", "1": "ONE", "3": "THREE", "5": "FIVE", "7": "SEVEN", ".": "PERIOD"}
+_found_at = {}  # where a button was: looked at first
 NOWHERE = (600, 500)  # a place in the 3D viewport
 ROW = 9  # pixels between two looks for a button, less than half its height
 BELOW = 27  # pixels from the middle of the choice at the pole to that of the first row of buttons, and to the next row
@@ -63,12 +64,15 @@ def find(name, index, area_type="VIEW_3D", region_type="UI", across=0.6):
     move(*NOWHERE)  # else the first look tells what was under the mouse before
     yield
     yield
-    for y in range(where.y + where.height - ROW, where.y, -ROW):
+    key = (name, index, area_type)
+    last = [_found_at[key]] if key in _found_at else []
+    for y in (*last, *range(where.y + where.height - ROW, where.y, -ROW)):
         move(x, y)
         yield
         with bpy.context.temp_override(window=window(), area=area, region=where):
             found = bpy.context.property
         if found and found[0] == camera() and found[1:] == (f"virtual_pinhole.{name}", index):
+            _found_at[key] = y
             return x, y - ROW / 2
     raise AssertionError(f"no button of virtual_pinhole.{name}[{index}] in the {region_type} of the {area_type}")
 
