@@ -1,6 +1,7 @@
 """Blender's camera data to the view plane and back, for every fit, shape, aspect, shift, percentage and border."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from viewcam_addon.errors import InputError
-from viewcam_addon.intrinsics import CameraData, Frame, ViewPlane, camera_data, view_plane
+from viewcam_addon.intrinsics import CameraData, Frame, ViewPlane, camera_data, growth, view_plane
 
 fits = st.sampled_from(["AUTO", "HORIZONTAL", "VERTICAL"])
 fractions = st.tuples(st.floats(0, 0.4), st.floats(0, 0.4), st.floats(0.6, 1), st.floats(0.6, 1))
@@ -42,6 +43,14 @@ def test_camera_data_of_a_view_plane_gives_the_camera_back(camera, frame):
     roundings = 9 * 2.0**-53 * 4000 * 2 / 16 * 3
     assert (back.shift_x, back.shift_y) == pytest.approx((camera.shift_x, camera.shift_y), abs=roundings)
     assert (back.sensor_width, back.sensor_height) == (camera.sensor_width, camera.sensor_height)
+
+
+@given(cameras, frames, frames)
+def test_the_distance_grows_with_the_picture_as_that_of_the_same_lens_does(camera, before, after):
+    was, now = (view_plane(camera, replace(frame, percentage=100, crop=False)).distance[0] for frame in (before, after))
+    # Each side a quotient and a product, or two.
+    assert growth(camera.sensor_fit, before, after) == pytest.approx(now / was, rel=8 * 2.0**-53)
+    assert growth(camera.sensor_fit, before, before) == 1
 
 
 @given(st.floats(1e-3, 1e7), frames, fits)

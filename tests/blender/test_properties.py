@@ -303,14 +303,18 @@ def test_a_library_override_keeps_its_values(posed_camera, tmp_path):
     bpy.context.scene.collection.objects.link(linked)
     override = linked.override_create(remap_local_usages=True)
     override.data.override_create(remap_local_usages=True)
-    override.virtual_pinhole.eye = (0, -9, 0)
+    group = override.virtual_pinhole
+    group.eye, group.roll, group.zoom, group.keeps = (0, -9, 0), 0.5, 2, "FIELD_OF_VIEW"
     assert tuple(override.location) == (0, -9, 0)
+    before = group.roll, group.numbers(), override.data.lens
     shot = str(tmp_path / "shot.blend")
     bpy.ops.wm.save_as_mainfile(filepath=shot)
     bpy.ops.wm.open_mainfile(filepath=shot)
     found = next(item for item in bpy.data.objects if item.override_library)
     assert tuple(found.virtual_pinhole.eye) == (0, -9, 0)
     assert tuple(found.location) == (0, -9, 0)
+    group = found.virtual_pinhole
+    assert (group.roll, group.numbers(), found.data.lens) == before and group.keeps == "FIELD_OF_VIEW"
 
 
 def test_the_properties_work_in_edit_mode_of_another_object(posed_camera, scene):
