@@ -9,11 +9,13 @@ objects in the scene (they would be in the file, the outliner and the render).
 """
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import ClassVar
 
 import bpy
 import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
 
 from .. import diagram as diagrams
 from ..errors import InputError
@@ -142,21 +144,29 @@ def _draw_letters() -> None:
     if not figures:
         return
     import blf
-    from bpy_extras.view3d_utils import location_3d_to_region_2d
 
-    font, colors = 0, _axis_colors(context)
-    blf.size(font, _LETTER_SIZE * context.preferences.system.ui_scale)
+    font, size, colors = 0, _LETTER_SIZE * context.preferences.system.ui_scale, _axis_colors(context)
+    blf.size(font, size)
     for pinhole, up, share in figures:
         figure = _diagram(pinhole, up, share)
-        if figure is None:
+        eye = _pixel(pinhole.eye, context)
+        if figure is None or eye is None:
             continue
         for name, tip in zip(_NAMES, figure.axes, strict=True):
-            at = location_3d_to_region_2d(context.region, context.region_data, np.add(pinhole.eye, _LETTER_AT * tip))
-            if at:
+            at = _pixel(np.add(pinhole.eye, _LETTER_AT * tip), context)
+            if at and (at - eye).length > size:
                 width, height = blf.dimensions(font, name)
                 blf.position(font, at.x - width / 2, at.y - height / 2, 0)
                 blf.color(font, *colors[name])
                 blf.draw(font, name)
+
+
+def _pixel(point: Iterable[float], context: bpy.types.Context) -> Vector | None:
+    """Where the context's region shows a point in world space, or None where it lies beyond what the viewport shows."""
+    clipped = context.region_data.perspective_matrix @ Vector((*point, 1.0))
+    if abs(clipped.z) > clipped.w:
+        return None
+    return location_3d_to_region_2d(context.region, context.region_data, point)
 
 
 class _ShowPanel:
