@@ -329,7 +329,7 @@ def count_what_is_made():
 
 
 def measure_a_drag():
-    """The whole update of a camera for one move of the mouse; what it costs on a quiet machine is in the README."""
+    """The whole update of a camera for one move of the mouse: 0.5 ms where nothing else runs, with ten times the room."""
     gizmos, first = room("gizmos"), place("eye")
     before, times = everything(), []
     for step in range(1, FRAMES):
