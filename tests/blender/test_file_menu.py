@@ -154,7 +154,7 @@ def test_what_could_not_come_along_is_told(hand_written):
     imported = import_scene.import_scene(scene_file.read(hand_written), "Hand", bpy.context.scene)
     reasons = {entry.object: entry.reason for entry in imported.ledger if entry.status != "exported"}
     assert reasons == {
-        "Hand": "its picture is 320 × 180 pixels and the scene's 1920 × 1080, as wide a view",
+        "Hand": "its picture is 320 × 180 pixels and the scene's 1920 × 1080: it is as wide a view",
         "lamp": "its spot size is 0.001, and Blender makes it 0.0174533",
         "Scene": "the scene keeps its own world, film and bounces",
     }

@@ -308,3 +308,65 @@ def scenes(draw):
 @settings(max_examples=60, phases=(Phase.explicit, Phase.generate))  # shrinking would open hundreds of files
 def test_any_small_scene_comes_back_the_same(registered_addon, made):
     check_same(made, there_and_back(made))
+
+
+# --- How things stand
+
+
+def object_with(matrix):
+    import_whole(scene_of([Object("Thing", "thing", matrix)], {"thing": tetrahedron()}))
+    return bpy.data.objects["Thing"]
+
+
+@pytest.mark.parametrize(
+    ("location", "degrees", "scale"),
+    [
+        ((1.5, -2.25, 0.1), (0, 0, 0), (1, 1, 1)),
+        ((0, 0, 0), (30, -45, 12.5), (2.5, 2.5, 2.5)),
+        ((7, 8, 9), (0, 90, 0), (1, 1, -1)),
+        ((0, 0, 0.7), (120, 10, -170), (1, 2, 0.5)),
+    ],
+)
+def test_location_rotation_and_scale_are_found_again(fresh_blender, location, degrees, scale):
+    block = bpy.data.objects.new("Placed", None)
+    block.location, block.rotation_euler, block.scale = location, np.radians(degrees), scale
+    matrix = np.array(block.matrix_basis, dtype=np.float64)
+    found = object_with(matrix)
+    assert found.parent is None
+    bpy.context.view_layer.update()
+    assert np.array_equal(np.array(found.matrix_world, dtype=np.float64), matrix)
+    assert np.abs(found.scale) == pytest.approx(np.abs(scale), rel=1e-6) and tuple(found.location) == pytest.approx(location)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_matrix_that_no_channels_give_stands_below_an_empty(fresh_blender, seed):
+    matrix = np.eye(4)
+    matrix[:3] = float32(np.random.default_rng(seed).normal(size=(3, 4)))
+    found = object_with(matrix)
+    assert found.parent.type == "EMPTY" and found.parent.name == "File.001"
+    bpy.context.view_layer.update()
+    assert np.array_equal(np.array(found.matrix_world, dtype=np.float64), matrix)
+
+
+def test_objects_of_one_geometry_share_it_and_keep_their_own_materials(fresh_blender):
+    red, green = (Material(diffuse=Colour(rgb)) for rgb in ((1, 0, 0), (0, 1, 0)))
+    objects = [Object(name, "thing", np.eye(4), materials=(name,)) for name in ("red", "green")]
+    import_whole(scene_of(objects, {"thing": tetrahedron()}, materials={"red": red, "green": green}))
+    one, other = bpy.data.objects["red"], bpy.data.objects["green"]
+    assert one.data == other.data
+    assert [block.material_slots[0].material.name for block in (one, other)] == ["red", "green"]
+
+
+def test_an_image_survives_saving_and_loading(fresh_blender, tmp_path):
+    pixels = np.random.default_rng(0).random((2, 3, 3)).astype(np.float32) * 10
+    made = scene_of(
+        [Object("Thing", "thing", np.eye(4), materials=("paper",))],
+        {"thing": tetrahedron(corner_uvs=np.zeros((4, 3, 2), np.float32))},
+        materials={"paper": Material(diffuse=Colour((1.0, 1.0, 1.0), "noise"))},
+        images={"noise": Picture(pixels)},
+    )
+    import_whole(made)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "file.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "file.blend"))
+    (picture,) = job.export(job.Request(level="path")).images.values()
+    assert np.array_equal(picture.pixels, pixels) and not picture.srgb

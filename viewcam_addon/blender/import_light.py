@@ -100,7 +100,7 @@ def image_from(picture: Picture, name: str, borrow: Borrower, ledger: Ledger) ->
     borrow.afterwards(bpy.data.batch_remove, [image])
     pixels = np.concatenate([picture.pixels, np.ones((height, width, 1), np.float32)], axis=2)
     if picture.srgb and np.abs(pixels - np.rint(pixels * 255) / 255).max() > 2.0**-20:
-        ledger.note(name, "approximated", "an image in sRGB of more than 256 levels, and Blender keeps so many")
+        ledger.note(name, "approximated", "its sRGB pixels are rounded to the 256 levels that Blender keeps")
     image.pixels.foreach_set(pixels.ravel())
     image.update()
     image.pack()

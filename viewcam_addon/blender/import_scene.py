@@ -13,6 +13,7 @@ shear), and the Empty for all (the sidebar would show no location).
 import contextlib
 import dataclasses
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import bpy
@@ -33,6 +34,9 @@ from .ledger import Ledger
 Array = NDArray[np.float64]
 
 _LARGEST_PICTURE, _LEAST_PICTURE = 65536, 4  # Blender's own limits
+_MIRRORS = np.array([[-1, 1, 1], [1, -1, 1], [1, 1, -1], [-1, -1, -1]])  # the scales that mirror, each with its own rotation
+_SHEAR = 2.0**-21  # what float32 may make of a rotation or of one scale for all axes
+_PIXEL_ASPECT = 2.0**-23  # what float32 makes of a ratio of two distances
 
 
 @dataclass(frozen=True)
@@ -123,13 +127,15 @@ class _Import:
         data = bpy.data.cameras.new(self._name)
         self._borrow.afterwards(bpy.data.batch_remove, [data])
         block = self._new(self._name, data)
-        for name, depth in zip(("clip_start", "clip_end"), visible_depths(self._made), strict=True):
-            import_light.store(data, name, depth, block.name, self._ledger)
+        pinhole = self._fitted(self._shown())
+        depths = visible_depths(dataclasses.replace(self._made, camera=pinhole))
+        for name, depth in zip(("clip_start", "clip_end"), depths, strict=True):
+            import_light.store(data, name, depth, self._name, self._ledger)
         if is_shown:
             self._borrow.set(self._scene, "camera", block)
-        for finding in cameras.apply(block, self._fitted(self._shown()), self._scene):
-            self._ledger.note(block.name, "approximated", finding)
-        self._ledger.placed(block.name)
+        for finding in cameras.apply(block, pinhole, self._scene):
+            self._ledger.note(self._name, "approximated", finding)
+        self._ledger.placed(self._name)
         return block
 
     def _shown(self) -> Pinhole:
@@ -146,31 +152,19 @@ class _Import:
         return shown
 
     def _fitted(self, pinhole: Pinhole) -> Pinhole:
-        """The camera of the scene's own picture that shows as much across."""
+        """The camera of the scene's own picture that is as wide a view."""
         frame = datablocks.frame_of(self._scene)
         _, _, width, height = frame.window
-        aspect = frame.pixel_aspect_x / frame.pixel_aspect_y
-        if (width, height) == (pinhole.width, pinhole.height) and abs(
-            pinhole.distance[1] / pinhole.distance[0] / aspect - 1
-        ) <= 2.0**-23:
-            return pinhole
-        self._ledger.note(
-            self._name,
-            "approximated",
-            f"its picture is {pinhole.width} × {pinhole.height} pixels and the scene's {width} × {height}, as wide a view",
-        )
         across = width / pinhole.width
-        upwards = across * pinhole.distance[0] * aspect / pinhole.distance[1]
-        return dataclasses.replace(
-            pinhole,
-            distance=(pinhole.distance[0] * across, pinhole.distance[1] * upwards),
-            width=width,
-            height=height,
-            principal_point=(
-                pinhole.principal_point[0] * across,
-                height / 2 + (pinhole.principal_point[1] - pinhole.height / 2) * upwards,
-            ),
-        )
+        distance = pinhole.distance[0] * across, pinhole.distance[0] * across * frame.pixel_aspect_x / frame.pixel_aspect_y
+        upwards = distance[1] / pinhole.distance[1]
+        if (width, height) == (pinhole.width, pinhole.height) and abs(upwards - 1) <= _PIXEL_ASPECT:
+            return pinhole
+        sizes = f"its picture is {pinhole.width} × {pinhole.height} pixels and the scene's {width} × {height}"
+        self._ledger.note(self._name, "approximated", f"{sizes}: it is as wide a view")
+        centre_x, centre_y = pinhole.principal_point
+        principal_point = centre_x * across, height / 2 + (centre_y - pinhole.height / 2) * upwards
+        return dataclasses.replace(pinhole, distance=distance, width=width, height=height, principal_point=principal_point)
 
     # --- Surfaces
 
@@ -201,8 +195,7 @@ class _Import:
     def _surface(
         self, placed: Object, data: bpy.types.Mesh | bpy.types.PointCloud, slots: list[bpy.types.Material | None]
     ) -> None:
-        is_first = not data.materials
-        if is_first:
+        if not data.materials:
             for material in slots:
                 data.materials.append(material)
         block = self._placed(placed.name, data, placed.matrix)
@@ -233,35 +226,36 @@ def stands(block: bpy.types.Object, matrix: Array) -> bool:
     """
     wanted = matrix.astype(np.float32)
     sizes = np.linalg.norm(matrix[:3, :3], axis=0)
-    if not sizes.all():
+    if not sizes.all() or rotation.skew(matrix[:3, :3]) > _SHEAR:
         return False
-    if np.linalg.det(matrix[:3, :3]) < 0:
-        sizes[0] = -sizes[0]
-    turn = rotation.nearest(matrix[:3, :3] / sizes)
     block.location = wanted[:3, 3]
-    for scale in _likely(sizes):
-        block.scale = scale
-        for angles in _likely_angles(rotation.euler(turn, "XYZ")):
-            block.rotation_euler = angles
-            if np.array_equal(np.array(block.matrix_basis, dtype=np.float32), wanted):
-                return True
+    mirrors = _MIRRORS if np.linalg.det(matrix[:3, :3]) < 0 else np.ones((1, 3))
+    for signed in mirrors * sizes:
+        angles = rotation.euler(rotation.nearest(matrix[:3, :3] / signed), "XYZ")
+        for scale in _likely_scales(signed):
+            block.scale = scale
+            for each in _likely_angles(angles):
+                block.rotation_euler = each
+                if np.array_equal(np.array(block.matrix_basis, dtype=np.float32), wanted):
+                    return True
     block.location, block.rotation_euler, block.scale = (0, 0, 0), (0, 0, 0), (1, 1, 1)
     return False
 
 
-def _likely_angles(angles: tuple[float, ...]) -> list[Array]:
+def _likely_angles(angles: tuple[float, ...]) -> Iterator[Array]:
     """Euler angles that may be meant, about x, then y, then z: of few digits in degrees, or as they are; both triples."""
     x, y, z = angles
     other = (x - math.copysign(math.pi, x), math.copysign(math.pi, y) - y, z - math.copysign(math.pi, z))
-    return [
-        each
-        for triple in (angles, other)
-        for each in (np.radians(np.round(np.degrees(triple), 3)), *rotation.neighbours(triple))
-    ]
+    for triple in (angles, other):
+        yield np.radians(np.round(np.degrees(triple), 3))
+    for triple in (angles, other):
+        yield from rotation.neighbours(triple)
 
 
-def _likely(sizes: Array) -> list[Array]:
+def _likely_scales(sizes: Array) -> list[tuple[float, ...]]:
     """Scales that may be meant: with few digits, the same along all axes, or as they are."""
-    mean = np.copysign(np.abs(sizes).mean(), sizes)
-    near = [np.array([float(f"{size:.6g}") for size in candidate]) for candidate in (sizes, mean)]
-    return [near[0], *([near[1], mean] if np.ptp(np.abs(sizes)) <= 2.0**-21 * abs(mean[0]) else []), sizes]
+    likely = [sizes]
+    if np.ptp(np.abs(sizes)) <= _SHEAR * np.abs(sizes).max():
+        likely.insert(0, np.copysign(np.abs(sizes).mean(), sizes))
+    likely = [*([float(f"{size:.6g}") for size in scale] for scale in likely), *likely]
+    return list(dict.fromkeys(tuple(np.float32(scale).tolist()) for scale in likely))
