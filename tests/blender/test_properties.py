@@ -170,6 +170,13 @@ def test_typing_no_roll_gives_back_the_worlds_z_as_up(posed_camera):
     assert group.numbers()[2] == (0, 0, 1) and group.roll == 0.0
 
 
+def test_a_roll_that_is_rounding_alone_is_0(posed_camera):
+    group = posed_camera.virtual_pinhole
+    for eye in ((-0.5, -7.6, 1.62), (3, 1, 4), (1e-3, 2, 9)):
+        group.eye = eye
+        assert str(group.roll) == "0.0"
+
+
 def test_roll_says_how_far_a_stated_up_leans(posed_camera):
     group = posed_camera.virtual_pinhole
     group.eye, group.look_at, group.up = (0, -5, 0), (0, 0, 0), (-1, 0, 1)

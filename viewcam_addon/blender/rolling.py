@@ -14,11 +14,15 @@ from ..errors import InputError
 from ..pinhole import Pinhole
 from . import datablocks, hold, preferences
 
+# A turn by less is lost in the float32 matrix in which a camera is stored, and would be shown as −0°.
+_UNSEEN = 2.0**-24
+
 
 def angle(group: bpy.types.PropertyGroup) -> float:
-    """Radians, from u towards v; 0 where the values make no camera."""
+    """Radians, from u towards v; 0 where the values make no camera, and below what can be seen."""
     with contextlib.suppress(InputError):
-        return rolls.angle_from(preferences.up_axis(), _view(group))
+        found = rolls.angle_from(preferences.up_axis(), _view(group))
+        return found if abs(found) > _UNSEEN else 0.0
     return 0.0
 
 
