@@ -20,7 +20,8 @@ from panel_in_a_window import NOWHERE, click, move, press, region, start, window
 from tour_hands import SIDEBAR, look, photograph
 
 FILE, FOLDER, *PICTURES = map(Path, sys.argv[sys.argv.index("--") + 1 :])
-PROOF = "bl_ext.user_default.virtual_pinhole.viewcam_addon.blender.proof"
+ADDON = "bl_ext.user_default.virtual_pinhole"
+PROOF = f"{ADDON}.viewcam_addon.blender.proof"
 ROW = 12  # pixels between two looks for a button, less than its height
 PATIENCE = 60  # seconds that one comparison may take on a busy machine
 LEFT, MIDDLE, RIGHT, CANCEL = 0.3, 0.5, 0.7, 0.83  # shares of the sidebar's width
@@ -74,9 +75,9 @@ def begin():
 def ended(comparison):
     """Steps until it has gone, without a trace."""
     ends = time.monotonic() + 5
-    while proof.running() and time.monotonic() < ends:
+    while (proof.running() or proof._timer) and time.monotonic() < ends:
         yield
-    assert proof.running() is None and not comparison.folder.exists()
+    assert proof.running() is None and proof._timer is None and not comparison.folder.exists()
     assert comparison._family.status() is not None
 
 
@@ -200,6 +201,18 @@ def open_a_file_while_it_runs():
     assert proof.latest() is None and not kept.exists()
 
 
+def turn_the_add_on_off_while_it_runs():
+    global proof
+    comparison, _ = yield from begin()
+    bpy.ops.preferences.addon_disable(module=ADDON)
+    yield
+    yield
+    assert not comparison.folder.exists() and comparison._family.status() is not None
+    bpy.ops.preferences.addon_enable(module=ADDON)
+    proof = importlib.import_module(PROOF)
+    yield
+
+
 def quit_while_it_runs():
     comparison, _ = yield from begin()
     (FOLDER / "last.txt").write_text(str(comparison.folder))
@@ -219,6 +232,8 @@ def steps():
         press_cancel,
         undo_while_it_runs,
         open_a_file_while_it_runs,
+        open_the_panel,
+        turn_the_add_on_off_while_it_runs,
         open_the_panel,
         quit_while_it_runs,
     ):

@@ -21,6 +21,7 @@ from .render_settings import LEVELS
 _SECONDS = 0.2  # between two looks
 _NAMES = tuple(name for name, *_ in LEVELS)
 
+_timer: bpy.types.Timer | None = None
 _running: Comparison | None = None
 _latest: Outcome | None = None
 
@@ -65,6 +66,13 @@ def _look() -> Outcome | None:
     return outcome
 
 
+def _stop_timer() -> None:
+    global _timer
+    if _timer:
+        bpy.context.window_manager.event_timer_remove(_timer)
+    _timer = None
+
+
 class ProofSettings(bpy.types.PropertyGroup):
     """`window_manager.virtual_pinhole_proof`: how the next comparison is made."""
 
@@ -106,7 +114,6 @@ class VIEWCAM_OT_compare_with_cycles(bpy.types.Operator):
         description="Name of the camera object, or empty for the active or the scene's camera",
         options={"SKIP_SAVE"},
     )
-    _timer = None
     _shown = ("", 0)  # the step and the second that were drawn last
 
     @classmethod
@@ -124,7 +131,8 @@ class VIEWCAM_OT_compare_with_cycles(bpy.types.Operator):
             return self.execute(context)
         if not self._begins(context):
             return {"CANCELLED"}
-        self._timer = context.window_manager.event_timer_add(_SECONDS, window=context.window)
+        global _timer
+        _timer = context.window_manager.event_timer_add(_SECONDS, window=context.window)
         context.window_manager.modal_handler_add(self)
         _redraw(context)
         return {"RUNNING_MODAL"}
@@ -181,9 +189,7 @@ class VIEWCAM_OT_compare_with_cycles(bpy.types.Operator):
         self._shown = step, second
 
     def _leave(self, context: bpy.types.Context) -> None:
-        if self._timer:
-            context.window_manager.event_timer_remove(self._timer)
-            self._timer = None
+        _stop_timer()
         _redraw(context)
 
     def _tells(self, outcome: Outcome, context: bpy.types.Context) -> set[str]:
@@ -372,6 +378,7 @@ def register() -> None:
 
 def unregister() -> None:
     end()
+    _stop_timer()  # Blender takes a modal operator that is unregistered away without its cancel()
     atexit.unregister(end)
     bpy.app.handlers.load_pre.remove(_on_load)
     bpy.types.STATUSBAR_HT_header.remove(_draw_status_bar)
