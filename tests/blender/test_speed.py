@@ -1,0 +1,250 @@
+"""What following costs: what is done for one camera among many, what is written, and what 10,000 updates leave behind.
+
+Bounds on time have a factor of ten of room for slow and busy machines; what matters is counted.
+"""
+
+import gc
+import resource
+import sys
+import time
+import tracemalloc
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from viewcam_addon.blender import animation, findings, properties
+from viewcam_addon.blender import camera as cameras
+
+
+def update():
+    bpy.context.view_layer.update()
+
+
+@pytest.fixture
+def target(empty):
+    """An empty at (1, 2, 3)."""
+    return empty("Target", (1, 2, 3))
+
+
+@pytest.fixture
+def placed(monkeypatch):
+    """The names of the cameras that are placed, in order, as long as the test lasts."""
+    names, place = [], cameras.place
+
+    def counting(camera_object, *rest):
+        names.append(camera_object.name)
+        return place(camera_object, *rest)
+
+    monkeypatch.setattr(cameras, "place", counting)
+    return names
+
+
+@pytest.fixture
+def two_hundred_cameras(posed_camera, scene):
+    """200 cameras that are enabled, each with data of its own; the first of them is the posed one."""
+    result = [posed_camera]
+    for _ in range(199):
+        twin = posed_camera.copy()
+        twin.data = posed_camera.data.copy()
+        scene.collection.objects.link(twin)
+        result.append(twin)
+    update()
+    return result
+
+
+def key_the_eye(camera_object):
+    group = camera_object.virtual_pinhole
+    for frame in (1, 101):
+        group.eye = (7, -6, frame)
+        group.keyframe_insert("eye", frame=frame)
+
+
+def test_one_target_among_200_cameras_places_one_camera(two_hundred_cameras, scene, target, placed):
+    two_hundred_cameras[0].virtual_pinhole.look_at_target = target
+    update()
+    placed.clear()
+    target.location.x = 5
+    update()
+    assert placed == ["Camera"]
+
+
+def test_one_keyed_camera_among_200_is_the_only_one_that_a_frame_places(two_hundred_cameras, scene, placed):
+    key_the_eye(two_hundred_cameras[0])
+    scene.frame_set(1)
+    placed.clear()
+    scene.frame_set(50)
+    assert placed == ["Camera"]
+
+
+def test_an_edit_among_200_cameras_places_one_camera(two_hundred_cameras, placed):
+    two_hundred_cameras[0].virtual_pinhole.eye = (1, 1, 9)
+    update()
+    assert placed == ["Camera"]
+
+
+def test_what_no_camera_depends_on_moves_without_placing_any(two_hundred_cameras, scene, target, empty, placed):
+    two_hundred_cameras[0].virtual_pinhole.look_at_target = target
+    other = empty("Other")
+    update()
+    placed.clear()
+    other.location.x = 5
+    update()
+    scene.frame_set(7)
+    assert placed == []
+
+
+def test_a_frame_looks_at_nothing_but_what_blender_has_evaluated(two_hundred_cameras, scene, monkeypatch):
+    """However many objects there are: is_animated is asked for the keyed camera alone."""
+    key_the_eye(two_hundred_cameras[0])
+    scene.frame_set(1)
+    asked, is_animated = [], animation.is_animated
+    monkeypatch.setattr(animation, "is_animated", lambda each: asked.append(each.name) or is_animated(each))
+    scene.frame_set(50)
+    assert asked == ["Camera"]
+
+
+def updates_of(action):
+    """The names of the objects and data that Blender evaluates after an action, as often as it asks the handlers."""
+    seen = []
+
+    def note(_scene, depsgraph):
+        seen.append(sorted(each.id.name for each in depsgraph.updates))
+
+    bpy.app.handlers.depsgraph_update_post.append(note)
+    try:
+        action()
+        update()
+    finally:
+        bpy.app.handlers.depsgraph_update_post.remove(note)
+    return seen
+
+
+def test_an_edit_of_the_eye_does_not_touch_the_lens(posed_camera):
+    update()
+    data = posed_camera.data
+    for seen in updates_of(lambda: setattr(posed_camera.virtual_pinhole, "eye", (1, 1, 9))):
+        assert seen == ["Camera"], f"{data.name} and {len(seen) - 1} more were evaluated again"
+
+
+def test_a_camera_in_place_is_not_written_to(posed_camera, scene):
+    cameras.follow(posed_camera, scene)
+    update()
+    assert updates_of(lambda: cameras.place(posed_camera, cameras.stated(posed_camera, scene), scene, depsgraph())) == []
+
+
+def test_a_camera_that_was_moved_out_of_place_is_put_back(posed_camera, scene):
+    cameras.follow(posed_camera, scene)
+    before = posed_camera.matrix_basis.copy()
+    for name, value in (("location", (1, 2, 3)), ("rotation_euler", (1, 2, 3)), ("rotation_mode", "ZYX")):
+        setattr(posed_camera, name, value)
+        cameras.follow(posed_camera, scene)
+        np.testing.assert_allclose(posed_camera.matrix_basis, before, atol=findings.LARGEST_TURN, err_msg=name)
+    posed_camera.data.lens = 20
+    cameras.follow(posed_camera, scene)
+    assert posed_camera.data.lens == pytest.approx(1500 * 36 / 1920)
+
+
+def depsgraph():
+    return bpy.context.evaluated_depsgraph_get()
+
+
+def seconds_each(action, count=100, rounds=3):
+    """The best of a few rounds."""
+    durations = []
+    for _ in range(rounds):
+        start = time.perf_counter()
+        for i in range(count):
+            action(i)
+        durations.append((time.perf_counter() - start) / count)
+    return min(durations)
+
+
+@pytest.mark.parametrize("mode", ["XYZ", "QUATERNION"])
+@pytest.mark.parametrize("kind", ["point", "target", "keyed"])
+def test_an_update_takes_about_half_a_millisecond(posed_camera, scene, target, kind, mode):
+    group, posed_camera.rotation_mode = posed_camera.virtual_pinhole, mode
+    if kind == "target":
+        group.look_at_target = target
+
+        def once(i):
+            target.location = (0.01 * i, 0, 1)
+            update()
+
+    elif kind == "keyed":
+        key_the_eye(posed_camera)
+        once = scene.frame_set
+    else:
+
+        def once(i):
+            group.eye = (7 + 0.01 * i, -6, 5)
+            update()
+
+    milliseconds = 1e3 * seconds_each(once)
+    assert milliseconds < 10, f"{milliseconds:.2f} ms"
+
+
+def leftovers(once, count):
+    """(bytes of Python, bytes of the process, datablocks, objects of Python) that `count` updates leave."""
+    tracemalloc.start()
+    for i in range(50):
+        once(i)
+    before = kept()
+    for i in range(count):
+        once(50 + i)
+    after = kept()
+    tracemalloc.stop()
+    return [there - here for here, there in zip(before, after, strict=True)]
+
+
+def kept():
+    """What there is without what is remembered for a while, which is a fixed number of entries."""
+    cameras._in_place.clear()
+    properties._parsed.cache_clear()
+    gc.collect()
+    return tracemalloc.get_traced_memory()[0], largest_memory(), datablocks(), len(gc.get_objects())
+
+
+def largest_memory():
+    """Bytes: the most that this process has ever had."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+
+
+def datablocks():
+    return sum(len(each) for each in (bpy.data.objects, bpy.data.cameras, bpy.data.actions)) + sum(
+        len(each.animation_data.drivers) for each in bpy.data.objects if each.animation_data
+    )
+
+
+@pytest.mark.parametrize("kind", ["point", "target", "keyed"])
+@pytest.mark.parametrize("count", [500, pytest.param(10000, marks=pytest.mark.exhaustive)], ids=["in_500", "in_10000"])
+def test_updates_leave_nothing_behind(posed_camera, scene, target, kind, count):
+    group = posed_camera.virtual_pinhole
+    if kind == "target":
+        group.look_at_target = target
+
+        def once(i):
+            target.location = (1e-3 * i, 0, 1)
+            update()
+
+    elif kind == "keyed":
+        key_the_eye(posed_camera)
+        once = scene.frame_set
+    else:
+
+        def once(i):
+            group.eye = (7 + 1e-3 * i, -6, 5)
+            update()
+
+    python, process, blocks, objects = leftovers(once, count)
+    # A leak of one number an update is 24 bytes, and what Blender and Python allocate at their first calls is a few kilobytes.
+    assert python < 16384 + 8 * count, f"{python} bytes of Python after {count} updates"
+    assert process < 16 * 2**20, f"the process has grown by {process / 2**20:.1f} MiB"
+    assert blocks == 0 and abs(objects) < 100, f"{blocks} datablocks and {objects} Python objects are left"
+
+
+def test_a_leak_would_be_noticed(posed_camera):
+    leaked = []
+    python, *_ = leftovers(lambda i: leaked.append(float(i)), 1000)
+    assert python > 16384 + 8 * 1000, f"{python} bytes"
