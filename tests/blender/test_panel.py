@@ -5,7 +5,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import datablocks, moving, panel
+from viewcam_addon.blender import clipboard, datablocks, moving, panel
 
 
 def contents(camera_object, scene):
@@ -242,6 +242,13 @@ def test_each_read_out_has_a_button_that_copies_it(posed_camera):
     assert buttons[-1].label == "To Look-At" and float(buttons[-1].text) == pytest.approx(10.0499, abs=1e-4)
 
 
+def test_the_tooltip_of_a_copy_button_shows_what_is_copied():
+    said = SimpleNamespace(label="u", text="(1.0, 0.0, 0.0)")
+    described = clipboard.VIEWCAM_OT_copy_readout.description(bpy.context, said)
+    assert described == f"{clipboard.VIEWCAM_OT_copy_readout.bl_description}: (1.0, 0.0, 0.0)"
+    assert bpy.ops.viewcam.copy_readout(label="u", text="(1.0, 0.0, 0.0)") == {"FINISHED"}
+
+
 def test_drawing_states_the_camera_once_and_reads_it_once_for_the_read_outs(posed_camera, monkeypatch):
     """With 10,000 frames of a held roll, stating it costs 30 ms."""
     calls = []
@@ -269,13 +276,15 @@ def test_drawing_looks_at_no_other_camera(posed_camera, add_camera, monkeypatch)
     assert looked_at == {"Camera"}
 
 
-GERMAN = {"Use Up {up}": "Oben wird {up}", "Focal Length": "Brennweite", "Copy this number": "Zahl kopieren"}
-SINGULAR = "The view is parallel to up, and the roll is undefined: the axes are the canonical ones"
+GERMAN = {
+    "Use Up {up}": "Oben wird {up}",
+    "The view is parallel to up, and the roll is undefined: the axes are the canonical ones": "Senkrecht",
+}
 
 
 def test_what_is_made_of_pieces_is_translated_before_the_pieces_go_in(posed_camera, monkeypatch):
     posed_camera.virtual_pinhole.eye = (0, 0, 5)
-    monkeypatch.setattr(panel, "iface", lambda text: (GERMAN | {SINGULAR: "Senkrecht"}).get(text, text))
+    monkeypatch.setattr(panel, "iface", lambda text: GERMAN.get(text, text))
     found = drawn(panel.VIEWCAM_PT_data)
     assert found[-1][2] == {"text": "Oben wird (1, 0, 0)", "translate": False}
     assert ("label", "Senkrecht", {"icon": "ERROR", "translate": False}) in [each[:3] for each in found]

@@ -58,7 +58,7 @@ class VIEWCAM_OT_paste_camera(CameraOperator, bpy.types.Operator):
 class VIEWCAM_OT_copy_readout(bpy.types.Operator):
     bl_idname = "viewcam.copy_readout"
     bl_label = "Copy Read-Out"
-    bl_description = "Copy this number with all its digits, angles in degrees, lengths in world units"
+    bl_description = "Copy this read-out with all its digits and without its unit; a length as world units"
     bl_options: ClassVar[set[str]] = {"INTERNAL"}
 
     label: bpy.props.StringProperty(options={"SKIP_SAVE"})
