@@ -93,6 +93,21 @@ def test_another_size_shows_the_same_and_is_stated_so(blend, scene, size):
     assert group.precision() == 2.0**-53 if group.exact else 2.0**-24
 
 
+@pytest.mark.parametrize("keeps", ["PIXELS", "FIELD_OF_VIEW"])
+def test_another_size_of_a_keyed_zoom_and_distance_shows_the_same(blend, both_sides, keeps):
+    group = bpy.data.objects["Camera"].virtual_pinhole
+    group.keeps = keeps
+    for frame, distance in ((1, 100), (11, 300)):
+        group.distance, group.zoom = distance, distance / 200
+        group.keyframe_insert("distance", frame=frame)
+        group.keyframe_insert("zoom", frame=frame)
+    both = both_sides(blend=blend(), frame=11, size=(80, 60))
+    both.check()
+    exported = both.exported
+    assert exported.camera.distance == pytest.approx((225, 225), rel=1e-6)
+    assert exported.stated_camera.distance == pytest.approx(exported.camera.distance, rel=1e-6)
+
+
 def test_another_size_than_the_percentage_of_the_scene(blend, scene):
     scene.render.resolution_percentage = 33
     exported = job.export(job.Request(blend(), size=(160, 120)))
