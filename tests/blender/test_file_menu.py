@@ -1,6 +1,8 @@
 import dataclasses
 import json
+import os
 import re
+from pathlib import Path
 
 import pytest
 
@@ -199,6 +201,7 @@ def test_coordinates_that_count_from_elsewhere_are_told(hand_written):
         ('"distance": 400', '"distance": 1e300', "needs 1e+300, beyond Blender's numbers"),
         ('"width": 320', '"width": 3', "the file's picture is 3 × 180 pixels"),
         ('"radii": [0.5, 0.25]', '"radii": [0.5, -1]', "radii not negative"),
+        ('"name": "lamp"', r'"name": "\ud800"', "this is no JSON text"),
     ],
 )
 def test_a_bad_file_is_one_sentence_and_changes_nothing(hand_written, wrong, right, sentence):
@@ -223,6 +226,26 @@ def test_whatever_fails_half_way_leaves_nothing_behind(hand_written, step, monke
     with pytest.raises(MemoryError):
         import_scene.import_scene(scene_file.read(hand_written), "Hand", bpy.context.scene, True, True)
     assert (blocks(), settings_of(bpy.context.scene)) == before
+
+
+@pytest.mark.parametrize("name", ["", "x" * 300, "a\nb", "😀", "Hand"])
+def test_things_may_have_any_name(hand_written, name):
+    hand_written.write_text(
+        HAND.replace('"name": "lamp"', f'"name": {json.dumps(name)}').replace('"wall"', json.dumps(name or "-"))
+    )
+    assert import_(hand_written) == {"FINISHED"}
+
+
+def test_a_file_may_have_any_name(hand_written):
+    odd = Path(os.fsdecode(os.fsencode(str(hand_written.parent)) + b"/\xff.json"))
+    hand_written.rename(odd)
+    scene = scene_file.read(odd)
+    assert scene.objects[0].name == "floor"
+    assert import_(odd) == {"FINISHED"}
+    assert [block.name for block in bpy.data.collections] == ["Collection", "?"]
+    odd.write_text("{")
+    with pytest.raises(RuntimeError, match=r"\?\.json: line 1 is not JSON"):
+        import_(odd)
 
 
 def test_it_imports_in_edit_mode(hand_written):

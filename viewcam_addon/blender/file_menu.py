@@ -56,7 +56,7 @@ class VIEWCAM_OT_export_scene(ExportHelper, bpy.types.Operator):
             scene = job.export(job.Request(level="path" if self.light else "geometry", recenter=self.recenter))
             scene_file.write(scene, path)
         except InputError as error:
-            self.report({"ERROR"}, datablocks.sentence(error))
+            self.report({"ERROR"}, _text(datablocks.sentence(error)))
             return {"CANCELLED"}
         _tell(self, scene.ledger, "exported", path, context)
         return {"FINISHED"}
@@ -103,9 +103,11 @@ class VIEWCAM_OT_import_scene(ImportHelper, bpy.types.Operator):
         path = Path(bpy.path.abspath(self.filepath))
         try:
             scene = scene_file.read(path)
-            imported = import_scene.import_scene(scene, path.stem, context.scene, self.set_picture, self.set_surroundings)
+            imported = import_scene.import_scene(
+                scene, _text(path.stem), context.scene, self.set_picture, self.set_surroundings
+            )
         except InputError as error:
-            self.report({"ERROR"}, datablocks.sentence(error))
+            self.report({"ERROR"}, _text(datablocks.sentence(error)))
             return {"CANCELLED"}
         if context.mode == "OBJECT":
             _select(imported.objects, imported.camera, context)
@@ -139,9 +141,14 @@ def _tell(
 ) -> None:
     """Report what became of a scene, and show what lacks in it. deed : "exported" or "imported"."""
     lacking = [entry for entry in ledger if entry.status != "exported"]
-    operator.report({"WARNING" if lacking else "INFO"}, f"{path.name}: {summary(ledger, deed)}")
+    operator.report({"WARNING" if lacking else "INFO"}, _text(f"{path.name}: {summary(ledger, deed)}"))
     if lacking and not bpy.app.background:
         _show(lacking, f"What the {deed.capitalize()} Scene Lacks", context)
+
+
+def _text(name: str) -> str:
+    """What Blender can show of a file's name, whose bytes may be no text."""
+    return name.encode("utf-8", "replace").decode()
 
 
 def summary(ledger: Sequence[LedgerEntry], deed: str) -> str:

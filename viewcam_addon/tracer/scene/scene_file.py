@@ -137,14 +137,18 @@ def _parsed(path: Path) -> object:
         raise InputError(f"{path.name}: {name} is no number that a scene can hold: give a finite one")
 
     try:
-        return json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=unique, parse_constant=finite)
+        text = path.read_text(encoding="utf-8")
+        document = json.loads(text, object_pairs_hook=unique, parse_constant=finite)
+        if r"\ud" in text.lower():
+            json.dumps(document, ensure_ascii=False).encode()  # half a character, which only JSON can write, is no text
+        return document
     except FileNotFoundError as error:
         raise InputError(f"{path} does not exist: check the name of the scene file") from error
     except OSError as error:
         raise InputError(f"{path} can't be read ({error.strerror}): check the name of the scene file") from error
     except json.JSONDecodeError as error:
         raise InputError(f"{path.name}: line {error.lineno} is not JSON ({error.msg}): correct it") from error
-    except (UnicodeDecodeError, RecursionError) as error:
+    except (UnicodeError, RecursionError) as error:
         raise InputError(f"{path.name}: this is no JSON text: give a scene file") from error
 
 
