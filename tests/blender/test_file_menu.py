@@ -242,7 +242,7 @@ def test_a_file_may_have_any_name(hand_written):
     scene = scene_file.read(odd)
     assert scene.objects[0].name == "floor"
     assert import_(odd) == {"FINISHED"}
-    assert [block.name for block in bpy.data.collections] == ["Collection", "?"]
+    assert "?" in bpy.data.collections
     odd.write_text("{")
     with pytest.raises(RuntimeError, match=r"\?\.json: line 1 is not JSON"):
         import_(odd)
