@@ -217,8 +217,10 @@ def datablocks():
     )
 
 
-@pytest.mark.parametrize("kind", ["point", "target", "keyed"])
-@pytest.mark.parametrize("count", [500, pytest.param(10000, marks=pytest.mark.exhaustive)], ids=["in_500", "in_10000"])
+@pytest.mark.parametrize(
+    ("kind", "count"),
+    [("point", 500), ("target", 500), ("keyed", 500), pytest.param("target", 10000, marks=pytest.mark.exhaustive)],
+)
 def test_updates_leave_nothing_behind(posed_camera, scene, target, kind, count):
     group = posed_camera.virtual_pinhole
     if kind == "target":
@@ -230,7 +232,9 @@ def test_updates_leave_nothing_behind(posed_camera, scene, target, kind, count):
 
     elif kind == "keyed":
         key_the_eye(posed_camera)
-        once = scene.frame_set
+
+        def once(i):
+            scene.frame_set(i % 100)
     else:
 
         def once(i):

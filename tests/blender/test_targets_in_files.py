@@ -229,6 +229,24 @@ def test_dolly_and_orbit_keep_the_target_and_looking_elsewhere_leaves_it(watchin
     assert group.look_at_target is None and group.numbers()[1] == (0, 0, 0)
 
 
+def test_adopting_a_camera_that_stands_as_its_targets_say_keeps_them(watching_camera, scene, target, empty):
+    group = watching_camera.virtual_pinhole
+    group.eye_target = empty("Eye", (4, -3, 2.7))
+    update()
+    cameras.adopt(watching_camera, scene)
+    assert (group.look_at_target, group.eye_target.name) == (target, "Eye")
+    assert group.numbers()[1] == (1, 2, 3) and is_where_stated(watching_camera, scene)
+
+
+def test_adopting_a_camera_that_was_moved_lets_go_of_its_target(watching_camera, scene):
+    group = watching_camera.virtual_pinhole
+    group.enabled = False
+    watching_camera.rotation_euler.x += 0.01
+    update()
+    cameras.adopt(watching_camera, scene)
+    assert group.look_at_target is None and is_where_stated(watching_camera, scene)
+
+
 def test_enabling_with_a_target_set_looks_at_it(camera_object, scene, target):
     group = camera_object.virtual_pinhole
     camera_object.location = (0, -9, 2)

@@ -294,10 +294,21 @@ def adopt(camera_object: bpy.types.Object, scene: bpy.types.Scene, keep: frozens
         eye = standing.eye
     if "look_at" not in keep:
         look_at = standing.look_at
+    eye, look_at = _as_followed(group, eye, look_at)
     if "up" not in keep:
         up = simplest_up(eye, look_at, read(camera_object, scene).basis()[1])
     at_full_size = standing.distance[0] * frame.resolution_x / frame.size[0]
     group.state(eye, look_at, up, pictures.distance(group, frame) if "distance" in keep else at_full_size, frame)
+
+
+def _as_followed(group: bpy.types.PropertyGroup, eye: Triple, look_at: Triple) -> tuple[Triple, Triple]:
+    """Eye and look-at, but the place of its target for a point that is there but for rounding, so that it stays followed."""
+    rounding = findings.LARGEST_TURN * (math.dist(eye, look_at) + max(map(abs, (*eye, *look_at))))
+    found = []
+    for point, stated in zip(targets.POINTS, (eye, look_at), strict=True):
+        at = targets.place(group, point)
+        found.append(at if at is not None and math.dist(at, stated) <= rounding else stated)
+    return tuple(found)
 
 
 def as_it_stands(camera_object: bpy.types.Object, scene: bpy.types.Scene, in_use: bool) -> Pinhole:
