@@ -129,6 +129,8 @@ class Layout:
         pass
 
     def _draw(self, kind, name, look):
+        unknown = set(look) - set(bpy.types.UILayout.bl_rna.functions[kind].parameters.keys())
+        assert not unknown, f"this Blender's {kind}() does not take {unknown}"
         properties = SimpleNamespace()
         self.drawn.append((kind, name, look, self, properties))
         return properties
