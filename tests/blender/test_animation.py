@@ -69,6 +69,26 @@ def test_it_follows_a_driven_zoom(posed_camera, scene):
     assert posed_camera.data.lens == pytest.approx(2.5 * 1500 * 36 / 1920, rel=2.0**-22)
 
 
+@pytest.mark.parametrize("is_driven", [False, True])
+def test_a_still_amid_two_frames_of_a_zoom_has_that_moments_lens(
+    posed_camera, scene, render_positions, picture_error, is_driven
+):
+    group = posed_camera.virtual_pinhole
+    if is_driven:
+        group.driver_add("zoom").driver.expression = "frame / 4.0"
+    else:
+        for frame, zoom in ((1, 1), (11, 3)):
+            group.zoom = zoom
+            group.keyframe_insert("zoom", frame=frame)
+    scene.frame_set(6, subframe=0.5)
+    expected, positions = cameras.stated(posed_camera, scene), render_positions()
+    error, tolerance = picture_error(expected, positions)
+    assert error <= tolerance, f"{error:.1e} px, and {tolerance:.1e} are rounding"
+    scene.frame_set(6)
+    other, _ = picture_error(cameras.stated(posed_camera, scene), positions)
+    assert other > 100 * tolerance, f"the whole frame's zoom would pass, {other:.1e} px"
+
+
 def test_a_zoom_rendered_in_one_go_is_that_of_each_frame(zooming_camera, scene, render_positions, picture_error):
     expected = {}
     for frame in (1, 11):
