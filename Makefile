@@ -6,13 +6,14 @@
 #   make test-light    whole pictures of light, 1024 samples a pixel, against Cycles of each of these
 #   make test-blender  the extension in a real Blender 5.2: $BLENDER, or blender on the PATH, or Debian's in a folder of its own
 #   make extension     dist/virtual_pinhole-VERSION-PLATFORM.zip for artists, built by that Blender
+#   make artist-pictures  docs/images/artists anew, by a tour in that Blender's window
 #   make scenes        sample_scenes/*.blend anew, by Blender 4.2
 #   make charts        docs/charts anew: every method up to where it fails
 #   make bench         all benchmarks of speed, scaling and poses, some with charts in docs/charts; fails where a target is missed
 #   make bench-guard   whether the tracer has become slower than it was, as a share of bare Embree's speed; a minute or two
 #   make clean         removes all that these made, but for ~/.cache/virtual-pinhole
 
-.PHONY: demo test test-exhaustive lint test-matrix test-light test-blender extension scenes charts bench bench-guard clean
+.PHONY: demo test test-exhaustive lint test-matrix test-light test-blender extension artist-pictures scenes charts bench bench-guard clean
 .DELETE_ON_ERROR:
 
 # bpy has wheels for these two only.
@@ -90,6 +91,10 @@ test-blender: .venv/test $(MATRIX:%=.venvs/%/ready)
 extension: .venv/demo
 	blender=$$(.ci/find-blender) || exit 1; \
 	.venv/bin/python .ci/extension.py "$$blender" dist $(PLATFORM)
+
+artist-pictures: .venv/test
+	BLENDER=$$(.ci/find-blender) || exit 1; export BLENDER; \
+	VIEWCAM_PICTURES=docs/images/artists .venv/bin/python -m pytest tests/real_blender/test_tour.py
 
 # Blender 4.2 writes them, so that every later one opens them.
 scenes: .venvs/4.2/ready

@@ -1,5 +1,6 @@
 """The artist's tour (tests/real_blender/tour.py) by properties and operators, without a window. docs/artists.md shows it."""
 
+import re
 import sys
 from pathlib import Path
 
@@ -11,6 +12,8 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path.append(str(ROOT / "tests" / "real_blender"))
 import tour
 import tour_step
+
+PAGE = ROOT / "docs" / "artists.md"
 
 
 def test_every_step_does_what_it_is_for_and_is_undone_and_redone(fresh_blender):
@@ -25,11 +28,21 @@ def test_every_step_does_what_it_is_for_and_is_undone_and_redone(fresh_blender):
         step.by_script()
         bpy.context.view_layer.update()
         bpy.ops.ed.undo_push(message="after")
-        step.check()
         after = tour_step.state()
+        step.check()
         assert (before != after) == bool(step.edits), f"{name} says that it makes {step.edits} undo steps"
         bpy.ops.ed.undo()
         assert not (lost := tour_step.differing(before, tour_step.state())), f"undoing {name} leaves {lost}"
         bpy.ops.ed.redo()
         assert not (lost := tour_step.differing(after, tour_step.state())), f"redoing {name} leaves {lost}"
         step.tidy()
+
+
+def test_every_picture_of_the_page_is_a_step_s_and_every_step_s_picture_is_on_the_page():
+    shown = set(re.findall(r"\(images/artists/([^)]+)\)", PAGE.read_text(encoding="utf-8")))
+    taken = [step.picture for step in tour.STEPS if step.picture]
+    assert len(taken) == len(set(taken)), "two steps take one picture"
+    assert shown == set(taken)
+    folder = PAGE.parent / "images" / "artists"
+    assert shown == {path.name for path in folder.iterdir()}, "docs/images/artists holds other pictures than the page shows"
+    assert sum((folder / name).stat().st_size for name in shown) < 2.5e6, "the pictures are too large for a page"

@@ -26,7 +26,7 @@ def take_the_tour(real_blender, *folder):
 
 def test_the_tour_goes_through_and_each_of_its_steps_is_undone_and_redone(real_blender):
     """VIEWCAM_PICTURES : a folder for the pictures of docs/artists.md; without it none are taken."""
-    folder = filter(None, [os.environ.get("VIEWCAM_PICTURES")])
+    folder = [each for each in [os.environ.get("VIEWCAM_PICTURES")] if each]
     for _ in range(ATTEMPTS):
         outcome = take_the_tour(real_blender, *folder)
         if outcome.returncode == 0:

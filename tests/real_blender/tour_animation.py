@@ -75,7 +75,7 @@ class Render(Step):
     """F12 shows what is in the middle of the view."""
 
     picture = "render.png"
-    shows = "view"
+    shows = "area"
     edits = 0
 
     def prepare(self):

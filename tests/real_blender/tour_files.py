@@ -1,15 +1,16 @@
 """The tour: the proof in one click, scene files, presets, preferences."""
 
+import shutil
 import tempfile
 from pathlib import Path
 
 import bpy
 import numpy as np
-from panel_in_a_window import press, region, window
-from tour_hands import VIEWPORT, call, push, unfold
+from panel_in_a_window import NOWHERE, press, region, window
+from tour_hands import SIDEBAR, VIEWPORT, call, push, unfold
 from tour_step import Step, camera, is_at_its_values, room, select, values
 
-FILE = Path(tempfile.gettempdir(), "virtual_pinhole_tour.json")
+FILE = Path(tempfile.mkdtemp(prefix="shots_"), "monkey.json")
 
 
 class CompareWithCycles(Step):
@@ -30,6 +31,10 @@ class CompareWithCycles(Step):
     def by_hand(self):
         yield from unfold("viewcam.compare_with_cycles(")
         yield from push("viewcam.compare_with_cycles(")
+        for _ in range(200):  # it begins when a copy of the file is written
+            yield
+            if room("proof").running():
+                break
         while room("proof").running():
             yield
         for _ in range(6):
@@ -43,43 +48,63 @@ class CompareWithCycles(Step):
         assert outcome is not None and outcome.passed, f"the verdict is {outcome and outcome.verdict}"
         is_at_its_values()
 
+    def pose_for_the_picture(self):
+        """The verdict stands at the end of the panel."""
+        call(bpy.ops.image.view_all, ("IMAGE_EDITOR", "WINDOW"))
+        for _ in range(10):
+            yield from scroll(bpy.ops.view2d.scroll_down)
+
+    def after_the_picture(self):
+        for _ in range(10):
+            yield from scroll(bpy.ops.view2d.scroll_up)
+
     def tidy(self):
         if not bpy.app.background:
             region("IMAGE_EDITOR", "WINDOW")[0].type = "PROPERTIES"
+
+
+def scroll(operator):
+    area, part = region(*SIDEBAR)
+    with bpy.context.temp_override(window=window(), area=area, region=part):
+        operator(deltay=100)
+    yield
 
 
 class Export(Step):
     """File › Export › Virtual Pinhole Scene."""
 
     picture = "export.png"
-    shows = "window"
+    shows = "area"
     edits = 0
 
+    def prepare(self):
+        bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
+
     def by_hand(self):
-        call(bpy.ops.viewcam.export_scene, filepath=str(FILE))
-        for _ in range(8):
-            yield
+        yield from self.pose_for_the_picture()
+        yield from in_the_file_browser(bpy.ops.file.execute)
 
     def by_script(self):
         bpy.ops.viewcam.export_scene(filepath=str(FILE))
 
-    def finish(self):
-        """In the window the file browser is photographed before it is confirmed."""
-        area = next(area for area in window().screen.areas if area.type == "FILE_BROWSER")
-        with bpy.context.temp_override(window=window(), area=area, region=area.regions[-1]):
-            bpy.ops.file.execute()
-
     def check(self):
-        if bpy.app.background:
-            self.is_written()
-
-    def tidy(self):
-        if not bpy.app.background:
-            self.finish()
-        self.is_written()
-
-    def is_written(self):
         assert '"eye"' in FILE.read_text(encoding="utf-8")
+
+    def pose_for_the_picture(self):
+        call(bpy.ops.viewcam.export_scene, filepath=str(FILE))
+        for _ in range(8):
+            yield
+
+    def after_the_picture(self):
+        yield from in_the_file_browser(bpy.ops.file.cancel)
+
+
+def in_the_file_browser(operator):
+    area, part = region("FILE_BROWSER", "WINDOW")
+    with bpy.context.temp_override(window=window(), area=area, region=part):
+        operator()
+    for _ in range(8):
+        yield
 
 
 class Import(Step):
@@ -91,7 +116,10 @@ class Import(Step):
     def by_hand(self):
         area, part = region(*VIEWPORT)
         with bpy.context.temp_override(window=window(), area=area, region=part):
-            bpy.ops.viewcam.import_scene(filepath=str(FILE))
+            bpy.ops.viewcam.import_scene("EXEC_DEFAULT", True, filepath=str(FILE))
+        yield
+        yield
+        press("ESC", *NOWHERE)  # the list of what the file lacks, if there is one
         yield
         yield
 
@@ -107,7 +135,7 @@ class Import(Step):
     def tidy(self):
         for block in [block for block in bpy.data.objects if block.name not in self.before]:
             bpy.data.objects.remove(block)
-        FILE.unlink()
+        shutil.rmtree(FILE.parent)
         select("Camera")
 
 
@@ -115,7 +143,7 @@ class Preset(Step):
     """A lens from the list."""
 
     picture = "presets.png"
-    shows = "window"
+    shows = "area"
 
     def by_hand(self):
         call(bpy.ops.viewcam.execute_preset, filepath=self.path())
@@ -147,8 +175,12 @@ class Preferences(Step):
     """Another axis is up by default, and Level knows it."""
 
     picture = "preferences.png"
-    shows = "window"
+    shows = (0.13, 0.55, 1.0, 0.72)  # without the folder that it is installed in
     edits, needs_a_window = 0, True
+
+    def prepare(self):
+        """Blender keeps preferences of what was enabled in them, not from the command line."""
+        bpy.ops.preferences.addon_enable(module=room("preferences").PACKAGE)
 
     def by_hand(self):
         self.mine = room("preferences").get()

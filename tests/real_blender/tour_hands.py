@@ -110,7 +110,11 @@ def unfold(button, where=SIDEBAR):
     _, part = region(*where)
     y = min((y for _, y in _map(where).values()), default=part.y + part.height) - _ROW
     while y > part.y and not _remembered(button, where):
-        yield from click(part.x + part.width * 0.35, y)
+        x = part.x + part.width * 0.35
+        if (yield from look(x, y, where)):  # still the last button
+            y -= _ROW / 2
+            continue
+        yield from click(x, y)
         if (yield from survey(y - _ROW / 2, max(y - 6 * _ROW, part.y), where)):
             yield from survey(y - 5 * _ROW, part.y, where)
             y = min(y for _, y in _map(where).values())
@@ -132,17 +136,23 @@ def write(text):
     """Replace the text of the field that is being edited."""
     press("A", *NOWHERE, ctrl=True)
     for character in text:
-        key = _DIGITS[int(character)] if character.isdigit() else _KEYS.get(character, character.upper())
-        for value in ("PRESS", "RELEASE"):
-            letter = {"unicode": character} if value == "PRESS" else {}
-            window().event_simulate(type=key, value=value, x=NOWHERE[0], y=NOWHERE[1], **letter)
+        strike(character)
     yield
+
+
+def strike(character):
+    """Press and release the key of a character."""
+    key = _DIGITS[int(character)] if character.isdigit() else _KEYS.get(character, character.upper())
+    for value in ("PRESS", "RELEASE"):
+        letter = {"unicode": character} if value == "PRESS" else {}
+        window().event_simulate(type=key, value=value, x=NOWHERE[0], y=NOWHERE[1], **letter)
 
 
 def key_over(button, key, where=SIDEBAR, **modifiers):
     """Press a key with the mouse over a button, as I for a keyframe."""
     x, y = yield from find(button, where)
-    press(key, x, y, **modifiers)
+    for value in ("PRESS",) if key.startswith("WHEEL") else ("PRESS", "RELEASE"):
+        window().event_simulate(type=key, value=value, x=int(x), y=int(y), **modifiers)
     yield
     yield
 
@@ -188,7 +198,7 @@ def call(operator, where=VIEWPORT, **properties):
     """Run an operator as its key or its place in a menu does, in a part of the window."""
     area, part = region(*where)
     with bpy.context.temp_override(window=window(), area=area, region=part):
-        return operator("INVOKE_DEFAULT", **properties)
+        return operator("INVOKE_DEFAULT", True, **properties)  # with its undo step
 
 
 def lowest_button(where=SIDEBAR):
@@ -200,7 +210,7 @@ def photograph(where, path, share=100):
     """Save what the screen shows of (left, bottom, width, height), in percent of its size and few colours."""
     left, bottom, width, height = map(int, where)
     crop = f"{width}x{height}+{left}+{SCREEN_HEIGHT - bottom - height}"
-    few = ("+dither", "-colors", "96") if path.suffix == ".png" else ("-quality", "85")
+    few = ("+dither", "-colors", "192", "-depth", "8")
     subprocess.run(
         ["import", "-window", "root", "-crop", crop, "+repage", "-resize", f"{share}%", *few, "-strip", str(path)], check=True
     )

@@ -5,11 +5,13 @@ blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python tour_in_a
 FOLDER : where the pictures of docs/artists.md go; without it none are taken. Leaves with status 0, or 5 and a traceback.
 """
 
+import math
 import sys
 import time
 from pathlib import Path
 
 import bpy
+from mathutils import Euler
 
 sys.path.append(str(Path(__file__).parent))
 import tour
@@ -20,6 +22,17 @@ from tour_hands import lowest_button, photograph, redo, undo
 FOLDER = next(map(Path, sys.argv[sys.argv.index("--") + 1 :]), None)
 MOUSE_AWAY = (200, 700)
 BELOW_BUTTONS = 45  # pixels below the lowest button of a panel that a picture of it shows
+
+
+def draw_finely():
+    """Steps until the viewport is drawn with smooth edges, which takes it several drawings."""
+    system = bpy.context.preferences.system
+    system.viewport_aa = "8"
+    for area in window().screen.areas:
+        area.tag_redraw()
+    for _ in range(12):
+        yield
+    system.viewport_aa = "OFF"
 
 
 def push_undo(message):
@@ -36,13 +49,12 @@ def take(step):
     before = tour_step.state()
     yield from step.by_hand()
     yield
-    step.check()
     after = tour_step.state()
+    step.check()
     if FOLDER and step.picture:
         yield from step.pose_for_the_picture()
         move(*MOUSE_AWAY)
-        yield
-        yield
+        yield from draw_finely()
         part, share = _shown(step.shows)
         photograph(part, FOLDER / step.picture, share)
         yield from step.after_the_picture()
@@ -58,21 +70,27 @@ def take(step):
 
 def _shown(name):
     """(left, bottom, width, height) of what a picture shows, and in how many percent of its size."""
-    view, _ = region("VIEW_3D", "WINDOW")
-    _, sidebar = region("VIEW_3D", "UI")
-    bottom = max(sidebar.y, lowest_button() - BELOW_BUTTONS)
-    return {
-        "sidebar": ((sidebar.x, bottom, sidebar.width, sidebar.y + sidebar.height - bottom), 100),
-        "view": ((view.x, view.y, view.width, view.height), 60),
-        "window": ((0, 0, window().width, window().height), 50),
-    }[name]
+    if name == "sidebar":
+        _, sidebar = region("VIEW_3D", "UI")
+        bottom = max(sidebar.y, lowest_button() - BELOW_BUTTONS)
+        return (sidebar.x, bottom, sidebar.width, sidebar.y + sidebar.height - bottom), 100
+    if name == "window":
+        return (0, 0, window().width, window().height), 60
+    area = max(window().screen.areas, key=lambda area: area.width * area.height)
+    left, bottom, right, top = (0.0, 0.0, 1.0, 1.0) if name == "area" else name
+    x, y = area.x + left * area.width, area.y + bottom * area.height
+    return (x, y, (right - left) * area.width, (top - bottom) * area.height), 60
 
 
 def steps():
     yield
     tour_step.make_the_scene()
+    bpy.context.preferences.system.viewport_aa = "OFF"  # drawn in software
     view, _ = region("VIEW_3D", "WINDOW")
-    view.spaces.active.shading.color_type = "MATERIAL"
+    space = view.spaces.active
+    space.shading.color_type = "MATERIAL"
+    space.region_3d.view_rotation = Euler((math.radians(66), 0, math.radians(75))).to_quaternion()
+    space.region_3d.view_location, space.region_3d.view_distance = (1.2, -2.2, 1.2), 13
     yield from open_the_panels()
     for each in tour.STEPS:
         started = time.perf_counter()

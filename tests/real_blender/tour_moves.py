@@ -4,6 +4,7 @@ import math
 
 import bpy
 import numpy as np
+from panel_in_a_window import region
 from tour_hands import push, unfold
 from tour_step import Step, axes, camera, is_at_its_values, select, values
 
@@ -23,6 +24,24 @@ class _Move(Step):
 
     def check(self):
         is_at_its_values()
+
+
+class _SeenThroughTheCamera(_Move):
+    """Its picture is taken through the camera."""
+
+    shows = "area"
+
+    def pose_for_the_picture(self):
+        yield from self._look("CAMERA")
+
+    def after_the_picture(self):
+        yield from self._look("PERSP")
+
+    def _look(self, perspective):
+        area, _ = region("VIEW_3D", "WINDOW")
+        area.spaces.active.region_3d.view_perspective = perspective
+        yield
+        yield
 
 
 class LookAtSelection(_Move):
@@ -49,7 +68,7 @@ class LookAtCursor(_Move):
         is_at_its_values()
 
 
-class FrameByDistance(_Move):
+class FrameByDistance(_SeenThroughTheCamera):
     """All of Suzanne fills the picture, by zooming."""
 
     picture = "frame.png"
@@ -97,7 +116,7 @@ class Swap(_Move):
         is_at_its_values()
 
 
-class Level(_Move):
+class Level(_SeenThroughTheCamera):
     """The horizon is level again."""
 
     picture = "level.png"

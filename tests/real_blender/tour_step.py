@@ -16,7 +16,8 @@ SIZE = (640, 360)
 class Step:
     """One thing that an artist does.
 
-    picture : file in docs/images/artists, taken when the step is done. shows : the part of the window in it.
+    picture : file in docs/images/artists, taken when the step is done. shows : "sidebar", "area" (the largest) or "window",
+        or where in the largest area, as shares of it: left, bottom, right and top.
     edits : how many undo steps it makes; each is undone and redone. needs_a_window : there is nothing to it without one.
     """
 
@@ -97,7 +98,8 @@ def state():
 
 
 def _stored(group):
-    return [each.identifier for each in group.bl_rna.properties if each.identifier not in ("rna_type", "name")]
+    """The roll is told from the others, as the preferences count it."""
+    return [each.identifier for each in group.bl_rna.properties if each.identifier not in ("rna_type", "name", "roll")]
 
 
 def _plain(group, name):
@@ -138,6 +140,8 @@ def _mesh(add, name, colour, **where):
     add(**where)
     block = bpy.context.object
     block.name = name
+    if name != "Floor":
+        bpy.ops.object.shade_smooth()
     material = bpy.data.materials.new(name)
     if not material.node_tree:  # new materials have one from 5.0 on
         material.use_nodes = True

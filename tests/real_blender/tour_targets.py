@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 from panel_in_a_window import NOWHERE, click, press
-from tour_hands import key_over, on_screen
+from tour_hands import key_over, on_screen, strike
 from tour_step import Step, axes, camera, is_at_its_values, select, values
 
 FIELD = "virtual_pinhole.look_at_target"
@@ -45,15 +45,14 @@ class MoveTheTarget(Step):
     """G X 1: the camera follows as the object goes."""
 
     picture = "follow.png"
-    shows = "view"
+    shows = "area"
 
     def prepare(self):
         select("Ball")
 
     def by_hand(self):
-        for key in ("G", "X", "ONE"):
-            letter = {"unicode": "1"} if key == "ONE" else {}
-            press(key, *NOWHERE, **letter)
+        for character in "gx1":
+            strike(character)
             yield
         press("RET", *NOWHERE)
         yield
@@ -64,6 +63,10 @@ class MoveTheTarget(Step):
 
     def check(self):
         looks_at(END)
+
+    def pose_for_the_picture(self):
+        select("Camera", "Ball")
+        yield
 
     def tidy(self):
         select("Camera")

@@ -120,7 +120,7 @@ class Roll(Step):
     """An angle that turns up about the view."""
 
     picture = "roll.png"
-    shows = "view"
+    shows = "area"
 
     def by_hand(self):
         yield from type_into("virtual_pinhole.roll", "20")
@@ -141,7 +141,8 @@ class KeepTheFieldOfView(Step):
     """What the camera keeps when the picture gets another resolution, by the mouse wheel over the choice."""
 
     def by_hand(self):
-        yield from key_over("virtual_pinhole.keeps", "WHEELDOWNMOUSE", ctrl=True)
+        while values().keeps != "FIELD_OF_VIEW":
+            yield from key_over("virtual_pinhole.keeps", "WHEELDOWNMOUSE", ctrl=True)
 
     def by_script(self):
         values().keeps = "FIELD_OF_VIEW"

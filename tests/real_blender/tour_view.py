@@ -11,7 +11,7 @@ class DragTheLookAtPoint(Step):
     """By its handle; the camera turns."""
 
     picture = "handles.png"
-    shows = "view"
+    shows = "area"
 
     def prepare(self):
         values().eye, values().look_at, values().up = (4, -6, 3.5), (0, 0, 1), (0, 0, 1)
@@ -54,7 +54,7 @@ class ShowTheDiagramElsewhere(Step):
     """The view plane is drawn close to the look-at point."""
 
     picture = "diagram.png"
-    shows = "view"
+    shows = "area"
 
     def by_hand(self):
         values().plane_at = 0.8
@@ -73,7 +73,7 @@ class FourViews(Step):
     """The quad view draws the diagram in each, orthographic ones too."""
 
     picture = "quad-view.png"
-    shows = "view"
+    shows = "area"
     edits, needs_a_window = 0, True
 
     def by_hand(self):
