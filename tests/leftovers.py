@@ -196,6 +196,16 @@ def _repository():
     return next(i for i, each in enumerate(bpy.context.preferences.extensions.repos) if each.module == "user_default")
 
 
+def differences(before, after):
+    """A line for each text that one snapshot has and the other has not."""
+    return [
+        f"{sign} {each} in {place}"
+        for place in sorted(before.keys() | after.keys())
+        for sign, one, other in (("more:", after, before), ("less:", before, after))
+        for each in sorted(one.get(place, set()) - other.get(place, set()))
+    ]
+
+
 def main(what="wheel", count="10", sabotage=""):
     if what == "wheel":
         sys.path.insert(0, os.getcwd())
@@ -203,12 +213,7 @@ def main(what="wheel", count="10", sabotage=""):
     else:
         before, package = rounds_of_the_zip(what, int(count), sabotage)
     after = snapshot()
-    left = [
-        f"{sign} {each} in {place}"
-        for place in sorted(before.keys() | after.keys())
-        for sign, one, other in (("more:", after, before), ("less:", before, after))
-        for each in sorted(one.get(place, set()) - other.get(place, set()))
-    ]
+    left = differences(before, after)
     if what != "wheel":
         left = [
             line for line in left if not line.endswith(_LEFT_BY_BLENDER) and line != f"less: {signal.SIGINT:d} None in signals"

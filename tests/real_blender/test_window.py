@@ -65,6 +65,13 @@ def test_handles_drag_eye_look_at_and_up_and_the_diagram_is_drawn_where_it_belon
     assert "Traceback" not in said, said  # what fails in a drawing or a handle is only printed
 
 
+def test_ten_rounds_of_enabling_and_disabling_leave_nothing_behind_in_a_window(real_blender):
+    outcome = run_in_a_window(real_blender, ROOT / "tests" / "real_blender" / "leftovers_in_a_window.py", size=("1000", "700"))
+    said = outcome.stdout + outcome.stderr
+    assert outcome.returncode == 0 and "done: leave_nothing_behind" in said, said
+    assert "Traceback" not in said, said
+
+
 def test_compare_with_cycles_comes_to_a_verdict_and_ends_in_every_other_way_without_a_trace(real_blender, tmp_path):
     """With the extension as it is installed, wheels and all; the last one is on its way when Blender is quit."""
     real_blender.run_inside("make", tmp_path / "scene.blend")
