@@ -3,6 +3,7 @@
 import tour_animation
 import tour_files
 import tour_moves
+import tour_objects
 import tour_targets
 import tour_values
 import tour_view
@@ -12,6 +13,7 @@ STEPS = [
     *tour_targets.STEPS,
     *tour_moves.STEPS,
     *tour_view.STEPS,
+    *tour_objects.STEPS,
     *tour_animation.STEPS,
     *tour_files.STEPS,
 ]

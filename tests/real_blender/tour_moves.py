@@ -5,7 +5,7 @@ import math
 import bpy
 import numpy as np
 from panel_in_a_window import region
-from tour_hands import push, unfold
+from tour_hands import call, push, unfold
 from tour_step import Step, axes, camera, is_at_its_values, select, values
 
 
@@ -65,6 +65,52 @@ class LookAtCursor(_Move):
 
     def check(self):
         assert tuple(values().look_at) == (-2, 0.5, 1)
+        is_at_its_values()
+
+
+class LookAtActive(_Move):
+    operator = "look_at_active"
+
+    def prepare(self):
+        select("Cone", "Camera")
+
+    def check(self):
+        np.testing.assert_allclose(values().look_at, (-2, 0.5, 0.8), atol=1e-6)
+        is_at_its_values()
+
+    def tidy(self):
+        select("Camera")
+
+
+class FromTheCurrentView(_Move):
+    """The camera sees what the viewport shows."""
+
+    operator = "adopt_view"
+
+    def check(self):
+        area = next(area for area in bpy.context.window_manager.windows[0].screen.areas if area.type == "VIEW_3D")
+        view = area.spaces.active.region_3d
+        np.testing.assert_allclose(values().look_at, view.view_location, atol=1e-6)
+        np.testing.assert_allclose(axes(), view.view_rotation.to_matrix(), atol=1e-6)
+        is_at_its_values()
+
+
+class Dolly(_Move):
+    """Its distance is typed in the redo panel, or given when it is called."""
+
+    operator, properties = "dolly_camera", {"reach": 6.0}
+
+    def prepare(self):
+        values().eye, values().look_at, values().up = (4, -6, 3.5), (0, 0, 1), (0, 0, 1)
+
+    def by_hand(self):
+        call(bpy.ops.viewcam.dolly_camera, camera="Camera", **self.properties)
+        yield
+        yield
+
+    def check(self):
+        reach = math.dist(*values().numbers()[:2])
+        assert abs(reach - 6) < 1e-5, f"the eye is {reach} from the look-at point"
         is_at_its_values()
 
 
@@ -130,4 +176,4 @@ class Level(_SeenThroughTheCamera):
         is_at_its_values()
 
 
-STEPS = [LookAtSelection, LookAtCursor, FrameByDistance, OrbitToTheRight, Swap, Level]
+STEPS = [LookAtSelection, LookAtCursor, LookAtActive, FromTheCurrentView, Dolly, FrameByDistance, OrbitToTheRight, Swap, Level]

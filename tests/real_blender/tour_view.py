@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 from panel_in_a_window import region, window
 from tour_hands import VIEWPORT, drag, on_screen
-from tour_step import Step, is_at_its_values, select, values
+from tour_step import Step, is_at_its_values, room, select, values
 
 
 class DragTheLookAtPoint(Step):
@@ -48,6 +48,27 @@ class DragTheEye(Step):
     def check(self):
         assert values().numbers()[1] == self.look_at and tuple(values().eye) != (4, -6, 3.5)
         is_at_its_values()
+
+
+class DragUp(Step):
+    """By the ring at its tip; the picture is turned."""
+
+    def by_hand(self):
+        camera_object = bpy.data.objects["Camera"]
+        yield from drag(on_screen(room("gizmos").place(camera_object, "up")), (40, 0))
+        for _ in range(4):
+            yield
+
+    def by_script(self):
+        values().up = (0.3, 0.1, 1)
+
+    def check(self):
+        up = np.array(values().up)
+        assert 0.05 < np.linalg.norm(np.cross(up, (0, 0, 1))) / np.linalg.norm(up) < 0.9, f"up is {up}"
+        is_at_its_values()
+
+    def tidy(self):
+        values().up = (0, 0, 1)
 
 
 class ShowTheDiagramElsewhere(Step):
@@ -140,4 +161,4 @@ def toggle(operator, **properties):
         operator(**properties)
 
 
-STEPS = [DragTheLookAtPoint, DragTheEye, ShowTheDiagramElsewhere, FourViews, LocalView, TwoWindows]
+STEPS = [DragTheLookAtPoint, DragTheEye, DragUp, ShowTheDiagramElsewhere, FourViews, LocalView, TwoWindows]
