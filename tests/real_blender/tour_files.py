@@ -1,5 +1,6 @@
 """The tour: the proof in one click, scene files, presets, preferences."""
 
+import os
 import shutil
 import tempfile
 from pathlib import Path
@@ -10,7 +11,7 @@ from panel_in_a_window import NOWHERE, press, region, window
 from tour_hands import SIDEBAR, VIEWPORT, call, push, unfold
 from tour_step import Step, camera, is_at_its_values, room, select, values
 
-FILE = Path(tempfile.mkdtemp(prefix="shots_"), "monkey.json")
+FILE = Path(tempfile.gettempdir(), f"shots_{os.getpid()}", "monkey.json")
 
 
 class CompareWithCycles(Step):
@@ -78,6 +79,7 @@ class Export(Step):
     edits = 0
 
     def prepare(self):
+        FILE.parent.mkdir()
         bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
 
     def by_hand(self):

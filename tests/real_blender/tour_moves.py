@@ -32,16 +32,23 @@ class _SeenThroughTheCamera(_Move):
     shows = "area"
 
     def pose_for_the_picture(self):
-        yield from self._look("CAMERA")
+        view = self._view()
+        self.was = view.view_rotation.copy(), view.view_location.copy(), view.view_distance
+        view.view_perspective = "CAMERA"
+        yield
+        yield
 
     def after_the_picture(self):
-        yield from self._look("PERSP")
+        """Blender would leave the viewport where the camera is."""
+        view = self._view()
+        view.view_perspective = "PERSP"
+        view.view_rotation, view.view_location, view.view_distance = self.was
+        yield
+        yield
 
-    def _look(self, perspective):
+    def _view(self):
         area, _ = region("VIEW_3D", "WINDOW")
-        area.spaces.active.region_3d.view_perspective = perspective
-        yield
-        yield
+        return area.spaces.active.region_3d
 
 
 class LookAtSelection(_Move):
