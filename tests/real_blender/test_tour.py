@@ -20,7 +20,7 @@ def take_the_tour(real_blender, *folder):
         cwd=ROOT,
         capture_output=True,
         text=True,
-        timeout=900,
+        timeout=400,  # six times what it takes
     )
 
 
