@@ -139,6 +139,11 @@ def open_the_view():
 
 def drag_each_handle():
     for name in NAMES:
+        if name == "up":
+            values().plane_at = 0.3  # moves its tip
+            push_undo()
+            yield
+            yield
         before, gripped = everything(), place(name)
         start = pixel_of(gripped)
         end = start[0] + 60, start[1] - 35

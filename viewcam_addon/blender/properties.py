@@ -103,6 +103,10 @@ def _on_target(group: "VirtualPinhole", context: bpy.types.Context) -> None:
     _on_edited(group, context)
 
 
+def _on_shown(_group: "VirtualPinhole", _context: bpy.types.Context) -> None:
+    """Nothing, but without a callback Blender draws nothing anew where a script sets the property."""
+
+
 class VirtualPinhole(bpy.types.PropertyGroup):
     """The four values of a camera object, world space. Distance counts pixels of the picture at 100 %."""
 
@@ -243,9 +247,9 @@ class VirtualPinhole(bpy.types.PropertyGroup):
     )
     show_overlay: bpy.props.BoolProperty(
         name="Diagram",
-        description="Draw view plane, pyramid, axes and the line to the look-at point in the 3D viewport, "
-        "while the camera is selected or active",
+        description="Draw view plane, pyramid, axes and line of sight in the viewport while the camera is selected or active",
         default=True,
+        update=_on_shown,
         options=set(),
         override={"LIBRARY_OVERRIDABLE"},
     )
@@ -253,6 +257,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         name="Handles",
         description="Handles that drag eye, look-at and up in the 3D viewport, while the camera is active",
         default=True,
+        update=_on_shown,
         options=set(),
         override={"LIBRARY_OVERRIDABLE"},
     )
@@ -265,6 +270,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         min=1e-4,
         soft_min=0.05,
         max=1.0,
+        update=_on_shown,
         options=set(),
         override={"LIBRARY_OVERRIDABLE"},
     )
