@@ -102,6 +102,7 @@ def prepare_cycles(contest: Contest, path: Path, threads: int) -> dict[str, race
         job.open_blend(SCENES / f"{contest.scene}.blend")
     scene, ledger = bpy.context.scene, Ledger()
     view_layer, camera_object = scene.view_layers[0], scene.camera
+    camera_object.virtual_pinhole.enabled = False  # else its lens would follow the resolution
     scene.render.resolution_x, scene.render.resolution_y = contest.size
     exported = export_scene(scene, view_layer, camera_object, ledger, lit=True)
     scene_file.write(exported, path)

@@ -283,6 +283,17 @@ def blenders_camera_and_the_view_plane(source):
         assert np.isfinite(stored).all() and np.float32(back.lens) >= 1 and (np.abs(stored) <= np.finfo(np.float32).max).all()
 
 
+@attacks("intrinsics.growth")
+def another_picture(source):
+    def frame():
+        sizes = [source.choice((1, 3, 1920, 65536, 2**31 - 1)) for _ in range(2)]
+        return Frame(*sizes, source.choice((1, 33, 100, 32767)), float32(source), float32(source))
+
+    fit, before, after = source.choice(intrinsics.FITS), frame(), frame()
+    there, back = answer(intrinsics.growth, fit, before, after), answer(intrinsics.growth, fit, after, before)
+    assert 0 < there < math.inf and abs(there * back - 1) <= 2 * 2.0**-52, (fit, before, after)  # two quotients, a product
+
+
 def public_functions():
     """Every public function, class, method and property of the two modules, by name."""
     for module in (pinhole, intrinsics):

@@ -39,6 +39,7 @@ def prepare(
         job.open_blend(SCENES / f"{scene_name}.blend")
     scene, ledger = bpy.context.scene, Ledger()
     view_layer, camera_object = scene.view_layers[0], scene.camera
+    camera_object.virtual_pinhole.enabled = False  # else its lens would follow the resolution
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = *size, 100
     if box_filter:
         scene.cycles.pixel_filter_type = "BOX"

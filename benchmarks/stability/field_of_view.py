@@ -115,6 +115,7 @@ def _cycles_distance(scene: bpy.types.Scene, camera: bpy.types.Object) -> float:
     mesh.from_pydata([(x * half, y * half, -1) for x, y in ((-2, -2), (2, -2), (2, 2), (-2, 2))], [], [(0, 1, 2, 3)])
     wall = bpy.data.objects.new("Wall", mesh)
     scene.collection.objects.link(wall)
+    camera.virtual_pinhole.enabled = False  # else its lens would follow the resolution
     scene.render.resolution_x = scene.render.resolution_y = PIXELS
     with TemporaryDirectory() as folder:
         cycles.render(scene, bpy.context.view_layer, camera, Path(folder, "wall.exr"))
