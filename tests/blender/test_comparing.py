@@ -1,8 +1,10 @@
 """A comparison beside Blender: the same picture, another one, cancelled, broken; and nothing of it in the file."""
 
 import contextlib
+import errno
 import json
 import os
+import shutil
 import sys
 import time
 from pathlib import Path
@@ -240,6 +242,19 @@ def test_where_the_report_can_not_be_kept_a_sentence_says_so(stand_in, tmp_path)
     comparison.let(6)
     outcome = wait_for(comparison.poll)
     assert outcome.passed is None and "can't be kept in" in outcome.verdict and not comparison.folder.exists()
+
+
+def test_a_full_disk_leaves_no_half_of_a_report_s_file(stand_in, tmp_path, monkeypatch):
+    def copy_half(_source, target):
+        Path(target).write_bytes(b"half")
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(shutil, "copyfile", copy_half)
+    comparison = stand_in(keep_in=tmp_path / "new")
+    comparison.let(6)
+    outcome = wait_for(comparison.poll)
+    assert outcome.passed is None and "No space left" in outcome.verdict and "free some space" in outcome.verdict
+    assert list((tmp_path / "new").iterdir()) == [] and not comparison.folder.exists()
 
 
 @pytest.mark.parametrize("ends", ["another file", "the add-on"])

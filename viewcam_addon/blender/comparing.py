@@ -25,6 +25,7 @@ import numpy as np
 
 from .. import children
 from ..errors import InputError
+from ..files import written_whole
 from ..pinhole import Pinhole
 from ..tracer.scene.film import LEVELS, SAMPLES, seeds
 from . import camera as cameras
@@ -180,8 +181,9 @@ class Comparison:
         folder, temporary = self.folder / _REPORT, self.folder
         if self._keep_in:
             try:
-                folder, temporary = Path(shutil.copytree(folder, self._keep_in, dirs_exist_ok=True)), None
-            except OSError as error:
+                shutil.copytree(folder, self._keep_in, copy_function=_copy_whole, dirs_exist_ok=True)
+                folder, temporary = self._keep_in, None
+            except (OSError, InputError) as error:
                 return Outcome(*of, None, f"The report can't be kept in {self._keep_in} ({error}): choose another folder")
         colours = result.get("difference", {}).get("colours", "")
         return Outcome(*of, result["passed"], result["sentence"], tuple(figures(result)), folder, colours, temporary)
@@ -293,6 +295,11 @@ def _percentiles(row: dict[str, Any], unit: str) -> list[tuple[str, str]]:
     names = (("Median", "p50"), ("99.9 % within", "p99.9"))
     found = row["percentiles"]
     return [(label, f"{_plain(found[name]['value'])} {unit}") for label, name in names if name in found]
+
+
+def _copy_whole(source: str, target: str) -> None:
+    with written_whole(target) as temporary:
+        shutil.copyfile(source, temporary)
 
 
 def _plain(value: float) -> str:
