@@ -172,6 +172,12 @@ def test_the_light_of_a_sample_scene_comes_back(fresh_blender):
     assert got == pytest.approx(wanted, rel=(made.bounces.total + 2) * PRODUCT + 2.0**-23, abs=2.0**-23)
 
 
+def test_an_object_without_material_shows_none_of_the_one_whose_geometry_it_shares(fresh_blender):
+    objects = [Object("Red", "ball", np.eye(4), material_indices=(5,)), Object("Plain", "ball", np.eye(4))]
+    made = scene_of(objects, {"ball": tetrahedron()})
+    check_same(made, there_and_back(made))
+
+
 def test_a_pixel_more_is_seen(fresh_blender):
     """The comparison of this module can fail."""
     made = scene_of([Object("Ball", "ball", np.eye(4))], {"ball": tetrahedron()})

@@ -43,8 +43,13 @@ class Paints:
 
     def material(self, name: str, index: int) -> bpy.types.Material | None:
         """The material of this name and pass index, or None for what Blender shows without any."""
-        if not name and not index:
-            return None
+        return self._one(name, index) if name or index else None
+
+    def plain(self) -> bpy.types.Material:
+        """A material that is as none."""
+        return self._one("", 0)
+
+    def _one(self, name: str, index: int) -> bpy.types.Material:
         if (name, index) not in self._made:
             self._made[name, index] = self._new(name, index)
         return self._made[name, index]

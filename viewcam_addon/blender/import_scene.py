@@ -180,7 +180,7 @@ class _Import:
                 for i, index in enumerate(placed.material_indices)
             ]
             for first, block in data[placed.geometry]:
-                self._surface(placed, block, [slots[first]] if isinstance(block, bpy.types.PointCloud) else slots)
+                self._surface(placed, block, [slots[first]] if isinstance(block, bpy.types.PointCloud) else slots, paints)
             self._ledger.placed(placed.name)
 
     def _data(self, name: str) -> list[tuple[int, bpy.types.Mesh | bpy.types.PointCloud]]:
@@ -193,15 +193,19 @@ class _Import:
         ]
 
     def _surface(
-        self, placed: Object, data: bpy.types.Mesh | bpy.types.PointCloud, slots: list[bpy.types.Material | None]
+        self,
+        placed: Object,
+        data: bpy.types.Mesh | bpy.types.PointCloud,
+        slots: list[bpy.types.Material | None],
+        paints: import_light.Paints,
     ) -> None:
         if not data.materials:
             for material in slots:
                 data.materials.append(material)
         block = self._placed(placed.name, data, placed.matrix)
         for slot, material in zip(block.material_slots, slots, strict=False):
-            if slot.material != material:  # another object of this geometry has others
-                slot.link, slot.material = "OBJECT", material
+            if slot.material != material:  # another object of this geometry has others; an empty slot would show its
+                slot.link, slot.material = "OBJECT", material or paints.plain()
         block.pass_index = min(placed.object_index, LARGEST)
         if placed.object_index > LARGEST:
             reason = f"its index is {placed.object_index}, and Blender's end at {LARGEST}"
