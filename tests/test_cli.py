@@ -182,6 +182,7 @@ def test_pictures_that_can_not_be_compared_are_refused(tmp_path, capfd):
         (["render"], "SCENE.json"),
         (["render", "a", "b", "--size", "3"], "'3' is no size"),
         (["render", "a", "b", "--size", "0x3"], "'0'"),
+        (["compare", "a", "b", "--difference", "d.jpg"], "'d.jpg' is drawn as PNG"),
         (["render", "a", "b", "--threads", "none"], "'none'"),
         (["render", "a", "b", "--level", "magic"], "magic"),
         (["check", "a.blend", "--frame", "1.5"], "1.5"),

@@ -114,7 +114,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
 
     def report(added: argparse.ArgumentParser) -> None:
         added.add_argument("--report", metavar="DIR", type=Path, help="write an HTML report there")
-        added.add_argument("--difference", metavar="FILE.png", type=Path, help="draw there what differs, pixel by pixel")
+        added.add_argument("--difference", metavar="FILE.png", type=_png, help="draw there what differs, pixel by pixel")
         added.add_argument("--repeat", help=argparse.SUPPRESS)  # what the report shall name as its command
 
     added = command(commands.export, "export", "Write the scene of a .blend as the tracer reads it.")
@@ -206,6 +206,13 @@ def _size(text: str) -> tuple[int, int]:
     if not x:
         raise argparse.ArgumentTypeError(f"{text!r} is no size: write 1920x1080")
     return _positive(width), _positive(height)
+
+
+def _png(text: str) -> Path:
+    path = Path(text)
+    if path.suffix.lower() != ".png":
+        raise argparse.ArgumentTypeError(f"{text!r} is drawn as PNG: give a name that ends in .png")
+    return path
 
 
 def _write_json(path: Path, result: dict[str, Any]) -> int:
