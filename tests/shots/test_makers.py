@@ -1,0 +1,96 @@
+"""Shots by rule: what an orbit keeps, which frames and cameras are meant."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from viewcam_addon import shots
+from viewcam_addon.errors import InputError
+from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.shots import Shot, ShotsError
+
+coordinates = st.floats(-1e3, 1e3, allow_subnormal=False)
+triples = st.tuples(coordinates, coordinates, coordinates)
+
+
+@given(triples, triples, triples, st.floats(10, 1e4), st.integers(1, 24))
+def test_an_orbit_begins_at_the_camera_and_goes_evenly_around_up(eye, look_at, up, distance, count):
+    reach = math.dist(eye, look_at)
+    assume(reach > 1 and math.hypot(*up) > 1e-3)
+    pinhole = Pinhole(eye, look_at, up, distance, 320, 180)
+    assume(pinhole.sine_to_up > 1e-2)
+    made = shots.orbit(pinhole, count)
+    assert made[0] == Shot("orbit_000", eye, look_at, up, distance, width=320, height=180)
+    assert [shot.name for shot in made] == [f"orbit_{i:03d}" for i in range(count)]
+    axis = np.array(up) / math.hypot(*up)
+    away = np.array([shot.eye for shot in made]) - look_at
+    # Rounding: a few operations on coordinates of up to 4e3, of 2⁻⁵³ each.
+    allowed = 64 * 2.0**-53 * 4e3
+    assert np.abs(np.linalg.norm(away, axis=1) - reach).max() <= allowed
+    assert np.abs(away @ axis - away[0] @ axis).max() <= allowed
+    u, _, w = pinhole.basis()
+    outwards = w - (w @ axis) * axis
+    radius, outwards = reach * np.linalg.norm(outwards), outwards / np.linalg.norm(outwards)
+    for i, point in enumerate(away):
+        angle = math.tau * i / count
+        error = np.abs(point - (point @ axis) * axis - radius * (math.cos(angle) * outwards + math.sin(angle) * u)).max()
+        assert error <= allowed, f"shot {i} of {count} is off by {error:.3g}, {allowed:.3g} is allowed"
+
+
+def test_an_orbit_about_the_point_straight_below_turns_the_picture():
+    made = shots.orbit(Pinhole((0, 0, 5), (0, 0, 0), (0, 0, 1), 400, 320, 180), 8)
+    assert {shot.eye for shot in made} == {(0.0, 0.0, 5.0)}
+    for i, shot in enumerate(made):
+        right = Pinhole(shot.eye, shot.look_at, shot.up, shot.d, 320, 180).basis()[0]
+        angle = math.tau * i / 8  # from u = (0, −1, 0) on, as the canonical axes have it
+        assert np.abs(right - (math.sin(angle), -math.cos(angle), 0)).max() <= 1e-15, f"shot {i} has u = {right}"
+
+
+@pytest.mark.parametrize("count", [0, -1, 2.5, 1_000_001, 2**31, True])
+def test_an_orbit_of_no_such_number_is_refused(count):
+    with pytest.raises(InputError, match="shots"):
+        shots.orbit(Pinhole((5, 0, 0), (0, 0, 0), (0, 0, 1), 400, 320, 180), count)
+
+
+@given(st.integers(-1048574, 1048574), st.integers(0, 50))
+def test_frames_are_a_shot_each_both_ends_included(first, more):
+    last = min(first + more, 1048574)
+    made = shots.frames(f" {first}..{last} ", "Camera")
+    assert [shot.frame for shot in made] == list(range(first, last + 1))
+    assert {shot.camera for shot in made} == {"Camera"} and made[0].eye is None
+    assert len({shot.name for shot in made}) == len(made)
+    if first >= 0:
+        assert sorted(made, key=lambda shot: shot.name) == made, "the files do not sort as the frames do"
+
+
+@pytest.mark.parametrize(
+    "text", ["", "1", "1-9", "1...9", "a..b", "1..", "1.5..2", "9..1", "0..1048575", "0..999999999", "١..٢"]
+)
+def test_frames_that_are_no_range_are_refused(text):
+    with pytest.raises(InputError, match=r"frames|frame of|shots: make"):
+        shots.frames(text, "Camera")
+
+
+def test_cameras_are_chosen_by_a_pattern_sorted_and_case_counts():
+    names = ["Cam.002", "Top", "Cam.001", "cam.003", "Camera"]
+    assert shots.from_cameras("Cam.*", names) == [Shot("Cam.001", camera="Cam.001"), Shot("Cam.002", camera="Cam.002")]
+    assert [shot.name for shot in shots.from_cameras("[Cc]am.00?", names)] == ["Cam.001", "Cam.002", "cam.003"]
+    assert len(shots.from_cameras("*", names)) == 5
+
+
+def test_a_pattern_that_fits_no_camera_tells_which_there_are():
+    with pytest.raises(InputError, match="called 'top': the file has Left, Top"):
+        shots.from_cameras("top", ["Top", "Left"])
+    with pytest.raises(InputError, match="has none"):
+        shots.from_cameras("*", [])
+
+
+def test_cameras_that_can_not_name_their_files_are_all_told():
+    with pytest.raises(ShotsError) as raised:
+        shots.from_cameras("*", ["a/b", "NUL", "left", "Left", "right", "right"])
+    assert len(raised.value.problems) == 4
+    for part in ("'a/b', which holds /", "'NUL', which is a device", "'Left' and 'left'", "'right' and 'right'"):
+        assert any(part in problem for problem in raised.value.problems), part

@@ -1,0 +1,72 @@
+"""The shots of a batch: from a file or made by rule, all of them checked before the first is rendered.
+
+    read(path)                      CSV, JSON or JSON Lines (docs/batch.md) → shots
+    orbit, frames, from_cameras     shots by rule
+    shard                           which of them one of several machines renders
+    settings_hash                   what a picture was made from, to know whether it must be made again
+
+Nothing here knows Blender: what the .blend says (its cameras' names, a camera's pinhole, its content's hash) is handed in.
+"""
+
+import codecs
+import os
+from collections.abc import Collection
+from pathlib import Path
+
+from ..errors import InputError
+from . import documents, table
+from .makers import frames, from_cameras, orbit
+from .problems import Problems, ShotsError
+from .rows import shots_of
+from .settings import settings_hash
+from .shards import shard
+from .shot import ENGINES, LEVELS, Shot
+
+__all__ = ["ENGINES", "LEVELS", "Shot", "ShotsError", "frames", "from_cameras", "orbit", "read", "settings_hash", "shard"]
+
+_READERS = {
+    ".csv": table.read,
+    ".tsv": table.read,
+    ".json": documents.read_document,
+    ".jsonl": documents.read_lines,
+    ".ndjson": documents.read_lines,
+}
+_OTHER_ENCODINGS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE, codecs.BOM_UTF32_BE)  # that of UTF-32 LE begins as UTF-16 LE's
+
+
+def read(path: str | os.PathLike[str], cameras: Collection[str] | None = None) -> list[Shot]:
+    """The shots of a file, in its order; its suffix tells the format.
+
+    cameras : the names of the .blend's cameras, where they are known, so that a shot of another is a problem.
+
+    Raises
+    ------
+    ShotsError
+        if anything is wrong with any of them; it has all that is.
+    InputError
+        if the file can't be read, or its suffix is none of a list of shots.
+    """
+    path = Path(path)
+    reader = _READERS.get(path.suffix.lower())
+    if reader is None:
+        raise InputError(f"{path} is no list of shots by its suffix: give a file called {', '.join(_READERS)}")
+    text = _text(path)
+    problems = Problems(str(path))
+    shots: list[Shot] = []
+    with problems.caught():
+        shots = shots_of(reader(text, problems), problems, cameras)
+    problems.raise_any()
+    if not shots:
+        raise InputError(f"{path} holds no shots: give at least one")
+    return shots
+
+
+def _text(path: Path) -> str:
+    """The file's text. Bytes that are not UTF-8 become lone surrogates, which are refused where they stand."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path} can't be read ({error.strerror}): check its name and permissions") from error
+    if data.startswith(_OTHER_ENCODINGS) or b"\0" in data[:100]:
+        raise InputError(f"{path} is not UTF-8: save it as UTF-8")
+    return data.decode("utf-8-sig", errors="surrogateescape")

@@ -1,0 +1,99 @@
+"""Shots by rule: around a point, through an animation, one for each camera of the file."""
+
+import fnmatch
+import math
+import re
+from collections.abc import Iterable
+
+from .. import checks, moves
+from ..errors import InputError
+from ..pinhole import Pinhole
+from . import names
+from .problems import Problems
+from .shot import Shot
+
+_MOST = 1_000_000
+_RANGE = re.compile(r"([-+]?\d{1,9})\.\.([-+]?\d{1,9})", re.ASCII)
+
+
+def orbit(pinhole: Pinhole, count: int) -> list[Shot]:
+    """`count` views of the pinhole's look-at point, evenly around up from the pinhole itself on, towards u.
+
+    The shots have the pinhole's size and, as d, its distance in pixel widths. What the four values don't say (shift, pixel
+    aspect, mirroring) stays as the file's camera has it.
+
+    Raises
+    ------
+    InputError
+        if the count is not from 1 to a million.
+    """
+    count = _count(checks.whole("orbit's number of shots", count))
+    shots = []
+    for i in range(count):
+        moved = moves.orbited(pinhole, math.tau * i / count, 0.0)
+        name = f"orbit_{i:0{_digits(count - 1)}d}"
+        shots.append(Shot(name, moved.eye, moved.look_at, moved.up, moved.distance[0], None, pinhole.width, pinhole.height))
+    return shots
+
+
+def frames(text: str, camera: str) -> list[Shot]:
+    """A shot of the camera at each frame of a range "A..B", both included.
+
+    Raises
+    ------
+    InputError
+        if the text is none, runs backwards or beyond Blender's frames, or has more than a million.
+    """
+    found = _RANGE.fullmatch(text.strip())
+    if not found:
+        raise InputError(f"frames {checks.shown(text)} are no range: write 1..250")
+    first, last = int(found[1]), int(found[2])
+    if first > last:
+        raise InputError(f"frames {text} run backwards: write {last}..{first}")
+    _count(last - first + 1)
+    digits = _digits(max(abs(first), abs(last)))
+    return [
+        Shot(f"frame_{'-' * (frame < 0)}{abs(frame):0{digits}d}", camera=camera, frame=frame)
+        for frame in range(first, last + 1)
+    ]
+
+
+def from_cameras(pattern: str, cameras: Iterable[str]) -> list[Shot]:
+    """A shot, of the camera's own name, of each camera whose name fits a pattern of *, ? and [abc]; sorted.
+
+    Case counts on every system.
+
+    Raises
+    ------
+    ShotsError
+        if such a camera's name can't be a file's, or two can't be beside each other; it has all of them.
+    InputError
+        if no name fits.
+    """
+    cameras = sorted(cameras)
+    chosen = [name for name in cameras if fnmatch.fnmatchcase(name, pattern)]
+    if not chosen:
+        raise InputError(f"no camera is called {checks.shown(pattern)}: the file has {', '.join(cameras[:8]) or 'none'}")
+    problems = Problems(f"the cameras {checks.shown(pattern)}")
+    files: dict[str, str] = {}
+    for name in chosen:
+        with problems.caught():
+            names.check("a camera", name)
+        file = names.one_file(name)
+        if file in files:
+            both = f"{checks.shown(files[file])} and {checks.shown(name)}"
+            problems.add(f"the cameras {both} would have one file on Windows and macOS: rename one, or list shots in a file")
+        files[file] = name
+    problems.raise_any()
+    return [Shot(name, camera=name) for name in chosen]
+
+
+def _count(count: int) -> int:
+    if count > _MOST:
+        raise InputError(f"these are {count} shots: make at most {_MOST} at a time")
+    return count
+
+
+def _digits(largest: int) -> int:
+    """Of the numbers in names, so that files sort as these do."""
+    return max(3, len(str(largest)))
