@@ -18,7 +18,12 @@ _ON_WINDOWS = sys.platform == "win32"
 
 def viewcam(*arguments: str | Path) -> list[str]:
     """The command that runs `viewcam` in a Python process of its own."""
-    return [sys.executable, "-m", f"{_PACKAGE.name}.cli", *map(str, arguments)]
+    return module("cli", *arguments)
+
+
+def module(name: str, *arguments: str | Path) -> list[str]:
+    """The command that runs a module of this package there. name : dotted, without the package's own."""
+    return [sys.executable, "-m", f"{_PACKAGE.name}.{name}", *map(str, arguments)]
 
 
 def environment(apart_from: str = "", **more: str) -> dict[str, str]:
@@ -33,14 +38,18 @@ def environment(apart_from: str = "", **more: str) -> dict[str, str]:
 class Family:
     """A process and all that it starts, which say what they have to say into a file.
 
+    handle : of this process, which the child inherits under the same number.
+
     Raises
     ------
     OSError
         if the process can't be started, or the file not be written.
     """
 
-    def __init__(self, command: Sequence[str], log: Path, variables: Mapping[str, str]) -> None:
+    def __init__(self, command: Sequence[str], log: Path, variables: Mapping[str, str], handle: int | None = None) -> None:
         apart = {"creationflags": subprocess.CREATE_NO_WINDOW} if _ON_WINDOWS else {"start_new_session": True}
+        if handle is not None:
+            apart |= _inherited(handle)
         with open(log, "wb") as words:
             self._first = subprocess.Popen(
                 command, stdin=subprocess.DEVNULL, stdout=words, stderr=subprocess.STDOUT, env=variables, **apart
@@ -50,9 +59,10 @@ class Family:
         """The first process's exit status, None while it runs, negative if a signal has ended it."""
         return self._first.poll()
 
-    def wait(self) -> None:
-        """Until the first process has ended."""
-        self._first.wait()
+    def wait(self, seconds: float | None = None) -> None:
+        """Until the first process has ended, or so many seconds."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._first.wait(seconds)
 
     def end(self) -> None:
         """End those that still run, and wait for the first."""
@@ -62,3 +72,11 @@ class Family:
             with contextlib.suppress(ProcessLookupError):  # all have ended by themselves
                 os.killpg(self._first.pid, signal.SIGKILL)
         self._first.wait()
+
+
+def _inherited(handle: int) -> dict[str, object]:
+    """What Popen must be told so that the child has a handle of ours."""
+    if not _ON_WINDOWS:
+        return {"pass_fds": (handle,)}
+    os.set_handle_inheritable(handle, True)
+    return {"startupinfo": subprocess.STARTUPINFO(lpAttributeList={"handle_list": [handle]})}

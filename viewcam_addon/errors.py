@@ -15,6 +15,10 @@ class InputError(ValueError):
     exit_status = 2
 
 
+class FullDiskError(InputError):
+    """Nothing more can be written there, so that there is no use in trying the next."""
+
+
 class NotModelledError(InputError):
     """Something in the scene has no counterpart in the model, and `--strict` does not let it pass."""
 

@@ -5,12 +5,16 @@ is on the disk. Blender's own writers (the .blend, Cycles' EXR) write to the tem
 """
 
 import contextlib
+import errno
 import os
 import secrets
 from collections.abc import Iterator
 from pathlib import Path
 
-from .errors import InputError
+from .errors import FullDiskError, InputError
+
+# What a system says when no more fits: on the disk, into a user's share of it, into the largest file that it allows.
+_FULL = {errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EFBIG}
 
 
 @contextlib.contextmanager
@@ -23,7 +27,7 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     Raises
     ------
     InputError
-        if the folder can't be written or the disk is full.
+        if the folder can't be written; FullDiskError if the disk is full.
     """
     target = Path(path)
     if target.is_dir():
@@ -36,7 +40,8 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
             os.fsync(written.fileno())
         os.replace(temporary, target)
     except OSError as error:
-        raise InputError(
+        kind = FullDiskError if error.errno in _FULL else InputError
+        raise kind(
             f"{target} can't be written ({error.strerror or error}): choose another folder or free some space"
         ) from error
     finally:

@@ -6,8 +6,25 @@ import io
 import os
 import sys
 from collections.abc import Iterator
+from typing import TextIO
 
 _MOST_HEAPS = -8  # M_ARENA_MAX
+
+
+def open_closed_streams() -> None:
+    """Let standard output and standard error lead nowhere, where whoever started this process has closed them."""
+    for name, number in (("stdout", 1), ("stderr", 2)):
+        if getattr(sys, name) is None:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            if nowhere != number:
+                os.dup2(nowhere, number)
+                os.close(nowhere)
+            setattr(sys, name, os.fdopen(number, "w"))
+
+
+def copy_of(stream: int) -> TextIO:
+    """Where standard output (1) or standard error (2) leads now, to write to inside `silent_libraries` as well."""
+    return open(os.dup(stream), "w", encoding="utf-8", errors="backslashreplace")
 
 
 @contextlib.contextmanager

@@ -99,3 +99,22 @@ def test_a_missing_pass_is_named(name, paper_scene):
     without = replace(picture, passes={key: values for key, values in picture.passes.items() if key != name})
     with pytest.raises(InputError, match=f"'{name}'"):
         compare(picture, without, paper_scene.pinhole)
+
+
+# A picture of 24 × 15 pixels, where all roundings together are smaller than what Cycles' filter table is off.
+SMALL = {"width": 24, "height": 15, "distance": 22.5, "principal_point": None}
+# Per axis, upwards to the right: 3.505e-4 of the filter's width of 0.01.
+BIAS = 3.505e-6
+
+
+def test_the_bias_of_cycles_filter_table_passes_however_small_the_picture(paper_scene):
+    scene = paper_scene.seen_by(replace(paper_scene.pinhole, **SMALL))
+    comparison = compare(scene.picture(), scene.picture(0.5 + BIAS, 0.5 + BIAS), scene.pinhole, scene.surface_at)
+    assert comparison.passed, "\n".join(comparison.lines())
+    assert np.median(comparison.roundings) > law.ROUNDINGS[0], "roundings alone would allow it: the test tests nothing"
+
+
+def test_four_times_that_bias_is_caught(paper_scene):
+    scene = paper_scene.seen_by(replace(paper_scene.pinhole, **SMALL))
+    off = 0.5 + 4 * BIAS
+    assert not compare(scene.picture(), scene.picture(off, off), scene.pinhole, scene.surface_at).passed

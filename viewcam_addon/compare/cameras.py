@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..pinhole import Pinhole
-from .law import FLOAT32, ROUNDINGS
+from .law import FILTER_BIAS, FLOAT32, ROUNDINGS
 
 Array = NDArray[np.float64]
 
@@ -109,7 +109,7 @@ def systematic_error(pinhole: Pinhole, pixels: NDArray, off_x: Array, off_y: Arr
     aspect = pinhole.distance[0] / pinhole.distance[1]
     roll = np.arctan2(shear_y * aspect - shear_x / aspect, 2.0 + zoom_x + zoom_y)
     mean_x, mean_y, typical = (np.average(values, weights=weight**2) for values in (off_x, off_y, one_rounding))
-    figures = (shift_x, shift_y, zoom_x, zoom_y, roll, np.hypot(mean_x, mean_y), ROUNDINGS[0] * typical)
+    figures = (shift_x, shift_y, zoom_x, zoom_y, roll, np.hypot(mean_x, mean_y), ROUNDINGS[0] * typical + FILTER_BIAS)
     return Systematic(*(float(figure) for figure in figures))
 
 

@@ -104,21 +104,27 @@ class Agreement:
         return Agreement(self.pinhole, self.across[chosen], {name: slope[chosen] for name, slope in self.slopes.items()})
 
     def errors(self, expected: Seen, seen: Seen) -> dict[str, tuple[Array, Array, Array | float]]:
-        """For each pass: (error, what one rounding causes, what storage causes), each (n,), the last may be one number.
+        """For each pass: (error, what one rounding causes, what storage and the filter's bias cause), each (n,).
 
-        The law is taken at `expected`. Meaningless where either side missed.
+        The last may be one number. The law is taken at `expected`. Meaningless where either side missed.
         """
         depth = expected["Depth"][..., 0].astype(np.float64)
         errors = {
-            "Position": (self.across, law.position_shift(self.pinhole, expected), 0.0),
-            "Depth": (np.abs(seen["Depth"][..., 0] - depth) / depth, law.depth_error(self.pinhole, expected), law.FLOAT32),
+            "Position": (self.across, law.position_shift(self.pinhole, expected), law.FILTER_BIAS),
+            "Depth": (
+                np.abs(seen["Depth"][..., 0] - depth) / depth,
+                law.depth_error(self.pinhole, expected),
+                law.FLOAT32 + law.FILTER_BIAS * law.depth_slope(self.pinhole, expected),
+            ),
         }
         if "Normal" in self.slopes:
             one_rounding = law.normal_error(self.pinhole, expected, self.slopes["Normal"])
-            errors["Normal"] = (law.angle_between(expected["Normal"], seen["Normal"]), one_rounding, law.NORMAL_STORAGE)
+            floor = law.NORMAL_STORAGE + law.FILTER_BIAS * self.slopes["Normal"]
+            errors["Normal"] = (law.angle_between(expected["Normal"], seen["Normal"]), one_rounding, floor)
         if "UV" in self.slopes:
             apart = np.abs(expected["UV"][..., :2].astype(np.float64) - seen["UV"][..., :2]).max(axis=-1)
-            errors["UV"] = (apart, law.uv_error(self.pinhole, expected, self.slopes["UV"]), law.uv_storage(expected))
+            floor = law.uv_storage(expected) + law.FILTER_BIAS * self.slopes["UV"]
+            errors["UV"] = (apart, law.uv_error(self.pinhole, expected, self.slopes["UV"]), floor)
         return errors
 
     def same_surface(self, expected: Seen, seen: Seen) -> NDArray[np.bool_]:

@@ -14,7 +14,6 @@ import re
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
-from string import Template
 from typing import Any
 
 import numpy as np
@@ -23,13 +22,13 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..files import written_whole
 from ..image import Image
+from ..paper import MARKS, filled
 from ..pinhole import Pinhole
 from . import pictures
 from .charts import figure
 from .law import PERCENTILES
 from .statistics import Row, percentile_name
 
-_ICONS = {True: "M20 6 9.5 17 4 11.5", False: "M5 5l14 14M19 5L5 19"}
 SWAP = "Point at the picture, tap it, or press the space bar to swap the two."
 
 
@@ -75,7 +74,8 @@ def written(folder: str | os.PathLike[str], result: str, parts: Mapping[str, Any
     path = Path(folder) / "index.html"
     if path.parent.exists() and not path.parent.is_dir():
         raise InputError(f"{path.parent} is a file: give a folder for the report")
-    text = _template("report.html").substitute({**parts, "result": _template(result).substitute(parts)})
+    beside = Path(__file__)
+    text = filled(beside.with_name("report.html"), {**parts, "result": filled(beside.with_name(result), parts)})
     with written_whole(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return path
@@ -96,7 +96,7 @@ def frame(
         "outcome": "passed" if comparison.passed else "failed",
         "title": escape(f"{headline} · {names[1]}"),
         "names": escape(f"{names[0]} against {names[1]}"),
-        "icon": _ICONS[comparison.passed],
+        "icon": MARKS[comparison.passed],
         "headline": escape(headline) + ".",
         "lede": escape(with_powers(rest[:1].upper() + rest[1:])),
         "hint": "",
@@ -203,10 +203,6 @@ def with_powers(text: str) -> str:
 
 def mark(ok: bool) -> str:
     return "<span class=ok>ok</span>" if ok else "<span class=bad>failed</span>"
-
-
-def _template(name: str) -> Template:
-    return Template(Path(__file__).with_name(name).read_text(encoding="utf-8"))
 
 
 def _vector_row(name: str, vector: Sequence[float], digits: int = 9) -> str:

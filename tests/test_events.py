@@ -1,0 +1,126 @@
+"""What a command tells on its way: JSON lines alone on standard output, sentences on standard error, a bar on a terminal."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from viewcam_addon import events
+from viewcam_addon.cli import main
+from viewcam_addon.terminal import silent_libraries
+
+CAMERA = {"eye": [0, -5, 0], "look_at": [0, 0, 0], "up": [0, 0, 1], "distance": 100, "width": 64, "height": 48}
+SCENE = {"format": "virtual-pinhole-scene", "version": 1, "camera": CAMERA, "geometries": {}, "objects": []}
+
+BATCH = [
+    ("batch_started", {"shots": 3, "kept": 0, "folder": "out"}),
+    ("shot_started", {"shot": "left"}),
+    ("shot_done", {"shot": "left", "seconds": 0.5, "image": "left.exr", "passed": None}),
+    ("shot_started", {"shot": "right"}),
+    ("shot_failed", {"shot": "right", "error": "the lens is too long, shorten it"}),
+    ("stopping", {"signal": "SIGINT"}),
+    ("batch_finished", {"done": 1, "kept": 0, "failed": 1, "left": 1, "seconds": 1.0, "exit_status": 130}),
+]
+TELL = f"""
+from viewcam_addon import events
+with events.opened(log_json=False) as told:
+    for event, fields in {BATCH!r}:
+        told.tell(event, **fields)
+"""
+
+
+def lines_of(text):
+    return [json.loads(line) for line in text.splitlines()]
+
+
+@pytest.fixture
+def scene(tmp_path):
+    path = tmp_path / "scene.json"
+    path.write_text(json.dumps(SCENE))
+    return path
+
+
+def test_each_event_is_a_line_of_json_with_its_time_and_nothing_else_is_on_standard_output(scene, tmp_path, capfd):
+    assert main(["render", str(scene), str(tmp_path / "out.exr"), "--log-json"]) == 0
+    said = capfd.readouterr()
+    started, message, finished = lines_of(said.out)
+    assert [event["event"] for event in (started, message, finished)] == ["started", "message", "finished"]
+    assert started["command"] == "render" and "out.exr --log-json" in started["words"]
+    assert message["text"].startswith("traced 64 × 48 pixels in ")
+    assert finished["exit_status"] == 0 and 0 < finished["seconds"] < 600
+    assert started["time"] <= message["time"] <= finished["time"] and started["time"].endswith("+00:00")
+    assert said.err == ""
+
+
+def test_an_error_is_an_event_and_a_sentence(tmp_path, capfd):
+    assert main(["render", str(tmp_path / "none.json"), str(tmp_path / "out.exr"), "--log-json"]) == 2
+    said = capfd.readouterr()
+    _, error, finished = lines_of(said.out)
+    assert error["event"] == "error" and finished["exit_status"] == 2
+    assert said.err == f"viewcam render: {error['text']}\n" and "none.json" in error["text"]
+
+
+def test_a_check_s_child_processes_tell_as_if_they_were_none(tmp_path, capfd):
+    pytest.importorskip("bpy")
+    from viewcam_addon.commands.proving import DEMO_SCENE
+
+    words = ["check", str(DEMO_SCENE), "--size", "64x36", "--json", str(tmp_path / "result.json"), "--log-json"]
+    status = main(words)
+    said = capfd.readouterr()
+    told = lines_of(said.out)
+    assert [event["event"] for event in told if event["event"] != "message"] == ["started", "finished"], said.out
+    messages = "\n".join(event["text"] for event in told[1:-1])
+    assert "exported and rendered" in messages and "traced 64 × 36" in messages and "objects exported whole" in messages
+    assert told[-1]["exit_status"] == status == json.loads((tmp_path / "result.json").read_text())["exit_status"]
+    assert said.err == ""
+
+
+def test_events_are_heard_while_libraries_are_silent(capfd):
+    with events.opened(log_json=True) as told, silent_libraries():
+        os.write(1, b"a library")
+        print("a module")
+        told.tell("shot_started", shot="left")
+    assert [event["shot"] for event in lines_of(capfd.readouterr().out)] == ["left"]
+
+
+def test_what_goes_wrong_with_a_batch_is_said_where_there_is_no_terminal_and_nothing_else(capfd):
+    with events.opened(log_json=False) as told:
+        for event, fields in BATCH:
+            told.tell(event, **fields)
+    said = capfd.readouterr()
+    assert said.out == ""
+    failed, stopping = said.err.splitlines()
+    assert failed == "viewcam batch: right: the lens is too long, shorten it"
+    assert stopping.startswith("viewcam batch: SIGINT: this shot will be finished")
+
+
+def program(text):
+    """Words and environment that run a Python program with this project in reach."""
+    return [sys.executable, "-c", text], os.environ | {"PYTHONPATH": str(Path(__file__).parent.parent)}
+
+
+def test_a_terminal_shows_a_bar_and_sentences_above_it(on_a_terminal):
+    pytest.importorskip("tqdm")
+    status, said = on_a_terminal(*program(TELL))
+    assert status == 0, said
+    assert "left:" in said and "| 0/3 [" in said and "1 failed" in said
+    assert "\rviewcam batch: right: the lens is too long, shorten it" in said.replace("\r\n", "\n")
+    assert said.rstrip(" ").endswith("\r"), "the bar is still there at the end"
+
+
+def test_without_tqdm_a_terminal_shows_the_sentences(on_a_terminal):
+    status, said = on_a_terminal(*program("import sys; sys.modules['tqdm'] = None\n" + TELL))
+    assert status == 0 and "%" not in said and len(said.splitlines()) == 2
+
+
+def test_lines_of_json_that_nobody_reads_end_no_command(scene, tmp_path):
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "viewcam_addon.cli", "render", scene, tmp_path / "out.exr", "--log-json"]
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent.parent)}
+    done = subprocess.run(command, env=environment, stdout=writer, stderr=subprocess.PIPE, check=False)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (0, b"") and (tmp_path / "out.exr").stat().st_size

@@ -1,0 +1,144 @@
+"""What a command tells while it runs: errors as sentences, a bar on a terminal, or a line of JSON for each event.
+
+An event is a name and fields. Of every command are told `started` (command, words), `message` (text: a line that it would have
+printed), `error` (command, text, and `problems` where there are several) and `finished` (command, exit_status, seconds); a
+batch tells of its shots too (docs/batch.md). All of it goes to copies of standard output and standard error, so it is heard
+while libraries are silent.
+
+Rejected: Python's logging, whose levels, loggers and handlers are more than a line of JSON needs, and to which the libraries in
+this process write as well.
+"""
+
+import contextlib
+import datetime
+import io
+import json
+from collections.abc import Iterator
+from typing import Any, Protocol, TextIO
+
+from .terminal import copy_of
+
+
+class Events(Protocol):
+    """Whoever is told of events. The fields are what JSON can say, and paths."""
+
+    def tell(self, event: str, **fields: Any) -> None: ...
+
+
+class Sentences:
+    """On standard error, what goes wrong, a sentence each; nothing else."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def tell(self, event: str, **fields: Any) -> None:
+        if sentence := _sentence(event, fields):
+            self._say(sentence)
+
+    def _say(self, sentence: str) -> None:
+        _write(self._stream, sentence)
+
+
+class Bar(Sentences):
+    """The same, above a bar of a batch's shots. draw : the class tqdm."""
+
+    def __init__(self, stream: TextIO, draw: type) -> None:
+        super().__init__(stream)
+        self._draw, self._bar, self._failed = draw, None, 0
+
+    def tell(self, event: str, **fields: Any) -> None:
+        super().tell(event, **fields)
+        if event == "batch_started":
+            shots = {"total": fields["shots"], "initial": fields["kept"], "unit": "shot"}
+            self._bar = self._draw(**shots, file=self._stream, dynamic_ncols=True, leave=False)
+        elif event == "shot_started" and self._bar is not None:
+            self._bar.set_description_str(fields["shot"])
+        elif event in ("shot_done", "shot_failed", "shot_elsewhere") and self._bar is not None:
+            self._failed += event == "shot_failed"
+            self._bar.set_postfix_str(f"{self._failed} failed" if self._failed else "", refresh=False)
+            self._bar.update()
+        elif event in ("batch_finished", "finished") and self._bar is not None:
+            self._bar.close()
+            self._bar = None
+
+    def _say(self, sentence: str) -> None:
+        if self._bar is None:
+            super()._say(sentence)
+        else:
+            self._bar.write(sentence, file=self._stream)
+
+
+class JsonLines:
+    """On standard output, each event as an object on a line of its own: `event`, `time` (UTC), its fields. Errors as ever."""
+
+    def __init__(self, stream: TextIO, errors: Sentences) -> None:
+        self._stream, self._errors = stream, errors
+
+    def tell(self, event: str, **fields: Any) -> None:
+        now = datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")
+        _write(self._stream, json.dumps({"event": event, "time": now, **fields}, default=str))
+        self._errors.tell(event, **fields)
+
+
+@contextlib.contextmanager
+def opened(log_json: bool) -> Iterator[Events]:
+    """Whoever is to be told: by lines of JSON, in which what is printed inside the block becomes messages; else by sentences,
+    with a bar if standard error is a terminal."""
+    with contextlib.ExitStack() as streams:
+        errors = streams.enter_context(_listening(2))
+        if log_json:
+            lines = JsonLines(streams.enter_context(_listening(1)), Sentences(errors))
+            with contextlib.redirect_stdout(_Messages(lines)):
+                yield lines
+        elif errors.isatty() and (draw := _tqdm()):
+            yield Bar(errors, draw)
+        else:
+            yield Sentences(errors)
+
+
+class _Messages(io.TextIOBase):
+    """A text stream each line of which is told as a message."""
+
+    def __init__(self, events: Events) -> None:
+        self._events, self._begun = events, ""
+
+    def write(self, text: str) -> int:
+        *lines, self._begun = (self._begun + text).split("\n")
+        for line in lines:
+            self._events.tell("message", text=line)
+        return len(text)
+
+
+@contextlib.contextmanager
+def _listening(stream: int) -> Iterator[TextIO]:
+    copy = copy_of(stream)
+    try:
+        yield copy
+    finally:
+        with contextlib.suppress(OSError):  # what could not be written is tried once more
+            copy.close()
+
+
+def _write(stream: TextIO, line: str) -> None:
+    with contextlib.suppress(OSError):  # nobody listens any more: that ends no command
+        stream.write(f"{line}\n")
+        stream.flush()
+
+
+def _tqdm() -> type | None:
+    try:
+        from tqdm import tqdm
+    except ImportError:  # a clone linked into Blender's extensions has no wheels
+        return None
+    return type("tqdm", (tqdm,), {"monitor_interval": 0})  # no thread that wakes up every ten seconds
+
+
+def _sentence(event: str, fields: dict[str, Any]) -> str:
+    """What is to be said of an event where nobody reads JSON; mostly nothing."""
+    if event == "error":
+        return f"viewcam {fields['command']}: {fields['text']}"
+    if event == "shot_failed":
+        return f"viewcam batch: {fields['shot']}: {fields['error']}"
+    if event == "stopping":
+        return f"viewcam batch: {fields['signal']}: this shot will be finished; a second one ends it at once"
+    return ""
