@@ -1,0 +1,394 @@
+"""Shots on several workers: the same files as from one process, whoever is killed. Dask is real, Blender is a stand-in."""
+
+import logging
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from viewcam_addon import children
+from viewcam_addon.batch import cluster, one, run, served
+from viewcam_addon.batch.folder import Folder
+from viewcam_addon.batch.served import ServedRenderer
+from viewcam_addon.errors import InputError
+from viewcam_addon.shots import Shot
+
+pytest.importorskip("distributed")
+
+TIMING = re.compile(rb'"timing": \{[^}]*\}')
+
+
+class Ear:
+    """What was told."""
+
+    def __init__(self):
+        self.told = []
+
+    def tell(self, event, **fields):
+        self.told.append((event, fields))
+
+    def all(self, event):
+        return [fields for name, fields in self.told if name == event]
+
+
+def shots(*names):
+    return [Shot(name, (0.1, -6.0, i), (0, 0, 1), (0, 0, 1), 400.0, None, 64, 36) for i, name in enumerate(names)]
+
+
+def settings_of(listed):
+    return {shot.name: f"hash of {shot.name}" for shot in listed}
+
+
+MADE_FROM = {"blend": "a scene", "blender": "stand-in", "seed": None}
+
+
+def run_on(machines, blend, folder, listed, ear=None, check=False, made_from=MADE_FROM, interruption=None):
+    """The summary of a batch on these workers."""
+    folder = Folder(folder)
+    work = machines.work(blend, folder, settings_of(listed), made_from, check=check)
+    how = {"resume": True, "check": check, "interruption": interruption}
+    return run.run(listed, folder, settings_of(listed), work, ear or Ear(), **how)
+
+
+def contents(folder):
+    """Name → bytes without timings of the shots' files."""
+    names = [path for path in folder.iterdir() if path.suffix in (".exr", ".png", ".json", ".html") and path.name[0] != "."]
+    return {path.name: TIMING.sub(b"", path.read_bytes()) for path in names if path.name != "summary.json"}
+
+
+@pytest.fixture(scope="module")
+def two_workers(stand_in_program):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("VIEWCAM_BLENDER", str(stand_in_program.program))
+        with cluster.opened(None, 2) as machines:
+            yield machines
+
+
+@pytest.fixture
+def machines(two_workers):
+    """Two workers, both there again if a test before has killed one. Each test has a file of its own, which they open anew."""
+    two_workers._client.wait_for_workers(2, timeout=60)
+    return two_workers
+
+
+def test_two_workers_write_the_bytes_of_one_process_and_each_loads_once(stand_in, machines, blend, tmp_path):
+    listed = shots(*(f"shot_{i}" for i in range(12)))
+    summary = run_on(machines, blend, tmp_path / "two", listed, check=True)
+    assert summary.exit_status == 0 and summary.counts["done"] == 12, summary.to_json()
+    opened = [words for words in stand_in.diary("open") if words[1] == str(blend)]
+    assert len(opened) == 2 and len({words[-1] for words in opened}) == 2, f"loads: {opened}"
+    workers = {words[-1] for words in stand_in.diary("render")}
+    assert len(workers) == 2, "one worker did all the work"
+
+    folder = Folder(tmp_path / "one")
+    with ServedRenderer(blend) as renderer:
+        work = one.in_turn(folder, renderer, settings_of(listed), True)
+        run.run(listed, folder, settings_of(listed), work, Ear(), check=True)
+    one_process, two_workers = contents(tmp_path / "one"), contents(tmp_path / "two")
+    assert len(one_process) == 12 * 3 + 1
+    assert one_process == two_workers
+
+
+def test_a_difference_in_one_byte_would_be_seen(stand_in, machines, blend, tmp_path):
+    run_on(machines, blend, tmp_path / "out", shots("a"))
+    before = contents(tmp_path / "out")
+    sidecar = tmp_path / "out" / "a.json"
+    sidecar.write_bytes(sidecar.read_bytes().replace(b"400.0", b"400.1"))
+    assert contents(tmp_path / "out") != before
+
+
+@pytest.mark.parametrize("victim", ["worker", "blender"])
+def test_what_is_killed_in_the_midst_of_a_shot_loses_nothing(stand_in, machines, blend, tmp_path, processes, victim):
+    listed = shots("a", "slow_one", "b", "c", "d", "e")
+    ear, outcome = Ear(), []
+    batch = threading.Thread(target=lambda: outcome.append(run_on(machines, blend, tmp_path / "out", listed, ear)))
+    batch.start()
+    assert processes.until(lambda: stand_in.diary("waits")), "the shot was never begun"
+    blender = int(stand_in.diary("waits")[0][-1])
+    worker = int(Path(f"/proc/{blender}/stat").read_text().rpartition(")")[2].split()[1])
+    os.kill(worker if victim == "worker" else blender, signal.SIGKILL)
+    batch.join(60)
+    assert outcome and outcome[0].exit_status == 0, ear.told
+    assert outcome[0].counts["done"] == 6 and not ear.all("shot_failed")
+    assert processes.until(lambda: not processes.run(blender)), "the killed worker's Blender goes on"
+    assert len([words for words in stand_in.diary("render") if words[1] == "slow_one"]) == 2
+    assert processes.run(worker) == (victim == "blender")
+
+
+def test_a_shot_that_always_crashes_blender_fails_and_the_rest_go_on(stand_in, machines, blend, tmp_path):
+    ear = Ear()
+    summary = run_on(machines, blend, tmp_path / "out", shots("a", "crash", "bad", "b", "c"), ear)
+    assert summary.exit_status == 4
+    failed = {fields["shot"]: fields["error"] for fields in ear.all("shot_failed")}
+    assert set(failed) == {"crash", "bad"}
+    assert f"{served.ATTEMPTS} times in a row" in failed["crash"] and failed["bad"] == "bad has no light: add some"
+    assert {fields["shot"] for fields in ear.all("shot_done")} == {"a", "b", "c"}
+
+
+def test_a_shot_that_ends_one_worker_after_another_fails_and_the_rest_go_on(stand_in, machines, blend, tmp_path):
+    ear = Ear()
+    summary = run_on(machines, blend, tmp_path / "out", shots("a", "poison", "b", "c"), ear)
+    assert summary.exit_status == 4 and {fields["shot"] for fields in ear.all("shot_done")} == {"a", "b", "c"}
+    ((failure),) = ear.all("shot_failed")
+    assert failure["shot"] == "poison" and "every worker that took this shot ended in it" in failure["error"]
+    assert len({words[-1] for words in stand_in.diary("render") if words[1] == "poison"}) == 4, "as docs/farm.md says"
+
+
+def test_a_full_disk_ends_the_batch(stand_in, machines, blend, tmp_path):
+    ear = Ear()
+    summary = run_on(machines, blend, tmp_path / "out", shots("full", *(f"shot_{i}" for i in range(40))), ear)
+    assert summary.exit_status == 4 and summary.counts["left"] > 20
+    (failure,) = ear.all("shot_failed")
+    assert "No space left on device" in failure["error"]
+
+
+def test_workers_that_would_make_other_pictures_get_no_shots(stand_in, machines, blend, tmp_path):
+    other = MADE_FROM | {"blender": "5.2.2"}
+    with pytest.raises(InputError, match=r"the worker tcp://\S+ can't render: .* another blender there: give all machines"):
+        run_on(machines, blend, tmp_path / "out", shots("a", "b", "c"), made_from=other)
+    assert not stand_in.diary("render")
+
+
+def test_a_file_that_changed_between_two_batches_is_loaded_again(stand_in, machines, blend, tmp_path):
+    def loads():  # of this file: a shot of the test before may have been under way
+        return len([words for words in stand_in.diary("open") if words[1] == str(blend)])
+
+    run_on(machines, blend, tmp_path / "out", shots("a", "b", "c", "d"))
+    before = loads()
+    assert before in (1, 2), "once for each worker that had a shot"
+    blend.write_text("another scene")
+    for name in ("e", "f"):
+        run_on(machines, blend, tmp_path / "out2", shots(name), made_from=MADE_FROM | {"blend": "another scene"})
+        assert before < loads() <= before + 2
+    summary = run_on(machines, blend, tmp_path / "out2", shots("g", "h"), made_from=MADE_FROM | {"blend": "another scene"})
+    assert summary.exit_status == 0 and loads() <= before + 2
+
+
+def test_a_worker_without_a_blender_says_so_in_a_sentence(stand_in, blend, tmp_path, monkeypatch):
+    monkeypatch.setenv("VIEWCAM_BLENDER", str(tmp_path / "ghost"))
+    with cluster.opened(None, 1) as machines, pytest.raises(InputError, match=r"ghost can't be started"):
+        run_on(machines, blend, tmp_path / "out", shots("a"))
+
+
+def test_threads_are_the_cores_shared_among_the_workers(stand_in, blend, tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster, "_cores", lambda: 7)
+    with cluster.opened(None, 2) as machines:
+        run_on(machines, blend, tmp_path / "out", shots("a"))
+    assert [words[2] for words in stand_in.diary("open")] == ["3"]
+
+
+def test_blender_computes_in_as_many_threads_as_without_dask(stand_in, machines, blend, tmp_path):
+    """Dask makes the libraries of its workers compute in one, and what these add up may then be other bits."""
+    assert os.environ.get("OMP_NUM_THREADS") != "1", "this test would see no difference"
+    run_on(machines, blend, tmp_path / "out", shots("a"))
+    assert stand_in.diary("one-thread")[0][1] == str(os.environ.get("OMP_NUM_THREADS"))
+
+
+def test_nothing_of_dask_stays_in_this_process(stand_in, processes):
+    """Modules to be found, variables, levels of logging, what Python's main program is; threads."""
+
+    def state():
+        program = sys.modules["__main__"]
+        logs = logging.root.manager.disable
+        return program.__spec__, getattr(program, "__file__", None), list(sys.path), dict(os.environ), logs
+
+    with cluster.opened(None, 1):  # starts threads that Python keeps for later
+        pass
+    before, threads = state(), threading.active_count()
+    with cluster.opened(None, 1):
+        pass
+    assert state() == before
+    assert processes.until(lambda: threading.active_count() <= threads), threading.enumerate()
+
+
+@pytest.mark.parametrize(
+    "address", ["tcp://127.0.0.1:9", "nonsense://here:1", "tcp://no-such-host.invalid:8786", "127.0.0.1:x"]
+)
+def test_a_scheduler_that_can_not_be_reached_is_one_sentence_within_seconds(address):
+    started = time.monotonic()
+    with (
+        pytest.raises(InputError, match=rf"^no Dask scheduler answers at {re.escape(address)}") as caught,
+        cluster.opened(address, None),
+    ):
+        pass
+    assert time.monotonic() < started + 5 * 10  # it is given 5 s
+    assert "\n" not in str(caught.value)
+
+
+def test_a_server_that_is_no_scheduler_is_one_sentence_too():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        with pytest.raises(InputError, match=r"^no Dask scheduler answers"), cluster.opened(address, None):
+            pass
+
+
+@pytest.fixture
+def farm(tmp_path, processes):
+    """Starts a scheduler and workers as docs/farm.md says; gives (address, start a worker)."""
+    family, scratch = [], tmp_path / "scratch"
+    scratch.mkdir()
+
+    def start(*words, **variables):
+        said = scratch / f"{len(family)}.txt"
+        family.append(children.Family([sys.executable, "-m", "dask", *words], said, children.environment(**variables)))
+        return family[-1], said
+
+    _, said = start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
+    assert processes.until(lambda: re.search(r"Scheduler at:\s+(tcp://\S+)", said.read_text())), said.read_text()
+    address = re.search(r"Scheduler at:\s+(tcp://\S+)", said.read_text())[1]
+
+    def worker(**variables):
+        return start("worker", address, "--nthreads", "1", "--no-dashboard", "--local-directory", str(scratch), **variables)[0]
+
+    yield address, worker, lambda: family[0].end()
+    for each in family:
+        each.end()
+
+
+def test_a_scheduler_without_workers_is_one_sentence(farm):
+    address, _, _ = farm
+    with (
+        pytest.raises(InputError, match=rf"the scheduler at {address} has no workers: start some"),
+        cluster.opened(address, None),
+    ):
+        pass
+
+
+def test_blender_of_a_farm_computes_in_all_threads_too(farm, stand_in, blend, tmp_path):
+    address, worker, _ = farm
+    worker()
+    with cluster.opened(address, None) as machines:
+        run_on(machines, blend, tmp_path / "out", shots("a"))
+    assert stand_in.diary("one-thread")[0][1] == "None"
+
+
+def test_workers_of_a_farm_keep_their_blender_from_batch_to_batch(farm, stand_in, blend, tmp_path):
+    address, worker, _ = farm
+    worker()
+    for folder in ("one", "two"):
+        with cluster.opened(address, None) as machines:
+            assert run_on(machines, blend, tmp_path / folder, shots("a", "b", "c")).exit_status == 0
+    assert [words[2] for words in stand_in.diary("open")] == ["None"], "one load, and the machine's own threads"
+
+
+def test_the_shots_of_a_machine_that_is_not_fit_are_rendered_by_another(farm, stand_in, blend, tmp_path):
+    address, worker, _ = farm
+    worker(VIEWCAM_BLENDER=str(tmp_path / "ghost"))
+    worker()
+    with cluster.opened(address, None) as machines:
+        machines._client.wait_for_workers(2, timeout=30)
+        summary = run_on(machines, blend, tmp_path / "out", shots(*"abcdef"))
+    assert summary.exit_status == 0 and summary.counts["done"] == 6
+
+
+def test_a_scheduler_that_dies_ends_the_batch_with_what_is_left(farm, stand_in, blend, tmp_path, processes):
+    address, worker, kill_scheduler = farm
+    worker()
+    ear = Ear()
+    with cluster.opened(address, None) as machines:
+        killer = threading.Thread(target=lambda: processes.until(lambda: stand_in.diary("waits")) and kill_scheduler())
+        killer.start()
+        summary = run_on(machines, blend, tmp_path / "out", shots("a", "slow_one", "b", "c", "d", "e"), ear)
+        killer.join()
+    assert summary.exit_status == 4 and summary.counts["done"] == 1
+    assert all("the scheduler is gone" in fields["error"] for fields in ear.all("shot_failed"))
+
+
+def test_workers_that_write_into_another_folder_are_told_and_nothing_is_believed(
+    stand_in, machines, blend, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(cluster, "_ANSWER_WITHIN", 1.0)
+    monkeypatch.setattr(Folder, "finished", lambda *_: None)
+    with pytest.raises(InputError, match="is another folder there: share the folder"):
+        run_on(machines, blend, tmp_path / "out", shots("a"))
+
+
+def test_without_dask_a_sentence_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with (
+        pytest.raises(InputError, match=r"need Dask, which is not here: \S+ -m pip install distributed"),
+        cluster.opened(None, 2),
+    ):
+        pass
+
+
+# A batch on two workers in a process that can be killed. Arguments: the file, the folder, names of shots.
+COORDINATOR = """
+import sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+import test_cluster
+from viewcam_addon.batch import cluster
+from viewcam_addon.batch.interruption import Interruption
+from viewcam_addon.terminal import silent_libraries
+blend, folder, shots = Path(sys.argv[2]), Path(sys.argv[3]), test_cluster.shots(*sys.argv[4:])
+heard = lambda signal: None
+with silent_libraries(), Interruption(heard) as interruption, cluster.opened(None, 2) as machines:
+    summary = test_cluster.run_on(machines, blend, folder, shots, interruption=interruption)
+sys.exit(summary.exit_status)
+"""
+
+
+def offspring(process):
+    """The numbers of all processes that descend from one."""
+    parents = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            parents[int(path.parent.name)] = int(path.read_text().rpartition(")")[2].split()[1])
+        except OSError:
+            continue
+    found, frontier = set(), {process}
+    while frontier:
+        frontier = {child for child, parent in parents.items() if parent in frontier} - found
+        found |= frontier
+    return found
+
+
+def test_a_script_that_has_workers_is_not_run_again_by_them(stand_in, blend, tmp_path):
+    script = tmp_path / "script.py"  # as people write them: nothing asks for __main__
+    script.write_text("print('run')" + COORDINATOR)
+    command = [sys.executable, script, Path(__file__).parent, blend, tmp_path / "out", "a", "b"]
+    done = subprocess.run(command, env=children.environment(), capture_output=True, text=True)
+    assert done.returncode == 0 and done.stdout == "run\n", done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("how", ["finished", signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+def test_nothing_is_left_running_and_nothing_is_said(stand_in, blend, tmp_path, processes, how):
+    """Also when the coordinator is killed, or when Ctrl-C reaches the whole group."""
+    command = [sys.executable, "-c", COORDINATOR, str(Path(__file__).parent), str(blend), str(tmp_path / "out"), "a", "b"]
+    slow = [] if how == "finished" else ["slow_one", "c", "d"]
+    before = set(os.listdir(os.getcwd()))
+    batch = subprocess.Popen(
+        [*command, *slow], env=children.environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True
+    )
+    try:
+        family = set()
+        if slow:
+            assert processes.until(lambda: stand_in.diary("waits")), "the slow shot was never begun"
+            family = offspring(batch.pid)
+            assert len(family) >= 4, "two workers and two Blenders"
+            if how == signal.SIGKILL:
+                batch.kill()
+            else:
+                os.killpg(batch.pid, how)
+                os.kill(int(stand_in.diary("waits")[0][-1]), signal.SIGKILL)  # the slow shot shall not take a minute
+        said, _ = batch.communicate(timeout=60)
+        status = batch.returncode
+    finally:
+        batch.kill()
+    blenders = {int(words[-1]) for words in stand_in.diary("open")}
+
+    def left():
+        return [process for process in family | blenders if processes.run(process)]
+
+    assert processes.until(lambda: not left()), f"still running: {left()}"
+    assert status == {"finished": 0, signal.SIGKILL: -9, signal.SIGINT: 130, signal.SIGTERM: 143}[how], said
+    assert said == b""
+    assert set(os.listdir(os.getcwd())) == before, "something was left in the user's folder"

@@ -1,0 +1,131 @@
+"""A process that is asked: it answers, errors arrive as they are, and neither side outlives the other."""
+
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from viewcam_addon import children, errors
+from viewcam_addon.batch.partner import Gone, Partner
+
+ECHO = """
+import os, signal, sys, time
+from viewcam_addon import errors
+from viewcam_addon.batch import partner
+
+def answers(request):
+    print("words that are nobody's business")
+    if "die" in request:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if "raise" in request:
+        raise getattr(errors, request["raise"])("the lamp is broken: mend it")
+    if "bug" in request:
+        return request["nothing of that name"]
+    if "sleep" in request:
+        time.sleep(request["sleep"])
+    return {"heard": request, "process": os.getpid()}
+
+partner.answer(sys.argv[1], answers, idle=float(os.environ.get("IDLE", "600")))
+"""
+# Asks one thing, tells who answered, and waits to be killed.
+ASKER = """
+import sys, time
+from viewcam_addon import children
+from viewcam_addon.batch.partner import Partner
+echo = Partner("the echo", [sys.executable, "-c", sys.argv[1]], children.environment())
+print(echo.ask({})["process"], flush=True)
+echo.ask({"sleep": float(sys.argv[2])})
+time.sleep(60)
+"""
+ENDS_WITHIN = 20
+"""Seconds for a process to end which has nothing to do: of those that a busy machine needs, many times as many."""
+
+
+@pytest.fixture
+def echo():
+    with Partner("the echo", [sys.executable, "-c", ECHO], children.environment()) as partner:
+        yield partner
+
+
+def test_an_answer_is_what_was_asked_float_by_float(echo):
+    asked = {"name": "Würfel", "numbers": [0.1, 1e308, -5e-324, 2**53 + 1], "nothing": None}
+    assert [echo.ask(asked)["heard"] for _ in range(3)] == [asked] * 3
+
+
+def test_one_process_answers_all(echo):
+    assert len({echo.ask({})["process"] for _ in range(3)}) == 1
+
+
+@pytest.mark.parametrize("kind", ["InputError", "FullDiskError", "NotModelledError"])
+def test_an_error_is_raised_here_as_it_was_there(echo, kind):
+    with pytest.raises(errors.InputError, match=r"^the lamp is broken: mend it$") as caught:
+        echo.ask({"raise": kind})
+    assert type(caught.value).__name__ == kind
+    assert echo.ask({"and": "on"})["heard"] == {"and": "on"}
+
+
+def test_a_bug_is_one_sentence_and_the_process_goes_on(echo):
+    with pytest.raises(errors.InputError, match=r"this is a bug.*nothing of that name"):
+        echo.ask({"bug": True})
+    assert echo.ask({})["heard"] == {}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows knows no such signal")
+def test_a_process_that_was_killed_is_gone_and_says_how(echo):
+    with pytest.raises(Gone, match=f"the echo has ended with signal {signal.SIGKILL:d}"):
+        echo.ask({"die": True})
+    with pytest.raises(Gone, match="the echo has ended"):
+        echo.ask({})
+
+
+def test_a_process_that_never_listens_is_gone():
+    command = [sys.executable, "-c", "import sys; sys.exit(3)"]
+    with Partner("the deaf one", command, os.environ) as deaf, pytest.raises(Gone, match="has ended with status 3"):
+        deaf.ask({})
+
+
+def test_a_program_that_is_not_there_is_one_sentence(tmp_path):
+    with pytest.raises(errors.InputError, match=r"the ghost can't be started \(.*\): check .*ghost"):
+        Partner("the ghost", [str(tmp_path / "ghost")], os.environ)
+
+
+def test_what_it_prints_stands_in_its_log(tmp_path):
+    with Partner("the echo", [sys.executable, "-u", "-c", ECHO], children.environment(), tmp_path / "log.txt") as echo:
+        echo.ask({})
+    assert (tmp_path / "log.txt").read_text() == "words that are nobody's business\n"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="whether a process runs is read off Linux's /proc")
+@pytest.mark.parametrize("answering", [0, 60])
+def test_a_process_ends_with_whoever_asked_even_in_the_midst_of_an_answer(tmp_path, answering):
+    said = tmp_path / "said.txt"
+    asker = children.Family([sys.executable, "-c", ASKER, ECHO, str(answering)], said, children.environment())
+    assert _until(lambda: said.read_text().strip().isdecimal()), said.read_text()
+    process = Path("/proc", said.read_text().strip())
+    assert process.exists()
+    os.kill(asker._first.pid, signal.SIGKILL)
+    asker.wait()
+    gone = _until(lambda: not process.exists() or (process / "stat").read_text().rpartition(")")[2].split()[0] == "Z")
+    assert gone, "it waits for nobody"
+
+
+def test_a_process_that_nobody_asks_for_long_ends_and_that_can_be_seen():
+    with Partner("the echo", [sys.executable, "-c", ECHO], children.environment(IDLE="0.5")) as echo:
+        echo.ask({})
+        assert _until(lambda: not echo.is_there()), "it waits on"
+
+
+def test_a_process_that_listens_is_there(echo):
+    assert echo.is_there()
+    echo.ask({})
+    assert echo.is_there()
+
+
+def _until(is_so):
+    ends = time.monotonic() + ENDS_WITHIN
+    while not (found := is_so()) and time.monotonic() < ends:
+        time.sleep(0.02)
+    return found

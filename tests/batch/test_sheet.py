@@ -1,0 +1,108 @@
+"""The contact sheet shows every shot, leads to its files whatever they are called, and says what went wrong."""
+
+from html.parser import HTMLParser
+from urllib.parse import unquote, urlsplit
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from viewcam_addon.batch import sheet
+from viewcam_addon.batch.summary import Result, Summary
+from viewcam_addon.errors import InputError
+from viewcam_addon.shots import Shot
+
+
+class Page(HTMLParser):
+    def __init__(self, text):
+        super().__init__()
+        self.links, self.images, self.texts, self.tags = [], [], [], []
+        self.feed(text)
+        self.text = " ".join(" ".join(self.texts).split())
+
+    def handle_starttag(self, tag, attributes):
+        attributes = dict(attributes)
+        self.tags.append(tag)
+        if tag == "a":
+            self.links.append(unquote(attributes["href"]))
+        if tag == "img":
+            self.images.append(attributes)
+
+    def handle_data(self, data):
+        self.texts.append(data)
+
+
+def page(folder):
+    return Page((folder / "contact-sheet.html").read_text(encoding="utf-8"))
+
+
+def test_each_shot_is_a_thumbnail_that_leads_to_its_files(tmp_path, painting):
+    painting.paint(tmp_path, 3)
+    found = page(tmp_path)
+    names = [f"shot_00{number}" for number in range(3)]
+    assert [image["alt"] for image in found.images] == names
+    assert all(image["loading"] == "lazy" and (image["width"], image["height"]) == ("4", "3") for image in found.images)
+    assert found.links == [f"{name}.{suffix}" for name in names for suffix in ("png", "exr", "json")]
+    assert all((tmp_path / link).exists() for link in found.links)
+    assert "3 shots" in found.text and "All are there." in found.text and "Only what went wrong" not in found.text
+
+
+def test_what_went_wrong_is_told_by_name(tmp_path, painting):
+    broken = {"shot_001": InputError("the lamp <Key & Fill> is broken: mend it")}
+    painting.paint(tmp_path, 4, painter=painting.Painter(broken=broken, unlike=["shot_002"]), check=True)
+    found = page(tmp_path)
+    assert "3 are there, 1 failed, 1 not what the reference tracer sees." in found.text
+    assert "the lamp <Key & Fill> is broken: mend it" in found.text and "the left half is < the right half" in found.text
+    assert "Only what went wrong" in found.text and "failed" in (tmp_path / "contact-sheet.html").read_text().split("\n")[1]
+
+
+def test_the_same_batch_gives_the_same_page(tmp_path, painting):
+    for name, pause in (("a", 0.0), ("b", 0.01)):
+        painting.paint(tmp_path / name, 2, painter=painting.Painter(pause=pause))
+    assert (tmp_path / "a" / "contact-sheet.html").read_bytes() == (tmp_path / "b" / "contact-sheet.html").read_bytes()
+
+
+def _can_be_a_shot(name):
+    try:
+        return bool(Shot(name, camera="C"))
+    except InputError:
+        return False
+
+
+names = st.text(st.characters(exclude_categories=["C"]) | st.sampled_from("&'%;=+@ü左𝔸(){}"), min_size=1, max_size=12)
+
+
+@given(names.filter(_can_be_a_shot), st.text(max_size=20))
+def test_names_and_sentences_of_any_letters_are_shown_and_led_to_as_they_are(name, words):
+    files = {"image": f"{name}.exr", "preview": f"{name}.png"}
+    check = {"passed": False, "verdict": words}
+    record = files | {"rendered": {"width": 4, "height": 3}, "warnings": [words], "check": check}
+    found = Page(sheet.picture(Result(name, record)))
+    assert found.links == [f"{name}.png", f"{name}.exr", f"{name}.json"]
+    assert unquote(found.images[0]["src"]) == f"{name}.png" and found.images[0]["alt"] == name
+    assert found.texts[0] == name
+    assert set(found.tags) <= {"figure", "a", "img", "figcaption", "b", "p", "span"}
+    failed = Page(sheet.picture(Result(name, None, words or "it failed")))
+    assert failed.texts[0] == name and set(failed.tags) <= {"figure", "figcaption", "b", "p", "span"}
+
+
+@given(names.filter(_can_be_a_shot))
+def test_a_link_stays_in_the_folder(name):
+    record = {"image": f"{name}.exr", "preview": f"{name}.png", "rendered": {"width": 4, "height": 3}, "warnings": []}
+    text = sheet.picture(Result(name, record))
+    for image in Page(text).images:
+        parts = urlsplit(image["src"])
+        assert not parts.scheme and not parts.netloc and not parts.query and not parts.fragment and "/" not in parts.path
+
+
+def test_counts_are_what_the_exit_status_goes_by():
+    done, wrong = {"state": "done", "passed": True}, {"state": "done", "passed": False}
+    failed, left = {"state": "failed"}, {"state": "left"}
+    for shots, signal, status in [
+        ([done], None, 0),
+        ([done, wrong], None, 1),
+        ([done, wrong, failed], None, 4),
+        ([left], None, 4),
+        ([done], 2, 130),
+        ([left, failed], 15, 143),
+    ]:
+        assert Summary(tuple(shots), 0, 0, 0, 1.0, signal).exit_status == status

@@ -1,0 +1,21 @@
+"""A batch: many shots of one file, each as a picture, a preview and a sidecar, and nothing lost on the way.
+
+    renderer              what renders a shot: the contract that Blender's side keeps
+    folder                what stands where, and whether a shot is there already
+    one                   one shot, rendered and written
+    run                   all of them: claimed, rendered, counted, through failures, full disks, signals and other batches
+    locks, interruption   shared work; the first signal and the second
+    summary, sheet        what it came to, as JSON and as a page of thumbnails
+    dataset               what it came to, as those read it who learn a scene from its pictures
+    partner               a process that is kept open and asked; on it stand
+    judge                     is what was rendered what the sidecar says?
+    serving, served           a renderer in a process of its own
+    cluster, worker           shots on several workers, each of which keeps such a process
+
+**Nothing lost.** A file appears whole or not at all (files.py), and a shot's sidecar is written last and taken away first: a
+shot is there if its sidecar is, whatever was killed when. All that a run decides it reads from the folder, so there is no
+journal that could be wrong. Locks only share the work out; without them two batches would do it twice, and end with the same
+bytes.
+
+Nothing here knows Blender. Rejected: a database of states (a second truth beside the files), and a folder per shot.
+"""

@@ -1,0 +1,59 @@
+"""The first SIGINT or SIGTERM asks a batch to end after the shot, the second ends the process at once.
+
+Python itself answers a signal between two steps of Python, which is after the shot: Blender renders in between, for minutes
+perhaps. So a thread of ours hears of it right away, tells the user, and counts. Blender's own answer to SIGINT, which breaks
+the render off, is replaced meanwhile, and so is Python's: a KeyboardInterrupt while bpy opens a file ends in a crash.
+"""
+
+import os
+import signal
+import socket
+import threading
+from collections.abc import Callable
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class Interruption:
+    """Listens while its block runs; in the main thread only, since signals are the main thread's. Elsewhere it does nothing.
+
+    number : of the signal that asked for the end, None so far.
+    heard : called once, as heard(signal="SIGINT"), from another thread.
+    """
+
+    def __init__(self, heard: Callable[..., None]) -> None:
+        self.number: int | None = None
+        self._heard = heard
+        self._listens = threading.current_thread() is threading.main_thread()
+
+    def __enter__(self) -> "Interruption":
+        if self._listens:
+            self._ear, self._mouth = socket.socketpair()
+            self._mouth.setblocking(False)
+            self._before = [(number, signal.signal(number, _do_nothing)) for number in _SIGNALS]
+            self._wakeup_before = signal.set_wakeup_fd(self._mouth.fileno(), warn_on_full_buffer=False)
+            self._thread = threading.Thread(target=self._listen, daemon=True)
+            self._thread.start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        if self._listens:
+            signal.set_wakeup_fd(self._wakeup_before)
+            for number, answer in self._before:  # None is an answer that was not Python's, and can't be put back
+                signal.signal(number, signal.SIG_DFL if answer is None else answer)
+            self._mouth.close()
+            self._thread.join()
+            self._ear.close()
+
+    def _listen(self) -> None:
+        while number := int.from_bytes(self._ear.recv(1), "big"):  # none when the mouth is closed
+            if number not in _SIGNALS:
+                continue
+            if self.number is not None:
+                os._exit(128 + number)
+            self.number = number
+            self._heard(signal=signal.Signals(number).name)
+
+
+def _do_nothing(number: int, frame: object) -> None:
+    """For a signal to wake the thread, Python must have some answer to it."""

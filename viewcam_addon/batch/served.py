@@ -1,0 +1,133 @@
+"""A renderer in a process of its own, as the one who asks has it: what BlenderRenderer is, without Blender in this process.
+
+The Blender is the one that VIEWCAM_BLENDER names, with the extension installed; without it the bpy module does. A Blender that
+crashes is started again, and what it was doing is done again, a few times.
+"""
+
+import dataclasses
+import importlib.util
+import os
+import platform
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from .. import children
+from ..errors import InputError
+from ..pinhole import Pinhole
+from ..shots import Shot
+from .partner import Gone, Partner
+
+BLENDER = "VIEWCAM_BLENDER"
+"""The variable that names the Blender."""
+
+ATTEMPTS = 3
+"""How many Blenders may crash in one shot until it counts as failed."""
+
+
+class ServedRenderer:
+    """A scene held open by a Blender in another process, which is started when it is first needed. See BlenderRenderer.
+
+    blend : the file. seed, threads : as the command line has them. program : that of this process, which is no Blender.
+
+    Every method raises InputError, also if that Blender can't be started or ends again and again, and OSError where it could
+    not write.
+    """
+
+    def __init__(self, blend: Path, seed: int | None = None, threads: int | None = None) -> None:
+        self.blend, self.program = blend, None
+        self._opening = {"open": {"blend": str(blend), "seed": seed, "threads": threads}}
+        self._partner: Partner | None = None
+        self._rendering: dict[str, Any] = {}
+
+    def open(self) -> None:
+        """Start the Blender and open the file, unless that is done."""
+        self._ask()
+
+    def render(self, shot: Shot, image: Path, preview: Path) -> dict[str, Any]:
+        self._rendering = {"render": {"shot": dataclasses.asdict(shot), "image": str(image), "preview": str(preview)}}
+        return self._ask(self._rendering)
+
+    def check(self, shot: Shot) -> dict[str, Any]:
+        return self._ask(self._rendering, {"check": {"shot": dataclasses.asdict(shot)}})
+
+    @property
+    def cameras(self) -> tuple[str, ...]:
+        return tuple(self._ask({"cameras": {}}))
+
+    @property
+    def scene_camera(self) -> str | None:
+        return self._ask({"scene_camera": {}})
+
+    def pinhole(self, camera: str | None, size: tuple[int, int] | None) -> Pinhole:
+        return Pinhole(**self._ask({"pinhole": {"camera": camera, "size": size}}))
+
+    def made_from(self) -> dict[str, Any]:
+        return self._ask({"made_from": {}})
+
+    def problems(self, shots: Iterable[Shot], check: bool = False) -> tuple[str, ...]:
+        said = [dataclasses.asdict(shot) for shot in shots]
+        return tuple(self._ask({"problems": {"shots": said, "check": check}}))
+
+    def close(self) -> None:
+        """End the Blender."""
+        if self._partner is not None:
+            self._partner.close()
+            self._partner = None
+
+    def __enter__(self) -> "ServedRenderer":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _ask(self, *requests: dict[str, Any]) -> Any:
+        """The answer to the last of the requests; those before it are repeated to a Blender that is new."""
+        for attempt in range(1, ATTEMPTS + 1):
+            try:
+                return self._answer(requests)
+            except Gone as gone:
+                self.close()
+                if attempt == ATTEMPTS:
+                    raise InputError(f"{ATTEMPTS} times in a row {gone}") from gone
+        raise AssertionError("unreachable")
+
+    def _answer(self, requests: tuple[dict[str, Any], ...]) -> Any:
+        if self._partner is not None and not self._partner.is_there():  # it was idle for long
+            self.close()
+        if self._partner is None:
+            self._start()
+        else:
+            requests = requests[-1:]
+        answer = None
+        for request in requests:
+            answer = self._partner.ask(request)
+        return answer
+
+    def _start(self) -> None:
+        name, command, variables = _blender()
+        self._partner = Partner(name, command, variables)
+        try:
+            self._partner.ask(self._opening)
+        except Gone as gone:
+            raise Gone(
+                f"{name} did not open the file: see that it is Blender 4.2 or newer with the extension Virtual Pinhole, "
+                "and that there is memory enough"
+            ) from gone
+        except InputError:
+            self.close()
+            raise
+
+
+def _blender() -> tuple[str, list[str], Mapping[str, str]]:
+    """What sentences call the Blender, the command that makes it serve, and its variables."""
+    program = os.environ.get(BLENDER)
+    if program:
+        return program, [program, "-b", "--disable-autoexec", "--command", "viewcam", "serve"], os.environ
+    module = importlib.util.find_spec("bpy")
+    if module is None:
+        raise InputError(f"there is no Blender on {platform.node()}: name one in {BLENDER}, or pip install bpy")
+    # Where bpy is loaded, here or in our parent, the path leads first to Blender's scripts, whose bpy is half of it.
+    place = Path(module.origin or "")
+    scripts = str(place.parents[2]) if place.name == "__init__.py" else ""
+    return "Blender", children.viewcam("serve"), children.environment(apart_from=scripts)
