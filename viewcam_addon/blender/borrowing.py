@@ -44,30 +44,42 @@ def borrowed() -> Iterator[Borrower]:
 
 
 def still_of_one_layer(
-    borrow: Borrower, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_object: bpy.types.Object
+    borrow: Borrower,
+    scene: bpy.types.Scene,
+    view_layer: bpy.types.ViewLayer,
+    camera_object: bpy.types.Object,
+    keep: bool = False,
 ) -> None:
     """Make `bpy.ops.render.render` render this view layer through this camera, sharp, and nothing after it.
 
     What both sides of a comparison have in common: compositor and sequencer, motion blur, stereo and Freestyle are off, and a
-    render border is cropped to. Simplify stays as the artist has it.
+    render border is cropped to. Simplify stays as the artist has it. keep : whether what Blender and Cycles have built is kept,
+    for the next render.
     """
     render = scene.render
+    borrow.set(render, "use_persistent_data", keep)
     for name in (
         "use_compositing",
         "use_sequencer",
         "use_multiview",
         "use_motion_blur",
         "use_freestyle",
-        "use_persistent_data",
         "use_single_layer",
         "use_stamp",
     ):
         borrow.set(render, name, False)
     borrow.set(render, "use_crop_to_border", render.use_border)
-    # Markers bound to cameras would choose among them: in a render, and while they are unbound and bound again.
-    borrow.afterwards(setattr, scene, "camera", scene.camera)
-    for marker in scene.timeline_markers:
-        borrow.set(marker, "camera", None)
+    cameras_unbound(borrow, scene)
     scene.camera = camera_object
     for each in scene.view_layers:
         borrow.set(each, "use", each == view_layer)
+
+
+def cameras_unbound(borrow: Borrower, scene: bpy.types.Scene) -> None:
+    """Let `scene.camera` be the one that renders, whatever it is set to until the loan ends.
+
+    Markers bound to cameras would choose among them: in a render, and while they are unbound and bound again.
+    """
+    borrow.afterwards(setattr, scene, "camera", scene.camera)
+    for marker in scene.timeline_markers:
+        borrow.set(marker, "camera", None)

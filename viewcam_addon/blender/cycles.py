@@ -84,11 +84,12 @@ def render(
     remedies: Iterable[Remedy] = (),
     threads: int | None = None,
     light: Light | None = None,
+    keep: bool = False,
 ) -> None:
     """Render one view layer at the current frame to a multilayer EXR, whole or not at all.
 
     remedies : what to take out for the time of the render (ledger.py). threads : all by default. light : for a picture of
-        light in place of the passes of geometry.
+        light in place of the passes of geometry. keep : whether Cycles keeps what it has built, for the next render.
 
     Raises
     ------
@@ -98,7 +99,7 @@ def render(
     if not hasattr(scene, "cycles"):
         raise InputError("Cycles is disabled: enable the add-on Cycles Render Engine in Blender's preferences")
     with written_whole(path) as temporary, borrowed() as borrow:
-        still_of_one_layer(borrow, scene, view_layer, camera_object)
+        still_of_one_layer(borrow, scene, view_layer, camera_object, keep)
         borrow_settings(borrow, scene, view_layer, light)
         _borrow_file(borrow, scene, temporary)
         if threads:
@@ -153,12 +154,12 @@ def _borrow_file(borrow: Borrower, scene: bpy.types.Scene, path: os.PathLike[str
     borrow.set(scene.render, "use_file_extension", False)
     borrow.set(scene.render, "use_overwrite", True)
     settings = scene.render.image_settings
-    _borrow_whole(borrow, settings)
+    borrow_whole(borrow, settings)
     settings.color_management = "FOLLOW_SCENE"
     versions.set_multilayer_file(settings)
 
 
-def _borrow_whole(borrow: Borrower, settings: bpy.types.ImageFormatSettings) -> None:
+def borrow_whole(borrow: Borrower, settings: bpy.types.ImageFormatSettings) -> None:
     """Give back all settings of the file together, since the kind of file changes what the others may be."""
     names = [prop.identifier for prop in settings.bl_rna.properties if not prop.is_readonly]
     names.sort(key=lambda name: ("media_type", "file_format").index(name) if name in ("media_type", "file_format") else 2)

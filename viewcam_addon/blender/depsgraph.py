@@ -58,6 +58,21 @@ def visit(scene: bpy.types.Scene, work: Callable[[bpy.types.Depsgraph], Result])
     return outcome[0]
 
 
+def only_cameras_changed(depsgraph: bpy.types.Depsgraph) -> bool:
+    """Whether all that Blender tells of since the last render are cameras, and settings of the scene.
+
+    Blender tells of whatever follows a camera, too (geometry nodes, constraints, drivers, children), and each time of all that
+    is animated. It does not tell of pixels that were painted and of what Cycles has for properties. Measured: 4.2, 5.0 and 5.2.
+    """
+    return all(_is_of_camera(update.id) for update in depsgraph.updates)
+
+
+def _is_of_camera(block: bpy.types.ID) -> bool:
+    if isinstance(block, bpy.types.Object):
+        return block.type == "CAMERA"
+    return isinstance(block, bpy.types.Camera | bpy.types.Scene | bpy.types.Action)
+
+
 def render_still(scene: bpy.types.Scene, to_file: bool = False) -> None:
     """Render the scene's current frame.
 

@@ -6,7 +6,7 @@ What goes wrong is reported, which ends `blender -b` with status 1 and without a
 Level `geometry` knows no light: its Combined shows surfaces as a lamp at the eye would, by the cosine between ray and normal.
 
 What is prepared for one picture serves all passes of a frame, and the next frames as well where Blender's "Persistent Data" is
-on, which keeps the engine.
+on, which keeps the engine. The scene is read anew for each, except in a batch (`keeps_scene`).
 
 Rejected: drawing in the viewport, which wants a quick preview where this engine is a reference; a result that is begun once and
 updated, which Blender would copy whole for each band of rows.
@@ -28,6 +28,7 @@ from ..tracer.scene import Scene
 from ..tracer.scene.film import LEVELS
 from ..tracer.scene.levels import least_level
 from . import datablocks, export, tracing, versions
+from .depsgraph import only_cameras_changed
 from .ledger import Ledger
 
 # The property of a view layer that asks for each pass. Combined is always there.
@@ -54,7 +55,13 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
     bl_use_preview = False
     bl_use_eevee_viewport = True
     bl_use_shading_nodes_custom = False
+    # For a batch: whether the scene, once it is read, serves all pictures until Blender tells of a change. An artist may change
+    # what Blender does not tell of.
+    keeps_scene = False
+    # Of the last picture: the level at which it was traced, and what is not modelled as it is, one sentence each.
+    level, warnings = _GEOMETRY, ()
     _keeper = None
+    _read = None  # what it was read for, and the scene
 
     def update_render_passes(self, scene: bpy.types.Scene, renderlayer: bpy.types.ViewLayer) -> None:
         for name in _asked_for(scene, renderlayer):
@@ -71,13 +78,14 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
             self.report({"ERROR"}, f"Virtual Pinhole: {errors.bug(error)}")
         finally:
             if not depsgraph.scene.render.use_persistent_data:  # else Blender keeps this engine for the next frame
-                self._keeper = None
+                self._keeper = self._read = None
 
     def _render(self, depsgraph: bpy.types.Depsgraph) -> None:
         self.update_stats("", "Reading the scene")
         settings = depsgraph.scene_eval.virtual_pinhole_reference
         scene = self._exported(depsgraph)
         level = least_level(scene)[0] if settings.level == "AUTO" else settings.level.lower()
+        type(self).level = level
         words = f"Level {level}" if level == _GEOMETRY else f"Level {level}, {settings.samples} samples"
         self.update_stats("", words)
         started, done = time.perf_counter(), np.zeros(scene.camera.height, bool)
@@ -92,20 +100,30 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
         """What is seen through the camera and the render border."""
         if depsgraph.scene.render.use_multiview:
             raise InputError("stereoscopy is on, and each eye has another camera: turn it off among the output properties")
-        settings = depsgraph.scene_eval.virtual_pinhole_reference
-        ledger, camera_object = Ledger(), self.camera_override.original
-        for sentence in datablocks.beyond_pinhole(camera_object, depsgraph.scene):
-            ledger.note(camera_object.name, "approximated", sentence)
-        scene = export.scene_in(depsgraph, camera_object, ledger, lit=settings.level != "GEOMETRY")
+        settings, camera_object = depsgraph.scene_eval.virtual_pinhole_reference, self.camera_override.original
+        scene = self._read_scene(depsgraph, camera_object, settings.level != "GEOMETRY")
         if settings.clay:
             scene = replace(scene, objects=tuple(replace(placed, materials=()) for placed in scene.objects))
         frame = datablocks.frame_of(depsgraph.scene)
         if frame.border and not frame.crop:
             scene = replace(scene, camera=scene.camera.cropped(*replace(frame, crop=True).window))
-        lacking = [entry for entry in ledger.entries() if entry.status != "exported"]
-        if lacking:
-            others = f" (and {len(lacking) - 1} more, which viewcam export lists)" if len(lacking) > 1 else ""
-            self.report({"WARNING"}, f"Not modelled as it is: {lacking[0].object!r}, {lacking[0].reason}{others}")
+        lacking = [(entry.object, entry.reason) for entry in scene.ledger if entry.status != "exported"]
+        beyond = [(camera_object.name, sentence) for sentence in datablocks.beyond_pinhole(camera_object, depsgraph.scene)]
+        words = [f"Not modelled as it is: {name!r}, {reason}" for name, reason in (*beyond, *lacking)]
+        if words:
+            others = f" (and {len(words) - 1} more, which viewcam export lists)" if len(words) > 1 else ""
+            self.report({"WARNING"}, words[0] + others)
+        type(self).warnings = tuple(words)
+        return scene
+
+    def _read_scene(self, depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, lit: bool) -> Scene:
+        """What is seen through the camera."""
+        former, self._read = self._read, None
+        if former and former[0] == lit and self.keeps_scene and only_cameras_changed(depsgraph):
+            scene = export.seen_from(former[1], depsgraph, camera_object)
+        else:
+            scene = export.scene_in(depsgraph, camera_object, Ledger(), lit)
+        self._read = lit, scene
         return scene
 
     def _bands(self, depsgraph: bpy.types.Depsgraph, scene: Scene, level: str) -> Iterator[tuple[Passes, range]]:

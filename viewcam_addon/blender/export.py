@@ -10,7 +10,7 @@ What has no counterpart is noted in the ledger, with the remedy that takes it ou
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -129,16 +129,28 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
         materials = shading.names(source.slots) if shading else ()
         placed = (source.object_index, source.materials, materials, source.hidden_from)
         objects.append(Object(source.name, names[source.key], matrix, *placed))
-    camera = camera_object.evaluated_get(depsgraph)
     return Scene(
-        camera=cameras.read(camera, depsgraph.scene),
+        **_view_in(depsgraph, camera_object),
         geometries=geometries,
         objects=tuple(_drawn(objects, geometries, ledger)),
-        stated_camera=cameras.stated(camera, depsgraph.scene),
-        clip=(camera.data.clip_start, camera.data.clip_end),
         **(vars(light_in(depsgraph, ledger)) | {"materials": shading.materials, "images": shading.images} if shading else {}),
         ledger=ledger.entries(),
     )
+
+
+def seen_from(scene: Scene, depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) -> Scene:
+    """The scene that was read from a depsgraph in which nothing has changed since but cameras."""
+    return replace(scene, **_view_in(depsgraph, camera_object))
+
+
+def _view_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) -> dict[str, object]:
+    """What of a Scene is its camera's."""
+    camera = camera_object.evaluated_get(depsgraph)
+    return {
+        "camera": cameras.read(camera, depsgraph.scene),
+        "stated_camera": cameras.stated(camera, depsgraph.scene),
+        "clip": (camera.data.clip_start, camera.data.clip_end),
+    }
 
 
 def placements(

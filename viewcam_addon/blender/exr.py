@@ -1,17 +1,23 @@
-"""Whether an EXR that Blender wrote is whole: on a full disk Blender reports it as saved all the same.
+"""Whether an EXR that Blender wrote is whole (on a full disk Blender reports it as saved all the same), and its attributes.
 
 An EXR file holds a table with the offset of each chunk of pixels, written when all of them are; a chunk that is missing has the
 offset 0. To read it takes a few lines, and OpenEXR itself must not be loaded into Blender's process. Layout: the format's own
 documentation, "OpenEXR File Layout".
 """
 
+import io
 import os
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import BinaryIO
 
 _MAGIC = 20000630
 _MULTIPART = 0x1000
+
+_Header = dict[str, tuple[str, bytes]]
+"""The attributes of a part: name → (type, value)."""
+
 # Rows of a chunk, by the number of the compression in the header: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB.
 _ROWS = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256)
 
@@ -20,10 +26,9 @@ def is_whole(path: str | os.PathLike[str]) -> bool:
     """Whether all pixels of a scan-line EXR, of one part or several, are in the file."""
     try:
         with open(path, "rb") as file:
-            magic, version = struct.unpack("<II", file.read(8))
-            many = bool(version & _MULTIPART)
-            count = sum(map(_chunk_count, _headers(file, many)))
-            offsets = struct.unpack(f"<{count}Q", file.read(8 * count))
+            (magic,) = struct.unpack("<I", file.read(4))
+            many = _is_multipart(file)
+            offsets = _offsets(file, list(_headers(file, many)))
             # The last chunk: its part's number, if there are several, its row, the size of what follows.
             file.seek(max(offsets) + (8 if many else 4))
             (size,) = struct.unpack("<i", file.read(4))
@@ -33,7 +38,33 @@ def is_whole(path: str | os.PathLike[str]) -> bool:
         return False
 
 
-def _headers(file: BinaryIO, many: bool) -> Iterator[dict[str, bytes]]:
+def strip(path: str | os.PathLike[str], is_unwanted: Callable[[str], bool]) -> None:
+    """Take attributes out of the headers of a whole EXR, by their names; its pixels stay as they are, byte for byte."""
+    content = Path(path).read_bytes()
+    file = io.BytesIO(content)
+    file.seek(4)
+    many = _is_multipart(file)
+    headers = list(_headers(file, many))
+    kept = [{name: attribute for name, attribute in header.items() if not is_unwanted(name)} for header in headers]
+    packed = b"".join(map(_packed, kept)) + b"\0" * many
+    shorter = file.tell() - 8 - len(packed)
+    offsets = [offset - shorter for offset in _offsets(file, headers)]
+    table = struct.pack(f"<{len(offsets)}Q", *offsets)
+    Path(path).write_bytes(content[:8] + packed + table + content[file.tell() :])
+
+
+def _is_multipart(file: BinaryIO) -> bool:
+    (version,) = struct.unpack("<I", file.read(4))
+    return bool(version & _MULTIPART)
+
+
+def _offsets(file: BinaryIO, headers: list[_Header]) -> tuple[int, ...]:
+    """Where in the file each chunk of pixels is, of all parts."""
+    count = sum(map(_chunk_count, headers))
+    return struct.unpack(f"<{count}Q", file.read(8 * count))
+
+
+def _headers(file: BinaryIO, many: bool) -> Iterator[_Header]:
     """The attributes of each part."""
     while header := dict(_attributes(file)):
         yield header
@@ -41,11 +72,19 @@ def _headers(file: BinaryIO, many: bool) -> Iterator[dict[str, bytes]]:
             return
 
 
-def _attributes(file: BinaryIO) -> Iterator[tuple[str, bytes]]:
+def _attributes(file: BinaryIO) -> Iterator[tuple[str, tuple[str, bytes]]]:
     while name := _text(file):
-        _text(file)  # its type
+        kind = _text(file)
         (size,) = struct.unpack("<i", file.read(4))
-        yield name, file.read(size)
+        yield name, (kind, file.read(size))
+
+
+def _packed(header: _Header) -> bytes:
+    """A header as it stands in the file."""
+    words = [
+        f"{name}\0{kind}\0".encode("latin-1") + struct.pack("<i", len(value)) + value for name, (kind, value) in header.items()
+    ]
+    return b"".join(words) + b"\0"
 
 
 def _text(file: BinaryIO) -> str:
@@ -56,8 +95,9 @@ def _text(file: BinaryIO) -> str:
     return letters.decode("latin-1")
 
 
-def _chunk_count(header: dict[str, bytes]) -> int:
-    if "chunkCount" in header:
-        return struct.unpack("<i", header["chunkCount"])[0]
-    _, lowest, _, highest = struct.unpack("<4i", header["dataWindow"])
-    return -(-(highest - lowest + 1) // _ROWS[header["compression"][0]])
+def _chunk_count(header: _Header) -> int:
+    values = {name: value for name, (_, value) in header.items()}
+    if "chunkCount" in values:
+        return struct.unpack("<i", values["chunkCount"])[0]
+    _, lowest, _, highest = struct.unpack("<4i", values["dataWindow"])
+    return -(-(highest - lowest + 1) // _ROWS[values["compression"][0]])

@@ -162,7 +162,7 @@ def _stage(request: Request) -> Iterator[_Stage]:
         camera = _camera(scene, request.camera)
         if request.size:
             _borrow_size(borrow, scene, camera, request.size)
-        layer = _view_layer(scene)
+        layer = rendered_layer(scene)
         if request.clay:
             borrow.set(layer, "material_override", materials.plain(borrow))
         level = request.level
@@ -211,7 +211,7 @@ def _camera(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object:
     return camera
 
 
-def _view_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
+def rendered_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
     """The window's view layer if it is rendered at all, else the first that is."""
     current = bpy.context.view_layer
     return current if current.use else next((layer for layer in scene.view_layers if layer.use), current)

@@ -80,7 +80,8 @@ def names(camera_object: bpy.types.Object) -> dict[str, str]:
 
 def release(group: bpy.types.PropertyGroup, point: str) -> None:
     """Clear a target; the point stays as it is stored. To be called without callbacks."""
-    setattr(group, f"{point}_target", None)
+    if getattr(group, f"{point}_target"):  # set to None again, Blender would build the relations of all objects anew
+        setattr(group, f"{point}_target", None)
     connect(group.id_data)
 
 

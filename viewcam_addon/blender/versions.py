@@ -129,6 +129,22 @@ def adaptive_subdivision(block: bpy.types.Object, scene: bpy.types.Scene) -> tup
     return (owner, "use_adaptive_subdivision") if owner.use_adaptive_subdivision else None
 
 
+# What EEVEE is called among the render engines. The one of 4.2 was the next one then.
+EEVEE = "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
+
+
+def compositor(scene: bpy.types.Scene) -> bpy.types.NodeTree | None:
+    """The nodes that make the picture of what was rendered, if any. Since 5.0 they are a group of their own."""
+    if bpy.app.version >= (5, 0):
+        return scene.compositing_node_group
+    return scene.node_tree if scene.use_nodes else None
+
+
+def has_strips(editor: bpy.types.SequenceEditor) -> bool:
+    """Whether the sequencer has any strip. They were called sequences."""
+    return len(editor.strips if hasattr(editor, "strips") else editor.sequences) > 0
+
+
 def literal_path(path: Path) -> str:
     """A path as the render's output takes it. Since 4.5 braces in it name variables."""
     return str(path).replace("{", "{{").replace("}", "}}") if bpy.app.version >= (4, 5) else str(path)
@@ -144,6 +160,14 @@ def set_multilayer_file(settings: bpy.types.ImageFormatSettings) -> None:
     settings.exr_codec = "ZIP"
     if hasattr(settings, "use_exr_interleave"):
         settings.use_exr_interleave = True
+
+
+def set_preview_file(settings: bpy.types.ImageFormatSettings) -> None:
+    """Let a render write a PNG of 8 bits."""
+    if hasattr(settings, "media_type"):
+        settings.media_type = "IMAGE"
+    settings.file_format = "PNG"
+    settings.color_mode, settings.color_depth, settings.compression = "RGBA", "8", 15
 
 
 def pass_name(name: str) -> str:

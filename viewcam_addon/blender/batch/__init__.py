@@ -1,0 +1,9 @@
+"""A batch where Blender is: one .blend, opened once, and many shots of it.
+
+renderer.py    opens, borrows, renders shot after shot, and gives everything back
+lending.py     what of the file's settings a batch changes for its time, and why each
+pictures.py    a render as files: EXR and preview, the same bytes each time
+origins.py     what the pictures are made from: hashes of the .blend and all it links
+checking.py    whether Cycles and the tracer see the same through a shot's camera
+obstacles.py   why a shot can't be rendered, known before anything is
+"""

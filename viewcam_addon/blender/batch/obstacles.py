@@ -1,0 +1,78 @@
+"""Why a shot can't be rendered, known before anything is: of a batch of a thousand, the last one counts as well."""
+
+from collections.abc import Iterator, Sequence
+
+import bpy
+
+from ... import checks, intrinsics
+from ...batch import judge
+from ...errors import InputError
+from ...pinhole import Pinhole
+from ...shots import Shot
+from .. import camera as cameras
+from .. import datablocks, versions
+from . import graphics
+from .lending import Lent, engine_name
+
+_DRAWN = (versions.EEVEE, "BLENDER_WORKBENCH")
+
+
+def obstacles(shots: Sequence[Shot], check: bool, scene: bpy.types.Scene, own: bpy.types.Object, lent: Lent) -> Iterator[str]:
+    """One sentence for each obstacle. check : whether each shot will be checked. own : the camera for the four values."""
+    if not any(layer.use for layer in scene.view_layers):
+        yield f"scene {scene.name!r} renders nothing: all of its view layers are off, let one render"
+    engines = sorted({lent.engine_of(shot) for shot in shots})
+    if ("CYCLES" in engines or check) and not hasattr(scene, "cycles"):
+        yield "Cycles is disabled: enable the add-on Cycles Render Engine in Blender's preferences"
+    for engine in engines:
+        if engine in _DRAWN and not graphics.are_there():
+            needs = f"{engine_name(engine)} draws with a GPU, and Blender can't open one here"
+            yield f"{needs}: choose CYCLES or VIEWCAM, or start a display"
+    if check and (lacking := judge.lacking()):
+        yield lacking
+    read: set[str] = set()
+    for shot in shots:
+        try:
+            if shot.camera is not None:
+                camera_object = camera_named(shot.camera, scene, own)
+                if shot.frame is None and shot.camera not in read:  # at other frames it may be another
+                    cameras.read(camera_object, scene)
+                    read.add(shot.camera)
+            else:
+                _check_storable(stated(shot, lent.frame_of(shot)), lent.frame_of(shot), own.data)
+        except InputError as error:
+            yield f"the shot {checks.shown(shot.name)}: {error}"
+
+
+def camera_names(scene: bpy.types.Scene, own: bpy.types.Object) -> tuple[str, ...]:
+    """The names of the scene's cameras but for the batch's own, sorted."""
+    return tuple(sorted(each.name for each in scene.objects if each.type == "CAMERA" and each != own))
+
+
+def camera_named(name: str | None, scene: bpy.types.Scene, own: bpy.types.Object) -> bpy.types.Object:
+    """A camera of the scene. name : None where the scene has none to render with.
+
+    Raises
+    ------
+    InputError
+        if none is called so, or if it is no perspective camera.
+    """
+    names = camera_names(scene, own)
+    if name not in names:
+        lacking = "no camera of its own" if name is None else f"no camera {name!r}"
+        raise InputError(f"scene {scene.name!r} has {lacking}: choose from {', '.join(names[:8]) or 'none, and add one'}")
+    datablocks.check_perspective(scene.objects[name])
+    return scene.objects[name]
+
+
+def stated(shot: Shot, frame: intrinsics.Frame) -> Pinhole:
+    """The pinhole that a shot's four values ask for in the picture of `frame`."""
+    distance = (shot.d, shot.d * (frame.pixel_aspect_x / frame.pixel_aspect_y))
+    whole = Pinhole(shot.eye, shot.look_at, shot.up, distance, *frame.size)
+    return whole.cropped(*frame.window) if frame.crop else whole
+
+
+def _check_storable(pinhole: Pinhole, frame: intrinsics.Frame, camera: bpy.types.Camera) -> None:
+    """Raise InputError if Blender's numbers hold no such camera."""
+    plane = intrinsics.ViewPlane(pinhole.distance, pinhole.principal_point, pinhole.width, pinhole.height)
+    intrinsics.camera_data(plane, frame, *datablocks.own_sensor(camera), camera.sensor_fit)

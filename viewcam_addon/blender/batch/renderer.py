@@ -1,0 +1,184 @@
+"""A batch's renderer where Blender is: opens a .blend once, renders shot after shot of it, and gives all back as it was.
+
+    with BlenderRenderer(blend) as renderer:
+        for shot in shots:
+            renderer.render(shot, image, preview)
+
+A shot is what `blender -b FILE -f N` would render (all view layers, the compositor, samples, world and passes as they are),
+from the shot's camera: `lending.py` has what else is another. The four values go to a camera of the batch's own, which has the
+clip range of the scene's camera; one of the file is rendered as it stands. The file is never saved, and its scripts do not run.
+
+Rejected: `-f` in a process each (a start, a file and an acceleration structure built for each shot), and the artist's own
+camera for the four values (what carries it would carry them).
+"""
+
+import contextlib
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...datasets.record import record
+from ...pinhole import Pinhole
+from ...shots import Shot
+from .. import camera as cameras
+from .. import datablocks, ensure_registered, job
+from ..borrowing import Borrower, borrowed
+from ..depsgraph import render_still
+from ..engine import VIEWCAM_RenderEngine
+from . import obstacles, origins, pictures
+from .checking import Checker
+from .lending import Lent
+
+_NAME = "viewcam batch"
+
+
+class BlenderRenderer:
+    """Renders shots of one .blend (batch.renderer.Renderer); a context manager.
+
+    blend : the file, or None for the one that is open. seed : of Cycles' and our noise, threads : of all engines; as the file
+    says where None.
+
+    Raises
+    ------
+    InputError
+        on entering, if the file can't be opened.
+    """
+
+    def __init__(
+        self, blend: str | os.PathLike[str] | None = None, seed: int | None = None, threads: int | None = None
+    ) -> None:
+        self._blend, self._seed, self._threads = blend, seed, threads
+        self._loan = contextlib.ExitStack()
+        self._has_drawn = False
+
+    def __enter__(self) -> "BlenderRenderer":
+        ensure_registered()
+        if self._blend is not None:
+            job.open_blend(self._blend)
+        with contextlib.ExitStack() as stack:
+            self.scene = bpy.context.scene
+            borrow = stack.enter_context(borrowed())
+            self._of_file = datablocks.render_camera(self.scene)
+            self._lent = Lent(borrow, self.scene, self._threads, self._seed)
+            self._own = _own_camera(borrow, self.scene, self._of_file)
+            self._checker = stack.enter_context(Checker(self._threads))
+            self._loan = stack.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._loan.close()
+
+    @property
+    def cameras(self) -> tuple[str, ...]:
+        """The names of the scene's cameras, sorted."""
+        return obstacles.camera_names(self.scene, self._own)
+
+    @property
+    def scene_camera(self) -> str | None:
+        """The name of the camera that a render of the file takes."""
+        return self._of_file.name if self._of_file else None
+
+    @property
+    def blend(self) -> Path | None:
+        """The file that is open; None if it was never saved."""
+        return Path(bpy.data.filepath) if bpy.data.filepath else None
+
+    @property
+    def program(self) -> str | None:
+        """The Blender that this process is; None where it is a Python module."""
+        return bpy.app.binary_path or None
+
+    def pinhole(self, name: str | None, size: tuple[int, int] | None = None) -> Pinhole:
+        """A camera of the file as it stands at the file's frame, with a look-at point as people choose it.
+
+        name : that of the scene's camera where None. size : of the whole picture, the file's where None.
+
+        Raises
+        ------
+        InputError
+            if there is none of that name, or if it is no pinhole.
+        """
+        camera_object = obstacles.camera_named(self.scene_camera if name is None else name, self.scene, self._own)
+        width, height = size or (None, None)
+        self._lent.set(Shot("pinhole", camera=camera_object.name, width=width, height=height))
+        return cameras.as_it_stands(camera_object, self.scene, in_use=camera_object.virtual_pinhole.enabled)
+
+    def made_from(self) -> dict[str, Any]:
+        """What the pictures are made from, beside the shots: hashes of the .blend and of all that it links; versions; the seed.
+
+        Raises
+        ------
+        InputError
+            if the open file was never saved.
+        """
+        return origins.made_from() | {"seed": self._seed}
+
+    def problems(self, shots: Sequence[Shot], check: bool = False) -> tuple[str, ...]:
+        """One sentence for each reason why a shot can't be rendered or checked, as far as it is known before anything is."""
+        return tuple(obstacles.obstacles(shots, check, self.scene, self._own, self._lent))
+
+    def render(self, shot: Shot, image: Path, preview: Path) -> dict[str, Any]:
+        """Write the shot's picture and preview to these two paths; what the sidecar says of it (batch.renderer.Renderer).
+
+        Raises
+        ------
+        InputError
+            if the camera can't be had, or if Blender can't render or write.
+        OSError
+            if the disk is full.
+        """
+        self._lent.set(shot)
+        warnings = self._aim(shot)
+        if self._lent.engine == "EEVEE" and not self._has_drawn:  # see keeping.py
+            render_still(self.scene)
+            self._has_drawn = True
+        render_still(self.scene)
+        if self.scene.render.engine == VIEWCAM_RenderEngine.bl_idname:
+            warnings += VIEWCAM_RenderEngine.warnings
+        pictures.write(self.scene, image, preview)
+        evaluated = self.scene.camera.evaluated_get(datablocks.depsgraph_of(self.scene))
+        self._taken = cameras.read(evaluated, self.scene)
+        return {
+            **record(self._taken, datablocks.camera_data_of(evaluated.data)),
+            **({"stated": record(self._stated)["camera"]} if self._stated else {}),
+            "rendered": self._lent.rendered(),
+            "warnings": [*self._lent.warnings, *warnings],
+            "versions": origins.versions(),
+        }
+
+    def check(self, _shot: Shot) -> dict[str, Any]:
+        """Compare the shot that was just rendered with the tracer (checking.py).
+
+        Raises
+        ------
+        InputError
+            if Cycles can't render the scene, or if the two can't be compared.
+        """
+        return self._checker.check(self.scene, self.scene.camera, self._taken, self._stated)
+
+    def _aim(self, shot: Shot) -> list[str]:
+        """Make the shot's camera the scene's; what a reader should know of it."""
+        if shot.camera is not None:
+            camera_object = obstacles.camera_named(shot.camera, self.scene, self._own)
+            self._stated, warnings = None, datablocks.beyond_pinhole(camera_object, self.scene)
+        else:
+            camera_object, self._stated = self._own, obstacles.stated(shot, self._lent.frame_of(shot))
+            warnings = cameras.apply(camera_object, self._stated, self.scene)
+            warnings += datablocks.beyond_pinhole(camera_object, self.scene)
+        self._lent.look_through(camera_object)
+        return warnings
+
+
+def _own_camera(borrow: Borrower, scene: bpy.types.Scene, like: bpy.types.Object | None) -> bpy.types.Object:
+    """A camera for the time of the loan, sharp, with the clip range of another."""
+    data = bpy.data.cameras.new(_NAME)
+    borrow.afterwards(bpy.data.cameras.remove, data)
+    camera_object = bpy.data.objects.new(_NAME, data)
+    borrow.afterwards(bpy.data.objects.remove, camera_object)
+    if like and like.type == "CAMERA":
+        data.clip_start, data.clip_end = like.data.clip_start, like.data.clip_end
+    scene.collection.objects.link(camera_object)
+    return camera_object
