@@ -17,6 +17,8 @@ CONTENTS = ["__init__.py", "viewcam_addon", "README.md", "LICENSE"]
 
 PYTHONS = ["3.11", "3.13", "3.14"]
 WHEELS = {"embreex": "4.4.0.post1", "OpenEXR": "3.5.3"}
+# In Python alone: one wheel for all of them.
+PURE_WHEELS = {"tqdm": "4.70.1"}
 # Blender's name of a platform, and pip's: what a wheel may ask for and Blender 4.2's own minimum grants.
 PLATFORMS = {
     "linux-x64": ["manylinux_2_28_x86_64"],
@@ -31,21 +33,29 @@ WITHOUT_EMBREE = ["windows-arm64"]
 
 def wheels_of(platform: str) -> list[Path]:
     """The wheels of one platform for every Python, downloaded where they are not there yet."""
-    folder = ROOT / "wheels" / platform
-    found = []
-    for package, version in WHEELS.items():
-        if package == "embreex" and platform in WITHOUT_EMBREE:
-            continue
-        for python in PYTHONS:
-            pattern = f"{package.lower()}-{version}-cp{python.replace('.', '')}-*.whl"
-            if not list(folder.glob(pattern)):
-                print(f"Downloading {package} {version} for {platform}, Python {python}", flush=True)
-                pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "download", "--quiet", "--no-deps"]
-                tags = [f"--platform={tag}" for tag in PLATFORMS[platform]]
-                target = ["--only-binary=:all:", f"--python-version={python}", *tags, f"--dest={folder}"]
-                subprocess.run([*pip, *target, f"{package}=={version}"], check=True)
-            found += folder.glob(pattern)
-    return found
+    tags = [f"--platform={tag}" for tag in PLATFORMS[platform]]
+    return [
+        wheel
+        for package, version in WHEELS.items()
+        if package != "embreex" or platform not in WITHOUT_EMBREE
+        for python in PYTHONS
+        for wheel in _wheels(platform, package, version, f"cp{python.replace('.', '')}", f"--python-version={python}", *tags)
+    ]
+
+
+def pure_wheels() -> list[Path]:
+    """Those that any Python takes on any platform."""
+    return [wheel for package, version in PURE_WHEELS.items() for wheel in _wheels("any", package, version, "py3-none-any")]
+
+
+def _wheels(folder_name: str, package: str, version: str, tag: str, *target: str) -> list[Path]:
+    folder = ROOT / "wheels" / folder_name
+    pattern = f"{package.lower()}-{version}-{tag}*.whl"
+    if not list(folder.glob(pattern)):
+        print(f"Downloading {package} {version}, {folder_name}, {tag}", flush=True)
+        pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "download", "--quiet", "--no-deps"]
+        subprocess.run([*pip, "--only-binary=:all:", *target, f"--dest={folder}", f"{package}=={version}"], check=True)
+    return list(folder.glob(pattern))
 
 
 def stage(folder: Path, platforms: list[str]) -> None:
@@ -56,7 +66,7 @@ def stage(folder: Path, platforms: list[str]) -> None:
             shutil.copytree(source, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
         else:
             shutil.copy(source, folder)
-    wheels = [wheel for platform in platforms for wheel in wheels_of(platform)]
+    wheels = [*pure_wheels(), *(wheel for platform in platforms for wheel in wheels_of(platform))]
     (folder / "wheels").mkdir()
     for wheel in wheels:
         os.symlink(wheel, folder / "wheels" / wheel.name)

@@ -4,7 +4,9 @@ Modules that need Blender start with `bpy = pytest.importorskip("bpy")`, so that
 this session is one with Blender. Rejected: registering through `addon_utils.enable`, which any `read_factory_settings` undoes.
 """
 
+import contextlib
 import os
+import subprocess
 import sys
 import warnings
 from pathlib import Path
@@ -63,6 +65,27 @@ def models_folder() -> Path:
     if not folder:
         pytest.skip("VIEWCAM_MODELS names no folder of models")
     return Path(folder).resolve(strict=True)
+
+
+@pytest.fixture
+def on_a_terminal():
+    """Runs a command (words, environment) with a terminal of 80 columns as its standard error; its status, what that showed."""
+    import pty
+    import termios
+
+    def run(words, environment):
+        ours, its = pty.openpty()
+        termios.tcsetwinsize(its, (24, 80))
+        child = subprocess.Popen([*map(str, words)], stderr=its, stdout=subprocess.DEVNULL, env=environment)
+        os.close(its)
+        shown = b""
+        with contextlib.suppress(OSError):  # Linux's way to say that the other side has gone
+            while part := os.read(ours, 4096):
+                shown += part
+        os.close(ours)
+        return child.wait(), shown.decode()
+
+    return run
 
 
 _exit_status = pytest.StashKey[int]()

@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from viewcam_addon import commands, image
+from viewcam_addon import image
 from viewcam_addon.cli import main
-from viewcam_addon.commands import DEMO_SCENE
+from viewcam_addon.commands import chart
+from viewcam_addon.commands.proving import DEMO_SCENE
 
 CAMERA = {"eye": [0, -5, 0], "look_at": [0, 0, 0], "up": [0, 0, 1], "distance": 100, "width": 64, "height": 48}
 SCENE = {
@@ -224,7 +225,7 @@ def test_a_chart_that_there_is_not_is_refused_with_those_that_there_are(tmp_path
 
 
 def test_charts_need_a_clone_of_the_project(tmp_path, capfd, monkeypatch):
-    monkeypatch.setattr(commands, "PACKAGE", tmp_path / "viewcam_addon")
+    monkeypatch.setattr(chart, "PROJECT", tmp_path)
     assert "in a clone of the project" in fails(capfd, "chart", "stability")
 
 
@@ -250,6 +251,16 @@ def test_lines_that_nobody_reads_change_no_status_and_the_picture_is_there(tmp_p
     os.close(writer)
     assert (done.returncode, done.stderr) == (0, "")
     assert image.read(tmp_path / "picture.exr").size
+
+
+@pytest.mark.parametrize("closed", [(1,), (2,), (0, 1, 2)], ids=["output", "errors", "all"])
+def test_a_command_whose_standard_streams_are_closed_does_the_same(tmp_path, closed):
+    done = viewcam("render", write_scene(tmp_path), tmp_path / "picture.exr", preexec_fn=lambda: [os.close(n) for n in closed])
+    assert (done.returncode, done.stderr) == (0, "")
+    assert image.read(tmp_path / "picture.exr").size
+    assert (
+        viewcam("render", tmp_path / "none.json", "out.exr", preexec_fn=lambda: [os.close(n) for n in closed]).returncode == 2
+    )
 
 
 def mounted(options, script, *arguments):

@@ -3,24 +3,25 @@
 Exit status: 0 all well; 1 the comparison failed; 2 bad input or usage, with one line on stderr; 3 something could not be
 modelled under --strict. No traceback reaches a user.
 
-Here are the words; what they do is in commands.py.
+Here are the words; what they do is in commands/.
 """
 
 import argparse
 import contextlib
 import json
-import math
 import os
 import shlex
 import sys
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from . import commands
+from . import batch_words, events, words
+from .commands import Result, batch, chart, proving, serve
 from .errors import InputError, bug
 from .files import written_whole
-from .terminal import share_one_heap
+from .terminal import open_closed_streams, share_one_heap
 from .tracer.scene.film import SAMPLES
 
 
@@ -35,18 +36,14 @@ def main(arguments: Sequence[str] | None = None, blend_is_open: bool = False) ->
     except SystemExit as leaving:  # argparse leaves after --help and after an error
         return int(leaving.code or 0)
     options.words = shlex.join(arguments)
-    try:
-        status, result = options.run(options)
-    except InputError as error:
-        status, result = error.exit_status, {"error": str(error)}
-        print(f"viewcam {options.command}: {error}", file=sys.stderr)
-    except KeyboardInterrupt:
-        status, result = 130, {"error": "interrupted"}
-    except Exception as error:  # in one line, as every other error
-        status, result = 2, {"error": bug(error)}
-        print(f"viewcam {options.command}: {bug(error)}", file=sys.stderr)
-    if options.json and result:
-        status = _write_json(options.json, {"exit_status": status, **result}) or status
+    started = time.monotonic()
+    with events.opened(options.log_json) as options.events:
+        options.events.tell("started", command=options.command, words=options.words)
+        status, result = _outcome(options)
+        if options.json and result:
+            status = _write_json(options, {"exit_status": status, **result}) or status
+        seconds = round(time.monotonic() - started, 3)
+        options.events.tell("finished", command=options.command, exit_status=status, seconds=seconds)
     return status
 
 
@@ -56,6 +53,7 @@ def main_and_exit() -> NoReturn:
     Leaves without Python's clean-up: all files are written, and to take a large scene apart takes a tenth of a second. Where
     Blender is a module of this process, bpy 4.2 crashes in it and 4.5 hangs, after properties with `update=` were registered.
     """
+    open_closed_streams()
     share_one_heap()
     status = main()
     with contextlib.suppress(OSError):  # whoever reads our lines may have gone
@@ -70,15 +68,28 @@ class _OneLineParser(argparse.ArgumentParser):
         sys.exit(2)
 
 
+class _CommandParser(_OneLineParser):
+    """Takes files and options in any order: Python 3.11 alone would take no file after an option where one may be left out."""
+
+    _is_intermixing = False
+
+    def parse_known_args(self, *arguments: Any) -> Any:  # which intermixed parsing uses itself
+        if self._is_intermixing:
+            return super().parse_known_args(*arguments)
+        self._is_intermixing = True
+        return self.parse_known_intermixed_args(*arguments)
+
+
 def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     parser = _OneLineParser(prog="viewcam", description="A camera from eye, look-at, up and distance, proven against Cycles.")
-    subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_CommandParser)
 
-    def command(run: Callable[[argparse.Namespace], commands.Result], name: str, text: str) -> argparse.ArgumentParser:
+    def command(run: Callable[[argparse.Namespace], Result], name: str, text: str) -> argparse.ArgumentParser:
         added = subparsers.add_parser(name, help=text, description=text)
         added.set_defaults(run=run)
-        added.add_argument("--threads", type=_positive, metavar="N", help="threads to use (default: all)")
+        added.add_argument("--threads", type=words.positive, metavar="N", help="threads to use (default: all)")
         added.add_argument("--json", metavar="FILE", type=Path, help="write the result as JSON")
+        added.add_argument("--log-json", action="store_true", help="tell on standard output a JSON object for each event")
         return added
 
     def blend(added: argparse.ArgumentParser) -> None:
@@ -90,7 +101,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     def scene_choices(added: argparse.ArgumentParser) -> None:
         added.add_argument("--camera", metavar="NAME", help="the camera object (default: the scene's)")
         added.add_argument("--frame", type=int, metavar="N", help="the frame (default: the file's current one)")
-        added.add_argument("--size", type=_size, metavar="WxH", help="pixels of the picture (default: the scene's)")
+        added.add_argument("--size", type=words.size, metavar="WxH", help="pixels of the picture (default: the scene's)")
         added.add_argument("--strict", action="store_true", help="exit with 3 if anything can not be modelled")
         added.add_argument("--recenter", action="store_true", help="put the origin at the eye: for scenes far from it")
         added.add_argument("--clay", action="store_true", help="the same matte material on everything, on both sides")
@@ -104,41 +115,46 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
             help="how much is modelled; auto is the least that shows the scene's light (default: %(default)s)",
         )
         (samples or added).add_argument(
-            "--samples", type=_positive, metavar="N", default=SAMPLES, help="samples a pixel, for light (default: %(default)s)"
+            "--samples",
+            type=words.positive,
+            metavar="N",
+            default=SAMPLES,
+            help="samples a pixel, for light (default: %(default)s)",
         )
-        added.add_argument("--seed", type=_seed, metavar="N", default=0, help="another noise for another number (default: 0)")
+        noise = "another noise for another number (default: 0)"
+        added.add_argument("--seed", type=words.seed, metavar="N", default=0, help=noise)
 
     def error(added: argparse._ActionsContainer, text: str) -> None:
         text = f"for light: {text} as many samples of each pixel as it takes for a standard error of E, in the picture's units"
-        added.add_argument("--error", type=_error, metavar="E", help=text)
+        added.add_argument("--error", type=words.error, metavar="E", help=text)
 
     def report(added: argparse.ArgumentParser) -> None:
         added.add_argument("--report", metavar="DIR", type=Path, help="write an HTML report there")
-        added.add_argument("--difference", metavar="FILE.png", type=_png, help="draw there what differs, pixel by pixel")
+        added.add_argument("--difference", metavar="FILE.png", type=words.png, help="draw there what differs, pixel by pixel")
         added.add_argument("--repeat", help=argparse.SUPPRESS)  # what the report shall name as its command
 
-    added = command(commands.export, "export", "Write the scene of a .blend as the tracer reads it.")
+    added = command(proving.export, "export", "Write the scene of a .blend as the tracer reads it.")
     blend(added)
     added.add_argument("scene", metavar="SCENE.json", type=Path)
     scene_choices(added)
 
-    added = command(commands.render, "render", "Trace a scene file into an EXR.")
+    added = command(proving.render, "render", "Trace a scene file into an EXR.")
     added.add_argument("scene", metavar="SCENE.json", type=Path)
     added.add_argument("image", metavar="OUT.exr", type=Path)
-    added.add_argument("--size", type=_size, metavar="WxH", help="pixels of the picture (default: the scene's)")
+    added.add_argument("--size", type=words.size, metavar="WxH", help="pixels of the picture (default: the scene's)")
     added.add_argument("--stated", action="store_true", help="trace the four values as stated, not as Blender stored them")
     spent = added.add_mutually_exclusive_group()
     light(added, spent)
     error(spent, "in place of --samples")
 
     added = command(
-        commands.cycles, "cycles", "Render a .blend with Cycles so that it can be compared, and give every setting back."
+        proving.cycles, "cycles", "Render a .blend with Cycles so that it can be compared, and give every setting back."
     )
     blend(added)
     added.add_argument("image", metavar="OUT.exr", type=Path)
     scene_choices(added)
 
-    added = command(commands.compare, "compare", "Compare EXRs of one camera against derived tolerances and noise.")
+    added = command(proving.compare, "compare", "Compare EXRs of one camera against derived tolerances and noise.")
     added.add_argument("reference", metavar="REFERENCE.exr", type=Path)
     added.add_argument(
         "tests", metavar="TEST.exr", type=Path, nargs="+", help="several are one picture, rendered with several seeds"
@@ -146,17 +162,22 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     added.add_argument(
         "--scene", metavar="SCENE.json", type=Path, help="the reference's scene: explains silhouettes, brings the ledger"
     )
-    added.add_argument("--test-samples", type=_positive, help=argparse.SUPPRESS)  # Cycles' file counts one that is left out
+    # Cycles' file counts one that is left out.
+    added.add_argument("--test-samples", type=words.positive, help=argparse.SUPPRESS)
     report(added)
 
-    added = command(commands.check, "check", "Export, trace, render with Cycles and compare, all in one go.")
+    added = command(proving.check, "check", "Export, trace, render with Cycles and compare, all in one go.")
     blend(added)
     scene_choices(added)
     error(added, "the tracer takes")
     report(added)
 
-    added = command(commands.demo, "demo", "Check the studio still that comes with the project, and write the report.")
-    added.set_defaults(blend=commands.DEMO_SCENE, camera=None, frame=None, size=None, strict=False, recenter=False, clay=False)
+    added = command(batch.run, "batch", batch_words.DESCRIPTION)
+    blend(added)
+    batch_words.add(added, blend_is_open)
+
+    added = command(proving.demo, "demo", "Check the studio still that comes with the project, and write the report.")
+    added.set_defaults(blend=proving.DEMO_SCENE, camera=None, frame=None, size=None, strict=False, recenter=False, clay=False)
     added.set_defaults(difference=None, repeat=None)
     light(added)
     error(added, "the tracer takes")
@@ -164,7 +185,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         "--report", metavar="DIR", type=Path, default=Path("demo"), help="where the report goes (default: %(default)s)"
     )
 
-    added = command(commands.chart, "chart", "Measure the methods and draw how they compare, in a clone of the project.")
+    added = command(chart.run, "chart", "Measure the methods and draw how they compare, in a clone of the project.")
     added.add_argument(
         "subject",
         choices=["stability", "light", "speed", "scaling", "poses"],
@@ -176,53 +197,38 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     )
     added.add_argument("--only", metavar="NAME", nargs="+", default=[], help="these sweeps and no others")
     added.add_argument("--quick", action="store_true", help="few trials: seconds instead of minutes")
+
+    hidden = subparsers.add_parser("serve")  # for our own processes: without a help, so the list of commands leaves it out
+    hidden.add_argument("handle")
+    hidden.set_defaults(run=serve.run, json=None, log_json=False)
     return parser
 
 
-def _positive(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is no whole number above 0")
-    return int(text)
-
-
-def _error(text: str) -> float:
+def _outcome(options: argparse.Namespace) -> Result:
+    """Exit status and result of the sub-command, whatever becomes of it; an error is told."""
     try:
-        error = float(text)
-    except ValueError:
-        error = math.nan
-    if not 0 < error < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number above 0")
-    return error
+        return options.run(options)
+    except InputError as error:
+        return _told(options, error.exit_status, str(error), getattr(error, "problems", ()))
+    except KeyboardInterrupt:
+        return 130, {"error": "interrupted"}
+    except Exception as error:  # in one line, as every other error
+        return _told(options, 2, bug(error))
 
 
-def _seed(text: str) -> int:
-    if not text.isdecimal() or int(text) >= 2**31:
-        raise argparse.ArgumentTypeError(f"{text!r} is no whole number from 0 to {2**31 - 1}")
-    return int(text)
+def _told(options: argparse.Namespace, status: int, sentence: str, problems: Sequence[str] = ()) -> Result:
+    several = {"problems": list(problems)} if problems else {}
+    options.events.tell("error", command=options.command, text=sentence, **several)
+    return status, {"error": sentence, **several}
 
 
-def _size(text: str) -> tuple[int, int]:
-    width, x, height = text.partition("x")
-    if not x:
-        raise argparse.ArgumentTypeError(f"{text!r} is no size: write 1920x1080")
-    return _positive(width), _positive(height)
-
-
-def _png(text: str) -> Path:
-    path = Path(text)
-    if path.suffix.lower() != ".png":
-        raise argparse.ArgumentTypeError(f"{text!r} is drawn as PNG: give a name that ends in .png")
-    return path
-
-
-def _write_json(path: Path, result: dict[str, Any]) -> int:
+def _write_json(options: argparse.Namespace, result: dict[str, Any]) -> int:
     """Write the result; the exit status if that fails, else 0."""
     try:
-        with written_whole(path) as temporary:
+        with written_whole(options.json) as temporary:
             temporary.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
     except InputError as error:
-        print(f"viewcam: {error}", file=sys.stderr)
-        return error.exit_status
+        return _told(options, error.exit_status, str(error))[0]
     return 0
 
 

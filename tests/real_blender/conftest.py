@@ -5,6 +5,7 @@ Each has a user folder of its own, so no test touches the extensions or the pref
 
 import os
 import platform
+import re
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -71,3 +72,19 @@ def host(request, tmp_path_factory, extension_zip) -> Host:
     host = Host((str(WHEELS[request.param]),), tmp_path_factory.mktemp(f"wheel-{request.param}"))
     host.run_inside("install", extension_zip)
     return host
+
+
+@pytest.fixture(scope="session")
+def packages(real_blender) -> Path:
+    """A folder with pytest and what the tests and their child processes import, for the Python inside this Blender."""
+    script = "import sys; print('PYTHON', '.'.join(map(str, sys.version_info[:2])))"
+    version = re.search(r"PYTHON (\S+)", real_blender.run("-b", "--factory-startup", "--python-expr", script).stdout)[1]
+    folder = ROOT / ".venvs" / f"inside-blender-{version}-with-dask"
+    if not (folder / "ready").exists():
+        pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--upgrade"]
+        target = [f"--target={folder}", f"--python-version={version}", "--only-binary=:all:"]
+        subprocess.run([*pip, *target, "pytest", "hypothesis", "mpmath", "distributed"], check=True)
+        # Without NumPy, which these two ask for: Blender has its own.
+        subprocess.run([*pip, *target, "--no-deps", "OpenEXR", "embreex"], check=True)
+        (folder / "ready").touch()
+    return folder

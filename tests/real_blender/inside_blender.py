@@ -95,8 +95,8 @@ def export(file, *arguments):
 
 
 def viewcam(*arguments):
-    commands = importlib.import_module(f"{enable().__name__}.commands")
-    sys.exit(commands.run_beside(*arguments))
+    surroundings = importlib.import_module(f"{enable().__name__}.commands.surroundings")
+    sys.exit(surroundings.run_beside(*arguments))
 
 
 def apply(file, output, pinhole):

@@ -58,9 +58,9 @@ def test_the_zip_holds_the_extension_and_its_wheels_and_nothing_else(extension_z
     tops = {name.split("/")[0] for name in names}
     assert tops == {"__init__.py", "blender_manifest.toml", "viewcam_addon", "wheels", "README.md", "LICENSE"}
     assert not [name for name in names if "__pycache__" in name]
-    # Two wheels for each Python of Blender 4.2 to 5.2.
+    # Two wheels for each Python of Blender 4.2 to 5.2, and one for all.
     assert sorted(f"./{name}" for name in names if name.endswith(".whl")) == sorted(manifest["wheels"])
-    assert len(manifest["wheels"]) == 6
+    assert len(manifest["wheels"]) == 7
 
 
 def test_it_installs_from_the_shell(real_blender):

@@ -1,4 +1,4 @@
-"""What each sub-command of `viewcam` does; cli.py knows its words. Each returns the exit status and what --json writes.
+"""The commands that prove a camera: export, render, cycles, compare, and check and demo, which are all of these in one go.
 
 What Blender does (export, Cycles) and what OpenEXR does (the tracer's pictures, the comparison) never share a process, because
 Blender brings a copy of OpenEXR of its own: `check` does the first in its own process and the second in child processes, in the
@@ -8,32 +8,26 @@ to test.
 
 import argparse
 import dataclasses
-import importlib
-import importlib.util
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from . import children
-from .errors import InputError
-from .terminal import silent_libraries
-from .tracer.scene.film import MOST_SAMPLES, seeds
+from ..errors import InputError
+from ..terminal import silent_libraries
+from ..tracer.scene.film import MOST_SAMPLES, seeds
+from . import Result
+from .surroundings import blender_room, run_beside
 
-PACKAGE = Path(__file__).parent
-DEMO_SCENE = PACKAGE.parent / "sample_scenes" / "studio.blend"
-
-Result = tuple[int, dict[str, Any]]
+DEMO_SCENE = Path(__file__).parents[2] / "sample_scenes" / "studio.blend"
 
 
 def export(options: argparse.Namespace) -> Result:
-    from .tracer.scene import scene_file
+    from ..tracer.scene import scene_file
 
     with silent_libraries():
-        scene = _job().export(_request(options))
+        scene = blender_room("job").export(_request(options))
     scene_file.write(scene, options.scene)
     print(*_ledger_lines(scene.ledger), sep="\n")
     result = {"scene": str(options.scene), "ledger": _ledger_json(scene.ledger)}
@@ -41,9 +35,9 @@ def export(options: argparse.Namespace) -> Result:
 
 
 def render(options: argparse.Namespace) -> Result:
-    from . import image
-    from .tracer.render import render as trace
-    from .tracer.scene import scene_file
+    from .. import image
+    from ..tracer.render import render as trace
+    from ..tracer.scene import scene_file
 
     scene = scene_file.read(options.scene)
     if options.stated:
@@ -73,15 +67,15 @@ def render(options: argparse.Namespace) -> Result:
 
 def cycles(options: argparse.Namespace) -> Result:
     with silent_libraries():
-        ledger = _job().render(_request(options), options.image)
+        ledger = blender_room("job").render(_request(options), options.image)
     print(*_ledger_lines(ledger), sep="\n")
     return 0, {"image": str(options.image), "ledger": _ledger_json(ledger)}
 
 
 def compare(options: argparse.Namespace) -> Result:
-    from . import image
-    from .compare import difference, light_report, radiance, report
-    from .tracer.scene import scene_file
+    from .. import image
+    from ..compare import difference, light_report, radiance, report
+    from ..tracer.scene import scene_file
 
     reference, tests = image.read(options.reference), [image.read(path) for path in options.tests]
     scene = scene_file.read(options.scene) if options.scene else None
@@ -111,8 +105,8 @@ def compare(options: argparse.Namespace) -> Result:
 
 
 def _compare_geometry(reference: Any, test: Any, camera: Any, scene: Any, threads: int | None) -> Any:
-    from .compare import geometry
-    from .tracer.render import Tracer
+    from ..compare import geometry
+    from ..tracer.render import Tracer
 
     if scene is None:
         return geometry.compare(reference, test, camera)
@@ -132,7 +126,8 @@ def check(options: argparse.Namespace) -> Result:
         threads = ["--threads", str(options.threads)] if options.threads else []
         spent = ["--error", str(options.error)] if options.error else ["--samples", str(options.samples)]
         light = ["--level", level, *spent, "--seed", str(options.seed)]
-        status = run_beside("render", scene, reference, *light, *threads)
+        tell_on = options.events if options.log_json else None
+        status = run_beside("render", scene, reference, *light, *threads, tell_on=tell_on)
         if status:
             return status, {"error": "the reference could not be traced"}
         outputs = [
@@ -145,7 +140,7 @@ def check(options: argparse.Namespace) -> Result:
         if level == "geometry":
             tests = tests[:1]
         # The child has written the JSON: there is nothing to add.
-        return run_beside("compare", reference, *tests, "--scene", scene, *threads, *outputs), {}
+        return run_beside("compare", reference, *tests, "--scene", scene, *threads, *outputs, tell_on=tell_on), {}
 
 
 def demo(options: argparse.Namespace) -> Result:
@@ -155,26 +150,16 @@ def demo(options: argparse.Namespace) -> Result:
     return check(options)
 
 
-def chart(options: argparse.Namespace) -> Result:
-    if not (PACKAGE.parent / "benchmarks").is_dir():
-        raise InputError("the charts are measured by benchmarks/, which is not here: run this in a clone of the project")
-    for package in ("bpy", "matplotlib", "mpmath"):
-        if importlib.util.find_spec(package) is None:
-            raise InputError(f"this needs {package}: pip install {package}")
-    sys.path.append(str(PACKAGE.parent))
-    return importlib.import_module(f"benchmarks.{options.subject}").run(options.output, options.only, options.quick)
-
-
 def _export_and_render(options: argparse.Namespace, scene_path: Path, image_paths: Sequence[Path]) -> str:
     """What of a check needs Blender: both sides from one evaluated state, under one numbering of the indices.
 
     Returns the level, the least one where that is asked for.
     """
-    from .tracer.scene import scene_file
+    from ..tracer.scene import scene_file
 
     started = time.perf_counter()
     with silent_libraries():
-        scene = _job().export_and_render(_request(options), image_paths)
+        scene = blender_room("job").export_and_render(_request(options), image_paths)
     scene_file.write(scene, scene_path)
     print(f"exported and rendered with Cycles in {time.perf_counter() - started:.1f} s", flush=True)
     return _told_level(scene)["level"] if options.level == "auto" else options.level
@@ -182,7 +167,7 @@ def _export_and_render(options: argparse.Namespace, scene_path: Path, image_path
 
 def _told_level(scene: Any) -> dict[str, str]:
     """The least level that models all of a scene's light, and why; said on the way."""
-    from .tracer.scene.levels import least_level
+    from ..tracer.scene.levels import least_level
 
     level, reason = least_level(scene)
     print(f"level {level} is enough. {reason}", flush=True)
@@ -190,7 +175,7 @@ def _told_level(scene: Any) -> dict[str, str]:
 
 
 def _request(options: argparse.Namespace) -> Any:
-    return _job().Request(
+    return blender_room("job").Request(
         blend=options.blend,
         camera=options.camera,
         frame=options.frame,
@@ -203,23 +188,6 @@ def _request(options: argparse.Namespace) -> Any:
         seed=options.seed,
         clay=options.clay,
     )
-
-
-def _job() -> Any:
-    """blender/job.py, where there is Blender."""
-    if importlib.util.find_spec("bpy") is None:
-        raise InputError(
-            "this needs Blender: install it as a module (pip install bpy), or run blender -b FILE.blend --command viewcam"
-        )
-    from .blender import job
-
-    return job
-
-
-def run_beside(*arguments: str | Path) -> int:
-    """Run a sub-command in a Python process of its own, with the same modules in reach as here."""
-    sys.stdout.flush()
-    return subprocess.run(children.viewcam(*arguments), env=children.environment(), check=False).returncode
 
 
 def _ledger_lines(ledger: Sequence[Any]) -> list[str]:

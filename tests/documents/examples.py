@@ -1,0 +1,221 @@
+"""The examples of README.md and docs/, and how each is run as its reader would run it.
+
+A block of sh is as many examples as it has commands. They run in the page's order, in a folder for each page where `viewcam`
+and `blender` are the ones under test, and the files that the pages speak of are small scenes (scenes.py). Any other block is an
+example as a whole: programs are run, lists of shots and scenes rendered.
+
+test_examples.py runs all of them with a wheel, tests/real_blender/test_documents.py in the real Blender.
+"""
+
+import json
+import os
+import re
+import shutil
+import stat
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+HERE = Path(__file__).parent
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "sample_scenes" / "README.md"]
+BLOCK = re.compile(r"^ *```(.*)\n((?:.*\n)*?) *```$", re.MULTILINE)
+
+SHOWN = ("text",)
+"""Languages of blocks that show what a program says."""
+
+_LONG = "it takes minutes or hours; tests/benchmarks measures all of it in small"
+_FARM = "there is no such host; tests/batch/test_farm.py does the same on this machine"
+_WITH = "VIEWCAM_BLENDER=/opt/blender/blender"
+
+NOT_RUN = {
+    "make demo": "it makes an environment; CI's tests of viewcam demo do what it does then",
+    "make test": "it runs this test",
+    "make bench": _LONG,
+    "make charts": _LONG,
+    "viewcam chart poses": _LONG,
+    "viewcam chart scaling --only triangles": _LONG,
+    "viewcam chart speed": _LONG,
+    "viewcam chart stability --only roll spheres": _LONG,
+    "pip install 'virtual-pinhole[cluster]'": "what it installs is there where this test runs",
+    "dask scheduler --port 8786": "it does not end; tests/batch/test_farm.py runs it",
+    f"{_WITH} dask worker tcp://farm:8786 --nworkers 1 --nthreads 1": _FARM,
+    f"{_WITH} viewcam batch /shared/shot.blend /shared/shots.csv --out /shared/renders --scheduler tcp://farm:8786": _FARM,
+    "blender -b --disable-autoexec /shared/shot.blend --command viewcam batch /shared/shots.csv --out /shared/renders "
+    "--resume --shard 1/8": _FARM,
+}
+"""Commands that no test runs, and why."""
+
+ZIP = "virtual_pinhole-VERSION-PLATFORM.zip"
+ONLY_REAL = {f"blender --command extension install-file -r user_default -e {ZIP}": "a wheel installs no extension so"}
+"""Commands that only a real Blender has, and why."""
+
+WRITTEN = {
+    ("docs/datasets.md", "json"): "its program writes them, as tests/datasets/test_documentation.py compares",
+}
+"""Blocks that show what another example writes, and who says so."""
+
+
+@dataclass(frozen=True)
+class Example:
+    """page : relative to the project. text : a command or a whole block. shown : the block behind it that says what it says."""
+
+    page: str
+    language: str
+    text: str
+    shown: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.page}: {self.text.strip().splitlines()[0][:100]}"
+
+
+def examples() -> list[Example]:
+    """All of them, in the order of pages and blocks."""
+    return [example for path in PAGES for example in of_page(str(path.relative_to(ROOT)), path.read_text(encoding="utf-8"))]
+
+
+def of_page(page: str, text: str) -> list[Example]:
+    blocks = [(match[1].strip(), match[2]) for match in BLOCK.finditer(text)]
+    found = []
+    for (language, block), (next_language, next_block) in zip(blocks, [*blocks[1:], ("", "")][: len(blocks)], strict=True):
+        if language == "sh":
+            found += [Example(page, language, command) for command in _commands(block)]
+        elif language not in SHOWN:
+            found.append(Example(page, language, block, next_block if next_language in SHOWN else ""))
+    return found
+
+
+def is_run(example: Example, real: bool) -> bool:
+    """Whether a test runs it, in a real Blender or with a wheel."""
+    only_shown = (example.page, example.language) in WRITTEN
+    return not only_shown and example.text not in NOT_RUN and (real or example.text not in ONLY_REAL)
+
+
+def _commands(block: str) -> list[str]:
+    lines = re.sub(r"\\\n\s*", "", block).splitlines()
+    return [command for line in lines if (command := re.sub(r"(^|\s+)#.*", "", line).strip())]
+
+
+class Reader:
+    """Who follows the pages: folder for its work, and the Blender that it has.
+
+    blender, viewcam : what these commands are, in a shell's words. python : the command that runs a program with `bpy`.
+    environment : more variables. package : what the add-on is called there. extension : the zip to install, where one can be.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        blender: str,
+        viewcam: str,
+        python: list[str],
+        environment: dict[str, str],
+        package: str = "viewcam_addon",
+        extension: Path | None = None,
+    ) -> None:
+        self._folder, self._python, self._package = folder, python, package
+        programs = folder / "programs"
+        programs.mkdir()
+        for name, words in (("blender", blender), ("viewcam", viewcam)):
+            (programs / name).write_text(f"#!/bin/sh\n{words}\n", encoding="utf-8")
+            (programs / name).chmod(stat.S_IRWXU)
+        self._environment = {**os.environ, **environment, "PATH": f"{programs}{os.pathsep}{os.environ['PATH']}"}
+        self._files = folder / "files"
+        self._files.mkdir()
+        self._must([*python, str(HERE / "scenes.py"), str(self._files)], folder)
+        for page, language, name in (("docs/batch.md", "csv", "shots.csv"), ("docs/scene-file.md", "json", "scene.json")):
+            first = next(each for each in examples() if (each.page, each.language) == (page, language))
+            (self._files / name).write_text(first.text, encoding="utf-8")
+        if extension:
+            shutil.copy(extension, self._files / ZIP)
+
+    def run(self, example: Example) -> None:
+        """Run it; AssertionError if it does not do what its page says."""
+        folder = self._folder / example.page.replace("/", "-")
+        if not folder.exists():
+            shutil.copytree(self._files, folder)
+        if example.language == "sh":
+            self._must(["sh", "-c", example.text.replace("/shared/", f"{folder}/")], folder)  # a farm's machines share a folder
+        elif example.language == "python":
+            self._run_program(example, folder)
+        elif example.language == "jsonl" and "event" in json.loads(example.text.splitlines()[0]):
+            self._compare_events(example, folder)
+        elif example.language == "json" and "format" in json.loads(example.text):
+            (folder / "example.json").write_text(example.text, encoding="utf-8")
+            self._must(["viewcam", "render", "example.json", "example.exr", "--level", "path", "--samples", "1"], folder)
+        elif example.language in ("csv", "json", "jsonl"):
+            self._render_list(example, folder)
+        else:
+            raise AssertionError(f"{example}: nobody knows how to run {example.language!r}")
+
+    def _run_program(self, example: Example, folder: Path) -> None:
+        """A program has a file open, whose scene and camera it calls `scene` and `camera_object`."""
+        text = example.text
+        if self._package != "viewcam_addon":  # inside Blender the extension is registered, and called otherwise
+            text = re.sub(r"(?m)^(import viewcam_addon|viewcam_addon\.register\(\))$", "", text)
+            text = text.replace("from viewcam_addon", f"from {self._package}")
+        (folder / "example.py").write_text(text, encoding="utf-8")
+        self._must([*self._python, str(HERE / "program.py"), "shot.blend", "example.py"], folder)
+
+    def _render_list(self, example: Example, folder: Path) -> None:
+        name = f"shots.{example.language}"
+        folder = Path(tempfile.mkdtemp(prefix="list-", dir=folder))
+        (folder / name).write_text(example.text, encoding="utf-8")
+        command = ["viewcam", "batch", "../shot.blend", name, "--out", "out", "--engine", "VIEWCAM", "--level", "geometry"]
+        if "nothing is rendered" in example.shown:
+            done = self._run(command, folder)
+            assert done.returncode == 2 and f"viewcam batch: {example.shown}" in done.stderr, done.stderr
+            assert not (folder / "out").exists()
+        else:
+            self._must(command, folder)
+            assert {path.name for path in (folder / "out").glob("*.exr")} == {"left.exr", "right.exr"}
+
+    def _compare_events(self, example: Example, folder: Path) -> None:
+        """The keys of each event that is shown, with those of a batch in which one shot fails and of one in which none does."""
+        shown = {event["event"]: [*event] for event in map(json.loads, example.text.splitlines())}
+        (folder / "events" / "right.png").mkdir(parents=True)
+        words = ["viewcam", "batch", "shot.blend", "shots.csv", "--out", "events", "--resume", "--log-json"]
+        failed = self._run(words, folder)
+        (folder / "events" / "right.png").rmdir()
+        lines = (failed.stdout + self._must(words, folder)).splitlines()
+        told = {event["event"]: [*event] for event in (json.loads(line) for line in lines if line.startswith("{"))}
+        rare = {"stopping": ["event", "time", "signal"], "shot_elsewhere": ["event", "time", "shot"]}
+        assert shown == told | rare, failed.stderr
+
+    def _must(self, command: list[str], folder: Path) -> str:
+        done = self._run(command, folder)
+        assert done.returncode == 0, f"{command} ended with {done.returncode}\n{done.stdout}\n{done.stderr}"
+        return done.stdout
+
+    def _run(self, command: list[str], folder: Path) -> subprocess.CompletedProcess:
+        return subprocess.run(command, cwd=folder, env=self._environment, capture_output=True, text=True, check=False)
+
+
+def with_wheel(folder: Path) -> Reader:
+    """A reader who has installed this project and a wheel of Blender."""
+    blender = f'exec "{sys.executable}" "{HERE / "blender_of_a_wheel.py"}" "$@"'
+    viewcam = f'exec "{sys.executable}" -m viewcam_addon.cli "$@"'
+    return Reader(folder, blender, viewcam, [sys.executable], {"PYTHONPATH": str(ROOT)})
+
+
+def with_blender(folder: Path, program: str, user_folder: Path, extension: Path) -> Reader:
+    """A reader who has a real Blender and the extension in it: what runs in the shell runs inside that Blender.
+
+    But for a cluster's own programs, which Blender's Python does not have: they stay in the shell, and that Blender renders.
+    """
+    path = os.environ["PATH"]  # the program may be a script that looks for a blender of its own
+    blender = f'PATH="{path}" exec "{program}" "$@"'
+    viewcam = f"""case "$*" in *--workers*)
+export PYTHONPATH="{ROOT}" VIEWCAM_BLENDER="{folder / "programs" / "blender"}"
+exec "{sys.executable}" -m viewcam_addon.cli "$@" ;;
+esac
+command=$1; shift
+case $command in
+render|compare) exec blender -q -b --command viewcam $command "$@" ;;
+*) file=$1; shift; exec blender -q -b "$file" --command viewcam $command "$@" ;;
+esac"""
+    python = ["sh", "-c", 'program=$1; shift; exec blender -b --python-exit-code 9 --python "$program" -- "$@"', "sh"]
+    package = "bl_ext.user_default.virtual_pinhole.viewcam_addon"
+    return Reader(folder, blender, viewcam, python, {"BLENDER_USER_RESOURCES": str(user_folder)}, package, extension)

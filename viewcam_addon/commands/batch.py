@@ -1,0 +1,144 @@
+"""`viewcam batch`: what is asked for becomes shots, all of them are looked at, and then they are run, here or on a cluster.
+
+Whatever is wrong with any shot is told before the first is rendered. Libraries are silent all the while: of a batch, its
+events are heard.
+"""
+
+import argparse
+import contextlib
+import dataclasses
+import functools
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from .. import shots as lists
+from ..batch import cluster, dataset, one, served
+from ..batch import run as running
+from ..batch.folder import Folder
+from ..batch.interruption import Interruption
+from ..batch.summary import Summary
+from ..errors import InputError
+from ..shots import Shot, ShotsError
+from ..terminal import silent_libraries
+from . import Result
+from .surroundings import blender_room
+
+_MOST_NAMED = 5
+
+
+@dataclasses.dataclass(frozen=True)
+class _Job:
+    """shots : those of this run, of all_shots. made_from : all but the shot that decides a picture; settings : the hash of
+    what each shot is made from, by its name."""
+
+    all_shots: Sequence[Shot]
+    shots: Sequence[Shot]
+    made_from: Mapping[str, Any]
+    settings: Mapping[str, str]
+
+
+def run(options: argparse.Namespace) -> Result:
+    _refuse_contradictions(options)
+    heard = functools.partial(options.events.tell, "stopping")
+    with silent_libraries(), Interruption(heard) as interruption, contextlib.ExitStack() as stack:
+        renderer = stack.enter_context(_renderer(options))
+        job = _job(options, renderer)
+        if _on_cluster(options):
+            blend, program = renderer.blend, renderer.program
+            stack.close()  # the workers open the file themselves
+            machines = stack.enter_context(cluster.opened(options.scheduler or None, options.workers, program))
+        folder = Folder(options.out, options.shard.strip().replace("/", "-of-") if options.shard else "")
+        if _on_cluster(options):
+            about = (job.made_from, options.seed, options.threads, options.check)
+            work = machines.work(blend, folder, job.settings, *about)
+        else:
+            work = one.in_turn(folder, renderer, job.settings, options.check)
+        how = {"resume": options.resume, "overwrite": options.overwrite, "check": options.check}
+        summary = running.run(job.shots, folder, job.settings, work, options.events, interruption=interruption, **how)
+        words = dataset.write(folder, job.all_shots, job.settings, options.transforms) if options.transforms else ""
+    _tell(options, summary, folder)
+    if words:
+        print(words)
+    return summary.exit_status, summary.to_json()
+
+
+def _refuse_contradictions(options: argparse.Namespace) -> None:
+    given = {"SHOTS": options.shots, "--orbit": options.orbit, "--frames": options.frames, "--cameras": options.cameras}
+    sources = [name for name, value in given.items() if value is not None]
+    if not sources:
+        raise InputError("which shots is not said: give a list (CSV, JSON or JSON Lines), --orbit, --frames or --cameras")
+    if len(sources) > 1:
+        raise InputError(f"{' and '.join(sources)} say each which shots: give one of them")
+    if options.camera is not None and sources[0] in ("SHOTS", "--cameras"):
+        raise InputError(f"--camera is that of --orbit and --frames, and {sources[0]} says the cameras itself: leave it out")
+    if options.frame is not None and sources[0] == "--frames":
+        raise InputError("--frame and --frames say both which frame: leave one of them out")
+    if options.scheduler and options.workers is not None:
+        raise InputError("a scheduler with an address has its workers already: leave --workers out")
+
+
+def _on_cluster(options: argparse.Namespace) -> bool:
+    return options.scheduler is not None or options.workers is not None
+
+
+def _renderer(options: argparse.Namespace) -> contextlib.AbstractContextManager:
+    """Blender with the file open, in this process; but where VIEWCAM_BLENDER names one, or workers will, in one of its own.
+
+    The bpy module puts folders on sys.path in which a worker's children, who get that path, would find half a bpy.
+    """
+    if options.blend is not None and (os.environ.get(served.BLENDER) or _on_cluster(options)):
+        return served.ServedRenderer(options.blend, options.seed, options.threads)
+    return blender_room("batch.renderer").BlenderRenderer(options.blend, options.seed, options.threads)
+
+
+def _job(options: argparse.Namespace, renderer: Any) -> _Job:
+    """All that is to be rendered, once nothing is wrong with it."""
+    all_shots = [_completed(shot, options) for shot in _shots(options, renderer)]
+    shots = lists.shard(all_shots, options.shard) if options.shard else all_shots
+    if problems := renderer.problems(all_shots, options.check):
+        raise ShotsError(str(options.shots or options.blend or renderer.blend), tuple(problems))
+    if _on_cluster(options) and renderer.blend is None:
+        raise InputError("this file is nowhere that workers could open it: save it first")
+    if options.transforms:
+        dataset.refuse(all_shots, options.transforms)
+    made_from = renderer.made_from()
+    hashed = all_shots if options.transforms else shots  # a dataset is of all of them
+    return _Job(all_shots, shots, made_from, {shot.name: lists.settings_hash(shot, made_from) for shot in hashed})
+
+
+def _shots(options: argparse.Namespace, renderer: Any) -> list[Shot]:
+    if options.shots is not None:
+        return lists.read(options.shots, renderer.cameras)
+    if options.cameras is not None:
+        return lists.from_cameras(options.cameras, renderer.cameras)
+    if options.orbit is not None:
+        return lists.orbit(renderer.pinhole(options.camera, options.size), options.orbit)
+    camera = options.camera or renderer.scene_camera
+    if camera not in renderer.cameras:
+        wrong = "the scene has no camera" if camera is None else f"the file has no camera {camera!r}"
+        raise InputError(f"{wrong}: name one with --camera, of {', '.join(renderer.cameras) or 'none'}")
+    return lists.frames(options.frames, camera)
+
+
+def _completed(shot: Shot, options: argparse.Namespace) -> Shot:
+    """The shot, with what the command line says where it says nothing itself."""
+    width, height = options.size or (None, None)
+    said = {field: getattr(options, field) for field in ("frame", "engine", "samples", "level")}
+    said |= {"width": width, "height": height}
+    return dataclasses.replace(shot, **{field: value for field, value in said.items() if getattr(shot, field) is None})
+
+
+def _tell(options: argparse.Namespace, summary: Summary, folder: Folder) -> None:
+    """In one line what the batch came to."""
+    counts = summary.counts
+    shots = "1 shot" if counts["shots"] == 1 else f"{counts['shots']} shots"
+    if counts["failed"] or counts["left"]:
+        what = f"of {shots}, {counts['failed']} failed and {counts['left']} are left"
+        options.events.tell("error", command=options.command, text=f"{what}: the same command with --resume renders them")
+        return
+    kept = f", {summary.kept} of them kept" if summary.kept else ""
+    print(f"{shots}{kept}, in {summary.seconds:.1f} s: {folder.contact_sheet}")
+    if unlike := [shot["name"] for shot in summary.shots if shot.get("passed") is False]:
+        named = ", ".join(unlike[:_MOST_NAMED]) + (", …" if len(unlike) > _MOST_NAMED else "")
+        print(f"{len(unlike)} are not what the reference tracer sees: {named}; {folder.summary} says how")

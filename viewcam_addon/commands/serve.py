@@ -1,0 +1,12 @@
+"""`viewcam serve`: a Blender that renders the shots of a batch for the process that started it. No command for people."""
+
+import argparse
+
+from ..batch import serving
+from . import Result
+from .surroundings import blender_room
+
+
+def run(options: argparse.Namespace) -> Result:
+    serving.serve(options.handle, blender_room("batch.renderer").BlenderRenderer)
+    return 0, {}
