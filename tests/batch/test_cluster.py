@@ -288,12 +288,29 @@ def test_the_shots_of_a_machine_that_is_not_fit_are_rendered_by_another(farm, st
     assert summary.exit_status == 0 and summary.counts["done"] == 6
 
 
-def test_a_scheduler_that_dies_ends_the_batch_with_what_is_left(farm, stand_in, blend, tmp_path, processes):
+@pytest.mark.parametrize("hears", ["in time", "too late"])
+def test_a_scheduler_that_dies_ends_the_batch_with_what_is_left(farm, stand_in, blend, tmp_path, processes, monkeypatch, hears):
+    """Also where it dies before it could say that the first shot is done."""
     address, worker, kill_scheduler = farm
     worker()
-    ear = Ear()
+    ear, outcome, heard = Ear(), cluster._Flight._outcome, threading.Event()
+
+    def outcome_of(flight, future, shot):
+        if hears == "too late":
+            killer.join()
+        said = outcome(flight, future, shot)
+        heard.set()
+        return said
+
+    def kill():
+        assert processes.until(lambda: stand_in.diary("waits"))
+        if hears == "in time":
+            heard.wait()
+        kill_scheduler()
+
+    monkeypatch.setattr(cluster._Flight, "_outcome", outcome_of)
+    killer = threading.Thread(target=kill)
     with cluster.opened(address, None) as machines:
-        killer = threading.Thread(target=lambda: processes.until(lambda: stand_in.diary("waits")) and kill_scheduler())
         killer.start()
         summary = run_on(machines, blend, tmp_path / "out", shots("a", "slow_one", "b", "c", "d", "e"), ear)
         killer.join()

@@ -178,13 +178,22 @@ class _Flight:
                 self._submit(shot)
                 yield from self._rest()
         except _LostError as lost:
-            if not self._fruitful:
-                raise InputError(str(lost)) from lost
-            for _, shot in self._flying.values():
-                yield shot, InputError(str(lost))
+            yield from self._lost(InputError(str(lost)))
         finally:
             for future, _ in self._flying.values():
                 future.cancel()
+
+    def _lost(self, error: InputError) -> Iterator[tuple[Shot, Outcome]]:
+        """The outcomes of the shots in flight when no worker can say more: what stands in the folder is done.
+
+        Raises the error if no shot ever was.
+        """
+        shots = [shot for _, shot in self._flying.values()]
+        records = [self._record(shot) for shot in shots]
+        if not self._fruitful and not any(records):
+            raise error
+        for shot, record in zip(shots, records, strict=True):
+            yield shot, record or error
 
     def _rest(self) -> Iterator[tuple[Shot, Outcome]]:
         while self._flying:
@@ -271,10 +280,13 @@ class _Flight:
         """The sidecar, which a folder of another machine may show a little later."""
         ends = time.monotonic() + _ANSWER_WITHIN
         while True:
-            record = self._folder.finished(shot.name, self._settings[shot.name], self._check)
+            record = self._record(shot)
             if record is not None or time.monotonic() > ends:
                 return record
             time.sleep(_MOMENT)
+
+    def _record(self, shot: Shot) -> dict[str, Any] | None:
+        return self._folder.finished(shot.name, self._settings[shot.name], self._check)
 
 
 class _Render:
