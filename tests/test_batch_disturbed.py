@@ -18,7 +18,7 @@ class TestWheel(disturbed.Disturbances):
     @classmethod
     def blender(cls):
         def command(shots: Path) -> disturbed.Command:
-            words = [sys.executable, "-m", "viewcam_addon.cli", "batch", disturbed.STUDIO, shots]
+            words = [sys.executable, "-m", "viewcam_addon", "batch", disturbed.STUDIO, shots]
             return disturbed.Command(words, {"PYTHONPATH": str(disturbed.ROOT)})
 
         return command

@@ -4,6 +4,7 @@ import importlib.util
 import json
 import os
 import resource
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -196,14 +197,12 @@ def test_wrong_usage_is_one_line_that_says_where_help_is(capfd, words, expected)
 
 
 def limit_files_to_4_kilobytes():
-    import signal
-
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
 
 
 def viewcam(*words, **options):
-    command = [sys.executable, "-m", "viewcam_addon.cli", *map(str, words)]
+    command = [sys.executable, "-m", "viewcam_addon", *map(str, words)]
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent.parent)}
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False, **options)
 
@@ -245,7 +244,7 @@ def test_a_picture_that_can_not_grow_leaves_nothing_behind(tmp_path):
 def test_lines_that_nobody_reads_change_no_status_and_the_picture_is_there(tmp_path):
     reader, writer = os.pipe()
     os.close(reader)
-    command = [sys.executable, "-m", "viewcam_addon.cli", "render", write_scene(tmp_path), tmp_path / "picture.exr"]
+    command = [sys.executable, "-m", "viewcam_addon", "render", write_scene(tmp_path), tmp_path / "picture.exr"]
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent.parent), "PYTHONUNBUFFERED": ""}
     done = subprocess.run(command, env=environment, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
     os.close(writer)
@@ -263,6 +262,15 @@ def test_a_command_whose_standard_streams_are_closed_does_the_same(tmp_path, clo
     )
 
 
+def test_ctrl_c_while_modules_are_imported_ends_the_process_without_a_traceback(tmp_path):
+    (tmp_path / "numpy.py").write_text("import signal, time\nsignal.raise_signal(signal.SIGINT)\ntime.sleep(60)")
+    paths = os.pathsep.join([str(tmp_path), str(Path(__file__).parent.parent)])
+    foreground = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)}
+    command, environment = [sys.executable, "-m", "viewcam_addon"], os.environ | {"PYTHONPATH": paths}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, **foreground)
+    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
+
+
 def mounted(options, script, *arguments):
     """Run a shell script beside a small file system mounted at $1, in a mount namespace of its own."""
     mount = f'mount -t tmpfs -o {options} tmpfs "$1" && shift && '
@@ -272,7 +280,7 @@ def mounted(options, script, *arguments):
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
 
 
-RENDER_AND_LIST = '"$1" -m viewcam_addon.cli render "$2" "$3/picture.exr"; status=$?; ls -A "$3"; exit $status'
+RENDER_AND_LIST = '"$1" -m viewcam_addon render "$2" "$3/picture.exr"; status=$?; ls -A "$3"; exit $status'
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -46,8 +47,11 @@ def scene(tmp_path):
 def test_each_event_is_a_line_of_json_with_its_time_and_nothing_else_is_on_standard_output(scene, tmp_path, capfd):
     assert main(["render", str(scene), str(tmp_path / "out.exr"), "--log-json"]) == 0
     said = capfd.readouterr()
-    started, message, finished = lines_of(said.out)
+    told = lines_of(said.out)
+    started, message, finished = (event for event in told if event["event"] != "progress")
     assert [event["event"] for event in (started, message, finished)] == ["started", "message", "finished"]
+    shares = [event["share"] for event in told if event["event"] == "progress"]
+    assert shares[0] == 0 and shares[-1] == 1 and shares == sorted(set(shares)), shares
     assert started["command"] == "render" and "out.exr --log-json" in started["words"]
     assert message["text"].startswith("traced 64 × 48 pixels in ")
     assert finished["exit_status"] == 0 and 0 < finished["seconds"] < 600
@@ -63,6 +67,26 @@ def test_an_error_is_an_event_and_a_sentence(tmp_path, capfd):
     assert said.err == f"viewcam render: {error['text']}\n" and "none.json" in error["text"]
 
 
+@pytest.mark.parametrize(
+    ("words", "command", "said"),
+    [
+        (["render", "a.json"], "render", "OUT.exr"),
+        (["rendr"], "", "rendr"),
+        (["batch", "a.blend", "--orbit", "x"], "batch", "'x'"),
+    ],
+)
+def test_wrong_usage_is_an_event_and_a_sentence_too(capfd, words, command, said):
+    assert main([*words, "--log-json"]) == 2
+    told = capfd.readouterr()
+    started, error, finished = lines_of(told.out)
+    assert (started["event"], started["command"]) == ("started", command) and "--log-json" in started["words"]
+    assert (error["event"], error["command"]) == ("error", command) and said in error["text"], error
+    assert (finished["event"], finished["command"], finished["exit_status"]) == ("finished", command, 2)
+    assert told.err == f"{'viewcam ' + command if command else 'viewcam'}: {error['text']}\n"
+    assert main(words) == 2
+    assert capfd.readouterr() == ("", told.err), "the sentence is the same without JSON"
+
+
 def test_a_check_s_child_processes_tell_as_if_they_were_none(tmp_path, capfd):
     pytest.importorskip("bpy")
     from viewcam_addon.commands.proving import DEMO_SCENE
@@ -71,8 +95,10 @@ def test_a_check_s_child_processes_tell_as_if_they_were_none(tmp_path, capfd):
     status = main(words)
     said = capfd.readouterr()
     told = lines_of(said.out)
-    assert [event["event"] for event in told if event["event"] != "message"] == ["started", "finished"], said.out
-    messages = "\n".join(event["text"] for event in told[1:-1])
+    others = [event for event in told if event["event"] != "message"]
+    assert (others[0]["event"], others[-1]["event"]) == ("started", "finished"), said.out
+    assert {event["event"] for event in others[1:-1]} == {"progress"} and others[-2]["share"] == 1, said.out
+    messages = "\n".join(event["text"] for event in told if event["event"] == "message")
     assert "exported and rendered" in messages and "traced 64 × 36" in messages and "objects exported whole" in messages
     assert told[-1]["exit_status"] == status == json.loads((tmp_path / "result.json").read_text())["exit_status"]
     assert said.err == ""
@@ -111,6 +137,26 @@ def test_a_terminal_shows_a_bar_and_sentences_above_it(on_a_terminal):
     assert said.rstrip(" ").endswith("\r"), "the bar is still there at the end"
 
 
+TRACE = """
+import time
+from viewcam_addon import events
+with events.opened(log_json=False) as told:
+    for percent in range(101):
+        told.tell("progress", share=percent / 100)
+        time.sleep({seconds} / 100)
+    told.tell("error", command="render", text="the disk is full")
+"""
+
+
+@pytest.mark.parametrize("seconds", [0.0, 2.0])
+def test_a_picture_that_takes_a_while_has_a_bar_on_a_terminal(on_a_terminal, seconds):
+    pytest.importorskip("tqdm")
+    status, said = on_a_terminal(*program(TRACE.format(seconds=seconds)))
+    assert status == 0, said
+    assert bool(re.search(r"traced \d+%\|", said)) == (seconds > 1), said
+    assert said.replace("\r\n", "\n").endswith("viewcam render: the disk is full\n") and "100%" not in said.split("\r")[-2]
+
+
 def test_without_tqdm_a_terminal_shows_the_sentences(on_a_terminal):
     status, said = on_a_terminal(*program("import sys; sys.modules['tqdm'] = None\n" + TELL))
     assert status == 0 and "%" not in said and len(said.splitlines()) == 2
@@ -119,7 +165,7 @@ def test_without_tqdm_a_terminal_shows_the_sentences(on_a_terminal):
 def test_lines_of_json_that_nobody_reads_end_no_command(scene, tmp_path):
     reader, writer = os.pipe()
     os.close(reader)
-    command = [sys.executable, "-m", "viewcam_addon.cli", "render", scene, tmp_path / "out.exr", "--log-json"]
+    command = [sys.executable, "-m", "viewcam_addon", "render", scene, tmp_path / "out.exr", "--log-json"]
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent.parent)}
     done = subprocess.run(command, env=environment, stdout=writer, stderr=subprocess.PIPE, check=False)
     os.close(writer)

@@ -31,7 +31,7 @@ def check(blend, folder, *options):
     """Run `viewcam check` and return its JSON; it must say "same within noise"."""
     result = folder / "result.json"
     words = ["check", blend, "--samples", SAMPLES, "--json", result, *options]
-    command = [sys.executable, "-m", "viewcam_addon.cli", *map(str, words)]
+    command = [sys.executable, "-m", "viewcam_addon", *map(str, words)]
     run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert run.returncode == 0, run.stdout + run.stderr
     assert "same within noise" in run.stdout.lower(), run.stdout

@@ -226,7 +226,7 @@ def test_what_the_readme_says_viewcam_does_it_does():
     promised = set(re.findall(r"(?m)(?:`|--command |^ *)viewcam ([a-z]+)", (ROOT / "README.md").read_text(encoding="utf-8")))
     assert {"check", "demo"} <= promised
     for name in sorted(promised):
-        command = [sys.executable, "-m", "viewcam_addon.cli", name, "--help"]
+        command = [sys.executable, "-m", "viewcam_addon", name, "--help"]
         outcome = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
         assert outcome.returncode == 0 and name in outcome.stdout, f"viewcam {name}: {outcome.stderr}"
 

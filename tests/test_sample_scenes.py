@@ -124,6 +124,6 @@ def test_spheres_are_exact_spheres_and_one_is_an_ellipsoid(fresh_blender):
 @pytest.mark.parametrize("name", SCENES)
 def test_cycles_and_the_tracer_agree(name):
     """In a process of its own, as a user runs it."""
-    command = [sys.executable, "-m", "viewcam_addon.cli", "check", str(FOLDER / f"{name}.blend")]
+    command = [sys.executable, "-m", "viewcam_addon", "check", str(FOLDER / f"{name}.blend")]
     run = subprocess.run(command, cwd=FOLDER.parent, capture_output=True, text=True)
     assert run.returncode == 0, run.stdout + run.stderr

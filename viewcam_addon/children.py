@@ -18,7 +18,7 @@ _ON_WINDOWS = sys.platform == "win32"
 
 def viewcam(*arguments: str | Path) -> list[str]:
     """The command that runs `viewcam` in a Python process of its own."""
-    return module("cli", *arguments)
+    return [sys.executable, "-m", _PACKAGE.name, *map(str, arguments)]
 
 
 def module(name: str, *arguments: str | Path) -> list[str]:

@@ -7,9 +7,7 @@ Here are the words; what they do is in commands/.
 """
 
 import argparse
-import contextlib
 import json
-import os
 import shlex
 import sys
 import time
@@ -21,7 +19,6 @@ from . import batch_words, events, words
 from .commands import Result, batch, chart, proving, serve
 from .errors import InputError, bug
 from .files import written_whole
-from .terminal import open_closed_streams, share_one_heap
 from .tracer.scene.film import SAMPLES
 
 
@@ -33,8 +30,11 @@ def main(arguments: Sequence[str] | None = None, blend_is_open: bool = False) ->
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     try:
         options = _parser(blend_is_open).parse_args(arguments)
-    except SystemExit as leaving:  # argparse leaves after --help and after an error
-        return int(leaving.code or 0)
+    except SystemExit:  # argparse leaves after --help
+        return 0
+    except _UsageError as error:
+        log_json = "--log-json" in arguments
+        options = argparse.Namespace(command=error.command, run=error.raised, json=None, log_json=log_json)
     options.words = shlex.join(arguments)
     started = time.monotonic()
     with events.opened(options.log_json) as options.events:
@@ -47,25 +47,22 @@ def main(arguments: Sequence[str] | None = None, blend_is_open: bool = False) ->
     return status
 
 
-def main_and_exit() -> NoReturn:
-    """The shell's entry point.
+class _UsageError(InputError):
+    """The words are no command. command : the sub-command, as far as it is known."""
 
-    Leaves without Python's clean-up: all files are written, and to take a large scene apart takes a tenth of a second. Where
-    Blender is a module of this process, bpy 4.2 crashes in it and 4.5 hangs, after properties with `update=` were registered.
-    """
-    open_closed_streams()
-    share_one_heap()
-    status = main()
-    with contextlib.suppress(OSError):  # whoever reads our lines may have gone
-        sys.stdout.flush()
-        sys.stderr.flush()
-    os._exit(status)
+    def __init__(self, message: str, command: str) -> None:
+        super().__init__(message)
+        self.command = command
+
+    def raised(self, _: argparse.Namespace) -> NoReturn:
+        """What such a command does when it is run."""
+        raise self
 
 
 class _OneLineParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        print(f"{self.prog}: {message}; {self.prog} --help tells how it is used", file=sys.stderr)
-        sys.exit(2)
+        command = self.prog.partition(" ")[2]
+        raise _UsageError(f"{message}; {self.prog} --help tells how it is used", command)
 
 
 class _CommandParser(_OneLineParser):
@@ -230,7 +227,3 @@ def _write_json(options: argparse.Namespace, result: dict[str, Any]) -> int:
     except InputError as error:
         return _told(options, error.exit_status, str(error))[0]
     return 0
-
-
-if __name__ == "__main__":
-    main_and_exit()

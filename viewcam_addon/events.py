@@ -2,8 +2,8 @@
 
 An event is a name and fields. Of every command are told `started` (command, words), `message` (text: a line that it would have
 printed), `error` (command, text, and `problems` where there are several) and `finished` (command, exit_status, seconds); a
-batch tells of its shots too (docs/batch.md). All of it goes to copies of standard output and standard error, so it is heard
-while libraries are silent.
+picture that is traced tells `progress` (share), and a batch tells of its shots (docs/batch.md). All of it goes to copies of
+standard output and standard error, so it is heard while libraries are silent.
 
 Rejected: Python's logging, whose levels, loggers and handlers are more than a line of JSON needs, and to which the libraries in
 this process write as well.
@@ -17,6 +17,8 @@ from collections.abc import Iterator
 from typing import Any, Protocol, TextIO
 
 from .terminal import copy_of
+
+_PERCENT = "{desc} {percentage:.0f}%|{bar}| {elapsed}<{remaining}"
 
 
 class Events(Protocol):
@@ -40,24 +42,41 @@ class Sentences:
 
 
 class Bar(Sentences):
-    """The same, above a bar of a batch's shots. draw : the class tqdm."""
+    """The same, above a bar of a batch's shots or of the rows of a picture."""
 
-    def __init__(self, stream: TextIO, draw: type) -> None:
+    def __init__(self, stream: TextIO) -> None:
         super().__init__(stream)
-        self._draw, self._bar, self._failed = draw, None, 0
+        self._bar, self._failed = None, 0
 
     def tell(self, event: str, **fields: Any) -> None:
         super().tell(event, **fields)
         if event == "batch_started":
-            shots = {"total": fields["shots"], "initial": fields["kept"], "unit": "shot"}
-            self._bar = self._draw(**shots, file=self._stream, dynamic_ncols=True, leave=False)
+            self._open(total=fields["shots"], initial=fields["kept"], unit="shot")
+        elif event == "progress":
+            self._progress(100 * fields["share"])
         elif event == "shot_started" and self._bar is not None:
             self._bar.set_description_str(fields["shot"])
         elif event in ("shot_done", "shot_failed", "shot_elsewhere") and self._bar is not None:
             self._failed += event == "shot_failed"
             self._bar.set_postfix_str(f"{self._failed} failed" if self._failed else "", refresh=False)
             self._bar.update()
-        elif event in ("batch_finished", "finished") and self._bar is not None:
+        elif event in ("batch_finished", "finished"):
+            self._close()
+
+    def _progress(self, percent: float) -> None:
+        if percent == 0.0:  # and no bar for what takes half a second
+            self._open(total=100, desc="traced", bar_format=_PERCENT, miniters=0, delay=0.5)
+        elif self._bar is not None:
+            self._bar.update(percent - self._bar.n)
+        if percent == 100.0:
+            self._close()
+
+    def _open(self, **what: Any) -> None:
+        if draw := _tqdm():
+            self._bar = draw(**what, file=self._stream, dynamic_ncols=True, leave=False)
+
+    def _close(self) -> None:
+        if self._bar is not None:
             self._bar.close()
             self._bar = None
 
@@ -90,10 +109,8 @@ def opened(log_json: bool) -> Iterator[Events]:
             lines = JsonLines(streams.enter_context(_listening(1)), Sentences(errors))
             with contextlib.redirect_stdout(_Messages(lines)):
                 yield lines
-        elif errors.isatty() and (draw := _tqdm()):
-            yield Bar(errors, draw)
         else:
-            yield Sentences(errors)
+            yield Bar(errors) if errors.isatty() else Sentences(errors)
 
 
 class _Messages(io.TextIOBase):
@@ -136,7 +153,8 @@ def _tqdm() -> type | None:
 def _sentence(event: str, fields: dict[str, Any]) -> str:
     """What is to be said of an event where nobody reads JSON; mostly nothing."""
     if event == "error":
-        return f"viewcam {fields['command']}: {fields['text']}"
+        command = f"viewcam {fields['command']}".rstrip()  # none where there is no such command
+        return f"{command}: {fields['text']}"
     if event == "shot_failed":
         return f"viewcam batch: {fields['shot']}: {fields['error']}"
     if event == "stopping":

@@ -55,7 +55,7 @@ def fresh(scene_path: Path, level: str, threads: int, environment: dict[str, str
 
     def runner(sampling: str, parameter: float, seed: int, path: Path) -> float:
         words = ["--error", str(parameter)] if sampling == "error" else ["--samples", str(int(parameter))]
-        command = [sys.executable, "-m", "viewcam_addon.cli", "render", scene_path, path, "--level", level, *words]
+        command = [sys.executable, "-m", "viewcam_addon", "render", scene_path, path, "--level", level, *words]
         command += ["--seed", str(seed), "--threads", str(threads)]
         started = time.perf_counter()
         subprocess.run(command, env=os.environ | environment | bytecode | modules, check=True, stdout=subprocess.DEVNULL)

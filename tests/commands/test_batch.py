@@ -172,6 +172,6 @@ def test_a_shot_that_fails_is_a_sentence_and_the_rest_are_there(tmp_path, capfd)
 
 def test_on_a_terminal_a_bar_counts_the_shots(tmp_path, on_a_terminal):
     pytest.importorskip("tqdm")
-    command = [sys.executable, "-m", "viewcam_addon.cli", "batch", CORNELL, "--orbit", "3", "--out", tmp_path / "out", *SMALL]
+    command = [sys.executable, "-m", "viewcam_addon", "batch", CORNELL, "--orbit", "3", "--out", tmp_path / "out", *SMALL]
     status, shown = on_a_terminal(command, os.environ | {"PYTHONPATH": str(ROOT)})
     assert status == 0 and "orbit_000: " in shown and "| 0/3 [" in shown, shown

@@ -36,4 +36,4 @@ if __name__ == "__main__":
     status = main(sys.argv[1:])
     sys.stdout.flush()
     sys.stderr.flush()
-    os._exit(status)  # as cli.main_and_exit does, and why
+    os._exit(status)  # as __main__.py does, and why

@@ -196,7 +196,7 @@ class Reader:
 def with_wheel(folder: Path) -> Reader:
     """A reader who has installed this project and a wheel of Blender."""
     blender = f'exec "{sys.executable}" "{HERE / "blender_of_a_wheel.py"}" "$@"'
-    viewcam = f'exec "{sys.executable}" -m viewcam_addon.cli "$@"'
+    viewcam = f'exec "{sys.executable}" -m viewcam_addon "$@"'
     return Reader(folder, blender, viewcam, [sys.executable], {"PYTHONPATH": str(ROOT)})
 
 
@@ -209,7 +209,7 @@ def with_blender(folder: Path, program: str, user_folder: Path, extension: Path)
     blender = f'PATH="{path}" exec "{program}" "$@"'
     viewcam = f"""case "$*" in *--workers*)
 export PYTHONPATH="{ROOT}" VIEWCAM_BLENDER="{folder / "programs" / "blender"}"
-exec "{sys.executable}" -m viewcam_addon.cli "$@" ;;
+exec "{sys.executable}" -m viewcam_addon "$@" ;;
 esac
 command=$1; shift
 case $command in

@@ -57,4 +57,4 @@ def main(folder):
 if __name__ == "__main__":
     main(Path(sys.argv[-1]))
     sys.stdout.flush()
-    os._exit(0)  # as cli.main_and_exit does, and why
+    os._exit(0)  # as __main__.py does, and why

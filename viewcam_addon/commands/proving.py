@@ -18,6 +18,7 @@ from ..errors import InputError
 from ..terminal import silent_libraries
 from ..tracer.scene.film import MOST_SAMPLES, seeds
 from . import Result
+from .progress import Progress
 from .surroundings import blender_room, run_beside
 
 DEMO_SCENE = Path(__file__).parents[2] / "sample_scenes" / "studio.blend"
@@ -52,7 +53,8 @@ def render(options: argparse.Namespace) -> Result:
     level = told.get("level", options.level)
     started = time.perf_counter()
     samples = MOST_SAMPLES if options.error else options.samples
-    passes = trace(scene, level, samples, options.seed, options.threads, error=options.error)
+    progress = Progress(options.events, scene.camera.height)
+    passes = trace(scene, level, samples, options.seed, options.threads, progress, options.error)
     seconds = time.perf_counter() - started
     attributes = {"software": "Virtual Pinhole", "level": level}
     if level != "geometry":

@@ -31,7 +31,7 @@ def blender_room(name: str) -> ModuleType:
 def run_beside(*arguments: str | Path, tell_on: Events | None = None) -> int:
     """Run a sub-command in a Python process of its own, with the same modules in reach as here; its exit status.
 
-    tell_on : whom its messages and errors are told, with --log-json; else it prints them itself.
+    tell_on : whom its events are told, with --log-json; else it prints what there is to say itself.
     """
     sys.stdout.flush()
     command, variables = children.viewcam(*arguments), children.environment()
@@ -40,6 +40,6 @@ def run_beside(*arguments: str | Path, tell_on: Events | None = None) -> int:
     with subprocess.Popen([*command, "--log-json"], env=variables, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as child:
         for line in child.stdout:
             event = json.loads(line)
-            if event["event"] in ("message", "error"):
+            if event["event"] not in ("started", "finished"):
                 tell_on.tell(**event)
     return child.returncode

@@ -1,0 +1,37 @@
+"""The shell's entry point: `viewcam`, and `python -m viewcam_addon`.
+
+While modules are imported, Ctrl-C ends the process at once. Rejected: to catch Python's KeyboardInterrupt, which some modules
+swallow and others, as NumPy, replace by an error of their own.
+"""
+
+import contextlib
+import os
+import signal
+import sys
+from typing import NoReturn
+
+
+def main_and_exit() -> NoReturn:
+    """Run the command and end this process with its exit status.
+
+    Leaves without Python's clean-up: all files are written, and to take a large scene apart takes a tenth of a second. Where
+    Blender is a module of this process, bpy 4.2 crashes in it and 4.5 hangs, after properties with `update=` were registered.
+    """
+    answer = signal.getsignal(signal.SIGINT)
+    if answer is signal.default_int_handler:  # a shell lets those that it starts in the background ignore it
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    from .cli import main
+    from .terminal import open_closed_streams, share_one_heap
+
+    signal.signal(signal.SIGINT, answer)
+    open_closed_streams()
+    share_one_heap()
+    status = main()
+    with contextlib.suppress(OSError):  # whoever reads our lines may have gone
+        sys.stdout.flush()
+        sys.stderr.flush()
+    os._exit(status)
+
+
+if __name__ == "__main__":
+    main_and_exit()
