@@ -43,6 +43,31 @@ FLOORS = [
 ]
 # The same inside the tracer.
 TRACER_FLOORS = ["arrays", "compiled", "scene", "rays", "light", "kernels", "tiles", "render"]
+# And where Blender is: first what is of the camera.
+BLENDER_FLOORS = [
+    "versions",
+    "borrowing",
+    "findings",
+    "rotation",
+    "render_settings",
+    "preferences",
+    "datablocks",
+    "picture",
+    "targets",
+    "hold",
+    "pose",
+    "suspects",
+    "camera",
+    "rolling",
+    "properties",
+    "resolution",
+    "animation",
+    "scenes",
+    "rendering",
+    "interface",
+    "batch",
+]
+HOUSES = {"tracer": TRACER_FLOORS, "blender": BLENDER_FLOORS}
 ROOF = {"__init__", "__main__"}
 
 # What exists inside Blender only.
@@ -84,8 +109,9 @@ def climbing_imports(source: str, path: Path) -> set[str]:
     """What `source`, as the file `path` relative to the package, imports from a floor above its own."""
     imports = imported_modules(source, ("viewcam_addon", *path.parent.parts))
     climbing = _climbing(imports, path.parts, "viewcam_addon", FLOORS)
-    if path.parts[0] == "tracer":
-        climbing |= _climbing(imports, path.parts[1:], "viewcam_addon.tracer", TRACER_FLOORS)
+    for house, floors in HOUSES.items():
+        if path.parts[0] == house:
+            climbing |= _climbing(imports, path.parts[1:], f"viewcam_addon.{house}", floors)
     return climbing
 
 
@@ -123,10 +149,11 @@ def test_imports_point_down_only(path):
     [
         ("from . import image", "pinhole.py"),
         ("from ..blender.camera import apply", "tracer/render.py"),
-        ("def late():\n    import viewcam_addon.cli", "blender/panel.py"),
-        ("from .. import cli", "blender/panel.py"),
+        ("def late():\n    import viewcam_addon.cli", "blender/camera.py"),
+        ("from .. import cli", "blender/camera.py"),
         ("from ..light.emitters import Emitters", "tracer/rays/space.py"),
         ("from ..rays.view import View", "tracer/scene/lamps.py"),
+        ("from .rendering import job", "blender/camera.py"),
     ],
 )
 def test_an_import_that_climbs_is_seen(source, path):
@@ -136,8 +163,10 @@ def test_an_import_that_climbs_is_seen(source, path):
 def test_every_room_has_a_floor():
     rooms = {path.relative_to(PACKAGE).parts[0].removesuffix(".py") for path in sources()}
     assert rooms - ROOF == set(FLOORS), "say in FLOORS on which floor the new room is"
-    rooms = {path.relative_to(PACKAGE / "tracer").parts[0].removesuffix(".py") for path in (PACKAGE / "tracer").rglob("*.py")}
-    assert rooms - ROOF == set(TRACER_FLOORS), "say in TRACER_FLOORS on which floor the new room is"
+    for house, floors in HOUSES.items():
+        inside = PACKAGE / house
+        rooms = {path.relative_to(inside).parts[0].removesuffix(".py") for path in inside.rglob("*.py")}
+        assert rooms - ROOF == set(floors), f"say in {house.upper()}_FLOORS on which floor the new room is"
 
 
 def test_imports_inside_the_package_are_relative():

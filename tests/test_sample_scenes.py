@@ -11,7 +11,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import job
+from viewcam_addon.blender.rendering import job
 from viewcam_addon.tracer.scene import Spheres
 
 FOLDER = Path(__file__).parent.parent / "sample_scenes"

@@ -17,9 +17,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from viewcam_addon.blender import cycles
-from viewcam_addon.blender.export import export_scene
-from viewcam_addon.blender.ledger import Ledger
+from viewcam_addon.blender.rendering import cycles
+from viewcam_addon.blender.scenes.export import export_scene
+from viewcam_addon.blender.scenes.ledger import Ledger
 from viewcam_addon.tracer.light import illumination
 from viewcam_addon.tracer.render import render
 

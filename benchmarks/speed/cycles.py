@@ -6,11 +6,12 @@ from pathlib import Path
 import bpy
 
 import viewcam_addon
-from viewcam_addon.blender import cycles, job, versions
+from viewcam_addon.blender import versions
 from viewcam_addon.blender.borrowing import Borrower, still_of_one_layer
-from viewcam_addon.blender.depsgraph import render_still
-from viewcam_addon.blender.export import export_scene
-from viewcam_addon.blender.ledger import Ledger, Remedy
+from viewcam_addon.blender.rendering import cycles, job
+from viewcam_addon.blender.scenes.depsgraph import render_still
+from viewcam_addon.blender.scenes.export import export_scene
+from viewcam_addon.blender.scenes.ledger import Ledger, Remedy
 from viewcam_addon.tracer.scene import scene_file
 from viewcam_addon.tracer.scene.film import NO_BOUNCES
 

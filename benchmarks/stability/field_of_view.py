@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import cycles
+from viewcam_addon.blender.rendering import cycles
 from viewcam_addon.pinhole import Pinhole
 
 from ..charts import Chart, Curve

@@ -178,7 +178,7 @@ def both_sides(fresh_blender, scene, tmp_path):
     scene.render.resolution_x, scene.render.resolution_y = 160, 120
 
     def make(**request):
-        from viewcam_addon.blender import job
+        from viewcam_addon.blender.rendering import job
 
         exported = job.export_and_render(job.Request(threads=2, **request), [tmp_path / "cycles.exr"])
         tracer = render.Tracer(exported, 2)

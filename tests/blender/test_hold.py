@@ -8,7 +8,8 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import findings, panel
+from viewcam_addon.blender import findings
+from viewcam_addon.blender.interface import panel
 from viewcam_addon.pinhole import Pinhole
 
 TURN = findings.LARGEST_TURN  # what float32 storage makes of a rotation

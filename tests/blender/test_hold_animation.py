@@ -10,7 +10,8 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon import roll as rolls
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import findings, hold, panel
+from viewcam_addon.blender import findings, hold
+from viewcam_addon.blender.interface import panel
 
 TURN = findings.LARGEST_TURN  # what float32 storage makes of a rotation
 

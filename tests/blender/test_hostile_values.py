@@ -13,7 +13,8 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import panel, pose, rotation
+from viewcam_addon.blender import pose, rotation
+from viewcam_addon.blender.interface import panel
 from viewcam_addon.errors import InputError
 
 HOSTILE = (math.nan, math.inf, -math.inf, 3.4e38, -3.4e38, 1e20, 1e-38, 1e-45, 0.0)

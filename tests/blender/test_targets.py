@@ -282,7 +282,7 @@ def test_what_cycles_is_compared_with_follows_the_target(watching_camera, scene,
 
 
 def test_a_comparison_in_another_size_keeps_the_target(watching_camera, scene, target):
-    from viewcam_addon.blender import job
+    from viewcam_addon.blender.rendering import job
 
     job.export(job.Request(size=(64, 48)))
     assert watching_camera.virtual_pinhole.look_at_target == target

@@ -7,7 +7,8 @@ bpy = pytest.importorskip("bpy")
 
 import viewcam_addon
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import findings, hold, panel, targets
+from viewcam_addon.blender import findings, hold, targets
+from viewcam_addon.blender.interface import panel
 from viewcam_addon.pinhole import Pinhole
 
 

@@ -13,7 +13,7 @@ bpy = pytest.importorskip("bpy")
 
 import viewcam_addon
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import job
+from viewcam_addon.blender.rendering import job
 from viewcam_addon.compare.geometry import compare
 from viewcam_addon.image import Image
 from viewcam_addon.pinhole import Pinhole

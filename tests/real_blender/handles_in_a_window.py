@@ -33,7 +33,7 @@ def room(name):
 
 
 def place(name):
-    return room("gizmos").place(camera(), name)
+    return room("interface.gizmos").place(camera(), name)
 
 
 def views():
@@ -85,7 +85,7 @@ def pull(start, end, **modifiers):
 def let_go(at):
     """Steps: the drag becomes a step of undo a moment later."""
     button("RELEASE", at)
-    while room("gizmos")._drag:
+    while room("interface.gizmos")._drag:
         yield
     yield
 
@@ -227,7 +227,7 @@ def frame_point():
     """The middle of the view plane's lower edge."""
     group = values()
     stated = room("camera").stated(camera(), bpy.context.scene)
-    figure = room("overlay").diagrams.diagram(stated, tuple(group.up), group.plane_at)
+    figure = room("interface.overlay").diagrams.diagram(stated, tuple(group.up), group.plane_at)
     return np.add(stated.eye, figure.plane[:2].mean(axis=0))
 
 
@@ -281,7 +281,7 @@ def hide_the_diagram():
 
 def look_through_the_camera():
     view = views()[-1].data
-    drawn, before = room("overlay"), room("overlay")._batches.cache_info()
+    drawn, before = room("interface.overlay"), room("interface.overlay")._batches.cache_info()
     view.view_perspective = "CAMERA"
     yield
     yield
@@ -310,7 +310,7 @@ def look_into_local_view():
 
 def count_what_is_made():
     """Lines are sent to the graphics card once, however often they are drawn, and nothing draws while nothing changes."""
-    batches, drawings = room("overlay")._batches, []
+    batches, drawings = room("interface.overlay")._batches, []
     handler = bpy.types.SpaceView3D.draw_handler_add(lambda: drawings.append(1), (), "WINDOW", "POST_PIXEL")
     move(*NOWHERE)
     for _ in range(6):
@@ -335,7 +335,7 @@ def count_what_is_made():
 
 def measure_a_drag():
     """The whole update of a camera for one move of the mouse: 0.5 ms where nothing else runs, with ten times the room."""
-    gizmos, first = room("gizmos"), place("eye")
+    gizmos, first = room("interface.gizmos"), place("eye")
     before, times = everything(), []
     for step in range(1, FRAMES):
         begun = time.perf_counter()

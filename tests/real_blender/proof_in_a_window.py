@@ -21,7 +21,7 @@ from tour_hands import SIDEBAR, look, photograph
 
 FILE, FOLDER, *PICTURES = map(Path, sys.argv[sys.argv.index("--") + 1 :])
 ADDON = "bl_ext.user_default.virtual_pinhole"
-PROOF = f"{ADDON}.viewcam_addon.blender.proof"
+PROOF = f"{ADDON}.viewcam_addon.blender.interface.proof"
 ROW = 12  # pixels between two looks for a button, less than its height
 PATIENCE = 60  # seconds that one comparison may take on a busy machine
 LEFT, MIDDLE, RIGHT, CANCEL = 0.3, 0.5, 0.7, 0.83  # shares of the sidebar's width

@@ -34,9 +34,9 @@ class CompareWithCycles(Step):
         yield from push("viewcam.compare_with_cycles(")
         for _ in range(200):  # it begins when a copy of the file is written
             yield
-            if room("proof").running():
+            if room("interface.proof").running():
                 break
-        while room("proof").running():
+        while room("interface.proof").running():
             yield
         for _ in range(6):
             yield
@@ -45,7 +45,7 @@ class CompareWithCycles(Step):
         bpy.ops.viewcam.compare_with_cycles(camera="Camera")
 
     def check(self):
-        outcome = room("proof").latest()
+        outcome = room("interface.proof").latest()
         assert outcome is not None and outcome.passed, f"the verdict is {outcome and outcome.verdict}"
         is_at_its_values()
 

@@ -61,7 +61,7 @@ def values():
 
 def room(name):
     """A module of viewcam_addon.blender, whatever the name is under which Blender has the add-on."""
-    package = bpy.types.VIEWCAM_PT_sidebar.__module__.rpartition(".")[0]
+    package = bpy.types.VIEWCAM_PT_sidebar.__module__.removesuffix(".interface.panel")
     return importlib.import_module(f"{package}.{name}")
 
 

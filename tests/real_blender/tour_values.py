@@ -75,7 +75,7 @@ class Copy(Step):
 
     def by_script(self):
         bpy.ops.viewcam.copy_camera()
-        self.copied = room("clipboard").text_of(camera(), bpy.context.scene)
+        self.copied = room("interface.clipboard").text_of(camera(), bpy.context.scene)
 
     def check(self):
         assert '"eye": [4.0, -7.0, 3.0]' in self.copied, f"copied {self.copied}"

@@ -55,7 +55,7 @@ class DragUp(Step):
 
     def by_hand(self):
         camera_object = bpy.data.objects["Camera"]
-        yield from drag(on_screen(room("gizmos").place(camera_object, "up")), (40, 0))
+        yield from drag(on_screen(room("interface.gizmos").place(camera_object, "up")), (40, 0))
         for _ in range(4):
             yield
 

@@ -8,26 +8,22 @@ _command = None
 
 def _rooms() -> list[ModuleType]:
     """Who has CLASSES for Blender or more to tell it, in order: a panel needs its operators, an operator its properties."""
-    from . import (
-        animation,
+    from . import animation, preferences, properties, render_settings, resolution
+    from .interface import (
         baking,
         clipboard,
-        engine,
         file_menu,
         gizmos,
         moving,
         operators,
         overlay,
         panel,
-        preferences,
         presets,
         proof,
-        properties,
         render_panels,
-        render_settings,
-        resolution,
         view_menu,
     )
+    from .rendering import engine
 
     buttons = [operators, moving, clipboard, baking, presets]
     shown = [panel, proof, overlay, gizmos]

@@ -28,7 +28,7 @@ def export(options: argparse.Namespace) -> Result:
     from ..tracer.scene import scene_file
 
     with silent_libraries():
-        scene = blender_room("job").export(_request(options))
+        scene = blender_room("rendering.job").export(_request(options))
     scene_file.write(scene, options.scene)
     print(*_ledger_lines(scene.ledger), sep="\n")
     result = {"scene": str(options.scene), "ledger": _ledger_json(scene.ledger)}
@@ -69,7 +69,7 @@ def render(options: argparse.Namespace) -> Result:
 
 def cycles(options: argparse.Namespace) -> Result:
     with silent_libraries():
-        ledger = blender_room("job").render(_request(options), options.image)
+        ledger = blender_room("rendering.job").render(_request(options), options.image)
     print(*_ledger_lines(ledger), sep="\n")
     return 0, {"image": str(options.image), "ledger": _ledger_json(ledger)}
 
@@ -161,7 +161,7 @@ def _export_and_render(options: argparse.Namespace, scene_path: Path, image_path
 
     started = time.perf_counter()
     with silent_libraries():
-        scene = blender_room("job").export_and_render(_request(options), image_paths)
+        scene = blender_room("rendering.job").export_and_render(_request(options), image_paths)
     scene_file.write(scene, scene_path)
     print(f"exported and rendered with Cycles in {time.perf_counter() - started:.1f} s", flush=True)
     return _told_level(scene)["level"] if options.level == "auto" else options.level
@@ -177,7 +177,7 @@ def _told_level(scene: Any) -> dict[str, str]:
 
 
 def _request(options: argparse.Namespace) -> Any:
-    return blender_room("job").Request(
+    return blender_room("rendering.job").Request(
         blend=options.blend,
         camera=options.camera,
         frame=options.frame,

@@ -7,9 +7,10 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import export, versions
+from viewcam_addon.blender import versions
 from viewcam_addon.blender.batch import keeping
 from viewcam_addon.blender.batch.renderer import BlenderRenderer
+from viewcam_addon.blender.scenes import export
 from viewcam_addon.shots import Shot
 
 LEFT = Shot("left", eye=(-6.0, -7.0, 4.0), look_at=(0.0, 0.0, 1.0), up=(0.0, 0.0, 1.0), d=40.0)

@@ -10,9 +10,9 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.batch import judge
-from viewcam_addon.blender import exr
 from viewcam_addon.blender.batch import graphics, pictures
 from viewcam_addon.blender.batch.renderer import BlenderRenderer
+from viewcam_addon.blender.rendering import exr
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.shots import Shot

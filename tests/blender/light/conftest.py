@@ -52,7 +52,7 @@ def pictures(stage, read_passes, tmp_path):
     samples : of each of Cycles' pictures; count : how many of them, the tracer having the samples of all. The rest is as in
     job.Request.
     """
-    from viewcam_addon.blender import job
+    from viewcam_addon.blender.rendering import job
 
     def make(arrange=lambda rng: None, samples=1, count=1, level="direct", scenes=SCENES, **request):
         exported, paths = [], []

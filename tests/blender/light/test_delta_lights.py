@@ -126,7 +126,7 @@ def test_a_wrong_formula_is_caught(pictures, sun, sabotage, monkeypatch):
     """The tests above must be able to fail."""
     from dataclasses import replace
 
-    from viewcam_addon.blender import lamps
+    from viewcam_addon.blender.scenes import lamps
     from viewcam_addon.tracer.scene import materials
 
     right = lamps.lamps_in

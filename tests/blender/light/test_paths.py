@@ -139,7 +139,7 @@ def test_a_see_through_film_with_its_own_exposure_and_filter(take, scene):
 @pytest.mark.parametrize("sabotage", ["albedo", "bounce"])
 def test_a_percent_less_light_is_caught(take, scene, sabotage, monkeypatch):
     """The tests above must be able to fail."""
-    from viewcam_addon.blender import export, shaders
+    from viewcam_addon.blender.scenes import export, shaders
     from viewcam_addon.tracer.scene.film import Bounces
     from viewcam_addon.tracer.scene.materials import Colour, Material
 
@@ -156,6 +156,6 @@ def test_a_percent_less_light_is_caught(take, scene, sabotage, monkeypatch):
     else:
         scene.cycles.max_bounces = 1
         monkeypatch.setattr(export.film, "bounces_of", lambda scene, ledger: Bounces(0, 4, 4, 12))
-        monkeypatch.setattr("viewcam_addon.blender.film.BOUNCES", {})
+        monkeypatch.setattr("viewcam_addon.blender.scenes.film.BOUNCES", {})
     errors, share = deviation(take())
     assert errors < -MOST, f"{errors:+.2f} standard errors, {share:+.3%}"

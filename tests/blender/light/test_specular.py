@@ -8,7 +8,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import cycles
+from viewcam_addon.blender.rendering import cycles
 from viewcam_addon.tracer.arrays import dot
 from viewcam_addon.tracer.light.scattering import reflected, refracted, specular_normal
 

@@ -5,7 +5,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import materials
+from viewcam_addon.blender.scenes import materials
 
 # Of the light that the brightest texture reflects. A cosine's rounding is 2e-7 at the 99th percentile (test_delta_lights.py); a
 # texture adds what its UV is off: 1e-5 of the picture's width at most, in textures of a few pixels.

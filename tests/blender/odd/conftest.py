@@ -140,7 +140,8 @@ class OddRow:
         """Look at the camera and at its panel."""
         import bpy
 
-        from viewcam_addon.blender import datablocks, panel
+        from viewcam_addon.blender import datablocks
+        from viewcam_addon.blender.interface import panel
 
         for _ in range(2):  # what a handler changes in one update shows in the next
             bpy.context.view_layer.update()
@@ -151,7 +152,7 @@ class OddRow:
 
     def render(self, camera_object, scene):
         """Look at the camera as a render engine gets it."""
-        from viewcam_addon.blender import depsgraph
+        from viewcam_addon.blender.scenes import depsgraph
 
         off = depsgraph.visit(scene, lambda graph: _off_by(camera_object, scene, graph))
         self._compare(2, off, "in the render")

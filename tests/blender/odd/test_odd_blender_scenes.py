@@ -5,7 +5,9 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import datablocks, job, panel
+from viewcam_addon.blender import datablocks
+from viewcam_addon.blender.interface import panel
+from viewcam_addon.blender.rendering import job
 
 
 @pytest.fixture

@@ -2,8 +2,10 @@
 
 renderer.py    opens, borrows, renders shot after shot, and gives everything back
 lending.py     what of the file's settings a batch changes for its time, and why each
+keeping.py     what Blender keeps from shot to shot, and where it must not
 pictures.py    a render as files: EXR and preview, the same bytes each time
 origins.py     what the pictures are made from: hashes of the .blend and all it links
 checking.py    whether Cycles and the tracer see the same through a shot's camera
 obstacles.py   why a shot can't be rendered, known before anything is
+graphics.py    whether EEVEE can draw here
 """

@@ -25,10 +25,12 @@ from ...batch.judge import Judge
 from ...pinhole import Pinhole
 from ...tracer.scene import LedgerEntry, Scene, scene_file
 from ...tracer.scene.sameness import same_things
-from .. import cycles, datablocks, indices, job
+from .. import datablocks
 from ..borrowing import borrowed
-from ..export import export_scene
-from ..ledger import Ledger, Remedy
+from ..rendering import cycles, job
+from ..scenes import indices
+from ..scenes.export import export_scene
+from ..scenes.ledger import Ledger, Remedy
 from . import keeping
 
 _MOST_TOLD = 5

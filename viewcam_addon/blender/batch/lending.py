@@ -16,7 +16,7 @@ from ... import intrinsics
 from ...shots import Shot
 from .. import datablocks, resolution, versions
 from ..borrowing import Borrower, cameras_unbound
-from ..engine import VIEWCAM_RenderEngine
+from ..rendering.engine import VIEWCAM_RenderEngine
 from . import keeping, pictures
 
 _ENGINES = {"CYCLES": "CYCLES", "EEVEE": versions.EEVEE, "VIEWCAM": "VIEWCAM"}

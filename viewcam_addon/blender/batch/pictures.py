@@ -12,9 +12,10 @@ from pathlib import Path
 import bpy
 
 from ...errors import InputError
-from .. import exr, png, versions
+from .. import versions
 from ..borrowing import Borrower
-from ..cycles import borrow_whole
+from ..rendering import exr, png
+from ..rendering.cycles import borrow_whole
 
 _PASSING = ("Date", "File", "Hostname", "Memory", "RenderTime")
 _PROBE = bytes(2**20)

@@ -24,10 +24,11 @@ from ...datasets.record import record
 from ...pinhole import Pinhole
 from ...shots import Shot
 from .. import camera as cameras
-from .. import datablocks, ensure_registered, job
+from .. import datablocks, ensure_registered
 from ..borrowing import Borrower, borrowed
-from ..depsgraph import render_still
-from ..engine import VIEWCAM_RenderEngine
+from ..rendering import job
+from ..rendering.engine import VIEWCAM_RenderEngine
+from ..scenes.depsgraph import render_still
 from . import obstacles, origins, pictures
 from .checking import Checker
 from .lending import Lent

@@ -1,0 +1,191 @@
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+bpy = pytest.importorskip("bpy")
+
+from viewcam_addon import camera_text
+from viewcam_addon.blender import camera as cameras
+from viewcam_addon.blender import findings
+from viewcam_addon.blender.interface import clipboard
+
+
+def paste(text, **options):
+    return bpy.ops.viewcam.paste_camera(text=text, **options)
+
+
+def values(camera_object):
+    eye, look_at, up, distance = camera_object.virtual_pinhole.numbers()
+    return (*eye, *look_at, *up, distance)
+
+
+def everything(camera_object):
+    """All that copying and pasting could change, bit for bit."""
+    group, data = camera_object.virtual_pinhole, camera_object.data
+    lens = (data.lens, data.shift_x, data.shift_y, data.sensor_width, data.sensor_height)
+    pose = (*camera_object.location, *camera_object.rotation_euler, *camera_object.scale)
+    return (group.enabled, *values(camera_object), *pose, *lens)
+
+
+def test_a_pasted_camera_stands_where_the_text_says(posed_camera, scene):
+    assert paste("eye=(1, 2, 3) look_at=(4, 5, 6) up=(0, 1, 0) d=900") == {"FINISHED"}
+    assert values(posed_camera) == (1, 2, 3, 4, 5, 6, 0, 1, 0, 900)
+    assert cameras.check(posed_camera, cameras.stated(posed_camera, scene), scene) == []
+
+
+def test_what_the_text_does_not_say_stays(posed_camera):
+    paste("look_at=(0, 0, 2)")
+    assert values(posed_camera) == (7, -6, 5, 0, 0, 2, 0, 0, 1, 1500)
+
+
+def test_copy_and_paste_bring_every_bit_to_another_camera(posed_camera, add_camera, scene):
+    paste("eye=0.1,0.2,0.3333333333333333 look_at=1e-3,-7,1e5 up=0.1,0.1,1 d=1234.5678901234567")
+    text = clipboard.text_of(posed_camera, scene)
+    other = add_camera("Other")
+    paste(text, camera="Other")
+    assert (
+        values(other) == values(posed_camera) == (0.1, 0.2, 0.3333333333333333, 1e-3, -7, 1e5, 0.1, 0.1, 1, 1234.5678901234567)
+    )
+    assert clipboard.text_of(other, scene) == text
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(st.floats(-1e4, 1e4), min_size=9, max_size=9),
+    st.floats(1, 1e5),
+    st.sampled_from([100, 50, 33]),
+    st.sampled_from([(1, 1), (2, 1), (1, 1.5)]),
+)
+def test_what_is_pasted_is_what_is_copied_at_any_percentage_and_pixel_aspect(
+    posed_camera, scene, pose, distance, percent, aspect
+):
+    scene.render.resolution_percentage = percent
+    scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = aspect
+    text = camera_text.written(pose[0:3], pose[3:6], pose[6:9], distance)
+    try:
+        paste(text)
+    except RuntimeError as error:  # eye = look-at, up = 0
+        assert "same point" in str(error) or "up is" in str(error).lower() or "Up is" in str(error)
+        return
+    copied = json.loads(clipboard.text_of(posed_camera, scene))
+    assert [*copied["eye"], *copied["look_at"], *copied["up"]] == pose
+    # To the picture's size and back: two products of one rounding each, and those of their factors.
+    assert copied["distance"] == pytest.approx(distance, rel=0 if percent == 100 else 4 * 2.0**-53, abs=0)
+
+
+def test_pasting_enables_a_camera_and_takes_the_rest_from_how_it_stands(camera_object, scene):
+    camera_object.location, camera_object.rotation_euler = (0, -5, 1), (math.pi / 2, 0, 0)
+    bpy.context.view_layer.update()
+    before = cameras.read(camera_object, scene)
+    paste("eye=(0, -9, 1)")
+    group = camera_object.virtual_pinhole
+    assert group.enabled and tuple(group.eye) == (0, -9, 1)
+    # The new camera's plane of focus, 10 m before it, is what it keeps looking at.
+    assert group.look_at[:] == pytest.approx((0, 5, 1), abs=1e-5)
+    after = cameras.read(camera_object, scene)
+    assert after.distance == before.distance
+    assert np.subtract(after.basis(), before.basis()) == pytest.approx(0, abs=findings.LARGEST_TURN)
+
+
+def test_copying_a_camera_that_is_not_in_use_changes_nothing(camera_object, scene):
+    camera_object.location = (1, 2, 3)
+    bpy.context.view_layer.update()
+    before = everything(camera_object)
+    copied = json.loads(clipboard.text_of(camera_object, scene))
+    assert copied["eye"] == [1, 2, 3] and copied["look_at"] == [1, 2, -7]
+    assert everything(camera_object) == before
+
+
+def test_copying_says_what_it_copied(posed_camera, capfd):
+    assert bpy.ops.viewcam.copy_camera() == {"FINISHED"}
+    said = capfd.readouterr().out.split("Copied ", 1)[1].splitlines()[0]
+    assert json.loads(said) == {"eye": [7, -6, 5], "look_at": [0, 0, 1], "up": [0, 0, 1], "distance": 1500}
+
+
+def test_a_held_roll_is_copied_as_the_up_of_the_same_picture(posed_camera, add_camera, scene):
+    group = posed_camera.virtual_pinhole
+    group.pole, group.held_roll = "HOLD", 0.3
+    before = cameras.stated(posed_camera, scene)
+    other = add_camera("Other")
+    paste(clipboard.text_of(posed_camera, scene), camera="Other")
+    after = cameras.stated(other, scene)
+    assert np.subtract(after.basis(), before.basis()) == pytest.approx(0, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "side"),
+    [
+        ('Scale -1 1 1 LookAt 7 -6 5 0 0 1 0 0 1 Camera "perspective" "float fov" 40', 1),
+        ("look_at(origin=[7, -6, 5], target=[0, 0, 1], up=[0, 0, 1]), 'fov': 40, 'fov_axis': 'x'", 0),
+        ("fov=40 axis=diagonal", 2),
+    ],
+)
+@pytest.mark.parametrize("aspect", [(1, 1), (2, 1)])
+def test_a_pasted_field_of_view_is_that_of_blenders_camera(posed_camera, scene, text, side, aspect):
+    scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = aspect
+    scene.render.resolution_percentage = 50
+    paste(text)
+    # The lens is stored in float32, its sensor and the pixel aspect as well.
+    assert math.degrees(cameras.read(posed_camera, scene).field_of_view()[side]) == pytest.approx(40, rel=4 * 2.0**-24)
+
+
+def test_what_a_reader_should_know_is_a_warning(posed_camera, capfd):
+    posed_camera.driver_add("location", 0).driver.expression = "1.0 + 1.0"
+    paste("LookAt 1 2 3 4 5 6 0 0 1")
+    printed = capfd.readouterr().out
+    assert "pbrt is left-handed" in printed and "driver" in printed
+    assert "Pasted eye, look-at, up on Camera" in printed
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "There is no text"),
+        ("hello", "not understood at 'hello'"),
+        ("eye=0,0,1", "same point"),
+        ("up=0,0,0", "(?i)up is"),
+        ("eye=1e200,0,0", "beyond Blender's numbers"),
+        ("d=1e-300", "too small for Blender's numbers"),
+    ],
+)
+def test_what_can_not_be_pasted_is_one_sentence_and_changes_nothing(posed_camera, text, sentence):
+    before = everything(posed_camera)
+    with pytest.raises(RuntimeError, match=sentence) as error:
+        paste(text)
+    assert everything(posed_camera) == before
+    assert "Traceback" not in str(error.value)
+
+
+def test_pasting_on_values_that_make_no_camera_heals_them(posed_camera):
+    posed_camera.virtual_pinhole.look_at = posed_camera.virtual_pinhole.eye
+    paste("look_at=0,0,1")
+    assert tuple(posed_camera.virtual_pinhole.look_at) == (0, 0, 1)
+
+
+def test_an_orthographic_camera_is_refused_by_name(camera_object):
+    camera_object.data.type = "ORTHO"
+    before = everything(camera_object)
+    for call in (lambda: paste("eye=1,2,3"), bpy.ops.viewcam.copy_camera):
+        with pytest.raises(RuntimeError, match="'Camera' is orthographic"):
+            call()
+    assert everything(camera_object) == before
+
+
+def test_undo_takes_a_pasted_camera_back(camera_object):
+    bpy.context.preferences.edit.use_global_undo = True
+    bpy.ops.ed.undo_push(message="before")
+    before = everything(camera_object)
+    paste("eye=1,2,3 look_at=4,5,6 d=900")
+    bpy.ops.ed.undo_push(message="after")
+    assert everything(bpy.data.objects["Camera"]) != before
+    bpy.ops.ed.undo()
+    assert everything(bpy.data.objects["Camera"]) == before
+
+
+def test_without_a_camera_both_are_off(fresh_blender):
+    assert not bpy.ops.viewcam.copy_camera.poll()
+    assert not bpy.ops.viewcam.paste_camera.poll()

@@ -1,0 +1,388 @@
+"""A comparison beside Blender: the same picture, another one, cancelled, broken; and nothing of it in the file."""
+
+import contextlib
+import errno
+import json
+import os
+import shutil
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from viewcam_addon.blender.interface import comparing, proof
+from viewcam_addon.errors import InputError
+
+# What `viewcam check` leaves behind, in place of it: a process that writes the files one by one, when it is told to.
+STAND_IN = """
+import json, pathlib, sys, time
+folder = pathlib.Path(sys.argv[1])
+def step(name, text="x"):
+    while not (folder / "go").exists() or int((folder / "go").read_text() or 0) < step.number:
+        time.sleep(0.01)
+    step.number += 1
+    (folder / "report").mkdir(exist_ok=True)
+    (folder / name).write_text(text)
+step.number = 1
+for name in ("report/cycles.exr", "report/scene.json", "report/reference.exr", "report/index.html", "report/difference.png"):
+    step(name)
+result = {"passed": True, "sentence": "The same picture: as told.", "passes": [], "ledger": []}
+step("result.json", json.dumps(result))
+"""
+
+
+@pytest.fixture
+def seen(monkey, posed_camera, scene):
+    """A scene of Suzanne, 64 × 48 pixels, saved nowhere."""
+    scene.render.resolution_x, scene.render.resolution_y = 64, 48
+    posed_camera.virtual_pinhole.distance = 60
+    bpy.context.view_layer.update()
+    return scene
+
+
+@pytest.fixture(autouse=True)
+def nothing_left():
+    """No comparison goes on, and none is remembered, from one test to the next."""
+    yield
+    proof.end()
+
+
+@pytest.fixture
+def stand_in(monkeypatch, seen):
+    """A function that starts a comparison whose child is the stand-in, with a method `let(steps)`."""
+
+    class Slow(comparing.Comparison):
+        def let(self, steps):
+            (self.folder / "go").write_text(str(steps))
+
+    def command(copy, _scene, _words):
+        return [sys.executable, "-c", STAND_IN, str(copy.parent)]
+
+    monkeypatch.setattr(comparing, "_command", command)
+    monkeypatch.setattr(proof, "Comparison", Slow)
+    return lambda **options: Slow(seen.camera, seen, **options)
+
+
+def wait_for(what, seconds=100):
+    ends = time.monotonic() + seconds
+    while not (found := what()) and time.monotonic() < ends:
+        time.sleep(0.02)
+    assert found, "it does not come about"
+    return found
+
+
+def processes_of(folder):
+    """The processes whose command line names the folder; one that has ended has none."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            found += [process.name] if str(folder).encode() in (process / "cmdline").read_bytes() else []
+    return found
+
+
+def values_of(block):
+    """Every property of a datablock or a group of settings that is no pointer, and what the pointers point to."""
+
+    def plain(value):
+        return tuple(map(plain, value)) if hasattr(value, "__len__") and not isinstance(value, str | bytes | set) else value
+
+    found = {}
+    for prop in block.bl_rna.properties:
+        value = getattr(block, prop.identifier, None)
+        if prop.type == "POINTER":
+            found[prop.identifier] = value and getattr(value, "name", "")
+        elif prop.type == "COLLECTION":
+            found[prop.identifier] = len(value)
+        elif prop.identifier != "rna_type":
+            found[prop.identifier] = repr(plain(value))
+    return found
+
+
+def state(scene):
+    """All that an artist has set: scene, render, Cycles, view layers, camera; which datablocks there are; and where."""
+    camera_object = scene.camera
+    blocks = [scene, scene.render, scene.render.image_settings, scene.cycles, scene.view_settings, *scene.view_layers]
+    blocks += [camera_object, camera_object.data, camera_object.virtual_pinhole]
+    collections = [prop.identifier for prop in bpy.data.bl_rna.properties if prop.type == "COLLECTION"]
+    counts = {name: len(getattr(bpy.data, name)) for name in collections}
+    found = {f"{type(block).__name__} {name}": value for block in blocks for name, value in values_of(block).items()}
+    return found | counts | {"file": bpy.data.filepath, "dirty": bpy.data.is_dirty}
+
+
+def changed(before, after):
+    """What is not as it was."""
+    return {name: (before.get(name), value) for name, value in after.items() if value != before.get(name)}
+
+
+def test_the_same_picture_is_the_verdict_and_the_file_stays_as_it_is(seen):
+    seen.objects["Suzanne"].location.x = 0.25  # an edit that nobody has saved
+    before = state(seen)
+    comparison, told = comparing.Comparison(seen.camera, seen), []
+    while (outcome := comparison.poll()) is None:
+        told.append(comparison.progress())
+        time.sleep(0.01)
+    assert changed(before, state(seen)) == {}
+    assert outcome.passed and outcome.verdict.startswith("The same picture: over "), outcome.verdict
+    assert [share for share, _ in told] == sorted(share for share, _ in told) and told[0][0] == 0
+    assert told[0][1] == "Rendering with Cycles" and told[-1][1] == "Comparing"
+    rows = dict(outcome.rows)
+    assert rows["Median"].endswith(" px") and "Mismatches" in rows and rows["Modelled"] == "1 of 1 objects"
+    assert outcome.report.is_file() and outcome.difference.is_file() and outcome.colours
+    assert "check untitled.blend --camera Camera --level geometry" in outcome.report.read_text()
+    exported = json.loads((outcome.folder / "scene.json").read_text())
+    assert "0.25" in json.dumps(exported["objects"]), "the edit is not in the picture that was compared"
+    assert outcome.is_of(seen.camera, seen)
+    seen.camera.virtual_pinhole.distance = 61
+    bpy.context.view_layer.update()
+    assert not outcome.is_of(seen.camera, seen), "the camera has changed since"
+    assert [path.name for path in comparison.folder.iterdir()] == ["report"]
+    outcome.discard()
+    assert not comparison.folder.exists() and outcome.report is None and outcome.difference is None
+
+
+def test_a_camera_that_is_not_where_it_was_put_differs_and_then_is_mended(seen):
+    """Twice by the operator: one image, of the second comparison in the end."""
+    seen.camera.location.x += 0.01
+    bpy.context.view_layer.update()
+    assert bpy.ops.viewcam.compare_with_cycles() == {"FINISHED"}
+    first = proof.latest()
+    assert first.passed is False and "from the stated one" in first.verdict
+    image = bpy.data.images["Virtual Pinhole Difference"]
+    bytes_before = image.packed_file.data
+    assert tuple(image.size) == (64, 48)
+    seen.camera.virtual_pinhole.distance = 50
+    assert bpy.ops.viewcam.compare_with_cycles(camera="Camera") == {"FINISHED"}
+    second = proof.latest()
+    assert second.passed and not first.temporary.exists() and second.report.is_file()
+    (again,) = [each for each in bpy.data.images if each.name.startswith("Virtual Pinhole Difference")]
+    assert again.packed_file.data == second.difference.read_bytes() != bytes_before
+
+
+def test_light_is_compared_with_as_many_samples_as_said(seen, add_lamp):
+    add_lamp("POINT", energy=500)
+    seen.render.resolution_percentage = 50
+    bpy.context.view_layer.update()
+    settings = bpy.context.window_manager.virtual_pinhole_proof
+    settings.level, settings.samples, settings.clay = "DIRECT", 4, True
+    try:
+        assert bpy.ops.viewcam.compare_with_cycles() == {"FINISHED"}
+    finally:
+        for name in ("level", "said", "samples", "clay"):
+            settings.property_unset(name)
+    outcome = proof.latest()
+    assert outcome.passed, outcome.verdict
+    assert outcome.what == "Camera, frame 1, direct" and "Light, to Tracer's" in dict(outcome.rows)
+    assert "Orange where Cycles is brighter" in outcome.colours
+    assert "--samples 4 --clay" in outcome.report.read_text()
+    assert len(list(outcome.folder.glob("cycles-*.exr"))) == 2
+
+
+def test_cancelled_while_it_renders_it_leaves_no_process_and_no_file(seen):
+    seen.render.resolution_x, seen.render.resolution_y = 1920, 1080
+    bpy.context.view_layer.update()
+    before, there = state(seen), set(Path(bpy.app.tempdir).iterdir())
+    comparison = comparing.Comparison(seen.camera, seen)
+    # Blender in the child has begun when it has a temporary folder.
+    wait_for(lambda: list(comparison.folder.glob("blender_*")))
+    assert processes_of(comparison.folder)
+    comparison.cancel()
+    assert processes_of(comparison.folder) == []
+    assert set(Path(bpy.app.tempdir).iterdir()) == there and changed(before, state(seen)) == {}
+    comparison.cancel()  # twice does no harm
+
+
+def test_the_files_that_appear_tell_how_far_it_is(stand_in):
+    comparison = stand_in()
+    told = [comparison.progress()]
+    for steps, name in ((1, "cycles.exr"), (2, "scene.json"), (3, "reference.exr")):
+        comparison.let(steps)
+        wait_for((comparison.folder / "report" / name).exists)
+        told.append(comparison.progress())
+    words = ["Rendering with Cycles", "Rendering with Cycles", "Tracing", "Comparing"]
+    assert told == list(zip((0, 0.25, 0.5, 0.75), words, strict=True))
+    assert comparison.poll() is None
+    comparison.let(6)
+    outcome = wait_for(comparison.poll)
+    assert outcome.verdict == "The same picture: as told."
+    outcome.discard()
+
+
+def test_light_is_rendered_in_pictures_that_are_counted(stand_in):
+    comparison = stand_in(level="path", samples=64)
+    assert comparison.progress() == (0, "Rendering with Cycles, 1 of 8")
+    report = comparison.folder / "report"
+    report.mkdir()
+    for i in range(3):
+        (report / f"cycles-{i + 1}.exr").write_text("")
+    assert comparison.progress() == (3 / 11, "Rendering with Cycles, 4 of 8")
+    comparison.cancel()
+
+
+def test_a_report_that_is_kept_stands_in_its_folder_and_nothing_else_changes_there(stand_in, tmp_path):
+    (tmp_path / "own.txt").write_text("the artist's")
+    cancelled = stand_in(keep_in=tmp_path)
+    cancelled.let(4)
+    wait_for((cancelled.folder / "report" / "index.html").exists)
+    cancelled.cancel()
+    assert [path.name for path in tmp_path.iterdir()] == ["own.txt"]
+    comparison = stand_in(keep_in=tmp_path / "new")
+    comparison.let(6)
+    outcome = wait_for(comparison.poll)
+    assert outcome.report == tmp_path / "new" / "index.html" and not comparison.folder.exists()
+    outcome.discard()
+    assert outcome.report.is_file(), "what the artist keeps is the artist's"
+
+
+def test_where_the_report_can_not_be_kept_a_sentence_says_so(stand_in, tmp_path):
+    (tmp_path / "file").write_text("")
+    comparison = stand_in(keep_in=tmp_path / "file" / "report")
+    comparison.let(6)
+    outcome = wait_for(comparison.poll)
+    assert outcome.passed is None and "can't be kept in" in outcome.verdict and not comparison.folder.exists()
+
+
+def test_a_full_disk_leaves_no_half_of_a_report_s_file(stand_in, tmp_path, monkeypatch):
+    def copy_half(_source, target):
+        Path(target).write_bytes(b"half")
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(shutil, "copyfile", copy_half)
+    comparison = stand_in(keep_in=tmp_path / "new")
+    comparison.let(6)
+    outcome = wait_for(comparison.poll)
+    assert outcome.passed is None and "No space left" in outcome.verdict and "free some space" in outcome.verdict
+    assert list((tmp_path / "new").iterdir()) == [] and not comparison.folder.exists()
+
+
+@pytest.mark.parametrize("ends", ["another file", "the add-on"])
+def test_another_file_and_turning_the_add_on_off_end_it(stand_in, registered_addon, ends):
+    proof._running = comparison = stand_in()
+    assert not bpy.ops.viewcam.compare_with_cycles.poll(), "two at a time"
+    if ends == "another file":
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    else:
+        registered_addon.unregister()
+        registered_addon.register()
+    assert proof.running() is None and proof.latest() is None
+    assert not comparison.folder.exists() and processes_of(comparison.folder) == []
+
+
+def test_cancel_ends_it_and_keeps_what_the_last_one_came_to(stand_in):
+    comparison = stand_in()
+    comparison.let(6)
+    wait_for(lambda: comparison._family.status() is not None)
+    proof._running = comparison
+    assert proof._look() is proof.latest() and proof.running() is None
+    assert not bpy.ops.viewcam.cancel_comparison.poll()
+    proof._running = stand_in()
+    assert bpy.ops.viewcam.cancel_comparison() == {"FINISHED"}
+    assert proof.running() is None and proof.latest().report.is_file()
+
+
+def test_a_child_that_dies_is_told_with_its_last_words(monkeypatch, seen):
+    program = "import os; print('Writing: something'); print('out of memory', flush=True); os.kill(os.getpid(), 11)"
+    monkeypatch.setattr(comparing, "_command", lambda *_: [sys.executable, "-c", program])
+    with pytest.raises(RuntimeError, match="was ended by signal 11 after saying: out of memory"):
+        bpy.ops.viewcam.compare_with_cycles()
+    outcome = proof.latest()
+    assert outcome.passed is None and outcome.report is None and outcome.rows == ()
+    assert not bpy.ops.viewcam.open_report.poll() and not bpy.ops.viewcam.show_difference.poll()
+    assert list(Path(bpy.app.tempdir).glob("viewcam-*")) == []
+
+
+@pytest.mark.parametrize(
+    ("said", "status", "sentence"),
+    [
+        ("traced\nviewcam render: out.exr can't be written\nleft\n", 2, "Out.exr can't be written"),
+        ("", 3, "The process that compares ended with status 3"),
+        ("first\n\n last \n", -9, "The process that compares was ended by signal 9 after saying: last"),
+    ],
+)
+def test_the_sentence_is_the_childs_own_where_it_has_one(said, status, sentence):
+    assert comparing.failure(said, status) == sentence
+
+
+@pytest.mark.parametrize(
+    ("result", "rows"),
+    [
+        (
+            {
+                "passes": [{"name": "Position", "percentiles": {"p50": {"value": 5.23e-5}, "p99.9": {"value": 0.00276}}}],
+                "mismatches": {"kinds": {"surface": {"count": 1200, "explained": 7}, "coverage": {"count": 0, "explained": 0}}},
+                "ledger": [{"status": "exported"}, {"status": "skipped"}],
+            },
+            [
+                ("Median", "0.000052 px"),
+                ("99.9 % within", "0.0028 px"),
+                ("Mismatches", "1,200, 7 explained"),
+                ("Modelled", "1 of 2 objects"),
+            ],
+        ),
+        ({"passes": [{"name": "Position", "percentiles": {}}], "ledger": []}, [("Modelled", "0 of 0 objects")]),
+        (
+            {"quantities": [{"ratio": 1.000123, "ratio_error": 3.1e-4, "steady": None}], "ledger": []},
+            [("Light, to Tracer's", "1.00012 ± 0.00031"), ("Modelled", "0 of 0 objects")],
+        ),
+        (
+            {"quantities": [{"steady": {"percentiles": {"p50": {"value": 0.0}, "p99.9": {"value": 2e-7}}}}], "ledger": []},
+            [("Median", "0 of the light"), ("99.9 % within", "0.0000002 of the light"), ("Modelled", "0 of 0 objects")],
+        ),
+    ],
+)
+def test_the_panel_tells_the_figures_that_tell_most(result, rows):
+    assert comparing.figures(result) == rows
+
+
+def test_what_can_not_be_compared_is_refused_at_once_in_one_sentence(seen, monkeypatch):
+    there = set(Path(bpy.app.tempdir).iterdir())
+    with monkeypatch.context() as patch:
+        patch.setattr("importlib.util.find_spec", lambda name: None)
+        with pytest.raises(InputError, match="OpenEXR is missing"):
+            comparing.Comparison(seen.camera, seen)
+    other = bpy.data.scenes.new("Other")
+    with pytest.raises(InputError, match="camera 'Camera' is not in scene 'Other'"):
+        comparing.Comparison(seen.camera, other)
+    with monkeypatch.context() as patch:
+        patch.setattr(comparing, "_COPY", "no/such/folder/copy.blend")
+        with pytest.raises(RuntimeError, match="A copy of the file can't be saved"):
+            bpy.ops.viewcam.compare_with_cycles()
+    with monkeypatch.context() as patch:
+        patch.setattr(comparing, "_command", lambda *_: ["/no/such/program"])
+        with pytest.raises(RuntimeError, match="The comparison can't be started"):
+            bpy.ops.viewcam.compare_with_cycles()
+    seen.camera.data.type = "ORTHO"
+    with pytest.raises(RuntimeError, match="is orthographic, no pinhole"):
+        bpy.ops.viewcam.compare_with_cycles()
+    seen.camera = None
+    bpy.context.view_layer.objects.active = None
+    assert not bpy.ops.viewcam.compare_with_cycles.poll()
+    assert set(Path(bpy.app.tempdir).iterdir()) == there and proof.running() is None
+
+
+@pytest.mark.parametrize("compress", [False, True])
+def test_the_copy_finds_what_the_file_finds_and_the_file_keeps_its_ways(seen, tmp_path, compress):
+    """Its name, the paths in it, whether it is compressed when it is saved the next time."""
+    picture = bpy.data.images.new("Picture", 4, 4)
+    picture.filepath_raw, picture.file_format = str(tmp_path / "picture.png"), "PNG"
+    picture.save()
+    picture.use_fake_user = True
+    path = tmp_path / "scene.blend"
+    picture.filepath, picture.source = str(tmp_path / "picture.png"), "FILE"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=compress)
+    picture.filepath = "//picture.png"
+    folder = tmp_path / "elsewhere"
+    folder.mkdir()
+    seen.objects["Suzanne"].location.x = 3
+    comparing.save_copy(folder / "copy.blend")
+    assert bpy.data.filepath == str(path) and picture.filepath == "//picture.png"
+    assert comparing._is_compressed() == compress
+    magic = [each.read_bytes()[:4] for each in (path, folder / "copy.blend")]
+    assert magic[0] == magic[1] and (magic[0] == b"BLEN") != compress
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["elsewhere", "picture.png", "scene.blend"]
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "copy.blend"))
+    assert bpy.data.objects["Suzanne"].location.x == 3
+    found = bpy.data.images["Picture"].filepath
+    assert os.path.samefile(bpy.path.abspath(found), tmp_path / "picture.png")

@@ -1,0 +1,389 @@
+"""The buttons that move a camera: what each does, what it says where it can't, and that undo takes it all back."""
+
+import math
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from viewcam_addon.blender import camera as cameras
+from viewcam_addon.blender import preferences
+from viewcam_addon.blender.interface import moving, viewport
+
+POINT = (1.5, -2.25, 3.125)  # numbers that float32 holds
+
+
+@pytest.fixture
+def selected_cube(posed_camera, scene):
+    """A cube of side 2 about POINT, selected and active; the camera is the scene's."""
+    bpy.ops.mesh.primitive_cube_add(location=POINT)
+    bpy.context.view_layer.update()
+    return bpy.context.object
+
+
+@pytest.fixture
+def stated(posed_camera, scene):
+    """A function that gives the camera's stated Pinhole after checking that it is the camera that one reads."""
+
+    def get():
+        pinhole = cameras.stated(posed_camera, scene)
+        assert cameras.check(posed_camera, pinhole, scene) == []
+        return pinhole
+
+    return get
+
+
+# --- What each does ---------------------------------------------------------------------------------------------------------
+
+
+def test_looks_at_the_selections_centre(selected_cube, stated):
+    before = stated()
+    assert bpy.ops.viewcam.look_at_selection() == {"FINISHED"}
+    after = stated()
+    assert after.look_at == POINT
+    assert (after.eye, after.up, after.distance) == (before.eye, before.up, before.distance)
+
+
+def test_looks_at_the_median_of_the_vertices_if_that_is_asked_for(selected_cube, stated):
+    for vertex in selected_cube.data.vertices:
+        if vertex.co.x > 0 and not (vertex.co.y > 0 and vertex.co.z > 0):
+            vertex.co.x = -1  # seven of eight corners on the left
+    bpy.ops.viewcam.look_at_selection(centre="MEDIAN")
+    assert stated().look_at == pytest.approx((POINT[0] - 0.75, *POINT[1:]))
+    bpy.ops.viewcam.look_at_selection(centre="BOUNDS")
+    assert stated().look_at == POINT
+
+
+def test_looks_at_the_selected_vertices_in_edit_mode(selected_cube, stated):
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="DESELECT")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for vertex in selected_cube.data.vertices:
+        vertex.select = vertex.co.z > 0
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.viewcam.look_at_selection()
+    assert stated().look_at == (POINT[0], POINT[1], POINT[2] + 1)
+
+
+@pytest.mark.parametrize("mode", ["SCULPT", "VERTEX_PAINT", "WEIGHT_PAINT", "TEXTURE_PAINT"])
+def test_in_modes_that_select_nothing_the_selected_object_counts(selected_cube, stated, mode):
+    bpy.ops.object.mode_set(mode=mode)
+    assert bpy.context.mode != "OBJECT"
+    bpy.ops.viewcam.look_at_selection()
+    assert stated().look_at == POINT
+
+
+def test_looks_at_the_cursor(stated, scene):
+    scene.cursor.location = POINT
+    bpy.ops.viewcam.look_at_cursor()
+    assert stated().look_at == POINT
+
+
+def test_looks_at_the_active_object_where_its_constraints_put_it(selected_cube, stated, empty):
+    selected_cube.constraints.new("COPY_LOCATION").target = empty("There", (4, 5, 6))
+    bpy.context.view_layer.objects.active = selected_cube
+    bpy.ops.viewcam.look_at_active()
+    assert stated().look_at == (4, 5, 6)
+
+
+def test_dolly_goes_to_a_distance_and_without_one_stays_and_tells_it(stated):
+    before = stated()
+    assert bpy.ops.viewcam.dolly_camera() == {"FINISHED"}
+    assert stated() == before
+    bpy.ops.viewcam.dolly_camera(reach=2.5)
+    after = stated()
+    assert math.dist(after.eye, after.look_at) == pytest.approx(2.5, abs=64 * 2**-53)
+    assert after.look_at == before.look_at
+    np.testing.assert_allclose(after.basis(), before.basis(), atol=64 * 2**-53)
+
+
+def test_orbit_goes_to_the_right_and_up_as_the_picture_shows_it(stated):
+    before = stated()
+    u, v, _ = before.basis()
+    bpy.ops.viewcam.orbit_camera(around=0.1)
+    assert np.subtract(stated().eye, before.eye) @ u > 0.5
+    bpy.ops.viewcam.orbit_camera(around=-0.1, upwards=0.1)
+    assert np.subtract(stated().eye, before.eye) @ v > 0.5
+
+
+def test_orbit_goes_to_the_right_of_a_mirrored_picture_too(posed_camera, stated):
+    posed_camera.scale.x = -1
+    bpy.ops.viewcam.apply_camera()
+    before = stated()
+    assert before.mirrored
+    bpy.ops.viewcam.orbit_camera(around=0.1)
+    middle = before.principal_point[0]
+    assert before.project(stated().eye - 20 * before.basis()[2])[0] > middle
+
+
+def test_orbit_over_the_pole_comes_down_upside_down_and_the_camera_takes_it(stated):
+    bpy.ops.viewcam.orbit_camera(around=0.0, upwards=math.radians(120))
+    after = stated()
+    assert after.up == (0, 0, -1) and after.basis()[1][2] < 0
+    bpy.ops.viewcam.orbit_camera(around=0.0, upwards=-math.radians(120))
+    after = stated()
+    assert after.up == (0, 0, 1)
+    np.testing.assert_allclose(after.eye, (7, -6, 5), atol=4 * 10 * 2**-24)  # angles in float32, there and back
+
+
+@pytest.mark.parametrize("by", ["EYE", "DISTANCE"])
+@pytest.mark.parametrize("shift", [0.0, 0.2])
+def test_framing_puts_the_selection_inside_the_margin_and_touches_it(selected_cube, posed_camera, stated, by, shift):
+    posed_camera.data.shift_x = shift
+    bpy.context.view_layer.update()
+    before = stated()
+    bpy.ops.viewcam.frame_selection(by=by, margin=10)
+    after = stated()
+    corners = np.array([POINT + np.array([x, y, z]) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    column, row, _ = after.project(corners)
+    inside = np.array([column - 192, 1728 - column, row - 108, 972 - row])
+    assert abs(inside.min()) < 1e-9, f"the nearest corner is {inside.min():.3g} px inside the margin"
+    if by == "EYE":
+        assert after.distance == before.distance and after.eye != before.eye
+    else:
+        assert after.eye == before.eye and after.distance != before.distance
+
+
+def test_swapping_looks_back(stated):
+    bpy.ops.viewcam.swap_camera()
+    assert (stated().eye, stated().look_at) == ((0, 0, 1), (7, -6, 5))
+
+
+def test_levelling_makes_up_the_worlds_z(posed_camera, stated):
+    posed_camera.virtual_pinhole.up = (1, 0.2, 0.3)
+    bpy.ops.viewcam.level_camera()
+    assert stated().up == (0, 0, 1)
+
+
+def test_levelling_makes_up_the_axis_that_the_preferences_say(posed_camera, stated, monkeypatch):
+    monkeypatch.setattr(preferences, "get", lambda: preferences.Defaults(default_up="-Y"))
+    bpy.ops.viewcam.level_camera()
+    assert stated().up == (0, -1, 0)
+
+
+@pytest.mark.parametrize("up", [(0, 0, 1), (0, 1, 0), (1, 1, 0)])
+def test_levelling_a_view_straight_down_leaves_no_doubt(posed_camera, stated, up):
+    group = posed_camera.virtual_pinhole
+    group.eye, group.look_at, group.up = (0, 0, 9), (0, 0, 0), up
+    bpy.ops.viewcam.level_camera()
+    after = stated()
+    assert after.up == (1, 0, 0) and not after.is_singular  # the canonical axes of up = z say this up
+
+
+def test_the_view_of_the_viewport_becomes_the_cameras(posed_camera, stated):
+    view = viewport.area_in(bpy.context).spaces.active.region_3d
+    view.view_perspective, view.view_location, view.view_distance = "PERSP", (0, 3, 2), 8.0
+    view.view_rotation = (math.sqrt(0.5), math.sqrt(0.5), 0, 0)
+    bpy.ops.viewcam.adopt_view()
+    after = stated()
+    np.testing.assert_allclose(after.eye, (0, -5, 2), atol=1e-5)
+    assert (after.look_at, after.up) == ((0, 3, 2), (0, 0, 1))
+
+
+def test_the_view_through_the_camera_itself_is_where_it_stands(posed_camera, stated):
+    viewport.area_in(bpy.context).spaces.active.region_3d.view_perspective = "CAMERA"
+    posed_camera.location.x += 1
+    bpy.context.view_layer.update()
+    before = np.array(posed_camera.matrix_world)
+    bpy.ops.viewcam.adopt_view()
+    assert stated().eye == (8, -6, 5)
+    np.testing.assert_allclose(np.array(posed_camera.matrix_world), before, atol=8 * 2**-24)
+
+
+# --- A camera that is not enabled, is named, keyed or linked ----------------------------------------------------------------
+
+
+def test_a_camera_that_is_not_enabled_is_adopted_first(camera_object, scene):
+    camera_object.location = (1, 2, 3)
+    bpy.context.view_layer.update()
+    before = cameras.read(camera_object, scene)
+    bpy.ops.viewcam.dolly_camera(reach=4.0)
+    after = cameras.stated(camera_object, scene)
+    assert camera_object.virtual_pinhole.enabled
+    np.testing.assert_allclose(after.eye, (1, 2, -3), atol=32 * 2**-53)  # 10 m before it is the plane of focus
+    assert after.distance == pytest.approx(before.distance)
+
+
+def test_what_was_stated_once_does_not_bring_a_disabled_camera_back(posed_camera, scene):
+    posed_camera.virtual_pinhole.enabled = False
+    posed_camera.location = (1, 2, 30)
+    bpy.context.view_layer.update()
+    bpy.ops.viewcam.look_at_cursor()
+    assert tuple(posed_camera.virtual_pinhole.eye) == (1, 2, 30)
+
+
+def test_a_move_that_fails_enables_nothing(camera_object, scene):
+    scene.cursor.location = camera_object.location
+    with pytest.raises(RuntimeError, match="Eye and look_at are the same point"):
+        bpy.ops.viewcam.look_at_cursor()
+    assert not camera_object.virtual_pinhole.enabled
+
+
+def test_a_camera_can_be_named(posed_camera, add_camera, scene):
+    add_camera("Other")
+    bpy.ops.viewcam.swap_camera(camera="Camera")
+    assert tuple(posed_camera.virtual_pinhole.eye) == (0, 0, 1)
+
+
+def test_what_does_not_stick_is_reported(posed_camera, scene, capfd):
+    posed_camera.driver_add("location", 0).driver.expression = "1.0 + 1.0"
+    bpy.ops.viewcam.swap_camera()
+    assert "A driver sets 'location'" in capfd.readouterr().out
+
+
+def test_keyed_values_can_be_moved_and_keyed_again(posed_camera, scene):
+    group = posed_camera.virtual_pinhole
+    for frame in (1, 10):
+        group.keyframe_insert("eye", frame=frame)
+    bpy.ops.viewcam.swap_camera()
+    bpy.context.view_layer.update()
+    assert tuple(group.eye) == (0, 0, 1) and cameras.read(posed_camera, scene).eye == (0, 0, 1)
+    group.keyframe_insert("eye", frame=5)
+    scene.frame_set(10)
+    assert tuple(group.eye) == (7, -6, 5)
+    scene.frame_set(5)
+    assert cameras.read(posed_camera, scene).eye == (0, 0, 1)
+
+
+def test_a_linked_camera_is_moved_and_it_is_said_that_this_is_not_saved(posed_camera, fresh_blender, tmp_path, capfd):
+    bpy.data.libraries.write(str(tmp_path / "library.blend"), {posed_camera})
+    fresh_blender.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, target):
+        target.objects = ["Camera"]
+    linked = target.objects[0]
+    bpy.context.scene.collection.objects.link(linked)
+    bpy.context.scene.camera = linked
+    bpy.context.view_layer.update()
+    bpy.ops.viewcam.swap_camera()
+    assert tuple(linked.location) == (0, 0, 1)
+    assert "what is set here is not saved" in capfd.readouterr().out
+
+
+def test_a_held_roll_becomes_a_part_of_up(held_camera, scene, over_the_top):
+    for degrees in (-10, 0, 10, 20):
+        held_camera.virtual_pinhole.eye = over_the_top(degrees, 1.0)
+    assert abs(held_camera.virtual_pinhole.held_roll) > 1
+    bpy.context.view_layer.update()
+    before = cameras.read(held_camera, scene)
+    bpy.ops.viewcam.dolly_camera(reach=20.0)
+    after = cameras.stated(held_camera, scene)
+    assert held_camera.virtual_pinhole.held_roll == 0
+    np.testing.assert_allclose(after.basis(), before.basis(), atol=32 * 2**-24)
+    assert cameras.check(held_camera, after, scene) == []
+
+
+def test_they_keep_float64(posed_camera, scene):
+    bpy.ops.viewcam.orbit_camera(around=0.1)
+    eye = cameras.stated(posed_camera, scene).eye
+    assert posed_camera.virtual_pinhole.precision() == 2.0**-53
+    rounded = np.float32(eye).tolist()
+    assert rounded == list(posed_camera.virtual_pinhole.eye) and rounded != list(eye)
+
+
+# --- What they say ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("operator", [each.bl_idname.split(".")[1] for each in moving.CLASSES])
+def test_without_a_camera_the_buttons_are_off(fresh_blender, operator):
+    assert not getattr(bpy.ops.viewcam, operator).poll()
+
+
+@pytest.mark.parametrize(
+    ("operator", "message"),
+    [
+        ("look_at_selection", "Nothing but the camera is selected"),
+        ("frame_selection", "Nothing but the camera is selected"),
+        ("look_at_active", "No object but the camera is active"),
+    ],
+)
+def test_with_nothing_but_the_camera_the_buttons_say_what_is_missing(posed_camera, operator, message):
+    posed_camera.select_set(True)
+    bpy.context.view_layer.objects.active = posed_camera
+    assert not getattr(bpy.ops.viewcam, operator).poll()
+    with pytest.raises(RuntimeError, match=message):
+        getattr(bpy.ops.viewcam, operator)()
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: bpy.ops.viewcam.dolly_camera(reach=0.0), "give one above 0"),
+        (lambda: bpy.ops.viewcam.look_at_active(camera="Cube"), "'Cube' is no camera"),
+        (lambda: bpy.ops.viewcam.frame_selection(camera="Nobody"), "There is no camera 'Nobody'"),
+    ],
+)
+def test_errors_are_one_sentence_and_change_nothing(selected_cube, posed_camera, scene, call, message):
+    before = snapshot("Camera")
+    with pytest.raises(RuntimeError, match=message) as error:
+        call()
+    assert "Traceback" not in str(error.value)
+    assert snapshot("Camera") == before
+
+
+def test_an_orthographic_viewport_is_an_error_in_one_sentence(posed_camera):
+    viewport.area_in(bpy.context).spaces.active.region_3d.view_perspective = "ORTHO"
+    with pytest.raises(RuntimeError, match="The viewport is orthographic, no pinhole"):
+        bpy.ops.viewcam.adopt_view()
+
+
+def test_no_vertex_selected_is_an_error_in_one_sentence(selected_cube):
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="DESELECT")
+    with pytest.raises(RuntimeError, match="No vertex, control point or bone is selected"):
+        bpy.ops.viewcam.frame_selection()
+
+
+@pytest.mark.parametrize("each", moving.CLASSES)
+def test_every_button_teaches_and_can_be_undone(each):
+    assert each.bl_options == {"REGISTER", "UNDO"}
+    assert len(each.bl_description) > 30 and not each.bl_description.endswith(".")
+    properties = getattr(bpy.ops.viewcam, each.bl_idname.split(".")[1]).get_rna_type().properties
+    assert all(each.description for each in properties if each.identifier != "rna_type")
+
+
+# --- Undo -------------------------------------------------------------------------------------------------------------------
+
+
+def snapshot(name):
+    """Everything of the camera that an operator could change, bit for bit."""
+    camera_object = bpy.data.objects[name]
+    group, data = camera_object.virtual_pinhole, camera_object.data
+    values = {prop.identifier: getattr(group, prop.identifier) for prop in group.bl_rna.properties if not prop.is_readonly}
+    values |= {key: getattr(camera_object, key) for key in ("location", "rotation_euler", "scale", "matrix_world")}
+    values |= {key: getattr(data, key) for key in ("lens", "sensor_width", "sensor_height", "shift_x", "shift_y")}
+    return {key: np.array(value).tolist() for key, value in values.items()}
+
+
+@pytest.mark.parametrize(
+    ("operator", "options"),
+    [
+        ("adopt_view", {}),
+        ("look_at_selection", {}),
+        ("look_at_cursor", {}),
+        ("look_at_active", {}),
+        ("dolly_camera", {"reach": 3.0}),
+        ("orbit_camera", {"around": 0.3, "upwards": 2.0}),
+        ("frame_selection", {"by": "EYE"}),
+        ("frame_selection", {"by": "DISTANCE"}),
+        ("swap_camera", {}),
+        ("level_camera", {}),
+    ],
+)
+@pytest.mark.parametrize("enabled", [True, False])
+def test_undo_restores_values_and_camera_bit_for_bit(posed_camera, selected_cube, scene, operator, options, enabled):
+    scene.cursor.location = (0.1, 0.2, 0.3)
+    posed_camera.virtual_pinhole.up = (0.1, 0.2, 0.7)
+    posed_camera.virtual_pinhole.enabled = enabled
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="before")
+    before = snapshot("Camera")
+    getattr(bpy.ops.viewcam, operator)(**options)
+    bpy.context.view_layer.update()
+    after = snapshot("Camera")
+    assert after != before, "it did nothing"
+    bpy.ops.ed.undo_push(message="moved")
+    bpy.ops.ed.undo()
+    assert snapshot("Camera") == before
+    bpy.ops.ed.redo()
+    assert snapshot("Camera") == after

@@ -1,0 +1,144 @@
+"""Whose diagram a viewport draws, and how often its lines are made.
+
+What it looks like, and that the mouse can drag it, is looked at in tests/real_blender/handles_in_a_window.py.
+"""
+
+import ast
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from viewcam_addon.blender.interface import overlay, viewport
+
+SOURCES = Path(overlay.__file__).parents[1]
+
+
+@pytest.fixture
+def shown(posed_camera, scene, monkeypatch):
+    """The context in which Blender draws a 3D viewport that shows the camera, which is active and not selected."""
+    space = viewport.area_in(bpy.context).spaces.active
+    monkeypatch.setattr(space.overlay, "show_overlays", True)
+    layer = bpy.context.view_layer
+    layer.objects.active = posed_camera
+    return SimpleNamespace(space_data=space, region_data=space.region_3d, scene=scene, view_layer=layer)
+
+
+def test_the_active_camera_has_its_diagram(shown, posed_camera):
+    assert overlay._cameras(shown) == [posed_camera]
+
+
+def test_the_selected_cameras_have_theirs_once_each(shown, posed_camera, add_camera):
+    for name in ("Second", "Third", "Unselected"):
+        add_camera(name).virtual_pinhole.enabled = True
+    for name in ("Camera", "Second", "Third"):
+        bpy.data.objects[name].select_set(True)
+    assert sorted(block.name for block in overlay._cameras(shown)) == ["Camera", "Second", "Third"]
+
+
+def _not_enabled(shown, camera):
+    camera.virtual_pinhole.enabled = False
+
+
+def _not_wanted(shown, camera):
+    camera.virtual_pinhole.show_overlay = False
+
+
+def _hidden(shown, camera):
+    camera.hide_set(True)
+
+
+def _excluded(shown, camera):
+    collection = bpy.data.collections.new("Elsewhere")
+    shown.scene.collection.children.link(collection)
+    collection.objects.link(camera)
+    shown.scene.collection.objects.unlink(camera)
+    shown.view_layer.layer_collection.children["Elsewhere"].exclude = True
+
+
+def _no_overlays(shown, camera):
+    shown.space_data.overlay.show_overlays = False
+
+
+def _looked_through(shown, camera):
+    shown.region_data = SimpleNamespace(view_perspective="CAMERA")
+
+
+def _another_is_active(shown, camera):
+    other = bpy.data.objects.new("Other", None)
+    shown.scene.collection.objects.link(other)
+    shown.view_layer.objects.active = other
+
+
+@pytest.mark.parametrize(
+    "hide", [_not_enabled, _not_wanted, _hidden, _excluded, _no_overlays, _looked_through, _another_is_active]
+)
+def test_no_diagram(shown, posed_camera, hide):
+    hide(shown, posed_camera)
+    bpy.context.view_layer.update()
+    assert overlay._cameras(shown) == []
+
+
+def test_a_view_through_another_camera_shows_this_one(shown, posed_camera, add_camera, monkeypatch):
+    other = add_camera("Other")
+    shown.region_data = SimpleNamespace(view_perspective="CAMERA")
+    assert overlay._cameras(shown) == [posed_camera]
+    monkeypatch.setattr(shown.space_data, "use_local_camera", True)
+    shown.space_data.camera = posed_camera
+    assert overlay._cameras(shown) == []
+    shown.space_data.camera = other
+    assert overlay._cameras(shown) == [posed_camera]
+
+
+def test_what_is_drawn_is_what_the_values_ask_for(shown, posed_camera):
+    posed_camera.location = (0, 0, 0)  # the camera was moved away from its values
+    ((pinhole, up, share),) = overlay._figures(shown)
+    assert pinhole.eye == (7, -6, 5) and up == (0, 0, 1) and share == posed_camera.virtual_pinhole.plane_at
+    assert (pinhole.width, pinhole.height) == (1920, 1080)
+
+
+def test_values_that_make_no_camera_have_no_diagram(shown, posed_camera):
+    posed_camera.virtual_pinhole.look_at = posed_camera.virtual_pinhole.eye
+    assert list(overlay._figures(shown)) == []
+
+
+def test_lines_are_made_again_only_where_something_changed(shown, posed_camera):
+    def made():
+        before = overlay._diagram.cache_info().misses
+        for figure in overlay._figures(shown):
+            overlay._diagram(*figure)
+        return overlay._diagram.cache_info().misses - before
+
+    made()
+    assert [made() for _ in range(20)] == [0] * 20
+    posed_camera.virtual_pinhole.eye[0] = 7.123
+    assert [made() for _ in range(3)] == [1, 0, 0]
+    shown.scene.render.resolution_x = 1919
+    assert [made() for _ in range(3)] == [1, 0, 0]
+    posed_camera.virtual_pinhole.plane_at = 0.25
+    assert [made() for _ in range(3)] == [1, 0, 0]
+    posed_camera.data.dof.focus_distance = 3
+    assert made() == 0, "the plane of focus is not drawn"
+
+
+def test_nothing_is_left_behind(registered_addon):
+    assert len(overlay._handlers) == 2
+    overlay.unregister()
+    try:
+        assert not overlay._handlers and overlay._diagram.cache_info().currsize == 0
+    finally:
+        overlay.register()
+
+
+def test_the_graphics_card_is_left_alone_until_something_is_drawn():
+    """Without a window there is none; gpu and blf are imported by the functions that draw alone."""
+    for path in SOURCES.rglob("*.py"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        functions = [each for each in ast.walk(tree) if isinstance(each, ast.FunctionDef)]
+        late = {line for each in functions for line in range(each.lineno, each.end_lineno + 1)}
+        for each in ast.walk(tree):
+            if isinstance(each, (ast.Import, ast.ImportFrom)):
+                names = {getattr(each, "module", None), *(name.name for name in each.names)}
+                assert not names & {"gpu", "gpu_extras.batch", "blf"} or each.lineno in late, f"{path.name}:{each.lineno}"

@@ -1,0 +1,309 @@
+from types import SimpleNamespace
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from viewcam_addon.blender import camera as cameras
+from viewcam_addon.blender import datablocks
+from viewcam_addon.blender.interface import clipboard, moving, panel
+
+
+def contents(camera_object, scene):
+    bpy.context.view_layer.update()
+    warnings = [notice.sentence for notice in panel.notices(camera_object, scene)]
+    return {row.label: " ".join(row.shown) for row in panel.shown(camera_object, scene)}, warnings
+
+
+def test_a_camera_that_is_well_shows_its_read_outs_and_no_warning(posed_camera, scene):
+    rows, warnings = contents(posed_camera, scene)
+    assert warnings == []
+    assert rows["Focal Length"] == "28.125 mm"
+    assert rows["To Look-At"] == "10.0499 m"
+    angles = ["Horizontal FOV", "Vertical FOV", "Diagonal FOV"]
+    assert list(rows) == ["Focal Length", "View Plane", *angles, "u", "v", "w", "To Look-At"]
+
+
+def test_a_camera_that_is_not_enabled_shows_what_it_is(camera_object, scene):
+    rows, warnings = contents(camera_object, scene)
+    assert rows["Focal Length"] == "50 mm"
+    assert "To Look-At" not in rows
+    assert warnings == []
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "warning"),
+    [
+        ("look_at", (7, -6, 5), "Eye and look_at are the same point"),
+        ("up", (0, 0, 0), "Up is (0, 0, 0)"),
+        ("distance", 0.0, "Distance is 0 pixels"),
+    ],
+)
+def test_values_that_make_no_camera_are_shown_as_the_sentence_of_their_error(posed_camera, scene, name, value, warning):
+    setattr(posed_camera.virtual_pinhole, name, value)
+    _, warnings = contents(posed_camera, scene)
+    assert len(warnings) == 1
+    assert warnings[0].startswith(warning)
+
+
+def test_a_singular_pose_is_warned_of(posed_camera, scene):
+    posed_camera.virtual_pinhole.eye = (0, 0, 9)
+    assert "parallel to up" in contents(posed_camera, scene)[1][0]
+
+
+def test_an_orthographic_camera_is_warned_of_once(posed_camera, scene):
+    posed_camera.data.type = "ORTHO"
+    rows, warnings = contents(posed_camera, scene)
+    assert rows == {}
+    assert warnings == ["Camera 'Camera' is orthographic, no pinhole: set its lens type to Perspective"]
+
+
+def test_a_sheared_camera_is_warned_of_once(posed_camera, scene):
+    parent = bpy.data.objects.new("Stretched", None)
+    scene.collection.objects.link(parent)
+    parent.scale = (1, 1, 3)
+    posed_camera.parent = parent
+    rows, warnings = contents(posed_camera, scene)
+    assert rows == {}
+    assert len(warnings) == 1
+
+
+def test_what_is_more_than_a_pinhole_is_warned_of(posed_camera, scene):
+    posed_camera.data.dof.use_dof = scene.render.use_multiview = scene.render.use_motion_blur = True
+    _, warnings = contents(posed_camera, scene)
+    assert [warning.split(" is on")[0] for warning in warnings] == ["Depth of field", "Stereoscopy", "Motion blur"]
+
+
+def test_the_distance_to_look_at_is_in_the_scenes_units(posed_camera, scene):
+    scene.unit_settings.system = "NONE"
+    assert contents(posed_camera, scene)[0]["To Look-At"] == "10.0499"
+
+
+def test_the_panel_means_the_active_camera_else_the_scenes(posed_camera, add_camera, scene):
+    other = add_camera("Other")
+    scene.camera = posed_camera
+    bpy.context.view_layer.objects.active = None
+    assert datablocks.camera_in(bpy.context) == posed_camera
+    bpy.context.view_layer.objects.active = other
+    assert datablocks.camera_in(bpy.context) == other
+
+
+def test_an_up_in_doubt_comes_with_a_better_one_and_a_certain_one_does_not(posed_camera, scene):
+    def remedies():
+        bpy.context.view_layer.update()
+        return [notice.remedy for notice in panel.notices(posed_camera, scene)]
+
+    assert remedies() == []
+    group = posed_camera.virtual_pinhole
+    group.eye, group.look_at = (0.5, 0.25, 5), (0.5, 0.25, 0)
+    assert remedies() == [("viewcam.choose_up", "Use Up (1, 0, 0)")]
+    group.look_at = group.eye
+    assert remedies() == [None]
+
+
+def test_the_camera_datas_panel_stays_away_from_the_data_of_a_lamp(posed_camera):
+    shown = [
+        panel.VIEWCAM_PT_data.poll(SimpleNamespace(camera=data, active_object=posed_camera))
+        for data in (posed_camera.data, None)
+    ]
+    assert shown == [True, False]
+
+
+class Layout:
+    """Stands in for Blender's, which draws in a window only: keeps what all layouts inside it draw, in order.
+
+    drawn : ("prop" | "operator" | "label", its name or text, what else was said, the layout that drew it).
+    """
+
+    def __init__(self, drawn=None, above=None):
+        self.drawn, self.above = [] if drawn is None else drawn, above
+        self.active = self.enabled = True
+        self.alert = self.use_property_split = self.use_property_decorate = False
+        self.alignment = "EXPAND"
+
+    def row(self, **_look):
+        return Layout(self.drawn, self)
+
+    column = split = row
+
+    def separator(self):
+        pass
+
+    def _draw(self, kind, name, look):
+        unknown = set(look) - set(bpy.types.UILayout.bl_rna.functions[kind].parameters.keys())
+        assert not unknown, f"this Blender's {kind}() does not take {unknown}"
+        properties = SimpleNamespace()
+        self.drawn.append((kind, name, look, self, properties))
+        return properties
+
+    def label(self, text, **look):
+        self._draw("label", text, look)
+
+    def prop(self, owner, name, **look):
+        assert name in owner.bl_rna.properties, f"{owner} has no {name}"
+        self._draw("prop", name, look)
+
+    def operator(self, name, **look):
+        return self._draw("operator", name, look)
+
+    def is_all(self, name):
+        """Whether this layout and all around it are active, or enabled."""
+        return getattr(self, name) and (self.above is None or self.above.is_all(name))
+
+
+def drawn(each, width=300):
+    """What a panel draws for the camera that is shown."""
+    layout = Layout()
+    context = SimpleNamespace(
+        scene=bpy.context.scene,
+        active_object=bpy.context.active_object,
+        region=SimpleNamespace(width=width),
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
+    )
+    each.draw(SimpleNamespace(layout=layout), context)
+    return layout.drawn
+
+
+def properties_drawn(each):
+    return {name: layout for kind, name, _, layout, _ in drawn(each) if kind == "prop"}
+
+
+def test_both_panels_have_closed_sub_panels(posed_camera):
+    for each, parent in (
+        (panel.VIEWCAM_PT_data_move, "VIEWCAM_PT_data"),
+        (panel.VIEWCAM_PT_data_readouts, "VIEWCAM_PT_data"),
+        (panel.VIEWCAM_PT_sidebar_move, "VIEWCAM_PT_sidebar"),
+        (panel.VIEWCAM_PT_sidebar_readouts, "VIEWCAM_PT_sidebar"),
+    ):
+        assert each.bl_parent_id == parent and "DEFAULT_CLOSED" in each.bl_options and each.poll(bpy.context)
+
+
+def test_the_sub_panel_has_every_move_for_the_camera_that_is_shown(posed_camera):
+    buttons = [each for each in drawn(panel.VIEWCAM_PT_sidebar_move) if each[0] == "operator"]
+    assert {name for _, name, *_ in buttons} == {each.bl_idname for each in moving.CLASSES}
+    icons = bpy.types.UILayout.bl_rna.functions["operator"].parameters["icon"].enum_items
+    for _, name, look, _, properties in buttons:
+        assert properties.camera == "Camera"
+        known = getattr(bpy.ops.viewcam, name.split(".")[1]).get_rna_type().properties
+        assert set(vars(properties)) <= set(known.keys()), f"{name} knows not all of {vars(properties)}"
+        assert look.get("icon", "NONE") in icons
+
+
+def test_every_value_has_its_row_and_the_roll_is_the_one_that_counts(posed_camera):
+    always = ["eye", "eye_target", "look_at", "look_at_target", "up", "distance", "zoom", "keeps"]
+    assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "roll", "pole"]
+    posed_camera.virtual_pinhole.pole = "HOLD"
+    assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "held_roll", "hold_within", "pole"]
+
+
+def test_what_is_not_enabled_is_greyed_and_can_be_edited(posed_camera):
+    posed_camera.virtual_pinhole.enabled = False
+    for name, layout in properties_drawn(panel.VIEWCAM_PT_sidebar).items():
+        assert not layout.is_all("active") and layout.is_all("enabled"), name
+
+
+def test_a_point_that_follows_a_target_can_not_be_edited(posed_camera, empty):
+    posed_camera.virtual_pinhole.look_at_target = empty("Target")
+    locked = [name for name, layout in properties_drawn(panel.VIEWCAM_PT_data).items() if not layout.is_all("enabled")]
+    assert locked == ["look_at"]
+
+
+def test_apply_again_is_marked_where_it_mends_and_only_there(posed_camera, scene):
+    def is_marked():
+        bpy.context.view_layer.update()
+        (layout,) = (each[3] for each in drawn(panel.VIEWCAM_PT_data) if each[1] == "viewcam.apply_camera")
+        return layout.alert
+
+    assert not is_marked()
+    for change in (("location", (1, 2, 3)), ("rotation_euler", (1, 2, 3))):
+        setattr(posed_camera, *change)
+        assert is_marked()
+        bpy.ops.viewcam.apply_camera(camera=posed_camera.name)
+        assert not is_marked()
+    posed_camera.data.lens = 50
+    assert is_marked()
+    bpy.ops.viewcam.apply_camera(camera=posed_camera.name)
+    posed_camera.constraints.new("LIMIT_LOCATION").use_min_z = True
+    posed_camera.constraints[0].min_z = 9
+    assert not is_marked()
+    assert any("moves 'Camera'" in notice.sentence for notice in panel.notices(posed_camera, scene))
+
+
+def test_a_notice_is_drawn_in_lines_that_fit_and_with_its_remedy_below(posed_camera):
+    posed_camera.virtual_pinhole.eye = (0, 0, 5)
+    found = drawn(panel.VIEWCAM_PT_sidebar, 200)
+    lines = [(name, look["icon"]) for kind, name, look, *_ in found if kind == "label"]
+    assert " ".join(line for line, _ in lines).startswith("The view is parallel to up")
+    assert [icon for _, icon in lines] == ["ERROR"] + ["BLANK1"] * (len(lines) - 1) and len(lines) > 2
+    assert found[-1][:2] == ("operator", "viewcam.choose_up") and found[-1][4].camera == "Camera"
+
+
+def test_each_read_out_has_a_button_that_copies_it(posed_camera):
+    found = drawn(panel.VIEWCAM_PT_data_readouts)
+    buttons = [properties for kind, _, _, _, properties in found if kind == "operator"]
+    assert [button.label for button in buttons] == [row.label for row in panel.shown(posed_camera, bpy.context.scene)]
+    assert buttons[-1].label == "To Look-At" and float(buttons[-1].text) == pytest.approx(10.0499, abs=1e-4)
+
+
+def test_the_tooltip_of_a_copy_button_shows_what_is_copied():
+    said = SimpleNamespace(label="u", text="(1.0, 0.0, 0.0)")
+    described = clipboard.VIEWCAM_OT_copy_readout.description(bpy.context, said)
+    assert described == f"{clipboard.VIEWCAM_OT_copy_readout.bl_description}: (1.0, 0.0, 0.0)"
+    assert bpy.ops.viewcam.copy_readout(label="u", text="(1.0, 0.0, 0.0)") == {"FINISHED"}
+
+
+def test_drawing_states_the_camera_once_and_reads_it_once_for_the_read_outs(posed_camera, monkeypatch):
+    """With 10,000 frames of a held roll, stating it costs 30 ms."""
+    calls = []
+    for name in ("stated", "read"):
+        real = getattr(cameras, name)
+        monkeypatch.setattr(cameras, name, lambda *given, name=name, real=real: calls.append(name) or real(*given))
+    drawn(panel.VIEWCAM_PT_data)
+    assert sorted(calls) == ["read", "stated"]
+    calls.clear()
+    drawn(panel.VIEWCAM_PT_data_readouts)
+    assert calls == ["read"]
+
+
+def test_drawing_looks_at_no_other_camera(posed_camera, add_camera, monkeypatch):
+    bpy.context.view_layer.objects.active = posed_camera
+    for i in range(20):
+        add_camera(f"Other {i}").virtual_pinhole.enabled = True
+    bpy.context.view_layer.update()
+    looked_at = set()
+    for name in ("stated", "read"):
+        real = getattr(cameras, name)
+        monkeypatch.setattr(cameras, name, lambda block, *given, real=real: looked_at.add(block.name) or real(block, *given))
+    for each in (panel.VIEWCAM_PT_data, panel.VIEWCAM_PT_data_readouts):
+        drawn(each)
+    assert looked_at == {"Camera"}
+
+
+GERMAN = {
+    "Use Up {up}": "Oben wird {up}",
+    "The view is parallel to up, and the roll is undefined: the axes are the canonical ones": "Senkrecht",
+}
+
+
+def test_what_is_made_of_pieces_is_translated_before_the_pieces_go_in(posed_camera, monkeypatch):
+    posed_camera.virtual_pinhole.eye = (0, 0, 5)
+    monkeypatch.setattr(panel, "iface", lambda text: GERMAN.get(text, text))
+    found = drawn(panel.VIEWCAM_PT_data)
+    assert found[-1][2] == {"text": "Oben wird (1, 0, 0)", "translate": False}
+    assert ("label", "Senkrecht", {"icon": "ERROR", "translate": False}) in [each[:3] for each in found]
+
+
+def test_numbers_are_never_translated(posed_camera):
+    rows = {text for row in panel.shown(posed_camera, bpy.context.scene) for text in row.shown}
+    found = drawn(panel.VIEWCAM_PT_data_readouts)
+    untranslated = {name for kind, name, look, *_ in found if kind == "label" and look.get("translate") is False}
+    assert untranslated == rows
+
+
+def test_every_property_and_operator_has_a_tooltip_without_the_dot_that_blender_adds():
+    properties = bpy.types.Object.bl_rna.properties["virtual_pinhole"].fixed_type.properties
+    described = [each for each in properties if not each.is_hidden and each.identifier not in ("rna_type", "name")]
+    described += [getattr(bpy.ops.viewcam, name).get_rna_type() for name in dir(bpy.ops.viewcam)]
+    for each in described:
+        text = each.description
+        assert len(text) > 20 and text[0].isupper() and not text.endswith("."), f"{each.identifier}: {text!r}"

@@ -1,0 +1,36 @@
+from types import SimpleNamespace
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+import viewcam_addon
+from viewcam_addon.blender.interface import baking, clipboard, moving, operators, view_menu
+
+
+def test_every_button_of_a_camera_stands_in_the_menu_which_the_search_reads(registered_addon):
+    entries = []
+    layout = SimpleNamespace(operator=entries.append, separator=lambda: None)
+    view_menu.VIEWCAM_MT_cameras.draw(SimpleNamespace(layout=layout), bpy.context)
+    rooms = (moving, operators, baking, clipboard)
+    assert set(entries) == {each.bl_idname for room in rooms for each in room.CLASSES}
+    assert all(getattr(bpy.ops.viewcam, entry.split(".")[1]).get_rna_type() for entry in entries)
+
+
+def test_the_menu_stands_under_view_cameras(registered_addon):
+    menus = []
+    layout = SimpleNamespace(menu=menus.append, separator=lambda: None)
+    view_menu._draw(SimpleNamespace(layout=layout), bpy.context)
+    assert menus == ["VIEWCAM_MT_cameras"] and hasattr(bpy.types, menus[0])
+    assert view_menu._draw in bpy.types.VIEW3D_MT_view_cameras._dyn_ui_initialize()
+
+
+def test_the_menu_goes_with_the_add_on(registered_addon):
+    functions = bpy.types.VIEW3D_MT_view_cameras._dyn_ui_initialize
+    count = len(functions())
+    viewcam_addon.unregister()
+    try:
+        assert len(functions()) == count - 1 and not hasattr(bpy.types, "VIEWCAM_MT_cameras")
+    finally:
+        viewcam_addon.register()
+    assert len(functions()) == count

@@ -1,0 +1,296 @@
+"""Cycles' settings are borrowed: given back whatever happens, and right while they last."""
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from viewcam_addon.blender.borrowing import borrowed
+from viewcam_addon.blender.rendering import cycles, job
+from viewcam_addon.blender.scenes import depsgraph, indices
+from viewcam_addon.errors import InputError
+
+# What describes the settings, what follows from them, and brushes (reading some of them crashes 4.2).
+NO_SETTINGS = {"rna_type", "is_evaluated", "depsgraph", "tool_settings"}
+
+
+def dump(block, depth=4):
+    """All that can be read of a datablock's own settings, nested and as text, without following other datablocks."""
+    found = {}
+    for prop in block.bl_rna.properties:
+        name = prop.identifier
+        if name in NO_SETTINGS:
+            continue
+        value = getattr(block, name)
+        if prop.type not in ("POINTER", "COLLECTION"):
+            found[name] = repr(value[:]) if getattr(prop, "is_array", False) else repr(value)
+        elif prop.type == "COLLECTION" and depth:
+            found[name] = [item.name if isinstance(item, bpy.types.ID) else dump(item, depth - 1) for item in value]
+        elif isinstance(value, bpy.types.ID):
+            found[name] = value.name
+        elif isinstance(value, bpy.types.bpy_struct) and depth:
+            found[name] = dump(value, depth - 1)
+    return found
+
+
+def state(scene):
+    """Everything of the file that a render of it may have touched."""
+    return {
+        "scene": dump(scene),
+        "objects": {block.name: dump(block, 2) for block in bpy.data.objects},
+        "cameras": {block.name: dump(block, 2) for block in bpy.data.cameras},
+        "materials": {block.name: dump(block, 2) for block in bpy.data.materials},
+        "lights": {block.name: dump(block, 2) for block in bpy.data.lights},
+        "worlds": {block.name: dump(block, 2) for block in bpy.data.worlds},
+        "trees": {
+            block.name: [dump(node, 0) for node in block.node_tree.nodes]
+            for block in (*bpy.data.materials, *bpy.data.lights, *bpy.data.worlds)
+            if block.node_tree
+        },
+        "names": [[block.name for block in blocks] for blocks in (bpy.data.materials, bpy.data.scenes, bpy.data.meshes)],
+        "frame": (scene.frame_current, scene.frame_subframe),
+    }
+
+
+def differences(before, after, path=""):
+    if isinstance(before, dict) and isinstance(after, dict):
+        for key in before.keys() | after.keys():
+            yield from differences(before.get(key), after.get(key), f"{path}.{key}")
+    elif isinstance(before, list) and isinstance(after, list) and len(before) == len(after):
+        for number, (one, other) in enumerate(zip(before, after, strict=True)):
+            yield from differences(one, other, f"{path}[{number}]")
+    elif before != after:
+        yield f"{path}: {before!r} became {after!r}"
+
+
+@pytest.fixture
+def crowded(scene, camera_object):
+    """A scene that has everything switched the way a comparison does not want it."""
+    camera_object.location = (0, 0, 8)
+    camera_object.data.dof.use_dof = True
+    bpy.ops.mesh.primitive_monkey_add()
+    monkey = bpy.context.object
+    bpy.ops.object.shade_smooth()
+    subdivision = monkey.modifiers.new("Subdivision", "SUBSURF")
+    subdivision.render_levels = 1
+    if hasattr(subdivision, "use_adaptive_subdivision"):
+        subdivision.use_adaptive_subdivision = True
+    else:
+        scene.cycles.feature_set, monkey.cycles.use_adaptive_subdivision = "EXPERIMENTAL", True
+    glass = bpy.data.materials.new("Glass")
+    glass.use_nodes = True
+    shader = glass.node_tree.nodes["Principled BSDF"]
+    shader.inputs["Alpha"].default_value = 0.3
+    bump = glass.node_tree.nodes.new("ShaderNodeBump")
+    glass.node_tree.links.new(bump.outputs[0], shader.inputs["Normal"])
+    monkey.data.materials.append(glass)
+    monkey.data.materials.append(None)
+    bpy.ops.mesh.primitive_cube_add(location=(2, 0, 0))
+    bpy.context.object.is_holdout = bpy.context.object.is_shadow_catcher = True
+    bpy.ops.mesh.primitive_uv_sphere_add(location=(-2, 0, 0))
+    world = bpy.data.worlds.new("Fog")
+    world.use_nodes = True
+    output = world.node_tree.nodes.get("World Output") or world.node_tree.nodes.new("ShaderNodeOutputWorld")
+    world.node_tree.links.new(world.node_tree.nodes.new("ShaderNodeVolumeScatter").outputs[0], output.inputs["Volume"])
+    world.cycles.max_bounces = 3
+    scene.world = world
+    lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "AREA"))
+    scene.collection.objects.link(lamp)
+    lamp.location, lamp.data.spread = (0, 0, 5), 1.0
+    lamp.data.cycles.max_bounces, lamp.data.cycles.use_multiple_importance_sampling = 3, False
+    lamp.light_linking.receiver_collection = bpy.data.collections.new("Receivers")
+    if not lamp.data.node_tree:
+        lamp.data.use_nodes = True
+    tree = lamp.data.node_tree
+    emission = next(node for node in tree.nodes if node.type == "EMISSION")
+    tree.links.new(tree.nodes.new("ShaderNodeLightFalloff").outputs["Linear"], emission.inputs["Strength"])
+    held_out = bpy.data.collections.new("Held out")
+    scene.collection.children.link(held_out)
+    scene.view_layers[0].layer_collection.children["Held out"].holdout = True
+    scene.view_layers[0].use_pass_mist = True
+    scene.view_layers.new("Other")
+    render = scene.render
+    render.resolution_x, render.resolution_y, render.resolution_percentage = 160, 120, 50
+    render.use_border, render.border_min_x, render.border_max_x = True, 0.1, 0.9
+    render.use_motion_blur = render.use_multiview = render.use_simplify = render.use_stamp = render.use_persistent_data = True
+    render.use_freestyle = False
+    render.filepath, render.film_transparent = "//never/####", True
+    scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.pixel_filter_type = 77, True, "GAUSSIAN"
+    scene.cycles.use_camera_cull = scene.cycles.use_animated_seed = True
+    scene.cycles.caustics_reflective, scene.cycles.film_exposure, scene.cycles.seed = False, 0.5, 5
+    scene.frame_set(7)
+    return scene
+
+
+@pytest.mark.parametrize("file_format", ["PNG", "JPEG", "OPEN_EXR", "OPEN_EXR_MULTILAYER", "FFMPEG"])
+@pytest.mark.parametrize("engine", ["CYCLES", "EEVEE", "BLENDER_WORKBENCH"])
+def test_everything_borrowed_is_given_back(crowded, both_sides, engine, file_format):
+    if engine == "EEVEE":
+        engine = "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0) else "BLENDER_EEVEE"
+    crowded.render.engine = engine
+    settings = crowded.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = {"OPEN_EXR_MULTILAYER": "MULTI_LAYER_IMAGE", "FFMPEG": "VIDEO"}.get(file_format, "IMAGE")
+    settings.file_format = file_format
+    if file_format == "PNG":
+        settings.color_mode, settings.color_depth, settings.compression = "RGBA", "16", 33
+    if file_format == "OPEN_EXR":
+        settings.color_depth, settings.exr_codec = "16", "DWAA"
+    crowded.render.resolution_x, crowded.render.resolution_y = 160, 120
+    before = state(crowded)
+    both_sides()
+    assert not (changed := list(differences(before, state(crowded)))), "\n".join(changed)
+
+
+@pytest.mark.parametrize("request_", [{}, {"clay": True}, {"recenter": True}], ids=str)
+def test_everything_borrowed_for_light_is_given_back(crowded, tmp_path, request_):
+    crowded.render.image_settings.file_format = "PNG"
+    before = state(crowded)
+    paths = [tmp_path / "first.exr", tmp_path / "second.exr"]
+    exported = job.export_and_render(job.Request(level="path", samples=4, threads=2, **request_), paths)
+    assert not (changed := list(differences(before, state(crowded)))), "\n".join(changed)
+    assert all(path.stat().st_size > 1000 for path in paths) and paths[0].read_bytes() != paths[1].read_bytes()
+    told = {entry.object: entry.reason for entry in exported.ledger}
+    assert "spread" in told["Lamp"] and "light linking" in told["Lamp"] and "has a volume" in told["Fog"]
+
+
+@pytest.fixture
+def settings_of_renders(monkeypatch):
+    """What of Cycles' settings each render is made with, in place of rendering."""
+    seen = []
+
+    def look(scene, to_file):
+        names = ("samples", "seed", "max_bounces", "diffuse_bounces", "pixel_filter_type", "film_exposure")
+        seen.append({name: getattr(scene.cycles, name) for name in names})
+        seen[-1]["passes"] = {
+            f"use_pass_{name}" for name in ("z", "emit", "position") if getattr(scene.view_layers[0], f"use_pass_{name}")
+        }
+
+    monkeypatch.setattr(cycles, "render_still", look)
+    monkeypatch.setattr(cycles, "is_whole", lambda path: path.touch() is None)
+    return seen
+
+
+def test_pictures_of_light_share_samples_and_count_seeds(scene, camera_object, tmp_path, settings_of_renders):
+    scene.cycles.max_bounces, scene.cycles.diffuse_bounces, scene.cycles.film_exposure = 9, 3, 2.0
+    scene.cycles.pixel_filter_type = "BOX"
+    paths = [tmp_path / f"{number}.exr" for number in range(3)]
+    job.export_and_render(job.Request(level="path", samples=48, seed=7), paths)
+    first = 0 if hasattr(scene.cycles, "sample_subset_length") else 1  # before 4.4 the first sample is not counted
+    assert [each["samples"] for each in settings_of_renders] == [17 - first] * 3
+    assert [each["seed"] for each in settings_of_renders] == [7, 8, 9]
+    assert settings_of_renders[0]["max_bounces"] == 9 and settings_of_renders[0]["diffuse_bounces"] == 3
+    assert settings_of_renders[0]["pixel_filter_type"] == "BOX" and settings_of_renders[0]["film_exposure"] == 2.0
+    assert settings_of_renders[0]["passes"] == {"use_pass_emit"}, "what is at the centre needs the first sample"
+
+
+def test_direct_light_has_no_bounces_and_one_sample_is_the_centre(scene, camera_object, tmp_path, settings_of_renders):
+    job.export_and_render(job.Request(level="direct", samples=1), [tmp_path / "picture.exr"])
+    (seen,) = settings_of_renders
+    assert (seen["samples"], seen["max_bounces"], seen["diffuse_bounces"]) == (1, 0, 0)
+    assert seen["pixel_filter_type"] == "BLACKMAN_HARRIS" and seen["passes"] == {"use_pass_emit", "use_pass_z"}
+
+
+def test_the_level_is_the_least_where_it_is_left_to_the_scene(scene, camera_object, tmp_path, settings_of_renders):
+    bpy.ops.mesh.primitive_cube_add()
+    scene.world = None
+    exported = job.export_and_render(job.Request(level="auto"), [tmp_path / "dark.exr"])
+    assert settings_of_renders[-1]["passes"] >= {"use_pass_position"} and not exported.lamps
+    scene.collection.objects.link(bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN")))
+    exported = job.export_and_render(job.Request(level="auto"), [tmp_path / "lit.exr"])
+    assert settings_of_renders[-1]["max_bounces"] == exported.bounces.total and exported.lamps
+
+
+def test_everything_is_given_back_after_an_error(crowded, camera_object, tmp_path, monkeypatch):
+    crowded.render.image_settings.file_format = "OPEN_EXR"
+    before = state(crowded)
+
+    def fail(*_arguments, **_options):
+        raise RuntimeError("Error: out of everything")
+
+    monkeypatch.setattr(cycles, "render_still", fail)
+    with pytest.raises(RuntimeError, match="out of everything"):
+        cycles.render(crowded, crowded.view_layers[0], camera_object, tmp_path / "picture.exr")
+    assert not (changed := list(differences(before, state(crowded)))), "\n".join(changed)
+    assert not list(tmp_path.iterdir()), "a partial file remains"
+
+
+def test_a_change_is_seen_by_the_dump(crowded):
+    """The tests above must be able to fail."""
+    before = state(crowded)
+    crowded.render.image_settings.color_mode = "BW"
+    crowded.cycles.samples = 78
+    bpy.data.objects["Cube"].pass_index = 1
+    bpy.data.materials["Glass"].node_tree.nodes["Principled BSDF"].mute = True
+    changed = [each.partition(":")[0] for each in differences(before, state(crowded))]
+    assert len(changed) >= 4, changed
+
+
+def test_a_loan_is_given_back_in_reverse_even_when_giving_back_fails(scene):
+    scene.cycles.samples = 5
+    order = []
+
+    def fail():
+        order.append("failed")
+        raise ValueError("gone")
+
+    with pytest.raises(ValueError, match="gone"), borrowed() as borrow:
+        borrow.set(scene.cycles, "samples", 1)
+        borrow.afterwards(fail)
+        borrow.afterwards(order.append, "first")
+    assert order == ["first", "failed"] and scene.cycles.samples == 5
+
+
+def test_an_error_in_the_visit_of_a_depsgraph_is_raised_and_the_engine_given_back(scene, camera_object):
+    scene.render.engine = "CYCLES"
+
+    def fail(_depsgraph):
+        raise InputError("nobody is here: come back later")
+
+    with pytest.raises(InputError, match="nobody is here"):
+        depsgraph.visit(scene, fail)
+    assert scene.render.engine == "CYCLES"
+    assert not hasattr(bpy.types, "VIEWCAM_VISITOR") and depsgraph.visit(scene, lambda graph: graph.mode) == "RENDER"
+
+
+def test_a_scene_without_a_camera_can_not_be_rendered_and_says_why(scene):
+    with pytest.raises(InputError, match="can't render scene 'Scene'"):
+        depsgraph.visit(scene, lambda graph: graph.mode)
+
+
+def test_threads_are_limited_for_the_time_of_the_render(scene, camera_object, tmp_path, monkeypatch):
+    seen = []
+    monkeypatch.setattr(
+        cycles, "render_still", lambda scene, to_file: seen.append((scene.render.threads_mode, scene.render.threads))
+    )
+    with pytest.raises(InputError):  # nothing was written
+        cycles.render(scene, scene.view_layers[0], camera_object, tmp_path / "picture.exr", threads=3)
+    assert seen == [("FIXED", 3)] and scene.render.threads_mode == "AUTO"
+
+
+def test_objects_and_materials_are_numbered_from_one_where_all_have_none(scene, camera_object):
+    bpy.ops.mesh.primitive_cube_add()
+    first, second = bpy.data.materials.new("First"), bpy.data.materials.new("Second")
+    with indices.numbered():
+        assert sorted(block.pass_index for block in bpy.data.objects) == [1, 2]
+        assert (first.pass_index, second.pass_index) == (1, 2)
+    assert not any(block.pass_index for block in (*bpy.data.objects, *bpy.data.materials))
+
+
+def test_an_artists_own_numbers_stay(scene, camera_object):
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.context.object.pass_index = 40
+    bpy.data.materials.new("First")
+    with pytest.raises(KeyError), indices.numbered():
+        assert sorted(block.pass_index for block in bpy.data.objects) == [0, 40]
+        assert bpy.data.materials["First"].pass_index == 1
+        raise KeyError
+    assert sorted(block.pass_index for block in bpy.data.objects) == [0, 40]
+    assert bpy.data.materials["First"].pass_index == 0
+
+
+def test_more_objects_than_indices_start_again(scene, camera_object, monkeypatch):
+    monkeypatch.setattr(indices, "LARGEST", 2)
+    for name in "abc":
+        bpy.data.objects.new(name, None)
+    with indices.numbered():
+        assert [block.pass_index for block in bpy.data.objects] == [1, 2, 1, 2]

@@ -1,0 +1,250 @@
+"""Any .blend, by path: opened without its scripts, set to the request for a while, never saved; or one sentence why not."""
+
+import os
+import shutil
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from viewcam_addon.blender.rendering import job
+from viewcam_addon.errors import InputError
+
+
+@pytest.fixture
+def blend(scene, camera_object, tmp_path):
+    """A function that saves the open file and returns its path; it has a camera above a cube, enabled at (0, 0, 6)."""
+    scene.render.resolution_x, scene.render.resolution_y = 160, 120
+    group = camera_object.virtual_pinhole
+    group.eye, group.look_at, group.up, group.distance = (0, -0.5, 6), (0, 0, 0), (0, 1, 0), 180
+    group.enabled = True
+    bpy.ops.mesh.primitive_cube_add()
+
+    def save(name="file.blend", **options):
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / name), **options)
+        return tmp_path / name
+
+    return save
+
+
+def fails(request, words):
+    with pytest.raises(InputError) as caught:
+        job.export(request)
+    message = str(caught.value)
+    assert words in message and "\n" not in message, message
+
+
+@pytest.mark.parametrize("compress", [False, True])
+def test_a_file_is_exported_as_it_is(blend, compress):
+    path = blend(compress=compress)
+    before = path.read_bytes()
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    exported = job.export(job.Request(path))
+    assert [placed.name for placed in exported.objects] == ["Cube"]
+    assert (exported.camera.width, exported.camera.height) == (160, 120)
+    assert exported.stated_camera.eye == (0, -0.5, 6) and exported.stated_camera.distance == (180, 180)
+    assert path.read_bytes() == before and [each.name for each in path.parent.iterdir()] == [path.name]
+
+
+def test_scripts_of_a_file_do_not_run(blend, scene, tmp_path):
+    witness = tmp_path / "witness"
+    text = bpy.data.texts.new("virus.py")
+    text.write(f"open({str(witness)!r}, 'w')")
+    text.use_module = True
+    bpy.data.objects["Cube"].driver_add("location", 0).driver.expression = f"open({str(witness)!r}, 'w') and 3"
+    path = blend()
+    witness.unlink(missing_ok=True)
+    exported = job.export(job.Request(path))
+    assert not witness.exists() and exported.objects[0].matrix[0, 3] == 0
+
+
+def test_another_camera_by_its_name(blend, add_camera, scene):
+    other = add_camera("Other")
+    other.location = (1, 2, 9)
+    scene.camera = bpy.data.objects["Camera"]
+    exported = job.export(job.Request(blend(), camera="Other"))
+    assert exported.camera.eye == (1, 2, 9) and exported.stated_camera is None
+
+
+def test_the_camera_of_a_frames_marker(blend, add_camera, scene):
+    other = add_camera("Other")
+    other.location = (1, 2, 9)
+    scene.camera = bpy.data.objects["Camera"]
+    for name, frame in (("Camera", 1), ("Other", 20)):
+        scene.timeline_markers.new(name, frame=frame).camera = bpy.data.objects[name]
+    path = blend()
+    assert job.export(job.Request(path, frame=25)).camera.eye == (1, 2, 9)
+    assert job.export(job.Request(path, frame=5)).camera.eye[2] == 6
+    assert job.export(job.Request(path, frame=25, camera="Camera")).camera.eye[2] == 6
+
+
+@pytest.mark.parametrize("size", [(320, 240), (80, 60), (200, 60), (60, 200)])
+def test_another_size_shows_the_same_and_is_stated_so(blend, scene, size):
+    path = blend()
+    exported = job.export(job.Request(path, size=size))
+    camera, stated = exported.camera, exported.stated_camera
+    assert (camera.width, camera.height) == (stated.width, stated.height) == size
+    assert camera.distance == pytest.approx((180 * max(size) / 160,) * 2, rel=1e-6)
+    assert stated.distance == pytest.approx(camera.distance, rel=1e-6)
+    scene = bpy.context.scene
+    group = scene.camera.virtual_pinhole
+    assert (scene.render.resolution_x, scene.render.resolution_y, group.distance, group.keeps) == (160, 120, 180, "PIXELS")
+    assert tuple(group.picture) == tuple(group.counted_in) == (160, 120, 100, 1, 1)
+    assert group.precision() == 2.0**-53 if group.exact else 2.0**-24
+
+
+@pytest.mark.parametrize("keeps", ["PIXELS", "FIELD_OF_VIEW"])
+def test_another_size_of_a_keyed_zoom_and_distance_shows_the_same(blend, both_sides, keeps):
+    group = bpy.data.objects["Camera"].virtual_pinhole
+    group.keeps = keeps
+    for frame, distance in ((1, 100), (11, 300)):
+        group.distance, group.zoom = distance, distance / 200
+        group.keyframe_insert("distance", frame=frame)
+        group.keyframe_insert("zoom", frame=frame)
+    both = both_sides(blend=blend(), frame=11, size=(80, 60))
+    both.check()
+    exported = both.exported
+    assert exported.camera.distance == pytest.approx((225, 225), rel=1e-6)
+    assert exported.stated_camera.distance == pytest.approx(exported.camera.distance, rel=1e-6)
+
+
+def test_another_size_than_the_percentage_of_the_scene(blend, scene):
+    scene.render.resolution_percentage = 33
+    exported = job.export(job.Request(blend(), size=(160, 120)))
+    assert exported.stated_camera.distance == pytest.approx((180, 180), rel=1e-6)
+    assert bpy.context.scene.render.resolution_percentage == 33
+
+
+def test_the_job_on_the_open_file_leaves_it_as_it_was(blend, scene):
+    scene.frame_set(3, subframe=0.25)
+    job.export(job.Request(frame=8, size=(64, 64)))
+    assert (scene.frame_current, scene.frame_subframe, scene.render.resolution_x) == (3, 0.25, 160)
+
+
+def test_a_border_is_cropped_to_on_both_sides(blend, scene, both_sides):
+    render = scene.render
+    render.use_border, render.use_crop_to_border = True, False
+    render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = 0.3, 0.8, 0.1, 0.7
+    sides = both_sides()
+    sides.check()
+    assert sides.cycles["Depth"].shape[:2] == (72, 80) and not render.use_crop_to_border
+
+
+def test_a_file_saved_in_edit_mode_is_seen_as_in_a_render(blend, both_sides):
+    bpy.ops.object.mode_set(mode="EDIT")
+    sides = both_sides()
+    sides.check()
+    assert len(next(iter(sides.exported.geometries.values())).triangles) == 12
+
+
+def test_linked_objects_are_exported_and_numbered(blend, scene, camera_object, both_sides):
+    material = bpy.data.materials.new("Shared")
+    bpy.data.objects["Cube"].data.materials.append(material)
+    library = blend("library.blend", copy=True)
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    bpy.data.materials.remove(material)
+    with bpy.data.libraries.load(str(library), link=True) as (_, target):
+        target.objects = ["Cube"]
+    scene.collection.objects.link(target.objects[0])
+    path = blend("linking.blend")
+    sides = both_sides(blend=path)
+    sides.check()
+    assert sides.exported.objects[0].object_index > 0 and sides.exported.objects[0].material_indices[0] > 0
+    assert not any(block.pass_index for block in bpy.data.objects)
+
+
+def test_a_missing_library_is_told(blend, scene):
+    library = blend("library.blend", copy=True)
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    with bpy.data.libraries.load(str(library), link=True) as (_, target):
+        target.objects = ["Cube"]
+    scene.collection.objects.link(target.objects[0])
+    path = blend("linking.blend")
+    library.unlink()
+    (entry,) = [entry for entry in job.export(job.Request(path)).ledger if entry.status == "skipped"]
+    assert entry.object == "library.blend" and "is missing" in entry.reason
+
+
+def test_bad_files_and_cameras_are_one_sentence(blend, scene, camera_object, tmp_path):
+    path = blend()
+    fails(job.Request(tmp_path / "none.blend"), "does not exist")
+    fails(job.Request(tmp_path), "does not exist")
+    (tmp_path / "text.blend").write_text("not a blend")
+    fails(job.Request(tmp_path / "text.blend"), "is not a .blend file")
+    (tmp_path / "empty.blend").touch()
+    fails(job.Request(tmp_path / "empty.blend"), "is not a .blend file")
+    (tmp_path / "short.blend").write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    fails(job.Request(tmp_path / "short.blend"), "can't be opened")
+    fails(job.Request(path, camera="Nobody"), "has no object 'Nobody': its cameras are Camera")
+    fails(job.Request(path, camera="Cube"), "'Cube' is no camera")
+    fails(job.Request(path, frame=10**9), "beyond Blender's last")
+    fails(job.Request(path, size=(2, 2)), "can't render 2 × 2")
+
+
+@pytest.mark.parametrize(("kind", "words"), [("ORTHO", "orthographic"), ("PANO", "panoramic")])
+def test_cameras_that_are_no_pinholes_are_one_sentence(blend, camera_object, kind, words):
+    camera_object.data.type = kind
+    fails(job.Request(blend()), words)
+
+
+def test_no_camera_and_impossible_values_are_one_sentence(blend, scene, camera_object):
+    group = camera_object.virtual_pinhole
+    group.look_at = group.eye
+    fails(job.Request(blend()), "the same point")
+    scene = bpy.context.scene
+    scene.camera = None
+    fails(job.Request(blend()), "has no camera")
+
+
+def test_a_sheared_camera_is_one_sentence(blend, scene):
+    parent = bpy.data.objects.new("Parent", None)
+    scene.collection.objects.link(parent)
+    parent.scale = (1, 3, 1)
+    camera = scene.camera
+    camera.virtual_pinhole.enabled = False
+    camera.parent, camera.rotation_euler = parent, (0.5, 0.6, 0.7)
+    fails(job.Request(blend()), "oblique")
+
+
+def test_a_folder_that_can_not_be_written_leaves_nothing(blend, tmp_path):
+    path = blend()
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="can't be written"):
+        job.render(job.Request(path), tmp_path / "file" / "picture.exr")
+
+
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() != 0 or not shutil.which("mount"),
+    reason="needs to mount a tmpfs; tests/test_cli.py tests the same without",
+)
+def test_a_full_disk_leaves_no_partial_file(blend, scene, tmp_path):
+    scene.render.resolution_x, scene.render.resolution_y = 1280, 960
+    path, small = blend(), tmp_path / "small"
+    small.mkdir()
+    if os.system(f"mount -t tmpfs -o size=16k none {small}"):
+        pytest.skip("no right to mount a file system here; tests/test_cli.py fills no disk and tests the same")
+    try:
+        with pytest.raises(InputError) as caught:
+            job.render(job.Request(path), small / "picture.exr")
+        assert "\n" not in str(caught.value) and not list(small.iterdir()), caught.value
+    finally:
+        os.system(f"umount {small}")
+
+
+@pytest.mark.parametrize("name", ["plain.exr", "Ä ö.exr", "a#b####.exr", "{a}{{b.exr", "folder/deep {x} ##/picture.exr"])
+def test_a_picture_of_any_name_relative_to_the_working_folder(blend, tmp_path, monkeypatch, name):
+    path = blend()
+    monkeypatch.chdir(tmp_path)
+    job.render(job.Request(path), name)
+    assert (tmp_path / name).stat().st_size > 1000
+    assert {each.name for each in (tmp_path / name).parent.iterdir()} <= {(tmp_path / name).name, path.name}
+
+
+def test_render_and_export_tell_the_same(blend, camera_object, tmp_path):
+    camera_object.data.dof.use_dof = True
+    bpy.data.objects["Cube"].is_shadow_catcher = True
+    path = blend()
+    told = job.render(job.Request(path), tmp_path / "picture.exr")
+    assert told == job.export(job.Request(path)).ledger
+    assert {entry.object: entry.status for entry in told} == {"Camera": "approximated", "Cube": "approximated"}
+    assert (tmp_path / "picture.exr").stat().st_size > 1000

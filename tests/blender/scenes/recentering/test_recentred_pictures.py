@@ -1,0 +1,250 @@
+"""Far from home: with the origin at the eye both sides show the file's scene to a thousandth of a pixel."""
+
+import json
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from mathutils import Vector
+
+from viewcam_addon.blender.camera import apply
+from viewcam_addon.blender.rendering import job
+from viewcam_addon.cli import main
+from viewcam_addon.errors import InputError
+from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.tracer.scene import scene_file
+
+UTM = (448262.25, 5411932.5, 42.0)
+ECEF = (4200952.5, 780362.0, 4720030.0)
+
+
+@pytest.mark.parametrize("place", [UTM, ECEF, (0.0, 0.0, 0.0)], ids=["UTM", "ECEF", "home"])
+def test_a_crowded_scene_anywhere_in_the_world_is_compared_to_a_thousandth_of_a_pixel(place, crowd, check):
+    crowd(place)
+    sides = check()
+    assert sides.exported.origin == tuple(np.add(place, (6.2, -7.3, 4.123456789)))
+    assert sides.exported.camera.eye == (0, 0, 0) and sides.exported.stated_camera.eye == (0, 0, 0)
+    shown = set(np.unique(sides.cycles["Object Index"]))
+    assert len(shown) >= 7, f"only the objects {shown} are in the picture"
+
+
+@pytest.mark.parametrize("place", [UTM, ECEF], ids=["UTM", "ECEF"])
+def test_what_plain_cycles_misses_by_pixels_is_told(place, look, both_sides, add_map):
+    look(place)
+    add_map(place)
+    comparison = both_sides().comparison
+    assert comparison.rows[0].values[0] > 0.5, f"only {comparison.rows[0].values[0]:.2g} px"
+    assert "check with --recenter" in comparison.far_from_home.sentence
+    assert both_sides(recenter=True).comparison.far_from_home is None
+
+
+def depth_of(comparison):
+    """The median error of Depth, relative."""
+    return next(row for row in comparison.rows if row.name == "Depth").values[0]
+
+
+def test_a_map_that_was_pulled_home_is_within_the_law_and_exact_when_recentred(look, both_sides, check, add_map):
+    """Its vertices are far from its origin, and its origin as far from the world's: Cycles adds the two in float32.
+
+    Each of its rays meets the rounded surface where it should, and so only Depth tells.
+    """
+    look((0, 0, 0))
+    block = add_map(UTM)
+    block.rotation_euler.z = 0.5
+    block.location = -(block.rotation_euler.to_matrix() @ Vector(UTM))
+    comparison = both_sides().comparison
+    assert comparison.passed and depth_of(comparison) > 1e-3, "\n".join(comparison.lines())
+    assert depth_of(check().comparison) < 1e-6
+
+
+def test_one_map_that_stands_in_several_places(look, scene, check, add_map):
+    look(UTM)
+    first = add_map(UTM)
+    for shift in ((40, 0, 3), (0, 40, 0)):
+        other = bpy.data.objects.new("Copy", first.data)
+        scene.collection.objects.link(other)
+        other.location = shift
+    check()
+
+
+def limit(block, place):
+    limit = block.constraints.new("LIMIT_LOCATION")
+    limit.use_min_x, limit.min_x = True, place[0] + 1.5
+
+
+def child_of(block, place):
+    target = bpy.data.objects.new("Target", None)
+    bpy.context.scene.collection.objects.link(target)
+    target.location, target.rotation_euler = place, (0, 0, 0.3)
+    bpy.context.view_layer.update()
+    constraint = block.constraints.new("CHILD_OF")
+    constraint.target, constraint.inverse_matrix = target, target.matrix_world.inverted()
+    target.location.z += 1
+
+
+def driven(block, place):
+    driver = block.driver_add("location", 2).driver
+    variable = driver.variables.new()
+    variable.type = "TRANSFORMS"
+    variable.targets[0].id, variable.targets[0].transform_type = bpy.context.scene.camera, "LOC_Z"
+    driver.expression = "var - 3"
+
+
+def rigid(block, place):
+    bpy.context.view_layer.objects.active = block
+    block.select_set(True)
+    bpy.ops.rigidbody.object_add()
+    bpy.context.scene.frame_set(5)
+
+
+@pytest.mark.parametrize("move", [limit, child_of, driven, rigid])
+def test_what_is_computed_in_world_space_stands_where_the_file_has_it(move, look, add, mesh_from, check):
+    look(UTM)
+    block = add(mesh_from("cube"), "Cube", UTM)
+    move(block, UTM)
+    check()
+
+
+def test_points_and_instances_of_geometry_nodes(look, add, mesh_from, node_group, check, map_mesh):
+    look(ECEF)
+    tree, start, end = node_group()
+    to_points, place_on, ball = (
+        tree.nodes.new(f"GeometryNode{kind}") for kind in ("MeshToPoints", "InstanceOnPoints", "MeshIcoSphere")
+    )
+    to_points.inputs["Radius"].default_value, ball.inputs["Radius"].default_value = 0.4, 0.5
+    shift = tree.nodes.new("GeometryNodeTransform")
+    shift.inputs["Translation"].default_value = (0, 0, 1.5)
+    join = tree.nodes.new("GeometryNodeJoinGeometry")
+    tree.links.new(start.outputs[0], to_points.inputs["Mesh"])
+    tree.links.new(to_points.outputs[0], shift.inputs["Geometry"])
+    tree.links.new(shift.outputs[0], place_on.inputs["Points"])
+    tree.links.new(ball.outputs[0], place_on.inputs["Instance"])
+    for socket in (to_points.outputs[0], place_on.outputs[0]):
+        tree.links.new(socket, join.inputs[0])
+    tree.links.new(join.outputs[0], end.inputs[0])
+    for name, data, where in (
+        ("Here", mesh_from("grid", x_subdivisions=3, y_subdivisions=3, size=6), ECEF),
+        ("Far from its origin", map_mesh("Far", np.add(ECEF, (4, 4, 0)), 4, 3), (0, 0, 0)),
+    ):
+        add(data, name, where).modifiers.new("Nodes", "NODES").node_group = tree
+    sides = check()
+    kinds = {type(geometry).__name__ for geometry in sides.exported.geometries.values()}
+    assert kinds == {"Mesh", "Spheres"}
+
+
+def test_particles_follow(look, add, mesh_from, scene, check):
+    look(UTM)
+    ground = add(mesh_from("grid", size=8), "Ground", UTM)
+    ball = add(mesh_from("ico_sphere", radius=0.3), "Ball", np.add(UTM, (0, 0, -9)))
+    ground.modifiers.new("Particles", "PARTICLE_SYSTEM")
+    settings = ground.particle_systems[0].settings
+    settings.count, settings.frame_end, settings.render_type, settings.instance_object = 40, 1, "OBJECT", ball
+    settings.particle_size, settings.physics_type = 1.0, "NO"
+    scene.frame_set(3)
+    sides = check()
+    assert sum(each.name == "Ball" for each in sides.exported.objects) > 20
+
+
+def test_a_file_in_edit_mode_and_materials_of_the_object_or_the_layer(look, add, mesh_from, scene, check):
+    look(UTM)
+    blue, layers, red = (bpy.data.materials.new(name) for name in ("Blue", "Layer", "Red"))
+    blue_index, layers_index, red_index = 1, 2, 3  # as `indices.numbered` counts them, in the order of their names
+    mesh = mesh_from("cube", size=3)
+    mesh.materials.append(red)
+    mesh.materials.append(None)
+    for number, polygon in enumerate(mesh.polygons):
+        polygon.material_index = number % 2
+    for number in range(2):
+        block = add(mesh, f"Cube {number}", np.add(UTM, (4 * number - 2, 0, 0)))
+        block.material_slots[1].link = "OBJECT"
+        block.material_slots[1].material = blue if number else None
+    sides = check()
+    assert set(np.unique(sides.cycles["Material Index"])) == {0, blue_index, red_index}
+    scene.view_layers[0].material_override = layers
+    assert set(np.unique(check().cycles["Material Index"])) == {0, layers_index}
+    bpy.context.view_layer.objects.active = block
+    bpy.ops.object.mode_set(mode="EDIT")
+    check()
+    assert bpy.context.mode == "EDIT_MESH"
+
+
+def test_normals_uvs_and_a_mirrored_portrait_with_shift(look, monkey, camera_object, scene, check):
+    render = scene.render
+    render.pixel_aspect_x, render.use_border, render.use_crop_to_border = 1.5, True, True
+    render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = 0.1, 0.9, 0.2, 1.0
+    scene.render.resolution_x, scene.render.resolution_y = 160, 120
+    monkey.location, monkey.scale = ECEF, (3, -2, 4)
+    bpy.context.view_layer.update()
+    eye, look_at = (tuple(np.add(ECEF, point).tolist()) for point in ((1, -8, 9), (0, 0, 1)))
+    size = (128, 96)
+    pinhole = Pinhole(eye, look_at, (0.1, 0, 1), (90, 135), *size, (70, 40), mirrored=True)
+    assert apply(camera_object, pinhole, scene) == []
+    sides = check()
+    assert sides.exported.camera.mirrored and sides.exported.camera.principal_point == pytest.approx((70, 40), abs=1e-4)
+    assert {"Normal", "UV"} <= {row.name for row in sides.comparison.rows if row.count}
+
+
+def test_the_camera_of_a_file_that_states_none_is_taken_as_it_stands(look, camera_object, check, add_map):
+    look(UTM)
+    camera_object.virtual_pinhole.enabled = False
+    add_map(UTM)
+    sides = check()
+    assert sides.exported.origin == tuple(camera_object.matrix_world.translation)
+    assert sides.comparison.conversion.ok and sides.comparison.conversion.largest < 1e-3
+
+
+def test_a_camera_that_is_not_where_it_was_stated_is_still_told(look, camera_object, both_sides, add_map):
+    look(UTM)
+    add_map(UTM)
+    camera_object.rotation_euler.z += 0.05
+    comparison = both_sides(recenter=True).comparison
+    assert comparison.rows[0].ok and not comparison.conversion.ok
+    # 0.05 rad at a distance of 150 px.
+    assert comparison.conversion.largest > 5
+
+
+def test_a_held_roll_is_held(look, camera_object, check, add_map):
+    look(UTM)
+    add_map(UTM)
+    group = camera_object.virtual_pinhole
+    group.pole, group.held_roll = "HOLD", 0.4
+    sides = check()
+    tilt = sides.exported.camera.basis()[0][2]  # u of a level camera is horizontal
+    assert abs(tilt) > 0.2 and sides.comparison.conversion.largest < 1e-3
+
+
+def test_an_object_that_is_nowhere_is_one_sentence(look, add, mesh_from):
+    look(UTM)
+    add(mesh_from("cube"), "Lost", UTM).scale.x = float("nan")
+    for recenter in (False, True):
+        with pytest.raises(InputError, match="'Lost' holds a number that is not finite"):
+            job.export(job.Request(recenter=recenter))
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_a_large_scale_or_a_small_one_moves_as_exactly(scale, look, check, add_map):
+    look(UTM)
+    add_map(np.divide(UTM, scale), size=30 / scale).scale = (scale, scale, scale)
+    check()
+
+
+def test_the_command_as_its_users_type_it(look, scene, tmp_path, capfd, add_map):
+    look(ECEF)
+    add_map(ECEF)
+    path, result = tmp_path / "far.blend", tmp_path / "result.json"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    words = ["check", str(path), "--threads", "2", "--json", str(result)]
+    main(words)
+    plain = json.loads(result.read_text())
+    told = capfd.readouterr().out
+    assert plain["far_from_home"]["error"] > 0.5 and plain["far_from_home"]["sentence"] in told
+    assert main([*words, "--recenter"]) == 0
+    recentred = json.loads(result.read_text())
+    assert recentred["far_from_home"] is None and recentred["origin"] == np.add(ECEF, (6.2, -7.3, 4.123456789)).tolist()
+    assert recentred["passes"][0]["percentiles"]["p99"]["value"] < 1e-3
+    scene_path = tmp_path / "scene.json"
+    assert main(["export", str(path), str(scene_path), "--recenter"]) == 0
+    assert list(scene_file.read(scene_path).origin) == recentred["origin"]
+    assert main(["cycles", str(path), str(tmp_path / "picture.exr"), "--recenter"]) == 0

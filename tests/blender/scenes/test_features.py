@@ -1,0 +1,285 @@
+"""What the tracer does not model is told, and taken out of Cycles' picture, so that the rest is the same on both sides."""
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from viewcam_addon.blender.scenes import materials
+
+
+@pytest.fixture
+def monkey(scene, camera_object):
+    """Suzanne, smooth, before a camera."""
+    camera_object.location = (0, 0, 5)
+    bpy.ops.mesh.primitive_monkey_add(rotation=(-0.4, 0.1, 0.3))
+    bpy.ops.object.shade_smooth()
+    return bpy.context.object
+
+
+@pytest.fixture
+def material(monkey):
+    """The monkey's material: a Principled surface, and nothing else."""
+    made = bpy.data.materials.new("Skin")
+    if not made.node_tree:  # new materials have one from 5.0 on
+        made.use_nodes = True
+    monkey.data.materials.append(made)
+    return made
+
+
+def add_node(material, kind, output, socket, node="Material Output"):
+    """Link a new node's output to a socket of another node."""
+    tree = material.node_tree
+    added = tree.nodes.new(kind)
+    tree.links.new(added.outputs[output], tree.nodes[node].inputs[socket])
+    return added
+
+
+def make_see_through(material):
+    material.node_tree.nodes["Principled BSDF"].inputs["Alpha"].default_value = 0.5
+
+
+def make_invisible(material):
+    add_node(material, "ShaderNodeBsdfTransparent", "BSDF", "Surface")
+
+
+def make_holdout(material):
+    add_node(material, "ShaderNodeHoldout", "Holdout", "Surface")
+
+
+def make_bumpy(material):
+    bump = add_node(material, "ShaderNodeBump", "Normal", "Normal", "Principled BSDF")
+    material.node_tree.links.new(material.node_tree.nodes.new("ShaderNodeTexNoise").outputs[0], bump.inputs["Height"])
+
+
+def make_turned(material):
+    vector = add_node(material, "ShaderNodeCombineXYZ", 0, "Normal", "Principled BSDF")
+    vector.inputs[0].default_value = 1
+
+
+def make_displaced(material):
+    displacement = add_node(material, "ShaderNodeDisplacement", 0, "Displacement")
+    displacement.inputs["Scale"].default_value, displacement.inputs["Height"].default_value = 1, 1
+    material.displacement_method = "DISPLACEMENT"
+
+
+def make_misty(material):
+    add_node(material, "ShaderNodeVolumeScatter", 0, "Volume")
+
+
+def make_volume_only(material):
+    make_misty(material)
+    material.node_tree.nodes.remove(material.node_tree.nodes["Principled BSDF"])
+
+
+def make_without_output(material):
+    material.node_tree.nodes.remove(material.node_tree.nodes["Material Output"])
+
+
+def make_bumpy_in_a_group(material):
+    group = bpy.data.node_groups.new("Group", "ShaderNodeTree")
+    group.interface.new_socket("Normal", in_out="OUTPUT", socket_type="NodeSocketVector")
+    bump, target = group.nodes.new("ShaderNodeNormalMap"), group.nodes.new("NodeGroupOutput")
+    bump.inputs["Color"].default_value = (1, 0.5, 0.5, 1)
+    group.links.new(bump.outputs[0], target.inputs[0])
+    node = material.node_tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = group
+    material.node_tree.links.new(node.outputs[0], material.node_tree.nodes["Principled BSDF"].inputs["Normal"])
+
+
+DEPARTURES = {
+    make_see_through: "is transparent",
+    make_invisible: "is transparent",
+    make_holdout: "is transparent",
+    make_bumpy: "turns the normals",
+    make_turned: "turns the normals",
+    make_displaced: "is displaced",
+    make_misty: "has a volume",
+    make_volume_only: "has no surface",
+    make_without_output: "has no output",
+    make_bumpy_in_a_group: "turns the normals",
+}
+
+
+@pytest.mark.parametrize("depart", DEPARTURES, ids=lambda depart: depart.__name__)
+def test_a_plain_material_stands_in(monkey, material, both_sides, depart):
+    depart(material)
+    sides = both_sides()
+    sides.check()
+    (entry,) = sides.exported.ledger
+    assert entry.status == "approximated" and DEPARTURES[depart] in entry.reason and "'Skin'" in entry.reason
+    assert not any(node.type == "BSDF_DIFFUSE" for node in material.node_tree.nodes)
+
+
+@pytest.mark.parametrize("depart", [make_invisible, make_bumpy, make_displaced], ids=lambda depart: depart.__name__)
+def test_without_its_stand_in_the_comparison_fails(monkey, material, both_sides, depart, monkeypatch):
+    """The tests above must be able to fail."""
+    depart(material)
+    monkeypatch.setattr(materials, "make_plain", lambda borrow, material: None)
+    assert not both_sides().comparison.passed
+
+
+@pytest.mark.parametrize("kind", ["Principled", "Glossy", "Glass", "Diffuse", "Toon", "Sheen", "Translucent", "Refraction"])
+def test_opaque_shaders_need_no_stand_in(monkey, material, both_sides, kind):
+    """Smooth surfaces seen at a grazing angle: Cycles would bend the normals of those that reflect."""
+    if kind != "Principled":
+        node = material.node_tree.nodes.new(f"ShaderNodeBsdf{kind}")
+        material.node_tree.links.new(node.outputs["BSDF"], material.node_tree.nodes["Material Output"].inputs["Surface"])
+    sides = both_sides()
+    sides.check()
+    assert [entry.status for entry in sides.exported.ledger] == ["exported"]
+
+
+def test_an_emitting_surface_needs_no_stand_in(monkey, material, both_sides):
+    add_node(material, "ShaderNodeEmission", 0, "Surface")
+    sides = both_sides()
+    sides.check()
+    assert [entry.status for entry in sides.exported.ledger] == ["exported"]
+
+
+def test_muted_nodes_do_nothing(material):
+    make_bumpy(material)
+    make_invisible(material)
+    for node in material.node_tree.nodes:
+        node.mute = node.type in ("BUMP", "BSDF_TRANSPARENT")
+    assert "is transparent" not in materials.departures(material)
+
+
+def test_adaptive_subdivision_is_subdivision_at_the_render_level(monkey, scene, both_sides):
+    subdivision = monkey.modifiers.new("Subdivision", "SUBSURF")
+    subdivision.levels, subdivision.render_levels = 0, 1
+    if hasattr(subdivision, "use_adaptive_subdivision"):
+        subdivision.use_adaptive_subdivision = True
+    else:
+        scene.cycles.feature_set, monkey.cycles.use_adaptive_subdivision = "EXPERIMENTAL", True
+    sides = both_sides()
+    sides.check()
+    assert len(next(iter(sides.exported.geometries.values())).triangles) == 3936
+    (entry,) = sides.exported.ledger
+    assert entry.status == "approximated" and "adaptive subdivision" in entry.reason
+
+
+def test_depth_of_field_stereo_and_motion_blur_are_off_on_both_sides(monkey, scene, camera_object, both_sides):
+    camera_object.data.dof.use_dof, camera_object.data.dof.focus_distance = True, 1
+    camera_object.data.dof.aperture_fstop = 0.1
+    scene.render.use_multiview = scene.render.use_motion_blur = True
+    monkey.keyframe_insert("location", frame=1)
+    monkey.location = (3, 0, 0)
+    monkey.keyframe_insert("location", frame=2)
+    scene.frame_set(1)
+    sides = both_sides()
+    sides.check()
+    (entry,) = [entry for entry in sides.exported.ledger if entry.status == "approximated"]
+    assert entry.object == "Camera" and all(word in entry.reason for word in ("Depth of field", "Stereoscopy", "Motion blur"))
+
+
+def test_a_world_full_of_fog_is_left_out(monkey, scene, both_sides):
+    world = bpy.data.worlds.new("Fog")
+    if not world.node_tree:
+        world.use_nodes = True
+    output = next(node for node in world.node_tree.nodes if node.type == "OUTPUT_WORLD")
+    scatter = world.node_tree.nodes.new("ShaderNodeVolumeScatter")
+    scatter.inputs["Density"].default_value = 1
+    world.node_tree.links.new(scatter.outputs[0], output.inputs["Volume"])
+    scene.world = world
+    sides = both_sides()
+    sides.check()
+    assert [entry.object for entry in sides.exported.ledger if entry.status == "approximated"] == ["Fog"]
+    assert scene.world == world
+
+
+def test_lights_leave_no_mark(monkey, scene, both_sides):
+    bpy.ops.object.light_add(type="AREA", radius=3, location=(0, 0, 2), rotation=(3.1, 0, 0))
+    sides = both_sides()
+    sides.check()
+    (entry,) = [entry for entry in sides.exported.ledger if entry.object == "Area"]
+    assert entry.status == "exported" and "a light" in entry.reason
+
+
+def test_compositor_sequencer_and_film_do_not_matter(monkey, scene, both_sides):
+    scene.render.film_transparent = True
+    scene.cycles.film_exposure = 3
+    strips = scene.sequence_editor_create()
+    strips = strips.strips if hasattr(strips, "strips") else strips.sequences
+    strips.new_effect(
+        "Colour", "COLOR", 1, frame_start=1, **({"length": 9} if bpy.app.version >= (5, 0) else {"frame_end": 10})
+    )
+    both_sides().check()
+
+
+def test_simplify_is_the_artists_on_both_sides_and_cycles_culls_nothing(monkey, scene, both_sides):
+    subdivision = monkey.modifiers.new("Subdivision", "SUBSURF")
+    subdivision.render_levels = 3
+    scene.render.use_simplify, scene.render.simplify_subdivision_render = True, 1
+    scene.cycles.use_distance_cull, scene.cycles.distance_cull_margin = True, 0.5
+    monkey.cycles.use_distance_cull = True
+    sides = both_sides()
+    sides.check()
+    assert len(next(iter(sides.exported.geometries.values())).triangles) == 3936
+
+
+@pytest.mark.parametrize("shared", [False, True])
+def test_a_surface_flattened_by_its_scale(scene, camera_object, both_sides, shared):
+    camera_object.location = (0, 0, 5)
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=9, y_subdivisions=9)
+    grid = bpy.context.object
+    for vertex in grid.data.vertices:
+        vertex.co.z = 0.2 * (vertex.index % 3)
+    bpy.ops.object.shade_smooth()
+    grid.scale, grid.rotation_euler = (1, 1, 0), (0.3, 0.2, 0)
+    if shared:
+        other = grid.copy()
+        scene.collection.objects.link(other)
+        other.location.x, other.scale.z = 2, 1
+    sides = both_sides()
+    sides.check()
+    assert len(sides.exported.objects) == 1
+
+
+def test_triangles_that_are_nowhere_are_left_out_and_told(monkey, both_sides):
+    bpy.ops.mesh.primitive_cube_add(location=(1.3, 0.5, 1), size=0.5)
+    bpy.context.object.data.vertices[7].co.x = float("nan")
+    sides = both_sides()
+    sides.check()
+    (entry,) = [entry for entry in sides.exported.ledger if entry.object == "Cube"]
+    assert "triangles have vertices that are not finite" in entry.reason
+    assert len(sides.exported.geometries["Cube"].triangles) < 12
+
+
+def test_grease_pencil_is_skipped(monkey, both_sides):
+    bpy.ops.object.grease_pencil_add(type="MONKEY") if bpy.app.version >= (4, 3) else bpy.ops.object.gpencil_add(type="MONKEY")
+    pencil = bpy.context.object
+    sides = both_sides()
+    sides.check()
+    (entry,) = [entry for entry in sides.exported.ledger if entry.object == pencil.name]
+    assert (entry.status, entry.reason) == ("skipped", "Grease Pencil is not modelled")
+
+
+def test_what_geometry_nodes_make_without_a_material(monkey, both_sides):
+    """Since 5.0 nothing keeps Cycles from bending the normals of such a mesh where they graze, and it is told."""
+    tree = bpy.data.node_groups.new("Sphere", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    sphere, shade = tree.nodes.new("GeometryNodeMeshUVSphere"), tree.nodes.new("GeometryNodeSetShadeSmooth")
+    target = tree.nodes.new("NodeGroupOutput")
+    tree.links.new(sphere.outputs[0], shade.inputs[0])
+    tree.links.new(shade.outputs[0], target.inputs[0])
+    monkey.modifiers.new("Nodes", "NODES").node_group = tree
+    sides = both_sides()
+    rows = {row.name: row.ok for row in sides.comparison.rows}
+    bent = not rows.pop("Normal")
+    (entry,) = sides.exported.ledger
+    assert all(rows.values()), rows
+    assert ("may bend its normals" in entry.reason) == bent == (bpy.app.version >= (5, 0))
+
+
+def test_an_empty_slot_that_no_face_uses_is_not_told(monkey, both_sides, node_group):
+    """Geometry nodes leave one before the slot of the material that they set."""
+    tree, source, target = node_group()
+    paint = tree.nodes.new("GeometryNodeSetMaterial")
+    paint.inputs["Material"].default_value = bpy.data.materials.new("Paint")
+    tree.links.new(source.outputs[0], paint.inputs["Geometry"])
+    tree.links.new(paint.outputs[0], target.inputs[0])
+    monkey.modifiers.new("Nodes", "NODES").node_group = tree
+    sides = both_sides()
+    sides.check()
+    (entry,) = sides.exported.ledger
+    assert entry.status == "exported", entry.reason

@@ -1,0 +1,184 @@
+"""Blender's lights as the tracer's lamps, and what Cycles must leave out so that both sides show the same."""
+
+import math
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from viewcam_addon.blender.rendering import job
+from viewcam_addon.tracer.scene.lamps import Area, Point, Spot, Sun
+
+
+@pytest.fixture(autouse=True)
+def camera_in_the_scene(camera_object):
+    camera_object.location = (0, 0, 9)
+
+
+@pytest.fixture
+def export():
+    """export() → (the lamps of the open file, what the ledger says that is not plain)."""
+
+    def make():
+        exported = job.export(job.Request(level="direct"))
+        told = {entry.object: entry.reason for entry in exported.ledger if entry.status != "exported"}
+        return exported.lamps, told
+
+    return make
+
+
+def close(values):
+    return pytest.approx(values, rel=1e-6)
+
+
+def test_a_sun_shines_along_its_axis(add_lamp, export):
+    add_lamp("SUN", rotation=(0.5, 0, 0), energy=3.0, color=(1, 0.5, 0.25), angle=0.1)
+    ((sun,), told) = export()
+    assert isinstance(sun, Sun) and not told and sun.casts_shadow and not sun.hidden_from
+    assert sun.irradiance == close((3.0, 1.5, 0.75)) and sun.angle == close(0.1)
+    assert sun.towards == close((0.0, -math.sin(0.5), math.cos(0.5)))
+
+
+def test_a_point_keeps_its_radius_under_scale(add_lamp, export):
+    add_lamp("POINT", (1, 2, 3), energy=100.0, shadow_soft_size=0.25, use_soft_falloff=False).scale = (5, 5, 5)
+    ((point,), told) = export()
+    assert isinstance(point, Point) and not told
+    assert (point.position, point.radius, point.power) == ((1.0, 2.0, 3.0), 0.25, (100.0,) * 3)
+    assert not point.soft_falloff
+
+
+def test_a_spot_brings_its_whole_matrix(add_lamp, export):
+    block = add_lamp("SPOT", (1, 2, 3), (0.1, 0.2, 0.3), spot_size=1.2, spot_blend=0.4, shadow_soft_size=0.0)
+    block.scale = (1, 2, 3)
+    ((spot,), told) = export()
+    assert isinstance(spot, Spot) and not told
+    assert (spot.angle, spot.blend, spot.radius) == (close(1.2), close(0.4), 0.0)
+    assert spot.matrix == pytest.approx(np.array(block.matrix_world), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("shape", "size", "ellipse"),
+    [("SQUARE", (2, 2), False), ("RECTANGLE", (2, 3), False), ("DISK", (2, 2), True), ("ELLIPSE", (2, 3), True)],
+)
+def test_an_area_light_has_one_of_four_shapes(add_lamp, export, shape, size, ellipse):
+    add_lamp("AREA", shape=shape, size=2.0, size_y=3.0, energy=10.0)
+    ((area,), told) = export()
+    assert isinstance(area, Area) and not told
+    assert (area.size, area.ellipse, area.power) == (size, ellipse, (10.0,) * 3)
+
+
+@pytest.mark.skipif(bpy.app.version < (4, 5), reason="lights have exposure, normalize and temperature since 4.5")
+@pytest.mark.parametrize("kind", ["SUN", "POINT", "SPOT", "AREA"])
+def test_exposure_temperature_and_strength_by_area(add_lamp, export, kind):
+    block = add_lamp(kind, energy=2.0, exposure=3.0)
+    block.data.normalize = False
+    if kind in ("POINT", "SPOT"):
+        block.data.shadow_soft_size = 0.25
+    if kind == "AREA":
+        block.data.size, block.scale = 0.5, (2, 3, 1)
+    ((lamp,), _) = export()
+    factor = {
+        "SUN": math.pi * math.sin(getattr(block.data, "angle", 0) / 2) ** 2,
+        "AREA": 0.5 * 2 * 0.5 * 3,
+    }.get(kind, 4 * math.pi * 0.25**2)
+    strength = lamp.irradiance if kind == "SUN" else lamp.power
+    assert strength == close((16.0 * factor,) * 3)
+    block.data.normalize, block.data.use_temperature, block.data.temperature = True, True, 3000
+    ((lamp,), _) = export()
+    assert (lamp.irradiance if kind == "SUN" else lamp.power) == close(tuple(16.0 * x for x in block.data.temperature_color))
+
+
+@pytest.mark.skipif(bpy.app.version < (4, 5), reason="lights have normalize since 4.5")
+def test_lights_without_a_size_are_strong_without_an_area(add_lamp, export):
+    add_lamp("POINT", energy=2.0, shadow_soft_size=0.0, normalize=False)
+    add_lamp("SUN", energy=2.0, angle=0.0, normalize=False)
+    (point, sun), _ = export()
+    assert (point.power, sun.irradiance) == ((8.0,) * 3, (2.0,) * 3)
+
+
+def test_what_a_light_hides_from_and_whether_it_casts_shadows(add_lamp, export):
+    block = add_lamp("SUN", angle=0.0, use_shadow=False)
+    block.visible_camera = block.visible_glossy = False
+    ((sun,), told) = export()
+    assert sun.hidden_from == {"camera", "glossy"} and not sun.casts_shadow and not told
+
+
+def test_lights_come_through_instances_and_parents(add_lamp, export, add):
+    block = add_lamp("POINT", (1, 0, 0))
+    collection = bpy.data.collections.new("Lamps")
+    bpy.context.scene.collection.objects.unlink(block)
+    collection.objects.link(block)
+    for x in (10, 20):
+        empty = add(None, f"At {x}", (x, 0, 0))
+        empty.instance_type, empty.instance_collection = "COLLECTION", collection
+    lamps, told = export()
+    assert sorted(lamp.position for lamp in lamps) == [(11.0, 0.0, 0.0), (21.0, 0.0, 0.0)] and not told
+
+
+def test_nothing_comes_of_lights_that_give_none(add_lamp, export):
+    add_lamp("POINT", name="Off", energy=0.0)
+    add_lamp("AREA", name="Thin", size=0.0)
+    add_lamp("AREA", name="Flat").scale = (0, 1, 1)
+    add_lamp("AREA", name="Portal").data.cycles.is_portal = True
+    add_lamp("SUN", name="Hidden").hide_render = True
+    assert export() == ((), {})
+
+
+def use_nodes(light):
+    if not light.node_tree:
+        light.use_nodes = True
+    return light.node_tree
+
+
+def test_a_constant_emission_is_a_factor(add_lamp, export):
+    block = add_lamp("POINT", energy=10.0)
+    emission = next(node for node in use_nodes(block.data).nodes if node.type == "EMISSION")
+    emission.inputs["Color"].default_value, emission.inputs["Strength"].default_value = (1, 0.5, 0.25, 1), 3.0
+    ((point,), told) = export()
+    assert point.power == close((30.0, 15.0, 7.5)) and not told
+
+
+def attach_falloff(block):
+    tree = use_nodes(block.data)
+    emission = next(node for node in tree.nodes if node.type == "EMISSION")
+    tree.links.new(tree.nodes.new("ShaderNodeLightFalloff").outputs["Linear"], emission.inputs["Strength"])
+
+
+def link_light(block):
+    block.light_linking.receiver_collection = bpy.data.collections.new("Receivers")
+
+
+APPROXIMATED = {
+    "nodes": (attach_falloff, "nodes are not modelled"),
+    "spread": (lambda block: setattr(block.data, "spread", 1.0), "spread"),
+    "bounces": (lambda block: setattr(block.data.cycles, "max_bounces", 1), "bounces are limited"),
+    "sampling": (lambda block: setattr(block.data.cycles, "use_multiple_importance_sampling", False), "importance"),
+    "linking": (link_light, "light linking is off"),
+    "shadows": (lambda block: setattr(block.data, "use_shadow", False), "casts no shadow"),
+}
+
+
+@pytest.mark.parametrize("what", APPROXIMATED)
+def test_what_is_approximated_is_told(add_lamp, export, what):
+    change, words = APPROXIMATED[what]
+    bpy.context.scene.cycles.max_bounces = 12
+    block = add_lamp("AREA")
+    change(block)
+    (_, told) = export()
+    assert words in told["Lamp"], told
+
+
+@pytest.mark.parametrize("energy", [-1.0, float("nan"), 1e30])
+def test_strengths_that_light_can_not_have_are_left_out(add_lamp, export, energy):
+    add_lamp("POINT", energy=energy)
+    lamps, told = export()
+    assert not lamps and "strength" in told["Lamp"]
+
+
+def test_a_sheared_area_light_is_told(add_lamp, export, add):
+    parent = add(None, "Parent")
+    parent.scale = (1, 3, 1)
+    add_lamp("AREA", rotation=(0, 0, 0.5)).parent = parent
+    bpy.context.view_layer.update()
+    assert "sheared" in export()[1]["Lamp"]

@@ -1,0 +1,290 @@
+"""Shader nodes as the tracer's material: what is exact is read, what is not has a stand-in and a reason."""
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from viewcam_addon.blender.borrowing import borrowed
+from viewcam_addon.blender.scenes import materials, shaders
+from viewcam_addon.tracer.scene.materials import PLAIN, Colour, Material
+
+RED, GREEN = (0.5, 0.25, 0.125), (0.0, 1.0, 0.5)
+
+
+def colour(rgb):
+    return (*rgb, 1.0)
+
+
+def link(material, kind, output, socket, node="Shader"):
+    """Link a new node's output to an input of another node."""
+    tree = material.node_tree
+    added = tree.nodes.new(kind)
+    tree.links.new(added.outputs[output], tree.nodes[node].inputs[socket])
+    return added
+
+
+def add_shader(material, kind, *sockets, **inputs):
+    """A new shader node, whose inputs are fed by other nodes' first outputs."""
+    tree = material.node_tree
+    added = tree.nodes.new(kind)
+    for name, value in inputs.items():
+        added.inputs[name].default_value = value
+    for number, node in sockets:
+        tree.links.new(node.outputs[0], added.inputs[number])
+    return added
+
+
+def show(material, node):
+    tree = material.node_tree
+    tree.links.new(node.outputs[0], tree.nodes["Output"].inputs["Surface"])
+
+
+def exactly(material):
+    """What a material is that needs no stand-in."""
+    reading = shaders.read(material)
+    assert not reading.reasons, reading.reasons
+    return reading.material
+
+
+def approximately(material, *words):
+    """What stands in for a material, whose first reason holds these words."""
+    reading = shaders.read(material)
+    assert reading.reasons and all(word in reading.reasons[0] for word in words), reading.reasons
+    return reading.material
+
+
+@pytest.fixture
+def diffuse(make_material):
+    return make_material("Skin", "ShaderNodeBsdfDiffuse", Color=colour(RED))
+
+
+def test_the_shaders_that_are_components_are_read_as_they_are(make_material):
+    assert exactly(make_material("d", "ShaderNodeBsdfDiffuse", Color=colour(RED))) == Material(diffuse=Colour(RED))
+    emission = make_material("e", "ShaderNodeEmission", Color=colour(RED), Strength=4.0)
+    assert exactly(emission) == Material(emission=Colour((2.0, 1.0, 0.5)))
+    mirror = make_material("m", "ShaderNodeBsdfGlossy", Color=colour(RED), Roughness=0.0)
+    assert exactly(mirror) == Material(mirror=Colour(RED))
+    glass = make_material("g", "ShaderNodeBsdfGlass", Color=colour(RED), Roughness=0.0, IOR=1.5)
+    assert exactly(glass) == Material(glass=Colour(RED), ior=1.5)
+    clear = make_material("r", "ShaderNodeBsdfRefraction", Color=colour(RED), Roughness=0.0, IOR=1.25)
+    assert exactly(clear) == Material(refraction=Colour(RED), ior=1.25)
+
+
+@pytest.mark.parametrize(("socket", "value"), [("Specular IOR Level", 0.0), ("IOR", 1.0)])
+def test_a_principled_surface_without_gloss_is_lamberts(make_material, socket, value):
+    material = make_material("p", "ShaderNodeBsdfPrincipled", Base_Color=colour(RED), Roughness=0.3, Anisotropic=0.5)
+    inputs = material.node_tree.nodes["Shader"].inputs
+    inputs[socket].default_value = value
+    assert exactly(material) == Material(diffuse=Colour(RED))
+    inputs["Emission Color"].default_value, inputs["Emission Strength"].default_value = colour(GREEN), 2.0
+    assert exactly(material) == Material(diffuse=Colour(RED), emission=Colour((0.0, 2.0, 1.0)))
+
+
+@pytest.mark.parametrize(
+    "socket",
+    [
+        "Metallic",
+        "Diffuse Roughness",
+        "Subsurface Weight",
+        "Specular IOR Level",
+        "Transmission Weight",
+        "Coat Weight",
+        "Sheen Weight",
+        "Thin Film Thickness",
+    ],
+)
+def test_a_principled_surface_of_another_kind_is_lamberts_for_now_and_says_why(make_material, socket):
+    material = make_material("p", "ShaderNodeBsdfPrincipled", Base_Color=colour(RED), Specular_IOR_Level=0.0)
+    inputs = material.node_tree.nodes["Shader"].inputs
+    if socket not in inputs:  # Diffuse Roughness came with 4.3
+        assert socket == "Diffuse Roughness" and bpy.app.version < (4, 3)
+        return
+    inputs[socket].default_value = 0.5
+    assert approximately(material, "'Shader'", socket, "0.5") == Material(diffuse=Colour(RED))
+
+
+@pytest.mark.parametrize(
+    ("kind", "component"),
+    [
+        ("ShaderNodeBsdfDiffuse", "diffuse"),
+        ("ShaderNodeBsdfGlossy", "diffuse"),
+        ("ShaderNodeBsdfGlass", "glass"),
+        ("ShaderNodeBsdfRefraction", "refraction"),
+    ],
+)
+def test_roughness_is_named(make_material, kind, component):
+    material = make_material("rough", kind, Color=colour(RED), Roughness=0.25)
+    assert approximately(material, "'Shader'", "Roughness 0.25").colours == {component: Colour(RED)}
+
+
+def test_shaders_are_mixed_and_added_by_constant_factors(diffuse):
+    nodes = diffuse.node_tree.nodes
+    glow = add_shader(diffuse, "ShaderNodeEmission", Color=colour((1, 1, 1)), Strength=2.0)
+    mirror = add_shader(diffuse, "ShaderNodeBsdfGlossy", Color=colour(GREEN), Roughness=0.0)
+    added = add_shader(diffuse, "ShaderNodeAddShader", (0, glow), (1, mirror))
+    mixed = add_shader(diffuse, "ShaderNodeMixShader", (1, nodes["Shader"]), (2, added))
+    mixed.inputs[0].default_value = 0.25
+    show(diffuse, mixed)
+    assert exactly(diffuse) == Material(
+        diffuse=Colour((0.375, 0.1875, 0.09375)), emission=Colour((0.5,) * 3), mirror=Colour((0.0, 0.25, 0.125))
+    )
+    both = add_shader(diffuse, "ShaderNodeAddShader", (0, mixed), (1, nodes["Shader"]))
+    show(diffuse, both)
+    assert exactly(diffuse).diffuse == Colour((0.875, 0.4375, 0.21875)), "two of a kind add up"
+
+
+@pytest.mark.parametrize(("factor", "left"), [(0.0, "first"), (-1.0, "first"), (1.0, "second"), (7.0, "second")])
+def test_what_has_no_weight_in_a_mixture_is_not_looked_at(diffuse, factor, left):
+    toon = add_shader(diffuse, "ShaderNodeBsdfToon")
+    pair = [diffuse.node_tree.nodes["Shader"], toon]
+    mixed = add_shader(diffuse, "ShaderNodeMixShader", *enumerate(pair if left == "first" else pair[::-1], start=1))
+    mixed.inputs[0].default_value = factor
+    show(diffuse, mixed)
+    assert exactly(diffuse) == Material(diffuse=Colour(RED))
+
+
+def test_a_factor_that_varies_is_a_half_for_now(diffuse):
+    mixed = add_shader(diffuse, "ShaderNodeMixShader", (1, diffuse.node_tree.nodes["Shader"]))
+    mixed.name = "Blend"
+    link(diffuse, "ShaderNodeFresnel", 0, 0, "Blend")
+    show(diffuse, mixed)
+    assert approximately(diffuse, "'Blend'", "varies") == Material(diffuse=Colour((0.25, 0.125, 0.0625)))
+
+
+def test_other_shaders_are_lamberts_of_their_colour(make_material):
+    toon = make_material("t", "ShaderNodeBsdfToon", Color=colour(RED))
+    assert approximately(toon, "'Shader'", "not modelled") == Material(diffuse=Colour(RED))
+
+
+def test_what_has_no_colour_has_the_viewports(make_material):
+    unknown = make_material("s", "ShaderNodeBsdfDiffuse")
+    link(unknown, "ShaderNodeTexNoise", 1, "Color").name = "Clouds"
+    unknown.diffuse_color = colour(GREEN)
+    assert approximately(unknown, "'Clouds'", "not modelled") == Material(diffuse=Colour(GREEN))
+
+
+def test_constant_nodes_reroutes_muted_nodes_and_groups_are_looked_through(diffuse):
+    tree = diffuse.node_tree
+    group = bpy.data.node_groups.new("Group", "ShaderNodeTree")
+    group.interface.new_socket("Tint", in_out="INPUT", socket_type="NodeSocketColor")
+    group.interface.new_socket("Power", in_out="INPUT", socket_type="NodeSocketFloat")
+    group.interface.new_socket("Surface", in_out="OUTPUT", socket_type="NodeSocketShader")
+    start, glow, end = (group.nodes.new(kind) for kind in ("NodeGroupInput", "ShaderNodeEmission", "NodeGroupOutput"))
+    group.links.new(start.outputs["Tint"], glow.inputs["Color"])
+    group.links.new(start.outputs["Power"], glow.inputs["Strength"])
+    group.links.new(glow.outputs[0], end.inputs[0])
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = group
+    node.inputs["Power"].default_value = 2.0
+    rgb, reroute = tree.nodes.new("ShaderNodeRGB"), tree.nodes.new("NodeReroute")
+    rgb.outputs[0].default_value = colour(RED)
+    muted = tree.nodes.new("ShaderNodeInvert")
+    muted.mute = True
+    tree.links.new(rgb.outputs[0], muted.inputs["Color"])
+    tree.links.new(muted.outputs[0], reroute.inputs[0])
+    tree.links.new(reroute.outputs[0], node.inputs["Tint"])
+    show(diffuse, node)
+    assert exactly(diffuse) == Material(emission=Colour((1.0, 0.5, 0.25)))
+
+
+def test_a_value_is_a_grey_and_a_colour_has_a_luminance(make_material):
+    material = make_material("e", "ShaderNodeEmission")
+    link(material, "ShaderNodeValue", 0, "Color").outputs[0].default_value = 0.5
+    link(material, "ShaderNodeRGB", 0, "Strength").outputs[0].default_value = colour((0.0, 1.0, 0.0))
+    assert exactly(material).emission.rgb == pytest.approx((0.3576,) * 3)
+
+
+@pytest.fixture
+def image(fresh_blender):
+    made = bpy.data.images.new("Checks", 4, 2)
+    made.pixels.foreach_set([0.5, 0.25, 1.0, 1.0] * 8)
+    return made
+
+
+def test_an_image_and_the_meshs_colours_are_factors(diffuse, image):
+    texture = link(diffuse, "ShaderNodeTexImage", 0, "Color")
+    texture.image, texture.interpolation = image, "Closest"
+    assert exactly(diffuse) == Material(diffuse=Colour((1.0, 1.0, 1.0), "Checks", closest=True))
+    link(diffuse, "ShaderNodeVertexColor", 0, "Color").layer_name = "Paint"
+    assert exactly(diffuse) == Material(diffuse=Colour((1.0, 1.0, 1.0), vertex=True))
+    assert shaders.read(diffuse).vertex == "Paint"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda node: setattr(node, "extension", "CLIP"), "does not repeat (clip)"),
+        (lambda node: setattr(node, "interpolation", "Cubic"), "interpolates cubic"),
+        (lambda node: setattr(node, "projection", "BOX"), "is not projected flat"),
+        (lambda node: setattr(node.texture_mapping, "scale", (2, 1, 1)), "mapping of its own"),
+        (lambda node: setattr(node.color_mapping, "brightness", 0.5), "mapping of its own"),
+        (lambda node: setattr(node, "image", None), "has no image"),
+        (lambda node: setattr(node.image, "source", "TILED"), "no single still image"),
+    ],
+)
+def test_how_an_image_is_used_otherwise_is_named(diffuse, image, change, words):
+    texture = link(diffuse, "ShaderNodeTexImage", 0, "Color")
+    texture.image = image
+    change(texture)
+    approximately(diffuse, "'Image Texture'", words)
+
+
+def test_where_an_image_is_laid_out_otherwise_is_named(diffuse, image):
+    texture = link(diffuse, "ShaderNodeTexImage", 0, "Color")
+    texture.image = image
+    coordinates = link(diffuse, "ShaderNodeTexCoord", "UV", "Vector", texture.name)
+    exactly(diffuse)
+    diffuse.node_tree.links.new(coordinates.outputs["Generated"], texture.inputs["Vector"])
+    approximately(diffuse, "'Texture Coordinate'", "not modelled")
+    link(diffuse, "ShaderNodeUVMap", 0, "Vector", texture.name).uv_map = "Second"
+    assert exactly(diffuse) and shaders.read(diffuse).uv == "Second"
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), 1e30])
+def test_colours_that_light_can_not_have_are_named(diffuse, value):
+    diffuse.node_tree.nodes["Shader"].inputs["Color"].default_value = (value, 0.5, 0.5, 1)
+    approximately(diffuse, "'Shader'", "Color")
+
+
+def test_without_nodes_or_without_an_output_the_viewports_colour_counts(diffuse):
+    diffuse.diffuse_color = colour(GREEN)
+    diffuse.node_tree.nodes.remove(diffuse.node_tree.nodes["Output"])
+    assert shaders.read(diffuse).material == Material(diffuse=Colour(GREEN))
+
+
+def test_the_stand_in_of_everything_is_read_as_what_it_stands_for(diffuse, image):
+    """What Cycles is shown is what the tracer is given, or the shader below would be another."""
+    made = Material(
+        diffuse=Colour(RED),
+        emission=Colour((1.0, 2.0, 3.0)),
+        mirror=Colour(GREEN),
+        glass=Colour((1.0, 1.0, 1.0)),
+        refraction=Colour(RED),
+        ior=1.25,
+    )
+    before = [node.name for node in diffuse.node_tree.nodes]
+    with borrowed() as borrow:
+        materials.stand_in(borrow, diffuse, shaders.Reading(made))
+        assert exactly(diffuse) == made
+    assert [node.name for node in diffuse.node_tree.nodes] == before
+    assert exactly(diffuse) == Material(diffuse=Colour(RED))
+
+
+def test_products_of_colours_are_read_as_what_they_stand_for(diffuse, image):
+    made = Material(
+        diffuse=Colour((0.5, 0.25, 0.0), image.name_full, closest=True, vertex=True),
+        emission=Colour((4.0, 2.0, 1.0), vertex=True),
+        mirror=Colour((0.5, 0.5, 0.5), image.name_full),
+    )
+    with borrowed() as borrow:
+        materials.stand_in(borrow, diffuse, shaders.Reading(made, {image.name_full: image}, "Paint"))
+        assert exactly(diffuse) == made and shaders.read(diffuse).vertex == "Paint"
+        (multiply, *_) = [node for node in diffuse.node_tree.nodes if node.type == "VECT_MATH"]
+        multiply.operation = "ADD"
+        approximately(diffuse, f"'{multiply.name}'", "not modelled")
+
+
+def test_the_plain_material_is_the_tracers(fresh_blender):
+    with borrowed() as borrow:
+        assert exactly(materials.plain(borrow)).diffuse.rgb == pytest.approx(PLAIN.diffuse.rgb, rel=2.0**-24)
+    assert not bpy.data.materials

@@ -1,0 +1,106 @@
+"""Blender's world as the tracer's: constant as it is, else its mean; film and bounces beside it."""
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from viewcam_addon.blender.rendering import job
+from viewcam_addon.tracer.scene.film import Bounces, Film
+from viewcam_addon.tracer.scene.lamps import World
+
+
+@pytest.fixture
+def export(camera_object):
+    """export() → (the scene of the open file, what the ledger says that is not plain)."""
+
+    def make():
+        exported = job.export(job.Request(level="direct"))
+        return exported, {entry.object: entry.reason for entry in exported.ledger if entry.status != "exported"}
+
+    return make
+
+
+def background_of(world):
+    return next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
+
+
+def test_no_world_is_dark(scene, export):
+    scene.world = None
+    exported, told = export()
+    assert exported.world == World() and not told
+
+
+def test_a_constant_background_is_the_world(set_world, export):
+    set_world((1.0, 0.5, 0.25), 2.0)
+    exported, told = export()
+    assert exported.world.radiance == (2.0, 1.0, 0.5) and not told
+
+
+def test_the_world_hides_from_rays_as_it_is_told_to(set_world, export):
+    set_world().cycles_visibility.camera = False
+    assert export()[0].world.hidden_from == {"camera"}
+
+
+def test_the_view_layers_own_world_counts(set_world, scene, export):
+    other = set_world((1, 0, 0))
+    set_world((0, 1, 0))
+    bpy.context.view_layer.world_override = other
+    assert export()[0].world.radiance == (1.0, 0.0, 0.0)
+
+
+@pytest.mark.skipif(bpy.app.version >= (5, 0), reason="since 5.0 nodes always count")
+def test_a_world_without_nodes_has_its_plain_colour(set_world, export):
+    world = set_world()
+    world.use_nodes, world.color = False, (0.25, 0.5, 1.0)
+    exported, told = export()
+    assert exported.world.radiance == (0.25, 0.5, 1.0) and not told
+
+
+def test_an_image_of_the_world_is_its_mean_over_the_sphere(set_world, export):
+    world = set_world(strength=2.0)
+    image = bpy.data.images.new("Sky", 4, 2, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"
+    pixels = np.zeros((2, 4, 4), np.float32)
+    pixels[0, :, 0], pixels[1, :, 1] = 1.0, 0.5
+    image.pixels.foreach_set(pixels.ravel())
+    texture = world.node_tree.nodes.new("ShaderNodeTexEnvironment")
+    texture.image = image
+    world.node_tree.links.new(texture.outputs[0], background_of(world).inputs["Color"])
+    exported, told = export()
+    assert exported.world.radiance == pytest.approx((1.0, 0.5, 0.0))
+    assert "'Environment Texture' that varies" in told["World"] and "constant" in told["World"]
+
+
+def test_other_worlds_are_their_colour_in_the_viewport(set_world, export):
+    world = set_world()
+    world.color = (0.25, 0.5, 1.0)
+    sky = world.node_tree.nodes.new("ShaderNodeTexSky")
+    world.node_tree.links.new(sky.outputs[0], background_of(world).inputs["Color"])
+    exported, told = export()
+    assert exported.world.radiance == (0.25, 0.5, 1.0) and "'Sky Texture' that varies" in told["World"]
+
+
+def test_a_volume_in_the_world_is_left_out_and_its_light_is_not(set_world, export):
+    world = set_world((1.0, 0.5, 0.25))
+    output = next(node for node in world.node_tree.nodes if node.type == "OUTPUT_WORLD")
+    world.node_tree.links.new(world.node_tree.nodes.new("ShaderNodeVolumeScatter").outputs[0], output.inputs["Volume"])
+    exported, told = export()
+    assert exported.world.radiance == (1.0, 0.5, 0.25) and "has a volume" in told["World"]
+
+
+def test_film_and_bounces_are_the_scenes(scene, export):
+    scene.cycles.pixel_filter_type, scene.cycles.film_exposure, scene.render.film_transparent = "BOX", 1.5, True
+    scene.cycles.max_bounces, scene.cycles.diffuse_bounces = 7, 3
+    scene.cycles.glossy_bounces, scene.cycles.transmission_bounces = 2, 5
+    exported, told = export()
+    assert exported.film == Film("BOX", scene.cycles.filter_width, True, 1.5)
+    assert exported.bounces == Bounces(7, 3, 2, 5) and not told
+
+
+def test_what_of_film_and_bounces_is_approximated_is_told(scene, export):
+    scene.cycles.pixel_filter_type = "GAUSSIAN"
+    scene.cycles.caustics_reflective = False
+    exported, told = export()
+    assert exported.film.filter == "BLACKMAN_HARRIS"
+    assert "GAUSSIAN" in told["Scene"] and "caustics" in told["Scene"]

@@ -1,0 +1,311 @@
+"""One comparison with Cycles beside Blender: a copy of the file as it stands, `viewcam check` on it in a process of its own.
+
+Nothing here needs a window. Whoever starts a comparison asks it now and then how far it is, or ends it. The copy, the child's
+own temporary files and what it makes stand in one folder in Blender's own temporary one, which ends with Blender.
+
+How far it is, the files tell that appear: each of them is written whole (files.py). Rejected: rendering in Blender's own
+process (it would stop the artist, and change the scene for as long), and `bpy.data.libraries.write` for the copy (it has no
+windows, and so another scene may be the current one).
+"""
+
+import importlib.util
+import json
+import re
+import shlex
+import shutil
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ... import children
+from ...errors import InputError
+from ...files import written_whole
+from ...pinhole import Pinhole
+from ...tracer.scene.film import LEVELS, SAMPLES, seeds
+from .. import camera as cameras
+from .. import datablocks, preferences
+
+_COPY, _RESULT, _SAID, _REPORT, _DIFFERENCE = "copy.blend", "result.json", "said.txt", "report", "difference.png"
+_COMPRESSED = (b"\x1f\x8b", b"\x28\xb5\x2f\xfd")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a comparison has come to.
+
+    what : of what it was: camera, frame and level. camera : the camera's name. seen : the camera then, None if it was none.
+    passed : whether both sides are the same picture, None where there are none. verdict : one sentence.
+    rows : (label, text) of the figures. folder : that of the report. colours : what those of the difference say.
+    temporary : what `discard` removes.
+    """
+
+    what: str
+    camera: str
+    seen: Pinhole | None
+    passed: bool | None
+    verdict: str
+    rows: tuple[tuple[str, str], ...] = ()
+    folder: Path | None = None
+    colours: str = ""
+    temporary: Path | None = None
+
+    @property
+    def report(self) -> Path | None:
+        return self._there("index.html")
+
+    @property
+    def difference(self) -> Path | None:
+        return self._there(_DIFFERENCE)
+
+    def is_of(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> bool:
+        """Whether the camera is still the one that was compared."""
+        return camera_object.name == self.camera and camera_seen(camera_object, scene) == self.seen
+
+    def discard(self) -> None:
+        """Remove what nobody wanted to keep."""
+        if self.temporary:
+            shutil.rmtree(self.temporary, ignore_errors=True)
+
+    def _there(self, name: str) -> Path | None:
+        path = self.folder and self.folder / name
+        return path if path and path.is_file() else None
+
+
+class Comparison:
+    """One comparison on its way, from the moment it is made.
+
+    scene : the one of the window. level : one of film.LEVELS, or "auto". samples : a pixel, for light. clay : whether one matte
+    material covers everything. keep_in : where the report is kept; by default it is gone with Blender.
+
+    Raises
+    ------
+    InputError
+        if the camera is no pinhole or not in the scene, if the copy can't be written, or the child not be started.
+    """
+
+    def __init__(
+        self,
+        camera_object: bpy.types.Object,
+        scene: bpy.types.Scene,
+        level: str = LEVELS[0],
+        samples: int = SAMPLES,
+        clay: bool = False,
+        keep_in: Path | None = None,
+    ) -> None:
+        _check_possible(camera_object, scene)
+        self._camera, self._seen = camera_object.name, camera_seen(camera_object, scene)
+        self._what = f"{camera_object.name}, frame {scene.frame_current}, {level}"
+        self._keep_in, self._pictures = keep_in, seeds(level, samples)
+        self._started = time.monotonic()
+        words = ["--camera", camera_object.name, "--level", level]
+        words += ["--samples", str(samples)] if level != LEVELS[0] else []
+        words += ["--clay"] if clay else []
+        try:
+            self.folder = Path(tempfile.mkdtemp(prefix="viewcam-", dir=bpy.app.tempdir or None))
+        except OSError as error:
+            raise InputError(f"no folder for the comparison can be made ({error.strerror}): free some space") from error
+        try:
+            save_copy(self.folder / _COPY)
+            self._family = self._child(scene, words)
+        except OSError as error:
+            _remove(self.folder)
+            raise InputError(f"the comparison can't be started ({error.strerror}): free some space") from error
+        except InputError:
+            _remove(self.folder)
+            raise
+
+    def _child(self, scene: bpy.types.Scene, words: Sequence[str]) -> children.Family:
+        """`viewcam check` with these words, on its way; the report names them and the artist's file."""
+        report = self.folder / _REPORT
+        repeat = shlex.join(["check", Path(bpy.data.filepath).name or "untitled.blend", *words])
+        written = ["--json", str(self.folder / _RESULT), "--report", str(report), "--difference", str(report / _DIFFERENCE)]
+        command = _command(self.folder / _COPY, scene, [*words, *written, "--repeat", repeat])
+        # Blender's own scripts hold what the inside of a `bpy` looks like, which hides the module from a new process.
+        scripts = bpy.utils.system_resource("SCRIPTS")
+        variables = children.environment(scripts, **{name: str(self.folder) for name in ("TMPDIR", "TMP", "TEMP")})
+        return children.Family(command, self.folder / _SAID, variables)
+
+    def progress(self) -> tuple[float, str]:
+        """How far it is, from 0 to 1 in steps of unequal length, and what it is doing."""
+        report, pictures = self.folder / _REPORT, self._pictures
+        rendered = len(list(report.glob("cycles*.exr")))
+        exported, traced = (report / "scene.json").exists(), (report / "reference.exr").exists()
+        if traced:
+            words = "Comparing"
+        elif exported:
+            words = "Tracing"
+        else:
+            words = "Rendering with Cycles"
+            words += f", {min(rendered + 1, pictures)} of {pictures}" if pictures > 1 else ""
+        return (rendered + exported + traced) / (pictures + 3), words
+
+    @property
+    def seconds(self) -> float:
+        """Since it was started."""
+        return time.monotonic() - self._started
+
+    def wait(self) -> None:
+        """Until there is something to poll."""
+        self._family.wait()
+
+    def poll(self) -> Outcome | None:
+        """What it has come to, None while it runs. What is left of it then is the outcome's folder."""
+        status = self._family.status()
+        if status is None:
+            return None
+        self._family.end()
+        outcome = self._outcome(status)
+        for path in self.folder.iterdir():  # the copy, and what else is no part of the report
+            if path != outcome.folder:
+                _remove(path)
+        if outcome.temporary is None:
+            _remove(self.folder)
+        return outcome
+
+    def cancel(self) -> None:
+        """End it at once, without a trace."""
+        self._family.end()
+        _remove(self.folder)
+
+    def _outcome(self, status: int) -> Outcome:
+        of = (self._what, self._camera, self._seen)
+        result = _read(self.folder / _RESULT)
+        if status not in (0, 1) or "passed" not in result:
+            return Outcome(*of, None, failure(self._said(), status))
+        folder, temporary = self.folder / _REPORT, self.folder
+        if self._keep_in:
+            try:
+                shutil.copytree(folder, self._keep_in, copy_function=_copy_whole, dirs_exist_ok=True)
+                folder, temporary = self._keep_in, None
+            except (OSError, InputError) as error:
+                return Outcome(*of, None, f"The report can't be kept in {self._keep_in} ({error}): choose another folder")
+        colours = result.get("difference", {}).get("colours", "")
+        return Outcome(*of, result["passed"], result["sentence"], tuple(figures(result)), folder, colours, temporary)
+
+    def _said(self) -> str:
+        return (self.folder / _SAID).read_text(encoding="utf-8", errors="replace")
+
+
+def save_copy(path: Path) -> None:
+    """Save the file as it stands, unsaved edits included, and leave what is open as it is: name, unsaved state, paths, history.
+
+    Raises
+    ------
+    InputError
+        if Blender can't write it.
+    """
+    try:
+        # Blender saves the artist's file the next time as it saved last.
+        bpy.ops.wm.save_as_mainfile(
+            "EXEC_DEFAULT", filepath=str(path), copy=True, relative_remap=True, compress=_is_compressed(), check_existing=False
+        )
+    except RuntimeError as error:
+        reason = str(error).strip().splitlines()[0].removeprefix("Error: ").rstrip(".")
+        raise InputError(f"a copy of the file can't be saved ({reason}): free some space") from error
+
+
+def camera_seen(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole | None:
+    """The camera as it stands, to tell later whether it has changed."""
+    try:
+        return cameras.read(camera_object, scene)
+    except InputError:
+        return None
+
+
+def figures(result: dict[str, Any]) -> list[tuple[str, str]]:
+    """(label, text) of what `viewcam check` wrote as JSON, for a panel."""
+    rows = []
+    for row in (row for row in result.get("passes", ()) if row["name"] == "Position"):
+        rows += _percentiles(row, "px")
+    if "mismatches" in result:
+        kinds = result["mismatches"]["kinds"].values()
+        count, explained = (sum(kind[name] for kind in kinds) for name in ("count", "explained"))
+        rows.append(("Mismatches", f"{count:,}" + (f", {_of_all(explained, count)} explained" if count else "")))
+    for light in result.get("quantities", ())[:1]:  # Combined
+        if light["steady"]:
+            rows += _percentiles(light["steady"], "of the light")
+        else:
+            rows.append(("Light, to Tracer's", f"{light['ratio']:.5f} ± {_plain(light['ratio_error'])}"))
+    ledger = result["ledger"]
+    whole = sum(entry["status"] == "exported" for entry in ledger)
+    return [*rows, ("Modelled", f"{whole} of {len(ledger)} objects")]
+
+
+def failure(said: str, status: int) -> str:
+    """One sentence for a child that came to nothing: its own, or its last words."""
+    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    own = [match[1] for line in lines if (match := re.match(r"viewcam(?: \w+)?: (.*)", line))]
+    if own:
+        return own[-1][:1].upper() + own[-1][1:]
+    how = f"was ended by signal {-status}" if status < 0 else f"ended with status {status}"
+    last = f" after saying: {lines[-1]}" if lines else ""
+    return f"The process that compares {how}{last}"
+
+
+def _check_possible(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
+    datablocks.check_perspective(camera_object)
+    if scene.objects.get(camera_object.name) != camera_object:
+        raise InputError(f"camera {camera_object.name!r} is not in scene {scene.name!r}: choose one that is")
+    if not hasattr(scene, "cycles"):
+        raise InputError("Cycles is disabled: enable the add-on Cycles Render Engine in Blender's preferences")
+    if importlib.util.find_spec("OpenEXR") is None:  # the children's search path is ours
+        raise InputError("OpenEXR is missing: install the extension from its zip, which brings it along")
+
+
+def _command(copy: Path, scene: bpy.types.Scene, words: Sequence[str]) -> list[str]:
+    """`viewcam check` on the copy, in this same Blender."""
+    if not bpy.app.binary_path:  # a module of Python
+        return children.viewcam("check", copy, *words)
+    # The file's own scene is that of its first window. The add-on may be enabled for this session only.
+    other = ["--scene", scene.name] if any(window.scene != scene for window in bpy.context.window_manager.windows[:1]) else []
+    enabled = ["--addons", preferences.PACKAGE] if preferences.PACKAGE in bpy.context.preferences.addons else []
+    return [bpy.app.binary_path, "--background", *enabled, str(copy), *other, "--command", "viewcam", "check", *words]
+
+
+def _is_compressed() -> bool:
+    try:
+        with open(bpy.data.filepath, "rb") as file:
+            return file.read(4).startswith(_COMPRESSED)
+    except OSError:  # never saved
+        return bpy.context.preferences.filepaths.use_file_compression
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except OSError:  # it was not written
+        return {}
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _percentiles(row: dict[str, Any], unit: str) -> list[tuple[str, str]]:
+    """Of a row of a table that has any, as JSON has it."""
+    names = (("Median", "p50"), ("99.9 % within", "p99.9"))
+    found = row["percentiles"]
+    return [(label, f"{_plain(found[name]['value'])} {unit}") for label, name in names if name in found]
+
+
+def _copy_whole(source: str, target: str) -> None:
+    with written_whole(target) as temporary:
+        shutil.copyfile(source, temporary)
+
+
+def _plain(value: float) -> str:
+    """Two significant digits without powers of ten: 0.000052."""
+    return np.format_float_positional(float(f"{value:.1e}"), trim="-")
+
+
+def _of_all(part: int, whole: int) -> str:
+    return "all" if part == whole else f"{part:,}"

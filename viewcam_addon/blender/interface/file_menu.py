@@ -1,0 +1,201 @@
+"""File › Export and File › Import: Virtual Pinhole Scene, and what could not come along.
+
+The export is that of `viewcam export` (job.py), at the current frame through the scene's camera; the import is that of
+import_scene.py, also for a file that is dropped on a viewport. What is not whole in the ledger is summed up in a report and
+shown in a popup, as Blender's own glTF exporter does. Rejected: the ledger as a text datablock, since exporting should change
+nothing in the file that is open.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import ClassVar
+
+import bpy
+from bpy_extras.io_utils import ExportHelper, ImportHelper
+
+from ...errors import InputError
+from ...tracer.scene import LedgerEntry
+from .. import datablocks
+from . import readouts
+
+_SUFFIX = ".json"
+_MENU_TEXT = "Virtual Pinhole Scene (.json)"
+_POPUP_ENTRIES = 12
+_POPUP_WIDTH = 480
+
+
+class VIEWCAM_OT_export_scene(ExportHelper, bpy.types.Operator):
+    bl_idname = "viewcam.export_scene"
+    bl_label = "Export Virtual Pinhole Scene"
+    bl_description = "Write the scene at the current frame, through the scene's camera, as the reference tracer reads it"
+
+    filename_ext = _SUFFIX
+    filter_glob: bpy.props.StringProperty(default=f"*{_SUFFIX}", options={"HIDDEN"})
+    light: bpy.props.BoolProperty(
+        name="Light", description="Materials, lamps, world and film as well; without it geometry alone", default=True
+    )
+    recenter: bpy.props.BoolProperty(
+        name="Origin at the Eye",
+        description="Count coordinates from the eye, for scenes in map or geocentric coordinates, where float32 loses pixels",
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.scene and datablocks.render_camera(context.scene):
+            return True
+        cls.poll_message_set("The scene has no camera")
+        return False
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        from ...tracer.scene import scene_file  # here, since Blender starts without
+        from ..rendering import job
+
+        path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), _SUFFIX))
+        try:
+            if path.name == _SUFFIX:
+                raise InputError("the scene has no file name: give one")
+            scene = job.export(job.Request(level="path" if self.light else "geometry", recenter=self.recenter))
+            scene_file.write(scene, path)
+        except InputError as error:
+            self.report({"ERROR"}, _text(datablocks.sentence(error)))
+            return {"CANCELLED"}
+        _tell(self, scene.ledger, "exported", path, context)
+        return {"FINISHED"}
+
+
+class VIEWCAM_OT_import_scene(ImportHelper, bpy.types.Operator):
+    bl_idname = "viewcam.import_scene"
+    bl_label = "Import Virtual Pinhole Scene"
+    bl_description = "Add the objects, lights and camera of a scene file, in a collection of their own"
+    bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
+
+    filename_ext = _SUFFIX
+    filter_glob: bpy.props.StringProperty(default=f"*{_SUFFIX}", options={"HIDDEN"})
+    files: bpy.props.CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
+    set_picture: bpy.props.BoolProperty(
+        name="Set Camera and Resolution",
+        description="Let the scene render through the file's camera, in the file's resolution",
+        options={"SKIP_SAVE"},
+    )
+    set_surroundings: bpy.props.BoolProperty(
+        name="Set World and Film",
+        description="Let the scene have the file's world, film and bounces, if the file has light",
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.scene and not context.scene.library:
+            return True
+        cls.poll_message_set("The scene is linked from another file")
+        return False
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        """Ask for the file, or of a dropped one for the options. A scene without a camera takes all that the file has."""
+        for name in ("set_picture", "set_surroundings"):
+            if not self.properties.is_property_set(name):
+                setattr(self, name, context.scene.camera is None)
+        return self.invoke_popup(context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        from ...tracer.scene import scene_file  # here, since Blender starts without
+        from ..scenes import import_scene
+
+        path = Path(bpy.path.abspath(self.filepath))
+        try:
+            scene = scene_file.read(path)
+            imported = import_scene.import_scene(
+                scene, _text(path.stem), context.scene, self.set_picture, self.set_surroundings
+            )
+        except InputError as error:
+            self.report({"ERROR"}, _text(datablocks.sentence(error)))
+            return {"CANCELLED"}
+        if context.mode == "OBJECT":
+            _select(imported.objects, imported.camera, context)
+        _tell(self, imported.ledger, "imported", path, context)
+        return {"FINISHED"}
+
+
+class VIEWCAM_FH_scene(bpy.types.FileHandler):
+    """What Blender does with a scene file that is dropped on a viewport."""
+
+    bl_idname = "VIEWCAM_FH_scene"
+    bl_label = "Virtual Pinhole Scene"
+    bl_import_operator = "viewcam.import_scene"
+    bl_file_extensions = _SUFFIX
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        return context.area is not None and context.area.type == "VIEW_3D"
+
+
+def _select(objects: Sequence[bpy.types.Object], active: bpy.types.Object, context: bpy.types.Context) -> None:
+    for block in context.selected_objects:
+        block.select_set(False)
+    for block in objects:
+        block.select_set(True)
+    context.view_layer.objects.active = active
+
+
+def _tell(
+    operator: bpy.types.Operator, ledger: Sequence[LedgerEntry], deed: str, path: Path, context: bpy.types.Context
+) -> None:
+    """Report what became of a scene, and show what lacks in it. deed : "exported" or "imported"."""
+    lacking = [entry for entry in ledger if entry.status != "exported"]
+    operator.report({"WARNING" if lacking else "INFO"}, _text(f"{path.name}: {summary(ledger, deed)}"))
+    if lacking and not bpy.app.background:
+        _show(lacking, f"What the {deed.capitalize()} Scene Lacks", context)
+
+
+def _text(name: str) -> str:
+    """What Blender can show of a file's name, whose bytes may be no text."""
+    return name.encode("utf-8", "replace").decode()
+
+
+def summary(ledger: Sequence[LedgerEntry], deed: str) -> str:
+    """How many objects came along: one line for the status bar."""
+    counts = {status: sum(entry.status == status for entry in ledger) for status in ("exported", "approximated", "skipped")}
+    total = len(ledger)
+    parts = [f"{counts['exported']} of {total} object{'' if total == 1 else 's'} {deed} whole"]
+    parts += [f"{count} {status}" for status, count in counts.items() if count and status != "exported"]
+    return ", ".join(parts)
+
+
+def popup_lines(lacking: Sequence[LedgerEntry]) -> list[tuple[str, str]]:
+    """(text, icon) of each line that tells what did not come along whole."""
+    lines = []
+    for entry in lacking[:_POPUP_ENTRIES]:
+        icon = "CANCEL" if entry.status == "skipped" else "ERROR"
+        for i, line in enumerate(readouts.wrapped(f"{entry.object}: {entry.status}, {entry.reason}", _POPUP_WIDTH)):
+            lines.append((line, "BLANK1" if i else icon))
+    more = len(lacking) - _POPUP_ENTRIES
+    return [*lines, (f"and {more} more", "BLANK1")] if more > 0 else lines
+
+
+def _show(lacking: Sequence[LedgerEntry], title: str, context: bpy.types.Context) -> None:
+    def draw(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+        for text, icon in popup_lines(lacking):
+            menu.layout.label(text=text, icon=icon)
+
+    context.window_manager.popup_menu(draw, title=title, icon="INFO")
+
+
+def _draw_export(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    menu.layout.operator("viewcam.export_scene", text=_MENU_TEXT)
+
+
+def _draw_import(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    menu.layout.operator("viewcam.import_scene", text=_MENU_TEXT)
+
+
+CLASSES = (VIEWCAM_OT_export_scene, VIEWCAM_OT_import_scene, VIEWCAM_FH_scene)
+
+
+def register() -> None:
+    bpy.types.TOPBAR_MT_file_export.append(_draw_export)
+    bpy.types.TOPBAR_MT_file_import.append(_draw_import)
+
+
+def unregister() -> None:
+    bpy.types.TOPBAR_MT_file_import.remove(_draw_import)
+    bpy.types.TOPBAR_MT_file_export.remove(_draw_export)

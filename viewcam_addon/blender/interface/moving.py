@@ -1,0 +1,229 @@
+"""The buttons that move the camera: from the viewport's view, look at, dolly, orbit, frame, swap, level.
+
+Each takes the camera's values, or where the Virtual Pinhole is not enabled the camera as it stands, moves them in float64
+(moves.py) and states them again, which enables it. A roll that is held through the pole becomes a part of up thereby. What a
+button asks for can be adjusted afterwards, as with Blender's own, in the viewport's redo panel or by F9.
+
+In the edit mode of an object Ctrl-Z brings back that object's geometry and nothing else; that is Blender's way with all that
+stands outside of it.
+"""
+
+import math
+from dataclasses import replace
+
+import bpy
+
+from ... import moves
+from ...errors import InputError
+from ...pinhole import Pinhole
+from .. import camera as cameras
+from .. import datablocks, pose, preferences
+from . import readouts, selection, viewport
+from .operators import CameraOperator
+
+
+class _Move(CameraOperator):
+    """A subclass says in `moved(pinhole, camera_object, scene)` where the camera goes."""
+
+    def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
+        stated = cameras.stated(camera_object, scene)
+        pinhole = cameras.as_it_stands(camera_object, scene, in_use=False) if stated is None else stated
+        for finding in cameras.apply(camera_object, self.moved(pinhole, camera_object, scene), scene):
+            self.report({"WARNING"}, finding)
+
+
+class _SelectionMove(_Move):
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not super().poll(context):
+            return False
+        if selection.objects(context, datablocks.camera_in(context)):
+            return True
+        cls.poll_message_set("Nothing but the camera is selected: select what it shall look at")
+        return False
+
+
+class VIEWCAM_OT_adopt_view(_Move, bpy.types.Operator):
+    bl_idname = "viewcam.adopt_view"
+    bl_label = "From Current View"
+    bl_description = (
+        "Put the camera where the 3D viewport looks from, so that its picture shows all that the viewport shows. "
+        "The point about which the view turns becomes the look-at point"
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not super().poll(context):
+            return False
+        if viewport.area_in(context):
+            return True
+        cls.poll_message_set("There is no 3D viewport in this window: open one")
+        return False
+
+    def moved(self, pinhole: Pinhole, _camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
+        area = viewport.area_in(bpy.context)
+        if area is None:
+            raise InputError("there is no 3D viewport in this window: open one")
+        return viewport.pinhole_of(area, pinhole, scene)
+
+
+class VIEWCAM_OT_look_at_selection(_SelectionMove, bpy.types.Operator):
+    bl_idname = "viewcam.look_at_selection"
+    bl_label = "Look at Selection"
+    bl_description = "Bring the selection's centre into the middle of the view. The camera turns and stays where it is"
+
+    centre: bpy.props.EnumProperty(
+        name="Centre",
+        description="Which point of the selection the camera looks at",
+        items=(
+            ("BOUNDS", "Bounding Box", "The middle of the box about the selection, along the world's axes"),
+            ("MEDIAN", "Median", "The mean of all vertices: where there are many it weighs more"),
+        ),
+    )
+
+    def moved(self, pinhole: Pinhole, camera_object: bpy.types.Object, _scene: bpy.types.Scene) -> Pinhole:
+        points = selection.points(bpy.context, camera_object)
+        return replace(
+            pinhole, look_at=selection.median(points) if self.centre == "MEDIAN" else selection.bounds_centre(points)
+        )
+
+
+class VIEWCAM_OT_look_at_cursor(_Move, bpy.types.Operator):
+    bl_idname = "viewcam.look_at_cursor"
+    bl_label = "Look at 3D Cursor"
+    bl_description = "Bring the 3D cursor into the middle of the view. The camera turns and stays where it is"
+
+    def moved(self, pinhole: Pinhole, _camera_object: bpy.types.Object, _scene: bpy.types.Scene) -> Pinhole:
+        return replace(pinhole, look_at=tuple(bpy.context.scene.cursor.location))
+
+
+class VIEWCAM_OT_look_at_active(_Move, bpy.types.Operator):
+    bl_idname = "viewcam.look_at_active"
+    bl_label = "Look at Active Object"
+    bl_description = "Bring the active object's origin into the middle of the view. The camera turns and stays where it is"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not super().poll(context):
+            return False
+        if context.active_object and context.active_object != datablocks.camera_in(context):
+            return True
+        cls.poll_message_set("No object but the camera is active: make another one active")
+        return False
+
+    def moved(self, pinhole: Pinhole, camera_object: bpy.types.Object, _scene: bpy.types.Scene) -> Pinhole:
+        active = bpy.context.active_object
+        if active is None or active == camera_object:
+            raise InputError("no object but the camera is active: make another one active")
+        evaluated = active.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        return replace(pinhole, look_at=tuple(pose.float64(evaluated.matrix_world.translation).tolist()))
+
+
+class VIEWCAM_OT_dolly_camera(_Move, bpy.types.Operator):
+    bl_idname = "viewcam.dolly_camera"
+    bl_label = "Dolly"
+    bl_description = "Move the eye along the view to a distance from the look-at point. The lens stays as it is"
+
+    reach: bpy.props.FloatProperty(
+        name="To Look-At",
+        description="How far the eye shall be from the look-at point; at first as far as it is",
+        subtype="DISTANCE",
+        unit="LENGTH",
+        soft_min=0.001,
+        options={"SKIP_SAVE"},
+    )
+
+    def moved(self, pinhole: Pinhole, _camera_object: bpy.types.Object, _scene: bpy.types.Scene) -> Pinhole:
+        if not self.properties.is_property_set("reach"):
+            self.reach = math.dist(pinhole.eye, pinhole.look_at)
+            return pinhole
+        return moves.dollied(pinhole, self.reach)
+
+
+class VIEWCAM_OT_orbit_camera(_Move, bpy.types.Operator):
+    bl_idname = "viewcam.orbit_camera"
+    bl_label = "Orbit"
+    bl_description = (
+        "Carry the eye about the look-at point. Over the pole the picture does not flip: the camera comes down the other side "
+        "upside down, and up turns into its opposite"
+    )
+
+    around: bpy.props.FloatProperty(
+        name="Around",
+        description="By how much the eye goes around up, to the right as the picture shows it",
+        subtype="ANGLE",
+        default=math.radians(15),
+        options={"SKIP_SAVE"},
+    )
+    upwards: bpy.props.FloatProperty(
+        name="Upwards",
+        description="By how much the eye rises over the look-at point, upwards as the picture shows it",
+        subtype="ANGLE",
+        options={"SKIP_SAVE"},
+    )
+
+    def moved(self, pinhole: Pinhole, _camera_object: bpy.types.Object, _scene: bpy.types.Scene) -> Pinhole:
+        return moves.orbited(pinhole, -self.around if pinhole.mirrored else self.around, self.upwards)
+
+
+class VIEWCAM_OT_frame_selection(_SelectionMove, bpy.types.Operator):
+    bl_idname = "viewcam.frame_selection"
+    bl_label = "Frame Selection"
+    bl_description = "Make all points of the selection fill the picture exactly, up to a margin. The view's direction stays"
+
+    by: bpy.props.EnumProperty(
+        name="By",
+        description="What changes until the selection fills the picture",
+        items=(
+            ("EYE", "Eye", "The eye moves along the view, and the perspective changes"),
+            ("DISTANCE", "Distance", "The view-plane distance d changes: the camera zooms, and the perspective stays"),
+        ),
+    )
+    margin: bpy.props.FloatProperty(
+        name="Margin",
+        description="How much of the picture's width and height stays free at each edge",
+        subtype="PERCENTAGE",
+        default=5.0,
+        min=0.0,
+        max=49.0,
+    )
+
+    def moved(self, pinhole: Pinhole, camera_object: bpy.types.Object, _scene: bpy.types.Scene) -> Pinhole:
+        frame = moves.framed_by_distance if self.by == "DISTANCE" else moves.framed_by_eye
+        return frame(pinhole, selection.points(bpy.context, camera_object), self.margin / 100)
+
+
+class VIEWCAM_OT_swap_camera(_Move, bpy.types.Operator):
+    bl_idname = "viewcam.swap_camera"
+    bl_label = "Swap Eye and Look-At"
+    bl_description = "Look back from the look-at point to where the eye is now"
+
+    def moved(self, pinhole: Pinhole, _camera_object: bpy.types.Object, _scene: bpy.types.Scene) -> Pinhole:
+        return moves.swapped(pinhole)
+
+
+class VIEWCAM_OT_level_camera(_Move, bpy.types.Operator):
+    bl_idname = "viewcam.level_camera"
+    bl_label = "Level"
+    bl_description = (
+        "Make up the preferred axis, the world's Z, so that the horizon is level. Where the view is so close to it that this "
+        "leaves the roll in doubt, the up that says the same for certain"
+    )
+
+    def moved(self, pinhole: Pinhole, _camera_object: bpy.types.Object, _scene: bpy.types.Scene) -> Pinhole:
+        level = replace(pinhole, up=preferences.up_axis())
+        in_doubt = readouts.roll_warning(level, precision=2.0**-24)
+        return replace(level, up=readouts.certain_up(level)) if in_doubt else level
+
+
+CLASSES = (
+    VIEWCAM_OT_adopt_view,
+    VIEWCAM_OT_look_at_selection,
+    VIEWCAM_OT_look_at_cursor,
+    VIEWCAM_OT_look_at_active,
+    VIEWCAM_OT_dolly_camera,
+    VIEWCAM_OT_orbit_camera,
+    VIEWCAM_OT_frame_selection,
+    VIEWCAM_OT_swap_camera,
+    VIEWCAM_OT_level_camera,
+)

@@ -1,0 +1,220 @@
+"""The camera's diagram in the 3D viewport: what the text draws (diagram.py), of each enabled camera that is selected or active.
+
+It is drawn in Blender's own drawing of the viewport and asks for none itself: whatever moves a camera redraws the viewport as
+it is. Lines are sent to the graphics card once for each camera and each pose (`_batches`), relative to the eye. A viewport that
+looks through the camera does not show its diagram, nor does one whose overlays are off.
+
+Rejected: a custom gizmo (gizmos are drawn whole even where a surface hides them, and not with overlays), and mesh or empty
+objects in the scene (they would be in the file, the outliner and the render).
+"""
+
+import functools
+from collections.abc import Iterable, Iterator
+from typing import ClassVar
+
+import bpy
+import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
+
+from ... import diagram as diagrams
+from ...errors import InputError
+from ...pinhole import Pinhole, Triple
+from .. import camera as cameras
+from .. import datablocks, preferences
+
+_NAMES = ("u", "v", "w")
+_LETTER_SIZE = 14  # points
+_LETTER_AT = 1.1  # of the axis, beyond its tip
+_FAINT = 0.35  # of a line's opacity, for the grid
+
+_handlers = []
+
+
+def is_shown(camera_object: bpy.types.Object, context: bpy.types.Context) -> bool:
+    """Whether a 3D viewport shows this object as an enabled camera, and does not look through it."""
+    if camera_object.type != "CAMERA" or not camera_object.virtual_pinhole.enabled:
+        return False
+    if not _is_viewport(context):
+        return False
+    space = context.space_data
+    looks_through = space.camera if space.use_local_camera else context.scene.camera
+    if context.region_data.view_perspective == "CAMERA" and camera_object == looks_through:
+        return False
+    return camera_object.visible_get(view_layer=context.view_layer, viewport=space)
+
+
+def _is_viewport(context: bpy.types.Context) -> bool:
+    """Whether it is a window's: File › Render › Viewport draws one from anywhere."""
+    return context.space_data is not None and context.space_data.type == "VIEW_3D" and context.region_data is not None
+
+
+def _cameras(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The cameras whose diagram is drawn in the context's viewport."""
+    if not _is_viewport(context) or not context.space_data.overlay.show_overlays:
+        return []
+    layer = context.view_layer
+    meant = dict.fromkeys((*layer.objects.selected, layer.objects.active))  # once each
+    return [block for block in meant if block and is_shown(block, context) and block.virtual_pinhole.show_overlay]
+
+
+def _figures(context: bpy.types.Context) -> Iterator[tuple[Pinhole, Triple, float]]:
+    """What `diagrams.diagram` is to draw in the context's viewport; values that make no camera have no diagram."""
+    for camera_object in _cameras(context):
+        group = camera_object.virtual_pinhole
+        try:
+            yield cameras.stated(camera_object, context.scene), group.numbers()[2], group.plane_at
+        except InputError:  # the panel shows it
+            continue
+
+
+@functools.lru_cache(maxsize=512)
+def _diagram(pinhole: Pinhole, up: Triple, share: float) -> diagrams.Diagram | None:
+    found = diagrams.diagram(pinhole, up, share)
+    return found if found.is_drawable() else None
+
+
+@functools.lru_cache(maxsize=512)
+def _batches(pinhole: Pinhole, up: Triple, share: float) -> dict | None:
+    """The diagram's parts on the graphics card, by name."""
+    import gpu
+    from gpu_extras.batch import batch_for_shader
+
+    figure = _diagram(pinhole, up, share)
+    if figure is None:
+        return None
+    lines = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+    frame = np.stack([figure.plane, np.roll(figure.plane, -1, axis=0)], axis=1)
+    arrows = {name: np.stack([np.zeros(3), tip]) for name, tip in zip((*_NAMES, "up"), (*figure.axes, figure.up), strict=True)}
+    parts = {"grid": figure.grid, "pyramid": figure.pyramid, "frame": frame, "view": figure.view, **arrows}
+    batches = {
+        name: batch_for_shader(lines, "LINES", {"pos": part.reshape(-1, 3).astype(np.float32)})
+        for name, part in parts.items()
+        if part.size
+    }
+    flat = gpu.shader.from_builtin("UNIFORM_COLOR")
+    batches["plane"] = batch_for_shader(flat, "TRI_FAN", {"pos": figure.plane.astype(np.float32)})
+    return batches
+
+
+def _axis_colors(context: bpy.types.Context) -> dict[str, tuple[float, ...]]:
+    theme = context.preferences.themes[0].user_interface
+    return {name: (*color, 1.0) for name, color in zip(_NAMES, (theme.axis_x, theme.axis_y, theme.axis_z), strict=True)}
+
+
+def _draw_lines() -> None:
+    context = bpy.context
+    figures = list(_figures(context))
+    if not figures:
+        return
+    import gpu
+
+    chosen, pixel = preferences.get(), context.preferences.system.pixel_size
+    line, plane = tuple(chosen.line_color), tuple(chosen.plane_color)
+    faint = (*line[:3], _FAINT * line[3])
+    pens = {"grid": (faint, 1.0), "pyramid": (line, 1.0), "view": (line, 1.0), "frame": (line, 2.0), "up": (line, 2.0)}
+    pens |= {name: (color, 2.5) for name, color in _axis_colors(context).items()}
+    lines, flat = (gpu.shader.from_builtin(name) for name in ("POLYLINE_UNIFORM_COLOR", "UNIFORM_COLOR"))
+    state = gpu.state
+    before = state.blend_get(), state.depth_test_get(), state.depth_mask_get()
+    state.blend_set("ALPHA")
+    state.depth_test_set("LESS_EQUAL")
+    state.depth_mask_set(False)
+    for figure in figures:
+        batches = _batches(*figure)
+        if batches is None:
+            continue
+        with gpu.matrix.push_pop():
+            gpu.matrix.translate(figure[0].eye)
+            flat.uniform_float("color", plane)
+            batches["plane"].draw(flat)
+            for name, (color, width) in pens.items():
+                if name in batches:
+                    lines.uniform_float("viewportSize", state.viewport_get()[2:])
+                    lines.uniform_float("lineWidth", width * pixel)
+                    lines.uniform_float("color", color)
+                    batches[name].draw(lines)
+    for restore, value in zip((state.blend_set, state.depth_test_set, state.depth_mask_set), before, strict=True):
+        restore(value)
+
+
+def _draw_letters() -> None:
+    context = bpy.context
+    figures = list(_figures(context))
+    if not figures:
+        return
+    import blf
+
+    font, size, colors = 0, _LETTER_SIZE * context.preferences.system.ui_scale, _axis_colors(context)
+    blf.size(font, size)
+    for pinhole, up, share in figures:
+        figure = _diagram(pinhole, up, share)
+        eye = _pixel(pinhole.eye, context)
+        if figure is None or eye is None:
+            continue
+        for name, tip in zip(_NAMES, figure.axes, strict=True):
+            at = _pixel(np.add(pinhole.eye, _LETTER_AT * tip), context)
+            if at and (at - eye).length > size:
+                width, height = blf.dimensions(font, name)
+                blf.position(font, at.x - width / 2, at.y - height / 2, 0)
+                blf.color(font, *colors[name])
+                blf.draw(font, name)
+
+
+def _pixel(point: Iterable[float], context: bpy.types.Context) -> Vector | None:
+    """Where the context's region shows a point in world space, or None where it lies beyond what the viewport shows."""
+    clipped = context.region_data.perspective_matrix @ Vector((*point, 1.0))
+    if abs(clipped.z) > clipped.w:
+        return None
+    return location_3d_to_region_2d(context.region, context.region_data, point)
+
+
+class _ShowPanel:
+    """The options of the diagram and the handles (gizmos.py)."""
+
+    bl_label = "Show"
+    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return datablocks.camera_in(context) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        group, layout = datablocks.camera_in(context).virtual_pinhole, self.layout
+        layout.use_property_split = True
+        column = layout.column(heading="Viewport")
+        column.active = group.enabled
+        column.prop(group, "show_handles")
+        column.prop(group, "show_overlay")
+        row = layout.column()
+        row.active = group.enabled and (group.show_overlay or group.show_handles)
+        row.prop(group, "plane_at")
+
+
+class VIEWCAM_PT_data_show(_ShowPanel, bpy.types.Panel):
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "data"
+    bl_parent_id = "VIEWCAM_PT_data"
+
+
+class VIEWCAM_PT_sidebar_show(_ShowPanel, bpy.types.Panel):
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Pinhole"
+    bl_parent_id = "VIEWCAM_PT_sidebar"
+
+
+CLASSES = (VIEWCAM_PT_data_show, VIEWCAM_PT_sidebar_show)
+
+
+def register() -> None:
+    for draw, when in ((_draw_lines, "POST_VIEW"), (_draw_letters, "POST_PIXEL")):
+        _handlers.append(bpy.types.SpaceView3D.draw_handler_add(draw, (), "WINDOW", when))
+
+
+def unregister() -> None:
+    while _handlers:
+        bpy.types.SpaceView3D.draw_handler_remove(_handlers.pop(), "WINDOW")
+    _batches.cache_clear()
+    _diagram.cache_clear()

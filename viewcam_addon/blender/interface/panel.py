@@ -1,0 +1,257 @@
+"""The panel "Virtual Pinhole": in Properties › Camera data, and in the 3D viewport's sidebar.
+
+What it says is found by functions that a test calls without a window: `notices` here, the rest in readouts.py. They run at
+every redraw, so the camera is stated once for the panel, and read once for the read-outs while these are open. Read-outs are
+text and no read-only properties: Blender asks for a property at times when nothing may be evaluated, in drivers and overrides.
+
+Blender translates what is a literal here, bl_label and bl_description. What is made of pieces is translated before the pieces
+go in (`iface`), and then not again.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import bpy
+from bpy.app.translations import pgettext_iface as iface
+
+from ...errors import InputError
+from ...pinhole import Pinhole
+from .. import camera as cameras
+from .. import datablocks, findings, hold, targets
+from . import baking, clipboard, presets, readouts
+
+
+@dataclass(frozen=True)
+class Notice:
+    """A sentence of warning. remedy : (operator, its button's text) that mends it and nothing else, if there is one."""
+
+    sentence: str
+    remedy: tuple[str, str] | None = None
+
+    @property
+    def is_mended_by_applying(self) -> bool:
+        """Whether setting the camera by its values again brings them together."""
+        return findings.APPLY_AGAIN in self.sentence
+
+
+class _CameraPanel:
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return datablocks.camera_in(context) is not None
+
+
+class _MainPanel(_CameraPanel):
+    bl_label = "Virtual Pinhole"
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        self.layout.prop(datablocks.camera_in(context).virtual_pinhole, "enabled", text="")
+
+    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+        presets.VIEWCAM_PT_presets.draw_panel_header(self.layout)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        camera_object, layout = datablocks.camera_in(context), self.layout
+        layout.use_property_split = layout.use_property_decorate = True
+        _draw_values(layout.column(), camera_object.virtual_pinhole)
+        found = notices(camera_object, context.scene)
+        clipboard.draw(layout, camera_object)
+        baking.draw(layout, camera_object)
+        _draw_setting(layout.row(align=True), camera_object, any(notice.is_mended_by_applying for notice in found))
+        width = context.region.width / context.preferences.system.ui_scale - 60
+        for notice in found:
+            _draw_notice(layout.column(align=True), notice, camera_object, width)
+
+
+def _draw_values(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
+    column.active = group.enabled
+    for point in targets.POINTS:
+        row = column.row()
+        row.enabled = targets.place(group, point) is None  # where the point is, its target says
+        row.prop(group, point)
+        column.prop(group, f"{point}_target", text="Object")
+    column.prop(group, "up")
+    column.separator()
+    for name in ("distance", "zoom", "keeps"):
+        column.prop(group, name)
+    column.separator()
+    column.prop(group, "held_roll" if group.pole == "HOLD" else "roll")
+    if group.pole == "HOLD":
+        column.prop(group, "hold_within")
+    column.prop(group, "pole")
+
+
+def _draw_setting(row: bpy.types.UILayout, camera_object: bpy.types.Object, alert: bool) -> None:
+    """The two ways to bring values and camera together. alert : whether they differ, and the first of them mends it."""
+    apply = row.row(align=True)
+    apply.enabled, apply.alert = camera_object.virtual_pinhole.enabled, alert
+    apply.operator("viewcam.apply_camera").camera = camera_object.name
+    row.operator("viewcam.adopt_camera").camera = camera_object.name
+
+
+def _draw_notice(column: bpy.types.UILayout, notice: Notice, camera_object: bpy.types.Object, width: float) -> None:
+    for i, line in enumerate(readouts.wrapped(iface(notice.sentence), width)):
+        column.label(text=line, icon="BLANK1" if i else "ERROR", translate=False)
+    if notice.remedy:
+        operator, text = notice.remedy
+        column.operator(operator, text=text, translate=False).camera = camera_object.name
+
+
+class _MovePanel(_CameraPanel):
+    bl_label = "Move"
+    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        name = datablocks.camera_in(context).name
+        column = self.layout.column()
+        for label, buttons in _MOVES.items():
+            split = column.split(factor=0.25)
+            heading = split.row()
+            heading.alignment = "RIGHT"
+            heading.label(text=label)
+            row = split.row(align=True)
+            for operator, look, properties in buttons:
+                button = row.operator(operator, **look)
+                button.camera = name
+                for key, value in properties.items():
+                    setattr(button, key, value)
+
+
+_STEP = math.radians(15)  # as Blender's own view orbits by Numpad 4, 6, 8 and 2
+# The rows: label → (operator, how its button looks, the operator's properties) from left to right.
+_MOVES = {
+    "From": (("viewcam.adopt_view", {"text": "Current View"}, {}),),
+    "Look At": (
+        ("viewcam.look_at_selection", {"text": "Selection"}, {}),
+        ("viewcam.look_at_cursor", {"text": "Cursor"}, {}),
+        ("viewcam.look_at_active", {"text": "Active"}, {}),
+    ),
+    "Frame by": (
+        ("viewcam.frame_selection", {"text": "Eye"}, {"by": "EYE"}),
+        ("viewcam.frame_selection", {"text": "Distance"}, {"by": "DISTANCE"}),
+    ),
+    "Orbit": (
+        ("viewcam.orbit_camera", {"text": "", "icon": "TRIA_LEFT"}, {"around": -_STEP}),
+        ("viewcam.orbit_camera", {"text": "", "icon": "TRIA_RIGHT"}, {"around": _STEP}),
+        ("viewcam.orbit_camera", {"text": "", "icon": "TRIA_UP"}, {"around": 0.0, "upwards": _STEP}),
+        ("viewcam.orbit_camera", {"text": "", "icon": "TRIA_DOWN"}, {"around": 0.0, "upwards": -_STEP}),
+    ),
+    "Eye": (
+        ("viewcam.dolly_camera", {"text": "Dolly"}, {}),
+        ("viewcam.swap_camera", {"text": "Swap"}, {}),
+    ),
+    "Up": (("viewcam.level_camera", {"text": "Level"}, {}),),
+}
+
+
+class _ReadOutsPanel(_CameraPanel):
+    bl_label = "Read-Outs"
+    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column = self.layout.column(align=True)
+        for readout in shown(datablocks.camera_in(context), context.scene):
+            split = column.split(factor=0.4 if len(readout.shown) == 1 else 0.1)
+            name = split.row()
+            name.alignment = "RIGHT"
+            name.label(text=readout.label)
+            row = split.row()
+            for text in readout.shown:
+                row.label(text=text, translate=False)
+            button = row.operator("viewcam.copy_readout", text="", icon="COPYDOWN", emboss=False)
+            button.label, button.text = readout.label, readout.exact
+
+
+def notices(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> list[Notice]:
+    """What the panel warns of."""
+    try:
+        stated = cameras.stated(camera_object, scene)
+        if stated is None:
+            cameras.read(camera_object, scene)
+            found = []
+        else:
+            found = _doubts(camera_object, stated)
+            found += map(Notice, cameras.check(camera_object, stated, scene))
+    except InputError as error:
+        return [Notice(datablocks.sentence(error))]
+    return [*found, *map(Notice, datablocks.beyond_pinhole(camera_object, scene))]
+
+
+def _doubts(camera_object: bpy.types.Object, stated: Pinhole) -> list[Notice]:
+    """What is to be said of the values, wherever the camera is."""
+    found = []
+    if sentence := readouts.roll_warning(stated, camera_object.virtual_pinhole.precision()):
+        up = readouts.vector(readouts.certain_up(stated))
+        found.append(Notice(sentence, ("viewcam.choose_up", iface("Use Up {up}").format(up=up))))
+    sentences = (readouts.distance_warning(stated), hold.obstacle(camera_object), *targets.warnings(camera_object))
+    return found + [Notice(sentence) for sentence in sentences if sentence]
+
+
+def shown(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> list[readouts.Readout]:
+    """The read-outs of a camera; none where it is no pinhole, which a notice says."""
+    group = camera_object.virtual_pinhole
+    try:
+        found = cameras.read(camera_object, scene)
+    except InputError:
+        return []
+    eye, look_at, _, _ = group.numbers()
+    reach = math.dist(eye, look_at) if group.enabled else math.nan
+    length = datablocks.length(reach, scene) if math.isfinite(reach) else None
+    frame = datablocks.frame_of(scene)
+    at_full_size = found.distance[0] * (frame.resolution_x / frame.size[0])
+    return readouts.readouts(found, camera_object.data.lens, at_full_size, (length, reach) if length else None)
+
+
+class VIEWCAM_PT_data(_MainPanel, bpy.types.Panel):
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "data"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        # The data may be a lamp's or a mesh's, and pinned data may have lost its object.
+        return context.camera is not None and super().poll(context)
+
+
+class VIEWCAM_PT_sidebar(_MainPanel, bpy.types.Panel):
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Pinhole"
+
+
+class VIEWCAM_PT_data_move(_MovePanel, bpy.types.Panel):
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "data"
+    bl_parent_id = "VIEWCAM_PT_data"
+
+
+class VIEWCAM_PT_sidebar_move(_MovePanel, bpy.types.Panel):
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Pinhole"
+    bl_parent_id = "VIEWCAM_PT_sidebar"
+
+
+class VIEWCAM_PT_data_readouts(_ReadOutsPanel, bpy.types.Panel):
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "data"
+    bl_parent_id = "VIEWCAM_PT_data"
+
+
+class VIEWCAM_PT_sidebar_readouts(_ReadOutsPanel, bpy.types.Panel):
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Pinhole"
+    bl_parent_id = "VIEWCAM_PT_sidebar"
+
+
+CLASSES = (
+    VIEWCAM_PT_data,
+    VIEWCAM_PT_sidebar,
+    VIEWCAM_PT_data_move,
+    VIEWCAM_PT_sidebar_move,
+    VIEWCAM_PT_data_readouts,
+    VIEWCAM_PT_sidebar_readouts,
+)

@@ -1,0 +1,388 @@
+"""The sub-panel "Proof": Compare with Cycles in one click, while the artist works on.
+
+comparing.py does the work; here a modal operator with a timer looks how far it is. What it came to belongs to this session of
+Blender: nothing of it is in the file but, while an Image Editor shows it, the packed image of the difference. Escape, Cancel,
+another file, turning the add-on off and leaving Blender end a comparison without a trace.
+"""
+
+import atexit
+from pathlib import Path
+from typing import ClassVar
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ...errors import InputError
+from ...tracer.scene.film import SAMPLES
+from .. import datablocks, preferences
+from ..render_settings import LEVELS
+from . import difference_image, readouts
+from .comparing import Comparison, Outcome
+
+_SECONDS = 0.2  # between two looks
+_NAMES = tuple(name for name, *_ in LEVELS)
+
+_timer: bpy.types.Timer | None = None
+_running: Comparison | None = None
+_latest: Outcome | None = None
+
+
+def running() -> Comparison | None:
+    """The comparison on its way, if there is one."""
+    return _running
+
+
+def latest() -> Outcome | None:
+    """What the last one came to, in this session and with this file."""
+    return _latest
+
+
+def end(forget: bool = True) -> None:
+    """Cancel the comparison on its way, and forget what the last one came to."""
+    global _running, _latest
+    if _running:
+        _running.cancel()
+    _running = None
+    if forget and _latest:
+        _latest.discard()
+        _latest = None
+
+
+def _begin(camera_object: bpy.types.Object, context: bpy.types.Context) -> None:
+    global _running
+    settings = context.window_manager.virtual_pinhole_proof
+    folder = Path(bpy.path.abspath(settings.folder)) if settings.folder else None
+    level = settings.level.lower()
+    _running = Comparison(camera_object, context.scene, level, settings.samples, settings.clay, folder)
+
+
+def _look() -> Outcome | None:
+    """What the comparison on its way has come to, None while it runs."""
+    global _running, _latest
+    outcome = _running.poll()
+    if outcome:
+        if _latest:
+            _latest.discard()
+        _running, _latest = None, outcome
+    return outcome
+
+
+def _stop_timer() -> None:
+    global _timer
+    if _timer:
+        bpy.context.window_manager.event_timer_remove(_timer)
+    _timer = None
+
+
+class ProofSettings(bpy.types.PropertyGroup):
+    """`window_manager.virtual_pinhole_proof`: how the next comparison is made."""
+
+    said: bpy.props.StringProperty(options={"HIDDEN"})
+    level: bpy.props.EnumProperty(
+        name="Level",
+        description="How much of the scene is compared",
+        items=LEVELS,
+        get=lambda group: _NAMES.index(group.said or preferences.get().default_level),
+        set=lambda group, number: setattr(group, "said", _NAMES[number]),
+    )
+    samples: bpy.props.IntProperty(
+        name="Samples",
+        description="Paths of light through each pixel, on both sides. The more, the smaller a difference is found",
+        default=SAMPLES,
+        min=1,
+        soft_max=4096,
+    )
+    clay: bpy.props.BoolProperty(
+        name="Clay", description="The same matte material on everything, on both sides: for scenes whose own are not modelled"
+    )
+    folder: bpy.props.StringProperty(
+        name="Report",
+        description="Where the report is kept. Without a folder it is there until another comparison or the end of Blender",
+        subtype="DIR_PATH",
+    )
+
+
+class VIEWCAM_OT_compare_with_cycles(bpy.types.Operator):
+    bl_idname = "viewcam.compare_with_cycles"
+    bl_label = "Compare with Cycles"
+    bl_description = (
+        "Render the picture of this camera with Cycles and with the reference tracer, in the background, and tell how far they "
+        "differ. The file stays as it is, and its unsaved edits count"
+    )
+
+    camera: bpy.props.StringProperty(
+        name="Camera",
+        description="Name of the camera object, or empty for the active or the scene's camera",
+        options={"SKIP_SAVE"},
+    )
+    _shown = ("", 0)  # the step and the second that were drawn last
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if _running:
+            cls.poll_message_set("A comparison is on its way")
+            return False
+        if context.scene and datablocks.camera_in(context):
+            return True
+        cls.poll_message_set("There is no camera")
+        return False
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        if bpy.app.background:
+            return self.execute(context)
+        if not self._begins(context):
+            return {"CANCELLED"}
+        global _timer
+        _timer = context.window_manager.event_timer_add(_SECONDS, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        _redraw(context)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if event.type == "ESC" and event.value == "PRESS":
+            end(forget=False)
+        elif event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        if _running is None:
+            self.report({"INFO"}, "The comparison is cancelled")
+            self._leave(context)
+            return {"CANCELLED"}
+        outcome = _look()
+        if outcome is None:
+            self._show(context)
+            return {"PASS_THROUGH"}
+        self._leave(context)
+        return self._tells(outcome, context)
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Blender closes the window or the file."""
+        end(forget=False)
+        self._leave(context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """For scripts: wait for it."""
+        if not self._begins(context):
+            return {"CANCELLED"}
+        try:
+            _running.wait()
+            outcome = _look()
+        except BaseException:  # Ctrl-C
+            end(forget=False)
+            raise
+        return self._tells(outcome, context)
+
+    def _begins(self, context: bpy.types.Context) -> bool:
+        try:
+            found = bpy.data.objects.get(self.camera) if self.camera else datablocks.camera_in(context)
+            if found is None:
+                raise InputError(f"there is no camera {self.camera!r}: name another")
+            _begin(found, context)
+        except InputError as error:
+            self.report({"ERROR"}, datablocks.sentence(error))
+            return False
+        return True
+
+    def _show(self, context: bpy.types.Context) -> None:
+        """Draw what has changed since the last look."""
+        step, second = _running.progress()[1], int(_running.seconds)
+        if (step, second) != self._shown:
+            _redraw(context, status_bar=step != self._shown[0])
+        self._shown = step, second
+
+    def _leave(self, context: bpy.types.Context) -> None:
+        _stop_timer()
+        _redraw(context)
+
+    def _tells(self, outcome: Outcome, context: bpy.types.Context) -> set[str]:
+        if outcome.passed is None:
+            self.report({"ERROR"}, outcome.verdict)
+            return {"CANCELLED"}
+        self.report({"INFO" if outcome.passed else "WARNING"}, outcome.verdict)
+        difference_image.show(outcome, context)
+        return {"FINISHED"}
+
+
+class VIEWCAM_OT_cancel_comparison(bpy.types.Operator):
+    bl_idname = "viewcam.cancel_comparison"
+    bl_label = "Cancel"
+    bl_description = "End the comparison with Cycles"
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        return _running is not None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        end(forget=False)
+        _redraw(context)
+        return {"FINISHED"}
+
+
+class VIEWCAM_OT_show_difference(bpy.types.Operator):
+    bl_idname = "viewcam.show_difference"
+    bl_label = "Show Difference"
+    bl_description = "Show what differs pixel by pixel, in an Image Editor"
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        return bool(_latest and _latest.difference)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        difference_image.show(_latest, context, anyway=True)
+        return {"FINISHED"}
+
+
+class VIEWCAM_OT_open_report(bpy.types.Operator):
+    bl_idname = "viewcam.open_report"
+    bl_label = "Open Report"
+    bl_description = "Open the report of the comparison in the browser"
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        return bool(_latest and _latest.report)
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        return bpy.ops.wm.url_open(url=_latest.report.absolute().as_uri())
+
+
+class _ProofPanel:
+    bl_label = "Proof"
+    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return datablocks.camera_in(context) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        camera_object = datablocks.camera_in(context)
+        _draw_settings(self.layout, context.window_manager.virtual_pinhole_proof)
+        if _running:
+            _draw_progress(self.layout)
+        else:
+            self.layout.operator("viewcam.compare_with_cycles", icon="PLAY").camera = camera_object.name
+        if _latest:
+            column = self.layout.column()
+            column.active = _running is None
+            _draw_outcome(column, _latest, camera_object, context)
+
+
+class VIEWCAM_PT_data_proof(_ProofPanel, bpy.types.Panel):
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "data"
+    bl_parent_id = "VIEWCAM_PT_data"
+
+
+class VIEWCAM_PT_sidebar_proof(_ProofPanel, bpy.types.Panel):
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Pinhole"
+    bl_parent_id = "VIEWCAM_PT_sidebar"
+
+
+def _draw_settings(layout: bpy.types.UILayout, settings: ProofSettings) -> None:
+    layout.use_property_split, layout.use_property_decorate = True, False
+    column = layout.column()
+    column.active = _running is None
+    column.prop(settings, "level")
+    if settings.level != "GEOMETRY":
+        column.prop(settings, "samples")
+        column.prop(settings, "clay")
+    column.prop(settings, "folder")
+
+
+def _draw_progress(layout: bpy.types.UILayout, timed: bool = True) -> None:
+    share, words = _running.progress()
+    row = layout.row(align=True)
+    row.progress(factor=share, text=f"{words} ({_running.seconds:.0f} s)" if timed else words)
+    row.operator("viewcam.cancel_comparison", text="", icon="CANCEL")
+
+
+def _draw_outcome(
+    layout: bpy.types.UILayout, outcome: Outcome, camera_object: bpy.types.Object, context: bpy.types.Context
+) -> None:
+    width = context.region.width / context.preferences.system.ui_scale - 60
+    headline, _, rest = outcome.verdict.partition(": ") if outcome.passed is not None else (outcome.verdict, "", "")
+    lines = [(headline, "CHECKMARK" if outcome.passed else "ERROR")]
+    if not outcome.passed:
+        lines.append((rest[:1].upper() + rest[1:], "BLANK1"))
+    if camera_object.name != outcome.camera:
+        lines.append((f"Of another camera: {outcome.what}", "INFO"))
+    elif not outcome.is_of(camera_object, context.scene):
+        lines.append((f"The camera has changed since: {outcome.what}", "INFO"))
+    column = layout.column(align=True)
+    for sentence, icon in lines:
+        for i, line in enumerate(readouts.wrapped(sentence, width)):
+            column.label(text=line, icon="BLANK1" if i else icon)
+    for label, text in outcome.rows:
+        split = column.split(factor=0.46)
+        name = split.row()
+        name.alignment = "RIGHT"
+        name.label(text=label)
+        split.label(text=text)
+    if outcome.report:
+        row = layout.row(align=True)
+        row.operator("viewcam.show_difference", text="Difference", icon="IMAGE_DATA")
+        row.operator("viewcam.open_report", text="Report", icon="URL")
+        column = layout.column(align=True)
+        for line in readouts.wrapped(outcome.colours, width):
+            column.label(text=line)
+
+
+def _draw_status_bar(header: bpy.types.Header, _context: bpy.types.Context) -> None:
+    if _running:
+        row = header.layout.row()
+        row.ui_units_x = 14
+        _draw_progress(row, timed=False)
+
+
+def _draw_render_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    menu.layout.separator()
+    menu.layout.operator_context = "INVOKE_DEFAULT"
+    menu.layout.operator("viewcam.compare_with_cycles")
+
+
+def _redraw(context: bpy.types.Context, status_bar: bool = True) -> None:
+    """The panels and the status bar; nothing else of the screen."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type in ("PROPERTIES", "VIEW_3D"):
+                for region in (region for region in area.regions if region.type in ("UI", "WINDOW")):
+                    if area.type == "PROPERTIES" or region.type == "UI":
+                        region.tag_redraw()
+    if status_bar and context.workspace:
+        context.workspace.status_text_set(None)  # as no status bar is in a screen's areas, nothing else tells it to draw
+
+
+@persistent
+def _on_load(*_: object) -> None:
+    end()
+
+
+CLASSES = (
+    VIEWCAM_OT_compare_with_cycles,
+    VIEWCAM_OT_cancel_comparison,
+    VIEWCAM_OT_show_difference,
+    VIEWCAM_OT_open_report,
+    VIEWCAM_PT_data_proof,
+    VIEWCAM_PT_sidebar_proof,
+)
+
+
+def register() -> None:
+    bpy.utils.register_class(ProofSettings)
+    bpy.types.WindowManager.virtual_pinhole_proof = bpy.props.PointerProperty(type=ProofSettings)
+    bpy.types.TOPBAR_MT_render.append(_draw_render_menu)
+    bpy.types.STATUSBAR_HT_header.append(_draw_status_bar)
+    bpy.app.handlers.load_pre.append(_on_load)
+    atexit.register(end)
+
+
+def unregister() -> None:
+    end()
+    _stop_timer()  # Blender takes a modal operator that is unregistered away without its cancel()
+    atexit.unregister(end)
+    bpy.app.handlers.load_pre.remove(_on_load)
+    bpy.types.STATUSBAR_HT_header.remove(_draw_status_bar)
+    bpy.types.TOPBAR_MT_render.remove(_draw_render_menu)
+    del bpy.types.WindowManager.virtual_pinhole_proof
+    bpy.utils.unregister_class(ProofSettings)

@@ -1,0 +1,174 @@
+"""Cycles' side of a comparison, in 32 bits: the passes of geometry through each pixel's centre, or those of light.
+
+The settings are those under which Cycles follows a pinhole best. Its first sample stands in the middle of the pixel but for a
+bias of the filter table, 3e-6 px at the narrowest Blackman-Harris filter; adaptive sampling, denoising and light thresholds
+would make of it something else. A picture of light is what the scene's own film and bounces make of it, without all that trades
+truth for less noise: clamping, filtered gloss, culled lights, guesses of indirect light. Everything is borrowed and given back.
+"""
+
+import errno
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+
+from ...errors import InputError
+from ...files import written_whole
+from ...tracer.scene.film import Bounces, Film
+from .. import versions
+from ..borrowing import Borrower, borrowed, still_of_one_layer
+from ..scenes import film
+from ..scenes.depsgraph import render_still
+from ..scenes.ledger import Remedy
+from .exr import is_whole
+
+_SAMPLING = {
+    "device": "CPU",
+    "samples": 1,
+    "use_adaptive_sampling": False,
+    "use_denoising": False,
+    "time_limit": 0.0,
+    "sample_offset": 0,
+    "use_sample_subset": False,
+    "pixel_filter_type": "BLACKMAN_HARRIS",
+    "filter_width": 0.01,
+    "light_sampling_threshold": 0.0,
+    "use_light_tree": False,
+    "use_layer_samples": "IGNORE",
+    "film_exposure": 1.0,
+    "use_camera_cull": False,
+    "use_distance_cull": False,
+}
+_PASSES = ("combined", "z", "position", "normal", "uv", "object_index", "material_index")
+_PASSES_OF_LIGHT = ("combined", "emit", "environment", "diffuse_direct", "diffuse_indirect", "diffuse_color")
+_PASSES_OF_CENTRES = ("z", "object_index")
+
+# Pixels independent of each other, and nothing left out or guessed.
+_LIGHT = {
+    "use_animated_seed": False,
+    "sampling_pattern": "TABULATED_SOBOL",
+    "scrambling_distance": 1.0,
+    "auto_scrambling_distance": False,
+    "min_light_bounces": 0,
+    "min_transparent_bounces": 0,
+    "transparent_max_bounces": 1024,
+    "volume_bounces": 0,
+    "sample_clamp_direct": 0.0,
+    "sample_clamp_indirect": 0.0,
+    "blur_glossy": 0.0,
+    "caustics_reflective": True,
+    "caustics_refractive": True,
+    "direct_light_sampling_type": "MULTIPLE_IMPORTANCE_SAMPLING",
+    "use_fast_gi": False,
+    "use_guiding": False,
+    "film_transparent_glass": False,
+}
+
+
+@dataclass(frozen=True)
+class Light:
+    """A picture of light. samples : a pixel, in all; one is the pixel's centre."""
+
+    film: Film
+    bounces: Bounces
+    samples: int
+    seed: int = 0
+
+
+def render(
+    scene: bpy.types.Scene,
+    view_layer: bpy.types.ViewLayer,
+    camera_object: bpy.types.Object,
+    path: str | os.PathLike[str],
+    remedies: Iterable[Remedy] = (),
+    threads: int | None = None,
+    light: Light | None = None,
+    keep: bool = False,
+) -> None:
+    """Render one view layer at the current frame to a multilayer EXR, whole or not at all.
+
+    remedies : what to take out for the time of the render (ledger.py). threads : all by default. light : for a picture of
+        light in place of the passes of geometry. keep : whether Cycles keeps what it has built, for the next render.
+
+    Raises
+    ------
+    InputError
+        if Cycles is disabled or reports an error, or if the file can't be written.
+    """
+    if not hasattr(scene, "cycles"):
+        raise InputError("Cycles is disabled: enable the add-on Cycles Render Engine in Blender's preferences")
+    with written_whole(path) as temporary, borrowed() as borrow:
+        still_of_one_layer(borrow, scene, view_layer, camera_object, keep)
+        borrow_settings(borrow, scene, view_layer, light)
+        _borrow_file(borrow, scene, temporary)
+        if threads:
+            borrow.set(scene.render, "threads_mode", "FIXED")
+            borrow.set(scene.render, "threads", threads)
+        for remedy in remedies:
+            remedy(borrow)
+        render_still(scene, to_file=True)
+        if not is_whole(temporary):
+            raise OSError(errno.EIO, "Blender did not finish the file")
+
+
+def borrow_settings(
+    borrow: Borrower, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, light: Light | None = None
+) -> None:
+    """Everything but the file; benchmarks render without one."""
+    borrow.set(scene.render, "engine", "CYCLES")
+    _borrow_all(borrow, scene.cycles, _SAMPLING)
+    passes = _PASSES
+    if light:
+        borrow.set(scene.render, "film_transparent", light.film.transparent)
+        _borrow_all(borrow, scene.cycles, _LIGHT | _settings_of(light))
+        passes = _PASSES_OF_LIGHT + (_PASSES_OF_CENTRES if light.samples == 1 else ())
+    _borrow_passes(borrow, view_layer, passes)
+
+
+def _settings_of(light: Light) -> dict[str, object]:
+    settings = {name: getattr(light.bounces, ours) for ours, name in film.BOUNCES.items()}
+    settings |= {"samples": light.samples, "seed": light.seed % 2**31, "film_exposure": light.film.exposure}
+    if light.samples > 1:
+        settings |= {"pixel_filter_type": light.film.filter, "filter_width": light.film.filter_width}
+        settings |= versions.without_first_sample(light.samples)
+    return settings
+
+
+def _borrow_all(borrow: Borrower, owner: bpy.types.bpy_struct, settings: dict[str, object]) -> None:
+    for name, value in settings.items():
+        if hasattr(owner, name):  # versions know fewer of them
+            borrow.set(owner, name, value)
+
+
+def _borrow_passes(borrow: Borrower, view_layer: bpy.types.ViewLayer, passes: Iterable[str]) -> None:
+    """Passes beside those that are on; surfaces, without hair and volumes."""
+    for name in passes:
+        borrow.set(view_layer, f"use_pass_{name}", True)
+    borrow.set(view_layer, "use_strand", False)
+    borrow.set(view_layer, "use_volumes", False)
+
+
+def _borrow_file(borrow: Borrower, scene: bpy.types.Scene, path: os.PathLike[str]) -> None:
+    borrow.set(scene.render, "filepath", versions.literal_path(Path(path).absolute()))
+    borrow.set(scene.render, "use_file_extension", False)
+    borrow.set(scene.render, "use_overwrite", True)
+    settings = scene.render.image_settings
+    borrow_whole(borrow, settings)
+    settings.color_management = "FOLLOW_SCENE"
+    versions.set_multilayer_file(settings)
+
+
+def borrow_whole(borrow: Borrower, settings: bpy.types.ImageFormatSettings) -> None:
+    """Give back all settings of the file together, since the kind of file changes what the others may be."""
+    names = [prop.identifier for prop in settings.bl_rna.properties if not prop.is_readonly]
+    names.sort(key=lambda name: ("media_type", "file_format").index(name) if name in ("media_type", "file_format") else 2)
+    before = {name: getattr(settings, name) for name in names}
+
+    def give_back() -> None:
+        for name, value in before.items():
+            if getattr(settings, name) != value:
+                setattr(settings, name, value)
+
+    borrow.afterwards(give_back)

@@ -1,0 +1,173 @@
+"""The render engine "Virtual Pinhole Reference": F12 and `blender -b FILE -E VIEWCAM -f 1` show what the tracer computes.
+
+The scene is what the depsgraph holds that Blender hands to an engine, read as `viewcam export` reads it; nothing in it changes.
+What goes wrong is reported, which ends `blender -b` with status 1 and without a file.
+
+Level `geometry` knows no light: its Combined shows surfaces as a lamp at the eye would, by the cosine between ray and normal.
+
+What is prepared for one picture serves all passes of a frame, and the next frames as well where Blender's "Persistent Data" is
+on, which keeps the engine. The scene is read anew for each, except in a batch (`keeps_scene`).
+
+Rejected: drawing in the viewport, which wants a quick preview where this engine is a reference; a result that is begun once and
+updated, which Blender would copy whole for each band of rows.
+"""
+
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import errors
+from ...errors import InputError
+from ...image import BACKGROUND_DEPTH, CHANNELS, GEOMETRY_PASSES
+from ...tracer.rays.surface import Passes
+from ...tracer.scene import Scene
+from ...tracer.scene.film import LEVELS
+from ...tracer.scene.levels import least_level
+from .. import datablocks, versions
+from ..scenes import export
+from ..scenes.depsgraph import only_cameras_changed
+from ..scenes.ledger import Ledger
+from . import tracing
+
+# The property of a view layer that asks for each pass. Combined is always there.
+ASKED_BY = {
+    "Depth": "use_pass_z",
+    "Position": "use_pass_position",
+    "Normal": "use_pass_normal",
+    "UV": "use_pass_uv",
+    "Object Index": "use_pass_object_index",
+    "Material Index": "use_pass_material_index",
+    "Diffuse Direct": "use_pass_diffuse_direct",
+    "Diffuse Indirect": "use_pass_diffuse_indirect",
+    "Diffuse Color": "use_pass_diffuse_color",
+    "Emission": "use_pass_emit",
+    "Environment": "use_pass_environment",
+}
+
+_GEOMETRY = LEVELS[0]
+
+
+class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
+    bl_idname = "VIEWCAM"
+    bl_label = "Virtual Pinhole Reference"
+    bl_use_preview = False
+    bl_use_eevee_viewport = True
+    bl_use_shading_nodes_custom = False
+    # For a batch: whether the scene, once it is read, serves all pictures until Blender tells of a change. An artist may change
+    # what Blender does not tell of.
+    keeps_scene = False
+    # Of the last picture: the level at which it was traced, and what is not modelled as it is, one sentence each.
+    level, warnings = _GEOMETRY, ()
+    _keeper = None
+    _read = None  # what it was read for, and the scene
+
+    def update_render_passes(self, scene: bpy.types.Scene, renderlayer: bpy.types.ViewLayer) -> None:
+        for name in _asked_for(scene, renderlayer):
+            letters = CHANNELS[name]
+            kind = "COLOR" if letters.startswith("RGB") else "VALUE" if len(letters) == 1 else "VECTOR"
+            self.register_pass(scene, renderlayer, versions.pass_name(name), len(letters), letters, kind)
+
+    def render(self, depsgraph: bpy.types.Depsgraph) -> None:
+        try:
+            self._render(depsgraph)
+        except InputError as error:
+            self.report({"ERROR"}, datablocks.sentence(error))
+        except Exception as error:  # Blender would print a traceback and call the render finished
+            self.report({"ERROR"}, f"Virtual Pinhole: {errors.bug(error)}")
+        finally:
+            if not depsgraph.scene.render.use_persistent_data:  # else Blender keeps this engine for the next frame
+                self._keeper = self._read = None
+
+    def _render(self, depsgraph: bpy.types.Depsgraph) -> None:
+        self.update_stats("", "Reading the scene")
+        settings = depsgraph.scene_eval.virtual_pinhole_reference
+        scene = self._exported(depsgraph)
+        level = least_level(scene)[0] if settings.level == "AUTO" else settings.level.lower()
+        type(self).level = level
+        words = f"Level {level}" if level == _GEOMETRY else f"Level {level}, {settings.samples} samples"
+        self.update_stats("", words)
+        started, done = time.perf_counter(), np.zeros(scene.camera.height, bool)
+        for band, rows in self._bands(depsgraph, scene, level):
+            self._show(depsgraph, band, rows)
+            done[rows.start : rows.stop] = True
+            self.update_progress(done.mean())
+            remaining = round((time.perf_counter() - started) * (1 / done.mean() - 1))
+            self.update_stats("", f"{words} | Remaining {remaining // 60}:{remaining % 60:02}")
+
+    def _exported(self, depsgraph: bpy.types.Depsgraph) -> Scene:
+        """What is seen through the camera and the render border."""
+        if depsgraph.scene.render.use_multiview:
+            raise InputError("stereoscopy is on, and each eye has another camera: turn it off among the output properties")
+        settings, camera_object = depsgraph.scene_eval.virtual_pinhole_reference, self.camera_override.original
+        scene = self._read_scene(depsgraph, camera_object, settings.level != "GEOMETRY")
+        if settings.clay:
+            scene = replace(scene, objects=tuple(replace(placed, materials=()) for placed in scene.objects))
+        frame = datablocks.frame_of(depsgraph.scene)
+        if frame.border and not frame.crop:
+            scene = replace(scene, camera=scene.camera.cropped(*replace(frame, crop=True).window))
+        lacking = [(entry.object, entry.reason) for entry in scene.ledger if entry.status != "exported"]
+        beyond = [(camera_object.name, sentence) for sentence in datablocks.beyond_pinhole(camera_object, depsgraph.scene)]
+        words = [f"Not modelled as it is: {name!r}, {reason}" for name, reason in (*beyond, *lacking)]
+        if words:
+            others = f" (and {len(words) - 1} more, which viewcam export lists)" if len(words) > 1 else ""
+            self.report({"WARNING"}, words[0] + others)
+        type(self).warnings = tuple(words)
+        return scene
+
+    def _read_scene(self, depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, lit: bool) -> Scene:
+        """What is seen through the camera."""
+        former, self._read = self._read, None
+        if former and former[0] == lit and self.keeps_scene and only_cameras_changed(depsgraph):
+            scene = export.seen_from(former[1], depsgraph, camera_object)
+        else:
+            scene = export.scene_in(depsgraph, camera_object, Ledger(), lit)
+        self._read = lit, scene
+        return scene
+
+    def _bands(self, depsgraph: bpy.types.Depsgraph, scene: Scene, level: str) -> Iterator[tuple[Passes, range]]:
+        """Trace the scene: the passes of some rows, and which they are. What is where is that at the pixels' centres."""
+
+        def traced(level: str) -> Iterator[tuple[Passes, range]]:
+            return tracing.bands(scene, level, settings.samples, settings.seed, threads, self.test_break, self._keeper)
+
+        self._keeper = self._keeper or tracing.keeper()
+        settings, threads = depsgraph.scene_eval.virtual_pinhole_reference, depsgraph.scene.render.threads
+        centres: Passes = {}
+        if level != _GEOMETRY and set(GEOMETRY_PASSES) & set(_asked_for(depsgraph.scene_eval, depsgraph.view_layer)):
+            for passes, _ in traced(_GEOMETRY):
+                centres = passes
+        for passes, rows in traced(level):
+            band = {name: values[rows.start : rows.stop] for name, values in (centres | passes).items()}
+            if level == _GEOMETRY:
+                band["Combined"] = _lit_from_the_eye(band)
+            yield band, rows
+
+    def _show(self, depsgraph: bpy.types.Depsgraph, band: Passes, rows: range) -> None:
+        """Hand over some rows of the passes that are asked for."""
+        _, width, _ = band["Combined"].shape
+        result = self.begin_result(0, rows.start, width, len(rows), layer=depsgraph.view_layer.name)
+        there = result.layers[0].passes
+        for name in _asked_for(depsgraph.scene_eval, depsgraph.view_layer):
+            if name in band:
+                there[versions.pass_name(name)].rect.foreach_set(band[name].ravel())
+        self.end_result(result)
+
+
+def _lit_from_the_eye(passes: Passes) -> NDArray[np.float32]:
+    """The Combined pass of level geometry, (height, width, 4): transparent where nothing is."""
+    hit = (passes["Depth"] < BACKGROUND_DEPTH).astype(np.float32)
+    return np.concatenate([passes["Facing"]] * 3 + [hit], axis=-1)
+
+
+def _asked_for(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Iterator[str]:
+    yield "Combined"
+    yield from (name for name, asked_by in ASKED_BY.items() if getattr(view_layer, asked_by))
+    if scene.virtual_pinhole_reference.use_pass_variance:
+        yield "Variance"
+
+
+CLASSES = (VIEWCAM_RenderEngine,)

@@ -1,0 +1,239 @@
+"""One job on one .blend, as the command line asks for it: export, render with Cycles, or both from the same state.
+
+A job opens the file (or takes the one that is open), chooses camera, frame and size for its own time only, and never saves.
+Scripts of the file do not run.
+"""
+
+import contextlib
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import bpy
+
+from ...errors import InputError
+from ...tracer.scene import LedgerEntry, Scene
+from ...tracer.scene.film import LEVELS, NO_BOUNCES, SAMPLES
+from ...tracer.scene.levels import least_level
+from .. import datablocks, ensure_registered, resolution
+from ..borrowing import Borrower, borrowed
+from ..scenes import indices, materials, recentering
+from ..scenes.export import Light, export_scene, survey
+from ..scenes.ledger import Ledger
+from . import cycles
+
+AUTO = "auto"
+
+# What a .blend starts with: itself, or a gzip or Zstandard stream.
+_MAGIC = (b"BLENDER", b"\x1f\x8b", b"\x28\xb5\x2f\xfd")
+_LAST_FRAME = 1048574
+
+
+@dataclass(frozen=True)
+class Request:
+    """blend : the file, or None for the one that is open. camera, frame, size : the scene's own where None.
+
+    recenter : whether both sides see the scene with its origin at the eye. level : one of film.LEVELS, or "auto" for the least
+    that models all light of the scene (levels.py). samples : a pixel, of all of Cycles' pictures together, from level `direct`
+    on. clay : whether one and the same material covers all surfaces.
+    """
+
+    blend: str | os.PathLike[str] | None = None
+    camera: str | None = None
+    frame: int | None = None
+    size: tuple[int, int] | None = None
+    strict: bool = False
+    recenter: bool = False
+    threads: int | None = None
+    level: str = "geometry"
+    samples: int = SAMPLES
+    seed: int = 0
+    clay: bool = False
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """What a job works on while it lasts.
+
+    level : what is modelled, never "auto". ledger : of what is on this stage. origin, names, told : of the file that a
+    recentred stage stands for, see recentering.py; told is the file's ledger.
+    """
+
+    scene: bpy.types.Scene
+    view_layer: bpy.types.ViewLayer
+    camera: bpy.types.Object
+    level: str = LEVELS[0]
+    ledger: Ledger = field(default_factory=Ledger)
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    names: dict[str, str] = field(default_factory=dict)
+    told: Ledger | None = None
+
+    @property
+    def is_lit(self) -> bool:
+        return self.level != LEVELS[0]
+
+    def entries(self, strict: bool) -> tuple[LedgerEntry, ...]:
+        """What is told of the file; NotModelledError if `strict` and anything is approximated or left out."""
+        ledger = self.ledger
+        if self.told:
+            self.told.add(self.ledger, self.names)
+            ledger = self.told
+        if strict:
+            ledger.check_strict()
+        return ledger.entries()
+
+
+def export(request: Request) -> Scene:
+    """The tracer's scene of a .blend.
+
+    Raises
+    ------
+    InputError
+        if the file can't be opened, or has no such camera, or one that is no pinhole.
+    NotModelledError
+        if `strict` and anything is approximated or left out.
+    """
+    with _stage(request) as stage, _seen_from(stage, request) as stage:
+        return _export(stage, request)
+
+
+def render(request: Request, path: str | os.PathLike[str]) -> tuple[LedgerEntry, ...]:
+    """Render a .blend with Cycles for a comparison; returns what the ledger says.
+
+    Raises as `export` does, and InputError if the picture can't be written.
+    """
+    with _stage(request) as stage, _seen_from(stage, request) as stage:
+        light = survey(stage.scene, stage.view_layer, stage.camera, stage.ledger, stage.is_lit)
+        told = stage.entries(request.strict)
+        _render(stage, request, [path], light)
+        return told
+
+
+def export_and_render(request: Request, paths: Sequence[str | os.PathLike[str]]) -> Scene:
+    """Both sides of one state of the file, objects and materials numbered alike. Raises as `render` does.
+
+    paths : for several pictures of Cycles, which share the samples; their seeds count from that of the request.
+    """
+    with _stage(request) as stage, indices.numbered(), _seen_from(stage, request) as stage:
+        scene = _export(stage, request)
+        _render(stage, request, paths, Light(scene.lamps, scene.world, scene.film, scene.bounces))
+        return scene
+
+
+def _export(stage: _Stage, request: Request) -> Scene:
+    scene = export_scene(stage.scene, stage.view_layer, stage.camera, stage.ledger, stage.is_lit)
+    objects = tuple(replace(placed, name=stage.names.get(placed.name, placed.name)) for placed in scene.objects)
+    return replace(scene, objects=objects, origin=stage.origin, ledger=stage.entries(request.strict))
+
+
+@contextlib.contextmanager
+def _seen_from(stage: _Stage, request: Request) -> Iterator[_Stage]:
+    """The stage itself or, where that is wanted, one whose origin is the camera's eye."""
+    if not request.recenter:
+        yield stage
+        return
+    with recentering.recentred(stage.scene, stage.view_layer, stage.camera, stage.ledger, stage.is_lit) as moved:
+        layer = moved.scene.view_layers[0]
+        yield _Stage(moved.scene, layer, moved.camera, stage.level, origin=moved.origin, names=moved.names, told=stage.ledger)
+
+
+def _render(stage: _Stage, request: Request, paths: Sequence[str | os.PathLike[str]], light: Light | None) -> None:
+    """Cycles' pictures. light : as exported, of a stage that is lit."""
+    share = max(request.samples // len(paths), 1)
+    for number, path in enumerate(paths):
+        picture = None
+        if stage.is_lit:
+            bounces = NO_BOUNCES if stage.level == "direct" else light.bounces
+            picture = cycles.Light(light.film, bounces, share, request.seed + number)
+        cycles.render(
+            stage.scene, stage.view_layer, stage.camera, path, stage.ledger.remedies.values(), request.threads, picture
+        )
+
+
+@contextlib.contextmanager
+def _stage(request: Request) -> Iterator[_Stage]:
+    """Open the file, and set it to the request until the job is done."""
+    ensure_registered()
+    if request.blend is not None:
+        open_blend(request.blend)
+    scene = bpy.context.scene
+    with borrowed() as borrow:
+        if request.frame is not None:
+            _borrow_frame(borrow, scene, request.frame)
+        camera = _camera(scene, request.camera)
+        if request.size:
+            _borrow_size(borrow, scene, camera, request.size)
+        layer = rendered_layer(scene)
+        if request.clay:
+            borrow.set(layer, "material_override", materials.plain(borrow))
+        level = request.level
+        if level == AUTO:
+            level, _ = least_level(export_scene(scene, layer, camera, Ledger(), lit=True))
+        yield _Stage(scene, layer, camera, level)
+
+
+def open_blend(path: str | os.PathLike[str]) -> None:
+    """Open a .blend without running its scripts.
+
+    Raises
+    ------
+    InputError
+        if there is no such file, or if Blender can't read it.
+    """
+    path = Path(path).absolute()
+    if not path.is_file():
+        raise InputError(f"{path} does not exist: check the name of the .blend file")
+    try:
+        with open(path, "rb") as file:
+            start = file.read(7)
+    except OSError as error:
+        raise InputError(f"{path} can't be read ({error.strerror}): check its permissions") from error
+    if not start.startswith(_MAGIC):
+        raise InputError(f"{path} is not a .blend file: give a file that Blender has saved")
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
+    except RuntimeError as error:
+        reason = str(error).strip().splitlines()[0].removeprefix("Error: ").rstrip(".")
+        raise InputError(f"{path} can't be opened by Blender {bpy.app.version_string} ({reason}): save it again") from error
+
+
+def _camera(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object:
+    """The camera object that is meant, checked to be a perspective one."""
+    if name is None:
+        camera = datablocks.render_camera(scene)
+        if camera is None:
+            raise InputError(f"scene {scene.name!r} has no camera: add one, or name one with --camera")
+    else:
+        camera = scene.objects.get(name)
+        if camera is None:
+            cameras = sorted(each.name for each in scene.objects if each.type == "CAMERA")
+            raise InputError(f"scene {scene.name!r} has no object {name!r}: its cameras are {', '.join(cameras) or 'none'}")
+    datablocks.check_perspective(camera)
+    return camera
+
+
+def rendered_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
+    """The window's view layer if it is rendered at all, else the first that is."""
+    current = bpy.context.view_layer
+    return current if current.use else next((layer for layer in scene.view_layers if layer.use), current)
+
+
+def _borrow_frame(borrow: Borrower, scene: bpy.types.Scene, frame: int) -> None:
+    before = (scene.frame_current, scene.frame_subframe)
+    if before == (frame, 0.0):
+        return
+    if abs(frame) > _LAST_FRAME:
+        raise InputError(f"frame {frame} is beyond Blender's last, {_LAST_FRAME}: give another")
+    borrow.afterwards(setattr, scene, "camera", scene.camera)  # a marker may change it, here and on the way back
+    borrow.afterwards(scene.frame_set, before[0], subframe=before[1])
+    scene.frame_set(frame)
+
+
+def _borrow_size(borrow: Borrower, scene: bpy.types.Scene, camera: bpy.types.Object, size: tuple[int, int]) -> None:
+    """Another number of pixels for the same lens; the stated distance counts pixels and goes with the lens."""
+    if not all(4 <= number <= 65536 for number in size):
+        raise InputError(f"Blender can't render {size[0]} × {size[1]} pixels: choose from 4 to 65536 each way")
+    borrow.enter(resolution.lens_kept(camera, scene))
+    for name, value in zip(("resolution_x", "resolution_y", "resolution_percentage"), (*size, 100), strict=True):
+        borrow.set(scene.render, name, value)

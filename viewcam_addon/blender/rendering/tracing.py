@@ -1,0 +1,86 @@
+"""Tracing in a thread of its own, its finished bands of rows handed over in the thread that asked.
+
+Blender may be spoken to only in the thread in which it calls an engine: here that thread looks every few milliseconds whether
+the artist cancelled, while the tracer's threads know nothing of Blender. Rejected: tracing in Blender's own thread, which can't
+ask for Escape before a band is finished.
+"""
+
+import contextlib
+import queue
+import threading
+import traceback
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING
+
+from ...tracer.rays.surface import Passes
+from ...tracer.scene import Scene
+
+if TYPE_CHECKING:
+    from ...tracer.render import Keeper
+
+_PATIENCE = 0.05
+"""Seconds between two looks at whether it is cancelled."""
+
+
+class _Watcher:
+    """What the tracer tells and asks, from its threads."""
+
+    def __init__(self) -> None:
+        self.bands: queue.SimpleQueue[tuple[Passes, range] | None] = queue.SimpleQueue()
+        self.cancelled = threading.Event()
+
+    def tile(self, passes: Passes, rows: range) -> None:
+        self.bands.put((passes, rows))
+
+    def stop(self) -> bool:
+        return self.cancelled.is_set()
+
+
+def keeper() -> "Keeper":
+    """What `bands` needs to keep what pictures share."""
+    from ...tracer.render import Keeper  # brings Embree, which Blender's start need not wait for
+
+    return Keeper()
+
+
+def bands(
+    scene: Scene,
+    level: str,
+    samples: int,
+    seed: int,
+    threads: int,
+    is_cancelled: Callable[[], bool],
+    keeper: "Keeper | None" = None,
+) -> Iterator[tuple[Passes, range]]:
+    """Trace a scene, and give what is finished: the passes of the whole picture, and the rows of them that are new.
+
+    is_cancelled : asked in the caller's thread. When it says so, or when the caller takes no more, tracing ends at once.
+    keeper : as in tracer.render.render.
+
+    Raises
+    ------
+    InputError
+        as tracer.render.render does.
+    """
+    from ...tracer.render import render
+
+    watcher = _Watcher()
+    with ThreadPoolExecutor(1, "viewcam") as pool:
+        tracing = pool.submit(render, scene, level, samples, seed, threads, watcher, keeper=keeper)
+        tracing.add_done_callback(lambda _: watcher.bands.put(None))
+        try:
+            while not is_cancelled():
+                with contextlib.suppress(queue.Empty):
+                    band = watcher.bands.get(timeout=_PATIENCE)
+                    if band is None:
+                        break
+                    yield band
+            else:
+                return
+        finally:
+            watcher.cancelled.set()
+            # An error's frames hold the tracer, in a circle; where Python 3.14 broke it by itself, Blender 5.2 crashed.
+            if error := tracing.exception():
+                traceback.clear_frames(error.__traceback__)
+    tracing.result()  # raises what was raised there

@@ -1,0 +1,243 @@
+"""Blender's scene as the tracer's scene: what Cycles would render, frozen at the current frame.
+
+Everything comes from the depsgraph of a render (depsgraph.py) through its object instances, as in Cycles' own synchronisation
+(intern/cycles/blender/object.cpp and geometry.cpp): modifiers, shape keys, armatures and drivers are evaluated; curves, text,
+surfaces and metaballs arrive as meshes; collections, geometry nodes and particles as instances that share their data. A
+geometry is stored once for each evaluated mesh. Rejected: `to_mesh` per object, which sees no instances and copies each mesh.
+
+What has no counterpart is noted in the ledger, with the remedy that takes it out of Cycles' render.
+"""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...tracer.scene import Mesh, Object, Scene, Spheres
+from ...tracer.scene.film import Bounces, Film
+from ...tracer.scene.lamps import RAYS, Lamp, World
+from .. import camera as cameras
+from ..borrowing import borrowed, still_of_one_layer
+from . import export_geometry, features, film, lamps, world
+from .depsgraph import visit
+from .ledger import Ledger
+from .shading import Shading
+
+Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A visible surface that stands in the world once or many times.
+
+    data : evaluated. key : the same for all that share a geometry in Cycles. slots : the materials, evaluated, at least 1.
+    hidden_from : the kinds of rays that don't see it.
+    """
+
+    name: str
+    data: bpy.types.Mesh | bpy.types.PointCloud
+    key: tuple[int, int]
+    object_index: int
+    slots: tuple[bpy.types.Material | None, ...]
+    hidden_from: frozenset[str]
+
+    @property
+    def materials(self) -> tuple[int, ...]:
+        """The materials' pass indices."""
+        return tuple(material.pass_index if material else 0 for material in self.slots)
+
+
+@dataclass(frozen=True)
+class Light:
+    """What of a Scene gives light, and makes a picture of it."""
+
+    lamps: tuple[Lamp, ...]
+    world: World
+    film: Film
+    bounces: Bounces
+
+
+def export_scene(
+    scene: bpy.types.Scene,
+    view_layer: bpy.types.ViewLayer,
+    camera_object: bpy.types.Object,
+    ledger: Ledger,
+    lit: bool = False,
+) -> Scene:
+    """The scene as a render of this view layer through this camera sees it, at the scene's current frame.
+
+    ledger : notes what could not come; afterwards it holds the remedies for Cycles' side. lit : whether materials, lamps,
+    world, film and bounces come along, for the levels above geometry.
+
+    Raises
+    ------
+    InputError
+        if the camera is no pinhole (orthographic, panoramic, sheared), or if Blender can't render the scene.
+    """
+    features.note_render(scene, view_layer, camera_object, ledger, lit)
+    with borrowed() as borrow:
+        still_of_one_layer(borrow, scene, view_layer, camera_object)
+        return visit(scene, lambda depsgraph: scene_in(depsgraph, camera_object, ledger, lit))
+
+
+def survey(
+    scene: bpy.types.Scene,
+    view_layer: bpy.types.ViewLayer,
+    camera_object: bpy.types.Object,
+    ledger: Ledger,
+    lit: bool = False,
+) -> Light | None:
+    """Fill the ledger as `export_scene` does, without reading any geometry; returns the light of the scene, if wanted."""
+
+    def look(depsgraph: bpy.types.Depsgraph) -> Light | None:
+        for _ in placements(depsgraph, ledger, Shading() if lit else None):
+            pass
+        return light_in(depsgraph, ledger) if lit else None
+
+    features.note_render(scene, view_layer, camera_object, ledger, lit)
+    with borrowed() as borrow:
+        still_of_one_layer(borrow, scene, view_layer, camera_object)
+        return visit(scene, look)
+
+
+def light_in(depsgraph: bpy.types.Depsgraph, ledger: Ledger) -> Light:
+    """What gives light in a depsgraph, and how it becomes a picture."""
+    scene = depsgraph.scene
+    bounces = film.bounces_of(scene, ledger)
+    return Light(
+        lamps=tuple(lamps.lamps_in(depsgraph, bounces, ledger)),
+        world=world.world_of(world.shown_world(scene, depsgraph.view_layer_eval), ledger),
+        film=film.film_of(scene, ledger),
+        bounces=bounces,
+    )
+
+
+def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, ledger: Ledger, lit: bool = False) -> Scene:
+    """The scene in the depsgraph that a render engine is given. lit : as in `export_scene`."""
+    shading = Shading() if lit else None
+    names: dict[tuple[int, int], str] = {}
+    geometries: dict[str, Mesh | Spheres] = {}
+    objects = []
+    for source, matrix in placements(depsgraph, ledger, shading):
+        if source.key not in names:
+            geometry = _geometry(source, ledger, shading)
+            names[source.key] = _free_name(source.data.name, geometries)
+            geometries[names[source.key]] = geometry
+        materials = shading.names(source.slots) if shading else ()
+        placed = (source.object_index, source.materials, materials, source.hidden_from)
+        objects.append(Object(source.name, names[source.key], matrix, *placed))
+    return Scene(
+        **_view_in(depsgraph, camera_object),
+        geometries=geometries,
+        objects=tuple(_drawn(objects, geometries, ledger)),
+        **(vars(light_in(depsgraph, ledger)) | {"materials": shading.materials, "images": shading.images} if shading else {}),
+        ledger=ledger.entries(),
+    )
+
+
+def seen_from(scene: Scene, depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) -> Scene:
+    """The scene that was read from a depsgraph in which nothing has changed since but cameras."""
+    return replace(scene, **_view_in(depsgraph, camera_object))
+
+
+def _view_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) -> dict[str, object]:
+    """What of a Scene is its camera's."""
+    camera = camera_object.evaluated_get(depsgraph)
+    return {
+        "camera": cameras.read(camera, depsgraph.scene),
+        "stated_camera": cameras.stated(camera, depsgraph.scene),
+        "clip": (camera.data.clip_start, camera.data.clip_end),
+    }
+
+
+def placements(
+    depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading | None = None
+) -> Iterator[tuple[Source, Matrix]]:
+    """Each surface that the camera may see, and its (4, 4) matrix to world space, one for each instance.
+
+    shading : reads the materials, where there shall be light; then other rays than the camera's may see a surface.
+    """
+    known: dict[tuple[int, ...], Source | None] = {}
+    for instance in depsgraph.object_instances:
+        features.note_hair(instance, ledger)
+        shown = instance.object
+        if not instance.show_self or shown.data is None:
+            continue
+        placed = features.placed_by(instance)
+        identity = tuple(each.as_pointer() for each in (placed.real, placed.parent, shown.data))
+        if identity not in known:
+            known[identity] = _source(placed, depsgraph, ledger, shading)
+        source = known[identity]
+        if source:
+            ledger.placed(source.name)
+            yield source, np.array(instance.matrix_world, dtype=np.float64)
+
+
+def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading | None) -> Source | None:
+    """What one object shows, or None if nothing of it is seen."""
+    if not features.is_surface(placed, ledger, shading):
+        return None
+    shown, real, _ = placed
+    layer = depsgraph.view_layer_eval
+    hidden_from = features.hidden_from(placed, layer)
+    if "camera" in hidden_from:
+        ledger.note(placed.name, "exported", "not visible to the camera")
+        if not shading or len(hidden_from) == len(RAYS):
+            return None
+    data = shown.data
+    if isinstance(data, bpy.types.Mesh):
+        if data.is_editmode:  # the file is in edit mode: what is edited must be made a mesh first
+            data = real.to_mesh()
+        if not data.polygons:
+            return None
+        if not layer.use_solid:
+            ledger.note(placed.name, "exported", "the view layer leaves out surfaces")
+            return None
+    override = layer.material_override
+    slots = [override or slot.material for slot in shown.material_slots] or [override]
+    features.note_object(placed, slots, depsgraph, ledger, shading)
+    # Cycles shares a geometry among objects unless a slot belongs to the object (BlenderSync::BKE_object_is_modified).
+    own = any(slot.link == "OBJECT" for slot in shown.material_slots)
+    return Source(
+        name=placed.name,
+        data=data,
+        key=(data.as_pointer(), real.as_pointer() if own else 0),
+        object_index=shown.pass_index,
+        slots=tuple(slots),
+        hidden_from=hidden_from if shading else frozenset(),
+    )
+
+
+def _geometry(source: Source, ledger: Ledger, shading: Shading | None) -> Mesh | Spheres:
+    if not isinstance(source.data, bpy.types.Mesh):
+        return export_geometry.spheres_of(source.data)
+    colours = shading.vertex_colours(source.slots) if shading else None
+    mesh = export_geometry.mesh_of(source.data, len(source.materials), colours)
+    if nowhere := len(source.data.loop_triangles) - len(mesh.triangles):
+        ledger.note(
+            source.name, "exported", f"{nowhere} triangles have vertices that are not finite, and Cycles draws none of them"
+        )
+    return mesh
+
+
+def _drawn(objects: list[Object], geometries: dict[str, Mesh | Spheres], ledger: Ledger) -> Iterator[Object]:
+    """The objects without those that a scale of 0 flattens, of which Cycles draws only meshes that no other object uses."""
+    users = Counter(placed.geometry for placed in objects)
+    flat = np.linalg.det(np.array([placed.matrix[:3, :3] for placed in objects]).reshape(-1, 3, 3)) == 0
+    for placed, is_flat in zip(objects, flat, strict=True):
+        if is_flat and (users[placed.geometry] > 1 or isinstance(geometries[placed.geometry], Spheres)):
+            ledger.note(placed.name, "exported", "flattened by its scale, and Cycles does not draw it")
+        else:
+            yield placed
+
+
+def _free_name(name: str, taken: dict[str, Mesh | Spheres]) -> str:
+    """`name`, with a number if another geometry has it."""
+    candidate, number = name, 1
+    while candidate in taken:
+        number += 1
+        candidate = f"{name} ({number})"
+    return candidate

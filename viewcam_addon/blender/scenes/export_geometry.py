@@ -1,0 +1,121 @@
+"""Blender's evaluated meshes and point clouds as the tracer's arrays, read in bulk.
+
+As Cycles reads them (intern/cycles/blender/mesh.cpp and pointcloud.cpp, and what its Normal pass shows): Blender's own
+triangulation; material indices clamped to the slots; where all faces are flat, the normal of each triangle, else Blender's
+corner normals, in which a flat face has one normal for all of its triangles. Until 5.0 a mesh that is smooth but for flat faces
+is another case: they have the normals of their triangles, and their neighbours the normals of their vertices.
+"""
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...tracer.scene import Mesh, Spheres
+from .. import versions
+
+# Cycles' radius of points that have none.
+DEFAULT_RADIUS = 0.01
+
+Array = NDArray[np.generic]
+
+
+def mesh_of(mesh: bpy.types.Mesh, slot_count: int, colours: str | None = None) -> Mesh:
+    """The triangles of an evaluated mesh, object space.
+
+    slot_count : the object's material slots, which material indices are clamped to. colours : the colour attribute to bring
+    along, "" being the one that is active for rendering, or None.
+    """
+    mesh.calc_loop_triangles()
+    vertices = read(mesh.vertices, "co", np.float32, 3).astype(np.float64)
+    corner_vertices = read(mesh.loops, "vertex_index", np.int32)
+    corners = read(mesh.loop_triangles, "loops", np.int32, 3)
+    faces = read(mesh.loop_triangles, "polygon_index", np.int32)
+    triangles = corner_vertices[corners]
+    finite = np.isfinite(vertices).all(axis=1)
+    if not finite.all():  # Cycles draws no triangle that is nowhere
+        drawn = finite[triangles].all(axis=1)
+        vertices[~finite], triangles, corners, faces = 0, triangles[drawn], corners[drawn], faces[drawn]
+    return Mesh(
+        vertices=vertices,
+        triangles=triangles,
+        materials=_materials(mesh, slot_count)[faces],
+        corner_normals=_corner_normals(mesh, vertices, triangles, corners, faces),
+        corner_uvs=_corner_uvs(mesh, corners),
+        corner_colours=None if colours is None else _corner_colours(mesh, colours, triangles, corners),
+    )
+
+
+def spheres_of(points: bpy.types.PointCloud) -> Spheres:
+    """The points of an evaluated point cloud, object space. Cycles gives all of them the first material."""
+    centers = _attribute(points, "position", "vector", np.float32, 3)
+    radii = _attribute(points, "radius", "value", np.float32)
+    if radii is None:
+        radii = np.full(len(centers), DEFAULT_RADIUS, np.float32)
+    return Spheres(centers.astype(np.float64), radii.astype(np.float64), np.zeros(len(centers), np.int32))
+
+
+def used_slots(mesh: bpy.types.Mesh, slot_count: int) -> set[int]:
+    """The material slots that some face of a mesh uses; geometry nodes leave an unused first one."""
+    return set(np.unique(_materials(mesh, slot_count)).tolist())
+
+
+def _materials(mesh: bpy.types.Mesh, slot_count: int) -> Array:
+    """(faces,) int32: each face's index among the material slots."""
+    indices = _attribute(mesh, "material_index", "value", np.int32, domain="FACE")
+    if indices is None:
+        return np.zeros(len(mesh.polygons), np.int32)
+    return np.clip(indices, 0, max(slot_count - 1, 0))
+
+
+def _corner_normals(mesh: bpy.types.Mesh, vertices: Array, triangles: Array, corners: Array, faces: Array) -> Array | None:
+    """(triangles, 3, 3) float32, or None where all faces are flat."""
+    if mesh.normals_domain == "FACE":
+        return None
+    if not (versions.CYCLES_KEEPS_FLAT_FACES and _only_faces_are_sharp(mesh)):
+        return read(mesh.corner_normals, "vector", np.float32, 3)[corners]
+    normals = read(mesh.vertex_normals, "vector", np.float32, 3)[triangles]
+    flat = _attribute(mesh, "sharp_face", "value", np.bool_, domain="FACE")[faces]
+    first, second, third = np.moveaxis(vertices[triangles[flat]], 1, 0)
+    across = np.cross(second - first, third - first)
+    lengths = np.linalg.norm(across, axis=1, keepdims=True)
+    normals[flat] = (across / np.where(lengths > 0, lengths, 1.0))[:, np.newaxis].astype(np.float32)
+    return normals
+
+
+def _only_faces_are_sharp(mesh: bpy.types.Mesh) -> bool:
+    """Whether flat faces stand beside smooth ones, without sharp edges and without custom normals."""
+    if mesh.normals_domain != "CORNER" or mesh.has_custom_normals:
+        return False
+    edges = _attribute(mesh, "sharp_edge", "value", np.bool_, domain="EDGE")
+    return edges is None or not edges.any()
+
+
+def _corner_uvs(mesh: bpy.types.Mesh, corners: Array) -> Array | None:
+    """(triangles, 3, 2) float32: the UV map that is active for rendering, or None where there is none."""
+    layer = next((layer for layer in mesh.uv_layers if layer.active_render), None)
+    return None if layer is None else read(layer.uv, "vector", np.float32, 2)[corners]
+
+
+def _corner_colours(mesh: bpy.types.Mesh, name: str, triangles: Array, corners: Array) -> Array:
+    """(triangles, 3, 3) float32, linear: those of a colour attribute; black, as in Cycles, where there is none of this name."""
+    attributes = mesh.color_attributes
+    if not name and attributes.render_color_index >= 0:
+        name = attributes[attributes.render_color_index].name
+    attribute = attributes.get(name)
+    if attribute is None:
+        return np.zeros((*corners.shape, 3), np.float32)
+    colours = np.ascontiguousarray(read(attribute.data, "color", np.float32, 4)[:, :3])
+    return colours[corners if attribute.domain == "CORNER" else triangles]
+
+
+def _attribute(owner: bpy.types.ID, name: str, field: str, dtype: type, width: int = 1, domain: str = "POINT") -> Array | None:
+    """An attribute's values, or None where there is none of this name and domain."""
+    attribute = owner.attributes.get(name)
+    return read(attribute.data, field, dtype, width) if attribute and attribute.domain == domain else None
+
+
+def read(collection: bpy.types.bpy_prop_collection, field: str, dtype: type, width: int = 1) -> Array:
+    """(items,) or (items, width) of `dtype`."""
+    values = np.empty(len(collection) * width, dtype)
+    collection.foreach_get(field, values)
+    return values.reshape(-1, width) if width > 1 else values

@@ -1,0 +1,196 @@
+"""What of a scene the tracer does not model, found and named: each with the remedy that takes it out of Cycles' render too.
+
+Hair and volumes need no remedy: the view layer is told to leave them out (cycles.py).
+"""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import bpy
+
+from ...tracer.scene.lamps import RAYS
+from .. import datablocks, versions
+from . import export_geometry, materials
+from .ledger import Ledger
+from .shading import Shading
+
+_NO_SURFACE = {
+    "VOLUME": "volumes are not modelled",
+    "CURVES": "hair and curves without a surface are not modelled",
+    "GREASEPENCIL": "Grease Pencil is not modelled",
+    "GPENCIL": "Grease Pencil is not modelled",
+}
+# Blender itself draws them into Cycles' picture, and into its Depth pass.
+_DRAWN_OVER_CYCLES = ("GREASEPENCIL", "GPENCIL")
+
+
+def note_render(
+    scene: bpy.types.Scene,
+    view_layer: bpy.types.ViewLayer,
+    camera_object: bpy.types.Object,
+    ledger: Ledger,
+    light: bool = False,
+) -> None:
+    """What the camera and the render settings do beyond a pinhole. To be asked before the settings are borrowed."""
+    for sentence in datablocks.beyond_pinhole(camera_object, scene):
+        ledger.note(camera_object.name, "approximated", f"{sentence} (off on both sides)")
+    ledger.set_for_cycles(camera_object.data.dof, "use_dof", False)
+    for layer in scene.view_layers:
+        if layer.use and layer != view_layer:
+            ledger.note(f"view layer {layer.name}", "skipped", f"only view layer {view_layer.name!r} is compared")
+    for library in bpy.data.libraries:
+        if not Path(bpy.path.abspath(library.filepath)).is_file():
+            ledger.note(library.name, "skipped", f"the library {library.filepath} is missing, and all that is linked from it")
+    if not light and scene.world and (tree := versions.node_tree(scene.world)):
+        output = tree.get_output_node("CYCLES")
+        if output and output.inputs["Volume"].is_linked:
+            ledger.note(scene.world.name, "approximated", "the world's volume is left out, and its light with it")
+            ledger.set_for_cycles(scene, "world", None)
+
+
+class Placed(NamedTuple):
+    """An object in the depsgraph, each of the three evaluated.
+
+    shown : what is placed, and its data. real : the object in the file that it comes from. parent : what places it; for an
+    object that is no instance all three are the same.
+    """
+
+    shown: bpy.types.Object
+    real: bpy.types.Object
+    parent: bpy.types.Object
+
+    @property
+    def name(self) -> str:
+        return self.real.original.name
+
+
+def placed_by(instance: bpy.types.DepsgraphObjectInstance) -> Placed:
+    """What a depsgraph's instance is."""
+    shown = instance.object
+    real, parent = (instance.instance_object, instance.parent) if instance.is_instance else (shown, shown)
+    return Placed(shown, real, parent)
+
+
+def hidden_from(placed: Placed, layer: bpy.types.ViewLayer) -> frozenset[str]:
+    """The kinds of rays (lights.RAYS) that don't see an object, be it by its own flags or by those of what places it."""
+    shown, _, parent = placed
+    hidden = {ray for ray in RAYS if not all(getattr(each, f"visible_{ray}") for each in (shown, parent))}
+    if parent.indirect_only_get(view_layer=layer) and not parent.holdout_get(view_layer=layer):
+        hidden.add("camera")
+    return frozenset(hidden)
+
+
+def is_surface(placed: Placed, ledger: Ledger, shading: Shading | None) -> bool:
+    """Whether this is a mesh or a point cloud; what is drawn but is neither is noted."""
+    shown, real, _ = placed
+    name = placed.name
+    if shown.type in _NO_SURFACE:
+        ledger.note(name, "skipped", _NO_SURFACE[shown.type])
+        if shown.type in _DRAWN_OVER_CYCLES:
+            ledger.set_for_cycles(real.original, "hide_render", True)
+    elif shown.type == "LIGHT":
+        if not shading:
+            ledger.note(name, "exported", "a light, which leaves no mark in the passes of level geometry")
+    elif _holds_gas(real) and shown.data == real.data:
+        ledger.note(name, "skipped", _NO_SURFACE["VOLUME"])
+    else:
+        return isinstance(shown.data, bpy.types.Mesh | bpy.types.PointCloud)
+    return False
+
+
+def note_object(
+    placed: Placed,
+    slots: list[bpy.types.Material | None],
+    depsgraph: bpy.types.Depsgraph,
+    ledger: Ledger,
+    shading: Shading | None,
+) -> None:
+    """What a visible surface is beyond its geometry. slots : its materials."""
+    shown, real, parent = placed
+    name = placed.name
+    if parent.holdout_get(view_layer=depsgraph.view_layer_eval):
+        ledger.note(name, "approximated", "a holdout, a plain object on both sides")
+        ledger.set_for_cycles(parent.original, "is_holdout", False)
+        for collection in _layer_collections(depsgraph.view_layer.layer_collection):
+            ledger.set_for_cycles(collection, "holdout", False)
+    for each in (shown, parent):
+        if each.is_shadow_catcher:
+            ledger.note(name, "approximated", "a shadow catcher, a plain object on both sides")
+            ledger.set_for_cycles(each.original, "is_shadow_catcher", False)
+    adaptive = versions.adaptive_subdivision(real.original, depsgraph.scene)
+    if adaptive:
+        ledger.note(name, "approximated", "adaptive subdivision is subdivision at the render level on both sides")
+        ledger.set_for_cycles(*adaptive, False)
+    if versions.DEFAULT_SURFACE_BENDS_NORMALS and _shows_empty_slot(shown.data, slots):
+        ledger.call_for_cycles(real.original, materials.fill_empty_slots)
+        if any(modifier.type == "NODES" and modifier.show_render for modifier in real.modifiers):
+            ledger.note(name, "approximated", "has no material, and Cycles may bend its normals where they graze")
+    for material in filter(None, slots):
+        if not shading:  # the Normal pass; mirrors and glass bend normals on both sides (scattering.specular_normal)
+            ledger.call_for_cycles(material.original, materials.keep_normals)
+        reasons = materials.departures(material)
+        if shading:
+            reasons += shading.reading(material).reasons
+        for reason in reasons:
+            ledger.note(name, "approximated", f"material {material.name!r} {reason}, and a plain one stands in")
+        if reasons and shading:
+            ledger.call_for_cycles(material.original, materials.stand_in, shading.reading(material))
+        elif reasons:
+            ledger.call_for_cycles(material.original, materials.make_plain)
+    if shading:
+        _note_light(placed, slots, ledger, shading)
+
+
+def _note_light(placed: Placed, slots: list[bpy.types.Material | None], ledger: Ledger, shading: Shading) -> None:
+    """What matters as soon as there is light."""
+    shown, real, parent = placed
+    data = shown.data
+    readings = [shading.reading(material) for material in filter(None, slots)]
+    if len({reading.vertex for reading in readings} - {None}) > 1:
+        ledger.note(placed.name, "approximated", "shows two colour attributes, and only the first comes along")
+    active = next((layer.name for layer in data.uv_layers if layer.active_render), None) if hasattr(data, "uv_layers") else None
+    for material, reading in zip(filter(None, slots), readings, strict=True):
+        if reading.uv not in (None, active):
+            reason = f"material {material.name!r} uses the UV map {reading.uv!r}, and the active one stands in"
+            ledger.note(placed.name, "approximated", reason)
+            ledger.call_for_cycles(material.original, materials.stand_in, reading)
+    note_linking(placed, ledger)
+    for each in (real.original, parent.original):
+        for owner, name in versions.shadow_terminator(each):
+            ledger.set_for_cycles(owner, name, 0.0)
+        ledger.set_for_cycles(each.cycles, "is_caustics_caster", False)
+        ledger.set_for_cycles(each.cycles, "is_caustics_receiver", False)
+
+
+def note_linking(placed: Placed, ledger: Ledger) -> None:
+    """Whether a light, or a surface that shines, lights some things and others not."""
+    for each in (placed.real.original, placed.parent.original):
+        for collection in ("receiver_collection", "blocker_collection"):
+            if getattr(each.light_linking, collection):
+                ledger.note(placed.name, "approximated", "light linking is off on both sides")
+                ledger.set_for_cycles(each.light_linking, collection, None)
+
+
+def _shows_empty_slot(data: bpy.types.ID, slots: list[bpy.types.Material | None]) -> bool:
+    is_mesh = isinstance(data, bpy.types.Mesh)
+    return is_mesh and None in slots and any(slots[i] is None for i in export_geometry.used_slots(data, len(slots)))
+
+
+def note_hair(instance: bpy.types.DepsgraphObjectInstance, ledger: Ledger) -> None:
+    """Hair of a particle system, which grows beside the object itself."""
+    shown = instance.object
+    if instance.show_particles and any(
+        system.settings.type == "HAIR" and system.settings.render_type == "PATH" for system in shown.particle_systems
+    ):
+        ledger.note(shown.original.name, "skipped", "particle hair is not modelled")
+
+
+def _holds_gas(real: bpy.types.Object) -> bool:
+    return any(
+        modifier.type == "FLUID" and modifier.fluid_type == "DOMAIN" and modifier.domain_settings.domain_type == "GAS"
+        for modifier in real.modifiers
+    )
+
+
+def _layer_collections(top: bpy.types.LayerCollection) -> list[bpy.types.LayerCollection]:
+    return [top, *(each for child in top.children for each in _layer_collections(child))]

@@ -1,0 +1,41 @@
+"""What of the render settings makes a picture of light: film and bounces."""
+
+import bpy
+
+from ...tracer.scene.film import FILTERS, Bounces, Film
+from .ledger import Ledger
+
+# Those of Bounces → those of `scene.cycles`.
+BOUNCES = {
+    "total": "max_bounces",
+    "diffuse": "diffuse_bounces",
+    "glossy": "glossy_bounces",
+    "transmission": "transmission_bounces",
+}
+CAUSTICS = ("caustics_reflective", "caustics_refractive")
+
+CYCLES_SETTINGS = ("pixel_filter_type", "filter_width", "film_exposure", *BOUNCES.values(), *CAUSTICS)
+"""Those of `scene.cycles` that are read here."""
+
+
+def film_of(scene: bpy.types.Scene, ledger: Ledger) -> Film:
+    """The scene's film; that of Blender's factory settings where Cycles is disabled."""
+    transparent = scene.render.film_transparent
+    cycles = getattr(scene, "cycles", None)
+    if cycles is None:
+        return Film(transparent=transparent)
+    kind = cycles.pixel_filter_type
+    if kind not in FILTERS:
+        ledger.note(scene.name, "approximated", f"the pixel filter {kind} is BLACKMAN_HARRIS on both sides")
+        kind = "BLACKMAN_HARRIS"
+    return Film(kind, cycles.filter_width, transparent, cycles.film_exposure)
+
+
+def bounces_of(scene: bpy.types.Scene, ledger: Ledger) -> Bounces:
+    """How often light may bounce in a render of the scene."""
+    cycles = getattr(scene, "cycles", None)
+    if cycles is None:
+        return Bounces()
+    if not all(getattr(cycles, name) for name in CAUSTICS):
+        ledger.note(scene.name, "approximated", "caustics are on on both sides")
+    return Bounces(**{ours: getattr(cycles, theirs) for ours, theirs in BOUNCES.items()})

@@ -1,0 +1,58 @@
+"""Blender's images as the tracer's pictures, with the pixels that Cycles looks up (intern/cycles/blender/image.cpp, and its
+ImageMetaData::detect_colorspace): bytes and sRGB files stay encoded, and are decoded after the interpolation.
+"""
+
+import bpy
+import numpy as np
+
+from ...tracer.scene.materials import Picture
+
+_LINEAR = ("Non-Color", "Linear Rec.709", "Raw", "Linear")
+
+
+def obstacle(image: bpy.types.Image | None) -> str | None:
+    """Why this image can't be a picture, one clause, or None where it can."""
+    if image is None:
+        return "has no image"
+    if image.source not in ("FILE", "GENERATED"):
+        return f"shows {image.name!r}, which is no single still image"
+    if not (image.has_data or image.size[0]) or not min(image.size):
+        return f"shows {image.name!r}, which is missing"
+    space = image.colorspace_settings.name
+    if space != "sRGB" and space not in _LINEAR:
+        return f"shows {image.name!r}, whose colours are {space}"
+    return None
+
+
+def picture_of(image: bpy.types.Image) -> Picture:
+    """An image without an obstacle."""
+    width, height = image.size
+    pixels = np.empty(width * height * image.channels, np.float32)
+    image.pixels.foreach_get(pixels)
+    pixels = pixels.reshape(height, width, image.channels)
+    rgb = pixels[..., :3] if image.channels >= 3 else np.repeat(pixels[..., :1], 3, axis=-1)
+    srgb = image.colorspace_settings.name == "sRGB"
+    if image.is_float and srgb:
+        # Blender has decoded them. Cycles reads a file for itself; what Blender hands it stays as it is.
+        srgb = image.source == "FILE" and not image.packed_file and not image.is_dirty
+        rgb = _encoded(rgb) if srgb else rgb
+    if image.channels == 4 and image.alpha_mode == "STRAIGHT" and not image.is_float:
+        # As Cycles does it, in whole bytes.
+        rgb = np.rint(rgb * 255) * np.rint(pixels[..., 3:] * 255) // 255 / 255
+    return Picture(np.ascontiguousarray(np.nan_to_num(rgb, posinf=0.0, neginf=0.0), np.float32), srgb)
+
+
+def mean(image: bpy.types.Image) -> tuple[float, float, float]:
+    """The mean colour, linear, of an image without an obstacle that is wrapped around the world (equirectangular)."""
+    picture = picture_of(image)
+    pixels = picture.pixels.astype(np.float64)
+    if picture.srgb:
+        pixels = np.where(pixels < 0.04045, pixels / 12.92, ((np.maximum(pixels, 0) + 0.055) / 1.055) ** 2.4)
+    height = len(pixels)
+    weights = np.sin((np.arange(height) + 0.5) * np.pi / height)
+    return tuple(np.average(pixels.mean(axis=1), axis=0, weights=weights).tolist())
+
+
+def _encoded(linear: np.ndarray) -> np.ndarray:
+    positive = np.maximum(linear, 0.0)
+    return np.where(positive < 0.0031308, positive * 12.92, 1.055 * positive ** (1 / 2.4) - 0.055).astype(np.float32)

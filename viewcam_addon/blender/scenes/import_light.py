@@ -1,0 +1,182 @@
+"""The tracer's materials, lamps, world, film and bounces as Blender's, as shaders.py, lamps.py, world.py and film.py read them.
+
+What Blender's numbers can't hold is read back and told. A light's colour is what it shines with over the largest of red, green
+and blue, which is its energy.
+"""
+
+import bpy
+import numpy as np
+
+from ...pinhole import Pinhole
+from ...tracer.scene import Scene
+from ...tracer.scene.film import Bounces, Film
+from ...tracer.scene.lamps import RAYS, Area, Lamp, Spot, Sun, World
+from ...tracer.scene.materials import PLAIN, Material, Picture
+from ..borrowing import Borrower
+from . import film, materials, nodes, shaders
+from .indices import LARGEST
+from .ledger import Ledger
+
+_COLUMN = 260.0  # between nodes, in the node editor's units
+
+
+def has_light(scene: Scene) -> bool:
+    """Whether a scene says anything beyond geometry."""
+    return bool(scene.materials or scene.lamps) or (scene.world, scene.film, scene.bounces) != (World(), Film(), Bounces())
+
+
+def store(owner: bpy.types.bpy_struct, name: str, value: float, who: str, ledger: Ledger) -> None:
+    """Set a property, and tell if Blender took another number."""
+    setattr(owner, name, value)
+    stored = getattr(owner, name)
+    if stored != value and stored != float(np.float32(value)):
+        ledger.note(who, "approximated", f"its {name.replace('_', ' ')} is {value:g}, and Blender makes it {stored:g}")
+
+
+class Paints:
+    """Makes the Blender materials of a scene, each once."""
+
+    def __init__(self, scene: Scene, borrow: Borrower, ledger: Ledger) -> None:
+        self._scene, self._borrow, self._ledger = scene, borrow, ledger
+        self._made: dict[tuple[str, int], bpy.types.Material] = {}
+        self._images: dict[str, bpy.types.Image] = {}
+
+    def material(self, name: str, index: int) -> bpy.types.Material | None:
+        """The material of this name and pass index, or None for what Blender shows without any."""
+        return self._one(name, index) if name or index else None
+
+    def plain(self) -> bpy.types.Material:
+        """A material that is as none."""
+        return self._one("", 0)
+
+    def _one(self, name: str, index: int) -> bpy.types.Material:
+        if (name, index) not in self._made:
+            self._made[name, index] = self._new(name, index)
+        return self._made[name, index]
+
+    def _new(self, name: str, index: int) -> bpy.types.Material:
+        material = bpy.data.materials.new(name or f"Index {index}")
+        self._borrow.afterwards(bpy.data.batch_remove, [material])
+        material.pass_index = min(index, LARGEST)
+        if index > LARGEST:
+            self._ledger.note(material.name, "approximated", f"its index is {index}, and Blender's end at {LARGEST}")
+        made = self._scene.materials[name] if name else PLAIN
+        paint(material, made, {key: self._image(key) for key in _images_of(made)})
+        return material
+
+    def _image(self, key: str) -> bpy.types.Image:
+        if key not in self._images:
+            self._images[key] = image_from(self._scene.images[key], key, self._borrow, self._ledger)
+        return self._images[key]
+
+
+def _images_of(made: Material) -> list[str]:
+    return [colour.image for colour in made.colours.values() if colour.image is not None]
+
+
+def paint(material: bpy.types.Material, made: Material, images: dict[str, bpy.types.Image]) -> None:
+    """Give a new material the nodes of the tracer's. images : `Colour.image` → the image."""
+    if not material.node_tree:  # from 5.0 on new materials have one
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    adder = nodes.Adder(tree)
+    output = adder.add("ShaderNodeOutputMaterial")
+    materials.add_surface(adder, output, shaders.Reading(made, images, ""))
+    _arrange(output, 0, {})
+    shown = next(iter(made.colours.values()), None)
+    if shown:
+        material.diffuse_color = (*np.clip(shown.rgb, 0.0, 1.0), 1.0)
+
+
+def _arrange(node: bpy.types.Node, column: int, taken: dict[int, int]) -> None:
+    """Lay out a node and all that feeds it from right to left, each below those that stand in its column already."""
+    row = taken[column] = taken.get(column, 0) + 1
+    node.location = (-_COLUMN * column, _COLUMN * (1 - row))
+    for socket in node.inputs:
+        for link in socket.links:
+            _arrange(link.from_node, column + 1, taken)
+
+
+def image_from(picture: Picture, name: str, borrow: Borrower, ledger: Ledger) -> bpy.types.Image:
+    """A packed image with these pixels: bytes where they are encoded, floats where they are linear."""
+    height, width, _ = picture.pixels.shape
+    image = bpy.data.images.new(name, width, height, float_buffer=not picture.srgb, is_data=not picture.srgb)
+    borrow.afterwards(bpy.data.batch_remove, [image])
+    pixels = np.concatenate([picture.pixels, np.ones((height, width, 1), np.float32)], axis=2)
+    if picture.srgb and np.abs(pixels - np.rint(pixels * 255) / 255).max() > 2.0**-20:
+        ledger.note(name, "approximated", "its sRGB pixels are rounded to the 256 levels that Blender keeps")
+    image.pixels.foreach_set(pixels.ravel())
+    image.update()
+    image.pack()
+    return image
+
+
+def light_from(lamp: Lamp, borrow: Borrower, ledger: Ledger) -> tuple[bpy.types.Light, np.ndarray]:
+    """The light, and the (4, 4) matrix that it stands by."""
+    data = bpy.data.lights.new(lamp.name, lamp.kind.upper())
+    borrow.afterwards(bpy.data.batch_remove, [data])
+    strength = lamp.irradiance if isinstance(lamp, Sun) else lamp.power
+    data.energy = max(strength)
+    data.color = tuple(value / max(strength) for value in strength) if any(strength) else (1.0, 1.0, 1.0)
+    data.use_shadow = lamp.casts_shadow
+    if isinstance(lamp, Sun):
+        store(data, "angle", lamp.angle, lamp.name, ledger)
+        return data, _facing(lamp.towards)
+    if isinstance(lamp, Area):
+        data.shape = "ELLIPSE" if lamp.ellipse else "RECTANGLE"
+        for name, value in zip(("size", "size_y"), lamp.size, strict=True):
+            store(data, name, value, lamp.name, ledger)
+        return data, lamp.matrix
+    store(data, "shadow_soft_size", lamp.radius, lamp.name, ledger)
+    data.use_soft_falloff = lamp.soft_falloff
+    if isinstance(lamp, Spot):
+        store(data, "spot_size", lamp.angle, lamp.name, ledger)
+        store(data, "spot_blend", lamp.blend, lamp.name, ledger)
+        return data, lamp.matrix
+    matrix = np.eye(4)
+    matrix[:3, 3] = lamp.position
+    return data, matrix
+
+
+def _facing(towards: tuple[float, ...]) -> np.ndarray:
+    """(4, 4): at the origin, with z along a direction."""
+    u, v, _ = Pinhole(towards, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1.0, 1, 1).basis()
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.column_stack([u, v, towards])
+    return matrix
+
+
+def hide(block: bpy.types.Object, hidden_from: frozenset[str]) -> None:
+    """Let these kinds of rays pass by an object, and all others see it."""
+    for ray in RAYS:
+        setattr(block, f"visible_{ray}", ray not in hidden_from)
+
+
+def set_surroundings(scene: bpy.types.Scene, made: Scene, name: str, borrow: Borrower, ledger: Ledger) -> None:
+    """Give a scene the file's world, film and bounces. name : of the new world."""
+    world = bpy.data.worlds.new(name)
+    borrow.afterwards(bpy.data.batch_remove, [world])
+    if not world.node_tree:
+        world.use_nodes = True
+    world.node_tree.nodes.clear()
+    adder = nodes.Adder(world.node_tree)
+    output = adder.add("ShaderNodeOutputWorld")
+    background = adder.add("ShaderNodeBackground", Color=(*made.world.radiance, 1.0), Strength=1.0)
+    adder.link(background.outputs[0], output.inputs["Surface"])
+    _arrange(output, 0, {})
+    borrow.set(scene, "world", world)
+    borrow.set(scene.render, "film_transparent", made.film.transparent)
+    if not hasattr(scene, "cycles"):
+        ledger.note(scene.name, "skipped", "film and bounces are Cycles' settings, and Cycles is disabled")
+        return
+    for ray in RAYS[:-1]:
+        setattr(world.cycles_visibility, ray, ray not in made.world.hidden_from)
+    numbers = {"filter_width": made.film.filter_width, "film_exposure": made.film.exposure}
+    numbers |= {theirs: getattr(made.bounces, ours) for ours, theirs in film.BOUNCES.items()}
+    for name, value in numbers.items():
+        borrow.afterwards(setattr, scene.cycles, name, getattr(scene.cycles, name))
+        store(scene.cycles, name, value, scene.name, ledger)
+    borrow.set(scene.cycles, "pixel_filter_type", made.film.filter)
+    for name in film.CAUSTICS:
+        borrow.set(scene.cycles, name, True)

@@ -1,0 +1,72 @@
+"""What became of each thing that the exporter met, and what Cycles must leave out so that both sides show the same.
+
+One entry an object, however often it is placed; its worst finding decides the status. A remedy is a change that, borrowed for
+Cycles' render, takes out of it what the tracer does not model, so that the rest can be compared.
+"""
+
+from collections.abc import Callable, Mapping
+
+import bpy
+
+from ...errors import NotModelledError
+from ...tracer.scene import LedgerEntry
+from ..borrowing import Borrower
+
+Remedy = Callable[[Borrower], None]
+
+_WORSE = ("exported", "approximated", "skipped")
+
+
+class Ledger:
+    def __init__(self) -> None:
+        self._findings: dict[str, dict[str, str]] = {}
+        self._placed: dict[str, int] = {}
+        self.remedies: dict[tuple, Remedy] = {}
+
+    def placed(self, name: str) -> None:
+        """The object is in the scene once more."""
+        self._placed[name] = self._placed.get(name, 0) + 1
+
+    def note(self, name: str, status: str, reason: str) -> None:
+        """A finding, one clause, about the object; the same one again changes nothing."""
+        self._findings.setdefault(name, {})[reason] = status
+
+    def set_for_cycles(self, owner: bpy.types.bpy_struct, attribute: str, value: object) -> None:
+        """The remedy is a property of an original datablock."""
+        self.remedies[owner.as_pointer(), attribute] = lambda borrow: borrow.set(owner, attribute, value)
+
+    def call_for_cycles(self, owner: bpy.types.bpy_struct, remedy: Callable[..., None], *arguments: object) -> None:
+        """The remedy is a function (borrow, owner, *arguments)."""
+        self.remedies[owner.as_pointer(), remedy.__name__] = lambda borrow: remedy(borrow, owner, *arguments)
+
+    def add(self, other: "Ledger", names: Mapping[str, str]) -> None:
+        """Note what another ledger found of objects that stand for these. names : object there → object here."""
+        for stand_in, name in names.items():
+            for reason, status in other._findings.get(stand_in, {}).items():
+                self.note(name, status, reason)
+
+    def entries(self) -> tuple[LedgerEntry, ...]:
+        """One entry an object: the skipped ones first, then those that are approximated."""
+        entries = []
+        for name in dict.fromkeys((*self._findings, *self._placed)):
+            findings = self._findings.get(name, {})
+            status = self._status(name, set(findings.values()))
+            reasons = list(findings)
+            if self._placed.get(name, 0) > 1:
+                reasons.append(f"placed {self._placed[name]} times")
+            entries.append(LedgerEntry(name, status, "; ".join(reasons)))
+        return tuple(sorted(entries, key=lambda entry: -_WORSE.index(entry.status)))
+
+    def check_strict(self) -> None:
+        """Raise NotModelledError, naming the first of them, if anything is approximated or skipped."""
+        lacking = [entry for entry in self.entries() if entry.status != "exported"]
+        if lacking:
+            others = f" (and {len(lacking) - 1} more)" if len(lacking) > 1 else ""
+            raise NotModelledError(
+                f"{lacking[0].object!r} can't be modelled{others}, {lacking[0].reason}: take it out, or leave --strict out"
+            )
+
+    def _status(self, name: str, statuses: set[str]) -> str:
+        worst = max(statuses, key=_WORSE.index, default="exported")
+        # What is there in part is approximated.
+        return "approximated" if worst == "skipped" and name in self._placed else worst

@@ -1,0 +1,169 @@
+"""Which materials change where a surface is or what its passes say, and the plain one that stands in for them in Cycles.
+
+Level geometry models no material. Most leave the passes of geometry alone; some do not: displacement moves the surface, bump
+and normal maps turn the Normal pass, and where a surface is transparent Cycles writes what lies behind. For the time of a
+comparison such a material gets a second output for Cycles, a diffuse surface of its viewport colour; its own nodes stay as
+they are. At the levels of light the same is done to every material that the tracer only approximates, with the components that
+shaders.py has found.
+"""
+
+from collections.abc import Iterator
+
+import bpy
+
+from ...tracer.scene.materials import PLAIN, Colour
+from .. import versions
+from ..borrowing import Borrower
+from . import nodes, shaders
+
+# Node types that let something else than the surface's own geometry into the passes.
+_TRANSPARENT = {"BSDF_TRANSPARENT", "HOLDOUT"}
+_TURNING = {"BUMP", "NORMAL_MAP", "BEVEL"}
+_UNKNOWN = {"SCRIPT"}
+_WHITE = (1.0, 1.0, 1.0)
+# The shaders of the tracer's components.
+_SHADERS = {
+    "diffuse": "ShaderNodeBsdfDiffuse",
+    "emission": "ShaderNodeEmission",
+    "mirror": "ShaderNodeBsdfGlossy",
+    "glass": "ShaderNodeBsdfGlass",
+    "refraction": "ShaderNodeBsdfRefraction",
+}
+
+
+def departures(material: bpy.types.Material) -> list[str]:
+    """Why this material's surface is not what level geometry models, one clause each; empty for most materials."""
+    tree = versions.node_tree(material)
+    if tree is None:
+        return []
+    output = tree.get_output_node("CYCLES")
+    if output is None:
+        return ["has no output, so that Cycles draws nothing"]
+    reasons = []
+    if output.inputs["Displacement"].is_linked:
+        reasons.append("is displaced")
+    if output.inputs["Volume"].is_linked:
+        reasons.append("has a volume")
+    all_nodes = list(_nodes(tree, set()))
+    if any(node.type in _TRANSPARENT or _sees_through(node) for node in all_nodes):
+        reasons.append("is transparent")
+    if any(node.type in _TURNING or _is_turned(node) for node in all_nodes):
+        reasons.append("turns the normals")
+    if any(node.type in _UNKNOWN for node in all_nodes):
+        reasons.append("runs a script")
+    if not output.inputs["Surface"].is_linked:
+        reasons.append("has no surface")
+    return reasons
+
+
+def make_plain(borrow: Borrower, material: bpy.types.Material) -> None:
+    """Let Cycles see a diffuse surface of the viewport colour until the loan ends."""
+    stand_in(borrow, material, shaders.in_the_viewport(material))
+
+
+def stand_in(borrow: Borrower, material: bpy.types.Material, reading: shaders.Reading) -> None:
+    """Let Cycles see the components of a tracer's material until the loan ends."""
+    output, adder = nodes.borrow_output(borrow, material.node_tree, "ShaderNodeOutputMaterial")
+    add_surface(adder, output, reading)
+
+
+def add_surface(adder: nodes.Adder, output: bpy.types.Node, reading: shaders.Reading) -> None:
+    """Add the nodes that shaders.read would read so, and link them to a material's output."""
+    made = reading.material
+    total = None
+    for component, colour in made.colours.items():
+        shader = adder.add(_SHADERS[component])
+        _set(shader, "Roughness", 0.0)
+        _set(shader, "IOR", made.ior)
+        _colour(adder, shader.inputs["Color"], colour, reading)
+        total = shader if total is None else adder.add("ShaderNodeAddShader", total.outputs[0], shader.outputs[0])
+    # Without any light Cycles would draw nothing: not even the depth.
+    total = total or adder.add("ShaderNodeBsdfDiffuse", Color=(0.0, 0.0, 0.0, 1.0))
+    adder.link(total.outputs[0], output.inputs["Surface"])
+
+
+def _colour(adder: nodes.Adder, socket: bpy.types.NodeSocket, colour: Colour, reading: shaders.Reading) -> None:
+    """The product that a colour is."""
+    if colour.image is None and not colour.vertex:
+        socket.default_value = (*colour.rgb, 1.0)
+        return
+    factors = []
+    if colour.image is not None:
+        texture = adder.add("ShaderNodeTexImage")
+        texture.image = reading.images[colour.image]
+        texture.interpolation = "Closest" if colour.closest else "Linear"
+        factors.append(texture.outputs["Color"])
+    if colour.vertex:
+        attribute = adder.add("ShaderNodeVertexColor")
+        attribute.layer_name = reading.vertex
+        factors.append(attribute.outputs["Color"])
+    product = factors[0]
+    for other in factors[1:]:
+        product = _times(adder, product, other).outputs[0]
+    if colour.rgb != _WHITE:
+        multiply = _times(adder, product)
+        multiply.inputs[1].default_value = colour.rgb
+        product = multiply.outputs[0]
+    adder.link(product, socket)
+
+
+def _times(adder: nodes.Adder, *factors: bpy.types.NodeSocket) -> bpy.types.Node:
+    multiply = adder.add("ShaderNodeVectorMath", *factors)
+    multiply.operation = "MULTIPLY"
+    return multiply
+
+
+def _set(node: bpy.types.Node, name: str, value: float) -> None:
+    if name in node.inputs:
+        node.inputs[name].default_value = value
+
+
+def keep_normals(borrow: Borrower, material: bpy.types.Material) -> None:
+    """Keep Cycles from bending the normals of smooth surfaces, seen at a grazing angle, so far that they reflect."""
+    borrow.set(material.cycles, "use_bump_map_correction", False)
+
+
+def fill_empty_slots(borrow: Borrower, block: bpy.types.Object) -> None:
+    """Give an object a material where it has none, until the loan ends: Cycles' own default bends normals."""
+    material = plain(borrow)
+    if not block.material_slots:
+        borrow.afterwards(block.data.materials.clear)  # pop would leave a slot behind on the object
+        block.data.materials.append(material)
+    for slot in block.material_slots:
+        if slot.material is None:
+            borrow.set(slot, "material", material)
+
+
+def plain(borrow: Borrower) -> bpy.types.Material:
+    """The tracer's own plain material, which leaves all passes of geometry alone, gone when the loan ends."""
+    material = bpy.data.materials.new("Virtual Pinhole")
+    borrow.afterwards(bpy.data.materials.remove, material)
+    material.cycles.use_bump_map_correction = False
+    if not material.node_tree:  # from 5.0 on new materials have one
+        material.use_nodes = True
+    stand_in(borrow, material, shaders.Reading(PLAIN))
+    return material
+
+
+def _nodes(tree: bpy.types.NodeTree, seen: set[bpy.types.NodeTree]) -> Iterator[bpy.types.Node]:
+    """All nodes of the tree and of the groups in it; whether they lead to the output is not asked."""
+    seen.add(tree)
+    for node in tree.nodes:
+        if node.mute:
+            continue
+        yield node
+        group = getattr(node, "node_tree", None)
+        if group and group not in seen:
+            yield from _nodes(group, seen)
+
+
+def _sees_through(node: bpy.types.Node) -> bool:
+    """Whether the node has an opacity that is not plainly 1."""
+    alpha = node.inputs.get("Alpha") if node.type == "BSDF_PRINCIPLED" else None
+    return alpha is not None and (alpha.is_linked or alpha.default_value != 1.0)
+
+
+def _is_turned(node: bpy.types.Node) -> bool:
+    """Whether a shader takes its normal from another node."""
+    is_shader = any(output.type == "SHADER" for output in node.outputs)
+    return is_shader and any("Normal" in socket.name and socket.is_linked for socket in node.inputs)

@@ -1,0 +1,115 @@
+"""Reading shader nodes, and giving a tree another output for a while.
+
+An input is followed to the node that feeds it: reroutes, muted nodes and node groups are looked through. What nothing feeds
+has a value of its own.
+"""
+
+from typing import NamedTuple
+
+import bpy
+
+from ..borrowing import Borrower
+
+
+class Input(NamedTuple):
+    """An input of a node. groups : the group nodes that it stands in, the outermost first."""
+
+    socket: bpy.types.NodeSocket
+    groups: tuple[bpy.types.Node, ...] = ()
+
+
+class Output(NamedTuple):
+    """An output of a node, with the groups that it stands in."""
+
+    node: bpy.types.Node
+    socket: bpy.types.NodeSocket
+    groups: tuple[bpy.types.Node, ...]
+
+    def input(self, name: str | int) -> Input | None:
+        """An input of this output's node by its name or number, or None where it has no such input."""
+        if isinstance(name, str) and name not in self.node.inputs:
+            return None
+        return Input(self.node.inputs[name], self.groups)
+
+
+def source(of: Input) -> Output | Input:
+    """The output that feeds an input, or the input, perhaps of a group around it, that nothing feeds."""
+    while True:
+        link = next((link for link in of.socket.links if not link.is_muted), None) if of.socket.is_linked else None
+        if link is None:
+            return of
+        node, socket = link.from_node, link.from_socket
+        through = _through(node, socket, of.groups)
+        if through is None:
+            return Output(node, socket, of.groups)
+        of = through
+
+
+def _through(node: bpy.types.Node, socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...]) -> Input | None:
+    """Where the search goes on behind an output, or None where it ends."""
+    if node.type == "REROUTE":
+        return Input(node.inputs[0], groups)
+    if node.mute:
+        inner = next((link.from_socket for link in node.internal_links if link.to_socket == socket), None)
+        return inner and Input(inner, groups)
+    if node.type == "GROUP" and node.node_tree:
+        ends = [each for each in node.node_tree.nodes if each.type == "GROUP_OUTPUT"]
+        end = next((each for each in ends if each.is_active_output), None)
+        return end and _by_identifier(end, socket, (*groups, node))
+    if node.type == "GROUP_INPUT" and groups:
+        return _by_identifier(groups[-1], socket, groups[:-1])
+    return None
+
+
+def _by_identifier(node: bpy.types.Node, socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...]) -> Input | None:
+    inner = next((each for each in node.inputs if each.identifier == socket.identifier), None)
+    return inner and Input(inner, groups)
+
+
+def borrow_output(borrow: Borrower, tree: bpy.types.NodeTree, kind: str) -> tuple[bpy.types.Node, "Adder"]:
+    """Let Cycles see another output of a tree until the loan ends.
+
+    kind : the output's class, "ShaderNodeOutputMaterial", … Returns it, and what adds nodes that go with it.
+    """
+    nodes = tree.nodes
+    active = nodes.active
+    before = [(node, node.is_active_output) for node in nodes if node.bl_idname == kind]
+    adder = Adder(tree)
+
+    def undo() -> None:
+        adder.remove()
+        for node, was_active in before:
+            node.is_active_output = was_active
+        nodes.active = active
+
+    borrow.afterwards(undo)
+    output = adder.add(kind)
+    output.target = "CYCLES"
+    for node, _ in before:
+        node.is_active_output = False
+    output.is_active_output = True
+    return output, adder
+
+
+class Adder:
+    """Adds nodes to a tree, and takes them out again."""
+
+    def __init__(self, tree: bpy.types.NodeTree) -> None:
+        self._tree, self._added = tree, []
+
+    def add(self, kind: str, *linked: bpy.types.NodeSocket, **values: object) -> bpy.types.Node:
+        """A node of this class. linked : outputs for its first inputs. values : of its inputs, by name."""
+        node = self._tree.nodes.new(kind)
+        self._added.append(node)
+        for number, socket in enumerate(linked):
+            self._tree.links.new(socket, node.inputs[number])
+        for name, value in values.items():
+            node.inputs[name].default_value = value
+        return node
+
+    def link(self, output: bpy.types.NodeSocket, socket: bpy.types.NodeSocket) -> None:
+        self._tree.links.new(output, socket)
+
+    def remove(self) -> None:
+        for node in self._added:
+            self._tree.nodes.remove(node)

@@ -1,0 +1,315 @@
+"""A scene whose origin is a camera's eye, for as long as it is needed: what float32 can't tell apart far from the origin.
+
+At 6.4e6 m, where geocentric coordinates lie, two neighbouring float32 numbers are half a metre apart. Blender keeps matrices
+and vertices so, and that can't be mended; but Cycles multiplies and subtracts them in float32 too, and loses pixels with it. So
+everything that a render would show is placed anew, in a scene of its own: evaluated geometry is copied, once for each that
+Cycles shares, and the difference to the eye is taken in float64.
+
+- Instances stand at R, t − s, with s the eye. The matrix is the inverse of a parent at the origin, which Blender multiplies by
+  ones and zeros: no rotation is taken apart, and shear survives.
+- Vertices far from their object's own origin (a map in UTM coordinates) need more: each geometry moves by its point c that is
+  nearest to the eye, v − c, and its instances by R c − s + t. Then no coordinate exceeds the distance and the size of what is
+  seen.
+- The camera is a new one at the origin. It shows the four values in float64, where the file's camera is what they say but for
+  rounding; else what the file's camera shows.
+
+Everything is then verified against the file: each matrix and each vertex that Blender evaluates there.
+
+Rejected: an Empty at −s as the parent of all that has none. Whatever is computed in world space does not follow it (Child Of
+and Limit constraints, baked particles, rigid bodies, drivers, noise in geometry nodes), maps keep their vertices, and children
+and instances, which the file has rounded to half a metre, come out elsewhere than in the file.
+"""
+
+import contextlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...pinhole import Pinhole
+from .. import camera as cameras
+from .. import datablocks, findings, pose
+from ..borrowing import Borrower, borrowed, still_of_one_layer
+from . import features, materials
+from .depsgraph import visit
+from .export import light_in, placements
+from .film import CYCLES_SETTINGS
+from .ledger import Ledger
+from .shading import Shading
+from .world import shown_world
+
+Array = NDArray[np.float64]
+Geometry = bpy.types.Mesh | bpy.types.PointCloud
+
+# A number is rounded once when Blender stores it; twice that allows for a last place of its product with a 1.
+_ROUNDING = 2.0**-23
+_LEAST = float(np.finfo(np.float32).tiny)
+
+# What of the render settings makes the picture's frame.
+_FRAME = (
+    "resolution_x",
+    "resolution_y",
+    "resolution_percentage",
+    "pixel_aspect_x",
+    "pixel_aspect_y",
+    "use_border",
+    "border_min_x",
+    "border_max_x",
+    "border_min_y",
+    "border_max_y",
+    "film_transparent",
+)
+
+
+@dataclass(frozen=True)
+class Recentred:
+    """A scene to render in place of the file's.
+
+    origin : the file's point that is the origin here: the eye. names : object here → the object in the file that it shows.
+    """
+
+    scene: bpy.types.Scene
+    camera: bpy.types.Object
+    origin: tuple[float, float, float]
+    names: dict[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class _Copy:
+    """A geometry of the file, moved. points : (n, 3) float32, as the file has them. anchor : (3,), what was taken off them."""
+
+    data: Geometry
+    points: NDArray[np.float32]
+    anchor: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Placed:
+    """Something in the file, once. data : what is shown. matrix : (4, 4), of `data` relative to the eye."""
+
+    name: str
+    data: bpy.types.ID
+    matrix: Array
+    object_index: int = 0
+    hidden_from: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    """The file's camera. shown : the pinhole to render; claimed : what it is said to be. Both in the file's world space."""
+
+    shown: Pinhole
+    claimed: Pinhole
+    sensor_fit: str
+    sensor: tuple[float, float]
+    clip: tuple[float, float]
+
+
+@contextlib.contextmanager
+def recentred(
+    scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_object: bpy.types.Object, ledger: Ledger, lit: bool = False
+) -> Iterator[Recentred]:
+    """Give what a render of this view layer shows, as a scene whose origin is the eye; it is gone at the end of the block.
+
+    ledger : notes what could not come, as `export.survey` does. lit : whether what only other rays than the camera's see comes
+        along, for the levels above geometry.
+
+    Raises
+    ------
+    InputError
+        as `export.export_scene` does, and if something does not stand where it should.
+    """
+    features.note_render(scene, view_layer, camera_object, ledger, lit)
+    with borrowed() as borrow:
+        keys = set(bpy.data.shape_keys)
+        borrow.afterwards(_remove_keys_but, keys)
+        view, placed, copies = _visit(
+            scene, view_layer, camera_object, lambda depsgraph: _seen(depsgraph, camera_object, ledger, borrow, lit)
+        )
+        _remove_keys_but(keys)
+        temporary = _empty_scene(borrow, scene, view_layer)
+        camera = _camera(borrow, temporary, view)  # before all others: it asks for a depsgraph
+        shown = _place(borrow, temporary, placed)
+        _visit(temporary, temporary.view_layers[0], camera, lambda depsgraph: _verify(depsgraph, shown, copies))
+        yield Recentred(temporary, camera, view.shown.eye, {each.name: source.name for each, source in shown.items()})
+
+
+def _visit(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_object: bpy.types.Object, work: Callable) -> Any:
+    with borrowed() as borrow:
+        still_of_one_layer(borrow, scene, view_layer, camera_object)
+        return visit(scene, work)
+
+
+def _seen(
+    depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, ledger: Ledger, borrow: Borrower, lit: bool
+) -> tuple[_View, list[_Placed], dict[bpy.types.ID, _Copy]]:
+    """What of the file is rendered; geometries are copied, and the copies gone when the loan ends."""
+    if lit:
+        light_in(depsgraph, ledger)  # for what the ledger tells of the file's own lamps
+    view = _view(depsgraph, camera_object)
+    eye = np.array(view.shown.eye)
+    plain = materials.plain(borrow)
+    copies: dict[tuple[int, int], _Copy] = {}
+    placed = []
+    for source, matrix in placements(depsgraph, ledger, Shading() if lit else None):
+        if not np.isfinite(matrix).all():
+            raise InputError(f"the matrix of object {source.name!r} holds a number that is not finite: check its transform")
+        matrix[:3, 3] -= eye
+        if source.key not in copies:
+            data = source.data.copy()
+            borrow.afterwards(bpy.data.batch_remove, [data])
+            _set_materials(data, [(material and material.original) or plain for material in source.slots])
+            copies[source.key] = _moved(data, matrix)
+        copy = copies[source.key]
+        matrix[:3, 3] += matrix[:3, :3] @ copy.anchor
+        placed.append(_Placed(source.name, copy.data, matrix, source.object_index, source.hidden_from))
+    return view, [*placed, *_lights(depsgraph, eye)], {copy.data: copy for copy in copies.values()}
+
+
+def _remove_keys_but(keys: set[bpy.types.Key]) -> None:
+    """Shape keys come along when a mesh is copied, although its points are evaluated ones; 4.2 does not say whose they are."""
+    bpy.data.batch_remove([key for key in bpy.data.shape_keys if key not in keys])
+
+
+def _lights(depsgraph: bpy.types.Depsgraph, eye: Array) -> Iterator[_Placed]:
+    """They leave no mark in the passes of geometry, and make the picture one that can be looked at."""
+    for instance in depsgraph.object_instances:
+        if instance.object.type == "LIGHT" and instance.show_self:
+            matrix = np.array(instance.matrix_world, dtype=np.float64)
+            matrix[:3, 3] -= eye
+            hidden_from = features.hidden_from(features.placed_by(instance), depsgraph.view_layer_eval)
+            yield _Placed(instance.object.original.name, instance.object.data.original, matrix, hidden_from=hidden_from)
+
+
+def _view(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) -> _View:
+    camera = camera_object.evaluated_get(depsgraph)
+    found = cameras.read(camera, depsgraph.scene)
+    stated = cameras.stated(camera, depsgraph.scene)
+    is_stated = stated and not findings.differences(stated, found, pose.reach(camera_object, depsgraph))
+    return _View(
+        shown=stated if is_stated else found,
+        claimed=stated or found,
+        sensor_fit=camera.data.sensor_fit,
+        sensor=datablocks.own_sensor(camera.data),
+        clip=(camera.data.clip_start, camera.data.clip_end),
+    )
+
+
+def _set_materials(data: Geometry, slots: list[bpy.types.Material]) -> None:
+    """Give a geometry the materials that its object's slots have."""
+    for index, material in enumerate(slots):
+        if index == len(data.materials):
+            data.materials.append(material)
+        else:
+            data.materials[index] = material
+
+
+def _moved(data: Geometry, matrix: Array) -> _Copy:
+    """Take off a copied geometry the point of its bounding box that is nearest to the eye.
+
+    matrix : (4, 4), of the first object that shows it, relative to the eye.
+    """
+    elements = data.vertices if isinstance(data, bpy.types.Mesh) else data.points
+    points = np.empty((len(elements), 3), np.float32)
+    elements.foreach_get("co", points.ravel())
+    finite = points[np.isfinite(points).all(axis=1)].astype(np.float64)
+    if not len(finite):
+        return _Copy(data, points, np.zeros(3))
+    eye = np.linalg.pinv(matrix[:3, :3]) @ -matrix[:3, 3]
+    anchor = np.clip(eye, finite.min(axis=0), finite.max(axis=0))
+    elements.foreach_set("co", (points - anchor).astype(np.float32).ravel())
+    data.update_tag()
+    return _Copy(data, points, anchor)
+
+
+def _empty_scene(borrow: Borrower, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> bpy.types.Scene:
+    """A scene that renders pictures of the same frame and film, with the same world."""
+    temporary = bpy.data.scenes.new("Virtual Pinhole")
+    borrow.afterwards(bpy.data.scenes.remove, temporary)
+    for name in _FRAME:
+        setattr(temporary.render, name, getattr(scene.render, name))
+    temporary.render.use_crop_to_border = scene.render.use_border  # as in borrowing.still_of_one_layer
+    if hasattr(scene, "cycles"):
+        for name in CYCLES_SETTINGS:
+            setattr(temporary.cycles, name, getattr(scene.cycles, name))
+    temporary.world = shown_world(scene, view_layer)
+    temporary.frame_current = scene.frame_current
+    return temporary
+
+
+def _place(borrow: Borrower, temporary: bpy.types.Scene, placed: list[_Placed]) -> dict[bpy.types.Object, _Placed]:
+    """An object for each thing, all of them children of one at the origin."""
+    root = bpy.data.objects.new("Virtual Pinhole", None)
+    objects = [root]
+    borrow.afterwards(bpy.data.batch_remove, objects)
+    temporary.collection.objects.link(root)
+    shown = {}
+    for each in placed:
+        block = bpy.data.objects.new(each.name, each.data)
+        objects.append(block)
+        block.parent = root
+        block.matrix_parent_inverse = Matrix(each.matrix)
+        block.pass_index = each.object_index
+        for ray in each.hidden_from:
+            setattr(block, f"visible_{ray}", False)
+        temporary.collection.objects.link(block)
+        shown[block] = each
+    return shown
+
+
+def _camera(borrow: Borrower, temporary: bpy.types.Scene, view: _View) -> bpy.types.Object:
+    """A camera that shows `view.shown`, and states `view.claimed`."""
+    data = bpy.data.cameras.new("Virtual Pinhole")
+    borrow.afterwards(bpy.data.batch_remove, [data])
+    block = bpy.data.objects.new("Virtual Pinhole", data)
+    borrow.afterwards(bpy.data.batch_remove, [block])
+    temporary.collection.objects.link(block)
+    temporary.camera = block
+    data.sensor_fit, (data.sensor_width, data.sensor_height) = view.sensor_fit, view.sensor
+    data.clip_start, data.clip_end = view.clip
+    shown, claimed = (_relative(pinhole, view.shown.eye) for pinhole in (view.shown, view.claimed))
+    cameras.place(block, shown, temporary, datablocks.depsgraph_of(temporary))
+    frame = datablocks.frame_of(temporary)
+    distance = claimed.distance[0] * frame.resolution_x / frame.size[0]
+    block.virtual_pinhole.state(claimed.eye, claimed.look_at, claimed.up, distance, frame)
+    return block
+
+
+def _relative(pinhole: Pinhole, origin: tuple[float, ...]) -> Pinhole:
+    """The same pinhole where `origin` is (0, 0, 0)."""
+    eye, look_at = (tuple(a - b for a, b in zip(point, origin, strict=True)) for point in (pinhole.eye, pinhole.look_at))
+    return replace(pinhole, eye=eye, look_at=look_at)
+
+
+def _verify(depsgraph: bpy.types.Depsgraph, shown: dict[bpy.types.Object, _Placed], copies: dict[bpy.types.ID, _Copy]) -> None:
+    """Raise InputError, by name, unless everything stands relative to the eye as in the file, each number rounded once."""
+    missing = dict(shown)
+    verified = set()
+    for instance in depsgraph.object_instances:
+        block = instance.object.original
+        if block not in missing:
+            continue
+        each = missing.pop(block)
+        _compare(each.name, np.array(instance.matrix_world), each.matrix)
+        if each.data in copies and each.data not in verified:
+            verified.add(each.data)
+            copy, data = copies[each.data], instance.object.data
+            elements = data.vertices if isinstance(data, bpy.types.Mesh) else data.points
+            points = np.empty((len(elements), 3), np.float32)
+            elements.foreach_get("co", points.ravel())
+            _compare(each.name, points, copy.points - copy.anchor)
+    for each in missing.values():
+        raise InputError(f"object {each.name!r} is missing in the scene that was moved to the eye: leave --recenter out")
+
+
+def _compare(name: str, found: NDArray, wanted: Array) -> None:
+    if found.shape == wanted.shape and np.allclose(found, wanted, rtol=_ROUNDING, atol=_LEAST, equal_nan=True):
+        return
+    raise InputError(
+        f"object {name!r} did not follow when the scene was moved to the eye, perhaps an add-on moves it: leave --recenter out"
+    )

@@ -1,0 +1,304 @@
+"""A Blender material as the tracer's: the components that its shader nodes add up to, or the nearest ones and why.
+
+Exact are, with constants, textures, vertex colours and their products: Emission, a Diffuse BSDF without roughness, a
+Principled BSDF whose gloss has no strength, and Glossy, Glass and Refraction BSDFs without roughness, mixed and added.
+Measured in 4.2, 4.5, 5.0 and 5.2: with a specular IOR level of 0, or an IOR of 1, a Principled BSDF gives the Diffuse BSDF's
+pixels to the last bit, whatever its roughness, anisotropy and tint, unless a weight or the thin film below is not 0.
+
+Whatever else is met becomes a Lambert surface of its base colour. Then Cycles is shown the same for the time of a comparison
+(materials.stand_in): an approximation is never a difference between the two sides. Rejected: matching roughness by a mixture of
+mirror and Lambert, which would be right nowhere.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import bpy
+
+from ...tracer.scene.materials import LARGEST_RADIANCE, PLAIN, Colour, Material
+from .. import versions
+from . import images, nodes
+from .nodes import Input, Output
+
+RGB = tuple[float, float, float]
+
+# What must be 0 for a Principled BSDF to be Lambert's; versions know fewer of them.
+_PRINCIPLED_ZERO = (
+    "Metallic",
+    "Diffuse Roughness",
+    "Subsurface Weight",
+    "Transmission Weight",
+    "Coat Weight",
+    "Sheen Weight",
+    "Thin Film Thickness",
+)
+_WHITE = (1.0, 1.0, 1.0)
+_LUMINANCE = (0.2126, 0.7152, 0.0722)
+
+
+@dataclass
+class Reading:
+    """What a Blender material is to the tracer.
+
+    images : key in `Colour.image` → the image. vertex : the colour attribute that `Colour.vertex` stands for ("" is the one
+    that is active for rendering), or None. uv : the UV map that an image is laid out by, or None for the active one. reasons :
+    why it is approximated, one clause each, about the material.
+    """
+
+    material: Material = PLAIN
+    images: dict[str, bpy.types.Image] = field(default_factory=dict)
+    vertex: str | None = None
+    uv: str | None = None
+    reasons: list[str] = field(default_factory=list)
+
+
+def read(material: bpy.types.Material) -> Reading:
+    """What Cycles would show of an evaluated material, but for its displacement and volume."""
+    tree = versions.node_tree(material)
+    output = tree and tree.get_output_node("CYCLES")
+    if not output:
+        return in_the_viewport(material)
+    reader = _Reader(in_the_viewport(material).material.diffuse)
+    components = reader.surface(Input(output.inputs["Surface"]))
+    reader.reading.material = Material(**components, **({} if reader.ior is None else {"ior": reader.ior}))
+    return reader.reading
+
+
+def in_the_viewport(material: bpy.types.Material) -> Reading:
+    """A Lambert surface of the colour that the material has in Blender's viewport."""
+    return Reading(Material(diffuse=Colour(possible(material.diffuse_color[:3]) or PLAIN.diffuse.rgb)))
+
+
+class _Reader:
+    """Follows the nodes from the output, and gathers what they ask for."""
+
+    def __init__(self, viewport: Colour) -> None:
+        self.reading = Reading()
+        self.viewport = viewport
+        self.ior: float | None = None
+
+    def surface(self, of: Input | None) -> dict[str, Colour]:
+        """Component of Material → its colour."""
+        source = of and nodes.source(of)
+        if not isinstance(source, Output):
+            return {}
+        read = {
+            "EMISSION": self._emission,
+            "BSDF_DIFFUSE": self._diffuse,
+            "BSDF_PRINCIPLED": self._principled,
+            "BSDF_GLOSSY": self._glossy,
+            "BSDF_GLASS": self._clear,
+            "BSDF_REFRACTION": self._clear,
+            "MIX_SHADER": self._mix,
+            "ADD_SHADER": self._add,
+        }.get(source.node.type, self._unknown)
+        return read(source)
+
+    def _emission(self, output: Output) -> dict[str, Colour]:
+        strength = self._number(output, "Strength", 1.0)
+        return {"emission": self._scaled(self._colour(output, "Color"), strength)}
+
+    def _diffuse(self, output: Output) -> dict[str, Colour]:
+        self._want(output, "Roughness", 0.0)
+        return {"diffuse": self._colour(output, "Color")}
+
+    def _principled(self, output: Output) -> dict[str, Colour]:
+        for name in _PRINCIPLED_ZERO:
+            self._want(output, name, 0.0)
+        if constant_number(output, "IOR") != 1.0:
+            self._want(output, "Specular IOR Level", 0.0)
+        found = {"diffuse": self._colour(output, "Base Color")}
+        strength = self._number(output, "Emission Strength", 1.0)
+        if strength:
+            found["emission"] = self._scaled(self._colour(output, "Emission Color"), strength)
+        return found
+
+    def _glossy(self, output: Output) -> dict[str, Colour]:
+        component = "mirror" if self._want(output, "Roughness", 0.0) else "diffuse"
+        return {component: self._colour(output, "Color")}
+
+    def _clear(self, output: Output) -> dict[str, Colour]:
+        self._want(output, "Roughness", 0.0)
+        self._want(output, "Thin Film Thickness", 0.0)
+        ior = self._number(output, "IOR", Material.ior)
+        if not 1e-3 <= ior <= 1e3:
+            self._reason(output, f"has an IOR of {ior:g}")
+            ior = Material.ior
+        if self.ior not in (None, ior):
+            self._reason(output, "has another IOR than the first")
+        else:
+            self.ior = ior
+        return {"glass" if output.node.type == "BSDF_GLASS" else "refraction": self._colour(output, "Color")}
+
+    def _mix(self, output: Output) -> dict[str, Colour]:
+        factor = min(max(self._number(output, 0, 0.5), 0.0), 1.0)
+        # The side without weight is not there: what is odd about it does not matter.
+        first = self.surface(output.input(1)) if factor < 1.0 else {}
+        second = self.surface(output.input(2)) if factor > 0.0 else {}
+        return self._sum(output, first, 1.0 - factor, second, factor)
+
+    def _add(self, output: Output) -> dict[str, Colour]:
+        return self._sum(output, self.surface(output.input(0)), 1.0, self.surface(output.input(1)), 1.0)
+
+    def _unknown(self, output: Output) -> dict[str, Colour]:
+        self._reason(output, "is not modelled")
+        name = next((name for name in ("Base Color", "Color") if name in output.node.inputs), None)
+        return {"diffuse": self._colour(output, name) if name else self.viewport}
+
+    def _sum(
+        self, output: Output, first: dict[str, Colour], weight: float, second: dict[str, Colour], other_weight: float
+    ) -> dict[str, Colour]:
+        total = {name: self._scaled(colour, weight) for name, colour in first.items()}
+        for name, colour in second.items():
+            colour = self._scaled(colour, other_weight)
+            before = total.get(name)
+            if before is None or before.is_black:
+                total[name] = colour
+            elif not colour.is_black:
+                if _pattern(before) != _pattern(colour):
+                    self._reason(output, f"adds two {name} colours that vary")
+                rgb = tuple(a + b for a, b in zip(before.rgb, colour.rgb, strict=True))
+                total[name] = Colour(rgb, before.image, before.closest, before.vertex)
+        return total
+
+    def _scaled(self, colour: Colour, factor: float) -> Colour:
+        rgb = possible(tuple(value * factor for value in colour.rgb))
+        if rgb is None:
+            self.reading.reasons.append(f"has a strength of {factor:g}")
+            return Colour((0.0, 0.0, 0.0))
+        return Colour(rgb, colour.image, colour.closest, colour.vertex)
+
+    def _colour(self, output: Output, name: str | int) -> Colour:
+        rgb = constant_colour(output, name)
+        if rgb is not None:
+            if possible(rgb) is None:
+                self._reason(output, f"has the {output.node.inputs[name].name} {', '.join(f'{value:g}' for value in rgb)}")
+            return Colour(rgb) if possible(rgb) else self.viewport
+        source = nodes.source(output.input(name))
+        node = source.node
+        if node.type == "TEX_IMAGE" and source.socket.name == "Color":
+            return self._image(source)
+        if node.type in ("VERTEX_COLOR", "ATTRIBUTE") and source.socket.name == "Color":
+            return self._vertex(source)
+        if node.type == "VECT_MATH" and node.operation == "MULTIPLY":
+            return self._product(source)
+        self._reason(source, "is not modelled")
+        return self.viewport
+
+    def _product(self, output: Output) -> Colour:
+        """What a Vector Math node makes of two colours."""
+        first, second = self._colour(output, 0), self._colour(output, 1)
+        if (first.image and second.image) or (first.vertex and second.vertex):
+            self._reason(output, "multiplies two colours that vary alike")
+            return first
+        rgb = possible(tuple(a * b for a, b in zip(first.rgb, second.rgb, strict=True)))
+        if rgb is None:
+            self._reason(output, "multiplies colours beyond what light can have")
+            return self.viewport
+        textured = first if first.image else second
+        return Colour(rgb, textured.image, textured.closest, first.vertex or second.vertex)
+
+    def _image(self, output: Output) -> Colour:
+        node = output.node
+        image = node.image and node.image.original
+        why = images.obstacle(image)
+        if why:
+            self._reason(output, why)
+            return self.viewport
+        if node.projection != "FLAT":
+            self._reason(output, "is not projected flat")
+        if node.extension != "REPEAT":
+            self._reason(output, f"does not repeat ({node.extension.lower()})")
+        if node.interpolation not in ("Linear", "Closest"):
+            self._reason(output, f"interpolates {node.interpolation.lower()}")
+        if not _maps_plainly(node):
+            self._reason(output, "has a mapping of its own")
+        vector = nodes.source(output.input("Vector"))
+        if isinstance(vector, Output):
+            if vector.node.type == "UVMAP" and not vector.node.from_instancer:
+                self.reading.uv = vector.node.uv_map or self.reading.uv
+            elif not (vector.node.type == "TEX_COORD" and vector.socket.name == "UV" and not vector.node.from_instancer):
+                self._reason(vector, "is not modelled")
+        self.reading.images[image.name_full] = image
+        return Colour(_WHITE, image.name_full, node.interpolation == "Closest")
+
+    def _vertex(self, output: Output) -> Colour:
+        node = output.node
+        if node.type == "ATTRIBUTE" and node.attribute_type != "GEOMETRY":
+            self._reason(output, "is not modelled")
+            return self.viewport
+        name = node.layer_name if node.type == "VERTEX_COLOR" else node.attribute_name
+        if self.reading.vertex not in (None, name):
+            self._reason(output, "shows another colour attribute than the first")
+        else:
+            self.reading.vertex = name
+        return Colour(_WHITE, vertex=True)
+
+    def _number(self, output: Output, name: str | int, otherwise: float) -> float:
+        """A constant, or what stands in for what is none."""
+        value = constant_number(output, name)
+        if value is None:
+            self._reason(output, f"has a {output.node.inputs[name].name} that varies")
+        return otherwise if value is None else value
+
+    def _want(self, output: Output, name: str, wanted: float) -> bool:
+        """Whether an input has this value, or is none in this version; a reason is noted where it has another."""
+        if output.input(name) is None:
+            return True
+        value = constant_number(output, name)
+        if value != wanted:
+            self._reason(output, f"has a {name} that varies" if value is None else f"has {name} {value:.3g}")
+        return value == wanted
+
+    def _reason(self, output: Output, clause: str) -> None:
+        reason = f"has a node {output.node.name!r} that {clause}"
+        if reason not in self.reading.reasons:
+            self.reading.reasons.append(reason)
+
+
+def _pattern(colour: Colour) -> tuple:
+    return colour.image, colour.closest, colour.vertex
+
+
+def _maps_plainly(node: bpy.types.Node) -> bool:
+    mapping, colours = node.texture_mapping, node.color_mapping
+    return (
+        tuple(mapping.translation) == tuple(mapping.rotation) == (0.0, 0.0, 0.0)
+        and tuple(mapping.scale) == _WHITE
+        and (mapping.mapping_x, mapping.mapping_y, mapping.mapping_z) == ("X", "Y", "Z")
+        and not (mapping.use_min or mapping.use_max or colours.use_color_ramp)
+        and (colours.brightness, colours.contrast, colours.saturation, colours.blend_factor) == (1.0, 1.0, 1.0, 0.0)
+    )
+
+
+def _rgb(value: object) -> RGB:
+    """A socket's value as a colour."""
+    return (float(value),) * 3 if isinstance(value, int | float) else tuple(map(float, value[:3]))
+
+
+def constant_number(output: Output, name: str | int) -> float | None:
+    """The constant that a node's input is given, or None where it varies."""
+    of = output.input(name)
+    value = of and _constant(of)
+    if value is None or isinstance(value, int | float):
+        return value
+    return sum(factor * each for factor, each in zip(_LUMINANCE, _rgb(value), strict=True))
+
+
+def constant_colour(output: Output, name: str | int) -> RGB | None:
+    """The same for a colour."""
+    of = output.input(name)
+    value = of and _constant(of)
+    return None if value is None else _rgb(value)
+
+
+def _constant(of: Input) -> object:
+    source = nodes.source(of)
+    if isinstance(source, Output) and source.node.type not in ("RGB", "VALUE"):
+        return None
+    return source.socket.default_value
+
+
+def possible(rgb: RGB) -> RGB | None:
+    """The colour, or None where light can't have it: it is negative, too large or not finite."""
+    return tuple(rgb) if all(math.isfinite(value) and 0.0 <= value <= LARGEST_RADIANCE for value in rgb) else None
