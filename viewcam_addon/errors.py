@@ -25,6 +25,11 @@ class NotModelledError(InputError):
     exit_status = 3
 
 
+def told(error: Exception) -> str:
+    """What a user is told of any error, in one sentence or, of a list of shots, in a list of them."""
+    return str(error) if isinstance(error, InputError) else bug(error)
+
+
 def bug(error: Exception) -> str:
     """One sentence for an error that no input should have caused, and where in the code it came from."""
     place = traceback.extract_tb(error.__traceback__)[-1]

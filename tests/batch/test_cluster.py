@@ -304,7 +304,7 @@ def test_a_scheduler_that_dies_ends_the_batch_with_what_is_left(farm, stand_in, 
     def kill():
         assert processes.until(lambda: stand_in.diary("waits"))
         if hears == "in time":
-            heard.wait()
+            heard.wait(30)
         kill_scheduler()
 
     monkeypatch.setattr(cluster._Flight, "_outcome", outcome_of)

@@ -9,7 +9,7 @@ import time
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 
-from ..errors import FullDiskError, InputError, bug
+from ..errors import FullDiskError, InputError, told
 from ..events import Events
 from ..shots import Shot
 from . import sheet, summary
@@ -123,7 +123,7 @@ class _Batch:
     def note(self, shot: Shot, outcome: dict | Exception) -> None:
         """Count a shot that was rendered or failed."""
         if isinstance(outcome, Exception):
-            error = str(outcome) if isinstance(outcome, InputError) else bug(outcome)
+            error = told(outcome)
             self._full = self._full or isinstance(outcome, FullDiskError)
             self._errors[shot.name] = error
             self._events.tell("shot_failed", shot=shot.name, error=error)

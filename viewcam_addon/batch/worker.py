@@ -10,7 +10,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
-from ..errors import FullDiskError, InputError, bug
+from ..errors import FullDiskError, InputError, told
 from ..shots import Shot
 from .folder import Folder
 from .one import render_one
@@ -63,13 +63,13 @@ def render(scene: dict[str, Any], folder: str, shot: dict[str, Any], settings: s
                 raise InputError(f"{folder} is not there: share the folder of the pictures among the machines")
             renderer = _blender.renderer(scene)
         except Exception as error:
-            return {"unfit": _sentence(error)}
+            return {"unfit": told(error)}
         try:
             render_one(Shot(**shot), Folder(Path(folder)), renderer, settings, check)
         except FullDiskError as error:
             return {"full": str(error)}
         except Exception as error:  # told as the shot's, and the next one is tried
-            return {"failed": _sentence(error)}
+            return {"failed": told(error)}
     return {}
 
 
@@ -99,7 +99,3 @@ def _refuse_other(here: dict[str, Any], batch: dict[str, Any]) -> None:
             f"the pictures would be made from another {', '.join(differing)} there: "
             "give all machines the same Blender, the same extension and the same files"
         )
-
-
-def _sentence(error: Exception) -> str:
-    return str(error) if isinstance(error, InputError) else bug(error)

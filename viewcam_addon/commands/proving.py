@@ -51,9 +51,9 @@ def render(options: argparse.Namespace) -> Result:
         scene = dataclasses.replace(scene, camera=scene.camera.resized(*options.size))
     told = _told_level(scene) if options.level == "auto" else {}
     level = told.get("level", options.level)
-    started = time.perf_counter()
     samples = MOST_SAMPLES if options.error else options.samples
     progress = Progress(options.events, scene.camera.height)
+    started = time.perf_counter()
     passes = trace(scene, level, samples, options.seed, options.threads, progress, options.error)
     seconds = time.perf_counter() - started
     attributes = {"software": "Virtual Pinhole", "level": level}
