@@ -14,7 +14,7 @@ import pytest
 
 from viewcam_addon import image
 from viewcam_addon.cli import main
-from viewcam_addon.commands import chart
+from viewcam_addon.commands import batch, chart, proving
 from viewcam_addon.commands.proving import DEMO_SCENE
 
 CAMERA = {"eye": [0, -5, 0], "look_at": [0, 0, 0], "up": [0, 0, 1], "distance": 100, "width": 64, "height": 48}
@@ -294,3 +294,46 @@ def test_where_nothing_can_be_written_one_line_says_so_and_nothing_is_left(tmp_p
         pytest.skip(f"no right to mount a file system here: {done.stderr.strip()}")
     assert done.returncode == 2 and reason in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
     assert done.stdout == "", "a file remains"
+
+
+@pytest.mark.parametrize(
+    ("words", "output"),
+    [
+        (["export", "a.blend", "OUT"], "scene"),
+        (["render", "scene.json", "OUT"], "image"),
+        (["cycles", "a.blend", "OUT"], "image"),
+        (["compare", "a.exr", "b.exr", "--report", "OUT"], "report"),
+        (["compare", "a.exr", "b.exr", "--difference", "OUT.png"], "difference"),
+        (["check", "a.blend", "--report", "OUT"], "report"),
+        (["demo", "--report", "OUT"], "report"),
+        (["batch", "a.blend", "--orbit", "3", "--out", "folder", "--json", "OUT"], "json"),
+        (["check", "a.blend", "--json", "OUT"], "json"),
+    ],
+)
+def test_what_can_not_be_written_is_said_before_anything_is_traced_or_rendered(tmp_path, capfd, monkeypatch, words, output):
+    """Before, `render` traced for half a minute and then found that its target is a folder."""
+    begun = []
+    for module, name in [(proving, words[0]), (batch, "run")]:
+        monkeypatch.setattr(module, name, lambda options: begun.append(options) or (0, {}), raising=False)
+    (tmp_path / "file").write_text("no folder")
+    bad = str(tmp_path / "file" / "out.png")
+    said = fails(capfd, *(word.replace("OUT.png", bad).replace("OUT", bad) for word in words))
+    assert not begun and "can't be written" in said and "out.png" in said
+    good = str(tmp_path / "new" / "out.png")
+    assert main([word.replace("OUT.png", good).replace("OUT", good) for word in words]) == 0
+    assert len(begun) == 1 and getattr(begun[0], output) == Path(good)
+    assert not (tmp_path / "new").exists(), "to look whether it can be written leaves nothing"
+
+
+def test_the_result_goes_to_standard_output_by_its_name_and_devices_stay(tmp_path):
+    """As root, --json /dev/null once left a file in its place."""
+    scene = write_scene(tmp_path)
+    command = [sys.executable, "-m", "viewcam_addon", "render", scene, tmp_path / "out.exr", "--json"]
+    told = subprocess.run([*command, "/dev/stdout"], capture_output=True, text=True, check=True).stdout
+    said, _, result = told.partition("\n")
+    assert "traced 64 × 48" in said and json.loads(result)["exit_status"] == 0
+    subprocess.run([*command, "/dev/null"], capture_output=True, check=True)
+    assert Path("/dev/null").is_char_device()
+    mixed = subprocess.run([*command, "/dev/stdout", "--log-json"], capture_output=True, text=True, check=False)
+    assert mixed.returncode == 2 and "is where viewcam prints" in mixed.stderr
+    assert all(json.loads(line) for line in mixed.stdout.splitlines())

@@ -1,9 +1,21 @@
-"""A file appears whole or not at all, and the folder tells nothing of a failure."""
+"""A file appears whole or not at all, the folder tells nothing of a failure, and what is no file is not replaced by one."""
+
+import contextlib
+import os
+import socket
+import stat
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
 
 import pytest
 
 from viewcam_addon.errors import InputError
-from viewcam_addon.files import written_whole
+from viewcam_addon.files import check_writable, written_whole
+
+posix = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such things in its folders")
 
 
 def test_what_was_written_appears_under_its_name_alone(tmp_path):
@@ -42,3 +54,134 @@ def test_a_block_that_wrote_nothing_is_an_error(tmp_path):
     with pytest.raises(InputError, match=r"file\.txt can't be written"), written_whole(tmp_path / "file.txt"):
         pass
     assert not list(tmp_path.iterdir())
+
+
+def test_a_symbolic_link_stays_and_what_it_leads_to_is_replaced(tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    file, link = tmp_path / "elsewhere" / "file.txt", tmp_path / "link.txt"
+    file.write_text("older")
+    link.symlink_to(file)
+    with written_whole(link) as temporary:
+        temporary.write_text("whole")
+        assert temporary.parent == file.parent and file.read_text() == "older"
+    assert link.is_symlink() and file.read_text() == "whole"
+    assert [path.name for path in file.parent.iterdir()] == ["file.txt"]
+
+
+def test_a_link_that_leads_nowhere_yet_leads_to_the_file_then(tmp_path):
+    link = tmp_path / "link.txt"
+    link.symlink_to(tmp_path / "file.txt")
+    with written_whole(link) as temporary:
+        temporary.write_text("whole")
+    assert link.is_symlink() and (tmp_path / "file.txt").read_text() == "whole"
+
+
+def test_a_link_to_itself_is_refused_in_one_sentence(tmp_path):
+    (tmp_path / "link.txt").symlink_to("link.txt")
+    with pytest.raises(InputError, match=r"link\.txt can't be written"), written_whole(tmp_path / "link.txt"):
+        raise AssertionError("nothing is to be made for it")
+    assert (tmp_path / "link.txt").is_symlink()
+
+
+@posix
+def test_a_pipe_stays_and_its_reader_has_all_of_it(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    read = []
+    reader = threading.Thread(target=lambda: read.append((tmp_path / "pipe").read_bytes()), daemon=True)
+    reader.start()
+    content = bytes(range(256)) * 4096  # sixteen times what a pipe holds
+    with _when_it_is_read(tmp_path / "pipe"), written_whole(tmp_path / "pipe") as temporary:
+        temporary.write_bytes(content)
+    reader.join(30)
+    assert read == [content] and stat.S_ISFIFO(os.stat(tmp_path / "pipe").st_mode)
+    assert [path.name for path in tmp_path.iterdir()] == ["pipe"]
+
+
+@posix
+def test_a_pipe_that_nobody_reads_is_refused_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="pipe that nobody reads"), written_whole(tmp_path / "pipe") as temporary:
+        temporary.write_bytes(b"whole")
+    assert stat.S_ISFIFO(os.stat(tmp_path / "pipe").st_mode)
+
+
+@posix
+def test_a_device_is_written_to_and_stays_one(tmp_path):
+    """Before, root's --json /dev/null left a file there. A terminal of our own is a device that tells what it was given."""
+    ours, its = os.openpty()
+    device = Path(os.ttyname(its))
+    try:
+        with written_whole(device) as temporary:
+            temporary.write_text("whole\n")
+        assert os.read(ours, 100).strip() == b"whole"
+        assert stat.S_ISCHR(device.stat().st_mode)
+    finally:
+        os.close(ours)
+        os.close(its)
+    with written_whole("/dev/null") as temporary:
+        temporary.write_text("gone")
+    assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
+
+
+@posix
+def test_standard_output_by_its_name_is_written_to_behind_what_is_printed_already(tmp_path):
+    program = "import viewcam_addon.files as files; print('printed')\nwith files.written_whole('/dev/stdout') as path:\n"
+    program += " path.write_text('whole\\n')\nprint('more')"
+    for way in ("pipe", "file"):
+        with open(tmp_path / "out.txt", "w") as out:
+            child = subprocess.run(
+                [sys.executable, "-c", program], stdout=subprocess.PIPE if way == "pipe" else out, check=True
+            )
+        said = child.stdout.decode() if way == "pipe" else (tmp_path / "out.txt").read_text()
+        assert said == "printed\nwhole\nmore\n", way
+
+
+@posix
+def test_a_socket_is_refused_and_stays(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # the names of sockets are short
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind("socket")
+        with pytest.raises(InputError, match="is a socket"), written_whole("socket"):
+            raise AssertionError("nothing is to be made for it")
+    assert stat.S_ISSOCK(os.stat("socket").st_mode)
+
+
+@pytest.mark.parametrize("kind", ["folder", "file as folder", "long name", "disk"])
+def test_what_can_not_be_written_is_known_before_there_is_anything_to_write(tmp_path, kind, monkeypatch):
+    (tmp_path / "file").write_text("no folder")
+    target = {
+        "folder": tmp_path,
+        "file as folder": tmp_path / "file" / "out.exr",
+        "long name": tmp_path / f"{'a' * 300}.exr",
+        "disk": tmp_path / "disk",
+    }[kind]
+    if kind == "disk":  # to make a real one takes root
+        disk = os.stat_result((stat.S_IFBLK | 0o660, *os.stat(tmp_path)[1:]))
+        real = os.stat
+        monkeypatch.setattr(os, "stat", lambda path, **how: disk if Path(path) == target else real(path, **how))
+    with pytest.raises(InputError, match=r"is a folder|can't be written|is a disk"):
+        check_writable(target)
+
+
+def test_to_look_whether_a_file_can_be_written_leaves_nothing(tmp_path):
+    (tmp_path / "older.txt").write_text("older")
+    check_writable(tmp_path / "older.txt")
+    check_writable(tmp_path / "new" / "folder" / "file.txt")
+    check_writable(os.devnull)
+    assert [path.name for path in tmp_path.iterdir()] == ["older.txt"] and (tmp_path / "older.txt").read_text() == "older"
+
+
+@contextlib.contextmanager
+def _when_it_is_read(pipe):
+    """Begins when somebody has opened the pipe, and holds it open on the way."""
+    ends, handle = time.monotonic() + 30, None
+    while handle is None:
+        try:
+            handle = os.open(pipe, os.O_WRONLY | os.O_NONBLOCK)
+        except OSError:
+            assert time.monotonic() < ends, "nobody reads"
+            time.sleep(0.01)
+    try:
+        yield
+    finally:
+        os.close(handle)

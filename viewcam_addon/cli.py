@@ -18,7 +18,7 @@ from typing import Any, NoReturn
 from . import batch_words, events, words
 from .commands import Result, batch, chart, proving, serve
 from .errors import InputError, bug
-from .files import written_whole
+from .files import check_writable, is_printed_to, written_whole
 from .tracer.scene.film import SAMPLES
 
 
@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None, blend_is_open: bool = False) ->
         return 0
     except _UsageError as error:
         log_json = "--log-json" in arguments
-        options = argparse.Namespace(command=error.command, run=error.raised, json=None, log_json=log_json)
+        options = argparse.Namespace(command=error.command, run=error.raised, json=None, log_json=log_json, writes=())
     options.words = shlex.join(arguments)
     started = time.monotonic()
     with events.opened(options.log_json) as options.events:
@@ -83,7 +83,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
 
     def command(run: Callable[[argparse.Namespace], Result], name: str, text: str) -> argparse.ArgumentParser:
         added = subparsers.add_parser(name, help=text, description=text)
-        added.set_defaults(run=run)
+        added.set_defaults(run=run, writes=())
         added.add_argument("--threads", type=words.positive, metavar="N", help="threads to use (default: all)")
         added.add_argument("--json", metavar="FILE", type=Path, help="write the result as JSON")
         added.add_argument("--log-json", action="store_true", help="tell on standard output a JSON object for each event")
@@ -128,16 +128,19 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     def report(added: argparse.ArgumentParser) -> None:
         added.add_argument("--report", metavar="DIR", type=Path, help="write an HTML report there")
         added.add_argument("--difference", metavar="FILE.png", type=words.png, help="draw there what differs, pixel by pixel")
+        added.set_defaults(writes=("report", "difference"))
         added.add_argument("--repeat", help=argparse.SUPPRESS)  # what the report shall name as its command
 
     added = command(proving.export, "export", "Write the scene of a .blend as the tracer reads it.")
     blend(added)
     added.add_argument("scene", metavar="SCENE.json", type=Path)
+    added.set_defaults(writes=("scene",))
     scene_choices(added)
 
     added = command(proving.render, "render", "Trace a scene file into an EXR.")
     added.add_argument("scene", metavar="SCENE.json", type=Path)
     added.add_argument("image", metavar="OUT.exr", type=Path)
+    added.set_defaults(writes=("image",))
     added.add_argument("--size", type=words.size, metavar="WxH", help="pixels of the picture (default: the scene's)")
     added.add_argument("--stated", action="store_true", help="trace the four values as stated, not as Blender stored them")
     spent = added.add_mutually_exclusive_group()
@@ -149,6 +152,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     )
     blend(added)
     added.add_argument("image", metavar="OUT.exr", type=Path)
+    added.set_defaults(writes=("image",))
     scene_choices(added)
 
     added = command(proving.compare, "compare", "Compare EXRs of one camera against derived tolerances and noise.")
@@ -175,7 +179,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
 
     added = command(proving.demo, "demo", "Check the studio still that comes with the project, and write the report.")
     added.set_defaults(blend=proving.DEMO_SCENE, camera=None, frame=None, size=None, strict=False, recenter=False, clay=False)
-    added.set_defaults(difference=None, repeat=None)
+    added.set_defaults(difference=None, repeat=None, writes=("report",))
     light(added)
     error(added, "the tracer takes")
     added.add_argument(
@@ -197,13 +201,14 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
 
     hidden = subparsers.add_parser("serve")  # for our own processes: without a help, so the list of commands leaves it out
     hidden.add_argument("handle")
-    hidden.set_defaults(run=serve.run, json=None, log_json=False)
+    hidden.set_defaults(run=serve.run, json=None, log_json=False, writes=())
     return parser
 
 
 def _outcome(options: argparse.Namespace) -> Result:
     """Exit status and result of the sub-command, whatever becomes of it; an error is told."""
     try:
+        _check_outputs(options)
         return options.run(options)
     except InputError as error:
         return _told(options, error.exit_status, str(error), getattr(error, "problems", ()))
@@ -211,6 +216,26 @@ def _outcome(options: argparse.Namespace) -> Result:
         return 130, {"error": "interrupted"}
     except Exception as error:  # in one line, as every other error
         return _told(options, 2, bug(error))
+
+
+def _check_outputs(options: argparse.Namespace) -> None:
+    """Raise InputError for what can't be written, before anything is traced or rendered."""
+    if options.json:
+        try:
+            _check_output(options.json, is_text=not options.log_json)
+        except InputError:
+            options.json = None  # where this error would be told as well
+            raise
+    for name in options.writes:
+        if path := getattr(options, name):
+            _check_output(path / "index.html" if name == "report" else path, is_text=False)
+
+
+def _check_output(path: Path, is_text: bool) -> None:
+    """is_text : it may stand between the lines that are printed."""
+    check_writable(path)
+    if not is_text and is_printed_to(path):
+        raise InputError(f"{path} is where viewcam prints: give the name of a file")
 
 
 def _told(options: argparse.Namespace, status: int, sentence: str, problems: Sequence[str] = ()) -> Result:

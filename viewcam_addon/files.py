@@ -2,12 +2,21 @@
 
 Every file that this project writes comes into being as a temporary file in the same folder and is renamed when its last byte
 is on the disk. Blender's own writers (the .blend, Cycles' EXR) write to the temporary path that `written_whole` hands out.
+
+Only a regular file is replaced, or nothing. A symbolic link stays, and the file that it leads to is replaced. What else may
+stand there (/dev/null, a terminal, a pipe, standard output under its name /dev/stdout) is written to, when all of it is ready.
+A disk, a socket and a folder are refused. Rejected: to follow links by hand, since the system may forbid to follow one that
+another user has put in a folder that all may write to.
 """
 
 import contextlib
 import errno
 import os
 import secrets
+import shutil
+import stat
+import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -27,23 +36,133 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     Raises
     ------
     InputError
-        if the folder can't be written; FullDiskError if the disk is full.
+        if the folder can't be written, or if `path` is a folder, a disk, a socket or a pipe that nobody reads; FullDiskError if
+        the disk is full.
     """
-    target = Path(path)
-    if target.is_dir():
-        raise InputError(f"{target} is a folder: give the name of a file")
-    temporary = target.with_name(f".{target.stem}-{secrets.token_hex(4)}{target.suffix}")
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
+    path = Path(path)
+    with _in_a_sentence(path), contextlib.ExitStack() as ends:
+        file = _replaceable(path)
+        if file:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            temporary = _beside(file, file.parent)
+            ends.callback(_removed, temporary)
+        else:
+            folder = ends.enter_context(tempfile.TemporaryDirectory(prefix="viewcam-", ignore_cleanup_errors=True))
+            temporary = Path(folder, path.name)
         yield temporary
         with open(temporary, "rb+") as written:
             os.fsync(written.fileno())
-        os.replace(temporary, target)
+            if not file:
+                with _opened_for_writing(path) as there:
+                    shutil.copyfileobj(written, there)
+        if file:
+            os.replace(temporary, file)
+
+
+def check_writable(path: str | os.PathLike[str]) -> None:
+    """Raise InputError if `written_whole` would, as far as that is known before anything is written; nothing stays behind.
+
+    For what takes its time before it has something to write.
+    """
+    path = Path(path)
+    with _in_a_sentence(path):
+        file = _replaceable(path)
+        if file:
+            folder = next(folder for folder in file.absolute().parents if os.path.lexists(folder))
+            temporary = _beside(file, folder)
+            try:
+                temporary.touch(exist_ok=False)
+            finally:
+                _removed(temporary)
+        elif not os.access(path, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+
+def is_replaced(path: str | os.PathLike[str]) -> bool:
+    """Whether `written_whole` makes or replaces a regular file there, beside which others may stand.
+
+    Raises
+    ------
+    InputError
+        if nothing can be written there, as far as that is known.
+    """
+    path = Path(path)
+    with _in_a_sentence(path):
+        return _replaceable(path) is not None
+
+
+def is_printed_to(path: str | os.PathLike[str]) -> bool:
+    """Whether it is where standard output or standard error leads, so that what is written would mix with what is printed."""
+    try:
+        there = os.stat(path)
+    except OSError:
+        return False
+    return _is_stream(there) and not os.path.samestat(there, os.stat(os.devnull))
+
+
+def _replaceable(path: Path) -> Path | None:
+    """The regular file that is to be replaced or made; None where something stands that is written to."""
+    try:
+        there = os.stat(path)
+    except FileNotFoundError:
+        there = None
+    if there is not None:
+        kind = stat.S_IFMT(there.st_mode)
+        if kind == stat.S_IFDIR:
+            raise InputError(f"{path} is a folder: give the name of a file")
+        if kind in (stat.S_IFBLK, stat.S_IFSOCK):
+            raise InputError(f"{path} is {'a disk' if kind == stat.S_IFBLK else 'a socket'}: give the name of a file")
+        if kind != stat.S_IFREG or _is_stream(there):
+            return None
+    return Path(os.path.realpath(path)) if path.is_symlink() else path
+
+
+def _is_stream(there: os.stat_result) -> bool:
+    return _is_open_as(1, there) or _is_open_as(2, there)
+
+
+def _is_open_as(stream: int, there: os.stat_result) -> bool:
+    """Whether it is what standard output (1) or standard error (2) leads to."""
+    try:
+        return os.path.samestat(there, os.fstat(stream))
+    except OSError:  # it is closed
+        return False
+
+
+def _opened_for_writing(path: Path) -> contextlib.AbstractContextManager:
+    """What stands there and is no file to replace, behind what is printed already if it is one of our own streams."""
+    there = os.stat(path)
+    for number, stream in ((1, sys.stdout), (2, sys.stderr)):
+        if _is_open_as(number, there):
+            if stream is not None:
+                stream.flush()
+            return open(os.dup(number), "wb")
+    try:
+        handle = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0))
+    except OSError as error:
+        if error.errno == errno.ENXIO:
+            raise InputError(f"{path} is a pipe that nobody reads: start its reader first") from error
+        raise
+    if hasattr(os, "O_NONBLOCK"):  # nothing that is opened so keeps us for ever; but its reader may be slow
+        os.set_blocking(handle, True)
+    return open(handle, "wb")
+
+
+def _beside(file: Path, folder: Path) -> Path:
+    """A name in the folder that nothing has, with the file's suffix."""
+    return folder / f".{file.stem}-{secrets.token_hex(4)}{file.suffix}"
+
+
+def _removed(temporary: Path) -> None:
+    with contextlib.suppress(OSError):  # where it could not be written, it is not there either
+        temporary.unlink()
+
+
+@contextlib.contextmanager
+def _in_a_sentence(path: Path) -> Iterator[None]:
+    """An OSError of the block as the error that a user is told."""
+    try:
+        yield
     except OSError as error:
         kind = FullDiskError if error.errno in _FULL else InputError
-        raise kind(
-            f"{target} can't be written ({error.strerror or error}): choose another folder or free some space"
-        ) from error
-    finally:
-        with contextlib.suppress(OSError):  # where it could not be written, it is not there either
-            temporary.unlink()
+        raise kind(f"{path} can't be written ({error.strerror or error}): choose another folder or free some space") from error

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...files import written_whole
+from ...files import is_replaced, written_whole
 from ...pinhole import Pinhole
 from . import LedgerEntry, Object, Scene, light_fields, placing
 from .fields import Field, arrays_beside
@@ -33,12 +33,14 @@ def write(scene: Scene, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     InputError
-        if the folder can't be written or the disk is full.
+        if the folder can't be written or the disk is full, or if arrays can't stand beside `path`.
     """
     path = Path(path)
     arrays: dict[str, NDArray] = {}
     document = _document(scene, arrays)
     arrays_path = path.with_suffix(".npz")
+    if arrays and not is_replaced(path):
+        raise InputError(f"{path} is no file, and this scene has arrays that stand in one beside it: give the name of a file")
     if arrays:
         document["arrays"] = arrays_path.name
     text = json.dumps(document, indent=1, allow_nan=False)
