@@ -1,5 +1,6 @@
 """The contact sheet shows every shot, leads to its files whatever they are called, and says what went wrong."""
 
+import json
 from html.parser import HTMLParser
 from urllib.parse import unquote, urlsplit
 
@@ -15,13 +16,14 @@ from viewcam_addon.shots import Shot
 class Page(HTMLParser):
     def __init__(self, text):
         super().__init__()
-        self.links, self.images, self.texts, self.tags = [], [], [], []
+        self.links, self.images, self.texts, self.tags, self.attributes = [], [], [], [], set()
         self.feed(text)
         self.text = " ".join(" ".join(self.texts).split())
 
     def handle_starttag(self, tag, attributes):
         attributes = dict(attributes)
         self.tags.append(tag)
+        self.attributes |= set(attributes)
         if tag == "a":
             self.links.append(unquote(attributes["href"]))
         if tag == "img":
@@ -92,6 +94,36 @@ def test_a_link_stays_in_the_folder(name):
     for image in Page(text).images:
         parts = urlsplit(image["src"])
         assert not parts.scheme and not parts.netloc and not parts.query and not parts.fragment and "/" not in parts.path
+
+
+ATTACK = "4\"><script>alert(1)</script><img src=x onerror='alert(2)' alt=\""
+
+
+def attacked(value):
+    """The value, once for each leaf of it, with an attack in that leaf's place."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from (value | {key: each} for each in attacked(inner))
+    elif isinstance(value, list):
+        for number, inner in enumerate(value):
+            yield from ([*value[:number], each, *value[number + 1 :]] for each in attacked(inner))
+    else:
+        yield ATTACK
+        yield "javascript:alert(1)"
+        yield "../../secret"
+
+
+def test_whatever_a_sidecar_says_it_is_text_in_the_page(tmp_path, painting):
+    """The size was not: a sidecar that comes from elsewhere could run a script in the browser of who opens the page."""
+    painting.paint(tmp_path, 1, check=True)
+    whole = json.loads((tmp_path / "shot_000.json").read_text(encoding="utf-8"))
+    safe = Page(sheet.picture(Result("shot_000", whole)))
+    records = list(attacked(whole))
+    assert len(records) > 3 * 10, "the sidecar has lost its keys"
+    for record in records:
+        found = Page(sheet.picture(Result("shot_000", record)))
+        assert found.attributes == safe.attributes and found.links == safe.links, record
+        assert [tag for tag in found.tags if tag not in ("p", "span")] == [tag for tag in safe.tags if tag not in ("p", "span")]
 
 
 def test_counts_are_what_the_exit_status_goes_by():

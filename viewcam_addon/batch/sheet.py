@@ -3,6 +3,8 @@
 Thumbnails are the previews themselves, loaded when they come into view, and lead to them; EXR and sidecar are linked. The page
 holds no times, so that the same batch gives the same page. Rejected: thumbnails inside the page, as reports have their
 pictures (ten thousand shots make a page that no browser opens), and smaller copies (a third file a shot).
+
+A sidecar may be anybody's: all that it says is text here and nothing else, and no link leads out of the folder.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,8 +26,9 @@ def picture(result: Result) -> str:
     if not record:
         mark = f"<span class=bad>{result.state}</span>"
         return f'<figure class="wrong"><figcaption>{words} {mark}<p>{escape(result.error or "")}</p></figcaption></figure>'
-    image, preview, sidecar = (escape(quote(file)) for file in (record["image"], record["preview"], f"{result.name}.json"))
-    size = f'width="{record["rendered"]["width"]}" height="{record["rendered"]["height"]}"'
+    image, preview, sidecar = (escape(quote(f"{result.name}.{suffix}")) for suffix in ("exr", "png", "json"))
+    width, height = (escape(str(record["rendered"][name])) for name in ("width", "height"))
+    size = f'width="{width}" height="{height}"'
     words += f'<a href="{image}">EXR</a> · <a href="{sidecar}">JSON</a>'
     wrong = ""
     if result.check and result.check["passed"]:
