@@ -23,7 +23,7 @@ def test_an_orbit_begins_at_the_camera_and_goes_evenly_around_up(eye, look_at, u
     pinhole = Pinhole(eye, look_at, up, distance, 320, 180)
     assume(pinhole.sine_to_up > 1e-2)
     made = shots.orbit(pinhole, count)
-    assert made[0] == Shot("orbit_000", eye, look_at, up, distance, width=320, height=180)
+    assert made[0] == Shot("orbit_000", eye, look_at, up, distance)
     assert [shot.name for shot in made] == [f"orbit_{i:03d}" for i in range(count)]
     axis = np.array(up) / math.hypot(*up)
     away = np.array([shot.eye for shot in made]) - look_at

@@ -19,8 +19,8 @@ _RANGE = re.compile(r"([-+]?\d{1,9})\.\.([-+]?\d{1,9})", re.ASCII)
 def orbit(pinhole: Pinhole, count: int) -> list[Shot]:
     """`count` views of the pinhole's look-at point, evenly around up from the pinhole itself on, towards u.
 
-    The shots have the pinhole's size and, as d, its distance in pixel widths. What the four values don't say (shift, pixel
-    aspect, mirroring) stays as the file's camera has it.
+    d is the pinhole's distance in pixel widths. What the four values don't say is not asked of the pinhole: pixel aspect, size
+    and border are the scene's, and a camera with shift or mirrored must not come here.
 
     Raises
     ------
@@ -32,7 +32,7 @@ def orbit(pinhole: Pinhole, count: int) -> list[Shot]:
     for i in range(count):
         moved = moves.orbited(pinhole, math.tau * i / count, 0.0)
         name = f"orbit_{i:0{_digits(count - 1)}d}"
-        shots.append(Shot(name, moved.eye, moved.look_at, moved.up, moved.distance[0], None, pinhole.width, pinhole.height))
+        shots.append(Shot(name, moved.eye, moved.look_at, moved.up, moved.distance[0]))
     return shots
 
 

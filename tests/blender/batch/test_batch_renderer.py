@@ -9,6 +9,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from viewcam_addon import shots as lists
 from viewcam_addon.batch import judge
 from viewcam_addon.blender.batch import graphics, pictures
 from viewcam_addon.blender.batch.renderer import BlenderRenderer
@@ -257,6 +258,44 @@ def test_a_pinhole_of_another_size_has_the_same_view(stage):
         own, large = renderer.pinhole(None), renderer.pinhole("First", (320, 180))
     assert (own.width, own.height) == (32, 18)
     assert large.distance[0] == pytest.approx(10 * own.distance[0]) and large.eye == own.eye
+
+
+def test_an_orbit_begins_with_the_picture_that_the_camera_takes_of_a_cropped_border_too(stage, shoot):
+    """It counted the border twice, and rendered a part of that part."""
+    render = stage.render
+    render.use_border = render.use_crop_to_border = True
+    render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = 0.25, 1.0, 0.0, 0.5
+    for size in (None, (64, 36)):
+        with BlenderRenderer() as renderer:
+            (first,) = lists.orbit(renderer.pinhole("First", size), 1)
+            width, height = size or (None, None)
+            asked = shoot(renderer, replace(first, width=width, height=height))[0]
+            own = shoot(renderer, Shot("own", camera="First", width=width, height=height))[0]
+        assert [asked["rendered"][name] for name in ("width", "height")] == [
+            own["rendered"][name] for name in ("width", "height")
+        ]
+        taken, camera = (Pinhole(**said["camera"]) for said in (asked, own))
+        # What float32 stores of either: 2⁻²⁴ of a hundred pixels and of ten units, a few times over.
+        assert taken.principal_point == pytest.approx(camera.principal_point, abs=1e-4)
+        assert taken.distance == pytest.approx(camera.distance, rel=1e-6) and taken.eye == pytest.approx(camera.eye, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("shift_x", 0.25, r"'First' has a lens shift of 0\.25, 0, .* set it to 0"),
+        ("shift_y", -0.5, r"'First' has a lens shift of 0, -0\.5, .* set it to 0"),
+        ("scale", (-1, 1, 1), "'First' is mirrored, .* make its scale positive"),
+    ],
+)
+def test_an_orbit_of_a_camera_that_has_more_than_four_values_is_refused(stage, name, value, words):
+    """A shift was left out without a word."""
+    camera = stage.objects["First"]
+    setattr(camera if name == "scale" else camera.data, name, value)
+    with BlenderRenderer() as renderer:
+        with pytest.raises(InputError, match=words):
+            renderer.pinhole("First")
+        renderer.pinhole("Second")
 
 
 @pytest.mark.parametrize(

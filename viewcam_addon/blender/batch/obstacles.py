@@ -65,6 +65,19 @@ def camera_named(name: str | None, scene: bpy.types.Scene, own: bpy.types.Object
     return scene.objects[name]
 
 
+def check_said_by_four_values(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene) -> None:
+    """Raise InputError if other views made from a camera of the file would lack something that it has: shift, mirroring."""
+    data = datablocks.camera_data_of(camera_object.evaluated_get(datablocks.depsgraph_of(scene)).data)
+    extra, remedy = "", ""
+    if data.shift_x or data.shift_y:
+        extra, remedy = f"has a lens shift of {data.shift_x:g}, {data.shift_y:g}", "set it to 0"
+    elif pinhole.mirrored:
+        extra, remedy = "is mirrored", "make its scale positive"
+    if extra:
+        lacking = f"camera {camera_object.name!r} {extra}, which the four values of a shot can't say"
+        raise InputError(f"{lacking}: {remedy}, or take another camera")
+
+
 def stated(shot: Shot, frame: intrinsics.Frame) -> Pinhole:
     """The pinhole that a shot's four values ask for in the picture of `frame`."""
     distance = (shot.d, shot.d * (frame.pixel_aspect_x / frame.pixel_aspect_y))

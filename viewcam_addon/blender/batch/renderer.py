@@ -95,17 +95,20 @@ class BlenderRenderer:
     def pinhole(self, name: str | None, size: tuple[int, int] | None = None) -> Pinhole:
         """A camera of the file as it stands at the file's frame, with a look-at point as people choose it.
 
-        name : that of the scene's camera where None. size : of the whole picture, the file's where None.
+        name : that of the scene's camera where None. size : of the whole picture, the file's where None. The four values say
+        all of it; `d` counts pixel widths.
 
         Raises
         ------
         InputError
-            if there is none of that name, or if it is no pinhole.
+            if there is none of that name, if it is no pinhole, or if it has what the four values can't say.
         """
         camera_object = obstacles.camera_named(self.scene_camera if name is None else name, self.scene, self._own)
         width, height = size or (None, None)
         self._lent.set(Shot("pinhole", camera=camera_object.name, width=width, height=height))
-        return cameras.as_it_stands(camera_object, self.scene, in_use=camera_object.virtual_pinhole.enabled)
+        found = cameras.as_it_stands(camera_object, self.scene, in_use=camera_object.virtual_pinhole.enabled)
+        obstacles.check_said_by_four_values(camera_object, found, self.scene)
+        return found
 
     def made_from(self) -> dict[str, Any]:
         """What the pictures are made from, beside the shots: hashes of the .blend and of all that it links; versions; the seed.
