@@ -30,6 +30,7 @@ FLOORS = [
     "diagram",
     "image",
     "intrinsics",
+    "cameras",
     "camera_text",
     "datasets",
     "compare",

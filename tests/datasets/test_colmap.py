@@ -9,6 +9,7 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
+from viewcam_addon import cameras
 from viewcam_addon.datasets import View, colmap
 from viewcam_addon.errors import InputError
 from viewcam_addon.files import written_whole
@@ -107,7 +108,7 @@ def test_where_one_can_not_be_written_it_and_the_images_stay_as_they_were(tmp_pa
             if path.name == failing:
                 raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(colmap, "written_whole", on_a_full_disk)
+    monkeypatch.setattr(cameras, "written_whole", on_a_full_disk)
     with pytest.raises(InputError, match=failing):
         colmap.write(tmp_path, THREE)
     left = {path.name: path.read_text() for path in tmp_path.iterdir()}

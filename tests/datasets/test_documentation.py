@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from viewcam_addon.datasets import matrices, record
+from viewcam_addon.cameras import axes
+from viewcam_addon.datasets import record
 from viewcam_addon.pinhole import Pinhole
 
 PAGE = Path(__file__).parents[2] / "docs" / "datasets.md"
@@ -44,7 +45,7 @@ def test_the_program_writes_what_the_page_shows(blocks, batch):
     shown = json.loads(sidecar)
     pinhole = Pinhole(**shown["camera"])
     assert shown | {"convention": record.CONVENTION} == json.loads(json.dumps(record.record(pinhole)))
-    assert pinhole.eye == (0, -5, 0) and shown["worldToCamera"] == matrices.world_to_camera(pinhole)
+    assert pinhole.eye == (0, -5, 0) and shown["worldToCamera"] == axes.world_to_camera(pinhole)
 
 
 def test_what_the_page_shows_the_readers_read(readers, batch):

@@ -7,7 +7,8 @@ dataset is of all shots of the list or there is none: programs that learn from o
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..datasets import View, colmap, named, transforms
+from ..cameras.naming import several
+from ..datasets import View, colmap, transforms
 from ..errors import InputError
 from ..pinhole import Pinhole
 from ..shots import Shot
@@ -39,7 +40,7 @@ def write(folder: Folder, shots: Sequence[Shot], settings: Mapping[str, str], su
     records = {shot.name: folder.finished(shot.name, settings[shot.name], check=False) for shot in shots}
     missing = [name for name, record in records.items() if record is None]
     if missing:
-        return f"no dataset is written, since {len(missing)} of {len(shots)} shots are missing: {named(missing)}"
+        return f"no dataset is written, since {len(missing)} of {len(shots)} shots are missing: {several(missing)}"
     views = [View(f"{name}.{suffix}", _camera(folder, name, record)) for name, record in records.items()]
     model = folder.path.joinpath(*MODEL)
     colmap.write(model, views)

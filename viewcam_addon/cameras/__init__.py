@@ -1,0 +1,162 @@
+"""Cameras of other programs, in and out: nothing else in this project reads or writes one.
+
+    read(text or Path, options=Options(…))        → list of Camera, recognised by content
+    write(cameras, "colmap", Options(…))          → text, or the files of a folder
+    save(cameras, path, "colmap", Options(…))     → written there, each whole or not at all
+    choose(cameras, name)                         → the one that is meant, or a sentence with all names
+
+    camera.py       Camera and Options
+    axes.py         the one place of conventions: axes, pixels, world
+    source.py       what is read from: text, file, folder; JSON and XML without their dangers
+    distortion.py   what a lens bends, in pixels at the corner
+    and a module for each format
+
+A format is a module in `FORMATS` with
+
+    TITLE                           what people call it
+    recognises(source) → bool       by content; False for whatever it can't be, and never an error of its own
+    read(source, options) → list[Camera]            where cameras can be read; in the file's own world
+    write(cameras, options) → text, or {file name: text or bytes}      where they can be written; in the file's own world
+    SUFFIX                          of the file that it writes; "" where these are several in a folder
+
+Axes and scale are applied here, for all alike. The first format that recognises something reads it: the more certain ones
+stand first, and what takes any text last.
+"""
+
+import contextlib
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+
+from .. import checks
+from ..errors import InputError
+from ..files import written_whole
+from . import colmap, transforms
+from .axes import moved, moved_back
+from .camera import ANGLES, AXES, PIXELS, Camera, Options, choose
+from .source import Source
+
+__all__ = [
+    "ANGLES",
+    "AXES",
+    "FORMATS",
+    "PIXELS",
+    "Camera",
+    "Options",
+    "choose",
+    "read",
+    "readable",
+    "recognised",
+    "save",
+    "writable",
+    "write",
+]
+
+FORMATS: dict[str, ModuleType] = {
+    "transforms": transforms,
+    "colmap": colmap,
+}
+"""Name → module, in the order in which they are asked."""
+
+
+def readable() -> list[str]:
+    """The formats that can be read."""
+    return [name for name, module in FORMATS.items() if hasattr(module, "read")]
+
+
+def writable() -> list[str]:
+    """The formats that can be written."""
+    return [name for name, module in FORMATS.items() if hasattr(module, "write")]
+
+
+def read(given: str | Path, *, format: str | None = None, options: Options | None = None) -> list[Camera]:
+    """The cameras of a text, a file or a folder.
+
+    given : a text, or the Path of a file or folder. format : one of `readable()`; None to recognise it by its content.
+
+    Raises
+    ------
+    InputError
+        if there is no camera in it, or one that is no pinhole, lacks something, or is not what it should be.
+    """
+    options = options or Options()
+    source = Source(given)
+    name = format or recognised(source)
+    cameras = _module(name, "read").read(source, options)
+    if not cameras:
+        raise InputError(f"{source.name} holds no camera: give another file")
+    return [_unmirrored(moved(camera, options), options) for camera in cameras]
+
+
+def recognised(source: str | Path | Source) -> str:
+    """The name of the format.
+
+    Raises
+    ------
+    InputError
+        if it is none that can be read.
+    """
+    source = source if isinstance(source, Source) else Source(source)
+    if source.path is None and not source.text.strip():
+        raise InputError("there is no text: copy a camera first")
+    for name in readable():
+        if FORMATS[name].recognises(source):
+            return name
+    if source.json_problem:
+        raise InputError(f"{source.name} looks like JSON and is none ({source.json_problem}): correct it")
+    formats = ", ".join(FORMATS[name].TITLE for name in readable())
+    raise InputError(f"{source.name} is no camera that is understood: give one of {formats}")
+
+
+def write(cameras: Iterable[Camera], format: str, options: Options | None = None) -> str | dict[str, str | bytes]:
+    """The cameras as a text, or as files: relative name → content.
+
+    Raises
+    ------
+    InputError
+        if there is none, or the format can't say what one of them is.
+    """
+    options = options or Options()
+    cameras = [moved_back(camera, options) for camera in cameras]
+    if not cameras:
+        raise InputError("there is no camera to write: give one at least")
+    return _module(format, "write").write(cameras, options)
+
+
+def save(cameras: Iterable[Camera], path: str | os.PathLike[str], format: str, options: Options | None = None) -> list[Path]:
+    """Write the cameras: a text to the file `path`, several files into the folder `path`. Returns what was written.
+
+    Raises
+    ------
+    InputError
+        as `write` does, or if a file can't be written; FullDiskError if the disk is full.
+    """
+    content = write(cameras, format, options)
+    files: Mapping[Path, str | bytes] = (
+        {Path(path): content}
+        if isinstance(content, str | bytes)
+        else {Path(path, name): each for name, each in content.items()}
+    )
+    with contextlib.ExitStack() as stack:
+        for file, each in files.items():
+            stack.enter_context(written_whole(file)).write_bytes(each if isinstance(each, bytes) else each.encode("utf-8"))
+    return [*files]
+
+
+def _module(name: str, does: str) -> ModuleType:
+    able: Sequence[str] = readable() if does == "read" else writable()
+    if name not in able:
+        raise InputError(
+            f"the format {checks.shown(name)} can't be {'read' if does == 'read' else 'written'}: {', '.join(able)} can"
+        )
+    return FORMATS[name]
+
+
+def _unmirrored(camera: Camera, options: Options) -> Camera:
+    if not (options.unmirrored and camera.pinhole.mirrored):
+        return camera
+    return replace(camera, pinhole=replace(camera.pinhole, mirrored=False)).noted(
+        f"The picture of {camera.name} is mirrored, and was taken without that"
+    )

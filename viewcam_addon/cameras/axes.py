@@ -1,0 +1,241 @@
+"""The one place where this project's conventions become those of others, and theirs ours: axes, rows, pixels, world.
+
+**Axes.** This project's camera has u to the right, v upwards and w away from the view. That is OpenGL's and Blender's, and
+that of `camera_to_world`. Computer vision's (OpenCV, COLMAP) has x to the right, y downwards and z into the view, which are u,
+−v and −w: that of `world_to_camera` and `intrinsics`. A format's own matrix is brought to `camera_to_world`'s form
+(`of_opencv`, `from_world_to_camera`), and `pinhole` makes the camera of it.
+
+**Pixels.** Rows count from the top here, from the bottom in `Pinhole`. The upper left corner of the picture is (0, 0) and the
+centre of its first pixel (0.5, 0.5), so the middle of a picture is (width/2, height/2). OpenCV's own functions put (0, 0) at
+the centre of that pixel: for them, subtract 0.5 from both numbers of the principal point.
+
+**World.** `moved` turns and scales it, for all formats alike; none does it by itself.
+
+What is written is computed in plain floats, one operation after another, so that the same camera gives the same digits on
+every machine. Rejected: `@` of NumPy and Python's `sum`, whose order or precision differs between versions.
+"""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import checks
+from ..errors import InputError
+from ..intrinsics import ViewPlane
+from ..pinhole import Pinhole
+from .camera import Camera, Options
+
+Rows = list[list[float]]
+Quaternion = tuple[float, float, float, float]
+
+# Of a rotation in a file, whose numbers have so many digits: what is worth a note, and what is none any more.
+_NOTED, _NO_ROTATION = 1e-5, 2e-3
+_SCALED = 1e-3
+
+
+def camera_to_world(pinhole: Pinhole) -> Rows:
+    """4 × 4, for column vectors, from the camera's axes (u, v, w) to world space: Blender's `matrix_world`.
+
+    Its columns are u, v, w and the eye; u is negated where the pinhole is mirrored.
+    """
+    u, v, w = _axes(pinhole)
+    return [*([*map(_plain, row)] for row in zip(u, v, w, pinhole.eye, strict=True)), [0.0, 0.0, 0.0, 1.0]]
+
+
+def world_to_camera(pinhole: Pinhole) -> Rows:
+    """4 × 4, for column vectors, from world space to the camera's x (right), y (down) and z (into the view).
+
+    Its rows are u, −v and −w (u negated where the pinhole is mirrored), each with its part of the translation −R e, which is
+    within 3 · 2⁻⁵³ |e| of exact arithmetic on these axes.
+
+    Raises
+    ------
+    InputError
+        if the translation is beyond float64.
+    """
+    u, v, w = _axes(pinhole)
+    rotation = [u, tuple(-a for a in v), tuple(-a for a in w)]
+    e = pinhole.eye
+    translation = [-(row[0] * e[0] + row[1] * e[1] + row[2] * e[2]) for row in rotation]
+    translation = checks.vector("the translation from the world's origin to the camera", translation, 3)
+    rows = [[*map(_plain, (*row, part))] for row, part in zip(rotation, translation, strict=True)]
+    return [*rows, [0.0, 0.0, 0.0, 1.0]]
+
+
+def intrinsics(pinhole: Pinhole) -> Rows:
+    """K, 3 × 3: (column, row, 1) · depth = K (x, y, z), in pixels, rows from the top."""
+    (d_x, d_y), (c_x, c_y) = pinhole.distance, pinhole.principal_point
+    return [[d_x, 0.0, c_x], [0.0, d_y, pinhole.height - c_y], [0.0, 0.0, 1.0]]
+
+
+def view_plane(f_x: float, f_y: float, c_x: float, c_top: float, size: tuple[int, int]) -> ViewPlane:
+    """The view plane of K's numbers, the principal point from the left and the **top** edge of the picture's corner."""
+    width, height = size
+    return ViewPlane((f_x, f_y), (c_x, height - c_top), width, height)
+
+
+def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str) -> tuple[Pinhole, tuple[str, ...]]:
+    """The camera of a matrix, and what is to be said of it.
+
+    matrix : 3 × 4 or 4 × 4, for column vectors, from camera to world as `camera_to_world` has it. plane : its view plane.
+    what : whose matrix, as a sentence names it.
+
+    The look-at point, which no matrix says, lies as far before the eye as the eye from the origin, at least 1: so its rounding
+    does not turn the view by more than 2⁻⁵².
+
+    Raises
+    ------
+    InputError
+        if it is no rotation and translation: transposed, sheared, or scaled differently along its axes.
+    """
+    matrix = checks.array(f"the matrix of {what}", matrix)
+    if matrix.shape not in ((3, 4), (4, 4)):
+        raise InputError(f"the matrix of {what} is {' × '.join(map(str, matrix.shape))}: give 3 × 4 or 4 × 4 numbers")
+    checks.finite(f"the matrix of {what}", matrix)
+    if matrix.shape == (4, 4) and matrix[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
+        hint = "transpose it" if not matrix[:3, 3].any() else "it should be 0 0 0 1"
+        raise InputError(f"the last row of the matrix of {what} is {checks.shown(matrix[3].tolist())}: {hint}")
+    axes, notes = rotation(matrix[:3, :3], what)
+    (_, y, z), eye = axes.T, tuple(matrix[:3, 3].tolist())
+    mirrored = bool(np.linalg.det(axes) < 0)
+    if mirrored:
+        notes = (*notes, f"The axes of {what} are left-handed: the picture is mirrored")
+    reach = 2.0 ** math.ceil(math.log2(max(1.0, math.hypot(*eye))))
+    look_at = tuple(a - reach * b for a, b in zip(eye, z.tolist(), strict=True))
+    made = Pinhole(
+        eye=eye,
+        look_at=look_at,
+        up=tuple(y.tolist()),
+        distance=plane.distance,
+        width=plane.width,
+        height=plane.height,
+        principal_point=plane.principal_point,
+        mirrored=mirrored,
+    )
+    return made, notes
+
+
+def rotation(matrix: ArrayLike, what: str) -> tuple[np.ndarray, tuple[str, ...]]:
+    """(3, 3) columns of length 1, and notes; the determinant may be −1.
+
+    Raises
+    ------
+    InputError
+        if the columns are not perpendicular or of different lengths.
+    """
+    matrix = checks.array(f"the rotation of {what}", matrix)
+    checks.finite(f"the rotation of {what}", matrix)
+    if matrix.shape != (3, 3):
+        raise InputError(f"the rotation of {what} is {' × '.join(map(str, matrix.shape))}: give 3 × 3 numbers")
+    largest = np.abs(matrix).max()
+    if not 1e-100 < largest < 1e100:
+        raise InputError(f"the rotation of {what} has {largest:g} as its largest number: give one of length 1")
+    lengths = np.sqrt((matrix * matrix).sum(axis=0))
+    if lengths.min() < lengths.max() * (1 - _NO_ROTATION):
+        stretched = " by ".join(f"{length:.6g}" for length in lengths)
+        raise InputError(f"the rotation of {what} has axes of the lengths {stretched}: give axes of one length")
+    axes = matrix / lengths
+    askew = max(abs(float(axes[:, i] @ axes[:, j])) for i, j in ((0, 1), (0, 2), (1, 2)))
+    if askew > _NO_ROTATION:
+        raise InputError(
+            f"the axes of {what} are {math.degrees(math.asin(min(askew, 1))):.3g}° from perpendicular: it is no rotation"
+        )
+    notes = []
+    if abs(lengths.mean() - 1) > _SCALED:
+        notes.append(f"The matrix of {what} is scaled by {lengths.mean():.6g}, which changes no picture and was left out")
+    if askew > _NOTED:
+        notes.append(f"The axes of {what} are {askew:.1g} from perpendicular: it has no more digits than that")
+    return axes, tuple(notes)
+
+
+def of_opencv(matrix: ArrayLike) -> np.ndarray:
+    """Camera to world with columns x right, y down, z into the view (OpenCV's) → with columns u, v, w; and back."""
+    matrix = np.array(matrix, dtype=np.float64)
+    matrix[:3, 1:3] = -matrix[:3, 1:3] + 0.0
+    return matrix
+
+
+def from_world_to_camera(turn: ArrayLike, translation: Sequence[float], what: str) -> np.ndarray:
+    """R, t of x = R X + t with OpenCV's axes (x right, y down, z into the view) → camera to world, 4 × 4, columns u, v, w, e.
+
+    The eye is −R⁻¹ t: where R has few digits, that is what R and t project from.
+
+    Raises
+    ------
+    InputError
+        if R is no rotation, or t no three numbers.
+    """
+    translation = checks.vector(f"the translation of {what}", translation, 3)
+    rotation(turn, what)
+    turn = np.asarray(turn, dtype=np.float64)
+    matrix = np.eye(4)
+    matrix[:3, :3] = turn.T
+    matrix[:3, 3] = -np.linalg.solve(turn, np.array(translation))
+    return of_opencv(matrix)
+
+
+def rotation_of(quaternion: Sequence[float], what: str) -> np.ndarray:
+    """(3, 3) of a quaternion (w, x, y, z), Hamilton's, of any length but 0."""
+    numbers = checks.vector(f"the quaternion of {what}", quaternion, 4)
+    length = math.hypot(*numbers)
+    if not 1e-100 < length < 1e100:
+        raise InputError(f"the quaternion of {what} has the length {length:g}: give one of length 1")
+    w, x, y, z = (number / length for number in numbers)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def quaternion(rotation: Sequence[Sequence[float]]) -> Quaternion:
+    """(w, x, y, z) of the rotation in the upper left 3 × 3 of a matrix, of length 1 to 4 · 2⁻⁵³.
+
+    Of the two quaternions of a rotation it is the one whose first number that is not 0 is positive. Each row below is the
+    quaternion times four times one of its own numbers; the row of the largest number, at least ½, cancels nothing.
+    """
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = (row[:3] for row in rotation)
+    multiples = (
+        (1 + xx + yy + zz, zy - yz, xz - zx, yx - xy),
+        (zy - yz, 1 + xx - yy - zz, yx + xy, xz + zx),
+        (xz - zx, yx + xy, 1 - xx + yy - zz, zy + yz),
+        (yx - xy, xz + zx, zy + yz, 1 - xx - yy + zz),
+    )
+    best = max(range(4), key=lambda i: multiples[i][i])
+    w, x, y, z = multiples[best]
+    size = math.copysign(math.sqrt(w * w + x * x + y * y + z * z), next(part for part in (w, x, y, z) if part))
+    return tuple(part / size + 0.0 for part in (w, x, y, z))
+
+
+def moved(camera: Camera, options: Options) -> Camera:
+    """A camera out of a file, in the world that `options` asks for."""
+    return _in_world(camera, options.axes == "y_up", options.scale, lambda p: (p[0], -p[2], p[1]))
+
+
+def moved_back(camera: Camera, options: Options) -> Camera:
+    """A camera on its way into a file: the inverse of `moved`."""
+    return _in_world(camera, options.axes == "y_up", 1 / options.scale, lambda p: (p[0], p[2], -p[1]))
+
+
+def _in_world(camera: Camera, turned: bool, scale: float, turn) -> Camera:
+    if not turned and scale == 1:
+        return camera
+    pinhole = camera.pinhole
+    e, l, up = ((turn(p) if turned else p) for p in (pinhole.eye, pinhole.look_at, pinhole.up))
+    e, l = (tuple(scale * a + 0.0 for a in p) for p in (e, l))
+    return dataclasses.replace(camera, pinhole=dataclasses.replace(pinhole, eye=e, look_at=l, up=tuple(a + 0.0 for a in up)))
+
+
+def _axes(pinhole: Pinhole) -> tuple:
+    u, v, w = pinhole.axes()
+    return (tuple(-a for a in u) if pinhole.mirrored else u), v, w
+
+
+def _plain(number: float) -> float:
+    """The number, and 0 for −0."""
+    return number + 0.0

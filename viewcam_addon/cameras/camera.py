@@ -1,0 +1,152 @@
+"""A camera that came from somewhere, or goes there, and what is chosen where a format leaves a choice."""
+
+from dataclasses import dataclass, field, replace
+from typing import NoReturn
+
+from .. import checks
+from ..errors import InputError
+from ..intrinsics import ViewPlane
+from ..pinhole import Pinhole
+
+AXES = {
+    "as_is": "As they are: the numbers stay those of the file",
+    "y_up": "Y up in the file, Z up here: (x, y, z) there is (x, −z, y) here",
+}
+PIXELS = {
+    "corner": "(0, 0) is the picture's corner and the first pixel's centre is (0.5, 0.5)",
+    "center": "(0, 0) is the centre of the first pixel",
+}
+ANGLES = {"degrees": "Degrees", "radians": "Radians"}
+_NAMED = 8
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A named, complete camera.
+
+    name : as the file has it, or made from its number. pinhole : all of it. size_stated : whether the file says how many
+    pixels the picture has, or tells it by the picture itself; else they are those of `Options`. notes : sentences on what was
+    in the file and did not come along, or how it was taken. image : the picture's path, as the file has it. picture : the
+    picture itself, encoded, where the file holds it. time : seconds, where the file says when.
+    """
+
+    name: str
+    pinhole: Pinhole
+    size_stated: bool = True
+    notes: tuple[str, ...] = ()
+    image: str | None = None
+    picture: bytes | None = field(default=None, repr=False)
+    time: float | None = None
+
+    def noted(self, *notes: str) -> "Camera":
+        """The same camera with more notes, each of them once."""
+        return replace(self, notes=tuple(dict.fromkeys((*self.notes, *notes))))
+
+
+@dataclass(frozen=True)
+class Options:
+    """What is chosen where a format leaves a choice. Reading what was written with the same options gives the same cameras.
+
+    axes : one of AXES. scale : > 0; world units here of one of the file's. size : (width, height) in pixels, where a file
+    says none. pixel_aspect : width of a pixel over its height, where a file says none. view_plane : the intrinsics where a
+    file says none. base : the camera whose values stand where a text says only some. angle_unit : one of ANGLES, where a text
+    says none. pixel : one of PIXELS, in place of what the format has by habit. without_distortion : take a camera without its
+    distortion. unmirrored : take a camera that mirrors its picture without that. original_world : undo the turn and scale
+    that a file says were applied to its world.
+
+    Raises
+    ------
+    InputError
+        if a value is not one of these.
+    """
+
+    axes: str = "as_is"
+    scale: float = 1.0
+    size: tuple[int, int] | None = None
+    pixel_aspect: float = 1.0
+    view_plane: ViewPlane | None = None
+    base: Pinhole | None = None
+    angle_unit: str | None = None
+    pixel: str | None = None
+    without_distortion: bool = False
+    unmirrored: bool = False
+    original_world: bool = False
+
+    def __post_init__(self) -> None:
+        _choice("axes", self.axes, AXES)
+        for name, among in (("angle_unit", ANGLES), ("pixel", PIXELS)):
+            if getattr(self, name) is not None:
+                _choice(name, getattr(self, name), among)
+        for name in ("scale", "pixel_aspect"):
+            object.__setattr__(self, name, checks.number(name, getattr(self, name), 1e-12, 1e12))
+        for name in ("without_distortion", "unmirrored", "original_world"):
+            checks.truth(name, getattr(self, name))
+        if self.size is not None:
+            width, height = self.size
+            object.__setattr__(self, "size", (checks.whole("width", width), checks.whole("height", height)))
+
+    def size_or_refuse(self, what: str) -> tuple[int, int]:
+        """The size to take where a file says none.
+
+        what : what lacks it, as a sentence names it.
+
+        Raises
+        ------
+        InputError
+            if none was given.
+        """
+        if self.size:
+            return self.size
+        if self.view_plane:
+            return self.view_plane.width, self.view_plane.height
+        if self.base:
+            return self.base.width, self.base.height
+        raise InputError(f"{what} does not say how many pixels its picture has: give the size, as in --size 1920x1080")
+
+    def plane_or_refuse(self, what: str) -> ViewPlane:
+        """The intrinsics to take where a file says none.
+
+        Raises
+        ------
+        InputError
+            if none were given.
+        """
+        if self.view_plane:
+            return self.view_plane
+        if self.base:
+            return plane_of(self.base)
+        raise InputError(f"{what} says where the camera is but not how it sees: give --size and --distance (in pixels)")
+
+
+def plane_of(pinhole: Pinhole) -> ViewPlane:
+    """The view plane of a pinhole."""
+    return ViewPlane(pinhole.distance, pinhole.principal_point, pinhole.width, pinhole.height)
+
+
+def choose(cameras: list[Camera], name: str | None = None) -> Camera:
+    """The one camera, or the one of that name.
+
+    Raises
+    ------
+    InputError
+        if there are several and none is named, or none is called so; it has their names.
+    """
+    names = ", ".join(checks.shown(camera.name) for camera in cameras[:_NAMED]) + (" …" if len(cameras) > _NAMED else "")
+    found = [camera for camera in cameras if name is None or camera.name == name]
+    if len(found) == 1:
+        return found[0]
+    if not found:
+        raise InputError(f"there is no camera {checks.shown(name)}: name one of {names}")
+    if name is None:
+        raise InputError(f"there are {len(found)} cameras and one is wanted: name one of {names}")
+    raise InputError(f"{len(found)} cameras are called {checks.shown(name)}: rename all but one")
+
+
+def not_a_pinhole(what: str, kind: str) -> NoReturn:
+    """Refuse what is no pinhole by its name."""
+    raise InputError(f"{what} is {kind}, which is no pinhole camera: only straight perspective can be taken")
+
+
+def _choice(name: str, value: object, among: dict[str, str]) -> None:
+    if not isinstance(value, str) or value not in among:
+        raise InputError(f"{name} is {checks.shown(value)}: give one of {', '.join(among)}")

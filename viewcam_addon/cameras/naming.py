@@ -1,0 +1,115 @@
+"""Names: of cameras that have only a picture's path, and of the pictures that datasets name."""
+
+import unicodedata
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from pathlib import PurePosixPath
+
+from .. import checks
+from ..errors import InputError
+from .camera import Camera
+
+_NAMED = 3  # files in a sentence
+_PICTURES = (
+    ".png",
+    ".jpg",
+    ".jpeg",
+    ".exr",
+    ".tif",
+    ".tiff",
+    ".webp",
+    ".bmp",
+    ".hdr",
+    ".tga",
+    ".ppm",
+    ".pgm",
+    ".heic",
+    ".dng",
+    ".avif",
+)
+
+
+def stem(path: str) -> str:
+    """The picture's name without folders and the suffix of a picture, if it has one."""
+    name = path.replace("\\", "/").rstrip("/").rpartition("/")[2]
+    suffix = PurePosixPath(name).suffix
+    return name[: -len(suffix)] if suffix.lower() in _PICTURES and len(suffix) < len(name) else name
+
+
+def has_suffix(path: str) -> bool:
+    """Whether the path ends as a picture's does."""
+    return PurePosixPath(path).suffix.lower() in _PICTURES
+
+
+def distinct(paths: Sequence[str]) -> list[str]:
+    """A name for each picture: its stem, or where two would be called alike its path, or that and its number."""
+    stems = [stem(path) for path in paths]
+    twice = {name for name, count in Counter(stems).items() if count > 1 or not name}
+    names = [path if name in twice else name for path, name in zip(paths, stems, strict=True)]
+    seen: Counter[str] = Counter()
+    result = []
+    for name in names:
+        seen[name] += 1
+        result.append(name if seen[name] == 1 and name else f"{name} #{seen[name]}".strip())
+    return result
+
+
+def image_of(camera: Camera) -> str:
+    """The path by which a dataset names the camera's picture."""
+    return camera.image or f"{camera.name}.png"
+
+
+def check_image(file: object) -> None:
+    """Refuse a path by which no dataset can name a picture.
+
+    Raises
+    ------
+    InputError
+        if it leaves its folder, or is no line of text.
+    """
+    if not isinstance(file, str) or any(map(_is_unseen, file)) or "\\" in file or {"", ".", ".."} & set(file.split("/")):
+        raise InputError(
+            f"file is {checks.shown(file)}: give the picture's path inside the folder of the batch, as in images/left.png"
+        )
+
+
+def checked(cameras: Iterable[Camera], written: str) -> tuple[Camera, ...]:
+    """The cameras, if a dataset can be made of them.
+
+    written : what they are for, as a sentence names it.
+
+    Raises
+    ------
+    InputError
+        if there are none, if two have one picture or one has none that can be named, or if a camera is mirrored, since a
+        rotation can't say that.
+    """
+    cameras = tuple(cameras)
+    if not cameras:
+        raise InputError(f"there is no picture for {written}: give one at least")
+    for camera in cameras:
+        check_image(image_of(camera))
+    twice = [file for file, count in Counter(map(image_of, cameras)).items() if count > 1]
+    if twice:
+        raise InputError(f"{several(twice)} would be several pictures of {written}: give each a file of its own")
+    refuse_mirrored(cameras, written)
+    return cameras
+
+
+def refuse_mirrored(cameras: Iterable[Camera], written: str) -> None:
+    """Raise InputError if a camera is mirrored and `written` can't say it."""
+    mirrored = [image_of(camera) for camera in cameras if camera.pinhole.mirrored]
+    if mirrored:
+        raise InputError(f"{written} can't say that a camera is mirrored, as in {several(mirrored)}: make its scale positive")
+
+
+def several(files: Sequence[str]) -> str:
+    """The files in a sentence, not too long a one."""
+    rest = len(files) - _NAMED
+    return ", ".join(files[:_NAMED]) + (f" and {rest} more" if rest > 0 else "")
+
+
+def _is_unseen(character: str) -> bool:
+    """Whether it is no character of a line of text: a control or format character, half of one, or a line's end."""
+    category = unicodedata.category(character)
+    return category[0] == "C" or category in ("Zl", "Zp")

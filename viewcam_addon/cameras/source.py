@@ -1,0 +1,319 @@
+"""What cameras are read from: a text, a file or a folder, and safe ways into JSON and XML.
+
+Each is parsed once, whoever asks. JSON may have comments, as instant-ngp's has; keys that appear twice are refused, since
+nobody knows which counts. XML is read without a document type, entities or anything outside, and no deeper than 100 elements:
+what attacks XML parsers needs one of these.
+"""
+
+import json
+import re
+import struct
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+from xml.parsers import expat
+
+from .. import checks
+from ..errors import InputError
+
+_MOST_BYTES = 2**30
+_DEEPEST = 100
+_COMMENT = re.compile(r'"(?:[^"\\]|\\.)*+"|//[^\n]*+|/\*.*?\*/', re.DOTALL)
+_TRAILING_COMMA = re.compile(r'"(?:[^"\\]|\\.)*+"|,(?=\s*+[\]}])')
+
+
+class Source:
+    """What was given: `path` of a file or folder, or None for a text; `data`, its bytes; `text`, its characters."""
+
+    def __init__(self, given: "str | Path | Source") -> None:
+        self.path = given if isinstance(given, Path) else None
+        self._given = given
+
+    @property
+    def name(self) -> str:
+        """As a sentence calls it."""
+        return str(self.path) if self.path else "the text"
+
+    @cached_property
+    def is_folder(self) -> bool:
+        return self.path is not None and self.path.is_dir()
+
+    @cached_property
+    def data(self) -> bytes:
+        """The bytes; none of a folder.
+
+        Raises
+        ------
+        InputError
+            if the file can't be read.
+        """
+        if self.path is None:
+            return self._given.encode("utf-8", errors="replace")
+        if self.is_folder:
+            return b""
+        try:
+            if self.path.exists() and not self.path.is_file():
+                raise InputError(f"{self.path} is no file: give one, or a folder")
+            if self.path.stat().st_size > _MOST_BYTES:
+                raise InputError(f"{self.path} is larger than {_MOST_BYTES >> 20} MiB: give the file of the cameras alone")
+            return self.path.read_bytes()
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise InputError(f"{self.path} can't be read ({reason}): check its name and permissions") from None
+
+    @cached_property
+    def is_binary(self) -> bool:
+        return b"\0" in self.data[:4096] and not self.data.startswith((b"\xff\xfe", b"\xfe\xff"))
+
+    @cached_property
+    def text(self) -> str:
+        """The characters, with plain line ends; empty if these are no characters."""
+        if self.is_binary:
+            return ""
+        data = self.data
+        encoding = "utf-16" if data.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig"
+        return data.decode(encoding, errors="replace").replace("\r\n", "\n").replace("\r", "\n")
+
+    @cached_property
+    def _json(self) -> tuple[Any, str]:
+        text = self.text.strip()
+        if text[:1] not in ("{", "["):
+            return None, ""
+        attempts = (text, _without_comments(text)) if "//" in text or "/*" in text or ",]" in text or ",}" in text else (text,)
+        problem = ""
+        for attempt in attempts:
+            try:
+                return json.loads(attempt, object_pairs_hook=_unique, parse_int=_whole, parse_constant=_not_finite), ""
+            except json.JSONDecodeError as error:
+                problem = f"line {error.lineno}, column {error.colno}: {error.msg}"
+            except RecursionError:
+                problem = "its brackets are nested too deeply"
+        return None, problem
+
+    @property
+    def json(self) -> Any:
+        """The JSON value, or None if this is no JSON.
+
+        Raises
+        ------
+        InputError
+            if a key is there twice, or a number is none.
+        """
+        return self._json[0]
+
+    @property
+    def json_problem(self) -> str:
+        """Why something that looks like JSON is none, or nothing."""
+        return self._json[1]
+
+    @cached_property
+    def document(self) -> Mapping[str, Any]:
+        """The JSON object; empty if this is none."""
+        return self.json if isinstance(self.json, dict) else {}
+
+    @cached_property
+    def xml(self) -> ElementTree.Element | None:
+        """The XML's first element, or None if this is no XML.
+
+        Raises
+        ------
+        InputError
+            if it has a document type or entities of its own, or is nested too deeply.
+        """
+        if not self.text.lstrip().startswith("<"):
+            return None
+        return _parsed_xml(self.text.strip())
+
+    def file(self, *parts: str) -> "Source | None":
+        """The file of that name in the folder, or beside this file; None if there is none."""
+        if self.path is None:
+            return None
+        path = (self.path if self.is_folder else self.path.parent).joinpath(*parts)
+        try:
+            return Source(path) if path.is_file() else None
+        except (OSError, ValueError):
+            return None
+
+    def files(self, pattern: str) -> Iterator["Source"]:
+        """The files of the folder that fit a pattern, sorted."""
+        for path in sorted(self.path.glob(pattern)) if self.is_folder else ():
+            if path.is_file():
+                yield Source(path)
+
+
+class Record:
+    """A JSON object whose values are checked where they are taken. place : what a sentence calls it ("frame 3")."""
+
+    def __init__(self, values: object, place: str) -> None:
+        if not isinstance(values, dict):
+            raise InputError(f"{place} is {checks.shown(values)}: it should be an object with keys")
+        self.values, self.place = values, place
+
+    def __contains__(self, key: str) -> bool:
+        return self.values.get(key) is not None
+
+    def get(self, key: str) -> Any:
+        """The value as it is, None if there is none."""
+        return self.values.get(key)
+
+    def called(self, key: str) -> str:
+        return f"{key} of {self.place}"
+
+    def needed(self, key: str) -> Any:
+        if key not in self:
+            raise InputError(f"{self.place} has no {key}: it can't be a camera without")
+        return self.values[key]
+
+    def number(self, key: str, default: float | None = None, least: float = -1e300, most: float = 1e300) -> float:
+        """A finite number, which may be written as a text. Without a default it must be there."""
+        if key not in self and default is not None:
+            return default
+        return number(self.called(key), self.needed(key), least, most)
+
+    def size(self, *keys: str) -> int:
+        """A whole number of pixels; the first of the keys that is there."""
+        key = next((key for key in keys if key in self), keys[0])
+        return pixels(self.called(key), self.needed(key))
+
+    def text(self, key: str, default: str | None = None) -> str:
+        value = self.values.get(key, default)
+        if not isinstance(value, str):
+            raise InputError(f"{self.called(key)} is {checks.shown(value)}: it should be a text")
+        return value
+
+    def numbers(self, key: str, count: int) -> tuple[float, ...]:
+        """So many numbers, in whatever nesting."""
+        found = flat(self.called(key), self.needed(key))
+        if len(found) != count:
+            raise InputError(f"{self.called(key)} has {len(found)} numbers: it should have {count}")
+        return found
+
+    def record(self, key: str) -> "Record":
+        return Record(self.needed(key), self.called(key))
+
+    def records(self, key: str, kind: str) -> list["Record"]:
+        """The objects of a list, or of an object by their keys. kind : what one of them is ("frame")."""
+        values = self.values.get(key)
+        if isinstance(values, dict):
+            return [Record(value, f"{kind} {checks.shown(name)}") for name, value in values.items()]
+        if not isinstance(values, list):
+            raise InputError(f"{self.called(key)} is {checks.shown(values)}: it should be a list")
+        return [Record(value, f"{kind} {number}") for number, value in enumerate(values)]
+
+
+def number(name: str, value: object, least: float = -1e300, most: float = 1e300) -> float:
+    """A finite number, also out of a text."""
+    if isinstance(value, str) and len(value) < 400:
+        try:
+            if "_" in value:
+                raise ValueError
+            value = float(value)
+        except ValueError:
+            raise InputError(f"{name} is {checks.shown(value)}: give a number") from None
+    return checks.number(name, value, least, most)
+
+
+def pixels(name: str, value: object) -> int:
+    """A whole number ≥ 1 of pixels, also out of a text or a float."""
+    size = number(name, value, 1.0, checks.LARGEST_WHOLE)
+    if not size.is_integer():
+        raise InputError(f"{name} is {size:g}: give whole pixels")
+    return int(size)
+
+
+def flat(name: str, value: object) -> tuple[float, ...]:
+    """All numbers of a list of lists, also out of a text that separates them by blanks, commas or semicolons."""
+    if isinstance(value, str):
+        value = re.split(r"[\s,;]+", value.strip())
+    if not isinstance(value, list | tuple):
+        raise InputError(f"{name} is {checks.shown(value)}: give a list of numbers")
+    found: list[float] = []
+    for item in value:
+        found += flat(name, item) if isinstance(item, list) else [number(name, item)]
+    return tuple(found)
+
+
+def image_size(path: Path) -> tuple[int, int] | None:
+    """(width, height) of a PNG or JPEG, from its head; None if it is none or is not there."""
+    try:
+        if not path.is_file():
+            return None
+        with path.open("rb") as file:
+            return _size_in(file.read(2**18))
+    except (OSError, ValueError):
+        return None
+
+
+def _size_in(head: bytes) -> tuple[int, int] | None:
+    if head.startswith(b"\x89PNG\r\n\x1a\n") and len(head) >= 24:
+        return struct.unpack(">II", head[16:24])
+    at = 2
+    while head.startswith(b"\xff\xd8") and at + 9 <= len(head) and head[at] == 0xFF:
+        marker, length = head[at + 1], struct.unpack(">H", head[at + 2 : at + 4])[0]
+        if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
+            height, width = struct.unpack(">HH", head[at + 5 : at + 9])
+            return (width, height)
+        at += 2 + length
+    return None
+
+
+def _without_comments(text: str) -> str:
+    text = _COMMENT.sub(lambda found: found[0] if found[0][0] == '"' else " ", text)
+    return _TRAILING_COMMA.sub(lambda found: found[0] if found[0][0] == '"' else " ", text)
+
+
+def _unique(pairs: list[tuple[str, object]]) -> dict:
+    result = dict(pairs)
+    if len(result) < len(pairs):
+        twice, _ = Counter(key for key, _ in pairs).most_common(1)[0]
+        raise InputError(f"the key {checks.shown(twice)} is given twice: leave one out")
+    return result
+
+
+def _whole(digits: str) -> int | float:
+    return int(digits) if len(digits) <= 300 else float(digits)  # Python refuses thousands of them
+
+
+def _not_finite(name: str) -> float:
+    return float(name.replace("Infinity", "inf"))  # refused where a number is wanted
+
+
+class _NoXml(Exception):
+    pass
+
+
+def _parsed_xml(text: str) -> ElementTree.Element | None:
+    builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate(namespace_separator="}")
+    depth = 0
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > _DEEPEST:
+            raise InputError(f"the XML is nested more than {_DEEPEST} elements deep: give the file of the cameras alone")
+        builder.start(_local(tag), {_local(key): value for key, value in attributes.items()})
+
+    def end(tag: str) -> None:
+        nonlocal depth
+        depth -= 1
+        builder.end(_local(tag))
+
+    def refuse(*_: object) -> None:
+        raise InputError("the XML declares entities of its own: take them out, none is read")
+
+    parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = start, end, builder.data
+    parser.EntityDeclHandler = parser.UnparsedEntityDeclHandler = parser.ExternalEntityRefHandler = refuse
+    parser.buffer_text = True
+    try:
+        parser.Parse(re.sub(r"\A<\?xml[^>]*+\?>", "", text).encode("utf-8", errors="replace"), True)
+        return builder.close()
+    except (expat.ExpatError, AssertionError):
+        return None
+
+
+def _local(tag: str) -> str:
+    """The name without its namespace."""
+    return tag.rpartition("}")[2]

@@ -1,0 +1,250 @@
+"""transforms.json: cameras as the original NeRF had them, and instant-ngp and nerfstudio made them more precise.
+
+**Pose.** `transform_matrix` is the camera in the world, its columns the camera's axes, x right, y up, z away from the view: u,
+v, w and the eye. It counts in whatever the scene counts in. `applied_transform` and `applied_scale` say what was done to the
+world before; the cameras stay in the file's world unless `original_world` is chosen.
+
+**Picture.** `fl_x`, `fl_y` are the view-plane distance in pixel widths and heights, `cx`, `cy` the principal point from the
+left and the top edge, where the first pixel's centre is (0.5, 0.5), and `w`, `h` pixels. `camera_angle_x` = 2 atan(w / 2
+fl_x), for readers that know nothing else, is the field of view if the principal point is the middle, which they take for
+granted: it isn't `Pinhole.field_of_view` where the camera is shifted. The original NeRF shoots its rays through the pixels'
+corners (bmild/nerf #24), which no file can mend; its files have no size either, which is then that of the picture beside it.
+
+**Where they stand.** At the top if all pictures have the same, else in every frame, and always together: nerfstudio takes what
+is at the top before it looks into a frame, and instant-ngp reads cx and w from the same object. Where both say something and
+not the same, these two would take different cameras, so it is refused.
+
+Sources: nerfstudio's docs/quickstart/data_conventions.md, nerfstudio/data/dataparsers/nerfstudio_dataparser.py and
+cameras/cameras.py (get_image_coords, _generate_rays_from_coords); instant-ngp's docs/nerf_dataset_tips.md, src/nerf_loader.cu
+(read_lens, read_focal_length) and include/neural-graphics-primitives/common_device.cuh (pixel_to_ray_pinhole).
+"""
+
+import json
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from .. import checks
+from ..errors import InputError
+from ..intrinsics import ViewPlane
+from ..pinhole import Pinhole
+from . import axes, distortion, naming
+from .camera import Camera, Options, not_a_pinhole
+from .source import Record, Source, image_size
+
+TITLE = "transforms.json (NeRF, instant-ngp, nerfstudio)"
+SUFFIX = ".json"
+FILE = "transforms.json"
+AABB_SCALES = tuple(2**exponent for exponent in range(8))
+
+_POSES = ("transform_matrix", "transform_matrix_start")
+_PINHOLES = ("PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "PERSPECTIVE")
+_OTHER_CAMERAS = ("is_fisheye", "ftheta_p0", "latlong", "equirectangular", "orthographic")
+_LENS = ("k1", "k2", "k3", "k4", "p1", "p2")  # the order of distortion_params, too
+_SAME_FOCAL = 1e-3  # relative: what camera_angle_x and fl_x may differ by for the few digits of one
+
+
+def recognises(source: Source) -> bool:
+    return bool(_files(source))
+
+
+def read(source: Source, options: Options) -> list[Camera]:
+    return [camera for file in _files(source) for camera in _cameras(file, options)]
+
+
+def write(cameras: Sequence[Camera], _options: Options) -> str:
+    return text(document(cameras))
+
+
+def text(content: dict[str, Any]) -> str:
+    """A `document` as it stands in a file, one frame a line."""
+    frames = ",\n".join(f"  {json.dumps(frame, allow_nan=False)}" for frame in content["frames"])
+    rest = {key: value for key, value in content.items() if key != "frames"}
+    head = "".join(f" {json.dumps(key)}: {json.dumps(value, allow_nan=False)},\n" for key, value in rest.items())
+    return f'{{\n{head} "frames": [\n{frames}\n ]\n}}\n'
+
+
+def document(cameras: Iterable[Camera], aabb_scale: int | None = None) -> dict[str, Any]:
+    """What the file holds, frames in the order of the cameras.
+
+    aabb_scale : for instant-ngp alone: how many times the unit cube it looks for the scene in. Not said if None.
+
+    Raises
+    ------
+    InputError
+        if there is no camera, two have one picture or one is mirrored, or if the scale is not one that instant-ngp takes.
+    """
+    cameras = naming.checked(cameras, FILE)
+    if aabb_scale is not None and checks.whole("aabb_scale", aabb_scale) not in AABB_SCALES:
+        raise InputError(f"aabb_scale is {aabb_scale}: give a power of two from 1 to {AABB_SCALES[-1]}")
+    pictures = [_picture(camera.pinhole) for camera in cameras]
+    shared = all(picture == pictures[0] for picture in pictures)
+    return {
+        **(pictures[0] if shared else {}),
+        **({} if aabb_scale is None else {"aabb_scale": int(aabb_scale)}),
+        "frames": [
+            {
+                "file_path": naming.image_of(camera),
+                **({} if shared else picture),
+                "transform_matrix": axes.camera_to_world(camera.pinhole),
+            }
+            for camera, picture in zip(cameras, pictures, strict=True)
+        ],
+    }
+
+
+def _picture(pinhole: Pinhole) -> dict[str, float]:
+    (fl_x, _, cx), (_, fl_y, cy), _ = axes.intrinsics(pinhole)
+    return {
+        "camera_angle_x": 2 * math.atan2(pinhole.width / 2, fl_x),
+        "camera_angle_y": 2 * math.atan2(pinhole.height / 2, fl_y),
+        "fl_x": fl_x,
+        "fl_y": fl_y,
+        "cx": cx,
+        "cy": cy,
+        "w": pinhole.width,
+        "h": pinhole.height,
+    }
+
+
+def _files(source: Source) -> list[Source]:
+    """The file itself; of a folder its transforms.json, or the original NeRF's transforms_train.json and its like."""
+    found = [source]
+    if source.is_folder:
+        found = [file] if (file := source.file(FILE)) else [*source.files("transforms_*.json")]
+    return [file for file in found if _is_ours(file)]
+
+
+def _is_ours(source: Source) -> bool:
+    frames = source.document.get("frames")
+    return isinstance(frames, list) and bool(frames) and isinstance(frames[0], dict) and any(key in frames[0] for key in _POSES)
+
+
+def _cameras(source: Source, options: Options) -> list[Camera]:
+    top = Record(source.document, source.name)
+    frames = top.records("frames", "frame")
+    paths = [frame.text("file_path", f"frame {i}").replace("\\", "/") for i, frame in enumerate(frames)]
+    undone = _applied(top) if options.original_world else None
+    told = () if options.original_world else _told_of_world(top)
+    planes: dict[object, tuple[ViewPlane, bool, tuple[str, ...]]] = {}
+    cameras = []
+    for frame, path, name in zip(frames, paths, naming.distinct(paths), strict=True):
+        both = _merged(top, frame)
+        known = tuple((key, str(value)) for key, value in both.values.items() if key not in ("frames", "file_path", *_POSES))
+        key = known if "w" in both and "h" in both else (known, path)
+        if key not in planes:
+            planes[key] = _plane(both, source, path, options)
+        plane, stated, notes = planes[key]
+        matrix = _matrix(frame)
+        pinhole, more = axes.pinhole(matrix if undone is None else undone(matrix), plane, frame.place)
+        image = path if naming.has_suffix(path) or "file_path" not in frame else f"{path}.png"
+        time = frame.number("time") if "time" in frame else None
+        cameras.append(
+            Camera(name, pinhole, stated, (*told, *notes, *more), image if "file_path" in frame else None, time=time)
+        )
+    return cameras
+
+
+def _merged(top: Record, frame: Record) -> Record:
+    """The frame's keys and those at the top, which must not contradict each other."""
+    for key in (*_INTRINSICS, *_LENS, "distortion_params", "camera_model", *_OTHER_CAMERAS):
+        if key in top and key in frame and top.get(key) != frame.get(key):
+            raise InputError(
+                f"{key} is {checks.shown(top.get(key))} at the top of the file and {checks.shown(frame.get(key))} in "
+                f"{frame.place}, and programs differ in which of them counts: take one out"
+            )
+    said = {key: value for key, value in top.values.items() if key != "frames" and value is not None}
+    return Record(said | {key: value for key, value in frame.values.items() if value is not None}, frame.place)
+
+
+_FOCAL = {"x": ("fl_x", "x_fov", "camera_angle_x"), "y": ("fl_y", "y_fov", "camera_angle_y")}
+_INTRINSICS = ("w", "h", "cx", "cy", *_FOCAL["x"], *_FOCAL["y"])
+
+
+def _plane(both: Record, source: Source, path: str, options: Options) -> tuple[ViewPlane, bool, tuple[str, ...]]:
+    """The view plane, whether its size is the file's, and notes."""
+    model = both.values.get("camera_model")
+    if model is not None and str(model).upper() not in _PINHOLES:
+        not_a_pinhole(both.place, f"of the camera model {checks.shown(model)}")
+    for key in _OTHER_CAMERAS:
+        if both.values.get(key) or (both.values.get(key) == 0.0 and key == "ftheta_p0"):
+            not_a_pinhole(both.place, f"a camera with {key}")
+    size, stated = _size(both, source, path, options)
+    focal = {along: _focal(both, along, side) for along, side in zip("xy", size, strict=True)}
+    if not any(focal.values()):
+        if options.view_plane or options.base:
+            return options.plane_or_refuse(both.place), False, ()
+        raise InputError(f"{both.place} has neither fl_x nor camera_angle_x: it can't be a camera without")
+    f_x, f_y = focal["x"] or focal["y"], focal["y"] or focal["x"]
+    plane = axes.view_plane(f_x, f_y, both.number("cx", size[0] / 2), both.number("cy", size[1] / 2), size)
+    numbers = {key: both.number(key, 0.0) for key in _LENS}
+    if "distortion_params" in both:
+        numbers = dict(zip(_LENS, both.numbers("distortion_params", 6), strict=True))
+    lens = distortion.opencv(numbers | {"k4": 0.0, "r8": numbers["k4"]})
+    return plane, stated, distortion.settle(numbers, lens, plane, both.place, options)
+
+
+def _size(both: Record, source: Source, path: str, options: Options) -> tuple[tuple[int, int], bool]:
+    if "w" in both and "h" in both:
+        return (both.size("w"), both.size("h")), True
+    if source.path:
+        for name in (path, f"{path}.png", f"{path}.jpg"):
+            if size := image_size(source.path.parent / name):
+                return size, True
+    return options.size_or_refuse(both.place), False
+
+
+def _focal(both: Record, along: str, side: int) -> float | None:
+    """The distance in pixels; all that say it must agree."""
+    length, degrees, radians = _FOCAL[along]
+    found: dict[str, float] = {}
+    if length in both:
+        found[length] = both.number(length, least=1e-9)
+    for key, factor in ((degrees, math.pi / 180), (radians, 1.0)):
+        if key in both:
+            angle = both.number(key) * factor
+            if not 0 < angle < math.pi:
+                raise InputError(f"{key} of {both.place} is {both.get(key)}: give an angle between 0 and half a turn")
+            found[key] = side / 2 / math.tan(angle / 2)
+    values = [*found.values()]
+    if values and max(values) > min(values) * (1 + _SAME_FOCAL):
+        said = " and ".join(f"{key} means {value:.6g} pixels" for key, value in found.items())
+        raise InputError(f"{both.place} contradicts itself: {said}; take the wrong one out, or give the right w and h")
+    return values[0] if values else None
+
+
+def _matrix(frame: Record) -> np.ndarray:
+    start, end = frame.values.get("transform_matrix_start"), frame.values.get("transform_matrix_end")
+    if start is not None and end is not None and start != end:
+        not_a_pinhole(frame.place, "a camera that moves while it exposes (transform_matrix_start and _end)")
+    key = next(key for key in (*_POSES, "transform_matrix") if key in frame or key == "transform_matrix")
+    numbers = checks.array(frame.called(key), frame.needed(key))
+    if numbers.shape not in ((4, 4), (3, 4)):
+        raise InputError(f"{frame.called(key)} has the shape {numbers.shape}: give four rows of four numbers")
+    return numbers
+
+
+def _told_of_world(top: Record) -> tuple[str, ...]:
+    if "applied_transform" not in top and "applied_scale" not in top:
+        return ()
+    return ("The file says that its world was turned or scaled before (applied_transform): it was left so",)
+
+
+def _applied(top: Record):
+    """The function that takes a matrix back into the world before `applied_transform` and `applied_scale`."""
+    applied = np.eye(4)
+    if "applied_transform" in top:
+        numbers = np.array(top.numbers("applied_transform", 16 if len(top.values["applied_transform"]) == 4 else 12))
+        applied[:3] = numbers.reshape(-1, 4)[:3]
+    if abs(np.linalg.det(applied)) < 1e-12:
+        raise InputError("the applied_transform can't be undone: its determinant is 0")
+    scale, inverse = top.number("applied_scale", 1.0, 1e-12), np.linalg.inv(applied)
+
+    def undone(matrix: np.ndarray) -> np.ndarray:
+        matrix = np.vstack([matrix[:3], [0, 0, 0, 1]])
+        matrix[:3, 3] /= scale
+        return inverse @ matrix
+
+    return undone
