@@ -40,7 +40,9 @@ def add(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     shots.add_argument("shots", metavar="SHOTS", type=Path, nargs="?", help="a list: .csv, .tsv, .json, .jsonl or .ndjson")
     shots.add_argument("--orbit", type=words.positive, metavar="N", help="N views around the camera's look-at point")
     shots.add_argument("--frames", metavar="A..B", help="a shot of the camera at each frame (from -5 on: --frames=-5..3)")
-    shots.add_argument("--cameras", metavar="GLOB", help="a shot of each camera so called: with * ? [abc]")
+    shots.add_argument(
+        "--cameras", metavar="GLOB", help="a shot of each camera so called: with * ? [abc]; --transforms has _ for each space"
+    )
     shots.add_argument("--shard", metavar="I/N", help="of all these, every N-th from the I-th on: for a farm's own manager")
 
     said = added.add_argument_group("what a shot does not say itself")

@@ -149,6 +149,16 @@ def test_frames_and_cameras_make_shots_of_their_names(tmp_path, capfd):
     assert {"frame_-001.exr", "frame_000.exr", "frame_001.exr", f"{CAMERA}.exr"} < {*files(out)}
 
 
+def test_cameras_with_spaces_in_their_names_make_a_dataset(tmp_path, capfd):
+    """The cameras of the samples have some, and --transforms refused them."""
+    out = tmp_path / "out"
+    batch(capfd, CORNELL, "--cameras", "Virtual*", "--transforms", "--out", out, *SMALL)
+    name = CAMERA.replace(" ", "_")
+    assert name != CAMERA and {f"{name}.exr", f"{name}.png", f"{name}.json"} < {*files(out)}
+    assert json.loads((out / f"{name}.json").read_text())["shot"]["camera"] == CAMERA
+    assert (out / "sparse" / "0" / "images.txt").read_text().splitlines()[-2].endswith(f" {name}.png")
+
+
 def test_every_event_of_a_batch_is_a_line(tmp_path, capfd):
     said = batch(capfd, CORNELL, "--orbit", "2", "--out", tmp_path / "out", *SMALL, "--log-json")
     told = [json.loads(line) for line in said.out.splitlines()]

@@ -91,6 +91,21 @@ def test_a_pattern_that_fits_no_camera_tells_which_there_are():
 def test_cameras_that_can_not_name_their_files_are_all_told():
     with pytest.raises(ShotsError) as raised:
         shots.from_cameras("*", ["a/b", "NUL", "left", "Left", "right", "right"])
-    assert len(raised.value.problems) == 4
+    assert len(raised.value.problems) == 4, raised.value.problems
     for part in ("'a/b', which holds /", "'NUL', which is a device", "'Left' and 'left'", "'right' and 'right'"):
         assert any(part in problem for problem in raised.value.problems), part
+
+
+def test_names_without_spaces_are_made_of_those_with_some_and_the_camera_is_still_the_same():
+    names = ["Virtual Pinhole", "Left\u3000eye", "Right"]
+    made = shots.from_cameras("*", names, spaces=False)
+    assert [(shot.name, shot.camera) for shot in made] == [
+        ("Left_eye", "Left\u3000eye"),
+        ("Right", "Right"),
+        ("Virtual_Pinhole", "Virtual Pinhole"),
+    ]
+    assert [shot.name for shot in shots.from_cameras("* *", names)] == ["Virtual Pinhole"]
+    with pytest.raises(ShotsError, match="'A b' and 'a_B' would have one file"):
+        shots.from_cameras("*", ["A b", "a_B"], spaces=False)
+    with pytest.raises(ShotsError, match="begins or ends with a blank"):
+        shots.from_cameras("*", [" a"], spaces=True)

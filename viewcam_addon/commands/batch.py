@@ -111,7 +111,7 @@ def _shots(options: argparse.Namespace, renderer: Any) -> list[Shot]:
     if options.shots is not None:
         return lists.read(options.shots, renderer.cameras)
     if options.cameras is not None:
-        return lists.from_cameras(options.cameras, renderer.cameras)
+        return lists.from_cameras(options.cameras, renderer.cameras, spaces=not options.transforms)
     if options.orbit is not None:
         return lists.orbit(renderer.pinhole(options.camera, options.size), options.orbit)
     camera = options.camera or renderer.scene_camera

@@ -58,15 +58,15 @@ def frames(text: str, camera: str) -> list[Shot]:
     ]
 
 
-def from_cameras(pattern: str, cameras: Iterable[str]) -> list[Shot]:
+def from_cameras(pattern: str, cameras: Iterable[str], spaces: bool = True) -> list[Shot]:
     """A shot, of the camera's own name, of each camera whose name fits a pattern of *, ? and [abc]; sorted.
 
-    Case counts on every system.
+    Case counts on every system. spaces : whether the shots' names may have some; else each is an underscore there.
 
     Raises
     ------
     ShotsError
-        if such a camera's name can't be a file's, or two can't be beside each other; it has all of them.
+        if such a camera's name can't be a file's, or two would be one file; it has all of them.
     InputError
         if no name fits.
     """
@@ -75,17 +75,21 @@ def from_cameras(pattern: str, cameras: Iterable[str]) -> list[Shot]:
     if not chosen:
         raise InputError(f"no camera is called {checks.shown(pattern)}: the file has {', '.join(cameras[:8]) or 'none'}")
     problems = Problems(f"the cameras {checks.shown(pattern)}")
-    files: dict[str, str] = {}
-    for name in chosen:
+    files: dict[str, str] = {}  # one_file(name of the shot) → camera
+    shots = {}
+    for camera in chosen:
+        name = camera if spaces else "".join("_" if character.isspace() else character for character in camera)
         with problems.caught():
             names.check("a camera", name)
-        file = names.one_file(name)
-        if file in files:
-            both = f"{checks.shown(files[file])} and {checks.shown(name)}"
-            problems.add(f"the cameras {both} would have one file on Windows and macOS: rename one, or list shots in a file")
-        files[file] = name
+        other = files.setdefault(names.one_file(name), camera)
+        if camera in shots or other != camera:
+            both = f"{checks.shown(other)} and {checks.shown(camera)}"
+            problems.add(
+                f"the cameras {both} would have one file, here or on another system: rename one, or list shots in a file"
+            )
+        shots[camera] = name
     problems.raise_any()
-    return [Shot(name, camera=name) for name in chosen]
+    return [Shot(name, camera=camera) for camera, name in shots.items()]
 
 
 def _count(count: int) -> int:

@@ -4,9 +4,11 @@ The readers here are written from those formats' own pages and share nothing wit
 """
 
 import json
+import re
 import subprocess
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -279,3 +281,20 @@ def test_a_mirrored_camera_has_its_picture_and_no_dataset(stage, batch, tmp_path
     assert batch(stage(), SHOTS[3:], *QUICK) == 2
     assert "can't say that a camera is mirrored, as in shifted.png: make its scale positive" in capfd.readouterr().err
     assert (tmp_path / "out" / "shifted.png").is_file() and datasets(tmp_path) == []
+
+
+def test_the_points_that_the_page_says_to_begin_with_are_those_of_the_scene(fresh_blender, scene, tmp_path, monkeypatch):
+    """A splat begins with points, and a dataset's points3D.txt is empty: docs/datasets.md says how to fill it."""
+    page = (Path(__file__).parents[3] / "docs" / "datasets.md").read_text(encoding="utf-8")
+    _, program = re.findall(r"```python\n(.*?)```", page, re.S)
+    bpy.ops.mesh.primitive_cube_add(size=2, location=(10, 0, 0))
+    bpy.ops.mesh.primitive_cube_add(size=4, location=(0, 20, 0))
+    bpy.ops.object.empty_add()
+    monkeypatch.chdir(tmp_path)
+    exec(compile(program, "docs/datasets.md", "exec"), {})
+    lines = [line.split() for line in (tmp_path / "points3D.txt").read_text().splitlines()]
+    # COLMAP's doc/format.rst: POINT3D_ID, X, Y, Z, R, G, B, ERROR, and a track, which may be empty.
+    assert [int(line[0]) for line in lines] == [*range(1, 17)] and all(line[4:] == ["128", "128", "128", "0"] for line in lines)
+    corners = [(10 + x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    corners += [(x, 20 + y, z) for x in (-2, 2) for y in (-2, 2) for z in (-2, 2)]
+    assert sorted(tuple(map(float, line[1:4])) for line in lines) == sorted(corners)
