@@ -17,6 +17,7 @@ PACKAGE = ROOT / "viewcam_addon"
 FLOORS = [
     "errors",
     "checks",
+    "memory",
     "files",
     "terminal",
     "events",

@@ -21,6 +21,7 @@ from .errors import InputError
 LARGEST_WHOLE = 2**31 - 1
 
 _WITHOUT_ORDER = (bytes, bytearray, memoryview, Set, Mapping)  # or whose items are no numbers of anybody's
+_MOST_DIGITS = 310  # more than the largest float64 has
 _SHOWN = 60  # characters of a refused value: a sentence is one line
 
 
@@ -61,6 +62,14 @@ def whole(name: str, value: object) -> int:
     if not 1 <= result <= LARGEST_WHOLE:
         raise InputError(f"{name} is {shown(value)}: give a whole number from 1 to {LARGEST_WHOLE}")
     return result
+
+
+def whole_of_json(digits: str) -> int | float:
+    """A whole number of JSON, for json.loads as `parse_int`; of more digits than float64 reaches it is a float.
+
+    Python refuses to read thousands of digits with an error that is no JSONDecodeError.
+    """
+    return int(digits) if len(digits) <= _MOST_DIGITS else float(digits)
 
 
 def truth(name: str, value: object) -> bool:

@@ -14,7 +14,6 @@ from .problems import Problems
 from .rows import Cell, Row
 
 _LINE_END = re.compile(r"\r\n|\r|\n")
-_MOST_DIGITS = 300  # Python refuses to read thousands of them
 
 
 class _Object(dict):
@@ -80,14 +79,10 @@ def _cells(place: str, value: object, problems: Problems) -> dict[str, Cell]:
 def _parsed(text: str, line: int = 1) -> object:
     """The JSON value. line : the number of the text's first line."""
     try:
-        return json.loads(text, object_pairs_hook=_Object, parse_int=_whole)
+        return json.loads(text, object_pairs_hook=_Object, parse_int=checks.whole_of_json)
     except json.JSONDecodeError as error:
         raise InputError(
             f"line {error.lineno + line - 1}, column {error.colno}: this is no JSON ({error.msg}), correct it"
         ) from None
     except RecursionError:
         raise InputError(f"line {line}: the brackets are nested too deeply, give a list of shots") from None
-
-
-def _whole(digits: str) -> int | float:
-    return int(digits) if len(digits) <= _MOST_DIGITS else float(digits)

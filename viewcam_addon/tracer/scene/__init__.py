@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ...checks import shown
 from ...errors import InputError
 from ...pinhole import Pinhole
 from .film import Bounces, Film
@@ -99,14 +100,16 @@ class Object:
     hidden_from: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
-        _check_shape(f"the matrix of object {self.name!r}", self.matrix, (4, 4))
+        _check_shape(f"the matrix of object {shown(self.name)}", self.matrix, (4, 4))
         if not np.isfinite(self.matrix).all():
-            raise InputError(f"the matrix of object {self.name!r} holds a number that is not finite: check its transform")
+            raise InputError(f"the matrix of object {shown(self.name)} holds a number that is not finite: check its transform")
         if not np.array_equal(self.matrix[3], (0, 0, 0, 1)):
-            raise InputError(f"the matrix of object {self.name!r} is not affine: its last row must be 0, 0, 0, 1")
+            raise InputError(f"the matrix of object {shown(self.name)} is not affine: its last row must be 0, 0, 0, 1")
         if not self.material_indices:
-            raise InputError(f"object {self.name!r} has no material_indices: give at least one, 0 where it has no material")
-        object.__setattr__(self, "hidden_from", hidden_from(f"object {self.name!r}", self.hidden_from))
+            raise InputError(
+                f"object {shown(self.name)} has no material_indices: give at least one, 0 where it has no material"
+            )
+        object.__setattr__(self, "hidden_from", hidden_from(f"object {shown(self.name)}", self.hidden_from))
 
 
 @dataclass(frozen=True)
@@ -162,23 +165,26 @@ class Scene:
         for placed in self.objects:
             if placed.geometry not in materials:
                 raise InputError(
-                    f"object {placed.name!r} names the geometry {placed.geometry!r}, which the scene does not have"
+                    f"object {shown(placed.name)} names the geometry {shown(placed.geometry)}, which the scene does not have"
                 )
             _check_reach(placed, reaches[placed.geometry])
             least, greatest = materials[placed.geometry]
             if least < 0 or greatest >= len(placed.material_indices):
                 raise InputError(
-                    f"object {placed.name!r} has {len(placed.material_indices)} material_indices and its geometry "
-                    f"{placed.geometry!r} uses materials {least} … {greatest}: give one for each"
+                    f"object {shown(placed.name)} has {len(placed.material_indices)} material_indices and its geometry "
+                    f"{shown(placed.geometry)} uses materials {least} … {greatest}: give one for each"
                 )
             for name in placed.materials:
                 if name and name not in self.materials:
-                    raise InputError(f"object {placed.name!r} names the material {name!r}, which the scene does not have")
+                    raise InputError(
+                        f"object {shown(placed.name)} names the material {shown(name)}, which the scene does not have"
+                    )
         for name, material in self.materials.items():
             for component, colour in material.colours.items():
                 if colour.image is not None and colour.image not in self.images:
                     raise InputError(
-                        f"{component} of material {name!r} names the image {colour.image!r}, which the scene does not have"
+                        f"{component} of material {shown(name)} names the image {shown(colour.image)}, "
+                        "which the scene does not have"
                     )
 
 
@@ -207,7 +213,7 @@ def _check_reach(placed: Object, reach: float) -> None:
             largest, 3 * reach * float(np.abs(placed.matrix[:3, :3]).max()) + float(np.abs(placed.matrix[:3, 3]).max())
         )
     if largest > LARGEST:
-        raise InputError(f"object {placed.name!r} reaches as far as {largest:.3g}: give it coordinates below {LARGEST:g}")
+        raise InputError(f"object {shown(placed.name)} reaches as far as {largest:.3g}: give it coordinates below {LARGEST:g}")
 
 
 def _material_range(materials: NDArray[np.int32]) -> tuple[int, int]:

@@ -6,19 +6,26 @@ gathered at the end (the first wrong key usually explains the others).
 
 import contextlib
 import math
+import os
 import zipfile
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NoReturn
+from typing import IO, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import checks
+from ... import checks, memory
 from ...errors import InputError
 
 _LARGEST_WHOLE = 2**31 - 1
+
+# Deflate's longest match has 258 bytes and takes 2 bits (zlib's technical details): 1032 to 1.
+_MOST_UNPACKED = 1032
+# An array is read and then converted to the type that the tracer takes, while it is still there.
+_COPIES = 2
+_HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 
 
 class Field:
@@ -42,15 +49,15 @@ class Field:
         table = self._object()
         for key in required:
             if key not in table:
-                self.fail(f"has no key {key!r}: add it")
+                self.fail(f"has no key {checks.shown(key)}: add it")
         unknown = None if others else next((key for key in table if key not in required + optional), None)
         if unknown is not None:
-            self.fail(f"has an unknown key {unknown!r}: remove it, or give one of {', '.join(required + optional)}")
-        return {key: Field(value, f"{key!r} of {self.name}", self.file) for key, value in table.items()}
+            self.fail(f"has an unknown key {checks.shown(unknown)}: remove it, or give one of {', '.join(required + optional)}")
+        return {key: Field(value, f"{checks.shown(key)} of {self.name}", self.file) for key, value in table.items()}
 
     def named(self, kind: str) -> dict[str, "Field"]:
         """The values of an object whose keys are names of things of this kind."""
-        return {key: Field(value, f"{kind} {key!r}", self.file) for key, value in self._object().items()}
+        return {key: Field(value, f"{kind} {checks.shown(key)}", self.file) for key, value in self._object().items()}
 
     def items(self, kind: str, count: int | None = None) -> list["Field"]:
         """The values of a list of things of this kind, called by their name where they have one."""
@@ -124,28 +131,83 @@ class Field:
 
 
 class Arrays:
-    """The arrays of the .npz beside a scene file; none where the scene names no such file."""
+    """The arrays of the .npz beside a scene file; none where the scene names no such file.
 
-    def __init__(self, file: str = "", archive: np.lib.npyio.NpzFile | None = None) -> None:
+    Nothing is allocated for an array before its size is known to be true: what its header says against what its archive says
+    it unpacks to, this against the most that the packed bytes can hold, and all arrays together against the memory that there
+    is. NumPy's own reader of archives is not used, since it allocates what a header says.
+    """
+
+    def __init__(self, file: str = "", archive: zipfile.ZipFile | None = None) -> None:
         self._file, self._archive = file, archive
+        self._members = {} if archive is None else _arrays_of(archive)
+        self._taken: dict[str, NDArray] = {}
 
     def take(self, key: Field) -> NDArray:
-        """The array of this key, of real numbers."""
+        """The array of this key, of real numbers; the same one each time."""
         if self._archive is None:
             key.fail("names an array, and the scene has no key 'arrays': add it, with the name of the .npz file")
-        if key.text() not in self._archive.files:  # `in` the archive itself would read the array, in NumPy before 1.25
-            key.fail(f"is {key.value!r}, which {self._file} does not hold: export the scene again")
-        try:
-            array = self._archive[key.value]
-        except ValueError as error:
-            raise InputError(
-                f"{self._file}: the array {key.value!r} holds pickled objects, which are not read: store numbers"
-            ) from error
-        except (OSError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
-            raise InputError(f"{self._file}: the array {key.value!r} is damaged: export the scene again") from error
+        name = key.text()
+        if name not in self._members:
+            key.fail(f"is {checks.shown(name)}, which {self._file} does not hold: export the scene again")
+        if name not in self._taken:
+            self._taken[name] = self._read(name)
+        array = self._taken[name]
         if array.dtype.kind not in "iuf":
             key.fail(f"names an array of {array.dtype}: store real numbers")
         return array
+
+    def _read(self, name: str) -> NDArray:
+        damaged = f"{self._file}: the array {checks.shown(name)} is damaged: export the scene again"
+        member = self._members[name]
+        try:
+            with self._archive.open(member) as file:
+                dtype, size = _header(file)
+                if dtype.hasobject:
+                    raise InputError(
+                        f"{self._file}: the array {checks.shown(name)} holds pickled objects, which are not read: store numbers"
+                    )
+                packed = min(member.compress_size, os.fstat(self._archive.fp.fileno()).st_size)
+                if file.tell() + size != member.file_size or member.file_size > packed * _MOST_UNPACKED:
+                    raise InputError(damaged)
+            together = size + sum(array.nbytes for array in self._taken.values())
+            memory.check(f"the arrays of {self._file}", _COPIES * together, "make the scene smaller")
+            with self._archive.open(member) as file:
+                return np.lib.format.read_array(file, allow_pickle=False)
+        except (
+            OSError,
+            ValueError,
+            EOFError,
+            NotImplementedError,
+            OverflowError,
+            RuntimeError,
+            zipfile.BadZipFile,
+            zlib.error,
+        ) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(damaged) from error
+
+
+def _arrays_of(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
+    """The members that are arrays, by their names, packed as NumPy packs them."""
+    return {
+        member.filename.removesuffix(".npy"): member
+        for member in archive.infolist()
+        if member.filename.endswith(".npy") and member.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+    }
+
+
+def _header(file: IO[bytes]) -> tuple[np.dtype, int]:
+    """The type of an array and its size in bytes, as its header has them; ValueError if it is none."""
+    try:
+        version = np.lib.format.read_magic(file)
+        shape, _, dtype = _HEADERS[version](file)
+    except Exception as error:  # of the tokenizer and the parser of Python, of no common class
+        raise ValueError("no header") from error
+    if any(type(length) is not int or length < 0 for length in shape):
+        raise ValueError("no shape")
+    return dtype, math.prod(shape) * dtype.itemsize
 
 
 @contextlib.contextmanager
@@ -155,21 +217,17 @@ def arrays_beside(scene_path: Path, field: Field | None) -> Iterator[Arrays]:
         yield Arrays()
         return
     path = _beside(scene_path, field)
-    refusal = f"{path.name} is no .npz file of arrays: export the scene again"
-    try:
-        file = path.open("rb")
-    except FileNotFoundError:
-        field.fail(f"names {path.name}, which is not there: put it beside the scene file")
-    except OSError as error:
-        raise InputError(refusal) from error
-    with file:
+    refusal = f"{checks.shown(path.name)} is no .npz file of arrays: export the scene again"
+    with contextlib.ExitStack() as opened:
         try:
-            archive = np.load(file, allow_pickle=False)
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+            if path.exists() and not path.is_file():
+                raise InputError(refusal)
+            archive = Arrays(path.name, opened.enter_context(zipfile.ZipFile(path)))
+        except FileNotFoundError:
+            field.fail(f"names {checks.shown(path.name)}, which is not there: put it beside the scene file")
+        except (OSError, ValueError, NotImplementedError, zipfile.BadZipFile) as error:
             raise InputError(refusal) from error
-        if not isinstance(archive, np.lib.npyio.NpzFile):
-            raise InputError(refusal)
-        yield Arrays(path.name, archive)
+        yield archive
 
 
 def _beside(scene_path: Path, field: Field) -> Path:
@@ -177,13 +235,13 @@ def _beside(scene_path: Path, field: Field) -> Path:
     folder = scene_path.resolve().parent
     path = folder / field.text()
     if "\0" in field.value or path.resolve().parent != folder or path.name != field.value:
-        field.fail(f"is {field.value!r}, which leaves the scene file's folder: give the name of a file in it")
+        field.fail(f"is {checks.shown(field.value)}, which leaves the scene file's folder: give the name of a file in it")
     return path
 
 
 def _name(kind: str, index: int, value: object, parent: Field) -> str:
     name = value.get("name", value.get("object")) if isinstance(value, dict) else None
-    return f"{kind} {name!r}" if isinstance(name, str) else f"{kind} {index} of {parent.name}"
+    return f"{kind} {checks.shown(name)}" if isinstance(name, str) else f"{kind} {index} of {parent.name}"
 
 
 def _is_number(value: object) -> bool:

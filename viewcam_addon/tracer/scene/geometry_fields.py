@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from ...checks import shown
 from ...errors import InputError
 from . import Mesh, Spheres
 from .fields import Arrays, Field
@@ -35,7 +36,7 @@ def geometry(field: Field, arrays: Arrays) -> Mesh | Spheres:
     kind = field.fields(("type",), others=True)["type"]
     readers = {"mesh": _mesh, "spheres": _spheres, "plane": _plane}
     if kind.text() not in readers:
-        kind.fail(f"is {kind.value!r}: give one of {', '.join(readers)}")
+        kind.fail(f"is {shown(kind.value)}: give one of {', '.join(readers)}")
     try:
         return readers[kind.value](field, arrays)
     except InputError as error:

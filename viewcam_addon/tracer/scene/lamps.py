@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import checks
+from ...checks import shown
 from ...errors import InputError
 from .materials import radiance
 
@@ -37,8 +38,8 @@ class Lamp:
     casts_shadow: bool = True
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "hidden_from", hidden_from(f"light {self.name!r}", self.hidden_from))
-        truth = checks.truth(f"casts_shadow of light {self.name!r}", self.casts_shadow)
+        object.__setattr__(self, "hidden_from", hidden_from(f"light {shown(self.name)}", self.hidden_from))
+        truth = checks.truth(f"casts_shadow of light {shown(self.name)}", self.casts_shadow)
         object.__setattr__(self, "casts_shadow", truth)
 
     @property
@@ -47,7 +48,7 @@ class Lamp:
         raise NotImplementedError
 
     def _check(self, what: str, value: object, least: float = 0.0, most: float = LARGEST) -> None:
-        object.__setattr__(self, what, checks.number(f"{what} of light {self.name!r}", value, least, most))
+        object.__setattr__(self, what, checks.number(f"{what} of light {shown(self.name)}", value, least, most))
 
     def _check_angle(self) -> None:
         """At most π, as which the float32 just above it counts, Blender's 180°."""
@@ -55,11 +56,13 @@ class Lamp:
         object.__setattr__(self, "angle", min(self.angle, np.pi))
 
     def _check_colour(self, what: str) -> None:
-        object.__setattr__(self, what, radiance(f"{what} of light {self.name!r}", getattr(self, what)))
+        object.__setattr__(self, what, radiance(f"{what} of light {shown(self.name)}", getattr(self, what)))
 
     def _check_matrix(self) -> None:
         if np.shape(self.matrix) != (4, 4) or not (np.abs(self.matrix) <= LARGEST).all():
-            raise InputError(f"the matrix of light {self.name!r} must be 4 × 4 numbers below {LARGEST:g}: check its transform")
+            raise InputError(
+                f"the matrix of light {shown(self.name)} must be 4 × 4 numbers below {LARGEST:g}: check its transform"
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,10 +82,10 @@ class Sun(Lamp):
         super().__post_init__()
         self._check_colour("irradiance")
         self._check_angle()
-        towards = checks.vector(f"towards of light {self.name!r}", self.towards, 3)
+        towards = checks.vector(f"towards of light {shown(self.name)}", self.towards, 3)
         largest = max(map(abs, towards))
         if not largest > 0:
-            raise InputError(f"towards of light {self.name!r} is 0, 0, 0: give the direction to the sun")
+            raise InputError(f"towards of light {shown(self.name)} is 0, 0, 0: give the direction to the sun")
         if abs(math.hypot(*towards) - 1) > 2.0**-50:  # what is a unit vector stays one, to the last bit
             towards = tuple(component / largest for component in towards)
             towards = tuple(component / math.hypot(*towards) for component in towards)
@@ -109,9 +112,9 @@ class Point(Lamp):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        position = checks.vector(f"position of light {self.name!r}", self.position, 3)
+        position = checks.vector(f"position of light {shown(self.name)}", self.position, 3)
         if max(map(abs, position)) > LARGEST:
-            raise InputError(f"position of light {self.name!r} is {checks.shown(position)}: give numbers below {LARGEST:g}")
+            raise InputError(f"position of light {shown(self.name)} is {shown(position)}: give numbers below {LARGEST:g}")
         object.__setattr__(self, "position", position)
         self._check_colour("power")
         self._check("radius", self.radius)
@@ -169,9 +172,9 @@ class Area(Lamp):
         super().__post_init__()
         self._check_matrix()
         self._check_colour("power")
-        size = checks.vector(f"size of light {self.name!r}", self.size, 2)
+        size = checks.vector(f"size of light {shown(self.name)}", self.size, 2)
         if not all(0 <= side <= LARGEST for side in size):
-            raise InputError(f"size of light {self.name!r} is {checks.shown(size)}: give two numbers from 0 to {LARGEST:g}")
+            raise InputError(f"size of light {shown(self.name)} is {shown(size)}: give two numbers from 0 to {LARGEST:g}")
         object.__setattr__(self, "size", size)
 
     @property
@@ -201,5 +204,5 @@ def hidden_from(name: str, rays: Collection[str]) -> frozenset[str]:
     """The kinds of rays that something is hidden from; InputError with its `name` where there is no such kind."""
     unknown = sorted(set(rays) - set(RAYS))
     if unknown:
-        raise InputError(f"{name} is hidden from {unknown[0]!r}: give some of {', '.join(RAYS)}")
+        raise InputError(f"{name} is hidden from {shown(unknown[0])}: give some of {', '.join(RAYS)}")
     return frozenset(rays)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...checks import shown
 from ...errors import InputError
 from . import Scene, placing
 from .fields import Arrays, Field
@@ -139,7 +140,7 @@ def _colour(field: Field) -> Colour:
 def _lamp(field: Field) -> Lamp:
     kind = field.fields(("type", "name"), others=True)["type"]
     if kind.text() not in _LAMPS:
-        kind.fail(f"is {kind.value!r}: give one of {', '.join(_LAMPS)}")
+        kind.fail(f"is {shown(kind.value)}: give one of {', '.join(_LAMPS)}")
     lamp = _LAMPS[kind.value]
     names = [each.name for each in dataclasses.fields(lamp) if each.name not in ("name", "matrix")]
     is_placed = len(names) + 1 < len(dataclasses.fields(lamp))

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ... import checks
 from ...errors import InputError
 from ...files import is_replaced, written_whole
 from ...pinhole import Pinhole
@@ -129,18 +130,19 @@ def _parsed(path: Path) -> object:
     """The JSON of a file, without NaN and without keys that appear twice."""
 
     def unique(pairs: list[tuple[str, object]]) -> dict:
-        keys = [key for key, _ in pairs]
-        twice = next((key for key in keys if keys.count(key) > 1), None) if len(set(keys)) < len(keys) else None
-        if twice is not None:
-            raise InputError(f"{path.name}: the key {twice!r} appears twice in one object: remove one")
-        return dict(pairs)
+        table = {}
+        for key, value in pairs:
+            if key in table:
+                raise InputError(f"{path.name}: the key {checks.shown(key)} appears twice in one object: remove one")
+            table[key] = value
+        return table
 
     def finite(name: str) -> float:
         raise InputError(f"{path.name}: {name} is no number that a scene can hold: give a finite one")
 
     try:
         text = path.read_text(encoding="utf-8")
-        document = json.loads(text, object_pairs_hook=unique, parse_constant=finite)
+        document = json.loads(text, object_pairs_hook=unique, parse_constant=finite, parse_int=checks.whole_of_json)
         if r"\ud" in text.lower():
             json.dumps(document, ensure_ascii=False).encode()  # half a character, which only JSON can write, is no text
         return document

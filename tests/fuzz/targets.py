@@ -1,0 +1,382 @@
+"""What reads a hostile file, as a program: `targets.py KIND FIRST COUNT FOLDER` feeds mutants FIRST … to it, one after another.
+
+A mutant that is met with anything but success, a failed comparison or one sentence is told as a line of JSON. Before each its
+number goes into FOLDER/current, so that who started this knows which one ended it: SIGALRM after `SECONDS`, a crash. All that
+this process may have is `MEMORY` of address space. With one word more, FOLDER keeps the mutants.
+"""
+
+import contextlib
+import io
+import json
+import os
+import random
+import shutil
+import signal
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+
+TESTS = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(TESTS / "fuzz"), str(TESTS / "batch"), str(TESTS.parent)]
+
+import mutants
+import numpy as np
+
+SECONDS = 20.0
+MEMORY = 4 * 2**30
+LONGEST = 1500  # characters of a sentence, which may name files
+
+CAMERA = {"eye": [0, -5, 0], "look_at": [0, 0, 0], "up": [0, 0, 1], "distance": 14, "width": 16, "height": 12}
+IDENTITY = np.eye(4).tolist()
+SCENE = {
+    "format": "virtual-pinhole-scene",
+    "version": 1,
+    "camera": CAMERA,
+    "stated_camera": CAMERA | {"principal_point": [8.0, 6.0], "mirrored": False, "distance": [14.0, 14.0]},
+    "arrays": "scene.npz",
+    "geometries": {
+        "ball": {"type": "spheres", "centers": [[0, 0, 0]], "radii": [1], "materials": [0]},
+        "wall": {"type": "plane", "corner": [-3, 1, -3], "edges": [[6, 0, 0], [0, 0, 6]]},
+        "far": {"type": "mesh", "vertices": {"npz": "v"}, "triangles": {"npz": "t"}, "corner_normals": {"npz": "n"}},
+        "face": {
+            "type": "mesh",
+            "vertices": [[0, 0, 0], [1, 0, 0], [0, 0, 1]],
+            "triangles": [[0, 1, 2]],
+            "corner_normals": [[[0, -1, 0], [0, -1, 0], [0, -1, 0]]],
+            "corner_uvs": [[[0, 0], [1, 0], [0, 1]]],
+            "corner_colours": [[[1, 0, 0], [0, 1, 0], [0, 0, 1]]],
+            "materials": [1],
+        },
+    },
+    "objects": [
+        {"name": "ball", "geometry": "ball", "matrix": IDENTITY, "materials": ["glass"], "hidden_from": ["shadow"]},
+        {"name": "wall", "geometry": "wall", "location": [0, 0, 0], "rotation": [0, 0, 0], "scale": [1, 1, 1]},
+        {"name": "far", "geometry": "far", "scale": 2, "materials": ["glowing"]},
+        {"name": "face", "geometry": "face", "object_index": 3, "material_indices": [1, 2], "materials": ["", "drawn"]},
+    ],
+    "clip": [0.1, 1000],
+    "origin": [1, 2, 3],
+    "images": {"chequer": {"pixels": [[[0, 0, 0], [1, 1, 1]]], "srgb": True}, "large": {"pixels": {"npz": "i"}}},
+    "materials": {
+        "glass": {"glass": [1, 1, 1], "ior": 1.5},
+        "glowing": {"emission": [2, 1, 1], "diffuse": [0.5, 0.5, 0.5]},
+        "drawn": {
+            "diffuse": {"image": "chequer", "closest": True, "vertex": True},
+            "mirror": {"image": "large", "rgb": [1, 1, 1]},
+        },
+    },
+    "lamps": [
+        {"type": "sun", "name": "sun", "towards": [0, 0.5, -1], "irradiance": [1, 1, 1], "angle": 0.01},
+        {"type": "point", "name": "bulb", "position": [0, -3, 3], "power": [9, 9, 9], "radius": 0.1, "soft_falloff": True},
+        {"type": "spot", "name": "spot", "matrix": IDENTITY, "power": [9, 9, 9], "angle": 1.0, "blend": 0.2, "radius": 0},
+        {"type": "area", "name": "area", "location": [0, 0, 3], "size": [1, 2], "power": [9, 9, 9], "ellipse": True},
+    ],
+    "world": {"radiance": [0.2, 0.2, 0.3]},
+    "film": {"filter": "BLACKMAN_HARRIS", "filter_width": 1.5, "exposure": 1.0, "transparent": False},
+    "bounces": {"total": 4, "diffuse": 2, "glossy": 2, "transmission": 4},
+    "ledger": [{"object": "Hair", "status": "skipped", "reason": "curls"}],
+}
+
+
+def arrays() -> dict[str, np.ndarray]:
+    grid = np.arange(25.0)
+    vertices = np.stack([grid % 5 - 2, np.full(25, 2.0), grid // 5 - 2], axis=1)
+    triangles = np.array([[i, i + 1, i + 6] for i in range(18)], np.int32)
+    normals = np.broadcast_to(np.array([0, -1, 0], np.float32), (18, 3, 3))
+    return {"v": vertices, "t": triangles, "n": np.array(normals), "i": np.ones((4, 8, 3), np.float32)}
+
+
+def packed(**members: np.ndarray) -> bytes:
+    file = io.BytesIO()
+    np.savez(file, **members)
+    return file.getvalue()
+
+
+class Said(Exception):
+    """A mutant was answered otherwise than it should."""
+
+
+def viewcam(*words: object) -> None:
+    """Run a command in this process, and raise Said unless all is well or told in a sentence."""
+    from viewcam_addon import cli
+
+    said = io.StringIO()
+    with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter("always")
+        status = _with_events(cli, [str(word) for word in words], said)
+    sentence = said.getvalue().strip()
+    if status not in (0, 1, 2, 3) or (status > 1) != bool(sentence):
+        raise Said(f"status {status}: {sentence!r}")
+    judge(sentence)
+    if warned:
+        raise Said(f"warned: {warned[0].message} at {warned[0].filename}:{warned[0].lineno}")
+
+
+def _with_events(cli: object, words: list[str], said: io.StringIO) -> int:
+    """Run the command with what it says of errors sent to `said` in place of standard error."""
+    from viewcam_addon import events
+
+    @contextlib.contextmanager
+    def opened(_: bool) -> Iterator[object]:
+        yield events.Sentences(said)
+
+    cli.events = type("Events", (), {"opened": staticmethod(opened)})
+    return cli.main(words)
+
+
+def judge(sentence: str) -> None:
+    """Raise Said if a sentence is none."""
+    if "bug" in sentence or "Traceback" in sentence or len(sentence) > LONGEST or "\n" in sentence:
+        raise Said(sentence[:LONGEST])
+
+
+Feed = Callable[[random.Random, Path], None]
+"""Makes one mutant and gives it to what reads it."""
+
+
+def scene() -> Feed:
+    """Scene files and the arrays beside them, traced at every level."""
+    whole = packed(**arrays())
+    other = packed(v=np.zeros((1, 3)), t=np.zeros((1, 3), np.int32), n=np.array(["text"]), i=np.zeros(3, complex))
+
+    def feed(chance: random.Random, folder: Path) -> None:
+        document, beside = json.dumps(SCENE).encode(), whole
+        if chance.random() < 0.7:
+            document = mutants.of_json(SCENE, SCENE, chance)
+        else:
+            beside = mutants.of_zip(whole, other, chance)
+        (folder / "scene.json").write_bytes(document)
+        (folder / "scene.npz").write_bytes(beside)
+        level = chance.choice(("geometry", "geometry", "direct", "path", "auto"))
+        stated = ["--stated"] if chance.random() < 0.2 else []
+        spent = ["--samples", chance.choice((1, 2)), "--threads", 1]
+        viewcam("render", folder / "scene.json", folder / "out.exr", "--size", "8x6", "--level", level, *spent, *stated)
+
+    return feed
+
+
+def exr() -> Feed:
+    """Pictures of geometry and of light, on either side of a comparison."""
+    import tempfile
+
+    import OpenEXR
+
+    with tempfile.TemporaryDirectory() as temporary:
+        made = Path(temporary)
+        (made / "scene.json").write_text(json.dumps(SCENE))
+        (made / "scene.npz").write_bytes(packed(**arrays()))
+        pictures = {}
+        for level, seed in (("geometry", 0), ("direct", 0), ("path", 1)):
+            words = ["--size", "16x12", "--level", level, "--samples", "4", "--seed", seed]
+            viewcam("render", made / "scene.json", made / "out.exr", *words)
+            pictures[level] = (made / "out.exr").read_bytes()
+        channels = OpenEXR.File(str(made / "out.exr"), separate_channels=True).channels()
+        kinds = {"zip": OpenEXR.ZIP_COMPRESSION, "piz": OpenEXR.PIZ_COMPRESSION, "dwa": OpenEXR.DWAA_COMPRESSION}
+        for name, compression in kinds.items():
+            header = {"compression": compression, "type": OpenEXR.scanlineimage}
+            pixels = {each: channel.pixels for each, channel in channels.items()}
+            OpenEXR.File(header, pixels).write(str(made / "out.exr"))
+            pictures[name] = (made / "out.exr").read_bytes()
+        parts = [OpenEXR.Part({}, {each: pixels[each]}, each) for each in pixels]
+        OpenEXR.File(parts).write(str(made / "out.exr"))
+        pictures["parts"] = (made / "out.exr").read_bytes()
+    beginning = 1200  # bytes, in which the header stands
+
+    def feed(chance: random.Random, folder: Path) -> None:
+        (folder / "scene.json").write_text(json.dumps(SCENE))
+        (folder / "scene.npz").write_bytes(packed(**arrays()))
+        name = chance.choice(list(pictures))
+        whole = folder / "whole.exr"
+        whole.write_bytes(pictures[name if name == "geometry" else chance.choice(("path", "direct"))])
+        data = pictures[name]
+        other = pictures[chance.choice(list(pictures))]
+        if chance.random() < 0.3 and b"virtualPinhole" in data:
+            data = _with_camera(data, chance)
+        else:
+            data = mutants.of_bytes(data, other, chance, beginning if chance.random() < 0.6 else None)
+        (folder / "mutant.exr").write_bytes(data)
+        sides = [folder / "mutant.exr", whole]
+        if chance.random() < 0.5:
+            sides.reverse()
+        more: list[object] = ["--scene", folder / "scene.json"] if chance.random() < 0.3 else []
+        if chance.random() < 0.2:
+            more += ["--report", folder / "report", "--difference", folder / "difference.png"]
+        if chance.random() < 0.2 and name != "geometry":
+            sides.append(whole)
+        viewcam("compare", *sides, *more, "--json", folder / "out.json", "--threads", 1)
+
+    return feed
+
+
+def _with_camera(data: bytes, chance: random.Random) -> bytes:
+    """A picture whose camera is changed; what says how long it is, and where all that follows stands, stays true."""
+    start = data.index(b"virtualPinhole\0string\0") + len(b"virtualPinhole\0string\0") + 4
+    size = int.from_bytes(data[start - 4 : start], "little")
+    text = mutants.of_json(json.loads(data[start : start + size]), SCENE, chance)
+    return data[:start] + text.ljust(size)[:size] + data[start + size :]
+
+
+SHOTS = {
+    "defaults": {"engine": "CYCLES", "samples": 16, "up": [0, 0, 1]},
+    "shots": [
+        {"name": "a", "eye": [3, -6, 2.5], "look_at": [0, 0, 1], "d": 400, "width": 320, "height": 180, "frame": 3},
+        {"name": "b", "camera": "Camera", "level": "path", "samples": 4, "engine": "VIEWCAM"},
+        {"name": "c", "eye_x": 1, "eye_y": 2, "eye_z": 3, "look_at": [0, 0, 0], "up": [0, 1, 0], "distance": 50.5},
+    ],
+}
+TABLE = b"""name,eye_x,eye_y,eye_z,look_at,up,d,width,height,frame,engine,samples,level
+a,3,-6,2.5,"0,0,1","0,0,1",400,320,180,1,CYCLES,16,
+b,3,-6.5,2.5,"0,0,1","0 0 1",40.5e1,320,180,2,VIEWCAM,16,path
+"""
+
+
+def shots() -> Feed:
+    """Lists of shots, in every format."""
+    from viewcam_addon import shots as lists
+    from viewcam_addon.errors import InputError
+
+    lines = b"".join(json.dumps(shot).encode() + b"\n" for shot in SHOTS["shots"])
+
+    def feed(chance: random.Random, folder: Path) -> None:
+        suffix = chance.choice((".csv", ".tsv", ".json", ".jsonl"))
+        if suffix == ".json":
+            data = mutants.of_json(chance.choice((SHOTS, SHOTS["shots"])), SHOTS, chance)
+        else:
+            data = mutants.of_text(TABLE if suffix in (".csv", ".tsv") else lines, TABLE + lines, chance)
+        path = folder / f"shots{suffix}"
+        path.write_bytes(data)
+        try:
+            for shot in lists.read(path, ["Camera"] if chance.random() < 0.5 else None):
+                lists.settings_hash(shot, {})
+        except InputError as error:
+            for sentence in getattr(error, "problems", [str(error)]):
+                judge(sentence)
+
+    return feed
+
+
+def sidecar() -> Feed:
+    """Sidecars in the folder of a batch that is continued, with its page, its summary and its dataset."""
+    import painting
+
+    from viewcam_addon import shots as lists
+    from viewcam_addon.batch import dataset, one, run
+    from viewcam_addon.batch.folder import Folder
+    from viewcam_addon.datasets.record import record
+    from viewcam_addon.errors import InputError, told
+    from viewcam_addon.pinhole import Pinhole
+
+    class Painter(painting.Painter):
+        def render(self, *given: object) -> dict:
+            return {**super().render(*given), **record(Pinhole(**CAMERA))}
+
+    wanted = [lists.Shot("one", camera="Camera"), lists.Shot("two", camera="Camera")]
+    settings = {shot.name: lists.settings_hash(shot, {}) for shot in wanted}
+    made: dict[str, bytes] = {}
+
+    def batch(folder: Path) -> Folder:
+        place = Folder(folder)
+        work = one.in_turn(place, Painter(), settings, True)
+        heard = painting.Listener()
+        run.run(wanted, place, settings, work, heard, resume=True, check=True)
+        for _, fields in heard.heard:
+            judge(str(fields.get("error", "")))
+        return place
+
+    def feed(chance: random.Random, folder: Path) -> None:
+        if not made:
+            made.update({path.name: path.read_bytes() for path in batch(folder / "whole").path.iterdir() if path.is_file()})
+        changed = folder / "changed"
+        changed.mkdir()
+        for name, data in made.items():
+            (changed / name).write_bytes(data)
+        name = chance.choice(("one.json", "two.json", "summary.json"))
+        document = json.loads(made[name])
+        (changed / name).write_bytes(mutants.of_json(document, SCENE | document, chance))
+        try:
+            dataset.write(batch(changed), wanted, settings, "png")
+        except InputError as error:
+            judge(told(error))
+
+    return feed
+
+
+def broken(kind: str) -> Feed:
+    """No reader, but what one may do: the third mutant makes it."""
+
+    def feed(chance: random.Random, folder: Path) -> None:
+        if not folder.name.endswith("-2"):
+            return
+        if kind == "bug":
+            raise Said("a bug")
+        if kind == "crash":
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if kind == "hang":
+            signal.setitimer(signal.ITIMER_REAL, 0.1)  # for 20 s
+            signal.sigwait([signal.SIGUSR1])
+        if kind == "greedy":
+            np.ones(MEMORY // 8)
+
+    return feed
+
+
+def blend() -> Feed:
+    """Blender's own files, exported by a command of its own, since no sentence of ours can follow a crash in this process."""
+    import subprocess
+
+    samples = sorted((TESTS.parent / "sample_scenes").glob("*.blend"), key=lambda path: path.stat().st_size)[:3]
+
+    def feed(chance: random.Random, folder: Path) -> None:
+        data, other = (_unpacked(chance.choice(samples)) for _ in range(2))
+        (folder / "mutant.blend").write_bytes(mutants.of_bytes(data, other, chance))
+        words = [sys.executable, "-m", "viewcam_addon", "export", "mutant.blend", "out.json"]
+        ran = subprocess.run(
+            words, cwd=folder, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(TESTS.parent)}
+        )
+        if ran.returncode not in (0, 2, 3) or (ran.returncode > 0) != bool(ran.stderr.strip()):
+            raise Said(f"status {ran.returncode}: {ran.stderr[-LONGEST:]!r}")
+        judge(ran.stderr.strip())
+
+    return feed
+
+
+def _unpacked(path: Path) -> bytes:
+    return path.read_bytes()
+
+
+KINDS = {"scene": scene, "exr": exr, "shots": shots, "sidecar": sidecar, "blend": blend}
+KINDS |= {kind: partial(broken, kind) for kind in ("bug", "crash", "hang", "greedy")}
+
+
+def main(kind: str, first: str, count: str, place: str) -> None:
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    folder = Path(place)
+    feed = KINDS[kind]()
+    for number in range(int(first), int(first) + int(count)):
+        (folder / "current").write_text(str(number))
+        work = folder / f"{kind}-{number}"
+        work.mkdir()
+        signal.setitimer(signal.ITIMER_REAL, SECONDS)
+        try:
+            feed(random.Random(f"{kind} {number}"), work)
+        except Said as error:
+            print(json.dumps({"mutant": number, "said": str(error)}), flush=True)
+        except Exception as error:
+            import traceback
+
+            place = traceback.extract_tb(error.__traceback__)[-1]
+            said = f"{type(error).__name__} at {Path(place.filename).name}:{place.lineno}: {error}"
+            print(json.dumps({"mutant": number, "said": said[:LONGEST]}), flush=True)
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0)
+        if len(sys.argv) < 6:
+            shutil.rmtree(work, ignore_errors=True)
+    (folder / "current").write_text("done")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:5])

@@ -1,0 +1,70 @@
+"""Files of strangers, by the thousand: each is read, or refused in a sentence, within 20 s and 4 GiB.
+
+A few of each kind with every run, all of them with `make test-exhaustive`. One that fails is made again by its number:
+`python tests/fuzz/targets.py KIND NUMBER 1 FOLDER keep` leaves its files in FOLDER.
+"""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+TARGETS = Path(__file__).with_name("targets.py")
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="address space is limited and alarms are set as Linux has it")
+
+
+def failures(kind: str, count: int, folder: Path) -> list[str]:
+    """Feed mutants 0 to count − 1; what is wrong with each. Where one ends the process, another goes on after it."""
+    found: list[str] = []
+    first = 0
+    while first < count:
+        words = [sys.executable, TARGETS, kind, str(first), str(count - first), folder]
+        ran = subprocess.run(words, capture_output=True, text=True)
+        found += (f"{kind} {told['mutant']}: {told['said']}" for told in map(json.loads, ran.stdout.splitlines()))
+        current = folder / "current"
+        reached = current.read_text() if current.exists() else "nothing"
+        if ran.returncode == 0:
+            break
+        found.append(f"{kind} {reached}: ended with status {ran.returncode}: {ran.stderr[-1000:]}")
+        if not reached.isdecimal():
+            break
+        first = int(reached) + 1
+        current.unlink()
+    return found
+
+
+def assert_met(kind: str, count: int, folder: Path) -> None:
+    found = failures(kind, count, folder)
+    assert not found, f"{len(found)} of {count} mutants:\n" + "\n".join(found[:20])
+
+
+SAMPLE = {"scene": 60, "shots": 200}
+ALL = {"scene": 4000, "shots": 3000}
+
+
+@pytest.mark.parametrize("kind", SAMPLE)
+def test_a_hostile_file_is_read_or_refused_in_a_sentence(kind, tmp_path):
+    assert_met(kind, SAMPLE[kind], tmp_path)
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("kind", ALL)
+def test_every_hostile_file_is_read_or_refused_in_a_sentence(kind, tmp_path):
+    assert_met(kind, ALL[kind], tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("bug", "bug 2: a bug"),
+        ("crash", "crash 2: ended with status -11"),
+        ("hang", "hang 2: ended with status -14"),
+        ("greedy", "greedy 2: MemoryError"),
+    ],
+)
+def test_what_a_mutant_can_do_is_seen(kind, words, tmp_path):
+    found = failures(kind, 4, tmp_path)
+    assert [each[: len(words)] for each in found] == [words], found
