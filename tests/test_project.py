@@ -27,10 +27,12 @@ FLOORS = [
     "exact",
     "pinhole",
     "roll",
+    "rotation",
     "moves",
     "diagram",
     "image",
     "intrinsics",
+    "camera_values",
     "cameras",
     "camera_text",
     "datasets",
@@ -50,17 +52,15 @@ BLENDER_FLOORS = [
     "versions",
     "borrowing",
     "findings",
-    "rotation",
     "render_settings",
     "preferences",
     "datablocks",
-    "picture",
+    "storage",
     "targets",
     "hold",
     "pose",
     "suspects",
     "camera",
-    "rolling",
     "properties",
     "resolution",
     "animation",
@@ -222,6 +222,44 @@ def test_everything_outside_blender_imports_where_there_is_no_blender():
     )
     outcome = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True)
     assert outcome.returncode == 0, outcome.stderr
+
+
+# Only these know `object.virtual_pinhole`; what lies below the interface knows CameraValues, so that no import goes up unseen.
+KNOW_THE_PROPERTY_GROUP = {"storage.py", "targets.py", "properties.py", "__init__.py"}
+METHODS = {"numbers", "precision"}
+
+
+def uses_of_the_property_group(source: str) -> list[str]:
+    """Where `source` reads `….virtual_pinhole`, or takes or gives a PropertyGroup."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Attribute) and node.attr in ("virtual_pinhole", "PropertyGroup"):
+            found.append(f"{node.lineno}: {ast.unparse(node)}")
+    return found
+
+
+def test_below_the_interface_nothing_takes_the_property_group():
+    """The camera's modules take objects and CameraValues: a call of the group's methods would be a call upward."""
+    camera_side = [path for path in NEEDS_BLENDER.glob("*.py") if path.name not in KNOW_THE_PROPERTY_GROUP]
+    uses = {path.name: uses_of_the_property_group(path.read_text(encoding="utf-8")) for path in camera_side}
+    settings = uses.pop("render_settings.py")  # a property group of its own
+    assert len(settings) == 1
+    guilty = {name: found for name, found in uses.items() if found}
+    assert len(uses) > 8 and not guilty, f"these reach up into the property group: {guilty}"
+    for name in ("storage.py", "targets.py"):
+        calls = {
+            node.func.attr
+            for node in ast.walk(ast.parse((NEEDS_BLENDER / name).read_text(encoding="utf-8")))
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
+        }
+        assert not calls & METHODS, f"{name} calls methods of the property group: {calls & METHODS}"
+
+
+@pytest.mark.parametrize(
+    "source", ["def f(group: bpy.types.PropertyGroup): ...", "camera_object.virtual_pinhole.numbers()", "g = o.virtual_pinhole"]
+)
+def test_a_use_of_the_property_group_is_seen(source):
+    assert uses_of_the_property_group(source)
 
 
 def test_the_version_stands_in_one_place():

@@ -10,7 +10,7 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon import roll as rolls
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import findings, hold
+from viewcam_addon.blender import findings, hold, targets
 from viewcam_addon.blender.interface import panel
 
 TURN = findings.LARGEST_TURN  # what float32 storage makes of a rotation
@@ -48,7 +48,7 @@ def rolls_of(camera_object, scene, frames):
     result = {}
     for frame in frames:
         scene.frame_set(math.floor(frame), subframe=frame % 1.0)
-        result[frame] = hold.roll(camera_object, scene)
+        result[frame] = hold.roll(camera_object, targets.values(camera_object), scene)
     return result
 
 
@@ -61,7 +61,7 @@ def test_an_animation_over_the_top_turns_no_more_than_the_view(looping_camera, s
             assert turn_between(before, after) <= math.radians(1) + 2 * TURN, f"frame {frame}"
         before = after
         assert findings.differences(cameras.stated(looping_camera, scene), cameras.read(looping_camera, scene), reach=10) == {}
-    assert abs(hold.roll(looping_camera, scene)) == pytest.approx(math.pi, abs=1e-12)
+    assert abs(hold.roll(looping_camera, targets.values(looping_camera), scene)) == pytest.approx(math.pi, abs=1e-12)
     assert after[2, 1] < -0.3
 
 
@@ -124,9 +124,9 @@ def test_an_edit_beside_the_reach_of_the_pole_carries_nothing_though_the_next_fr
     looping_camera.virtual_pinhole.hold_within = math.radians(10.5)
     x, _, z = over_the_top(-11)
     looping_camera.virtual_pinhole.eye = (x * math.cos(0.2), x * math.sin(0.2), z)
-    assert hold.roll(looping_camera, scene) == 0
+    assert hold.roll(looping_camera, targets.values(looping_camera), scene) == 0
     scene.frame_set(10)
-    assert hold.roll(looping_camera, scene) == 0
+    assert hold.roll(looping_camera, targets.values(looping_camera), scene) == 0
 
 
 def test_a_keyframed_roll_is_added(looping_camera, scene):
@@ -145,9 +145,9 @@ def test_only_what_is_animated_is_read_from_curves(looping_camera, scene):
     """Moving the constant look-at point along with nothing else changes the flight, at all frames."""
     scene.frame_set(41)
     looping_camera.virtual_pinhole.look_at = (0, 9, 0)
-    assert hold.roll(looping_camera, scene) == 0  # never near the pole now
+    assert hold.roll(looping_camera, targets.values(looping_camera), scene) == 0  # never near the pole now
     looping_camera.virtual_pinhole.look_at = (0, 0, 0)
-    assert abs(hold.roll(looping_camera, scene)) == pytest.approx(math.pi, abs=1e-12)
+    assert abs(hold.roll(looping_camera, targets.values(looping_camera), scene)) == pytest.approx(math.pi, abs=1e-12)
 
 
 def test_a_frame_whose_values_make_no_camera_is_flown_across(looping_camera, scene):
@@ -165,7 +165,7 @@ def test_a_muted_curve_is_not_read(looping_camera, scene, over_the_top):
         curve.mute = True
     scene.frame_set(41)
     assert tuple(looping_camera.virtual_pinhole.eye) == pytest.approx(over_the_top(-20))
-    assert hold.roll(looping_camera, scene) == 0
+    assert hold.roll(looping_camera, targets.values(looping_camera), scene) == 0
 
 
 def test_a_muted_group_of_curves_is_read_where_blender_plays_it(looping_camera, scene, key_a_loop):
@@ -176,7 +176,7 @@ def test_a_muted_group_of_curves_is_read_where_blender_plays_it(looping_camera, 
         curve.group.mute = True
     scene.frame_set(41)
     has_flown = looping_camera.virtual_pinhole.eye[0] > 0
-    assert (abs(hold.roll(looping_camera, scene)) > 3) == has_flown
+    assert (abs(hold.roll(looping_camera, targets.values(looping_camera), scene)) > 3) == has_flown
 
 
 def test_time_that_is_stretched_is_followed(looping_camera, scene):
@@ -192,7 +192,7 @@ def test_time_that_is_stretched_is_followed(looping_camera, scene):
 def test_a_driver_can_not_be_held_and_the_panel_says_so(looping_camera, scene, name):
     looping_camera.virtual_pinhole.driver_add(name, 0).driver.expression = "0.25 * frame"
     scene.frame_set(41)
-    assert hold.roll(looping_camera, scene) == 0
+    assert hold.roll(looping_camera, targets.values(looping_camera), scene) == 0
     (sentence,) = (each.sentence for each in panel.notices(looping_camera, scene) if "not held" in each.sentence)
     assert sentence.startswith(f"A driver sets the {name.replace('_', '-')}, ")
 
@@ -206,7 +206,7 @@ def test_an_nla_strip_can_not_be_held_and_the_panel_says_so(looping_camera, scen
     data.action = None
     scene.frame_set(41)
     assert hold.is_animated(looping_camera)
-    assert hold.roll(looping_camera, scene) == 0
+    assert hold.roll(looping_camera, targets.values(looping_camera), scene) == 0
     assert sum(each.sentence.startswith("An NLA strip sets the eye, ") for each in panel.notices(looping_camera, scene)) == 1
     track.mute = True
     assert hold.obstacle(looping_camera) is None
@@ -285,7 +285,7 @@ def test_a_frame_change_stays_fast_after_ten_thousand_frames(held_camera, scene)
     durations = []
     for _ in range(3):
         start = time.perf_counter()
-        hold.roll(held_camera, scene)
+        hold.roll(held_camera, targets.values(held_camera), scene)
         durations.append(time.perf_counter() - start)
     # Ten times what it takes on two cores, since a machine may be slow or busy.
     assert min(durations) < 0.5, f"{min(durations) * 1e3:.0f} ms"

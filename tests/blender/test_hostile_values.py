@@ -12,8 +12,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from viewcam_addon import rotation
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import pose, rotation
+from viewcam_addon.blender import pose
 from viewcam_addon.blender.interface import panel
 from viewcam_addon.errors import InputError
 

@@ -7,8 +7,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from viewcam_addon import rotation
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import rotation
 from viewcam_addon.pinhole import Pinhole
 
 MODES = ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX", "QUATERNION", "AXIS_ANGLE"]

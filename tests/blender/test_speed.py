@@ -14,7 +14,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import animation, findings, properties
+from viewcam_addon.blender import animation, findings, storage
 from viewcam_addon.blender import camera as cameras
 
 
@@ -201,7 +201,7 @@ def leftovers(once, count):
 def kept():
     """What there is without what is remembered for a while, which is a fixed number of entries."""
     cameras._in_place.clear()
-    properties._parsed.cache_clear()
+    storage._parsed.cache_clear()
     gc.collect()
     return tracemalloc.get_traced_memory()[0], largest_memory(), datablocks(), len(gc.get_objects())
 

@@ -278,7 +278,7 @@ def test_what_cycles_is_compared_with_follows_the_target(watching_camera, scene,
     found = both_sides(frame=6)
     assert found.exported.stated_camera.look_at == (6, 2, 3)
     found.check()
-    assert targets.target_of(watching_camera.virtual_pinhole, "look_at") == moving_target
+    assert targets.target_of(watching_camera, "look_at") == moving_target
 
 
 def test_a_comparison_in_another_size_keeps_the_target(watching_camera, scene, target):

@@ -104,7 +104,7 @@ def test_a_loop_that_is_made_later_stops_the_following_and_one_that_is_undone_ta
 @pytest.mark.parametrize("point", ["eye", "look_at"])
 def test_the_camera_itself_is_no_target(posed_camera, scene, point):
     group = posed_camera.virtual_pinhole
-    assert not targets.can_be_target(group, posed_camera)
+    assert not targets.can_be_target(posed_camera, posed_camera)
     setattr(group, f"{point}_target", posed_camera)
     update()
     assert is_where_stated(posed_camera, scene)
@@ -113,8 +113,8 @@ def test_the_camera_itself_is_no_target(posed_camera, scene, point):
 
 def test_the_list_to_choose_from_leaves_out_what_the_camera_moves(posed_camera, target, empty):
     target.parent = posed_camera
-    assert not targets.can_be_target(posed_camera.virtual_pinhole, target)
-    assert targets.can_be_target(posed_camera.virtual_pinhole, empty("Other"))
+    assert not targets.can_be_target(posed_camera, target)
+    assert targets.can_be_target(posed_camera, empty("Other"))
 
 
 def test_two_cameras_may_look_at_each_other(watching_camera, scene, target, add_camera):

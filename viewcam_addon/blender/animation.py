@@ -17,7 +17,7 @@ from bpy.app.handlers import persistent
 
 from ..errors import InputError
 from . import camera as cameras
-from . import targets, versions
+from . import storage, targets, versions
 from .datablocks import is_animated
 
 
@@ -62,7 +62,7 @@ def _is_driven(camera_object: bpy.types.Object) -> bool:
 
 def _follow(camera_object: bpy.types.Object, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     evaluated = camera_object.evaluated_get(depsgraph)
-    if not evaluated.is_evaluated or not evaluated.virtual_pinhole.enabled:
+    if not evaluated.is_evaluated or not storage.is_enabled(evaluated):
         return
     try:
         cameras.place(camera_object, cameras.stated(evaluated, scene), scene, depsgraph)
@@ -74,7 +74,7 @@ def _follow(camera_object: bpy.types.Object, scene: bpy.types.Scene, depsgraph: 
         camera_object.data.update_tag(refresh={"TIME"})
     else:
         targets.connect(camera_object)  # one that was removed from the file leaves its driver
-        camera_object.virtual_pinhole.mirror(evaluated.virtual_pinhole)
+        targets.mirror(camera_object, evaluated)
 
 
 def register() -> None:

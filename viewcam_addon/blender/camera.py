@@ -15,6 +15,7 @@ Blender's 1 mm: then lens and sensor double together, and the artist's sensor co
 negative scale mirrors the picture, as in Cycles; its sign changes only if the Pinhole asks for the other picture.
 """
 
+import contextlib
 import math
 from dataclasses import replace
 
@@ -22,16 +23,18 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import intrinsics
+from .. import intrinsics, rotation
 from .. import roll as rolls
+from ..camera_values import HOLD, CameraValues, without_border
 from ..errors import InputError
 from ..pinhole import Pinhole, Triple
-from . import datablocks, findings, hold, pose, preferences, rotation, suspects, targets
-from . import picture as pictures
+from . import datablocks, findings, hold, pose, preferences, storage, suspects, targets
 
 Array = NDArray[np.float64]
 
 _LARGEST_FLOAT32 = float(np.finfo(np.float32).max)
+# A turn by less is lost in the float32 matrix in which a camera is stored, and would be shown as −0°.
+_UNSEEN = 2.0**-24
 
 # What `place` was asked for lately, with the state that it left: Blender tells of each edit once more when it evaluates it, and
 # a camera that follows something would be placed where it stands already.
@@ -56,14 +59,32 @@ def apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Sc
     _place_closely(camera_object, pinhole, scene)
     frame = datablocks.frame_of(scene)
     followed = targets.names(camera_object)
-    camera_object.virtual_pinhole.state(
-        pinhole.eye, pinhole.look_at, pinhole.up, pinhole.distance[0] * (frame.resolution_x / frame.size[0]), frame
-    )
+    at_full_size = pinhole.distance[0] * (frame.resolution_x / frame.size[0])
+    state(camera_object, pinhole.eye, pinhole.look_at, pinhole.up, at_full_size, frame)
     if followed:  # being asked where these are, Blender has brought the camera back to them
         _place_closely(camera_object, pinhole, scene)
     kept = targets.names(camera_object)
     left = [f"The {words} no longer follows {name!r}" for words, name in followed.items() if words not in kept]
     return left + check(camera_object, pinhole, scene)
+
+
+def state(
+    camera_object: bpy.types.Object, eye: Triple, look_at: Triple, up: Triple, distance: float, frame: intrinsics.Frame
+) -> None:
+    """Set the four values in float64 and enable them; the camera stays where it is.
+
+    distance : the effective one in the picture of `frame` at 100 %, zoom included.
+    A target that stands exactly where the point is stated stays, any other is cleared.
+    """
+    released = [point for point, at in (("eye", eye), ("look_at", look_at)) if targets.place(camera_object, point) != tuple(at)]
+    for point in released:
+        targets.release(camera_object, point)
+    before = storage.load(camera_object)
+    if not storage.is_counted_in_earlier(camera_object, before):
+        before = replace(before, counted_in=without_border(frame))
+    said = before.stating(eye, look_at, up, distance, frame, camera_object.data.sensor_fit)
+    storage.store(camera_object, said, *storage.EXACT, "counted_in", "enabled", *(["zoom"] if said.zoom != before.zoom else []))
+    storage.settle(camera_object, said, frame)
 
 
 def follow(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
@@ -74,14 +95,13 @@ def follow(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
     InputError
         as `stated` and `apply` do. Nothing has changed then.
     """
-    group = camera_object.virtual_pinhole
-    level = _level(camera_object, scene)
-    roll, angle = group.held_roll, hold.roll(camera_object, scene)
-    if hold.is_written_by_edits(camera_object):
-        before = _stood_at(camera_object, scene)
-        roll = angle = hold.after_edit(before, level, roll, group.hold_within) if before else roll
+    values, level = _level(camera_object, scene)
+    held, angle = values.held_roll, hold.roll(camera_object, values, scene)
+    if hold.is_written_by_edits(camera_object, values):
+        before = _stood_at(camera_object, values, scene)
+        held = angle = hold.after_edit(before, level, held, values.hold_within) if before else held
     _place_closely(camera_object, rolls.turned(level, angle), scene)
-    group.settle(datablocks.frame_of(scene), roll)
+    storage.settle(camera_object, replace(values.as_set(), held_roll=held), datablocks.frame_of(scene))
 
 
 def place(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
@@ -124,7 +144,7 @@ def refit(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
     datablocks.check_perspective(camera_object)
     camera, frame = camera_object.data, datablocks.frame_of(scene)
     plane = intrinsics.view_plane(datablocks.camera_data_of(camera), frame)
-    distance = _distances(camera_object.virtual_pinhole, frame)
+    distance = targets.values(camera_object).distances(frame, camera.sensor_fit)
     sensor = datablocks.own_sensor(camera)
     data = intrinsics.camera_data(replace(plane, distance=distance), frame, *sensor, camera.sensor_fit)
     _check_storable(camera_object, distance=(data.lens, data.sensor_width))
@@ -226,49 +246,31 @@ def stated(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole |
     InputError
         if the values make no camera: eye = look-at, up = 0, distance ≤ 0, a number that is not finite.
     """
-    if not camera_object.virtual_pinhole.enabled:
+    if not storage.is_enabled(camera_object):
         return None
-    level = _level(camera_object, scene)
-    return rolls.turned(level, hold.roll(camera_object, scene))
+    values, level = _level(camera_object, scene)
+    return rolls.turned(level, hold.roll(camera_object, values, scene))
 
 
-def _level(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
-    """What the four values ask for, whatever the roll is."""
+def _level(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> tuple[CameraValues, Pinhole]:
+    """The values, and the Pinhole that they ask for, whatever the roll is."""
     datablocks.check_perspective(camera_object)
     evaluated = camera_object if camera_object.is_evaluated else camera_object.evaluated_get(datablocks.depsgraph_of(scene))
     frame = datablocks.frame_of(scene)
     plane = intrinsics.view_plane(datablocks.camera_data_of(evaluated.data), frame)
-    group = camera_object.virtual_pinhole
-    eye, look_at, up, _ = group.numbers()
-    return Pinhole(
-        eye,
-        look_at,
-        up,
-        _distances(group, frame),
-        plane.width,
-        plane.height,
-        plane.principal_point,
-        pose.mirrors(evaluated.matrix_world),
-    )
+    values = targets.values(camera_object)
+    return values, values.pinhole(plane, frame, camera_object.data.sensor_fit, pose.mirrors(evaluated.matrix_world))
 
 
-def _distances(group: bpy.types.PropertyGroup, frame: intrinsics.Frame) -> tuple[float, float]:
-    """(d_x, d_y) as the values ask for them in the picture of `frame`."""
-    distance = pictures.distance(group, frame) * (frame.size[0] / frame.resolution_x)
-    return distance, distance * (frame.pixel_aspect_x / frame.pixel_aspect_y)
-
-
-def _stood_at(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole | None:
+def _stood_at(camera_object: bpy.types.Object, values: CameraValues, scene: bpy.types.Scene) -> Pinhole | None:
     """The view before an edit, without its roll, or None if the camera does not stand where it was set (moved, constrained)."""
-    group = camera_object.virtual_pinhole
-    numbers = group.numbers_when_set()
-    if numbers is None:
+    if values.view_when_set is None:
         return None
     try:
-        before, found = Pinhole(*numbers, 1.0, 1, 1), read(camera_object, scene)
+        before, found = Pinhole(*values.view_when_set, 1.0, 1, 1), read(camera_object, scene)
     except InputError:
         return None
-    off = np.subtract(rolls.turned(before, group.held_roll).basis(), found.basis())
+    off = np.subtract(rolls.turned(before, values.held_roll).basis(), found.basis())
     return before if np.abs(off).max() <= findings.LARGEST_TURN else None
 
 
@@ -286,27 +288,28 @@ def adopt(camera_object: bpy.types.Object, scene: bpy.types.Scene, keep: frozens
     InputError
         as `read` does.
     """
-    group = camera_object.virtual_pinhole
-    standing = as_it_stands(camera_object, scene, in_use=group.enabled and not keep)
-    eye, look_at, up, _ = group.numbers()
-    frame = datablocks.frame_of(scene)
+    standing = as_it_stands(camera_object, scene, in_use=storage.is_enabled(camera_object) and not keep)
+    values, frame = targets.values(camera_object), datablocks.frame_of(scene)
+    eye, look_at, up = values.eye, values.look_at, values.up
     if "eye" not in keep:
         eye = standing.eye
     if "look_at" not in keep:
         look_at = standing.look_at
-    eye, look_at = _as_followed(group, eye, look_at)
+    eye, look_at = _as_followed(camera_object, eye, look_at)
     if "up" not in keep:
         up = simplest_up(eye, look_at, read(camera_object, scene).basis()[1])
-    at_full_size = standing.distance[0] * frame.resolution_x / frame.size[0]
-    group.state(eye, look_at, up, pictures.distance(group, frame) if "distance" in keep else at_full_size, frame)
+    distance = standing.distance[0] * frame.resolution_x / frame.size[0]
+    if "distance" in keep:
+        distance = values.distance_at_full_size(frame, camera_object.data.sensor_fit)
+    state(camera_object, eye, look_at, up, distance, frame)
 
 
-def _as_followed(group: bpy.types.PropertyGroup, eye: Triple, look_at: Triple) -> tuple[Triple, Triple]:
+def _as_followed(camera_object: bpy.types.Object, eye: Triple, look_at: Triple) -> tuple[Triple, Triple]:
     """Eye and look-at, but the place of its target for a point that is there but for rounding, so that it stays followed."""
     rounding = findings.LARGEST_TURN * (math.dist(eye, look_at) + max(map(abs, (*eye, *look_at))))
     found = []
     for point, stated in zip(targets.POINTS, (eye, look_at), strict=True):
-        at = targets.place(group, point)
+        at = targets.place(camera_object, point)
         found.append(at if at is not None and math.dist(at, stated) <= rounding else stated)
     return tuple(found)
 
@@ -323,8 +326,8 @@ def as_it_stands(camera_object: bpy.types.Object, scene: bpy.types.Scene, in_use
     """
     found = read(camera_object, scene)
     _, v, w = found.basis()
-    eye, look_at, _, _ = camera_object.virtual_pinhole.numbers()
-    reach = math.dist(eye, look_at) if in_use else 0.0
+    values = targets.values(camera_object)
+    reach = math.dist(values.eye, values.look_at) if in_use else 0.0
     if not 0 < reach < math.inf:
         reach = _focus_distance(camera_object, found, datablocks.depsgraph_of(scene))
     look_at = tuple((np.array(found.eye) - reach * w).tolist())
@@ -347,3 +350,29 @@ def _focus_distance(camera_object: bpy.types.Object, pinhole: Pinhole, depsgraph
         if np.isfinite(place).all() and (depth := float(pinhole.project(place)[2])) > 0:
             return depth
     return focus.focus_distance if focus.focus_distance > 0 else 10.0  # which nan is not
+
+
+def roll(camera_object: bpy.types.Object) -> float:
+    """The property `roll`, radians: 0 where the values make no camera, and below what can be seen."""
+    with contextlib.suppress(InputError):
+        values = targets.values(camera_object)
+        found = values.roll_from(preferences.up_axis(), _held_roll(camera_object, values))
+        return found if abs(found) > _UNSEEN else 0.0
+    return 0.0
+
+
+def turn(camera_object: bpy.types.Object, angle: float) -> None:
+    """Say values with that `roll`, radians, and move nothing. Those that make no camera stay as they are."""
+    with contextlib.suppress(InputError):
+        values = targets.values(camera_object)
+        held = _held_roll(camera_object, values)
+        if values.pole == HOLD:
+            more = angle - values.roll_from(preferences.up_axis(), held)
+            storage.store(camera_object, replace(values, held_roll=values.held_roll + more), "held_roll")
+        else:
+            up = rolls.rolled(rolls.turned(values.view(), held), preferences.up_axis(), angle).up
+            storage.store(camera_object, replace(storage.load(camera_object), up=up), "up")
+
+
+def _held_roll(camera_object: bpy.types.Object, values: CameraValues) -> float:
+    return hold.roll(camera_object, values, datablocks.scene_of(camera_object.original))

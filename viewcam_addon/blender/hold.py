@@ -22,8 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import roll as rolls
+from ..camera_values import HOLD, CameraValues
 from ..pinhole import Pinhole
-from . import versions
+from . import storage, versions
 from .datablocks import is_animated
 from .targets import POINTS, target_of
 
@@ -33,37 +34,35 @@ Array = NDArray[np.float64]
 _COLUMNS = {f"virtual_pinhole.{name}": 3 * i for i, name in enumerate(("eye", "look_at", "up"))}
 
 
-def roll(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> float:
+def roll(camera_object: bpy.types.Object, values: CameraValues, scene: bpy.types.Scene) -> float:
     """Radians by which the picture is turned from what up says, at the scene's current frame.
 
-    The evaluated object of any depsgraph may be given as well.
+    The evaluated object of any depsgraph may be given as well, with its values.
 
     Raises
     ------
     InputError
         if the values make no camera.
     """
-    group = camera_object.virtual_pinhole
-    if group.pole != "HOLD":
+    if values.pole != HOLD:
         return 0.0
     curves = _view_curves(versions.action_curves(camera_object.original))
     if not curves or obstacle(camera_object.original):
-        return group.held_roll
-    return group.held_roll + _carried_since_first_frame(group, curves, scene)
+        return values.held_roll
+    return values.held_roll + _carried_since_first_frame(values, curves, scene)
 
 
-def is_written_by_edits(camera_object: bpy.types.Object) -> bool:
+def is_written_by_edits(camera_object: bpy.types.Object, values: CameraValues) -> bool:
     """Whether an edit of the values carries the roll along and writes it; in an animation the curves say what it is."""
-    return camera_object.virtual_pinhole.pole == "HOLD" and not is_animated(camera_object)
+    return values.pole == HOLD and not is_animated(camera_object)
 
 
 def obstacle(camera_object: bpy.types.Object) -> str | None:
     """The sentence that says why an animation's roll can't be held, or None where it can."""
-    group = camera_object.virtual_pinhole
-    if group.pole != "HOLD":
+    if storage.load(camera_object).pole != HOLD:
         return None
     for point, words in POINTS.items():
-        if target := target_of(group, point):
+        if target := target_of(camera_object, point):
             return (
                 f"The {words} follows {target.name!r}, whose place at other frames can't be known, so that the roll is not "
                 "held: clear the target, or choose Canonical Axes"
@@ -96,22 +95,21 @@ def _view_curves(curves: list[bpy.types.FCurve]) -> list[bpy.types.FCurve]:
     return [curve for curve in curves if curve.data_path in _COLUMNS and not versions.is_muted(curve)]
 
 
-def _carried_since_first_frame(group: bpy.types.PropertyGroup, curves: list[bpy.types.FCurve], scene: bpy.types.Scene) -> float:
+def _carried_since_first_frame(values: CameraValues, curves: list[bpy.types.FCurve], scene: bpy.types.Scene) -> float:
     now, first = scene.frame_current_final, scene.frame_start
     whole = math.floor(now)
-    eye, look_at, up, _ = group.numbers()
-    stated = np.array([*eye, *look_at, *up])
+    stated = np.array([*values.eye, *values.look_at, *values.up])
     frames = np.arange(min(first, whole), max(first, whole + 1) + 1)
     poses = _poses(stated, curves, frames)
     frames, poses = _without_gaps(frames, poses)
     if not len(frames):
         return 0.0
-    turns, near = rolls.steps(*_vectors(poses), group.hold_within)
+    turns, near = rolls.steps(*_vectors(poses), values.hold_within)
     totals = np.concatenate([[0.0], np.cumsum(np.where(near, turns, 0.0))])
     start, here = np.maximum(np.searchsorted(frames, (first, whole), side="right") - 1, 0)
     # A sub-frame belongs to the step that it is a part of: were it to decide alone, the picture would jump within a frame.
     amid_carried_step = now > whole and here < len(near) and near[here]
-    last = _step([poses[here], stated], math.pi / 2 if amid_carried_step else group.hold_within)
+    last = _step([poses[here], stated], math.pi / 2 if amid_carried_step else values.hold_within)
     return float(totals[here] - totals[start] + (last or 0.0))
 
 

@@ -16,9 +16,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import rotation
 from ..errors import InputError
 from ..pinhole import Pinhole
-from . import rotation
 
 Array = NDArray[np.float64]
 

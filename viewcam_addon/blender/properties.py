@@ -1,110 +1,103 @@
-"""`object.virtual_pinhole`: the four values, and the camera that moves when one of them is edited.
+"""`object.virtual_pinhole`: the values as Blender shows and keeps them, and the camera that moves when one of them is edited.
 
-Blender's properties are float32. What a script states in float64 would be lost in them, so `exact` keeps the numbers as they
-were given; each counts as long as it rounds to the property beside it, and an edit or a keyframe overrules it. Rejected: ID
-properties for the values themselves (float64, but without update callbacks, units, limits and library overrides).
+A property group that stores and does not think: what its values are is a `CameraValues` (camera_values.py, read and written by
+storage.py), and what they do to the camera stands in camera.py.
 
-Where the roll is held through the pole (hold.py), an edit also writes the new roll. `when_set` remembers the view of the
-camera as it was last set, from which the next edit sets out: a callback hears of an edit only when the old value is gone.
-
-`zoom` is a factor on d of its own, so that a zoom can be keyed and taken off again: `numbers` gives the product. `roll` is not
-stored (rolling.py).
-
-`keeps` says what the camera keeps when the picture gets another resolution (picture.py, resolution.py).
+`roll` is not stored: it is the angle about the view by which the picture is turned from what the preferred up axis says, read
+off the axes, well defined straight down as well, where the canonical ones count. Setting it turns up, or where the roll is held
+through the pole (hold.py), what is held. Rejected: to store it, a second truth beside up, and to animate it: up can be keyed,
+and of a keyed roll and a keyed up one would have to win.
 
 Undo, redo and opening a file bring values and camera back together and call nothing. Callbacks raise nothing: values that make
 no camera (eye = look-at) leave it where it was, and the panel says so.
 """
 
 import contextlib
-import functools
-import json
 import math
-from collections.abc import Iterator
+from dataclasses import replace
 
 import bpy
-import numpy as np
 
-from .. import checks, intrinsics
+from ..camera_values import CANONICAL, FIELD_OF_VIEW, HOLD, PIXELS, without_border
 from ..errors import InputError
 from . import camera as cameras
-from . import datablocks, picture, rolling, targets
-
-VALUES = ("eye", "look_at", "up", "distance")
-_stating = False
-
-
-@contextlib.contextmanager
-def without_callbacks() -> Iterator[None]:
-    """Values may be written in here without moving the camera."""
-    global _stating
-    before, _stating = _stating, True
-    try:
-        yield
-    finally:
-        _stating = before
+from . import datablocks, storage, targets
 
 
 def _on_enabled(group: "VirtualPinhole", context: bpy.types.Context) -> None:
     """What nobody has stated yet follows the camera, so that enabling for the first time moves nothing."""
-    if _stating or not group.enabled:
+    if storage.is_being_written() or not group.enabled:
         return
-    keep = frozenset(name for name in VALUES if group.is_property_set(name))
-    if keep != frozenset(VALUES):
-        with without_callbacks():
+    keep = frozenset(name for name in storage.EXACT if group.is_property_set(name))
+    if keep != frozenset(storage.EXACT):
+        with storage.without_callbacks():
             group.enabled = False  # else a target would move the camera before it is read
         with contextlib.suppress(InputError):
             cameras.adopt(group.id_data, datablocks.scene_of(group.id_data), keep)
-        with without_callbacks():
+        with storage.without_callbacks():
             group.enabled = True
     if keep:
         _on_edited(group, context)
 
 
 def _on_edited(group: "VirtualPinhole", _context: bpy.types.Context) -> None:
-    if _stating or not group.enabled:
+    if storage.is_being_written() or not group.enabled:
         return
-    camera_object = group.id_data
-    scene = datablocks.scene_of(camera_object)
     with contextlib.suppress(InputError):  # the panel finds the same error and shows it
-        cameras.follow(camera_object, scene)
+        cameras.follow(group.id_data, datablocks.scene_of(group.id_data))
 
 
 def _on_distance(group: "VirtualPinhole", context: bpy.types.Context) -> None:
     """Who states a distance means the pixels of the picture as it is now."""
-    if not _stating and not picture.is_counted_in_earlier(group):
-        _count_in_present_picture(group)
+    if not storage.is_being_written():
+        values = storage.load(group.id_data)
+        if not storage.is_counted_in_earlier(group.id_data, values):
+            _count_in_present_picture(group)
     _on_edited(group, context)
 
 
 def _on_keeps(group: "VirtualPinhole", context: bpy.types.Context) -> None:
-    if not _stating:
+    if not storage.is_being_written():
         _count_in_present_picture(group)
     _on_edited(group, context)
 
 
 def _count_in_present_picture(group: "VirtualPinhole") -> None:
     with contextlib.suppress(InputError):  # the panel finds the same error and shows it
-        group.counted_in = picture.shape(datablocks.frame_of(datablocks.scene_of(group.id_data)))
+        picture = without_border(datablocks.frame_of(datablocks.scene_of(group.id_data)))
+        storage.store(group.id_data, replace(storage.load(group.id_data), counted_in=picture), "counted_in")
 
 
 def _on_pole(group: "VirtualPinhole", context: bpy.types.Context) -> None:
-    if group.pole != "HOLD":
-        with without_callbacks():
+    if group.pole != HOLD:
+        with storage.without_callbacks():
             group.held_roll = 0.0
     _on_edited(group, context)
 
 
 def _on_target(group: "VirtualPinhole", context: bpy.types.Context) -> None:
-    if _stating:
+    if storage.is_being_written():
         return
     targets.connect(group.id_data)
-    group.mirror(group)
+    targets.mirror(group.id_data, group.id_data)
     _on_edited(group, context)
 
 
 def _on_shown(_group: "VirtualPinhole", _context: bpy.types.Context) -> None:
     """Nothing, but without a callback Blender draws nothing anew where a script sets the property."""
+
+
+def _can_be_target(group: "VirtualPinhole", candidate: bpy.types.Object) -> bool:
+    return targets.can_be_target(group.id_data, candidate)
+
+
+def _roll(group: "VirtualPinhole") -> float:
+    return cameras.roll(group.id_data)
+
+
+def _turn(group: "VirtualPinhole", angle: float) -> None:
+    cameras.turn(group.id_data, angle)
+    _on_edited(group, bpy.context)
 
 
 class VirtualPinhole(bpy.types.PropertyGroup):
@@ -145,7 +138,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         name="Eye Target",
         description="An object in whose origin the camera stands, wherever it is moved. Empty: the point above counts",
         type=bpy.types.Object,
-        poll=targets.can_be_target,
+        poll=_can_be_target,
         update=_on_target,
         override={"LIBRARY_OVERRIDABLE"},
     )
@@ -153,7 +146,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         name="Look-At Target",
         description="An object at whose origin the camera looks, wherever it is moved. Empty: the point above counts",
         type=bpy.types.Object,
-        poll=targets.can_be_target,
+        poll=_can_be_target,
         update=_on_target,
         override={"LIBRARY_OVERRIDABLE"},
     )
@@ -190,9 +183,9 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         name="Resize Keeps",
         description="What the camera keeps when the picture gets another resolution",
         items=(
-            ("PIXELS", "Distance", "The distance in pixels: a larger picture shows more, and each pixel as much as before"),
+            (PIXELS, "Distance", "The distance in pixels: a larger picture shows more, and each pixel as much as before"),
             (
-                "FIELD_OF_VIEW",
+                FIELD_OF_VIEW,
                 "Field of View",
                 "The lens: a larger picture shows as much, and the distance in pixels grows with it",
             ),
@@ -207,8 +200,8 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         description="By how much the picture is turned about the view, from how it is where up is the world's Z, or the axis "
         "in the preferences. Setting it turns up. Type 0 to level the picture",
         subtype="ANGLE",
-        get=rolling.angle,
-        set=rolling.turn,
+        get=_roll,
+        set=_turn,
         options=set(),
     )
     pole: bpy.props.EnumProperty(
@@ -216,11 +209,11 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         description="What the picture does where the view comes close to up or down",
         items=(
             (
-                "CANONICAL",
+                CANONICAL,
                 "Canonical Axes",
                 "Up alone decides, and exactly along it fixed axes. The picture flips as the view passes by",
             ),
-            ("HOLD", "Hold the Roll", "The picture is carried along from the pose before, or from the first frame on: no flip"),
+            (HOLD, "Hold the Roll", "The picture is carried along from the pose before, or from the first frame on: no flip"),
         ),
         update=_on_pole,
         options=set(),
@@ -289,97 +282,14 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         override={"LIBRARY_OVERRIDABLE"},
     )
 
-    def state(self, eye: tuple, look_at: tuple, up: tuple, distance: float, frame: intrinsics.Frame, roll: float = 0.0) -> None:
-        """Set the four values in float64 and enable them; the camera stays where it is.
-
-        distance : the effective one in the picture of `frame`, zoom included. A zoom that can be kept stays, others become 1.
-        A target that stands exactly where the point is stated stays, any other is cleared.
-        """
-        released = [point for point, at in (("eye", eye), ("look_at", look_at)) if targets.place(self, point) != tuple(at)]
-        if not picture.is_counted_in_earlier(self):
-            self.counted_in = picture.shape(frame)
-        distance /= picture.growth(self, frame)
-        with without_callbacks():
-            for point in released:
-                targets.release(self, point)
-            if not _can_divide(self.zoom, distance):
-                self.zoom = 1.0
-            distance /= self.zoom
-            self.eye, self.look_at, self.up, self.distance = eye, look_at, up, distance
-            self.exact = json.dumps([*eye, *look_at, *up, distance])
-            self.enabled = True
-        self.settle(frame, roll)
-
-    def mirror(self, evaluated: "VirtualPinhole") -> None:
-        """Store where the targets stand, so that the camera stays in place when they are cleared."""
-        with without_callbacks():
-            for point in targets.POINTS:
-                at = targets.place(evaluated, point)
-                if at is not None and at != tuple(getattr(self, point)):
-                    setattr(self, point, at)
-
-    def set_up(self, up: tuple) -> None:
-        """Set up alone, in float64, as an edit does."""
-        eye, look_at, _, distance = self.stored()
-        self.exact = json.dumps([*eye, *look_at, *up, distance])
-        self.up = up
-
-    def multiply_distance(self, factor: float) -> None:
-        """Set the distance alone, in float64; the camera stays where it is."""
-        eye, look_at, up, distance = self.stored()
-        with without_callbacks():
-            self.distance = factor * distance
-            self.exact = json.dumps([*eye, *look_at, *up, factor * distance])
-
-    def settle(self, frame: intrinsics.Frame, roll: float) -> None:
-        """Take note that the camera has been set by the values as they are, for the picture of `frame`."""
-        eye, look_at, up, _ = self.numbers()
-        with without_callbacks():
-            self.held_roll, self.when_set = roll, json.dumps([*eye, *look_at, *up])
-        picture.settle(self, frame)
-
-    def numbers_when_set(self) -> tuple[tuple, tuple, tuple] | None:
-        """Eye, look-at and up as they were when the camera was last set, or None if that is not known."""
-        numbers = _parsed(self.when_set, 9)
-        return (tuple(numbers[0:3]), tuple(numbers[3:6]), tuple(numbers[6:9])) if numbers else None
-
     def numbers(self) -> tuple[tuple, tuple, tuple, float]:
         """Eye, look-at, up and the effective distance, zoom included, in float64. A followed point is where its target is."""
-        eye, look_at, up, distance = self.stored()
-        eye, look_at = targets.place(self, "eye") or eye, targets.place(self, "look_at") or look_at
-        return eye, look_at, up, distance * self.zoom
+        values = targets.values(self.id_data)
+        return values.eye, values.look_at, values.up, values.distance * values.zoom
 
     def precision(self) -> float:
         """The relative rounding of the values: 2⁻⁵³ where all are known in float64, else float32's 2⁻²⁴."""
-        eye, look_at, up, distance = self.stored()
-        is_exact = self._exact() == (*eye, *look_at, *up, distance) and not (self.eye_target or self.look_at_target)
-        return 2.0**-53 if is_exact else 2.0**-24
-
-    def stored(self) -> tuple[tuple, tuple, tuple, float]:
-        """The four values without zoom, and as they are where no target is followed."""
-        exact, shown = self._exact(), [*self.eye, *self.look_at, *self.up, self.distance]
-        with np.errstate(over="ignore"):
-            rounded = np.array(exact, dtype=np.float32).tolist()
-        values = [number if short == value else value for number, short, value in zip(exact, rounded, shown, strict=True)]
-        return tuple(values[0:3]), tuple(values[3:6]), tuple(values[6:9]), values[9]
-
-    def _exact(self) -> tuple[float, ...]:
-        """Ten numbers in float64, NaN where none is known."""
-        return _parsed(self.exact, 10) or (math.nan,) * 10
-
-
-def _can_divide(zoom: float, distance: float) -> bool:
-    """Whether a zoom is a factor above 0 that leaves of the distance a number which Blender stores with all its digits."""
-    float32 = np.finfo(np.float32)
-    return 0 < zoom < math.inf and float(float32.tiny) <= distance / zoom <= float(float32.max)
-
-
-@functools.lru_cache(maxsize=256)
-def _parsed(text: str, count: int) -> tuple[float, ...] | None:
-    """So many finite numbers from JSON, None if it holds anything else."""
-    with contextlib.suppress(ValueError, RecursionError):  # InputError is a ValueError
-        return tuple(checks.vector("the text", json.loads(text), count))
-    return None
+        return storage.load(self.id_data).precision
 
 
 def register() -> None:

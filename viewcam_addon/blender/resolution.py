@@ -5,21 +5,22 @@ and 5.2), in the window, at a script's next evaluation, and before a render. A s
 render only, in `frame_change_post`. Only the lens is set anew: the pose does not depend on the picture, and the artist may have
 moved the camera. Rejected: message-bus subscriptions (they hear of the window's edits only, and not of scripts).
 
-Whether a camera is set for the present picture is stored beside its values (picture.py), so that undo needs no care. A camera
+Whether a camera is set for the present picture is stored beside its values (storage.py), so that undo needs no care. A camera
 that is set for another one of its scenes stays so, and the panel says it: one lens can't serve both.
 """
 
 import contextlib
 from collections.abc import Iterator
+from dataclasses import replace
 
 import bpy
 from bpy.app.handlers import persistent
 
 from .. import intrinsics
+from ..camera_values import FIELD_OF_VIEW, PIXELS, without_border
 from ..errors import InputError
 from . import camera as cameras
-from . import datablocks, picture
-from .properties import without_callbacks
+from . import datablocks, storage
 
 # The picture for which all cameras of a scene have been looked at, by the scene's name, with the scene's address: it is another
 # scene after undo and in another file. Without it every change of a scene's settings would look at every object.
@@ -37,31 +38,29 @@ def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 def lens_kept(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[None]:
     """For a picture of another size within the block: no camera follows it, and this one's values go with its lens."""
     global _is_paused
-    group = camera_object.virtual_pinhole
-    before, was_paused = (group.keeps, tuple(group.counted_in)), _is_paused
+    values, was_paused = storage.load(camera_object), _is_paused
     _is_paused = True
     try:
-        if group.keeps == "PIXELS":
-            with without_callbacks():
-                group.keeps, group.counted_in = "FIELD_OF_VIEW", picture.shape(datablocks.frame_of(scene))
-        yield
+        with storage.restored(camera_object, "keeps", "counted_in"):
+            if values.keeps == PIXELS:
+                picture = without_border(datablocks.frame_of(scene))
+                storage.store(camera_object, replace(values, keeps=FIELD_OF_VIEW, counted_in=picture), "keeps", "counted_in")
+            yield
     finally:
         _is_paused = was_paused
-        with without_callbacks():
-            group.keeps, group.counted_in = before
 
 
 def follow(scene: bpy.types.Scene) -> None:
     """Set the lenses of the scene's cameras for its picture, if it is another one than last time."""
     with contextlib.suppress(InputError):  # no picture at all: the panel says so
         frame = datablocks.frame_of(scene)
-        now = (scene.as_pointer(), picture.shape(frame))
+        now = (scene.as_pointer(), without_border(frame))
         if _seen.get(scene.name_full) != now:
             _seen[scene.name_full] = now
             for camera_object in _set_for_another(scene, frame):
                 with contextlib.suppress(InputError):
                     cameras.refit(camera_object, scene)
-                    picture.settle(camera_object.virtual_pinhole, frame)
+                    storage.settle(camera_object, storage.load(camera_object), frame)
 
 
 @persistent
@@ -82,9 +81,9 @@ def _set_for_another(scene: bpy.types.Scene, frame: intrinsics.Frame) -> list[bp
         each
         for each in scene.objects
         if each.type == "CAMERA"
-        and each.virtual_pinhole.enabled
-        and tuple(each.virtual_pinhole.picture) != picture.shape(frame)
-        and not picture.scenes_it_is_set_for(each, scene)
+        and storage.is_enabled(each)
+        and storage.load(each).set_for != without_border(frame)
+        and not storage.scenes_it_is_set_for(each, scene)
     ]
 
 

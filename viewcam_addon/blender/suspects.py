@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import bpy
 
-from . import datablocks, picture, pose, versions
+from . import datablocks, pose, storage, versions
 from .findings import APPLY_AGAIN, CENTRE, DISTANCE, EYE, LENS, POSE, REMEDY, VIEW, Suspect
 from .hold import is_animated
 
@@ -127,11 +127,11 @@ def _sensor(camera: bpy.types.Camera) -> Iterator[Suspect]:
 
 
 def _render_size(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[Suspect]:
-    frame = picture.frame(camera_object.virtual_pinhole.picture)
+    frame = storage.load(camera_object).set_for
     if frame is None or frame.size == datablocks.frame_of(scene).size:
         return
     before, now = frame.size, datablocks.frame_of(scene).size
-    if others := picture.scenes_it_is_set_for(camera_object, scene):
+    if others := storage.scenes_it_is_set_for(camera_object, scene):
         culprit = (
             f"The camera is set for the {before[0]} × {before[1]} px of scene {others[0].name!r}, "
             f"and scene {scene.name!r} renders {now[0]} × {now[1]}"

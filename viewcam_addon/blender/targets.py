@@ -15,41 +15,59 @@ the other. A target that is such a camera stands at its own eye, so that two cam
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import bpy
 
+from ..camera_values import CameraValues
 from ..pinhole import Triple
-from . import datablocks, versions
+from . import datablocks, storage, versions
 
 POINTS = {"eye": "eye", "look_at": "look-at"}  # property → as a sentence says it
 _HOOK = "virtual_pinhole.followed"
 
 
-def target_of(group: bpy.types.PropertyGroup, point: str) -> bpy.types.Object | None:
+def values(camera_object: bpy.types.Object) -> CameraValues:
+    """The values of a camera, with a followed point where its target is. The evaluated object may be given as well."""
+    found = storage.load(camera_object)
+    followed = {point: place(camera_object, point) for point in POINTS if target_of(camera_object, point)}
+    return replace(found, **{point: at for point, at in followed.items() if at}) if followed else found
+
+
+def target_of(camera_object: bpy.types.Object, point: str) -> bpy.types.Object | None:
     """The object that a point ("eye" or "look_at") is set to follow."""
-    return getattr(group, f"{point}_target")
+    return getattr(camera_object.virtual_pinhole, f"{point}_target")
 
 
-def place(group: bpy.types.PropertyGroup, point: str) -> Triple | None:
+def place(camera_object: bpy.types.Object, point: str) -> Triple | None:
     """World space: where the target of a point stands, or None where there is none to be followed.
 
-    group : of an original object, or of the evaluated one of any depsgraph, which has evaluated targets.
+    camera_object : an original, or the evaluated one of any depsgraph, which has evaluated targets.
     """
-    target = target_of(group, point)
-    if target is None or _chain(target.original, group.id_data.original):
+    target = target_of(camera_object, point)
+    if target is None or _chain(target.original, camera_object.original):
         return None
     if _is_led(target):
-        theirs = target.virtual_pinhole
-        return place(theirs, "eye") or theirs.stored()[0]
+        return place(target, "eye") or storage.load(target).eye
     if not target.is_evaluated:
-        target = target.evaluated_get(datablocks.depsgraph_of(datablocks.scene_of(group.id_data)))
+        target = target.evaluated_get(datablocks.depsgraph_of(datablocks.scene_of(camera_object)))
     return tuple(target.matrix_world.translation)
+
+
+def mirror(camera_object: bpy.types.Object, evaluated: bpy.types.Object) -> None:
+    """Store where the targets stand, so that the camera stays in place when they are cleared."""
+    group = camera_object.virtual_pinhole
+    with storage.without_callbacks():
+        for point in POINTS:
+            at = place(evaluated, point)
+            if at is not None and at != tuple(getattr(group, point)):
+                setattr(group, point, at)
 
 
 def connect(camera_object: bpy.types.Object) -> None:
     """Make the drivers of `followed` those of the targets that are set."""
     for index, point in enumerate(POINTS):
-        target = target_of(camera_object.virtual_pinhole, point)
+        target = target_of(camera_object, point)
         curve = next((each for each in _hooks(camera_object) if each.array_index == index), None)
         if target is None:
             if curve:
@@ -74,22 +92,23 @@ def _depend(driver: bpy.types.Driver, target: bpy.types.Object) -> None:
 
 def names(camera_object: bpy.types.Object) -> dict[str, str]:
     """The targets' names by the words for the point: {"look-at": "Empty"}."""
-    found = ((words, target_of(camera_object.virtual_pinhole, point)) for point, words in POINTS.items())
+    found = ((words, target_of(camera_object, point)) for point, words in POINTS.items())
     return {words: target.name for words, target in found if target}
 
 
-def release(group: bpy.types.PropertyGroup, point: str) -> None:
-    """Clear a target; the point stays as it is stored. To be called without callbacks."""
-    if getattr(group, f"{point}_target"):  # set to None again, Blender would build the relations of all objects anew
-        setattr(group, f"{point}_target", None)
-    connect(group.id_data)
+def release(camera_object: bpy.types.Object, point: str) -> None:
+    """Clear a target; the point stays as it is stored, and the camera where it is."""
+    if target_of(camera_object, point):  # set to None again, Blender would build the relations of all objects anew
+        with storage.without_callbacks():
+            setattr(camera_object.virtual_pinhole, f"{point}_target", None)
+    connect(camera_object)
 
 
 def warnings(camera_object: bpy.types.Object) -> list[str]:
     """One sentence for each target that can't be followed as one would expect."""
     sentences = []
     for point, words in POINTS.items():
-        target = target_of(camera_object.virtual_pinhole, point)
+        target = target_of(camera_object, point)
         if target is None:
             continue
         start = f"The {words} target {target.name!r}"
@@ -107,9 +126,9 @@ def warnings(camera_object: bpy.types.Object) -> list[str]:
     return sentences
 
 
-def can_be_target(group: bpy.types.PropertyGroup, candidate: bpy.types.Object) -> bool:
+def can_be_target(camera_object: bpy.types.Object, candidate: bpy.types.Object) -> bool:
     """Whether an object may be chosen: the camera does not move it."""
-    return not _chain(candidate, group.id_data)
+    return not _chain(candidate, camera_object)
 
 
 def _hooks(camera_object: bpy.types.Object) -> list[bpy.types.FCurve]:
@@ -118,7 +137,7 @@ def _hooks(camera_object: bpy.types.Object) -> list[bpy.types.FCurve]:
 
 def _is_led(block: bpy.types.Object) -> bool:
     """Whether it is a camera that its values place anew, so that Blender's dependency graph does not know where it will be."""
-    return block.type == "CAMERA" and block.virtual_pinhole.enabled and datablocks.is_animated(block)
+    return block.type == "CAMERA" and storage.is_enabled(block) and datablocks.is_animated(block)
 
 
 def _chain(target: bpy.types.Object, camera_object: bpy.types.Object) -> list[bpy.types.Object]:
@@ -151,7 +170,7 @@ def _movers(block: bpy.types.Object, is_place: bool = False) -> Iterator[bpy.typ
     """What an object's pose depends on directly. is_place : its place alone counts, not where it looks."""
     if _is_led(block):
         points = ("eye",) if is_place else POINTS
-        yield from filter(None, (target_of(block.virtual_pinhole, point) for point in points))
+        yield from filter(None, (target_of(block, point) for point in points))
     else:
         if block.parent:
             yield block.parent

@@ -17,7 +17,7 @@ from ... import camera_text
 from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
-from .. import datablocks, picture
+from .. import datablocks, targets
 from .operators import CameraOperator
 
 _NAMES = {"eye": "eye", "look_at": "look-at", "up": "up"}
@@ -82,10 +82,13 @@ def text_of(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> str:
     InputError
         if the values make no camera, or the object is no pinhole.
     """
-    group, frame = camera_object.virtual_pinhole, datablocks.frame_of(scene)
+    frame = datablocks.frame_of(scene)
     stated = cameras.stated(camera_object, scene)
     shown = stated or cameras.as_it_stands(camera_object, scene, in_use=False)
-    distance = picture.distance(group, frame) if stated else shown.distance[0] * (frame.resolution_x / frame.size[0])
+    if stated:
+        distance = targets.values(camera_object).distance_at_full_size(frame, camera_object.data.sensor_fit)
+    else:
+        distance = shown.distance[0] * (frame.resolution_x / frame.size[0])
     return camera_text.written(shown.eye, shown.look_at, shown.up, distance)
 
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from ... import diagram as diagrams
 from ...pinhole import Triple
-from .. import datablocks, properties, versions
+from .. import datablocks, storage, versions
 from . import overlay
 
 _TWEAK = "GIZMOGROUP_OT_gizmo_tweak"
@@ -105,7 +105,7 @@ def _state(camera_object: bpy.types.Object) -> dict[str, object]:
 
 def _restore(camera_object: bpy.types.Object, state: dict[str, object]) -> None:
     present = _state(camera_object)
-    with properties.without_callbacks():
+    with storage.without_callbacks():
         for path, value in state.items():
             if present[path] != value:
                 owner, _, name = path.rpartition(".")

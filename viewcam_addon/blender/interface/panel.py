@@ -67,7 +67,7 @@ def _draw_values(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> 
     column.active = group.enabled
     for point in targets.POINTS:
         row = column.row()
-        row.enabled = targets.place(group, point) is None  # where the point is, its target says
+        row.enabled = targets.place(group.id_data, point) is None  # where the point is, its target says
         row.prop(group, point)
         column.prop(group, f"{point}_target", text="Object")
     column.prop(group, "up")

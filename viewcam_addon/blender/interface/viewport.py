@@ -9,10 +9,11 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
+from ... import rotation
 from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
-from .. import pose, rotation
+from .. import pose
 
 # The larger side of a region shows what a sensor of twice Blender's usual 36 mm sees.
 _SENSOR = 72.0

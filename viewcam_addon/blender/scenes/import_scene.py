@@ -21,12 +21,13 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
+from ... import rotation
 from ...errors import InputError
 from ...pinhole import Pinhole
 from ...tracer.scene import LedgerEntry, Mesh, Object, Scene
 from ...tracer.scene.depths import visible_depths
 from .. import camera as cameras
-from .. import datablocks, findings, rotation
+from .. import datablocks, findings
 from ..borrowing import Borrower
 from . import import_geometry, import_light
 from .indices import LARGEST

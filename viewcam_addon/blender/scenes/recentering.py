@@ -276,7 +276,7 @@ def _camera(borrow: Borrower, temporary: bpy.types.Scene, view: _View) -> bpy.ty
     cameras.place(block, shown, temporary, datablocks.depsgraph_of(temporary))
     frame = datablocks.frame_of(temporary)
     distance = claimed.distance[0] * frame.resolution_x / frame.size[0]
-    block.virtual_pinhole.state(claimed.eye, claimed.look_at, claimed.up, distance, frame)
+    cameras.state(block, claimed.eye, claimed.look_at, claimed.up, distance, frame)
     return block
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from viewcam_addon.blender import rotation
+from viewcam_addon import rotation
 
 ORDERS = ["".join(order) for order in itertools.permutations("XYZ")]
 angles = st.tuples(*[st.floats(-math.pi, math.pi)] * 3)

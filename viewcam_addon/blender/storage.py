@@ -1,0 +1,154 @@
+"""`object.virtual_pinhole` as `CameraValues`, and back: the one place that knows how Blender keeps them.
+
+Blender's properties are float32. What a script states in float64 would be lost in them, so the hidden text `exact` keeps the
+ten numbers as they were given; each counts as long as it rounds to the property beside it, and an edit or a keyframe overrules
+it. `when_set` keeps the view of the camera as it was last set, since a callback hears of an edit only when the old value is
+gone. `picture` and `counted_in` keep resolution, percentage and pixel aspect. Rejected: ID properties for the values themselves
+(float64, but without update callbacks, units, limits and library overrides).
+"""
+
+import contextlib
+import functools
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from .. import checks
+from ..camera_values import FIELD_OF_VIEW, CameraValues, without_border
+from ..errors import InputError
+from ..intrinsics import Frame
+from . import datablocks, versions
+
+EXACT = ("eye", "look_at", "up", "distance")  # of these `exact` has the digits
+# What is noted of a camera once it has been set.
+_NOTED = ("distance", "counted_in", "set_for", "view_when_set", "held_roll")
+_stating = False
+
+
+@contextlib.contextmanager
+def without_callbacks() -> Iterator[None]:
+    """Values may be written in here without moving the camera."""
+    global _stating
+    before, _stating = _stating, True
+    try:
+        yield
+    finally:
+        _stating = before
+
+
+def is_being_written() -> bool:
+    """Whether a property is set by `store`, and not by the artist or a script."""
+    return _stating
+
+
+def is_enabled(camera_object: bpy.types.Object) -> bool:
+    """Whether the values place the camera."""
+    return camera_object.virtual_pinhole.enabled
+
+
+def load(camera_object: bpy.types.Object) -> CameraValues:
+    """The values of a camera, its eye and look-at as they are where no target is followed (targets.values).
+
+    The evaluated object of any depsgraph may be given as well.
+    """
+    group = camera_object.virtual_pinhole
+    exact, shown = _parsed(group.exact, 10), (*group.eye, *group.look_at, *group.up, group.distance)
+    numbers, is_exact = shown, False
+    if exact:
+        numbers = tuple([full if short == value else value for full, short, value in zip(*exact, shown, strict=True)])
+        is_exact = numbers == exact[0] and not (group.eye_target or group.look_at_target)
+    when_set = _parsed(group.when_set, 9)
+    return CameraValues(
+        eye=numbers[0:3],
+        look_at=numbers[3:6],
+        up=numbers[6:9],
+        distance=numbers[9],
+        zoom=group.zoom,
+        enabled=group.enabled,
+        keeps=group.keeps,
+        counted_in=_frame(tuple(group.counted_in)),
+        set_for=_frame(tuple(group.picture)),
+        pole=group.pole,
+        hold_within=group.hold_within,
+        held_roll=group.held_roll,
+        view_when_set=(when_set[0][0:3], when_set[0][3:6], when_set[0][6:9]) if when_set else None,
+        precision=2.0**-53 if is_exact else 2.0**-24,
+    )
+
+
+def store(camera_object: bpy.types.Object, values: CameraValues, *names: str) -> None:
+    """Write some of the values, by their names, and move nothing. Eye, look-at, up and distance are kept in float64."""
+    group = camera_object.virtual_pinhole
+    with without_callbacks():
+        for name in names:
+            value = getattr(values, name)
+            if name == "view_when_set":
+                group.when_set = _text(*value)
+            elif isinstance(value, Frame):
+                shape = (value.resolution_x, value.resolution_y, value.percentage, value.pixel_aspect_x, value.pixel_aspect_y)
+                setattr(group, "picture" if name == "set_for" else name, shape)
+            else:
+                setattr(group, name, value)
+        if any(name in EXACT for name in names):
+            group.exact = _text(values.eye, values.look_at, values.up, (values.distance,))
+
+
+def settle(camera_object: bpy.types.Object, values: CameraValues, frame: Frame) -> None:
+    """Take note that the camera has been set by these values for the picture of `frame`; the distance now counts its pixels."""
+    before = load(camera_object)
+    after = replace(before, view_when_set=values.view_when_set, held_roll=values.held_roll, set_for=without_border(frame))
+    if not is_counted_in_earlier(camera_object, before):
+        after = after.counted_anew(frame, camera_object.data.sensor_fit)
+    store(camera_object, after, *(name for name in _NOTED if getattr(after, name) != getattr(before, name)))
+
+
+def is_counted_in_earlier(camera_object: bpy.types.Object, values: CameraValues) -> bool:
+    """Whether `counted_in` has to stay: the field of view is kept, and the distance is animated."""
+    if values.keeps != FIELD_OF_VIEW or values.counted_in is None:
+        return False
+    curves = [*versions.animation_curves(camera_object), *versions.drivers(camera_object)]
+    return any(curve.data_path == "virtual_pinhole.distance" for curve in curves)
+
+
+def scenes_it_is_set_for(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> list[bpy.types.Scene]:
+    """The other scenes of a camera, those that render the very picture for which it was set."""
+    set_for = load(camera_object).set_for
+    others = (each for each in camera_object.users_scene if each != scene)
+    return [each for each in others if without_border(datablocks.frame_of(each)) == set_for]
+
+
+@contextlib.contextmanager
+def restored(camera_object: bpy.types.Object, *names: str) -> Iterator[None]:
+    """Give properties back what they hold now, whatever is stored within the block."""
+    group = camera_object.virtual_pinhole
+    before = {name: value if isinstance(value := getattr(group, name), str | float) else tuple(value) for name in names}
+    try:
+        yield
+    finally:
+        with without_callbacks():
+            for name, value in before.items():
+                setattr(group, name, value)
+
+
+def _text(*vectors: tuple[float, ...]) -> str:
+    return json.dumps([number for vector in vectors for number in vector])
+
+
+@functools.lru_cache(maxsize=256)
+def _parsed(text: str, count: int) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
+    """So many finite numbers from JSON, and what float32 makes of them; None if it holds anything else."""
+    with contextlib.suppress(ValueError, RecursionError), np.errstate(over="ignore"):  # InputError is a ValueError
+        numbers = checks.vector("the text", json.loads(text), count)
+        return numbers, tuple(np.array(numbers, dtype=np.float32).tolist())
+    return None
+
+
+@functools.lru_cache(maxsize=256)
+def _frame(stored: tuple[float, ...]) -> Frame | None:
+    """The picture whose five numbers were stored, None where they are those of none."""
+    with contextlib.suppress(InputError, ValueError, OverflowError):
+        return Frame(*map(int, stored[:3]), *stored[3:])
+    return None

@@ -1,0 +1,144 @@
+"""The values that say where a camera stands and how far it zooms, and the `Pinhole` that they make. Pure, no Blender.
+
+Blender stores them in `object.virtual_pinhole` (blender/storage.py); panel and handles edit them; blender/camera.py brings the
+camera there. Any number may stand in them, as an artist may type any: `pinhole` refuses values that make no camera.
+
+`zoom` is a factor on d of its own, so that a zoom can be keyed and taken off again.
+
+Where `keeps` is FIELD_OF_VIEW the distance grows with the picture: it counts pixels of the one in `counted_in`, and each time
+the camera is set it is counted anew in the present one. A distance with curves or a driver of its own stays as they say, and
+`counted_in` with it. Rejected: to scale the curves (the artist's, and perhaps shared or linked), and never to count anew (the
+panel would show a distance in pixels that are no longer those of the picture).
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from . import checks, intrinsics
+from . import roll as rolls
+from .errors import InputError
+from .intrinsics import Frame
+from .pinhole import Pinhole, Triple
+
+PIXELS, FIELD_OF_VIEW = "PIXELS", "FIELD_OF_VIEW"
+CANONICAL, HOLD = "CANONICAL", "HOLD"
+
+
+@dataclass(frozen=True)
+class CameraValues:
+    """What an artist or a script says of a camera, in float64 where that is known. Points and up in world space.
+
+    eye, look_at : a followed point is where its target stands. distance : pixels of the picture at 100 %, without zoom.
+    enabled : whether they place the camera.
+    keeps : PIXELS or FIELD_OF_VIEW, what stays when the picture gets another resolution.
+    counted_in : the picture whose pixels the distance counts, None where nobody has said. set_for : the picture for which the
+        camera was set last. Both without border.
+    pole : CANONICAL or HOLD, what the picture does near up. hold_within : radians from up. held_roll : radians, see roll.py.
+    view_when_set : (eye, look_at, up) from which the next edit sets out, None where that is not known.
+    precision : the relative rounding of the values, 2⁻⁵³ where all are known in float64, else float32's 2⁻²⁴.
+    """
+
+    eye: Triple
+    look_at: Triple
+    up: Triple
+    distance: float
+    zoom: float = 1.0
+    enabled: bool = False
+    keeps: str = PIXELS
+    counted_in: Frame | None = None
+    set_for: Frame | None = None
+    pole: str = CANONICAL
+    hold_within: float = math.radians(10)
+    held_roll: float = 0.0
+    view_when_set: tuple[Triple, Triple, Triple] | None = None
+    precision: float = 2.0**-24
+
+    def view(self) -> Pinhole:
+        """Where the values look, in a picture of one pixel and whatever a held roll is.
+
+        Raises
+        ------
+        InputError
+            if eye = look-at, up = 0, or a number is not finite.
+        """
+        return Pinhole(self.eye, self.look_at, self.up, 1.0, 1, 1)
+
+    def pinhole(self, plane: Pinhole, frame: Frame, sensor_fit: str, mirrored: bool) -> Pinhole:
+        """The camera that the values ask for, whatever a held roll is.
+
+        plane : whose size and principal point it has. frame : the picture. sensor_fit : "AUTO", "HORIZONTAL" or "VERTICAL".
+
+        Raises
+        ------
+        InputError
+            if the values make no camera: eye = look-at, up = 0, distance ≤ 0, zoom ≤ 0, a number that is not finite.
+        """
+        distance = self.distances(frame, sensor_fit)
+        size, centre = (plane.width, plane.height), plane.principal_point
+        return Pinhole(self.eye, self.look_at, self.up, distance, *size, centre, mirrored)
+
+    def distances(self, frame: Frame, sensor_fit: str) -> tuple[float, float]:
+        """(d_x, d_y) in pixels of the picture of `frame`, its percentage included."""
+        distance = self.distance_at_full_size(frame, sensor_fit) * (frame.size[0] / frame.resolution_x)
+        return distance, distance * (frame.pixel_aspect_x / frame.pixel_aspect_y)
+
+    def distance_at_full_size(self, frame: Frame, sensor_fit: str) -> float:
+        """The effective distance in the picture of `frame` at 100 %: zoom, and what the resolution keeps, included.
+
+        Raises
+        ------
+        InputError
+            if zoom is no number above 0.
+        """
+        if checks.number("zoom", self.zoom) <= 0:
+            raise InputError(f"zoom is {self.zoom:g}: give a factor above 0")
+        return self.distance * self.zoom * self.growth(frame, sensor_fit)
+
+    def growth(self, frame: Frame, sensor_fit: str) -> float:
+        """The factor on the distance in the picture of `frame`: 1 unless the field of view of another picture is kept."""
+        if self.keeps != FIELD_OF_VIEW or self.counted_in is None:
+            return 1.0
+        return intrinsics.growth(sensor_fit, self.counted_in, frame)
+
+    def stating(
+        self, eye: Triple, look_at: Triple, up: Triple, distance: float, frame: Frame, sensor_fit: str
+    ) -> "CameraValues":
+        """The values that say another view, without a held roll. A zoom that can be kept stays, others become 1.
+
+        distance : the effective one in the picture of `frame` at 100 %, zoom included.
+        """
+        distance /= self.growth(frame, sensor_fit)
+        zoom = self.zoom if _can_divide(self.zoom, distance) else 1.0
+        said = replace(self, eye=eye, look_at=look_at, up=up, distance=distance / zoom, zoom=zoom, enabled=True, held_roll=0.0)
+        return said.as_set()
+
+    def as_set(self) -> "CameraValues":
+        """The values from which the next edit sets out, once the camera is where they say."""
+        return replace(self, view_when_set=(self.eye, self.look_at, self.up))
+
+    def counted_anew(self, frame: Frame, sensor_fit: str) -> "CameraValues":
+        """The same camera with its distance in the pixels of the picture of `frame`."""
+        return replace(self, distance=self.growth(frame, sensor_fit) * self.distance, counted_in=without_border(frame))
+
+    def roll_from(self, up: Triple, held: float) -> float:
+        """The roll of the picture from what another up gives: radians, from u towards v. held : the roll that is held.
+
+        Raises
+        ------
+        InputError
+            as `view` does.
+        """
+        return rolls.angle_from(up, rolls.turned(self.view(), held))
+
+
+def without_border(frame: Frame) -> Frame:
+    """What values tell of a picture: resolution, percentage and pixel aspect."""
+    return frame if frame.border is None and not frame.crop else replace(frame, border=None, crop=False)
+
+
+def _can_divide(zoom: float, distance: float) -> bool:
+    """Whether a zoom is a factor above 0 that leaves of the distance a number which Blender stores with all its digits."""
+    float32 = np.finfo(np.float32)
+    return 0 < zoom < math.inf and float(float32.tiny) <= distance / zoom <= float(float32.max)
