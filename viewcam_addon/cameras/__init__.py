@@ -33,7 +33,7 @@ from types import ModuleType
 from .. import checks
 from ..errors import InputError
 from ..files import written_whole
-from . import colmap, transforms
+from . import bop, colmap, colmap_binary, gltf, opencv, ros, sidecar, transforms, usd
 from .axes import moved, moved_back
 from .camera import ANGLES, AXES, PIXELS, Camera, Options, choose
 from .source import Source
@@ -55,8 +55,15 @@ __all__ = [
 ]
 
 FORMATS: dict[str, ModuleType] = {
+    "sidecar": sidecar,
     "transforms": transforms,
     "colmap": colmap,
+    "colmap_binary": colmap_binary,
+    "bop": bop,
+    "gltf": gltf,
+    "usd": usd,
+    "ros": ros,
+    "opencv": opencv,
 }
 """Name → module, in the order in which they are asked."""
 

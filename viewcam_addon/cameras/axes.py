@@ -77,11 +77,11 @@ def view_plane(f_x: float, f_y: float, c_x: float, c_top: float, size: tuple[int
     return ViewPlane((f_x, f_y), (c_x, height - c_top), width, height)
 
 
-def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str) -> tuple[Pinhole, tuple[str, ...]]:
+def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str, scaled: bool = False) -> tuple[Pinhole, tuple[str, ...]]:
     """The camera of a matrix, and what is to be said of it.
 
     matrix : 3 × 4 or 4 × 4, for column vectors, from camera to world as `camera_to_world` has it. plane : its view plane.
-    what : whose matrix, as a sentence names it.
+    what : whose matrix, as a sentence names it. scaled : whether the format lets nodes be scaled without scaling the camera.
 
     The look-at point, which no matrix says, lies as far before the eye as the eye from the origin, at least 1: so its rounding
     does not turn the view by more than 2⁻⁵².
@@ -98,7 +98,7 @@ def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str) -> tuple[Pinhole, tu
     if matrix.shape == (4, 4) and matrix[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
         hint = "transpose it" if not matrix[:3, 3].any() else "it should be 0 0 0 1"
         raise InputError(f"the last row of the matrix of {what} is {checks.shown(matrix[3].tolist())}: {hint}")
-    axes, notes = rotation(matrix[:3, :3], what)
+    axes, notes = rotation(matrix[:3, :3], what, scaled)
     (_, y, z), eye = axes.T, tuple(matrix[:3, 3].tolist())
     mirrored = bool(np.linalg.det(axes) < 0)
     if mirrored:
@@ -118,7 +118,7 @@ def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str) -> tuple[Pinhole, tu
     return made, notes
 
 
-def rotation(matrix: ArrayLike, what: str) -> tuple[np.ndarray, tuple[str, ...]]:
+def rotation(matrix: ArrayLike, what: str, scaled: bool = False) -> tuple[np.ndarray, tuple[str, ...]]:
     """(3, 3) columns of length 1, and notes; the determinant may be −1.
 
     Raises
@@ -134,7 +134,7 @@ def rotation(matrix: ArrayLike, what: str) -> tuple[np.ndarray, tuple[str, ...]]
     if not 1e-100 < largest < 1e100:
         raise InputError(f"the rotation of {what} has {largest:g} as its largest number: give one of length 1")
     lengths = np.sqrt((matrix * matrix).sum(axis=0))
-    if lengths.min() < lengths.max() * (1 - _NO_ROTATION):
+    if not lengths.min() > 0 or (not scaled and lengths.min() < lengths.max() * (1 - _NO_ROTATION)):
         stretched = " by ".join(f"{length:.6g}" for length in lengths)
         raise InputError(f"the rotation of {what} has axes of the lengths {stretched}: give axes of one length")
     axes = matrix / lengths
@@ -144,7 +144,7 @@ def rotation(matrix: ArrayLike, what: str) -> tuple[np.ndarray, tuple[str, ...]]
             f"the axes of {what} are {math.degrees(math.asin(min(askew, 1))):.3g}° from perpendicular: it is no rotation"
         )
     notes = []
-    if abs(lengths.mean() - 1) > _SCALED:
+    if abs(lengths.mean() - 1) > _SCALED and not scaled:
         notes.append(f"The matrix of {what} is scaled by {lengths.mean():.6g}, which changes no picture and was left out")
     if askew > _NOTED:
         notes.append(f"The axes of {what} are {askew:.1g} from perpendicular: it has no more digits than that")

@@ -1,34 +1,262 @@
-"""A COLMAP model as text: cameras.txt, images.txt, and a points3D.txt without points, since none are known.
+"""A COLMAP model: text and binary in; text out, and binary by colmap_binary.py; and a points3D without points, since none are
+known.
 
-**Cameras.** One line for each set of intrinsics that the pictures have: SIMPLE_PINHOLE (f, cx, cy) where pixels are square,
-else PINHOLE (fx, fy, cx, cy). The upper left corner of the picture is (0, 0), its first pixel's centre (0.5, 0.5).
+**Cameras.** One for each set of intrinsics that the pictures have: SIMPLE_PINHOLE (f, cx, cy) where pixels are square, else
+PINHOLE (fx, fy, cx, cy). The upper left corner of the picture is (0, 0), its first pixel's centre (0.5, 0.5).
 
-**Images.** Two lines each, the second one empty: it would list image points. The pose takes world space to the camera's x
-right, y down, z into the view, as a unit quaternion (w first, Hamilton's) and a translation. Of the two quaternions of a
-rotation it is the one whose first number that is not 0 is positive. All numbers have as many digits as bring back the same
-float64.
+**Images.** In text two lines each, the second one empty where written here: it would list image points. The pose takes world
+space to the camera's x right, y down, z into the view, as a unit quaternion (w first, Hamilton's) and a translation. All
+numbers have as many digits as bring back the same float64. Of text and binary in one folder the binary one counts, as for
+COLMAP.
 
-rigs.txt and frames.txt, new in COLMAP 3.12, are left out: without them each image is a frame of its own, as older readers take
-it.
+rigs and frames, new in COLMAP 3.12, are neither written nor read: without them each image is a frame of its own, as older
+readers take it, and with them the images repeat the poses that they compose.
 
-Sources: COLMAP's doc/format.rst, doc/database.rst (pixel centres) and src/colmap/scene/reconstruction_io_text.cc (what parts a
-line: a name ends at a space).
+Sources: COLMAP's doc/format.rst, doc/database.rst (pixel centres), src/colmap/sensor/models.h (the lenses) and
+src/colmap/scene/reconstruction_io_text.cc and _binary.cc (what parts a line: a name ends at a space).
 """
 
-from collections.abc import Iterable, Sequence
+import itertools
+import math
+import re
+import struct
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
 
+from .. import checks
 from ..errors import InputError
+from ..intrinsics import ViewPlane
 from ..pinhole import Pinhole
-from . import naming
+from . import axes, distortion, naming
 from .axes import intrinsics, quaternion, world_to_camera
-from .camera import Camera, Options
+from .camera import Camera, Options, not_a_pinhole
+from .source import Source, flat, pixels
 
 TITLE = "COLMAP model (cameras, images)"
 SUFFIX = ""
 
+MODELS: dict[str, tuple[int, tuple[str, ...]]] = {
+    "SIMPLE_PINHOLE": (0, ("f", "cx", "cy")),
+    "PINHOLE": (1, ("fx", "fy", "cx", "cy")),
+    "SIMPLE_RADIAL": (2, ("f", "cx", "cy", "k1")),
+    "RADIAL": (3, ("f", "cx", "cy", "k1", "k2")),
+    "OPENCV": (4, ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2")),
+    "OPENCV_FISHEYE": (5, ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4")),
+    "FULL_OPENCV": (6, ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")),
+    "FOV": (7, ("fx", "fy", "cx", "cy", "omega")),
+    "SIMPLE_RADIAL_FISHEYE": (8, ("f", "cx", "cy", "k")),
+    "RADIAL_FISHEYE": (9, ("f", "cx", "cy", "k1", "k2")),
+    "THIN_PRISM_FISHEYE": (10, ("fx", "fy", "cx", "cy", *"abcdefgh")),
+    "RAD_TAN_THIN_PRISM_FISHEYE": (11, ("fx", "fy", "cx", "cy", *"abcdefghijkl")),
+    "SIMPLE_DIVISION": (12, ("f", "cx", "cy", "k")),
+    "DIVISION": (13, ("fx", "fy", "cx", "cy", "k")),
+    "SIMPLE_FISHEYE": (14, ("f", "cx", "cy")),
+    "FISHEYE": (15, ("fx", "fy", "cx", "cy")),
+    "EUCM": (16, ("fx", "fy", "cx", "cy", "alpha", "beta")),
+    "EQUIRECTANGULAR": (17, ("w", "h")),
+}
+"""Name → its number in binary files, and its parameters."""
 
-def recognises(_source) -> bool:
-    return False
+_STRAIGHT = ("f", "fx", "fy", "cx", "cy")
+_FILES = ("cameras", "images")
+_FOLDERS = ((), ("sparse", "0"), ("sparse",), ("colmap", "sparse", "0"))
+
+
+class _Intrinsics(NamedTuple):
+    """What cameras.txt says of one."""
+
+    model: str
+    width: int
+    height: int
+    parameters: tuple[float, ...]
+
+
+class _Image(NamedTuple):
+    name: str
+    quaternion: tuple[float, ...]
+    translation: tuple[float, ...]
+    camera: int
+
+
+def recognises(source: Source) -> bool:
+    return _model(source) is not None
+
+
+def read(source: Source, options: Options) -> list[Camera]:
+    folder, suffix = _model(source)
+    files = [_file(folder / f"{name}{suffix}") for name in _FILES]
+    if suffix == ".bin":
+        intrinsic, images = _binary_cameras(files[0]), [*_binary_images(files[1])]
+    else:
+        intrinsic, images = _text_cameras(files[0]), [*_text_images(files[1])]
+    notes = (
+        ("The folder has the model as text, too: the binary one counts",) if _has(folder, ".txt") and suffix == ".bin" else ()
+    )
+    planes = {}
+    cameras = []
+    for image, name in zip(images, naming.distinct([image.name for image in images]), strict=True):
+        if image.camera not in intrinsic:
+            raise InputError(f"{folder}: image {checks.shown(image.name)} is of camera {image.camera}, which is not there")
+        if image.camera not in planes:
+            planes[image.camera] = _plane(intrinsic[image.camera], f"camera {image.camera}", options)
+        plane, of_lens = planes[image.camera]
+        what = f"image {checks.shown(image.name)}"
+        matrix = axes.from_world_to_camera(axes.rotation_of(image.quaternion, what), image.translation, what)
+        pinhole, more = axes.pinhole(matrix, plane, what)
+        cameras.append(Camera(name, pinhole, True, (*notes, *of_lens, *more), image.name))
+    return cameras
+
+
+def _model(source: Source) -> tuple[Path, str] | None:
+    """The folder of the model, and the suffix of its files."""
+    if source.path is None:
+        return None
+    if not source.is_folder:
+        ours = source.path.stem in (*_FILES, "points3D", "rigs", "frames") and source.path.suffix in (".txt", ".bin")
+        return (source.path.parent, source.path.suffix) if ours and _has(source.path.parent, source.path.suffix) else None
+    for parts in _FOLDERS:
+        folder = source.path.joinpath(*parts)
+        for suffix in (".bin", ".txt"):
+            if _has(folder, suffix):
+                if parts[-1:] == ("0",) and (others := [other.name for other in folder.parent.iterdir() if other.name != "0"]):
+                    numbers = [name for name in others if name.isdigit()]
+                    if numbers:
+                        raise InputError(
+                            f"{folder.parent} has {len(numbers) + 1} models, each a world of its own: give one of the folders"
+                        )
+                return folder, suffix
+    return None
+
+
+def _has(folder: Path, suffix: str) -> bool:
+    return all((folder / f"{name}{suffix}").is_file() for name in _FILES)
+
+
+def _file(path: Path) -> Source:
+    return Source(path)
+
+
+def _plane(intrinsic: _Intrinsics, what: str, options: Options) -> tuple[ViewPlane, tuple[str, ...]]:
+    names = MODELS[intrinsic.model][1]
+    if "FISHEYE" in intrinsic.model or intrinsic.model in ("EUCM", "EQUIRECTANGULAR"):
+        not_a_pinhole(what, f"of the camera model {intrinsic.model}")
+    if len(intrinsic.parameters) != len(names):
+        raise InputError(
+            f"{what} is {intrinsic.model} with {len(intrinsic.parameters)} parameters: it should have {len(names)}"
+        )
+    values = dict(zip(names, intrinsic.parameters, strict=True))
+    f_x, f_y = values.get("fx", values.get("f")), values.get("fy", values.get("f"))
+    if not (f_x > 0 and f_y > 0):
+        raise InputError(f"{what} has the focal length {min(f_x, f_y):g}: give one above 0")
+    plane = axes.view_plane(f_x, f_y, values["cx"], values["cy"], (intrinsic.width, intrinsic.height))
+    bent = {name: value for name, value in values.items() if name not in _STRAIGHT}
+    return plane, distortion.settle(bent, _lens(intrinsic.model, bent), plane, f"{what} ({intrinsic.model})", options)
+
+
+def _lens(model: str, values: dict[str, float]) -> distortion.Lens:
+    if model == "FOV":
+        return distortion.radial(lambda r: math.atan(2 * r * math.tan(values["omega"] / 2)) / values["omega"])
+    if "DIVISION" in model:
+        return distortion.radial(lambda r: (1 - math.sqrt(1 - 4 * values["k"] * r * r)) / (2 * values["k"] * r))
+    return distortion.opencv(values)
+
+
+def _lines(source: Source) -> list[str]:
+    return source.text.split("\n")
+
+
+def _text_cameras(source: Source) -> dict[int, _Intrinsics]:
+    found = {}
+    for number, line in enumerate(_lines(source), start=1):
+        if not (words := line.split()) or words[0].startswith("#"):
+            continue
+        place = f"line {number} of {source.name}"
+        if len(words) < 5 or not words[0].isdecimal():
+            raise InputError(f"{place} is {checks.shown(line)}: it should be CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]")
+        if words[1] not in MODELS:
+            raise InputError(f"{place}: the camera model {checks.shown(words[1])} is unknown: convert it to PINHOLE")
+        size = (pixels(f"{what} of {place}", word) for what, word in zip(("width", "height"), words[2:4], strict=True))
+        found[_id(words[0], place)] = _Intrinsics(words[1], *size, flat(f"parameters of {place}", words[4:]))
+    return found
+
+
+def _text_images(source: Source) -> Iterator[_Image]:
+    lines = enumerate(_lines(source), start=1)
+    for number, line in lines:
+        words = line.split()
+        if not words or words[0].startswith("#"):
+            continue
+        place = f"line {number} of {source.name}"
+        if len(words) < 10 or not words[0].isdecimal():
+            raise InputError(f"{place} is {checks.shown(line)}: it should be IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME")
+        pose = flat(f"the pose in {place}", words[1:8])
+        yield _Image(re.split(r"\s+", line.strip(), maxsplit=9)[9], pose[:4], pose[4:], _id(words[8], place))
+        for number, points in itertools.islice(lines, 1):
+            if len(points.split()) % 3 and not points.lstrip().startswith("#"):
+                raise InputError(
+                    f"line {number} of {source.name} is no list of image points, X Y POINT3D_ID: each image has two lines, "
+                    "the second of which may be empty"
+                )
+
+
+def _id(word: str, place: str) -> int:
+    if not word.isdecimal() or len(word) > 20:
+        raise InputError(f"{place} has {checks.shown(word)} where a number of a camera or image should be: correct it")
+    return int(word)
+
+
+class _Reader:
+    """Little-endian numbers of a file, one after another."""
+
+    def __init__(self, source: Source) -> None:
+        self._source, self._at = source, 0
+
+    def numbers(self, form: str) -> tuple:
+        try:
+            found = struct.unpack_from(f"<{form}", self._source.data, self._at)
+        except struct.error:
+            self._ended()
+        self._at += struct.calcsize(f"<{form}")
+        return found
+
+    def skip(self, count: int) -> None:
+        self._at += count
+        if self._at > len(self._source.data):
+            self._ended()
+
+    def text(self) -> str:
+        end = self._source.data.find(b"\0", self._at)
+        if end < 0:
+            self._ended()
+        found = self._source.data[self._at : end].decode("utf-8", errors="replace")
+        self._at = end + 1
+        return found
+
+    def _ended(self):
+        raise InputError(f"{self._source.name} ends in the middle, or is no COLMAP file: copy it again")
+
+
+def _binary_cameras(source: Source) -> dict[int, _Intrinsics]:
+    names = {number: name for name, (number, _) in MODELS.items()}
+    reader, found = _Reader(source), {}
+    for _ in range(reader.numbers("Q")[0]):
+        number, model, width, height = reader.numbers("IiQQ")
+        if model not in names:
+            raise InputError(f"camera {number} of {source.name} is of the unknown model {model}: convert it to PINHOLE")
+        size = (pixels(f"{side} of camera {number}", value) for side, value in (("width", width), ("height", height)))
+        name = names[model]
+        found[number] = _Intrinsics(name, *size, reader.numbers(f"{len(MODELS[name][1])}d"))
+    return found
+
+
+def _binary_images(source: Source) -> Iterator[_Image]:
+    reader = _Reader(source)
+    for _ in range(reader.numbers("Q")[0]):
+        _, *pose, camera = reader.numbers("I7dI")
+        name = reader.text()
+        reader.skip(24 * reader.numbers("Q")[0])
+        yield _Image(name, tuple(pose[:4]), tuple(pose[4:]), camera)
 
 
 def write(cameras: Sequence[Camera], _options: Options) -> dict[str, str]:

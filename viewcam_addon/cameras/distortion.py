@@ -37,6 +37,17 @@ def opencv(k: Mapping[str, float]) -> Lens:
     return lens
 
 
+def radial(law: Callable[[float], float]) -> Lens:
+    """A lens that moves a point at the radius r to the radius `law(r)`."""
+
+    def lens(x: float, y: float) -> Point:
+        r = math.hypot(x, y)
+        factor = law(r) / r if r else 1.0
+        return x * factor, y * factor
+
+    return lens
+
+
 def _even(r: float, *terms: float) -> float:
     """The polynomial of r² without its constant, by Horner's rule."""
     total = 0.0
@@ -79,6 +90,6 @@ def displacement(lens: Lens, plane: ViewPlane) -> float:
             try:
                 moved_x, moved_y = lens(x, y)
                 largest = max(largest, math.hypot((moved_x - x) * d_x, (moved_y - y) * d_y))
-            except (OverflowError, ZeroDivisionError):
+            except (OverflowError, ZeroDivisionError, ValueError):
                 return math.inf
     return largest if math.isfinite(largest) else math.inf

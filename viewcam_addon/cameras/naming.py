@@ -96,6 +96,14 @@ def checked(cameras: Iterable[Camera], written: str) -> tuple[Camera, ...]:
     return cameras
 
 
+def refuse_taken(names: Sequence[str]) -> None:
+    """Raise InputError if two cameras would be one file, or a name can't be a file's."""
+    for name in names:
+        check_image(name)
+    if twice := [name for name, count in Counter(name.casefold() for name in names).items() if count > 1]:
+        raise InputError(f"{several(twice)} would be one file for several cameras: rename them")
+
+
 def refuse_mirrored(cameras: Iterable[Camera], written: str) -> None:
     """Raise InputError if a camera is mirrored and `written` can't say it."""
     mirrored = [image_of(camera) for camera in cameras if camera.pinhole.mirrored]

@@ -1,14 +1,26 @@
 """What the sidecar of a picture says of its camera: the exact values, and what others would have to derive from them.
 
-Unlike a dataset's file it can say that a camera is mirrored: the matrices then have a determinant of −1.
+A batch writes one beside each picture (docs/datasets.md). Unlike a dataset's file it can say that a camera is mirrored: the
+matrices then have a determinant of −1. Read back it is the same pinhole to the bit; of what the shot asked for (`stated`) and
+what Blender made of it (`camera`) it is the second, which took the picture.
 """
 
 import dataclasses
+import json
+from collections.abc import Sequence
 from typing import Any
 
+from .. import checks
+from ..errors import InputError
 from ..intrinsics import CameraData
 from ..pinhole import Pinhole
+from . import naming
 from .axes import camera_to_world, intrinsics, world_to_camera
+from .camera import Camera, Options
+from .source import Record, Source
+
+TITLE = "the sidecars of a batch"
+SUFFIX = ".json"
 
 CONVENTION = (
     "K times the first three numbers of worldToCamera times (x, y, z, 1) is depth times (column, row, 1): column vectors; "
@@ -40,3 +52,37 @@ def record(pinhole: Pinhole, camera_data: CameraData | None = None) -> dict[str,
         "convention": CONVENTION,
         **({} if camera_data is None else {"blender": dataclasses.asdict(camera_data)}),
     }
+
+
+def recognises(source: Source) -> bool:
+    return _is_ours(source) or any(map(_is_ours, source.files("*.json")))
+
+
+def read(source: Source, _options: Options) -> list[Camera]:
+    files = [source] if not source.is_folder else [file for file in source.files("*.json") if _is_ours(file)]
+    return [_camera(file) for file in files]
+
+
+def write(cameras: Sequence[Camera], _options: Options) -> dict[str, str]:
+    naming.refuse_taken([camera.name for camera in cameras])
+    return {
+        f"{camera.name}.json": json.dumps({"image": camera.image, **record(camera.pinhole)}, indent=1) + "\n"
+        for camera in cameras
+    }
+
+
+def _is_ours(source: Source) -> bool:
+    return {"camera", "cameraToWorld", "worldToCamera", "K"} <= source.document.keys()
+
+
+def _camera(source: Source) -> Camera:
+    document = Record(source.document, source.name)
+    camera = document.record("camera")
+    fields = {field.name for field in dataclasses.fields(Pinhole)}
+    if unknown := camera.values.keys() - fields:
+        raise InputError(f"the key {checks.shown(min(unknown))} of {camera.place} is none of a camera: take it out")
+    if missing := fields - camera.values.keys():
+        raise InputError(f"{camera.place} has no {min(missing)}: it can't be a camera without")
+    preview = next((document.get(key) for key in ("preview", "image") if isinstance(document.get(key), str)), None)
+    name = naming.stem(preview) if preview else source.path.stem if source.path else "camera"
+    return Camera(name, Pinhole(**camera.values), image=preview)

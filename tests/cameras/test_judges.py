@@ -1,0 +1,215 @@
+"""Each format judged by a library that nobody here wrote, both ways: what we write it projects as we do, and what it writes we
+read as the same camera. With mirrored, shifted, stretched, upright, long, and far cameras."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from viewcam_addon import cameras
+from viewcam_addon.cameras import Camera, Options, axes
+from viewcam_addon.errors import InputError
+
+from .conftest import CAMERAS, allowed, picture_error, points_before
+
+UNMIRRORED = [name for name, pinhole in CAMERAS.items() if not pinhole.mirrored]
+UNSHIFTED = [name for name in UNMIRRORED if "shift" not in name and name != "off_the_picture"]
+FLOAT32 = 2.0**-24
+
+
+def of(name: str) -> Camera:
+    return Camera(name, CAMERAS[name], image=f"{name}.png")
+
+
+def judged(pinhole, column, row_from_top, points, unit=2.0**-53):
+    error = picture_error(pinhole, column, pinhole.height - row_from_top, points)
+    limit = max(1e-3, allowed(pinhole, points, unit))
+    assert error <= limit, f"{error:.3g} pixels, {limit:.3g} are allowed"
+    return error
+
+
+def same_picture(camera: Camera, pinhole, unit=2.0**-53):
+    points = points_before(pinhole)
+    column, row, _ = camera.pinhole.project(points)
+    judged(pinhole, column, pinhole.height - row, points, unit)
+    assert (camera.pinhole.width, camera.pinhole.height) == (pinhole.width, pinhole.height)
+    assert camera.pinhole.mirrored == pinhole.mirrored
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+@pytest.mark.parametrize("form", ["colmap", "colmap_binary"])
+def test_pycolmap_sees_through_what_we_write_as_we_do(tmp_path, name, form):
+    pycolmap = pytest.importorskip("pycolmap")
+    cameras.save([of(name)], tmp_path, form)
+    (image,) = pycolmap.Reconstruction(tmp_path).images.values()
+    points = points_before(CAMERAS[name])
+    seen = np.array([image.project_point(point) for point in points])
+    judged(CAMERAS[name], seen[:, 0], seen[:, 1], points)
+    assert image.name == f"{name}.png"
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+@pytest.mark.parametrize("binary", [False, True])
+def test_what_pycolmap_writes_we_see_through_as_it_does(tmp_path, name, binary):
+    pycolmap = pytest.importorskip("pycolmap")
+    cameras.save([of(name)], tmp_path, "colmap")
+    model = pycolmap.Reconstruction(tmp_path)
+    theirs = tmp_path / "theirs" / "sparse" / "0"
+    theirs.mkdir(parents=True)
+    (model.write_binary if binary else model.write_text)(theirs)
+    (read,) = cameras.read(tmp_path / "theirs")
+    same_picture(read, CAMERAS[name])
+    assert read.name == name and read.size_stated
+
+
+def test_our_binary_model_is_pycolmaps_to_the_byte(tmp_path):
+    pycolmap = pytest.importorskip("pycolmap")
+    cameras.save([of(name) for name in UNMIRRORED], tmp_path / "ours", "colmap_binary")
+    (tmp_path / "theirs").mkdir()
+    pycolmap.Reconstruction(tmp_path / "ours").write_binary(tmp_path / "theirs")
+    for name in ("cameras.bin", "points3D.bin"):
+        assert (tmp_path / "ours" / name).read_bytes() == (tmp_path / "theirs" / name).read_bytes(), name
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+@pytest.mark.parametrize("suffix", [".yml", ".json", ".xml"])
+def test_opencv_and_we_see_the_same(tmp_path, name, suffix):
+    cv2 = pytest.importorskip("cv2")
+    pinhole = CAMERAS[name]
+    ours = tmp_path / "ours.yml"
+    cameras.save([of(name)], ours, "opencv")
+    storage = cv2.FileStorage(str(ours), cv2.FILE_STORAGE_READ)
+    read = {key: storage.getNode(key).mat() for key in ("camera_matrix", "R", "rvec", "t", "distortion_coefficients")}
+    storage.release()
+    points = points_before(pinhole)
+    turn, _ = cv2.Rodrigues(read["R"])
+    seen, _ = cv2.projectPoints(points, turn, read["t"], read["camera_matrix"], read["distortion_coefficients"])
+    judged(pinhole, seen[:, 0, 0] + 0.5, seen[:, 0, 1] + 0.5, points, unit=2.0**-51)
+    assert np.abs(cv2.Rodrigues(read["rvec"])[0] - read["R"]).max() < 1e-14
+
+    theirs = tmp_path / f"theirs{suffix}"
+    storage = cv2.FileStorage(str(theirs), cv2.FILE_STORAGE_WRITE)
+    storage.write("image_width", pinhole.width)
+    storage.write("image_height", pinhole.height)
+    storage.write("K", read["camera_matrix"])
+    storage.write("rvec", read["rvec"])
+    storage.write("tvec", read["t"])
+    storage.release()
+    (back,) = cameras.read(theirs)
+    same_picture(back, pinhole, unit=2.0**-51)
+
+
+@pytest.mark.parametrize("name", [*CAMERAS])
+def test_usd_and_we_see_the_same(tmp_path, name):
+    pxr = pytest.importorskip("pxr.Usd")
+    from pxr import UsdGeom
+
+    pinhole = CAMERAS[name]
+    cameras.save([of(name)], tmp_path / "ours.usda", "usd")
+    stage = pxr.Stage.Open(str(tmp_path / "ours.usda"))
+    (prim,) = [prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Camera)]
+    frustum = UsdGeom.Camera(prim).GetCamera(pxr.TimeCode.Default()).frustum
+    view = np.array(UsdGeom.Camera(prim).ComputeLocalToWorldTransform(pxr.TimeCode.Default()).GetInverse())
+    points = points_before(pinhole)
+    clip = np.c_[points, np.ones(len(points))] @ view @ np.array(frustum.ComputeProjectionMatrix())
+    seen = (clip[:, :2] / clip[:, 3:] + 1) / 2 * [pinhole.width, pinhole.height]
+    judged(pinhole, seen[:, 0], pinhole.height - seen[:, 1], points, FLOAT32)
+    for suffix in (".usda", ".usdc"):
+        stage.Export(str(tmp_path / f"theirs{suffix}"))
+        (back,) = cameras.read(tmp_path / f"theirs{suffix}")
+        same_picture(back, pinhole, FLOAT32)
+        assert back.name == name
+
+
+@pytest.mark.parametrize("name", UNSHIFTED)
+def test_gltf_as_other_libraries_parse_it_sees_what_we_see(tmp_path, name):
+    pygltflib, trimesh = pytest.importorskip("pygltflib"), pytest.importorskip("trimesh")
+    pinhole = CAMERAS[name]
+    cameras.save([of(name)], tmp_path / "ours.gltf", "gltf")
+    model = pygltflib.GLTF2().load(str(tmp_path / "ours.gltf"))
+    (node,), (camera,) = model.nodes, model.cameras
+    x, y, z, w = node.rotation
+    matrix = trimesh.transformations.quaternion_matrix([w, x, y, z])
+    matrix[:3, 3] = node.translation
+    points = points_before(pinhole)
+    local = (points - matrix[:3, 3]) @ matrix[:3, :3]
+    slope = math.tan(camera.perspective.yfov / 2)
+    column = (local[:, 0] / -local[:, 2] / (slope * camera.perspective.aspectRatio) + 1) / 2 * pinhole.width
+    row = (local[:, 1] / -local[:, 2] / slope + 1) / 2 * pinhole.height
+    judged(pinhole, column, pinhole.height - row, points, unit=2.0**-50)
+    model.save_binary(str(tmp_path / "theirs.glb"))
+    (back,) = cameras.read(tmp_path / "theirs.glb")
+    same_picture(back, pinhole, unit=2.0**-50)
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_ros_camera_info_as_pyyaml_reads_it_has_our_intrinsics(tmp_path, name):
+    yaml = pytest.importorskip("yaml")
+    pinhole = CAMERAS[name]
+    cameras.save([of(name)], tmp_path / "ours.yaml", "ros")
+    said = yaml.safe_load((tmp_path / "ours.yaml").read_text())
+    k = np.array(said["camera_matrix"]["data"]).reshape(3, 3)
+    expected = np.array(axes.intrinsics(pinhole)) - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]
+    assert np.array_equal(k, expected) and said["camera_name"] == name
+    (tmp_path / "theirs.yaml").write_text(yaml.safe_dump(said))
+    (back,) = cameras.read(tmp_path / "theirs.yaml")
+    assert np.allclose(axes.intrinsics(back.pinhole), axes.intrinsics(pinhole), rtol=1e-15, atol=0)
+    assert any("no pose" in note for note in back.notes)
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_bop_projects_as_its_format_says_and_comes_back(name):
+    pinhole = CAMERAS[name]
+    text = cameras.write([of(name)], "bop", Options(scale=0.001))
+    said = json.loads(text)["0"]
+    points = points_before(pinhole)
+    local = points * 1000 @ np.array(said["cam_R_w2c"]).reshape(3, 3).T + said["cam_t_w2c"]
+    seen = local @ np.array(said["cam_K"]).reshape(3, 3).T
+    judged(pinhole, seen[:, 0] / seen[:, 2] + 0.5, seen[:, 1] / seen[:, 2] + 0.5, points)
+    (back,) = cameras.read(text, options=Options(scale=0.001, size=(pinhole.width, pinhole.height)))
+    same_picture(back, pinhole)
+    assert not back.size_stated
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_transforms_as_nerfstudios_rays_go_pass_through_our_pixels(name):
+    """Its formula, in NumPy: ((column + 0.5 − cx)/fl_x, −(row + 0.5 − cy)/fl_y, −1) turned by the matrix."""
+    pinhole = CAMERAS[name]
+    text = cameras.write([of(name)], "transforms")
+    said = json.loads(text)
+    matrix = np.array(said["frames"][0]["transform_matrix"])
+    column, row = np.array([0, 17, pinhole.width - 1]), np.array([0, 33, pinhole.height - 1])
+    local = np.c_[(column + 0.5 - said["cx"]) / said["fl_x"], -(row + 0.5 - said["cy"]) / said["fl_y"], -np.ones(3)]
+    rays = local @ matrix[:3, :3].T
+    ours = pinhole.ray_directions(column, pinhole.height - 1 - row)
+    assert np.abs(rays / np.linalg.norm(rays, axis=1)[:, None] - ours).max() < 1e-14
+    (back,) = cameras.read(text)
+    same_picture(back, pinhole)
+    assert axes.intrinsics(back.pinhole) == axes.intrinsics(pinhole) and back.pinhole.eye == pinhole.eye
+
+
+@pytest.mark.parametrize("name", [*CAMERAS])
+def test_a_sidecar_comes_back_to_the_bit(tmp_path, name):
+    cameras.save([of(name)], tmp_path, "sidecar")
+    (back,) = cameras.read(tmp_path)
+    assert back.pinhole == CAMERAS[name] and back.name == name
+
+
+@pytest.mark.parametrize("form", ["transforms", "colmap", "colmap_binary", "opencv", "ros", "bop", "gltf"])
+def test_a_mirrored_camera_is_refused_by_what_can_not_say_it(form):
+    with pytest.raises(InputError, match="mirrored"):
+        cameras.write([of("mirrored")], form)
+
+
+def test_npz_of_numpy_is_read_and_pickle_is_not(tmp_path):
+    pinhole = CAMERAS["shifted"]
+    rows = np.array(axes.world_to_camera(pinhole))
+    k = np.array(axes.intrinsics(pinhole)) - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]
+    data = {"K": k, "R": rows[:3, :3], "t": rows[:3, 3], "image_size": [640, 360]}
+    np.savez(tmp_path / "pickled.npz", **data, other=np.array([{"a": 1}], dtype=object))
+    with pytest.raises(InputError):
+        cameras.read(tmp_path / "pickled.npz")
+    np.savez(tmp_path / "camera.npz", **data)
+    (back,) = cameras.read(tmp_path / "camera.npz")
+    same_picture(back, pinhole)

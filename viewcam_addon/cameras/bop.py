@@ -1,0 +1,85 @@
+"""BOP's scene_camera.json: K for each image of a scene and, where the scene has a world, its pose.
+
+World to camera, x right, y down, z into the view, in **millimetres**, whose numbers stay unless a scale is chosen (0.001 makes
+metres). BOP's toolkit puts (0, 0) at the centre of the first pixel. The size is that of the pictures in rgb/ or gray/, of the
+data set's camera.json, or given. Without a pose the camera stands at the origin: BOP's objects are posed to the camera then.
+
+Source: bop_toolkit's docs/bop_datasets_format.md and bop_toolkit_lib/misc.py (depth_im_to_dist_im).
+"""
+
+import json
+from collections.abc import Sequence
+
+import numpy as np
+
+from . import axes, naming, opencv
+from .camera import Camera, Options
+from .source import Record, Source, image_size, pixels
+
+TITLE = "BOP scene_camera.json"
+SUFFIX = ".json"
+FILE = "scene_camera.json"
+
+_FOLDERS = ("rgb", "gray")
+_UNITS = "BOP counts in millimetres: a scale of 0.001 makes them metres"
+
+
+def recognises(source: Source) -> bool:
+    return _document(source) is not None
+
+
+def read(source: Source, options: Options) -> list[Camera]:
+    source = _document(source)
+    cameras = []
+    for number, values in source.document.items():
+        image = Record(values, f"image {number}")
+        f_x, f_y, c_x, c_y = opencv.matrix_of_k(image.numbers("cam_K", 9), image.place)
+        name, size, stated = _picture(source, number, image, options)
+        half = opencv.half_pixel(options)
+        plane = axes.view_plane(f_x, f_y, c_x + half, c_y + half, size)
+        notes = (*opencv.told_of_half_pixel(options, "BOP"), *(() if options.scale != 1 else (_UNITS,)))
+        turn, translation = np.eye(3), (0.0, 0.0, 0.0)
+        if "cam_R_w2c" in image or "cam_t_w2c" in image:
+            turn, translation = np.array(image.numbers("cam_R_w2c", 9)).reshape(3, 3), image.numbers("cam_t_w2c", 3)
+        else:
+            notes += ("The scene has no world: the camera stands at the origin and looks along z, y down",)
+        pinhole, more = axes.pinhole(axes.from_world_to_camera(turn, translation, image.place), plane, image.place)
+        cameras.append(Camera(str(number), pinhole, stated, (*notes, *more), name))
+    return cameras
+
+
+def write(cameras: Sequence[Camera], options: Options) -> str:
+    naming.refuse_mirrored(cameras, FILE)
+    half = opencv.half_pixel(options)
+    lines = []
+    for number, camera in enumerate(cameras):
+        (f_x, _, c_x), (_, f_y, c_y), _ = axes.intrinsics(camera.pinhole)
+        rows = axes.world_to_camera(camera.pinhole)[:3]
+        said = {
+            "cam_K": [f_x, 0.0, c_x - half, 0.0, f_y, c_y - half, 0.0, 0.0, 1.0],
+            "cam_R_w2c": [part for row in rows for part in row[:3]],
+            "cam_t_w2c": [row[3] for row in rows],
+            "depth_scale": 1.0,
+        }
+        lines.append(f' "{number}": {json.dumps(said)}')
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _document(source: Source) -> Source | None:
+    source = source.file(FILE) if source.is_folder else source
+    first = next(iter(source.document.values()), None) if source else None
+    return source if isinstance(first, dict) and "cam_K" in first else None
+
+
+def _picture(source: Source, number: str, image: Record, options: Options) -> tuple[str | None, tuple[int, int], bool]:
+    if source.path and number.isdecimal():
+        for folder in _FOLDERS:
+            for suffix in ("png", "jpg", "tif"):
+                name = f"{folder}/{int(number):06d}.{suffix}"
+                if size := image_size(source.path.parent / name):
+                    return name, size, True
+        for up in ("..", "../.."):
+            of_all = source.file(*up.split("/"), "camera.json")
+            if of_all and {"width", "height"} <= of_all.document.keys():
+                return None, tuple(pixels(key, of_all.document[key]) for key in ("width", "height")), True
+    return None, options.size_or_refuse(image.place), False

@@ -1,0 +1,37 @@
+"""A COLMAP model in its binary form, out; it is read in colmap.py, which tells of both. Little endian, without padding."""
+
+import struct
+from collections.abc import Sequence
+
+from . import naming
+from .axes import intrinsics, quaternion, world_to_camera
+from .camera import Camera, Options
+from .colmap import MODELS, check_names
+
+TITLE = "COLMAP model, binary"
+SUFFIX = ""
+
+
+def write(cameras: Sequence[Camera], _options: Options) -> dict[str, bytes]:
+    cameras = naming.checked(cameras, "a COLMAP model")
+    check_names(map(naming.image_of, cameras))
+    numbers: dict[bytes, int] = {}
+    images = [struct.pack("<Q", len(cameras))]
+    for number, camera in enumerate(cameras, start=1):
+        intrinsic = numbers.setdefault(_intrinsics(camera), len(numbers) + 1)
+        *rows, _ = world_to_camera(camera.pinhole)
+        images.append(struct.pack("<I7dI", number, *quaternion(rows), *(row[3] for row in rows), intrinsic))
+        images.append(naming.image_of(camera).encode("utf-8") + b"\0" + struct.pack("<Q", 0))
+    return {
+        "images.bin": b"".join(images),
+        "cameras.bin": struct.pack("<Q", len(numbers)) + b"".join(struct.pack("<I", i) + each for each, i in numbers.items()),
+        "points3D.bin": struct.pack("<Q", 0),
+    }
+
+
+def _intrinsics(camera: Camera) -> bytes:
+    (f_x, _, c_x), (_, f_y, c_y), _ = intrinsics(camera.pinhole)
+    model, focal = ("SIMPLE_PINHOLE", (f_x,)) if f_x == f_y else ("PINHOLE", (f_x, f_y))
+    parameters = (*focal, c_x, c_y)
+    size = (camera.pinhole.width, camera.pinhole.height)
+    return struct.pack(f"<iQQ{len(parameters)}d", MODELS[model][0], *size, *parameters)

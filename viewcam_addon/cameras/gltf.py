@@ -1,0 +1,207 @@
+"""glTF 2.0: cameras on nodes, of a .gltf or a .glb.
+
+Camera axes are x right, y up, z away from the view; the world's y points up. A camera has a vertical angle, and an aspect
+ratio or that of whatever shows it; no size, no shift. So a shifted or mirrored camera is refused on the way out, and the size
+goes into `extras`, which is where glTF lets programs keep what others do not know. Nodes may be scaled, which a camera is not
+by the specification.
+
+Source: Khronos' glTF 2.0 specification, sections 3.10 and 5.12.
+"""
+
+import json
+import math
+import struct
+from collections.abc import Sequence
+
+import numpy as np
+
+from .. import checks
+from ..errors import InputError
+from . import axes, naming
+from .camera import Camera, Options, not_a_pinhole
+from .source import Record, Source
+
+TITLE = "glTF and GLB"
+SUFFIX = ".gltf"
+
+_Y_UP = "glTF's y points up: the numbers stay as they are unless the axes Y up → Z up are chosen"
+_NEAR = 0.01  # of what is written; glTF asks for one
+
+
+def recognises(source: Source) -> bool:
+    document = _document(source)
+    return "asset" in document and ("cameras" in document or "nodes" in document)
+
+
+def read(source: Source, options: Options) -> list[Camera]:
+    document = Record(_document(source), source.name)
+    cameras = document.records("cameras", "camera") if "cameras" in document else []
+    nodes = document.records("nodes", "node") if "nodes" in document else []
+    worlds = _Worlds(nodes)
+    moving = _moving(document)
+    found, refused = [], []
+    for index, node in enumerate(nodes):
+        if "camera" not in node:
+            continue
+        camera = cameras[_index(node, "camera", len(cameras))]
+        name = next(
+            (text for text in (node.get("name"), camera.get("name")) if isinstance(text, str) and text), f"node {index}"
+        )
+        try:
+            found.append(_camera(name, camera, worlds.of(index), options))
+        except InputError as error:
+            refused.append(error)
+            continue
+        if moving & {index, *worlds.above(index)}:
+            found[-1] = found[-1].noted(f"{name} is animated: it was taken as it stands without its animation")
+    if refused and not found:
+        raise refused[0]
+    told = tuple(f"Left out: {error}" for error in refused)
+    names = naming.distinct([camera.name for camera in found])
+    return [_renamed(camera, name).noted(*told) for camera, name in zip(found, names, strict=True)]
+
+
+def write(cameras: Sequence[Camera], _options: Options) -> str:
+    naming.refuse_mirrored(cameras, "glTF")
+    document = {
+        "asset": {"version": "2.0", "generator": "Virtual Pinhole"},
+        "scene": 0,
+        "scenes": [{"nodes": [*range(len(cameras))]}],
+        "nodes": [_node(i, camera) for i, camera in enumerate(cameras)],
+        "cameras": [_perspective(camera) for camera in cameras],
+    }
+    return json.dumps(document, indent=1, allow_nan=False) + "\n"
+
+
+def _document(source: Source) -> dict:
+    data = source.data
+    if data[:4] != b"glTF":
+        return source.document
+    if len(data) < 20 or data[16:20] != b"JSON":
+        raise InputError(f"{source.name} is a GLB without its JSON: export it again, as glTF 2.0")
+    (length,) = struct.unpack("<I", data[12:16])
+    inner = Source(data[20 : 20 + length].decode("utf-8", errors="replace"))
+    if inner.json_problem:
+        raise InputError(f"the JSON in {source.name} is none ({inner.json_problem}): export it again")
+    return inner.document
+
+
+class _Worlds:
+    """The nodes' matrices in the world."""
+
+    def __init__(self, nodes: list[Record]) -> None:
+        self._nodes, self._parents, self._known = nodes, {}, {}
+        for index, node in enumerate(nodes):
+            for child in node.values.get("children") or []:
+                if not isinstance(child, int) or not 0 <= child < len(nodes) or child in self._parents:
+                    raise InputError(
+                        f"{node.place} has the child {checks.shown(child)}, which is none or another's: correct it"
+                    )
+                self._parents[child] = index
+
+    def above(self, index: int) -> list[int]:
+        """The node's parents, nearest first."""
+        found = []
+        while (index := self._parents.get(index)) is not None:
+            if len(found) > len(self._nodes):
+                raise InputError(f"node {index} is its own parent: correct its children")
+            found.append(index)
+        return found
+
+    def of(self, index: int) -> np.ndarray:
+        matrix = np.eye(4)
+        for node in reversed([index, *self.above(index)]):
+            if node not in self._known:
+                self._known[node] = _local(self._nodes[node])
+            matrix = matrix @ self._known[node]
+        return matrix
+
+
+def _local(node: Record) -> np.ndarray:
+    if "matrix" in node:
+        return np.array(node.numbers("matrix", 16)).reshape(4, 4).T
+    x, y, z, w = node.numbers("rotation", 4) if "rotation" in node else (0, 0, 0, 1)
+    scale = node.numbers("scale", 3) if "scale" in node else (1, 1, 1)
+    matrix = np.eye(4)
+    matrix[:3, :3] = axes.rotation_of((w, x, y, z), node.place) * np.array(scale)
+    matrix[:3, 3] = node.numbers("translation", 3) if "translation" in node else (0, 0, 0)
+    return matrix
+
+
+def _index(node: Record, key: str, count: int) -> int:
+    index = node.get(key)
+    if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < count:
+        raise InputError(f"{node.called(key)} is {checks.shown(index)}: the file has {count} of them")
+    return index
+
+
+def _moving(document: Record) -> set[int]:
+    animations = document.values.get("animations")
+    channels = [
+        channel
+        for animation in (animations if isinstance(animations, list) else ())
+        if isinstance(animation, dict)
+        for channel in (animation.get("channels") or ())
+        if isinstance(channel, dict)
+    ]
+    targets = [channel.get("target") for channel in channels]
+    return {target["node"] for target in targets if isinstance(target, dict) and isinstance(target.get("node"), int)}
+
+
+def _camera(name: str, camera: Record, matrix: np.ndarray, options: Options) -> Camera:
+    what = f"camera {checks.shown(name)}"
+    if camera.get("type") != "perspective":
+        not_a_pinhole(what, f"{checks.shown(camera.get('type'))}")
+    lens = camera.record("perspective")
+    angle = lens.number("yfov", least=1e-9)
+    if angle >= math.pi:
+        raise InputError(f"yfov of {what} is {angle:g}: give radians below π")
+    size, stated = _size(camera, what, options)
+    width, height = size
+    slope = math.tan(angle / 2)
+    d_y = height / 2 / slope
+    d_x, notes = d_y / options.pixel_aspect, ()
+    if "aspectRatio" in lens:
+        aspect = lens.number("aspectRatio", least=1e-9)
+        across = width / 2 / (aspect * slope)
+        if stated or abs(across / d_x - 1) < 1e-3:
+            d_x = across if abs(across / d_x - 1) > 1e-12 else d_x
+        else:
+            notes = (
+                f"{what} is made for an aspect of {aspect:.6g} and the picture's is {width / height:.6g}: its height counts",
+            )
+    plane = axes.view_plane(d_x, d_y, width / 2, height / 2, size)
+    pinhole, more = axes.pinhole(matrix, plane, what, scaled=True)
+    return Camera(name, pinhole, stated, (*notes, *more, *(() if options.axes == "y_up" else (_Y_UP,))))
+
+
+def _size(camera: Record, what: str, options: Options) -> tuple[tuple[int, int], bool]:
+    extras = camera.get("extras")
+    if isinstance(extras, dict) and {"width", "height"} <= extras.keys():
+        said = Record(extras, what)
+        return (said.size("width"), said.size("height")), True
+    return options.size_or_refuse(what), False
+
+
+def _renamed(camera: Camera, name: str) -> Camera:
+    return Camera(name, camera.pinhole, camera.size_stated, camera.notes)
+
+
+def _node(index: int, camera: Camera) -> dict:
+    rows = axes.camera_to_world(camera.pinhole)[:3]
+    w, x, y, z = axes.quaternion(rows)
+    return {"name": camera.name, "camera": index, "translation": [row[3] for row in rows], "rotation": [x, y, z, w]}
+
+
+def _perspective(camera: Camera) -> dict:
+    pinhole = camera.pinhole
+    width, height = pinhole.width, pinhole.height
+    if pinhole.principal_point != (width / 2, height / 2):
+        raise InputError(f"glTF can't say that a camera is shifted, as {checks.shown(camera.name)} is: choose another format")
+    d_x, d_y = pinhole.distance
+    lens = {
+        "yfov": 2 * math.atan2(height / 2, d_y),
+        "aspectRatio": width * d_y / (height * d_x),
+        "znear": _NEAR,
+    }
+    return {"name": camera.name, "type": "perspective", "perspective": lens, "extras": {"width": width, "height": height}}

@@ -1,0 +1,394 @@
+"""K, R or rvec, and t: OpenCV's FileStorage as YAML, JSON or XML, and plain JSON, YAML or NPZ with the same names.
+
+The pose takes world space to the camera's x right, y down, z into the view: R X + t, as `solvePnP` gives it. Names are those
+that people give (K, camera_matrix, cameraMatrix, intrinsic_matrix …; R, rvec; t, tvec; T_cw, extrinsic …). OpenCV itself has no
+file of a pose, so a file may hold K alone, which stands at the origin and looks along +z, as it would for `projectPoints`; a
+note says so. What is written has K, R, rvec, t, a distortion of zeros and the size, and NPZ is read only.
+
+**Pixels.** OpenCV puts (0, 0) at the centre of the first pixel (`remap`, `undistort`, calibration), so half a pixel lies
+between its K and ours, and a note says that it was added; `pixel = "corner"` takes K as it stands, for files of tools that mean
+the corner.
+
+Rejected: PyYAML, which refuses FileStorage's first line and tags, is not in Blender, and would be asked for three kinds of
+lines; K that means the corner where it is exactly half the size: the middle of a picture does not tell by which rule it is so.
+
+Source: OpenCV's modules/core/src/persistence_yml.cpp and calib3d's projectPoints.
+"""
+
+import io
+import math
+import re
+import zipfile
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from .. import checks
+from ..errors import InputError
+from ..intrinsics import ViewPlane
+from . import axes, distortion, naming
+from .camera import Camera, Options, not_a_pinhole
+from .source import Record, Source, flat, pixels
+
+TITLE = "OpenCV K, R, t (FileStorage YAML, JSON or XML; NPZ)"
+SUFFIX = ".yml"
+
+_K = ("k", "cameramatrix", "intrinsicmatrix", "intrinsics", "intrinsic", "mtx", "cammatrix", "camk", "kmatrix", "m", "m1")
+_R = ("r", "rot", "rotation", "rmat", "rotationmatrix", "rw2c")
+_RVEC = ("rvec", "rodrigues", "rotationvector", "rvecs")
+_T = ("t", "tvec", "translation", "translationvector", "trans", "tw2c")
+_EXTRINSIC = ("extrinsic", "extrinsics", "rt", "worldtocamera", "w2c", "tcw", "extrinsicmatrix")
+_DISTORTION = (
+    "distortioncoefficients", "distcoeffs", "dist", "distortion", "distcoef", "distcoeff", "d", "distortioncoeffs", "dist0",
+)  # fmt: skip
+_WIDTH = ("imagewidth", "width", "w", "resx")
+_HEIGHT = ("imageheight", "height", "h", "resy")
+_SIZE = ("imagesize", "size", "resolution", "imgsize", "imagesizewh")
+NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tx", "ty")
+"""Of the distortion's coefficients, in OpenCV's order."""
+
+
+def recognises(source: Source) -> bool:
+    return any(True for _ in _found(source))
+
+
+def read(source: Source, options: Options) -> list[Camera]:
+    return [_camera(name, values, source, options) for name, values in _found(source)]
+
+
+def write(cameras: Sequence[Camera], options: Options) -> str | dict[str, str]:
+    naming.refuse_mirrored(cameras, "OpenCV's R, t")
+    if len(cameras) == 1:
+        return _text(cameras[0], options)
+    naming.refuse_taken([camera.name for camera in cameras])
+    return {f"{camera.name}{SUFFIX}": _text(camera, options) for camera in cameras}
+
+
+def half_pixel(options: Options, habit: str = "center") -> float:
+    """What to add to a format's principal point to count it from the picture's corner. habit : of the format, one of PIXELS."""
+    return 0.5 if (options.pixel or habit) == "center" else 0.0
+
+
+def told_of_half_pixel(options: Options, program: str) -> tuple[str, ...]:
+    """The note on it."""
+    if options.pixel:
+        return ()
+    return (f"{program} counts pixels from the first one's centre: half a pixel was added to the principal point",)
+
+
+def _text(camera: Camera, options: Options) -> str:
+    (f_x, _, c_x), (_, f_y, c_y), _ = axes.intrinsics(camera.pinhole)
+    half = half_pixel(options)
+    rows = axes.world_to_camera(camera.pinhole)[:3]
+    turn = [row[:3] for row in rows]
+    lines = [
+        "%YAML:1.0",
+        "---",
+        f"image_width: {camera.pinhole.width}",
+        f"image_height: {camera.pinhole.height}",
+        _matrix("camera_matrix", [[f_x, 0.0, c_x - half], [0.0, f_y, c_y - half], [0.0, 0.0, 1.0]]),
+        _matrix("distortion_coefficients", [[0.0]] * 5),
+        _matrix("R", turn),
+        _matrix("rvec", [[number] for number in rotation_vector(turn)]),
+        _matrix("t", [[row[3]] for row in rows]),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _matrix(name: str, rows: Sequence[Sequence[float]]) -> str:
+    data = ", ".join(repr(float(number)) for row in rows for number in row)
+    return f"{name}: !!opencv-matrix\n   rows: {len(rows)}\n   cols: {len(rows[0])}\n   dt: d\n   data: [ {data} ]"
+
+
+def rotation_vector(turn: Sequence[Sequence[float]]) -> tuple[float, float, float]:
+    """Axis times angle in radians, at most π, of a rotation."""
+    w, *axis = axes.quaternion(turn)
+    sine = math.hypot(*axis)
+    angle = 2 * math.atan2(sine, w)
+    return tuple(angle * part / sine if sine else 0.0 for part in axis)
+
+
+def of_rotation_vector(vector: Sequence[float], what: str) -> np.ndarray:
+    """(3, 3) of axis times angle, Rodrigues'."""
+    vector = checks.vector(f"the rotation vector of {what}", vector, 3)
+    angle = math.hypot(*vector)
+    if angle > 1e6:
+        raise InputError(f"the rotation vector of {what} has the length {angle:g}: give an angle in radians")
+    sine = math.sin(angle / 2) / angle if angle else 0.5
+    return axes.rotation_of((math.cos(angle / 2), *(sine * part for part in vector)), what)
+
+
+def _plain(key: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", key.lower()[:60])
+
+
+def _by_name(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {_plain(key): value for key, value in values.items() if isinstance(key, str) and value is not None}
+
+
+def _first(values: Mapping[str, Any], names: Sequence[str]) -> Any:
+    return next((values[name] for name in names if name in values), None)
+
+
+def _is_camera(values: Mapping[str, Any]) -> bool:
+    k = _first(values, _K)
+    if k is None or len(values.keys() & {"frames", "poses", "object"}):
+        return False
+    try:
+        return len(_numbers("K", k)) in (4, 9, 12)
+    except InputError:
+        return False
+
+
+def _found(source: Source):
+    """(name, values by plain name) of each camera in the file."""
+    document = _document(source)
+    by_name = _by_name(document)
+    if _is_camera(by_name):
+        yield (source.path.stem if source.path else "camera"), by_name
+        return
+    shared = {name: value for name, value in by_name.items() if not isinstance(value, dict)}
+    for name, value in document.items():
+        if isinstance(value, dict) and _is_camera(inner := _by_name(value)):
+            yield str(name), {**shared, **inner}
+
+
+def _document(source: Source) -> Mapping[str, Any]:
+    if source.is_folder:
+        return {}
+    if source.data[:4] == b"PK\x03\x04":
+        return _npz(source)
+    if source.document:
+        return source.document
+    if isinstance(source.json, list):
+        return {f"camera {i}": value for i, value in enumerate(source.json)}
+    if source.text.lstrip()[:1] == "<":
+        return _xml(source)
+    return yaml(source.text)
+
+
+def _npz(source: Source) -> dict[str, Any]:
+    """Arrays of numbers without pickle, and no more of them than a camera has."""
+    found = {}
+    try:
+        with zipfile.ZipFile(io.BytesIO(source.data)) as archive:
+            for entry in archive.infolist():
+                if entry.filename.endswith(".npy") and entry.file_size < 2**16 and len(found) < 1000:
+                    array = np.lib.format.read_array(io.BytesIO(archive.read(entry)), allow_pickle=False)
+                    if array.dtype.kind in "iuf":
+                        found[entry.filename.removesuffix(".npy")] = array.tolist()
+    except (ValueError, zipfile.BadZipFile, OSError, EOFError, NotImplementedError, RuntimeError, SyntaxError):
+        return {}
+    return found
+
+
+def _xml(source: Source) -> dict[str, Any]:
+    root = source.xml
+    if root is None or root.tag != "opencv_storage":
+        return {}
+    found: dict[str, Any] = {}
+    for child in root:
+        inner = {each.tag: (each.text or "").strip() for each in child}
+        found[child.tag] = inner if inner else (child.text or "").strip()
+    return found
+
+
+_LINE = re.compile(r"(\s*+)(?:- )?([\"']?)([^:\"'#\[\]{}]++)\2\s*+:(?:\s++(.*))?$")
+_DEEPEST = 8
+
+
+def yaml(text: str) -> dict[str, Any]:
+    """The part of YAML in which OpenCV, ROS and Kalibr write cameras: keys, numbers, texts, lists; blocks by indentation.
+
+    What is not of it is left out, so that whoever looks for a key does not find it.
+    """
+    lines = _joined(text)
+    root: dict[str, Any] = {}
+    stack: list[tuple[int, dict[str, Any]]] = [(-1, root)]
+    block: tuple[int, list] | None = None
+    for line in lines:
+        if (item := re.match(r"(\s*+)-\s++(.*)$", line)) and block is not None and len(item[1]) >= block[0]:
+            block[1].append(_value(item[2].strip()))
+            continue
+        found = _LINE.match(line)
+        if not found:
+            continue
+        indent, key, value = len(found[1]), found[3].strip(), _without_tag((found[4] or "").strip())
+        while indent <= stack[-1][0]:
+            stack.pop()
+        holder, block = stack[-1][1], None
+        if value:
+            holder[key] = _value(value)
+        elif len(stack) <= _DEEPEST:
+            inner = _Block()
+            holder[key] = inner
+            stack.append((indent, inner))
+            block = (indent, inner.items_of_list)
+    return _settled_blocks(root)
+
+
+def _settled_blocks(values: dict[str, Any]) -> dict[str, Any]:
+    """The blocks as what they turned out to be: objects, or lists."""
+    return {
+        key: (value.items_of_list or _settled_blocks(value)) if isinstance(value, _Block) else value
+        for key, value in values.items()
+    }
+
+
+class _Block(dict):
+    """What stands below a key: keys of its own, or the items of a list."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.items_of_list: list = []
+
+
+def _joined(text: str) -> list[str]:
+    """The lines, those of one pair of brackets in one; comments and the document's marks left out."""
+    lines, parts, open_brackets = [], [], 0
+    for line in text.split("\n"):
+        if line.startswith(("%", "---", "...")) or line.lstrip().startswith("#"):
+            continue
+        line = re.sub(r"\s#.*$", "", line) if "#" in line else line
+        parts.append(line if not parts else line.strip())
+        open_brackets += line.count("[") + line.count("{") - line.count("]") - line.count("}")
+        if open_brackets <= 0:
+            lines.append(" ".join(parts))
+            parts, open_brackets = [], 0
+    return lines
+
+
+def _without_tag(value: str) -> str:
+    return re.sub(r"^![^\s]*\s*", "", value)
+
+
+def _value(text: str) -> Any:
+    if text.startswith("["):
+        try:
+            return _list(text)
+        except InputError:
+            return text
+    try:
+        return float(text) if "_" not in text else text.strip("\"'")
+    except ValueError:
+        return text.strip("\"'")
+
+
+def _list(text: str) -> list:
+    return [_value(part.strip()) for part in re.sub(r"[\[\]]", " ", text).split(",") if part.strip()]
+
+
+def _numbers(name: str, value: Any) -> tuple[float, ...]:
+    """The numbers of a matrix: FileStorage's object with rows, cols and data, a list of lists, or a text."""
+    if isinstance(value, dict):
+        rows, columns = (value.get(key) for key in ("rows", "cols"))
+        found = flat(name, value.get("data", []))
+        if rows is not None and columns is not None and len(found) != pixels("rows", rows) * pixels("cols", columns):
+            raise InputError(f"{name} has {len(found)} numbers: its rows and cols say {rows:g} × {columns:g}")
+        return found
+    return flat(name, value)
+
+
+def matrix_of_k(values: Sequence[float], what: str) -> tuple[float, float, float, float]:
+    """(fx, fy, cx, cy) of nine numbers, row after row, of the twelve of a 3 × 4, or of these four themselves.
+
+    Raises
+    ------
+    InputError
+        if it has skew, no last row 0 0 1, or a focal length that is not above 0.
+    """
+    if len(values) == 4:
+        f_x, f_y, c_x, c_y = values
+    else:
+        if len(values) == 12:
+            values = [values[i] for i in (0, 1, 2, 4, 5, 6, 8, 9, 10)]
+        if len(values) != 9:
+            raise InputError(f"K of {what} has {len(values)} numbers: give nine")
+        f_x, skew, c_x, lower, f_y, c_y, *last = values
+        if [lower, *last[:2]] != [0, 0, 0] or last[2] != 1:
+            hint = "transpose it" if [values[1], values[2], values[5]] == [0, 0, 0] else "its last row should be 0 0 1"
+            raise InputError(f"K of {what} is {checks.shown([*values])}: {hint}")
+        if abs(skew) > 1e-9 * abs(f_x):
+            raise InputError(
+                f"K of {what} has a skew of {skew:g} pixels, which no pinhole camera here has: rectify the pictures"
+            )
+    if not (f_x > 0 and f_y > 0):
+        raise InputError(f"K of {what} has the focal lengths {f_x:g} and {f_y:g}: give numbers above 0")
+    return f_x, f_y, c_x, c_y
+
+
+def coefficients(numbers: Sequence[float], what: str) -> dict[str, float]:
+    """OpenCV's distortion coefficients by name.
+
+    Raises
+    ------
+    InputError
+        if they are more than OpenCV has.
+    """
+    if len(numbers) not in (0, 1, 2, 3, 4, 5, 8, 12, 14):
+        raise InputError(f"{what} has {len(numbers)} distortion coefficients: OpenCV has 4, 5, 8, 12 or 14")
+    return dict(zip(NAMES, numbers, strict=False))
+
+
+def settled(numbers: dict[str, float], plane: ViewPlane, what: str, options: Options) -> tuple[str, ...]:
+    """The notes on OpenCV's distortion, or its refusal."""
+    return distortion.settle(numbers, distortion.opencv(numbers), plane, what, options)
+
+
+def _camera(name: str, values: Mapping[str, Any], source: Source, options: Options) -> Camera:
+    what = f"camera {checks.shown(name)}"
+    model = str(_first(values, ("cameramodel", "distortionmodel", "model", "distortiontype")) or "")
+    if re.search(r"fisheye|equidistant|omni|mei|eucm|kannala|spherical|ortho", model.lower()):
+        not_a_pinhole(what, f"of the model {checks.shown(model)}")
+    f_x, f_y, c_x, c_y = matrix_of_k(_numbers("K", _first(values, _K)), what)
+    size, stated = _size(values, what, options)
+    half = half_pixel(options)
+    plane = axes.view_plane(f_x, f_y, c_x + half, c_y + half, size)
+    given = _first(values, _DISTORTION)
+    notes = told_of_half_pixel(options, "OpenCV")
+    if given is not None:
+        notes += settled(coefficients(_numbers("the distortion", given), what), plane, what, options)
+    turn, translation, more = _pose(values, what)
+    pinhole, more_of_pose = axes.pinhole(axes.from_world_to_camera(turn, translation, what), plane, what)
+    return Camera(name, pinhole, stated, (*notes, *more, *more_of_pose))
+
+
+def _size(values: Mapping[str, Any], what: str, options: Options) -> tuple[tuple[int, int], bool]:
+    record = Record(dict(values), what)
+    width, height = (next((name for name in names if name in values), None) for names in (_WIDTH, _HEIGHT))
+    if width and height:
+        return (record.size(width), record.size(height)), True
+    if (both := _first(values, _SIZE)) is not None:
+        numbers = _numbers(f"the size of {what}", both)
+        if len(numbers) != 2:
+            raise InputError(f"the size of {what} has {len(numbers)} numbers: give the width and the height")
+        return tuple(pixels(f"the size of {what}", number) for number in numbers), True
+    return options.size_or_refuse(what), False
+
+
+def _pose(values: Mapping[str, Any], what: str) -> tuple[np.ndarray, tuple[float, ...], tuple[str, ...]]:
+    extrinsic, turn, vector, translation = (_first(values, names) for names in (_EXTRINSIC, _R, _RVEC, _T))
+    if extrinsic is not None and turn is None and vector is None:
+        numbers = _numbers(f"the extrinsic matrix of {what}", extrinsic)
+        if len(numbers) not in (12, 16) or (len(numbers) == 16 and numbers[12:] != (0, 0, 0, 1)):
+            raise InputError(f"the extrinsic matrix of {what} is not 3 × 4 or 4 × 4 with the last row 0 0 0 1: correct it")
+        rows = np.array(numbers).reshape(-1, 4)[:3]
+        return rows[:, :3], tuple(rows[:, 3].tolist()), ()
+    if turn is None and vector is None and translation is None:
+        return np.eye(3), (0.0, 0.0, 0.0), (f"{what} has no pose: it stands at the origin and looks along z, y down",)
+    if (turn is None and vector is None) or translation is None:
+        raise InputError(f"{what} has only a part of its pose: give R or rvec, and t")
+    translation = _numbers(f"t of {what}", translation)
+    numbers = _numbers(f"R of {what}", turn if turn is not None else vector)
+    if len(numbers) == 9:
+        matrix = np.array(numbers).reshape(3, 3)
+    elif len(numbers) == 3:
+        matrix = of_rotation_vector(numbers, what)
+    else:
+        raise InputError(f"R of {what} has {len(numbers)} numbers: give nine, or three of a rotation vector")
+    if turn is not None and vector is not None and len(numbers) == 9:
+        both = _numbers(f"rvec of {what}", vector)
+        if len(both) == 3 and np.abs(of_rotation_vector(both, what) - matrix).max() > 1e-3:
+            raise InputError(f"R and rvec of {what} are different rotations: take one out")
+    return matrix, translation, ()
