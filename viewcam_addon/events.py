@@ -16,7 +16,7 @@ import json
 from collections.abc import Iterator
 from typing import Any, Protocol, TextIO
 
-from .terminal import copy_of
+from .terminal import copy_of, plain
 
 _PERCENT = "{desc} {percentage:.0f}%|{bar}| {elapsed}<{remaining}"
 
@@ -55,7 +55,7 @@ class Bar(Sentences):
         elif event == "progress":
             self._progress(100 * fields["share"])
         elif event == "shot_started" and self._bar is not None:
-            self._bar.set_description_str(fields["shot"])
+            self._bar.set_description_str(plain(fields["shot"]))
         elif event in ("shot_done", "shot_failed", "shot_elsewhere") and self._bar is not None:
             self._failed += event == "shot_failed"
             self._bar.set_postfix_str(f"{self._failed} failed" if self._failed else "", refresh=False)
@@ -151,12 +151,13 @@ def _tqdm() -> type | None:
 
 
 def _sentence(event: str, fields: dict[str, Any]) -> str:
-    """What is to be said of an event where nobody reads JSON; mostly nothing."""
+    """What is to be said of an event where nobody reads JSON, plain; mostly nothing."""
     if event == "error":
         command = f"viewcam {fields['command']}".rstrip()  # none where there is no such command
-        return f"{command}: {fields['text']}"
+        lines = fields["text"].split("\n") if fields.get("problems") else [fields["text"]]
+        return "\n".join(map(plain, [f"{command}: {lines[0]}", *lines[1:]]))
     if event == "shot_failed":
-        return f"viewcam batch: {fields['shot']}: {fields['error']}"
+        return plain(f"viewcam batch: {fields['shot']}: {fields['error']}")
     if event == "stopping":
         return f"viewcam batch: {fields['signal']}: this shot will be finished; a second one ends it at once"
     return ""

@@ -16,6 +16,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..errors import InputError
+from ..terminal import plain
 from . import camera as cameras
 from . import storage, targets, versions
 from .datablocks import is_animated
@@ -67,7 +68,7 @@ def _follow(camera_object: bpy.types.Object, scene: bpy.types.Scene, depsgraph: 
     try:
         cameras.place(camera_object, cameras.stated(evaluated, scene), scene, depsgraph)
     except InputError as error:
-        print(f"viewcam: frame {scene.frame_current}: {camera_object.name}: {error}", file=sys.stderr)
+        print(plain(f"viewcam: frame {scene.frame_current}: {camera_object.name}: {error}"), file=sys.stderr)
         return
     if depsgraph.mode == "RENDER":
         camera_object.update_tag(refresh={"OBJECT", "DATA", "TIME"})

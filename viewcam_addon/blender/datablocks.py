@@ -6,6 +6,7 @@ import bpy
 
 from .. import intrinsics
 from ..errors import InputError
+from ..terminal import plain
 from . import versions
 
 # Metres: what is shorter, Blender calls zero.
@@ -134,6 +135,6 @@ def beyond_pinhole(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> l
 
 
 def sentence(error: InputError) -> str:
-    """An error's message with a capital, as it stands alone in a panel or a report."""
-    message = str(error)
+    """An error's message with a capital, plain, as it stands alone in a panel or a report, which Blender prints as well."""
+    message = plain(str(error))
     return message[:1].upper() + message[1:]

@@ -20,7 +20,7 @@ from ..batch.interruption import Interruption
 from ..batch.summary import Summary
 from ..errors import InputError
 from ..shots import Shot, ShotsError
-from ..terminal import silent_libraries
+from ..terminal import say, silent_libraries
 from . import Result
 from .surroundings import blender_room
 
@@ -59,7 +59,7 @@ def run(options: argparse.Namespace) -> Result:
         words = dataset.write(folder, job.all_shots, job.settings, options.transforms) if options.transforms else ""
     _tell(options, summary, folder)
     if words:
-        print(words)
+        say(words)
     return summary.exit_status, summary.to_json()
 
 
@@ -138,7 +138,7 @@ def _tell(options: argparse.Namespace, summary: Summary, folder: Folder) -> None
         options.events.tell("error", command=options.command, text=f"{what}: the same command with --resume renders them")
         return
     kept = f", {summary.kept} of them kept" if summary.kept else ""
-    print(f"{shots}{kept}, in {summary.seconds:.1f} s: {folder.contact_sheet}")
+    say(f"{shots}{kept}, in {summary.seconds:.1f} s: {folder.contact_sheet}")
     if unlike := [shot["name"] for shot in summary.shots if shot.get("passed") is False]:
         named = ", ".join(unlike[:_MOST_NAMED]) + (", …" if len(unlike) > _MOST_NAMED else "")
-        print(f"{len(unlike)} are not what the reference tracer sees: {named}; {folder.summary} says how")
+        say(f"{len(unlike)} are not what the reference tracer sees: {named}; {folder.summary} says how")
