@@ -33,7 +33,26 @@ from types import ModuleType
 from .. import checks
 from ..errors import InputError
 from ..files import written_whole
-from . import bop, colmap, colmap_binary, gltf, opencv, ros, sidecar, transforms, usd
+from . import (
+    arkit,
+    bop,
+    bundler,
+    colmap,
+    colmap_binary,
+    fspy,
+    gltf,
+    llff,
+    meshroom,
+    metashape,
+    opencv,
+    openmvg,
+    realitycapture,
+    ros,
+    sidecar,
+    trajectories,
+    transforms,
+    usd,
+)
 from .axes import moved, moved_back
 from .camera import ANGLES, AXES, PIXELS, Camera, Options, choose
 from .source import Source
@@ -62,8 +81,17 @@ FORMATS: dict[str, ModuleType] = {
     "bop": bop,
     "gltf": gltf,
     "usd": usd,
+    "fspy": fspy,
+    "metashape": metashape,
+    "realitycapture": realitycapture,
+    "meshroom": meshroom,
+    "openmvg": openmvg,
+    "bundler": bundler,
+    "llff": llff,
+    "arkit": arkit,
     "ros": ros,
     "opencv": opencv,
+    "trajectories": trajectories,
 }
 """Name → module, in the order in which they are asked."""
 
