@@ -14,6 +14,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from ..errors import InputError
+from ..files import read_bytes
 from . import documents, table
 from .makers import frames, from_cameras, orbit
 from .problems import Problems, ShotsError
@@ -64,7 +65,7 @@ def read(path: str | os.PathLike[str], cameras: Collection[str] | None = None) -
 def _text(path: Path) -> str:
     """The file's text. Bytes that are not UTF-8 become lone surrogates, which are refused where they stand."""
     try:
-        data = path.read_bytes()
+        data = read_bytes(path)
     except OSError as error:
         raise InputError(f"{path} can't be read ({error.strerror}): check its name and permissions") from error
     if data.startswith(_OTHER_ENCODINGS) or b"\0" in data[:100]:
