@@ -51,6 +51,7 @@ TRACER_FLOORS = ["arrays", "compiled", "scene", "rays", "light", "kernels", "til
 BLENDER_FLOORS = [
     "versions",
     "borrowing",
+    "opening",
     "findings",
     "render_settings",
     "preferences",

@@ -94,6 +94,9 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
             added.add_argument("blend", metavar="FILE.blend", type=Path, help="any file that Blender opens")
         else:
             added.set_defaults(blend=None)
+        added.add_argument(
+            "--trust", action="store_true", help="let what is in the file run and write: Python, shaders, caches"
+        )
 
     def scene_choices(added: argparse.ArgumentParser) -> None:
         added.add_argument("--camera", metavar="NAME", help="the camera object (default: the scene's)")
@@ -179,7 +182,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
 
     added = command(proving.demo, "demo", "Check the studio still that comes with the project, and write the report.")
     added.set_defaults(blend=proving.DEMO_SCENE, camera=None, frame=None, size=None, strict=False, recenter=False, clay=False)
-    added.set_defaults(difference=None, repeat=None, writes=("report",))
+    added.set_defaults(difference=None, repeat=None, trust=False, writes=("report",))
     light(added)
     error(added, "the tracer takes")
     added.add_argument(

@@ -50,7 +50,7 @@ def run(options: argparse.Namespace) -> Result:
             machines = stack.enter_context(cluster.opened(options.scheduler or None, options.workers, program))
         folder = Folder(options.out, options.shard.strip().replace("/", "-of-") if options.shard else "")
         if _on_cluster(options):
-            about = (job.made_from, options.seed, options.threads, options.check)
+            about = (job.made_from, options.seed, options.threads, options.check, options.trust)
             work = machines.work(blend, folder, job.settings, *about)
         else:
             work = one.in_turn(folder, renderer, job.settings, options.check)
@@ -88,8 +88,8 @@ def _renderer(options: argparse.Namespace) -> contextlib.AbstractContextManager:
     The bpy module puts folders on sys.path in which a worker's children, who get that path, would find half a bpy.
     """
     if options.blend is not None and (os.environ.get(served.BLENDER) or _on_cluster(options)):
-        return served.ServedRenderer(options.blend, options.seed, options.threads)
-    return blender_room("batch.renderer").BlenderRenderer(options.blend, options.seed, options.threads)
+        return served.ServedRenderer(options.blend, options.seed, options.threads, options.trust)
+    return blender_room("batch.renderer").BlenderRenderer(options.blend, options.seed, options.threads, options.trust)
 
 
 def _job(options: argparse.Namespace, renderer: Any) -> _Job:

@@ -189,6 +189,7 @@ def _request(options: argparse.Namespace) -> Any:
         samples=options.samples,
         seed=options.seed,
         clay=options.clay,
+        trust=options.trust,
     )
 
 

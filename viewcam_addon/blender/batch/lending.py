@@ -8,7 +8,7 @@ shots (keeping.py), and no camera of the file follows a picture of another size 
 """
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import bpy
 
@@ -30,12 +30,14 @@ def engine_name(engine: str) -> str:
 class Lent:
     """A scene while a batch has it. warnings : a sentence for each thing that is another in a render by itself.
 
-    threads, seed : of all shots, the file's where None.
+    threads, seed : of all shots, the file's where None. off : what is off because the file is not trusted (opening.py).
     """
 
-    def __init__(self, borrow: Borrower, scene: bpy.types.Scene, threads: int | None, seed: int | None) -> None:
+    def __init__(
+        self, borrow: Borrower, scene: bpy.types.Scene, threads: int | None, seed: int | None, off: Iterable[str] = ()
+    ) -> None:
         self._scene = scene
-        self.warnings = tuple(_warnings(scene))
+        self.warnings = (*_warnings(scene), *(f"{sentence[:1].upper()}{sentence[1:]}, without --trust" for sentence in off))
         render = scene.render
         cameras_unbound(borrow, scene)
         for name in ("use_multiview", "use_sequencer", "use_stamp"):
