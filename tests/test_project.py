@@ -284,14 +284,6 @@ def test_the_top_level_is_the_fixed_one():
     assert not extra, f"not a part of the top level: {sorted(extra)}"
 
 
-def test_no_file_is_too_long_to_be_one_room():
-    lengths = {
-        path: len((ROOT / path).read_text(encoding="utf-8").splitlines()) for path in tracked_files() if path.endswith(".py")
-    }
-    long = {path: length for path, length in lengths.items() if length > 400}
-    assert lengths and not long, f"over 400 lines: {long}"
-
-
 def test_what_the_readme_says_viewcam_does_it_does():
     promised = set(re.findall(r"(?m)(?:`|--command |^ *)viewcam ([a-z]+)", (ROOT / "README.md").read_text(encoding="utf-8")))
     assert {"check", "demo"} <= promised
