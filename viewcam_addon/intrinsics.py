@@ -225,6 +225,33 @@ def growth(sensor_fit: str, before: Frame, after: Frame) -> float:
     return now / was
 
 
+def own_sensor(current: tuple[float, float], before: tuple[float, float]) -> tuple[float, float]:
+    """The sensor (width, height) in mm on which `camera_data` is to be asked: the one before it grew, unless changed since.
+
+    before : the sensor before it grew, zeros where it never did.
+    """
+    if not all(before):
+        return current
+    growth = current[0] / before[0]
+    has_grown = math.frexp(growth)[0] == 0.5 and growth > 1 and growth == current[1] / before[1]
+    return before if has_grown else current
+
+
+def lens_and_sensor(data: CameraData, own: tuple[float, float]) -> dict[str, float | tuple[float, float]]:
+    """What Blender is to store, by its names: lens and sensor, and beside them the artist's own sensor if it had to grow."""
+    before = own if data.sensor_width != own[0] else (0.0, 0.0)
+    found = {name: getattr(data, name) for name in ("lens", "sensor_width", "sensor_height")}
+    return found | {"virtual_pinhole_sensor": before}
+
+
+def check_storable(camera: str, **numbers: tuple[float, ...]) -> None:
+    """Raise InputError, by the camera's name, unless float32 holds all numbers."""
+    for name, values in numbers.items():
+        if not all(abs(value) <= _LARGEST for value in values):
+            largest = max(values, key=abs)
+            raise InputError(f"the {name} of camera {camera!r} needs {largest:g}, beyond Blender's numbers: choose another")
+
+
 def _beyond_blender(name: str, pixels: float, of_blender: str, value: float) -> str:
     problem = "too small" if abs(value) < 1 else "too large"
     return f"the {name} of {pixels:g} pixels needs a {of_blender} of {value:g}, {problem} for Blender's numbers: choose another"

@@ -67,7 +67,7 @@ def camera_named(name: str | None, scene: bpy.types.Scene, own: bpy.types.Object
 
 def check_said_by_four_values(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene) -> None:
     """Raise InputError if other views made from a camera of the file would lack something that it has: shift, mirroring."""
-    data = datablocks.camera_data_of(camera_object.evaluated_get(datablocks.depsgraph_of(scene)).data)
+    data = datablocks.camera_data_of(camera_object.evaluated_get(datablocks.depsgraph_of(scene)))
     extra, remedy = "", ""
     if data.shift_x or data.shift_y:
         extra, remedy = f"has a lens shift of {data.shift_x:g}, {data.shift_y:g}", "set it to 0"

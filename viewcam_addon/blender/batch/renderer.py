@@ -148,7 +148,7 @@ class BlenderRenderer:
         evaluated = self.scene.camera.evaluated_get(datablocks.depsgraph_of(self.scene))
         self._taken = cameras.read(evaluated, self.scene)
         return {
-            **record(self._taken, datablocks.camera_data_of(evaluated.data)),
+            **record(self._taken, datablocks.camera_data_of(evaluated)),
             **({"stated": record(self._stated)["camera"]} if self._stated else {}),
             "rendered": self._lent.rendered(),
             "warnings": [*self._lent.warnings, *warnings],
