@@ -280,6 +280,23 @@ def another_picture(source):
     assert 0 < there < math.inf and abs(there * back - 1) <= 2 * 2.0**-52, (fit, before, after)  # two quotients, a product
 
 
+@attacks("intrinsics.own_sensor", "intrinsics.lens_and_sensor", "intrinsics.check_storable")
+def a_sensor_that_grew(source):
+    """Whatever a script has stored: the sensor is one of the two, and it grew by a power of two where it is the earlier."""
+    current, before = ((source.finite(), source.finite()) for _ in range(2))
+    before = source.choice((before, (0.0, 0.0), (math.nan, 1.0), tuple(side / 4 for side in current)))
+    own = intrinsics.own_sensor(current, before)
+    assert own in (current, before)
+    if own is not current:
+        assert own[0] * 2 ** round(math.log2(current[0] / own[0])) == current[0]
+    data = CameraData(50.0, float32(source), 24.0)
+    stored = intrinsics.lens_and_sensor(data, own)
+    assert stored["virtual_pinhole_sensor"] in (own, (0.0, 0.0)) and stored["sensor_width"] == data.sensor_width
+    values = (source.choice((source.finite(), math.inf, math.nan)),)
+    found = answer(lambda: intrinsics.check_storable("Camera", eye=values))
+    assert (found is REFUSED) == (not abs(values[0]) <= np.finfo(np.float32).max)
+
+
 def public_functions():
     """Every public function, class, method and property of the two modules, by name."""
     for module in (pinhole, intrinsics):
