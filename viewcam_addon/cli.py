@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from . import batch_words, events, words
-from .commands import Result, batch, chart, proving, serve
+from .commands import Result, batch, camera, chart, proving, serve
 from .errors import InputError, bug
 from .files import check_writable, is_printed_to, written_whole
 from .tracer.scene.film import SAMPLES
@@ -179,6 +179,9 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     added = command(batch.run, "batch", batch_words.DESCRIPTION)
     blend(added)
     batch_words.add(added, blend_is_open)
+
+    added = command(camera.run, "camera", "List the cameras of another program's file, or write them for a third one.")
+    camera.add(added)
 
     added = command(proving.demo, "demo", "Check the studio still that comes with the project, and write the report.")
     added.set_defaults(blend=proving.DEMO_SCENE, camera=None, frame=None, size=None, strict=False, recenter=False, clay=False)

@@ -118,8 +118,10 @@ def read(given: str | Path, *, format: str | None = None, options: Options | Non
     """
     options = options or Options()
     source = Source(given)
-    name = format or recognised(source)
-    cameras = _module(name, "read").read(source, options)
+    module = _module(format or recognised(source), "read")
+    if format and not module.recognises(source):
+        raise InputError(f"{source.name} is not {module.TITLE} by its content: leave the format out")
+    cameras = module.read(source, options)
     if not cameras:
         raise InputError(f"{source.name} holds no camera: give another file")
     return [_unmirrored(moved(camera, options), options) for camera in cameras]

@@ -12,6 +12,7 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from .. import cameras
 from .. import shots as lists
 from ..batch import cluster, dataset, one, served
 from ..batch import run as running
@@ -22,6 +23,7 @@ from ..errors import InputError
 from ..shots import Shot, ShotsError
 from ..terminal import say, silent_libraries
 from . import Result
+from .camera import options_of
 from .surroundings import blender_room
 
 _MOST_NAMED = 5
@@ -67,7 +69,7 @@ def _refuse_contradictions(options: argparse.Namespace) -> None:
     given = {"SHOTS": options.shots, "--orbit": options.orbit, "--frames": options.frames, "--cameras": options.cameras}
     sources = [name for name, value in given.items() if value is not None]
     if not sources:
-        raise InputError("which shots is not said: give a list (CSV, JSON or JSON Lines), --orbit, --frames or --cameras")
+        raise InputError("which shots is not said: give a list, cameras of any program, --orbit, --frames or --cameras")
     if len(sources) > 1:
         raise InputError(f"{' and '.join(sources)} say each which shots: give one of them")
     if options.camera is not None and sources[0] in ("SHOTS", "--cameras"):
@@ -109,7 +111,12 @@ def _job(options: argparse.Namespace, renderer: Any) -> _Job:
 
 def _shots(options: argparse.Namespace, renderer: Any) -> list[Shot]:
     if options.shots is not None:
-        return lists.read(options.shots, renderer.cameras)
+        if lists.is_list(options.shots):
+            return lists.read(options.shots, renderer.cameras)
+        found = cameras.read(options.shots, options=options_of(options))
+        for note in dict.fromkeys(note for camera in found for note in camera.notes):
+            options.events.tell("note", command=options.command, text=note)
+        return lists.from_pinholes((camera.name, camera.pinhole) for camera in found)
     if options.cameras is not None:
         return lists.from_cameras(options.cameras, renderer.cameras, spaces=not options.transforms)
     if options.orbit is not None:

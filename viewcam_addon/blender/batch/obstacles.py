@@ -79,9 +79,9 @@ def check_said_by_four_values(camera_object: bpy.types.Object, pinhole: Pinhole,
 
 
 def stated(shot: Shot, frame: intrinsics.Frame) -> Pinhole:
-    """The pinhole that a shot's four values ask for in the picture of `frame`."""
+    """The pinhole that a shot's values ask for in the picture of `frame`."""
     distance = (shot.d, shot.d * (frame.pixel_aspect_x / frame.pixel_aspect_y))
-    whole = Pinhole(shot.eye, shot.look_at, shot.up, distance, *frame.size)
+    whole = Pinhole(shot.eye, shot.look_at, shot.up, distance, *frame.size, shot.principal_point, bool(shot.mirrored))
     return whole.cropped(*frame.window) if frame.crop else whole
 
 

@@ -1,0 +1,119 @@
+"""`viewcam camera`: cameras of any program, listed or written for another.
+
+A file, a folder or, as "-", what stands on standard input; see cameras/. And the words that say how cameras are to be taken,
+which `viewcam batch` has, too.
+"""
+
+import argparse
+import dataclasses
+import sys
+from pathlib import Path
+
+from .. import cameras, words
+from ..cameras import Camera, Options
+from ..cameras.sidecar import record
+from ..errors import InputError
+from ..intrinsics import ViewPlane
+from ..terminal import say
+from . import Result
+
+_MOST_CHARACTERS = 100_000_000
+
+
+def add(added: argparse.ArgumentParser) -> None:
+    """Add the words to the parser of the command, which has those of every command already."""
+    added.add_argument("file", metavar="FILE", help="a file or folder with cameras; - for standard input")
+    added.add_argument("--list", action="store_true", help="a line for each camera, and what is to be said of them")
+    added.add_argument("--camera", metavar="NAME", help="only this one of them")
+    added.add_argument("--from", dest="format", choices=cameras.readable(), help="the format (default: by its content)")
+    added.add_argument("--to", choices=cameras.writable(), help="write them in this format")
+    added.add_argument("--out", metavar="FILE", type=Path, help="where to; a folder for some formats (default: printed)")
+    taken(added)
+    added.add_argument("--out-axes", choices=[*cameras.AXES], default="as_is", help="the axes of what is written")
+    added.add_argument("--out-scale", type=words.error, metavar="S", default=1.0, help="1 unit written is S units here")
+
+
+def taken(added: argparse._ActionsContainer, size: bool = True) -> None:
+    """Add the words that say how cameras are to be taken. size : whether --size is one of them, and not there already."""
+    if size:
+        added.add_argument("--size", type=words.size, metavar="WxH", help="pixels, where the file does not say")
+    added.add_argument("--axes", choices=[*cameras.AXES], default="as_is", help="y_up: y points up in the file and z here")
+    added.add_argument("--scale", type=words.error, metavar="S", default=1.0, help="1 unit of the file is S units here")
+    added.add_argument("--distance", type=words.error, metavar="D", help="view-plane distance in pixels, for poses alone")
+    added.add_argument(
+        "--pixel-aspect", type=words.error, metavar="A", default=1.0, help="a pixel's width over its height, where not said"
+    )
+    added.add_argument("--angles", choices=[*cameras.ANGLES], help="the unit of angles that have none")
+    added.add_argument("--pixel", choices=[*cameras.PIXELS], help="where (0, 0) is, in place of the format's habit")
+    added.add_argument("--without-distortion", action="store_true", help="take cameras without their lens distortion")
+    added.add_argument("--unmirrored", action="store_true", help="take cameras that mirror their picture without that")
+    added.add_argument("--original-world", action="store_true", help="undo a transforms.json's applied_transform")
+
+
+def options_of(options: argparse.Namespace) -> Options:
+    """What these words say."""
+    plane = None
+    if options.distance is not None:
+        if options.size is None:
+            raise InputError("--distance counts pixels of a picture: give --size as well")
+        width, height = options.size
+        distance = (options.distance, options.distance * options.pixel_aspect)
+        plane = ViewPlane(distance, (width / 2, height / 2), width, height)
+    return Options(
+        axes=options.axes,
+        scale=options.scale,
+        size=options.size,
+        pixel_aspect=options.pixel_aspect,
+        view_plane=plane,
+        angle_unit=options.angles,
+        pixel=options.pixel,
+        without_distortion=options.without_distortion,
+        unmirrored=options.unmirrored,
+        original_world=options.original_world,
+    )
+
+
+def run(options: argparse.Namespace) -> Result:
+    if options.list and options.to:
+        raise InputError("--list and --to say each what to do with the cameras: give one of them")
+    if options.out and not options.to:
+        raise InputError("--out says where to, but not in which format: give --to")
+    given = sys.stdin.read(_MOST_CHARACTERS) if options.file == "-" else Path(options.file)
+    found = cameras.read(given, format=options.format, options=options_of(options))
+    if options.camera is not None:
+        found = [cameras.choose(found, options.camera)]
+    notes = list(dict.fromkeys(note for camera in found for note in camera.notes))
+    for note in notes:
+        options.events.tell("note", command=options.command, text=note)
+    result = {"cameras": [{"name": each.name, **_said(each)} for each in found], "notes": notes}
+    if options.to is None:
+        say(*(_line(camera) for camera in found))
+        return 0, result
+    how = Options(axes=options.out_axes, scale=options.out_scale, pixel=options.pixel)
+    if options.out is None:
+        content = cameras.write(found, options.to, how)
+        if not isinstance(content, str):
+            raise InputError(f"{options.to} is {len(content)} files, {', '.join([*content][:3])}: give a folder with --out")
+        say(*content.removesuffix("\n").split("\n"))
+        return 0, result
+    written = cameras.save(found, options.out, options.to, how)
+    count = "1 camera" if len(found) == 1 else f"{len(found)} cameras"
+    say(f"{count}, as {cameras.FORMATS[options.to].TITLE}: {options.out}")
+    return 0, result | {"written": [str(path) for path in written]}
+
+
+def _said(camera: Camera) -> dict:
+    said = dataclasses.asdict(camera)
+    kept = {key: said[key] for key in ("size_stated", "image", "time", "notes")}
+    return {**kept, "camera": record(camera.pinhole)["camera"]}
+
+
+def _line(camera: Camera) -> str:
+    pinhole = camera.pinhole
+    e, l = (", ".join(f"{number:.6g}" for number in point) for point in (pinhole.eye, pinhole.look_at))
+    d = " × ".join(f"{number:.6g}" for number in dict.fromkeys(pinhole.distance))
+    c = ", ".join(f"{number:.6g}" for number in pinhole.principal_point)
+    shifted = "" if pinhole.principal_point == (pinhole.width / 2, pinhole.height / 2) else f", principal point {c}"
+    mirrored = ", mirrored" if pinhole.mirrored else ""
+    size = f"{pinhole.width} × {pinhole.height}{'' if camera.size_stated else ' (as given)'}"
+    return f"{camera.name}: {size}, d = {d}{shifted}{mirrored}, eye ({e}), look-at ({l})"
