@@ -50,9 +50,10 @@ ROOMS = {
         "errors checks files terminal children pinhole roll rotation moves diagram image intrinsics camera_values "
         "camera_text datasets compare tracer shots batch"
     ),
-    "commands": "errors terminal events children image compare tracer shots batch",
-    "batch_words": "words shots",
-    "cli": "errors files events words tracer commands batch_words",
+    "commands": "errors terminal events children intrinsics cameras image compare tracer shots batch",
+    "camera_words": "words cameras",
+    "batch_words": "words camera_words shots",
+    "cli": "errors files events words tracer commands camera_words batch_words",
 }
 BLENDER_ROOMS = {
     "versions": "",

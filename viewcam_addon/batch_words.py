@@ -3,8 +3,7 @@
 import argparse
 from pathlib import Path
 
-from . import words
-from .commands import camera
+from . import camera_words, words
 from .shots import ENGINES, LEVELS
 
 DESCRIPTION = "Render many shots of one file: opened once, each written whole, and continued after whatever ended it."
@@ -54,7 +53,7 @@ def add(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     )
     shots.add_argument("--shard", metavar="I/N", help="of all these, every N-th from the I-th on: for a farm's own manager")
 
-    camera.taken(added.add_argument_group("how cameras of another program are taken"), size=False)
+    camera_words.taken(added.add_argument_group("how cameras of another program are taken"), size=False)
 
     said = added.add_argument_group("what a shot does not say itself")
     said.add_argument("--camera", metavar="NAME", help="of --orbit and --frames: the camera (default: the scene's)")

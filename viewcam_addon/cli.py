@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from . import batch_words, events, words
+from . import batch_words, camera_words, events, words
 from .commands import Result, batch, camera, chart, proving, serve
 from .errors import InputError, bug
 from .files import check_writable, is_printed_to, written_whole
@@ -181,7 +181,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     batch_words.add(added, blend_is_open)
 
     added = command(camera.run, "camera", "List the cameras of another program's file, or write them for a third one.")
-    camera.add(added)
+    camera_words.add(added)
 
     added = command(proving.demo, "demo", "Check the studio still that comes with the project, and write the report.")
     added.set_defaults(blend=proving.DEMO_SCENE, camera=None, frame=None, size=None, strict=False, recenter=False, clay=False)

@@ -55,7 +55,7 @@ def test_text_on_standard_input_is_answered_on_standard_output(monkeypatch, capf
         (["camera", "MODEL", "--to", "colmap"], "--out"),
         (["camera", "MODEL", "--to", "gltf", "--out", "a.gltf"], "shifted"),
         (["camera", "MODEL", "--to", "fspy"], "fspy"),
-        (["camera", "MODEL", "--from", "gltf"], "gltf"),
+        (["camera", "MODEL", "--from", "gltf"], "not glTF"),
         (["camera", "MODEL", "--distance", "3"], "--size"),
         (["camera", "none.json"], "none.json"),
     ],
