@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from viewcam_addon import checks, intrinsics, pinhole
 from viewcam_addon.errors import InputError
-from viewcam_addon.intrinsics import CameraData, Frame, ViewPlane
-from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.intrinsics import CameraData, Frame
+from viewcam_addon.pinhole import Pinhole, ViewPlane
 
 pytestmark = pytest.mark.usefixtures("no_warnings")
 
@@ -229,7 +229,14 @@ def float32(source):
     return min(max(abs(source.finite()), 2.0**-149), 3.4028234663852886e38)
 
 
-@attacks("intrinsics.CameraData", "intrinsics.Frame", "intrinsics.ViewPlane", "intrinsics.Frame.size")
+@attacks(
+    "intrinsics.CameraData",
+    "intrinsics.Frame",
+    "pinhole.ViewPlane",
+    "pinhole.check_distance",
+    "pinhole.Pinhole.plane",
+    "intrinsics.Frame.size",
+)
 def the_classes_of_intrinsics(source):
     numbers = [source.number() for _ in range(5)]
     fit = source.choice((*intrinsics.FITS, "auto", "", None, 1, ["AUTO"]))
@@ -245,6 +252,8 @@ def the_classes_of_intrinsics(source):
     plane = answer(ViewPlane, source.choice((numbers[:2], numbers[0])), source.choice((numbers[2:4], None)), *wholes[:2])
     if plane is not REFUSED:
         assert all(map(math.isfinite, (*plane.distance, *plane.principal_point))) and min(plane.distance) > 0
+        pinhole_of_it = Pinhole((0, 0, 1), (0, 0, 0), (0, 1, 0), plane.distance, *wholes[:2], plane.principal_point)
+        assert pinhole_of_it.plane == plane and pinhole.check_distance(min(plane.distance)) is None
 
 
 @attacks("intrinsics.view_plane", "intrinsics.camera_data", "intrinsics.Frame.window", "intrinsics.Frame.border_window")

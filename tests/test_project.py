@@ -37,7 +37,7 @@ ROOMS = {
     "moves": "errors checks exact pinhole",
     "diagram": "pinhole",
     "image": "errors files terminal pinhole",
-    "intrinsics": "errors checks",
+    "intrinsics": "errors checks pinhole",
     "camera_values": "errors checks pinhole roll intrinsics",
     "cameras": "errors checks files pinhole intrinsics",
     "camera_text": "errors checks intrinsics",

@@ -20,7 +20,7 @@ from . import checks, intrinsics
 from . import roll as rolls
 from .errors import InputError
 from .intrinsics import Frame
-from .pinhole import Pinhole, Triple
+from .pinhole import Pinhole, Triple, ViewPlane
 
 PIXELS, FIELD_OF_VIEW = "PIXELS", "FIELD_OF_VIEW"
 CANONICAL, HOLD = "CANONICAL", "HOLD"
@@ -67,7 +67,7 @@ class CameraValues:
         """
         return Pinhole(self.eye, self.look_at, self.up, 1.0, 1, 1)
 
-    def pinhole(self, plane: Pinhole, frame: Frame, sensor_fit: str, mirrored: bool) -> Pinhole:
+    def pinhole(self, plane: ViewPlane, frame: Frame, sensor_fit: str, mirrored: bool) -> Pinhole:
         """The camera that the values ask for, whatever a held roll is.
 
         plane : whose size and principal point it has. frame : the picture. sensor_fit : "AUTO", "HORIZONTAL" or "VERTICAL".

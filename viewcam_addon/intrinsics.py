@@ -18,6 +18,7 @@ import numpy as np
 
 from . import checks
 from .errors import InputError
+from .pinhole import ViewPlane
 
 # Blender clamps a shorter lens, silently (rna_camera.cc).
 SHORTEST_LENS = 1.0
@@ -111,33 +112,6 @@ class Frame:
     def window(self) -> tuple[int, int, int, int]:
         """(column, row, width, height) of what the image file holds: the border if it is cropped to, else the whole picture."""
         return self.border_window if self.crop else (0, 0, *self.size)
-
-
-@dataclass(frozen=True)
-class ViewPlane:
-    """The part of a `Pinhole` that is not its pose.
-
-    distance : (d_x, d_y) in pixels, > 0. principal_point : (c_x, c_y) in pixels from the left and the bottom edge.
-    width, height : pixels of the picture.
-
-    Raises
-    ------
-    InputError
-        if a distance is not positive, a size not whole and ≥ 1, or a number not finite.
-    """
-
-    distance: tuple[float, float]
-    principal_point: tuple[float, float]
-    width: int
-    height: int
-
-    def __post_init__(self) -> None:
-        _set(self, "distance", checks.vector("distance", self.distance, 2))
-        if min(self.distance) <= 0:
-            raise InputError(f"distance is {min(self.distance):g} pixels: the view plane must lie before the eye, give d > 0")
-        _set(self, "principal_point", checks.vector("principal_point", self.principal_point, 2))
-        for name in ("width", "height"):
-            _set(self, name, checks.whole(name, getattr(self, name)))
 
 
 def _set(instance: object, name: str, value: object) -> None:

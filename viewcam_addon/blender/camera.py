@@ -129,9 +129,8 @@ def place(
     channels, _, grown_from = before
     order = (pinhole, frame, parent.tobytes())
     if (*order, *before) not in _in_place:
-        plane = intrinsics.ViewPlane(pinhole.distance, pinhole.principal_point, pinhole.width, pinhole.height)
         sensor = intrinsics.own_sensor((camera.sensor_width, camera.sensor_height), grown_from)
-        data = intrinsics.camera_data(plane, frame, *sensor, camera.sensor_fit)
+        data = intrinsics.camera_data(pinhole.plane, frame, *sensor, camera.sensor_fit)
         if not np.isfinite(channels.delta_rotation).all():
             raise pose.no_size(camera_object)
         location, turn, scale = channels.bringing_to(pinhole, parent)

@@ -11,7 +11,7 @@ from functools import partial
 
 from .. import checks
 from ..errors import InputError
-from ..pinhole import Triple
+from ..pinhole import Triple, check_distance
 from ..tracer.scene import film
 from . import names
 
@@ -135,8 +135,7 @@ def _up(place: str, value: object) -> Triple:
 
 def _distance(place: str, value: object) -> float:
     d = checks.number(place, value)
-    if d <= 0:
-        raise InputError(f"{place} is {d:g} pixels: the view plane must lie before the eye, give d > 0")
+    check_distance(d, place)
     return checks.number(place, d, _SMALLEST_FLOAT32, _LARGEST_FLOAT32)
 
 

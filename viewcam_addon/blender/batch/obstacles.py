@@ -87,5 +87,4 @@ def stated(shot: Shot, frame: intrinsics.Frame) -> Pinhole:
 
 def _check_storable(pinhole: Pinhole, frame: intrinsics.Frame, camera: bpy.types.Camera) -> None:
     """Raise InputError if Blender's numbers hold no such camera."""
-    plane = intrinsics.ViewPlane(pinhole.distance, pinhole.principal_point, pinhole.width, pinhole.height)
-    intrinsics.camera_data(plane, frame, *datablocks.own_sensor(camera), camera.sensor_fit)
+    intrinsics.camera_data(pinhole.plane, frame, *datablocks.own_sensor(camera), camera.sensor_fit)
