@@ -1,5 +1,8 @@
 """EXR files: what goes in comes out, rows flip once, names of all versions mean the same, damage is named."""
 
+import re
+import tracemalloc
+
 import numpy as np
 import OpenEXR
 import pytest
@@ -7,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from viewcam_addon import image
+from viewcam_addon import image, memory
 from viewcam_addon.errors import InputError
 from viewcam_addon.image import Image
 from viewcam_addon.pinhole import Pinhole
@@ -127,6 +130,103 @@ def test_files_that_are_no_exr_or_hold_nothing_known_are_refused(tmp_path):
     for name, words in (("none.exr", "does not exist"), ("text.exr", "can't be read"), ("plain.exr", "none of the passes")):
         with pytest.raises(InputError, match=words):
             image.read(tmp_path / name)
+
+
+def deep(path):
+    header = {"type": OpenEXR.deepscanline, "compression": OpenEXR.ZIPS_COMPRESSION}
+    samples = np.empty((2, 3), dtype=object)
+    for place in np.ndindex(2, 3):
+        samples[place] = np.ones(2, dtype=np.float32)
+    OpenEXR.File(header, {"ViewLayer.Depth.Z": OpenEXR.Channel("ViewLayer.Depth.Z", samples)}).write(str(path))
+
+
+def window(path, data=((0, 0), (4, 3)), display=((0, 0), (4, 3)), aspect=1.0):
+    (left, top), (right, bottom) = data
+    pixels = np.zeros((bottom - top + 1, right - left + 1), dtype=np.float32)
+    corners = {
+        name: tuple(np.array(corner, np.int32) for corner in at)
+        for name, at in (("dataWindow", data), ("displayWindow", display))
+    }
+    header = {**corners, "pixelAspectRatio": aspect, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, {"ViewLayer.Depth.Z": pixels}).write(str(path))
+
+
+@pytest.mark.parametrize("data", [((100, 0), (104, 3)), ((1, 1), (3, 2)), ((-1, 0), (4, 3))])
+def test_a_part_of_a_picture_is_refused_with_both_windows(tmp_path, data):
+    window(tmp_path / "a.exr", data)
+    words = f"holds the pixels from {data[0]} to {data[1]} of a picture from (0, 0) to (4, 3): render all of it"
+    with pytest.raises(InputError, match=re.escape(words)):
+        image.read(tmp_path / "a.exr")
+
+
+def test_a_picture_may_begin_anywhere(tmp_path):
+    window(tmp_path / "a.exr", ((7, -7), (11, -4)), ((7, -7), (11, -4)))
+    assert image.read(tmp_path / "a.exr").size == (5, 4)
+
+
+def test_pictures_of_other_sizes_or_pixels_are_told_apart_by_their_headers(tmp_path, monkeypatch):
+    window(tmp_path / "a.exr")
+    window(tmp_path / "wide.exr", aspect=2.0)
+    window(tmp_path / "small.exr", ((0, 0), (3, 3)), ((0, 0), (3, 3)))
+    image.check_same_frames([tmp_path / "a.exr", tmp_path / "a.exr"])
+    for other, words in (
+        ("wide", "wide.exr has 5 × 4 pixels, each 2 times as wide as it is high and .*a.exr has 5 × 4 pixels: compare"),
+        ("small", "small.exr has 4 × 4 pixels and .*a.exr has 5 × 4 pixels: compare pictures of the same size"),
+    ):
+        with pytest.raises(InputError, match=words):
+            image.check_same_frames([tmp_path / "a.exr", tmp_path / f"{other}.exr"])
+
+
+def test_what_takes_more_memory_than_there_is_is_refused_by_its_header(tmp_path, monkeypatch):
+    """64 MiB of zeros, which are 60 kB as they are packed."""
+    monkeypatch.setattr(memory, "most", lambda: 100 * 2**20)
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, {"ViewLayer.Depth.Z": np.zeros((4096, 4096), np.float32)}).write(str(tmp_path / "a.exr"))
+    tracemalloc.start()
+    with pytest.raises(InputError, match=r"a\.exr need 0\.125 GiB of memory and there are 0\.0977 GiB: render it smaller"):
+        image.read(tmp_path / "a.exr")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 2**20, f"{peak} bytes were taken"
+
+
+def test_a_deep_picture_and_channels_of_fewer_pixels_are_refused(tmp_path):
+    deep(tmp_path / "deep.exr")
+    with pytest.raises(InputError, match="several depths in each pixel"):
+        image.read(tmp_path / "deep.exr")
+    window(tmp_path / "half.exr", ((0, 0), (3, 3)), ((0, 0), (3, 3)))
+    data = (tmp_path / "half.exr").read_bytes()
+    start = data.index(b"ViewLayer.Depth.Z\0") + len(b"ViewLayer.Depth.Z\0") + 8
+    (tmp_path / "half.exr").write_bytes(data[:start] + b"\2\0\0\0" * 2 + data[start + 8 :])
+    with pytest.raises(InputError, match="channels of less than all pixels"):
+        image.read(tmp_path / "half.exr")
+
+
+@pytest.mark.parametrize("camera", ["[" * 100_000, "9" * 5000, "[]", '{"eye": 1}', '{"distance": [[1]]}', "NaN", "\udce9"])
+def test_a_camera_that_is_none_is_told_in_a_sentence(tmp_path, camera):
+    passes = {"ViewLayer.Depth.Z": np.zeros((4, 5), np.float32)}
+    OpenEXR.File({"virtualPinhole": camera.encode("utf-8", "replace").decode()}, passes).write(str(tmp_path / "a.exr"))
+    with pytest.raises(InputError, match=r"has a camera attribute that can't be read .*: render it again"):
+        image.read(tmp_path / "a.exr")
+
+
+def test_a_camera_of_another_size_is_refused_by_the_header(tmp_path):
+    image.write(tmp_path / "a.exr", Image({"Depth": np.zeros((2, 3, 1), np.float32)}, CAMERA))
+    with pytest.raises(InputError, match=r"a\.exr has 3 × 2 pixels and its camera 5 × 4: render it again"):
+        image.read(tmp_path / "a.exr")
+
+
+def test_names_that_are_not_utf_8_are_told_in_a_sentence(tmp_path):
+    image.write(tmp_path / "a.exr", Image(numbered(), CAMERA))
+    data = (tmp_path / "a.exr").read_bytes()
+    (tmp_path / "a.exr").write_bytes(data.replace(b"ViewLayer.Depth.Z", b"ViewLayer.D\xff\xfeth.Z"))
+    with pytest.raises(InputError, match=r"a\.exr .*can't be read.*: render it again"):
+        image.read(tmp_path / "a.exr")
+
+
+def test_a_device_is_no_picture():
+    with pytest.raises(InputError, match="/dev/zero is no file"):
+        image.read("/dev/zero")
 
 
 def test_nothing_is_left_where_the_folder_can_not_be_written(tmp_path):

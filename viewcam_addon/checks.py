@@ -11,6 +11,7 @@ import operator
 import warnings
 from collections.abc import Mapping, Set
 from numbers import Real
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -70,6 +71,15 @@ def whole_of_json(digits: str) -> int | float:
     Python refuses to read thousands of digits with an error that is no JSONDecodeError.
     """
     return int(digits) if len(digits) <= _MOST_DIGITS else float(digits)
+
+
+def for_json(value: Any) -> Any:
+    """The value with null in place of each float that JSON can't hold."""
+    if isinstance(value, Mapping):
+        return {key: for_json(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [for_json(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def truth(name: str, value: object) -> bool:

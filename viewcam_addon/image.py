@@ -22,13 +22,15 @@ import dataclasses
 import json
 import os
 from collections import defaultdict
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from . import memory
 from .errors import InputError
 from .files import written_whole
 from .pinhole import Pinhole
@@ -81,6 +83,9 @@ BACKGROUND_DEPTH = 1e10
 _LAYER = "ViewLayer"
 _CAMERA_ATTRIBUTE = "virtualPinhole"
 
+# All channels are read one by one, and then put together as passes.
+_COPIES = 2
+
 
 @dataclass(frozen=True, eq=False)
 class Image:
@@ -125,20 +130,27 @@ def read(path: str | os.PathLike[str], only: Collection[str] | None = None) -> I
     Raises
     ------
     InputError
-        if there is no such file, if it is no EXR or a damaged one, or if it holds no known pass.
+        if there is no such file, if it is no EXR or a damaged one, if it holds no known pass, or, by its header, a part of a
+        picture only, another size than its camera's, or more than there is memory for.
     """
     import OpenEXR
 
     path = Path(path)
-    if not path.is_file():
-        raise InputError(f"{path} does not exist: check the name of the EXR file")
+    headers = _headers(path)
+    camera = _camera(headers[0].get(_CAMERA_ATTRIBUTE), path)
+    frame = _frame(headers, path)
+    width, height = frame.size
+    if camera is not None and (camera.width, camera.height) != frame.size:
+        other = f"{camera.width} × {camera.height}"
+        raise InputError(f"{path} has {width} × {height} pixels and its camera {other}: render it again")
+    channels = sum(len(header["channels"]) for header in headers)
+    memory.check(f"the pixels of {path}", _COPIES * 4 * channels * width * height, "render it smaller")
     try:
         with silent_libraries():
-            promised = len(OpenEXR.File(str(path), header_only=True).parts)
             parts = OpenEXR.File(str(path), separate_channels=True).parts
-    except Exception as error:  # OpenEXR raises what its C++ raised, of no common class
-        raise InputError(f"{path} can't be read as an EXR file ({_first_line(error)}): render it again") from error
-    if len(parts) < promised:  # a part whose pixels fail is left out
+    except Exception as error:
+        raise _unreadable(path, error) from error
+    if len(parts) < len(headers):  # a part whose pixels fail is left out
         raise InputError(f"{path} is cut short or damaged, its pixels can't be read: render it again")
     channels = {name: channel.pixels for part in parts for name, channel in part.channels.items()}
     passes = {
@@ -149,13 +161,87 @@ def read(path: str | os.PathLike[str], only: Collection[str] | None = None) -> I
     if not passes:
         wanted = ", ".join(only or CHANNELS)
         raise InputError(f"{path} holds none of the passes {wanted}: render a multilayer EXR with them")
-    if len({array.shape[:2] for array in passes.values()}) > 1:
-        raise InputError(f"{path} holds passes of different sizes: render it again")
-    header = parts[0].header
     attributes = {
-        key: value for key, value in header.items() if isinstance(value, str) and key not in (_CAMERA_ATTRIBUTE, "name")
+        key: value for key, value in headers[0].items() if isinstance(value, str) and key not in (_CAMERA_ATTRIBUTE, "name")
     }
-    return Image(passes, _camera(header.get(_CAMERA_ATTRIBUTE), path), attributes, str(path))
+    return Image(passes, camera, attributes, str(path))
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What the pixels of a file are, by its header alone. size : width and height. aspect : of a pixel, width over height."""
+
+    size: tuple[int, int]
+    aspect: float
+
+    def __str__(self) -> str:
+        width, height = self.size
+        return f"{width} × {height} pixels" + (
+            "" if self.aspect == 1 else f", each {self.aspect:g} times as wide as it is high"
+        )
+
+
+def check_same_frames(paths: Sequence[str | os.PathLike[str]]) -> None:
+    """Refuse files that can't be pictures of one camera, before any pixel of them is read.
+
+    Raises
+    ------
+    InputError
+        as `read` does of a header, or if they differ in their size or in the shape of their pixels.
+    """
+    first, *others = (Path(path) for path in paths)
+    expected = _frame(_headers(first), first)
+    for path in others:
+        found = _frame(_headers(path), path)
+        if found != expected:
+            raise InputError(f"{path} has {found} and {first} has {expected}: compare pictures of the same size")
+
+
+def _headers(path: Path) -> list[dict[str, Any]]:
+    """The header of each part."""
+    import OpenEXR
+
+    if not path.is_file():
+        raise InputError(f"{path} {'is no file' if path.exists() else 'does not exist'}: check the name of the EXR file")
+    try:
+        with silent_libraries():
+            headers = [part.header for part in OpenEXR.File(str(path), header_only=True).parts]
+        if not headers:
+            raise ValueError("it has no part")
+        return headers
+    except Exception as error:  # OpenEXR raises what its C++ raised, of no common class
+        raise _unreadable(path, error) from error
+
+
+def _unreadable(path: Path, error: Exception) -> InputError:
+    return InputError(f"{path} can't be read as an EXR file ({_first_line(error)}): render it again")
+
+
+def _frame(headers: Sequence[dict[str, Any]], path: Path) -> Frame:
+    """The frame of all parts. What is not stored pixel by pixel, and the whole picture, is refused.
+
+    A part of a picture (a data window that is not its display window) would have to be put in its place, with something around
+    it that nobody rendered.
+    """
+    import OpenEXR
+
+    frames = set()
+    for header in headers:
+        data, display = (np.array(header[name], dtype=np.int64).tolist() for name in ("dataWindow", "displayWindow"))
+        if header["type"] not in (OpenEXR.scanlineimage, OpenEXR.tiledimage):
+            raise InputError(f"{path} holds several depths in each pixel: render it as an EXR that is not deep")
+        if any((channel.xSampling, channel.ySampling) != (1, 1) for channel in header["channels"]):
+            raise InputError(f"{path} has channels of less than all pixels: render it again")
+        if data != display:
+            raise InputError(
+                f"{path} holds the pixels from {tuple(data[0])} to {tuple(data[1])} of a picture from {tuple(display[0])} to "
+                f"{tuple(display[1])}: render all of it"
+            )
+        (left, top), (right, bottom) = data
+        frames.add(Frame((right - left + 1, bottom - top + 1), float(header["pixelAspectRatio"])))
+    if len(frames) > 1:
+        raise InputError(f"{path} holds passes of different sizes: render it again")
+    return frames.pop()
 
 
 def write(path: str | os.PathLike[str], image: Image) -> None:
@@ -208,7 +294,7 @@ def _camera(text: str | None, path: Path) -> Pinhole | None:
         return None
     try:
         return Pinhole(**json.loads(text))
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, RecursionError) as error:
         raise InputError(f"{path} has a camera attribute that can't be read ({_first_line(error)}): render it again") from error
 
 

@@ -98,7 +98,6 @@ class Cluster:
         seed: int | None = None,
         threads: int | None = None,
         check: bool = False,
-        trust: bool = False,
     ) -> Work:
         """The work of the workers on one file; the same bytes as one.in_turn's but for `timing`.
 
@@ -111,7 +110,6 @@ class Cluster:
             "blend": str(blend.absolute()),
             "seed": seed,
             "threads": threads or self._threads,
-            "trust": trust,
             "made_from": dict(made_from),
         }
 

@@ -10,12 +10,11 @@ only. It is no part of Blender's process, where there must be no second copy of 
 
 import dataclasses
 import importlib.util
-import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import children
+from .. import checks, children
 from ..errors import InputError
 from ..pinhole import Pinhole
 from . import partner
@@ -115,7 +114,7 @@ class _Bench:
 def _figures(comparison: "Comparison") -> dict[str, Any]:
     """What is kept of a comparison."""
     position = comparison.rows[0].to_json()
-    return _plain(
+    return checks.for_json(
         {
             "pixels": position["count"],
             "position": {name: figure["value"] for name, figure in position["percentiles"].items()},
@@ -128,13 +127,6 @@ def _figures(comparison: "Comparison") -> dict[str, Any]:
             "conversion": comparison.conversion and comparison.conversion.to_json(),
         }
     )
-
-
-def _plain(figures: Any) -> Any:
-    """The figures without what is no number, which JSON can't hold."""
-    if isinstance(figures, dict):
-        return {key: _plain(value) for key, value in figures.items()}
-    return None if isinstance(figures, float) and not math.isfinite(figures) else figures
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..terminal import say, silent_libraries
+from ..terminal import silent_libraries
 from ..tracer.scene.film import MOST_SAMPLES, seeds
 from . import Result
 from .progress import Progress
@@ -30,7 +30,7 @@ def export(options: argparse.Namespace) -> Result:
     with silent_libraries():
         scene = blender_room("rendering.job").export(_request(options))
     scene_file.write(scene, options.scene)
-    say(*_ledger_lines(scene.ledger))
+    print(*_ledger_lines(scene.ledger), sep="\n")
     result = {"scene": str(options.scene), "ledger": _ledger_json(scene.ledger)}
     return 0, result | (_told_level(scene) if options.level != "geometry" else {})
 
@@ -63,14 +63,14 @@ def render(options: argparse.Namespace) -> Result:
             attributes["error"] = str(options.error)
         attributes |= {"samples": str(samples), "seed": str(options.seed)}
     image.write(options.image, image.Image(passes, scene.camera, attributes))
-    say(f"traced {scene.camera.width} × {scene.camera.height} pixels in {seconds:.2f} s")
+    print(f"traced {scene.camera.width} × {scene.camera.height} pixels in {seconds:.2f} s")
     return 0, {"image": str(options.image), "seconds": seconds} | told
 
 
 def cycles(options: argparse.Namespace) -> Result:
     with silent_libraries():
         ledger = blender_room("rendering.job").render(_request(options), options.image)
-    say(*_ledger_lines(ledger))
+    print(*_ledger_lines(ledger), sep="\n")
     return 0, {"image": str(options.image), "ledger": _ledger_json(ledger)}
 
 
@@ -79,6 +79,7 @@ def compare(options: argparse.Namespace) -> Result:
     from ..compare import difference, light_report, radiance, report
     from ..tracer.scene import scene_file
 
+    image.check_same_frames([options.reference, *options.tests])
     reference, tests = image.read(options.reference), [image.read(path) for path in options.tests]
     scene = scene_file.read(options.scene) if options.scene else None
     camera = reference.camera or (scene and scene.camera)
@@ -97,9 +98,9 @@ def compare(options: argparse.Namespace) -> Result:
         write_report = report.write_report
     else:
         raise InputError(f"{options.reference} has no noise that several pictures could tell: compare it with one")
-    say(*_ledger_lines(ledger), *comparison.lines())
+    print(*_ledger_lines(ledger), *comparison.lines(), sep="\n")
     if options.report:
-        say(f"report: {write_report(comparison, reference, tests, options.report, ledger, words)}")
+        print(f"report: {write_report(comparison, reference, tests, options.report, ledger, words)}")
     result = {**comparison.to_json(), "ledger": _ledger_json(ledger)}
     if options.difference:
         result["difference"] = difference.write(comparison, options.difference)
@@ -148,7 +149,7 @@ def check(options: argparse.Namespace) -> Result:
 def demo(options: argparse.Namespace) -> Result:
     if not options.blend.is_file():
         raise InputError(f"{options.blend} is not here: run the demo in a clone of the project, where its sample scenes are")
-    say(f"{options.blend.name}: a camera given by four values, rendered by Cycles and by the reference tracer")
+    print(f"{options.blend.name}: a camera given by four values, rendered by Cycles and by the reference tracer")
     return check(options)
 
 
@@ -163,7 +164,7 @@ def _export_and_render(options: argparse.Namespace, scene_path: Path, image_path
     with silent_libraries():
         scene = blender_room("rendering.job").export_and_render(_request(options), image_paths)
     scene_file.write(scene, scene_path)
-    say(f"exported and rendered with Cycles in {time.perf_counter() - started:.1f} s")
+    print(f"exported and rendered with Cycles in {time.perf_counter() - started:.1f} s", flush=True)
     return _told_level(scene)["level"] if options.level == "auto" else options.level
 
 
@@ -172,7 +173,7 @@ def _told_level(scene: Any) -> dict[str, str]:
     from ..tracer.scene.levels import least_level
 
     level, reason = least_level(scene)
-    say(f"level {level} is enough. {reason}")
+    print(f"level {level} is enough. {reason}", flush=True)
     return {"level": level, "reason": reason}
 
 
@@ -189,7 +190,6 @@ def _request(options: argparse.Namespace) -> Any:
         samples=options.samples,
         seed=options.seed,
         clay=options.clay,
-        trust=options.trust,
     )
 
 

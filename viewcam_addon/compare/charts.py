@@ -146,6 +146,8 @@ def figure(value: float) -> str:
         return "−" + figure(-value)
     if value == 0:
         return "0"
+    if not math.isfinite(value):
+        return "∞" if value > 0 else "no number"
     digits, exponent = f"{value:.1e}".split("e")
     exponent = int(exponent)
     if -3 < exponent < 5:

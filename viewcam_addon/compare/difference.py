@@ -21,6 +21,7 @@ from .statistics import Row
 _NOTHING = np.full((1, 3), 64, np.uint8)
 
 
+@np.errstate(all="ignore")
 def write(comparison: Comparison | RadianceComparison, path: str | os.PathLike[str]) -> dict[str, str]:
     """Write the PNG; returns its path and what its colours say, as plain JSON values.
 

@@ -6,7 +6,7 @@ so depth, normal and UV are compared with the reference's, and indices and cover
 at this level.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..image import Image
 from ..pinhole import Pinhole
-from . import law
-from .cameras import conversion_error, systematic_error
-from .far_from_home import far_from_home
-from .law import Array, Seen
+from . import law, verdict
+from .cameras import ConversionError, Systematic, conversion_error, systematic_error
+from .far_from_home import FarFromHome, far_from_home
+from .law import Array, Seen, in_float32
 from .mismatches import (
     KINDS,
+    PIXELS_PER_UNEXPLAINED,
     Agreement,
     Mismatches,
     SurfaceAt,
@@ -30,16 +31,97 @@ from .mismatches import (
     reach_of,
 )
 from .statistics import Row, measure
-from .verdict import Comparison, allowed_unexplained
 
 # The passes that are compared with their channels (the third of UV is constant), and which of them both pictures must have.
 _CHANNELS = {"Depth": 1, "Position": 3, "Normal": 3, "UV": 2, "Object Index": 1, "Material Index": 1}
 _UNITS = {"Position": "px", "Position depth": "relative", "Depth": "relative", "Normal": "°", "UV": "absolute"}
 _NEEDED = ("Depth", "Position", "Object Index")
+# Pixels whose centres are traced again, to see whether the reference shows the scene.
+_ASKED_OF_THE_REFERENCE = 1000
 # Passes that only the reference has: what the law is evaluated with.
 _LAW = ("Magnitude", "Facing")
 
 
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """What differs between a reference and a test picture.
+
+    pinhole : the camera of the reference. stated : the camera that was asked for, or None.
+    hits : pixels that hit something in (reference, test).
+    rows : one for each measured pass. mismatches : pixels that see another surface.
+    systematic : what is the same for all pixels, None where nothing was compared.
+    conversion : the camera's own error, None where nobody stated a camera.
+    maps : pass name to (height, width) float32, rows from the bottom: the error of each pixel in the unit of the pass's row,
+    nan
+        where it was not compared.
+    roundings : (n,) float64, the error of each compared position over what one rounding of float32 causes there.
+    far_from_home : what the distance from the origin costs, None where that is nothing to speak of.
+    origin : the point of the world from which the coordinates of both pictures are counted.
+    """
+
+    pinhole: Pinhole
+    stated: Pinhole | None
+    hits: tuple[int, int]
+    rows: tuple[Row, ...]
+    mismatches: Mismatches
+    systematic: Systematic | None
+    conversion: ConversionError | None
+    maps: dict[str, NDArray[np.float32]]
+    roundings: Array
+    far_from_home: FarFromHome | None = None
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def pixels(self) -> int:
+        return self.pinhole.width * self.pinhole.height
+
+    @property
+    def allowed_unexplained(self) -> int:
+        """How many mismatches may stay unexplained in a picture of this size."""
+        return _allowed_unexplained(self.pinhole)
+
+    @property
+    def mismatches_ok(self) -> bool:
+        not_a_number = self.mismatches.counts()["not a number"][0]
+        return not_a_number == 0 and self.mismatches.unexplained_count <= self.allowed_unexplained
+
+    @property
+    def passed(self) -> bool:
+        """Whether the two are the same picture. False, too, where there was nothing to compare."""
+        systematic_ok = self.systematic is not None and self.systematic.ok
+        conversion_ok = self.conversion is None or self.conversion.ok
+        return systematic_ok and conversion_ok and self.mismatches_ok and all(row.ok for row in self.rows)
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in one sentence."""
+        return verdict.sentence(self)
+
+    def lines(self) -> list[str]:
+        """The result for the shell: a line for each pass, and the verdict."""
+        return verdict.lines(self)
+
+    def to_json(self) -> dict:
+        """Everything but the maps, as plain JSON values."""
+        return {
+            "passed": self.passed,
+            "sentence": self.sentence,
+            "size": [self.pinhole.width, self.pinhole.height],
+            "hits": {"reference": self.hits[0], "test": self.hits[1]},
+            "passes": [row.to_json() for row in self.rows],
+            "mismatches": {
+                **self.mismatches.to_json(),
+                "allowed_unexplained": self.allowed_unexplained,
+                "ok": self.mismatches_ok,
+            },
+            "systematic": self.systematic and self.systematic.to_json(),
+            "conversion": self.conversion and self.conversion.to_json(),
+            "far_from_home": self.far_from_home and self.far_from_home.to_json(),
+            "origin": list(self.origin),
+        }
+
+
+@np.errstate(all="ignore")
 def compare(
     reference: Image,
     test: Image,
@@ -54,12 +136,15 @@ def compare(
     without it no mismatch can be explained. stated : the camera as the four values state it; with it the conversion's error
     is measured too. origin : that of both pictures, in the world.
 
+    Whatever float32 can hold may stand in the pictures: what can't be computed with is not within tolerance.
+
     Raises
     ------
     InputError
-        if the sizes differ, or a pass is missing.
+        if the sizes differ, a pass is missing, or the reference is not what `surface_at` sees.
     """
     expected, seen = _passes(reference, test, pinhole)
+    _check_figures(reference.source, expected, pinhole)
     size = (pinhole.height, pinhole.width)
     hit = law.is_hit(expected)
     shift = np.where(hit, law.ray_shift(pinhole, expected), np.nan)
@@ -70,11 +155,13 @@ def compare(
     # At an edge the ray may meet either surface, so a re-traced one is judged by the steepest slope around.
     steepest = {name: largest_around(slope.reshape(size)).ravel() for name, slope in agreement.slopes.items()}
     around = replace(agreement, slopes=steepest)
+    if surface_at is not None:
+        _check_reference(reference.source, expected, np.flatnonzero(kinds >= 0), agreement, surface_at)
     mismatches = _mismatches(kinds, seen, reach_of(shift.reshape(size)).ravel(), around, surface_at)
 
     compared = hit & np.isin(kinds, (-1, KINDS.index("material index"), KINDS.index("surface")))
     # What is explained, or few enough to be let pass, is no error of the passes; what is not, shows in their figures.
-    settled = mismatches.explained | (mismatches.unexplained_count <= allowed_unexplained(pinhole))
+    settled = mismatches.explained | (mismatches.unexplained_count <= _allowed_unexplained(pinhole))
     compared[mismatches.rows[settled] * pinhole.width + mismatches.columns[settled]] = False
     chosen = np.flatnonzero(compared)
     errors = agreement.at(chosen).errors(at(expected, chosen), at(seen, chosen))
@@ -93,6 +180,10 @@ def compare(
     roundings = errors["Position"][0] / errors["Position"][1]
     far = far_from_home(pinhole, expected, chosen, rows[0])
     return Comparison(pinhole, stated, hits, rows, mismatches, systematic, conversion, maps, roundings, far, origin)
+
+
+def _allowed_unexplained(pinhole: Pinhole) -> int:
+    return pinhole.width * pinhole.height // PIXELS_PER_UNEXPLAINED
 
 
 def _passes(reference: Image, test: Image, pinhole: Pinhole) -> tuple[Seen, Seen]:
@@ -132,6 +223,45 @@ def _mismatches(kinds: NDArray, seen: Seen, reach: Array, agreement: Agreement, 
     return Mismatches(columns, rows, kinds[found], shifts, reach[found], retraced)
 
 
+def _check_figures(source: str, expected: Seen, pinhole: Pinhole) -> None:
+    """Refuse a reference whose figures are no numbers or contradict one another: all tolerances are derived from them.
+
+    A position and its depth are rounded once each, the position in three coordinates: 2 · 2⁻²⁴ times its largest two, and 2⁻²⁴
+    times the depth. Twice as much is let pass.
+    """
+    broken = next((name for name, values in expected.items() if not np.isfinite(values).all()), None)
+    if broken is not None:
+        raise InputError(f"{source} holds what is no finite number in its pass {broken!r}: trace it again")
+    hit = law.is_hit(expected)
+    depth, position = (expected[name][hit].astype(np.float64) for name in ("Depth", "Position"))
+    along = -(position - pinhole.eye) @ pinhole.basis()[2]
+    size = np.abs(position).max(axis=-1) + np.abs(pinhole.eye).max() + np.abs(depth[:, 0])
+    apart = ~(np.abs(along - depth[:, 0]) <= 4.0 * law.FLOAT32 * size)
+    if apart.any():
+        raise InputError(
+            f"{source} contradicts itself in {int(apart.sum()):,} pixels, where Position is not at the Depth that its camera "
+            "sees: trace it again"
+        )
+
+
+def _check_reference(source: str, expected: Seen, found: NDArray, agreement: Agreement, surface_at: SurfaceAt) -> None:
+    """Refuse a reference that its own scene does not show, where it differs from the test.
+
+    Else rays would be sent for each of its pixels, as far as its figures say that they may be off. One of an older version of
+    the scene, or a damaged one, is not the same for most of them; a true one is for all.
+
+    found : pixels that see another surface.
+    """
+    found = found[:: max(len(found) // _ASKED_OF_THE_REFERENCE, 1)]
+    rows, columns = np.divmod(found, agreement.pinhole.width)
+    traced, shown = surface_at(columns, rows, 0.5, 0.5), at(expected, found)
+    same = agreement.at(found).same_place(traced, shown) | ~(
+        law.is_hit(traced) | law.is_hit(shown) | np.isnan(shown["Depth"][:, 0])
+    )
+    if len(found) and not same.mean() >= 0.5:
+        raise InputError(f"{source} is not what the tracer sees in the scene: trace it again, or give the scene that it shows")
+
+
 def _displacement(pinhole: Pinhole, seen: Seen) -> tuple[Array, Array, Array]:
     """How far the positions, projected, lie from the centres of their pixels, to the right and upwards; and their depths."""
     row, column = np.divmod(np.arange(pinhole.width * pinhole.height), pinhole.width)
@@ -153,6 +283,6 @@ def _measure(errors: dict, chosen: NDArray, size: tuple[int, int]) -> tuple[tupl
         error, one_rounding, storage = (np.degrees(figure) if unit == "°" else figure for figure in errors[name])
         rows.append(measure(name, unit, error, one_rounding, storage))
         flat = np.full(size[0] * size[1], np.nan, dtype=np.float32)
-        flat[chosen] = error
+        flat[chosen] = in_float32(error)
         maps[name] = flat.reshape(size)
     return tuple(rows), maps

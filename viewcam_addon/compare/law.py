@@ -186,6 +186,12 @@ def angle_between(a: NDArray, b: NDArray) -> Array:
     return 2.0 * np.arcsin(np.minimum(chord / 2.0, 1.0))
 
 
+def in_float32(values: NDArray) -> NDArray[np.float32]:
+    """The values rounded; what is larger than float32 can hold is the largest that it can."""
+    largest = np.finfo(np.float32).max
+    return np.clip(values, -largest, largest).astype(np.float32)
+
+
 def _distance(pinhole: Pinhole, seen: Seen) -> Array:
     """(n,) t: how far the hits are from the eye, world units."""
     return np.linalg.norm(seen["Position"].astype(np.float64) - pinhole.eye, axis=-1)

@@ -35,6 +35,7 @@ _STEADY_NOTE = (
 )
 
 
+@np.errstate(all="ignore")
 def write_report(
     comparison: RadianceComparison,
     reference: Image,

@@ -206,7 +206,8 @@ def _in_gamut(lightness: NDArray, chroma: NDArray, hue: NDArray) -> NDArray[np.f
 def _to_screen(linear: NDArray[np.float64]) -> Picture:
     """Linear light, rows from the bottom, to a picture that is no wider than a screen."""
     step = _step(linear.shape[1])
-    return np.round(255 * _encoded(np.clip(linear[::-1][::step, ::step], 0.0, 1.0))).astype(np.uint8)
+    shown = np.nan_to_num(linear[::-1][::step, ::step])  # what is no number is black
+    return np.round(255 * _encoded(np.clip(shown, 0.0, 1.0))).astype(np.uint8)
 
 
 def _encoded(linear: NDArray[np.float64]) -> NDArray[np.float64]:

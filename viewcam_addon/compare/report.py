@@ -25,6 +25,7 @@ _FOOTER = (
 )
 
 
+@np.errstate(all="ignore")
 def write_report(
     comparison: Comparison,
     reference: Image,

@@ -25,6 +25,8 @@ CHANNEL_NAMES = ("red", "green", "blue")
 
 # A standard error below so many roundings of float32 of the value itself is no noise but rounding.
 _QUIET = 16.0
+# Of a number of samples: more than anybody renders, and that Python refuses to read.
+_MOST_DIGITS = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +63,7 @@ def samples_of(image: Image) -> int | None:
         for name, value in image.attributes.items()
         if name == "samples" or (name.startswith("cycles.") and name.endswith(".samples"))
     ]
-    return int(told[0]) if told and told[0].isdecimal() else None
+    return int(told[0]) if told and told[0].isdecimal() and len(told[0]) <= _MOST_DIGITS else None
 
 
 def all_sides(reference: Image, tests: Sequence[Image]) -> Iterator[Sides]:

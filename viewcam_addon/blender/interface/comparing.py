@@ -231,7 +231,8 @@ def figures(result: dict[str, Any]) -> list[tuple[str, str]]:
         if light["steady"]:
             rows += _percentiles(light["steady"], "of the light")
         else:
-            rows.append(("Light, to Tracer's", f"{light['ratio']:.5f} ± {_plain(light['ratio_error'])}"))
+            ratio = "nothing" if light["ratio"] is None else f"{light['ratio']:.5f} ± {_plain(light['ratio_error'])}"
+            rows.append(("Light, to Tracer's", ratio))
     ledger = result["ledger"]
     whole = sum(entry["status"] == "exported" for entry in ledger)
     return [*rows, ("Modelled", f"{whole} of {len(ledger)} objects")]
@@ -265,18 +266,7 @@ def _command(copy: Path, scene: bpy.types.Scene, words: Sequence[str]) -> list[s
     # The file's own scene is that of its first window. The add-on may be enabled for this session only.
     other = ["--scene", scene.name] if any(window.scene != scene for window in bpy.context.window_manager.windows[:1]) else []
     enabled = ["--addons", preferences.PACKAGE] if preferences.PACKAGE in bpy.context.preferences.addons else []
-    return [
-        bpy.app.binary_path,
-        "--background",
-        "--disable-autoexec",
-        *enabled,
-        str(copy),
-        *other,
-        "--command",
-        "viewcam",
-        "check",
-        *words,
-    ]
+    return [bpy.app.binary_path, "--background", *enabled, str(copy), *other, "--command", "viewcam", "check", *words]
 
 
 def _is_compressed() -> bool:
@@ -313,8 +303,10 @@ def _copy_whole(source: str, target: str) -> None:
         shutil.copyfile(source, temporary)
 
 
-def _plain(value: float) -> str:
+def _plain(value: float | None) -> str:
     """Two significant digits without powers of ten: 0.000052."""
+    if value is None:  # what JSON can't hold
+        return "∞"
     return np.format_float_positional(float(f"{value:.1e}"), trim="-")
 
 
