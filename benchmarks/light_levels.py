@@ -89,8 +89,9 @@ def prepare_cycles(contest: Contest, path: Path, threads: int) -> dict[str, race
 
     import viewcam_addon
     from benchmarks import suzannes
+    from viewcam_addon.blender import opening
     from viewcam_addon.blender.borrowing import borrowed, still_of_one_layer
-    from viewcam_addon.blender.rendering import cycles, job
+    from viewcam_addon.blender.rendering import cycles
     from viewcam_addon.blender.scenes.depsgraph import render_still
     from viewcam_addon.blender.scenes.export import export_scene
     from viewcam_addon.blender.scenes.ledger import Ledger
@@ -99,7 +100,7 @@ def prepare_cycles(contest: Contest, path: Path, threads: int) -> dict[str, race
     if contest.scene == "suzannes":
         suzannes.six(*contest.size)
     else:
-        job.open_blend(SCENES / f"{contest.scene}.blend")
+        opening.open_blend(SCENES / f"{contest.scene}.blend")
     scene, ledger = bpy.context.scene, Ledger()
     view_layer, camera_object = scene.view_layers[0], scene.camera
     camera_object.virtual_pinhole.enabled = False  # else its lens would follow the resolution

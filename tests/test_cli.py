@@ -4,6 +4,7 @@ import importlib.util
 import json
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 from viewcam_addon import image
+from viewcam_addon.batch.folder import Folder
 from viewcam_addon.cli import main
 from viewcam_addon.commands import batch, chart, proving
 from viewcam_addon.commands.proving import DEMO_SCENE
@@ -337,3 +339,32 @@ def test_the_result_goes_to_standard_output_by_its_name_and_devices_stay(tmp_pat
     mixed = subprocess.run([*command, "/dev/stdout", "--log-json"], capture_output=True, text=True, check=False)
     assert mixed.returncode == 2 and "is where viewcam prints" in mixed.stderr
     assert all(json.loads(line) for line in mixed.stdout.splitlines())
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["render", "PIPE", "out.exr"],
+        ["compare", "PIPE", "PIPE"],
+        ["compare", "out.exr", "out.exr", "--scene", "PIPE"],
+        ["export", "PIPE", "scene.json"],
+        ["batch", "PIPE", "--orbit", "2", "--out", "out"],
+        ["batch", "a.blend", "PIPE.csv", "--out", "out"],
+    ],
+)
+def test_a_pipe_in_place_of_a_file_is_refused_and_not_waited_for(tmp_path, words):
+    """A pipe that nobody writes to kept its reader for ever."""
+    os.mkfifo(tmp_path / "pipe")
+    os.mkfifo(tmp_path / "pipe.csv")
+    shutil.copy(DEMO_SCENE.with_name("cornell.blend"), tmp_path / "a.blend")
+    assert main(["render", str(write_scene(tmp_path)), str(tmp_path / "out.exr"), "--size", "8x6"]) == 0
+    command = [sys.executable, "-m", "viewcam_addon", *(word.replace("PIPE", "pipe") for word in words)]
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 2 and "pipe" in done.stderr and "bug" not in done.stderr, done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_pipe_in_place_of_a_sidecar_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "shot.json")
+    assert Folder(tmp_path).finished("shot", "hash", check=False) is None

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from viewcam_addon.errors import InputError
-from viewcam_addon.files import check_writable, written_whole
+from viewcam_addon.files import check_writable, read_bytes, written_whole
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such things in its folders")
 
@@ -134,6 +134,16 @@ def test_standard_output_by_its_name_is_written_to_behind_what_is_printed_alread
             )
         said = child.stdout.decode() if way == "pipe" else (tmp_path / "out.txt").read_text()
         assert said == "printed\nwhole\nmore\n", way
+
+
+@posix
+def test_what_is_no_file_is_not_read_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", "/dev/zero", tmp_path, tmp_path / "none"):
+        with pytest.raises(OSError, match=r"no file|directory|No such"):
+            read_bytes(path)
+    (tmp_path / "link").symlink_to(__file__)
+    assert read_bytes(tmp_path / "link") == Path(__file__).read_bytes()
 
 
 @posix

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from viewcam_addon import checks, intrinsics, pinhole
 from viewcam_addon.errors import InputError
-from viewcam_addon.intrinsics import CameraData, Frame, ViewPlane
-from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.intrinsics import CameraData, Frame
+from viewcam_addon.pinhole import Pinhole, ViewPlane
 
 pytestmark = pytest.mark.usefixtures("no_warnings")
 
@@ -229,7 +229,14 @@ def float32(source):
     return min(max(abs(source.finite()), 2.0**-149), 3.4028234663852886e38)
 
 
-@attacks("intrinsics.CameraData", "intrinsics.Frame", "intrinsics.ViewPlane", "intrinsics.Frame.size")
+@attacks(
+    "intrinsics.CameraData",
+    "intrinsics.Frame",
+    "pinhole.ViewPlane",
+    "pinhole.check_distance",
+    "pinhole.Pinhole.plane",
+    "intrinsics.Frame.size",
+)
 def the_classes_of_intrinsics(source):
     numbers = [source.number() for _ in range(5)]
     fit = source.choice((*intrinsics.FITS, "auto", "", None, 1, ["AUTO"]))
@@ -245,6 +252,8 @@ def the_classes_of_intrinsics(source):
     plane = answer(ViewPlane, source.choice((numbers[:2], numbers[0])), source.choice((numbers[2:4], None)), *wholes[:2])
     if plane is not REFUSED:
         assert all(map(math.isfinite, (*plane.distance, *plane.principal_point))) and min(plane.distance) > 0
+        pinhole_of_it = Pinhole((0, 0, 1), (0, 0, 0), (0, 1, 0), plane.distance, *wholes[:2], plane.principal_point)
+        assert pinhole_of_it.plane == plane and pinhole.check_distance(min(plane.distance)) is None
 
 
 @attacks("intrinsics.view_plane", "intrinsics.camera_data", "intrinsics.Frame.window", "intrinsics.Frame.border_window")
@@ -278,6 +287,23 @@ def another_picture(source):
     fit, before, after = source.choice(intrinsics.FITS), frame(), frame()
     there, back = answer(intrinsics.growth, fit, before, after), answer(intrinsics.growth, fit, after, before)
     assert 0 < there < math.inf and abs(there * back - 1) <= 2 * 2.0**-52, (fit, before, after)  # two quotients, a product
+
+
+@attacks("intrinsics.own_sensor", "intrinsics.lens_and_sensor", "intrinsics.check_storable")
+def a_sensor_that_grew(source):
+    """Whatever a script has stored: the sensor is one of the two, and it grew by a power of two where it is the earlier."""
+    current, before = ((source.finite(), source.finite()) for _ in range(2))
+    before = source.choice((before, (0.0, 0.0), (math.nan, 1.0), tuple(side / 4 for side in current)))
+    own = intrinsics.own_sensor(current, before)
+    assert own in (current, before)
+    if own is not current:
+        assert own[0] * 2 ** round(math.log2(current[0] / own[0])) == current[0]
+    data = CameraData(50.0, float32(source), 24.0)
+    stored = intrinsics.lens_and_sensor(data, own)
+    assert stored["virtual_pinhole_sensor"] in (own, (0.0, 0.0)) and stored["sensor_width"] == data.sensor_width
+    values = (source.choice((source.finite(), math.inf, math.nan)),)
+    found = answer(lambda: intrinsics.check_storable("Camera", eye=values))
+    assert (found is REFUSED) == (not abs(values[0]) <= np.finfo(np.float32).max)
 
 
 def public_functions():

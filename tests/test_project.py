@@ -1,6 +1,11 @@
-"""The project's own rules, held by tests: floors, sizes, one version, a tidy top level, a manifest that Blender accepts."""
+"""The project's own rules, held by tests.
+
+Where Blender may be known, which room imports from which, one version, a tidy top level, a manifest that Blender accepts, and
+that what documents name exists.
+"""
 
 import ast
+import graphlib
 import importlib.util
 import re
 import subprocess
@@ -13,63 +18,69 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "viewcam_addon"
 
-# From the ground to the roof: a room imports from those before it. The package's __init__ and __main__ only open doors.
-FLOORS = [
-    "errors",
-    "checks",
-    "memory",
-    "files",
-    "terminal",
-    "events",
-    "words",
-    "paper",
-    "children",
-    "exact",
-    "pinhole",
-    "roll",
-    "rotation",
-    "moves",
-    "diagram",
-    "image",
-    "intrinsics",
-    "camera_values",
-    "cameras",
-    "camera_text",
-    "datasets",
-    "compare",
-    "tracer",
-    "shots",
-    "batch",
-    "blender",
-    "commands",
-    "batch_words",
-    "cli",
-]
-# The same inside the tracer.
+# Which room of viewcam_addon imports from which, and which of blender/. A new arrow is a decision: say it here, or leave it
+# out. The package's __init__ and __main__ only open doors.
+ROOMS = {
+    "errors": "",
+    "checks": "errors",
+    "memory": "errors",
+    "files": "errors",
+    "terminal": "",
+    "events": "terminal",
+    "words": "",
+    "paper": "",
+    "children": "",
+    "exact": "",
+    "pinhole": "errors checks exact",
+    "roll": "errors pinhole",
+    "rotation": "pinhole",
+    "moves": "errors checks exact pinhole",
+    "diagram": "pinhole",
+    "image": "errors memory files terminal pinhole",
+    "intrinsics": "errors checks pinhole",
+    "camera_values": "errors checks pinhole roll intrinsics",
+    "cameras": "errors checks files pinhole intrinsics",
+    "camera_text": "errors checks intrinsics",
+    "datasets": "files pinhole cameras",
+    "compare": "errors files paper pinhole image",
+    "tracer": "errors checks memory files exact pinhole image",
+    "shots": "errors checks files terminal pinhole moves tracer",
+    "batch": "errors checks files events paper children pinhole image cameras datasets compare tracer shots",
+    "blender": (
+        "errors checks files terminal children pinhole roll rotation moves diagram image intrinsics camera_values "
+        "camera_text datasets compare tracer shots batch"
+    ),
+    "commands": "errors terminal events children intrinsics cameras image compare tracer shots batch",
+    "camera_words": "words cameras",
+    "batch_words": "words camera_words shots",
+    "cli": "errors checks files events words tracer commands camera_words batch_words",
+}
+BLENDER_ROOMS = {
+    "versions": "",
+    "borrowing": "",
+    "opening": "borrowing",
+    "findings": "",
+    "render_settings": "",
+    "preferences": "render_settings",
+    "datablocks": "versions",
+    "storage": "versions datablocks",
+    "targets": "versions datablocks storage",
+    "hold": "versions storage targets",
+    "pose": "",
+    "suspects": "versions findings datablocks storage pose",
+    "camera": "findings preferences datablocks storage targets hold pose suspects",
+    "properties": "datablocks storage targets camera",
+    "resolution": "datablocks storage camera",
+    "animation": "versions datablocks storage targets camera resolution",
+    "scenes": "versions borrowing findings datablocks pose camera",
+    "rendering": "versions borrowing opening datablocks resolution scenes",
+    "interface": "versions findings render_settings preferences datablocks storage targets hold pose camera scenes rendering",
+    "batch": "versions borrowing opening datablocks camera resolution scenes rendering",
+}
+# Inside the tracer a room may import from all those before it.
 TRACER_FLOORS = ["arrays", "compiled", "scene", "rays", "light", "kernels", "tiles", "render"]
-# And where Blender is: first what is of the camera.
-BLENDER_FLOORS = [
-    "versions",
-    "borrowing",
-    "findings",
-    "render_settings",
-    "preferences",
-    "datablocks",
-    "storage",
-    "targets",
-    "hold",
-    "pose",
-    "suspects",
-    "camera",
-    "properties",
-    "resolution",
-    "animation",
-    "scenes",
-    "rendering",
-    "interface",
-    "batch",
-]
-HOUSES = {"tracer": TRACER_FLOORS, "blender": BLENDER_FLOORS}
+TRACER_ROOMS = {floor: " ".join(TRACER_FLOORS[:i]) for i, floor in enumerate(TRACER_FLOORS)}
+HOUSES = {"": ROOMS, "blender": BLENDER_ROOMS, "tracer": TRACER_ROOMS}
 ROOF = {"__init__", "__main__"}
 
 # What exists inside Blender only.
@@ -107,22 +118,28 @@ def imported_modules(source: str, package: tuple[str, ...]) -> set[str]:
     return found
 
 
-def climbing_imports(source: str, path: Path) -> set[str]:
-    """What `source`, as the file `path` relative to the package, imports from a floor above its own."""
+def arrows(source: str, path: Path) -> set[tuple[str, str, str]]:
+    """(house, room, room it imports from) of `source`, as the file `path` relative to the package."""
     imports = imported_modules(source, ("viewcam_addon", *path.parent.parts))
-    climbing = _climbing(imports, path.parts, "viewcam_addon", FLOORS)
-    for house, floors in HOUSES.items():
-        if path.parts[0] == house:
-            climbing |= _climbing(imports, path.parts[1:], f"viewcam_addon.{house}", floors)
-    return climbing
+    found = set()
+    for house, rooms in HOUSES.items():
+        inside = Path(house) if house else Path()
+        if inside != Path() and inside not in path.parents:
+            continue
+        room = path.relative_to(inside).parts[0].removesuffix(".py")
+        package = ".".join(("viewcam_addon", *inside.parts))
+        others = {other for other in rooms if any(f"{name}.".startswith(f"{package}.{other}.") for name in imports)}
+        found |= {(house, room, other) for other in others if room not in ROOF and other != room}
+    return found
 
 
-def _climbing(imports: set[str], path: tuple[str, ...], package: str, floors: list[str]) -> set[str]:
-    floor = path[0].removesuffix(".py")
-    if floor in ROOF:
-        return set()
-    above = floors[floors.index(floor) + 1 :]
-    return {name for name in imports if any(f"{name}.".startswith(f"{package}.{room}.") for room in above)}
+def undeclared(source: str, path: Path) -> list[str]:
+    """The imports of a file that the tables do not have."""
+    return sorted(
+        f"{room} imports from {other}"
+        for house, room, other in arrows(source, path)
+        if other not in HOUSES[house].get(room, "").split()
+    )
 
 
 def blender_imports(source: str) -> set[str]:
@@ -140,10 +157,20 @@ def tracked_files() -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("path", [path.relative_to(PACKAGE) for path in sources()], ids=str)
-def test_imports_point_down_only(path):
-    climbing = climbing_imports((PACKAGE / path).read_text(encoding="utf-8"), path)
-    assert not climbing, f"{path} imports from a floor above its own: {sorted(climbing)}"
+def test_each_room_imports_only_from_those_that_its_line_in_the_table_names():
+    found = {path: undeclared(path.read_text(encoding="utf-8"), path.relative_to(PACKAGE)) for path in sources()}
+    guilty = {str(path.relative_to(PACKAGE)): names for path, names in found.items() if names}
+    assert not guilty, f"not in the table of tests/test_project.py: {guilty}"
+
+
+def test_the_table_has_no_circle_and_no_arrow_that_nothing_uses():
+    for rooms in HOUSES.values():
+        graphlib.TopologicalSorter({room: names.split() for room, names in rooms.items()}).prepare()  # or CycleError
+    used = set().union(*(arrows(path.read_text(encoding="utf-8"), path.relative_to(PACKAGE)) for path in sources()))
+    declared = {
+        (house, room, other) for house in ("", "blender") for room, names in HOUSES[house].items() for other in names.split()
+    }
+    assert not declared - used, f"nothing imports so: take it out of the table: {sorted(declared - used)}"
 
 
 @pytest.mark.parametrize(
@@ -153,22 +180,57 @@ def test_imports_point_down_only(path):
         ("from ..blender.camera import apply", "tracer/render.py"),
         ("def late():\n    import viewcam_addon.cli", "blender/camera.py"),
         ("from .. import cli", "blender/camera.py"),
+        ("if TYPE_CHECKING:\n    from .blender import camera", "roll.py"),
         ("from ..light.emitters import Emitters", "tracer/rays/space.py"),
         ("from ..rays.view import View", "tracer/scene/lamps.py"),
         ("from .rendering import job", "blender/camera.py"),
     ],
 )
-def test_an_import_that_climbs_is_seen(source, path):
-    assert climbing_imports(source, Path(path))
+def test_an_import_that_is_not_in_the_table_is_seen(source, path):
+    assert undeclared(source, Path(path))
 
 
-def test_every_room_has_a_floor():
-    rooms = {path.relative_to(PACKAGE).parts[0].removesuffix(".py") for path in sources()}
-    assert rooms - ROOF == set(FLOORS), "say in FLOORS on which floor the new room is"
-    for house, floors in HOUSES.items():
+def test_every_room_has_its_line_in_the_table():
+    for house, rooms in HOUSES.items():
         inside = PACKAGE / house
-        rooms = {path.relative_to(inside).parts[0].removesuffix(".py") for path in inside.rglob("*.py")}
-        assert rooms - ROOF == set(floors), f"say in {house.upper()}_FLOORS on which floor the new room is"
+        found = {path.relative_to(inside).parts[0].removesuffix(".py") for path in inside.rglob("*.py")} - ROOF
+        assert found == set(rooms), (
+            f"say in the table of {house or 'the package'} what these import: {sorted(found ^ set(rooms))}"
+        )
+
+
+def circle(modules: dict[str, str]) -> list[str]:
+    """Modules that import one another in a circle, whether at once, in a function or for types alone; source by dotted name."""
+
+    def module_of(imported: str) -> str | None:
+        """The module itself, else the one whose name is imported from it."""
+        parent = imported.rpartition(".")[0]
+        return next(
+            (each for each in (imported, f"{imported}.__init__", parent, f"{parent}.__init__") if each in modules), None
+        )
+
+    def of(name: str, source: str) -> set[str]:
+        return {module_of(each) for each in imported_modules(source, tuple(name.split(".")[:-1]))} - {name, None}
+
+    try:
+        graphlib.TopologicalSorter({name: of(name, source) for name, source in modules.items()}).prepare()
+    except graphlib.CycleError as error:
+        return error.args[1]
+    return []
+
+
+def test_no_modules_import_one_another_in_a_circle():
+    """Neither by `if TYPE_CHECKING` nor in functions, so that each can be read without the other."""
+    openers = {PACKAGE / "__init__.py", NEEDS_BLENDER / "__init__.py"}  # what Blender is to hear of is imported as it registers
+    files = [path for path in sources() if path not in openers]
+    modules = {".".join(path.relative_to(ROOT).with_suffix("").parts): path.read_text(encoding="utf-8") for path in files}
+    assert len(modules) > 100 and not (found := circle(modules)), " → ".join(found)
+
+
+def test_a_circle_is_seen():
+    assert circle({"a.b": "from .c import x", "a.c": "if TYPE_CHECKING:\n    from .b import y"})
+    assert circle({"a.b": "from . import c", "a.c": "def f():\n    from . import b"})
+    assert not circle({"a.b": "from . import c", "a.c": "import b"})
 
 
 def test_imports_inside_the_package_are_relative():
@@ -281,14 +343,6 @@ def test_the_top_level_is_the_fixed_one():
     top = {Path(name).parts[0] for name in tracked_files()}
     extra = {name for name in top - TOP_LEVEL - BUILD_FILES if not name.startswith(".")}
     assert not extra, f"not a part of the top level: {sorted(extra)}"
-
-
-def test_no_file_is_too_long_to_be_one_room():
-    lengths = {
-        path: len((ROOT / path).read_text(encoding="utf-8").splitlines()) for path in tracked_files() if path.endswith(".py")
-    }
-    long = {path: length for path, length in lengths.items() if length > 400}
-    assert lengths and not long, f"over 400 lines: {long}"
 
 
 def test_what_the_readme_says_viewcam_does_it_does():

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from . import words
+from . import camera_words, words
 from .shots import ENGINES, LEVELS
 
 DESCRIPTION = "Render many shots of one file: opened once, each written whole, and continued after whatever ended it."
@@ -12,6 +12,8 @@ _EXAMPLES = """\
 examples:
   {command}{file} shots.csv --out renders
       a list of shots: CSV, JSON or JSON Lines, one camera a row
+  {command}{file} sparse/0 --out renders
+      the cameras of a COLMAP model, or of any file that viewcam camera reads
   {command}{file} --orbit 36 --size 640x360 --out turntable
       around what the scene's camera looks at
   {command}{file} --frames 1..250 --out frames --resume
@@ -37,13 +39,21 @@ def add(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     added.epilog = _EXAMPLES.format(command=command, file=file)
 
     shots = added.add_argument_group("which shots: one of these")
-    shots.add_argument("shots", metavar="SHOTS", type=Path, nargs="?", help="a list: .csv, .tsv, .json, .jsonl or .ndjson")
+    shots.add_argument(
+        "shots",
+        metavar="SHOTS",
+        type=Path,
+        nargs="?",
+        help="a list (.csv, .json, .jsonl …) or any cameras",
+    )
     shots.add_argument("--orbit", type=words.positive, metavar="N", help="N views around the camera's look-at point")
     shots.add_argument("--frames", metavar="A..B", help="a shot of the camera at each frame (from -5 on: --frames=-5..3)")
     shots.add_argument(
         "--cameras", metavar="GLOB", help="a shot of each camera so called: with * ? [abc]; --transforms has _ for each space"
     )
     shots.add_argument("--shard", metavar="I/N", help="of all these, every N-th from the I-th on: for a farm's own manager")
+
+    camera_words.taken(added.add_argument_group("how cameras of another program are taken"), size=False)
 
     said = added.add_argument_group("what a shot does not say itself")
     said.add_argument("--camera", metavar="NAME", help="of --orbit and --frames: the camera (default: the scene's)")

@@ -20,7 +20,7 @@ from . import checks, intrinsics
 from . import roll as rolls
 from .errors import InputError
 from .intrinsics import Frame
-from .pinhole import Pinhole, Triple
+from .pinhole import Pinhole, Triple, ViewPlane
 
 PIXELS, FIELD_OF_VIEW = "PIXELS", "FIELD_OF_VIEW"
 CANONICAL, HOLD = "CANONICAL", "HOLD"
@@ -38,6 +38,7 @@ class CameraValues:
     pole : CANONICAL or HOLD, what the picture does near up. hold_within : radians from up. held_roll : radians, see roll.py.
     view_when_set : (eye, look_at, up) from which the next edit sets out, None where that is not known.
     precision : the relative rounding of the values, 2⁻⁵³ where all are known in float64, else float32's 2⁻²⁴.
+    follows : those of "eye" and "look_at" that are set to follow an object.
     """
 
     eye: Triple
@@ -54,6 +55,7 @@ class CameraValues:
     held_roll: float = 0.0
     view_when_set: tuple[Triple, Triple, Triple] | None = None
     precision: float = 2.0**-24
+    follows: tuple[str, ...] = ()
 
     def view(self) -> Pinhole:
         """Where the values look, in a picture of one pixel and whatever a held roll is.
@@ -65,7 +67,7 @@ class CameraValues:
         """
         return Pinhole(self.eye, self.look_at, self.up, 1.0, 1, 1)
 
-    def pinhole(self, plane: Pinhole, frame: Frame, sensor_fit: str, mirrored: bool) -> Pinhole:
+    def pinhole(self, plane: ViewPlane, frame: Frame, sensor_fit: str, mirrored: bool) -> Pinhole:
         """The camera that the values ask for, whatever a held roll is.
 
         plane : whose size and principal point it has. frame : the picture. sensor_fit : "AUTO", "HORIZONTAL" or "VERTICAL".

@@ -15,8 +15,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from . import batch_words, checks, events, words
-from .commands import Result, batch, chart, proving, serve
+from . import batch_words, camera_words, checks, events, words
+from .commands import Result, batch, camera, chart, proving, serve
 from .errors import InputError, bug
 from .files import check_writable, is_printed_to, written_whole
 from .tracer.scene.film import SAMPLES
@@ -94,6 +94,9 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
             added.add_argument("blend", metavar="FILE.blend", type=Path, help="any file that Blender opens")
         else:
             added.set_defaults(blend=None)
+        added.add_argument(
+            "--trust", action="store_true", help="let what is in the file run and write: Python, shaders, caches"
+        )
 
     def scene_choices(added: argparse.ArgumentParser) -> None:
         added.add_argument("--camera", metavar="NAME", help="the camera object (default: the scene's)")
@@ -177,9 +180,12 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     blend(added)
     batch_words.add(added, blend_is_open)
 
+    added = command(camera.run, "camera", "List the cameras of another program's file, or write them for a third one.")
+    camera_words.add(added)
+
     added = command(proving.demo, "demo", "Check the studio still that comes with the project, and write the report.")
     added.set_defaults(blend=proving.DEMO_SCENE, camera=None, frame=None, size=None, strict=False, recenter=False, clay=False)
-    added.set_defaults(difference=None, repeat=None, writes=("report",))
+    added.set_defaults(difference=None, repeat=None, trust=False, writes=("report",))
     light(added)
     error(added, "the tracer takes")
     added.add_argument(

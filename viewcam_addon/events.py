@@ -1,9 +1,9 @@
 """What a command tells while it runs: errors as sentences, a bar on a terminal, or a line of JSON for each event.
 
 An event is a name and fields. Of every command are told `started` (command, words), `message` (text: a line that it would have
-printed), `error` (command, text, and `problems` where there are several) and `finished` (command, exit_status, seconds); a
-picture that is traced tells `progress` (share), and a batch tells of its shots (docs/batch.md). All of it goes to copies of
-standard output and standard error, so it is heard while libraries are silent.
+printed), `error` (command, text, and `problems` where there are several), `note` (command, text: how something was taken) and
+`finished` (command, exit_status, seconds); a picture that is traced tells `progress` (share), and a batch tells of its shots
+(docs/batch.md). All of it goes to copies of standard output and standard error, so it is heard while libraries are silent.
 
 Rejected: Python's logging, whose levels, loggers and handlers are more than a line of JSON needs, and to which the libraries in
 this process write as well.
@@ -16,7 +16,7 @@ import json
 from collections.abc import Iterator
 from typing import Any, Protocol, TextIO
 
-from .terminal import copy_of
+from .terminal import copy_of, plain
 
 _PERCENT = "{desc} {percentage:.0f}%|{bar}| {elapsed}<{remaining}"
 
@@ -55,7 +55,7 @@ class Bar(Sentences):
         elif event == "progress":
             self._progress(100 * fields["share"])
         elif event == "shot_started" and self._bar is not None:
-            self._bar.set_description_str(fields["shot"])
+            self._bar.set_description_str(plain(fields["shot"]))
         elif event in ("shot_done", "shot_failed", "shot_elsewhere") and self._bar is not None:
             self._failed += event == "shot_failed"
             self._bar.set_postfix_str(f"{self._failed} failed" if self._failed else "", refresh=False)
@@ -151,12 +151,15 @@ def _tqdm() -> type | None:
 
 
 def _sentence(event: str, fields: dict[str, Any]) -> str:
-    """What is to be said of an event where nobody reads JSON; mostly nothing."""
+    """What is to be said of an event where nobody reads JSON, plain; mostly nothing."""
     if event == "error":
         command = f"viewcam {fields['command']}".rstrip()  # none where there is no such command
-        return f"{command}: {fields['text']}"
+        lines = fields["text"].split("\n") if fields.get("problems") else [fields["text"]]
+        return "\n".join(map(plain, [f"{command}: {lines[0]}", *lines[1:]]))
+    if event == "note":
+        return plain(f"viewcam {fields['command']}: note: {fields['text']}")
     if event == "shot_failed":
-        return f"viewcam batch: {fields['shot']}: {fields['error']}"
+        return plain(f"viewcam batch: {fields['shot']}: {fields['error']}")
     if event == "stopping":
         return f"viewcam batch: {fields['signal']}: this shot will be finished; a second one ends it at once"
     return ""

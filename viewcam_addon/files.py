@@ -1,4 +1,4 @@
-"""The one writer of files: a file appears whole, or not at all.
+"""The one writer of files: a file appears whole, or not at all. And how those are read that strangers send.
 
 Every file that this project writes comes into being as a temporary file in the same folder and is renamed when its last byte
 is on the disk. Blender's own writers (the .blend, Cycles' EXR) write to the temporary path that `written_whole` hands out.
@@ -57,6 +57,20 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
                     shutil.copyfileobj(written, there)
         if file:
             os.replace(temporary, file)
+
+
+def read_bytes(path: str | os.PathLike[str]) -> bytes:
+    """The content of a file.
+
+    Raises
+    ------
+    OSError
+        if it can't be read, or is no regular file: a pipe keeps its reader waiting for ever, a device may never end.
+    """
+    kind = stat.S_IFMT(os.stat(path).st_mode)
+    if kind not in (stat.S_IFREG, stat.S_IFDIR):  # a folder's own error says more
+        raise OSError(errno.EINVAL, "it is no file")
+    return Path(path).read_bytes()
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:

@@ -18,6 +18,7 @@ import numpy as np
 
 from . import checks
 from .errors import InputError
+from .pinhole import ViewPlane
 
 # Blender clamps a shorter lens, silently (rna_camera.cc).
 SHORTEST_LENS = 1.0
@@ -113,33 +114,6 @@ class Frame:
         return self.border_window if self.crop else (0, 0, *self.size)
 
 
-@dataclass(frozen=True)
-class ViewPlane:
-    """The part of a `Pinhole` that is not its pose.
-
-    distance : (d_x, d_y) in pixels, > 0. principal_point : (c_x, c_y) in pixels from the left and the bottom edge.
-    width, height : pixels of the picture.
-
-    Raises
-    ------
-    InputError
-        if a distance is not positive, a size not whole and ≥ 1, or a number not finite.
-    """
-
-    distance: tuple[float, float]
-    principal_point: tuple[float, float]
-    width: int
-    height: int
-
-    def __post_init__(self) -> None:
-        _set(self, "distance", checks.vector("distance", self.distance, 2))
-        if min(self.distance) <= 0:
-            raise InputError(f"distance is {min(self.distance):g} pixels: the view plane must lie before the eye, give d > 0")
-        _set(self, "principal_point", checks.vector("principal_point", self.principal_point, 2))
-        for name in ("width", "height"):
-            _set(self, name, checks.whole(name, getattr(self, name)))
-
-
 def _set(instance: object, name: str, value: object) -> None:
     object.__setattr__(instance, name, value)
 
@@ -223,6 +197,33 @@ def growth(sensor_fit: str, before: Frame, after: Frame) -> float:
     """The factor by which d, in pixel widths at 100 %, grows from one picture to another where lens and sensor stay."""
     was, now = (_fitted_pixels(sensor_fit, replace(frame, percentage=100))[0] for frame in (before, after))
     return now / was
+
+
+def own_sensor(current: tuple[float, float], before: tuple[float, float]) -> tuple[float, float]:
+    """The sensor (width, height) in mm on which `camera_data` is to be asked: the one before it grew, unless changed since.
+
+    before : the sensor before it grew, zeros where it never did.
+    """
+    if not all(before):
+        return current
+    growth = current[0] / before[0]
+    has_grown = math.frexp(growth)[0] == 0.5 and growth > 1 and growth == current[1] / before[1]
+    return before if has_grown else current
+
+
+def lens_and_sensor(data: CameraData, own: tuple[float, float]) -> dict[str, float | tuple[float, float]]:
+    """What Blender is to store, by its names: lens and sensor, and beside them the artist's own sensor if it had to grow."""
+    before = own if data.sensor_width != own[0] else (0.0, 0.0)
+    found = {name: getattr(data, name) for name in ("lens", "sensor_width", "sensor_height")}
+    return found | {"virtual_pinhole_sensor": before}
+
+
+def check_storable(camera: str, **numbers: tuple[float, ...]) -> None:
+    """Raise InputError, by the camera's name, unless float32 holds all numbers."""
+    for name, values in numbers.items():
+        if not all(abs(value) <= _LARGEST for value in values):
+            largest = max(values, key=abs)
+            raise InputError(f"the {name} of camera {camera!r} needs {largest:g}, beyond Blender's numbers: choose another")
 
 
 def _beyond_blender(name: str, pixels: float, of_blender: str, value: float) -> str:

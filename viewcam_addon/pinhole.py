@@ -36,6 +36,43 @@ _SMALLEST_SAFE, _LARGEST_SAFE = 2.0**-500, 2.0**500
 _AT_ONCE = 8192  # poses: their numbers stay in a core's cache; more take twice as long each
 
 
+def check_distance(distance: float, name: str = "distance") -> None:
+    """Raise InputError, with the given name, unless a view plane at that distance in pixels lies before the eye."""
+    if distance <= 0:
+        raise InputError(f"{name} is {distance:g} pixels: the view plane must lie before the eye, give d > 0")
+
+
+@dataclass(frozen=True)
+class ViewPlane:
+    """The part of a `Pinhole` that is not its pose.
+
+    distance : in pixels, > 0; one float, or a pair (d_x, d_y) in pixel widths and pixel heights.
+    principal_point : (c_x, c_y) in pixels from the left and the bottom edge, the picture's centre if it is None.
+    width, height : pixels of the picture.
+
+    Raises
+    ------
+    InputError
+        if a distance is not positive, a size not whole and ≥ 1, or a number not finite.
+    """
+
+    distance: tuple[float, float]
+    principal_point: tuple[float, float] | None
+    width: int
+    height: int
+
+    def __post_init__(self) -> None:
+        checked = {name: checks.whole(name, getattr(self, name)) for name in ("width", "height")}
+        pair = self.distance if np.iterable(self.distance) else (self.distance,) * 2
+        checked["distance"] = checks.vector("distance", pair, 2)
+        check_distance(min(checked["distance"]))
+        centre = (checked["width"] / 2, checked["height"] / 2)
+        point = centre if self.principal_point is None else self.principal_point
+        checked["principal_point"] = checks.vector("principal_point", point, 2)
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+
+
 @dataclass(frozen=True)
 class Pinhole:
     """A pinhole camera, immutable and validated.
@@ -69,19 +106,19 @@ class Pinhole:
         for name in ("eye", "look_at", "up"):
             self._set(name, checks.vector(name, getattr(self, name), 3))
         _check_pose(self.eye, self.look_at, self.up)
-        for name in ("width", "height"):
-            self._set(name, checks.whole(name, getattr(self, name)))
-        distance = self.distance if np.iterable(self.distance) else (self.distance,) * 2
-        self._set("distance", checks.vector("distance", distance, 2))
-        if min(self.distance) <= 0:
-            raise InputError(f"distance is {min(self.distance):g} pixels: the view plane must lie before the eye, give d > 0")
-        centre = (self.width / 2, self.height / 2)
-        point = centre if self.principal_point is None else self.principal_point
-        self._set("principal_point", checks.vector("principal_point", point, 2))
+        plane = ViewPlane(self.distance, self.principal_point, self.width, self.height)
+        for name in ("distance", "principal_point", "width", "height"):
+            self._set(name, getattr(plane, name))
+        self._set("_plane", plane)
         self._set("mirrored", checks.truth("mirrored", self.mirrored))
 
     def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
+
+    @property
+    def plane(self) -> ViewPlane:
+        """All of it but its pose."""
+        return self._plane
 
     @cached_property
     def _view(self) -> tuple[Pair, Pair, float]:

@@ -1,4 +1,4 @@
-"""Rotation matrices ↔ Blender's rotation modes, in float64. Pure arithmetic, no Blender.
+"""Rotation matrices ↔ Blender's rotation modes, and the channels of a Blender object, in float64. Pure, no Blender.
 
 Blender's own conversions run in float32, and near gimbal lock `Matrix.to_euler` (and so `matrix_world =`) turns rounding into
 up to 2.5e-3 of a matrix entry. Here the third angle is read off after the first has been undone, which is well-conditioned in
@@ -10,13 +10,17 @@ Every matrix is (3, 3) float64 and takes column vectors: its columns are the ima
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .pinhole import Pinhole
+
 Array = NDArray[np.float64]
 
+IDENTITY = np.eye(4)
 # Radians: in so small a turn the axis, and so close to gimbal lock one of the angles, may be any, within float32's rounding.
 _FREE = 2.0**-26
 
@@ -155,3 +159,72 @@ def skew(matrix: Array) -> float:
     """The largest |cosine| between two columns: 0 if they are perpendicular."""
     columns = matrix / np.linalg.norm(matrix, axis=0)
     return float(np.abs((columns.T @ columns)[[0, 0, 1], [1, 2, 2]]).max())
+
+
+def float64(numbers: Iterable) -> Array:
+    """The numbers of a Blender matrix or vector. From 5.0 on NumPy takes these for float32, and would compute in it."""
+    return np.array(numbers, dtype=np.float64)
+
+
+def mirrors(matrix: Iterable) -> bool:
+    """Whether a (4, 4) matrix mirrors; one that is not finite does nothing."""
+    matrix = float64(matrix)
+    return bool(np.isfinite(matrix).all() and np.linalg.det(matrix[:3, :3]) < 0)
+
+
+def has_inverse(matrix: Array) -> bool:
+    """Whether a matrix is finite and not singular."""
+    return bool(np.isfinite(matrix).all() and np.linalg.det(matrix) != 0)
+
+
+@dataclass(frozen=True)
+class Channels:
+    """All that says where a Blender object stands relative to what carries it, as it is stored.
+
+    mode : an order of Euler angles, "QUATERNION" or "AXIS_ANGLE". rotation : its numbers in this mode, and delta_rotation those
+    that Blender applies after it; () for AXIS_ANGLE, for which it shows none.
+    """
+
+    mode: str
+    location: tuple[float, float, float]
+    rotation: tuple[float, ...]
+    scale: tuple[float, float, float]
+    delta_location: tuple[float, float, float]
+    delta_rotation: tuple[float, ...]
+    delta_scale: tuple[float, float, float]
+
+    @property
+    def full_scale(self) -> Array:
+        """(3,): the scale, delta included."""
+        return float64(self.scale) * float64(self.delta_scale)
+
+    @property
+    def signs(self) -> Array:
+        """(3,): −1 for each axis that the scale turns round."""
+        return np.where(self.full_scale < 0, -1.0, 1.0)
+
+    @property
+    def delta(self) -> Array:
+        """(3, 3): the rotation that Blender applies after the object's own."""
+        if not self.delta_rotation:
+            return np.eye(3)
+        numbers = self.delta_rotation
+        return from_quaternion(numbers) if self.mode == "QUATERNION" else from_euler(numbers, self.mode)
+
+    def bringing_to(self, pinhole: Pinhole, parent: Array) -> tuple[tuple[float, ...], Array, tuple[float, ...]]:
+        """Location, (3, 3) rotation and scale that bring a camera to the pose of a pinhole.
+
+        parent : (4, 4), invertible, from the camera's own channels to world space.
+        """
+        is_free = np.array_equal(parent, IDENTITY)  # as most cameras are, which need no linear algebra
+        u, v, w = pinhole.basis()
+        wanted = np.column_stack([-u if pinhole.mirrored else u, v, w])
+        scale, signs = float64(self.scale), self.signs
+        local = wanted if is_free else np.linalg.solve(parent[:3, :3], wanted)
+        if (pinhole.mirrored if is_free else np.linalg.det(local) < 0) != (signs.prod() < 0):
+            scale[0], signs[0] = -scale[0], -signs[0]
+        turn = local * signs if is_free else nearest(local / np.linalg.norm(local, axis=0) * signs)
+        eye = np.array(pinhole.eye)
+        location = eye if is_free else np.linalg.solve(parent[:3, :3], eye - parent[:3, 3])
+        location = location - float64(self.delta_location)
+        return tuple(location.tolist()), self.delta.T @ turn, tuple(scale.tolist())

@@ -1,10 +1,16 @@
-"""The process that a terminal starts: what it prints, our lines and not what libraries print past Python, and its heap."""
+"""The process that a terminal starts: what it prints, our lines and not what libraries print past Python, and its heap.
+
+Names come from files, and files from strangers: a name may hold what moves a terminal's cursor, ends the line or turns the
+direction of the text, and so write a verdict of its own. All that this project prints goes through `plain`, by `say` or by
+events.py.
+"""
 
 import contextlib
 import ctypes
 import io
 import os
 import sys
+import unicodedata
 from collections.abc import Iterator
 from typing import TextIO
 
@@ -20,6 +26,26 @@ def open_closed_streams() -> None:
                 os.dup2(nowhere, number)
                 os.close(nowhere)
             setattr(sys, name, os.fdopen(number, "w"))
+
+
+def plain(text: str) -> str:
+    """The text on one line of characters that only show themselves; all others are written as escapes of Python's.
+
+    Kept are letters, marks, digits, punctuation, symbols and spaces. Escaped are line ends, controls and formats (among them
+    all that changes the direction of text), halves of characters, and what is private or not assigned.
+    """
+    return text if text.isprintable() else "".join(map(_plain, text))
+
+
+def _plain(character: str) -> str:
+    shows = character.isprintable() or unicodedata.category(character) == "Zs"
+    return character if shows else character.encode("unicode_escape").decode("ascii")
+
+
+def say(*lines: str) -> None:
+    """Print the lines to standard output, each of them plain, and see that they are there."""
+    with contextlib.suppress(OSError):  # nobody listens any more: that ends no command
+        print(*map(plain, lines), sep="\n", flush=True)
 
 
 def copy_of(stream: int) -> TextIO:

@@ -6,9 +6,9 @@ from pathlib import Path
 import bpy
 
 import viewcam_addon
-from viewcam_addon.blender import versions
+from viewcam_addon.blender import opening, versions
 from viewcam_addon.blender.borrowing import Borrower, still_of_one_layer
-from viewcam_addon.blender.rendering import cycles, job
+from viewcam_addon.blender.rendering import cycles
 from viewcam_addon.blender.scenes.depsgraph import render_still
 from viewcam_addon.blender.scenes.export import export_scene
 from viewcam_addon.blender.scenes.ledger import Ledger, Remedy
@@ -37,7 +37,7 @@ def prepare(
     if scene_name in _SUZANNES:
         _SUZANNES[scene_name](*size)
     else:
-        job.open_blend(SCENES / f"{scene_name}.blend")
+        opening.open_blend(SCENES / f"{scene_name}.blend")
     scene, ledger = bpy.context.scene, Ledger()
     view_layer, camera_object = scene.view_layers[0], scene.camera
     camera_object.virtual_pinhole.enabled = False  # else its lens would follow the resolution

@@ -24,7 +24,7 @@ def note(*words):
         print(*words, os.getpid(), file=diary)
 
 class Renderer:
-    def __init__(self, blend, seed, threads):
+    def __init__(self, blend, seed, threads, trust):
         note("open", blend, threads)
         note("one-thread", os.environ.get("OMP_NUM_THREADS"))
         if not blend.exists():

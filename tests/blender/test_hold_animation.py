@@ -10,7 +10,7 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon import roll as rolls
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import findings, hold, targets
+from viewcam_addon.blender import datablocks, findings, hold, targets
 from viewcam_addon.blender.interface import panel
 
 TURN = findings.LARGEST_TURN  # what float32 storage makes of a rotation
@@ -205,7 +205,7 @@ def test_an_nla_strip_can_not_be_held_and_the_panel_says_so(looping_camera, scen
         strip.action_slot = slot
     data.action = None
     scene.frame_set(41)
-    assert hold.is_animated(looping_camera)
+    assert datablocks.is_animated(looping_camera)
     assert hold.roll(looping_camera, targets.values(looping_camera), scene) == 0
     assert sum(each.sentence.startswith("An NLA strip sets the eye, ") for each in panel.notices(looping_camera, scene)) == 1
     track.mute = True

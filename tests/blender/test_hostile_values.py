@@ -14,7 +14,6 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon import rotation
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import pose
 from viewcam_addon.blender.interface import panel
 from viewcam_addon.errors import InputError
 
@@ -269,7 +268,7 @@ def test_applying_the_values_mends_a_camera_whose_own_channels_are_not_finite(po
 
 def test_blenders_matrices_are_computed_with_in_float64(posed_camera, empty, scene):
     # From 5.0 on NumPy takes them for float32: a million metres away the location would be 0.06 m off.
-    assert pose.float64(posed_camera.matrix_world).dtype == np.float64
+    assert rotation.float64(posed_camera.matrix_world).dtype == np.float64
     parent = empty("Parent", location=(1e6 / 3, -1e6 / 7, 1e5))
     posed_camera.parent = parent
     bpy.context.view_layer.update()
@@ -283,6 +282,6 @@ def test_a_rotation_by_no_quaternion_is_that_of_blender(camera_object):
     camera_object.rotation_mode = "QUATERNION"
     for numbers in ((0, 0, 0, 0), (1e-30, 0, 0, 0), (1e-20, 0, 1e-20, 0)):
         camera_object.rotation_quaternion = numbers
-        blenders = pose.float64(camera_object.matrix_basis)[:3, :3]
+        blenders = rotation.float64(camera_object.matrix_basis)[:3, :3]
         # The square of 1e-20 is a denormal float32 of 17 bits.
         np.testing.assert_allclose(rotation.from_quaternion(numbers), blenders, atol=2.0**-16)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import findings, hold, targets
+from viewcam_addon.blender import datablocks, findings, targets
 from viewcam_addon.pinhole import Pinhole
 
 POINTS = ("eye", "look_at")
@@ -120,7 +120,7 @@ def test_the_stored_point_goes_along_so_that_clearing_leaves_the_camera(watching
     group.look_at_target = None
     update()
     assert watching_camera.matrix_world == before
-    assert not hold.is_animated(watching_camera)
+    assert not datablocks.is_animated(watching_camera)
     moving_target.parent.driver_remove("location")
     scene.frame_set(1)
     assert watching_camera.matrix_world == before

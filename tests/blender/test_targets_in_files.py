@@ -7,7 +7,7 @@ bpy = pytest.importorskip("bpy")
 
 import viewcam_addon
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import findings, hold, targets
+from viewcam_addon.blender import datablocks, findings, hold, targets
 from viewcam_addon.blender.interface import panel
 from viewcam_addon.pinhole import Pinhole
 
@@ -175,7 +175,7 @@ def test_a_target_that_is_removed_leaves_the_camera_where_it_was(posed_camera, s
     update()
     scene.frame_set(3)
     assert (posed_camera.matrix_world, posed_camera.virtual_pinhole.numbers()) == before
-    assert hooks(posed_camera) == [] and not hold.is_animated(posed_camera)
+    assert hooks(posed_camera) == [] and not datablocks.is_animated(posed_camera)
     assert targets.warnings(posed_camera) == []
     assert capfd.readouterr().err == ""
 

@@ -98,6 +98,7 @@ class Cluster:
         seed: int | None = None,
         threads: int | None = None,
         check: bool = False,
+        trust: bool = False,
     ) -> Work:
         """The work of the workers on one file; the same bytes as one.in_turn's but for `timing`.
 
@@ -110,6 +111,7 @@ class Cluster:
             "blend": str(blend.absolute()),
             "seed": seed,
             "threads": threads or self._threads,
+            "trust": trust,
             "made_from": dict(made_from),
         }
 

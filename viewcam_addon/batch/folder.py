@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..files import written_whole
+from ..files import read_bytes, written_whole
 
 _TEMPORARY = re.compile(r"\.(.+)-[0-9a-f]{8}\.(?:exr|png|json|html|txt)")
 
@@ -54,7 +54,7 @@ class Folder:
         check : whether it must have been checked, too.
         """
         try:
-            record = json.loads(self.sidecar(name).read_text(encoding="utf-8"))
+            record = json.loads(read_bytes(self.sidecar(name)).decode("utf-8"))
             sizes = {"image": self.image(name).stat().st_size, "preview": self.preview(name).stat().st_size}
         except (OSError, ValueError, RecursionError):  # missing, or somebody else's
             return None

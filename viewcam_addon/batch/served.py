@@ -28,15 +28,15 @@ ATTEMPTS = 3
 class ServedRenderer:
     """A scene held open by a Blender in another process, which is started when it is first needed. See BlenderRenderer.
 
-    blend : the file. seed, threads : as the command line has them. program : that of this process, which is no Blender.
+    blend : the file. seed, threads, trust : as the command line has them. program : that of this process, which is no Blender.
 
     Every method raises InputError, also if that Blender can't be started or ends again and again, and OSError where it could
     not write.
     """
 
-    def __init__(self, blend: Path, seed: int | None = None, threads: int | None = None) -> None:
+    def __init__(self, blend: Path, seed: int | None = None, threads: int | None = None, trust: bool = False) -> None:
         self.blend, self.program = blend, None
-        self._opening = {"open": {"blend": str(blend), "seed": seed, "threads": threads}}
+        self._opening = {"open": {"blend": str(blend), "seed": seed, "threads": threads, "trust": trust}}
         self._partner: Partner | None = None
         self._rendering: dict[str, Any] = {}
 

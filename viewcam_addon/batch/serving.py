@@ -22,7 +22,7 @@ def serve(handle: str, opened: Callable[..., Any]) -> None:
     """Answer the ServedRenderer that started this process, until it has gone.
 
     handle : the last word of this process's command. opened : BlenderRenderer, or what takes its place; called with the file,
-    `seed` and `threads`.
+    `seed`, `threads` and `trust`.
     """
     with contextlib.ExitStack() as stack:
         partner.answer(handle, _Served(stack, opened).answer, IDLE)
@@ -38,8 +38,8 @@ class _Served:
         ((name, arguments),) = request.items()
         return _ANSWERS[name](self, **arguments)
 
-    def open(self, blend: str, seed: int | None, threads: int | None) -> None:
-        self._renderer = self._stack.enter_context(self._opened(Path(blend), seed=seed, threads=threads))
+    def open(self, blend: str, seed: int | None, threads: int | None, trust: bool) -> None:
+        self._renderer = self._stack.enter_context(self._opened(Path(blend), seed=seed, threads=threads, trust=trust))
 
     def render(self, shot: dict[str, Any], image: str, preview: str) -> dict[str, Any]:
         return self._renderer.render(Shot(**shot), Path(image), Path(preview))

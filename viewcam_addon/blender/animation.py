@@ -16,17 +16,19 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..errors import InputError
+from ..terminal import plain
 from . import camera as cameras
-from . import storage, targets, versions
+from . import resolution, storage, targets, versions
 from .datablocks import is_animated
 
 
 @persistent
 def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
     depsgraph = depsgraph or bpy.context.evaluated_depsgraph_get()
-    for camera_object in _updated_cameras(depsgraph):
-        if is_animated(camera_object):
-            _follow(camera_object, scene, depsgraph)
+    for block in [update.id.original for update in depsgraph.updates]:
+        if isinstance(block, bpy.types.Object) and block.type == "CAMERA" and is_animated(block):
+            _follow(block, scene, depsgraph)
+    resolution.on_frame_change(scene, depsgraph)
 
 
 @persistent
@@ -35,9 +37,12 @@ def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
     Blender evaluates what this sets without calling it again, so that a constraint in the way makes no endless loop.
     """
-    for camera_object in _updated_cameras(depsgraph):
-        if _is_driven(camera_object):
-            _follow(camera_object, scene, depsgraph)
+    for block in [update.id.original for update in depsgraph.updates]:
+        is_camera = isinstance(block, bpy.types.Object) and block.type == "CAMERA"
+        if is_camera and block.animation_data and _is_driven(block):
+            _follow(block, scene, depsgraph)
+    if depsgraph.id_type_updated("SCENE"):
+        resolution.follow(scene)
 
 
 @persistent
@@ -51,11 +56,6 @@ def on_load(_path: str, _more: object = None) -> None:
         _follow(camera_object, scene, bpy.context.evaluated_depsgraph_get())
 
 
-def _updated_cameras(depsgraph: bpy.types.Depsgraph) -> list[bpy.types.Object]:
-    updated = (update.id for update in depsgraph.updates)
-    return [each.original for each in updated if isinstance(each, bpy.types.Object) and each.type == "CAMERA"]
-
-
 def _is_driven(camera_object: bpy.types.Object) -> bool:
     return any(curve.data_path.startswith("virtual_pinhole.") for curve in versions.drivers(camera_object))
 
@@ -67,7 +67,7 @@ def _follow(camera_object: bpy.types.Object, scene: bpy.types.Scene, depsgraph: 
     try:
         cameras.place(camera_object, cameras.stated(evaluated, scene), scene, depsgraph)
     except InputError as error:
-        print(f"viewcam: frame {scene.frame_current}: {camera_object.name}: {error}", file=sys.stderr)
+        print(plain(f"viewcam: frame {scene.frame_current}: {camera_object.name}: {error}"), file=sys.stderr)
         return
     if depsgraph.mode == "RENDER":
         camera_object.update_tag(refresh={"OBJECT", "DATA", "TIME"})

@@ -32,7 +32,6 @@ from . import datablocks, findings, hold, pose, preferences, storage, suspects, 
 
 Array = NDArray[np.float64]
 
-_LARGEST_FLOAT32 = float(np.finfo(np.float32).max)
 # A turn by less is lost in the float32 matrix in which a camera is stored, and would be shown as −0°.
 _UNSEEN = 2.0**-24
 
@@ -55,14 +54,15 @@ def apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Sc
         if the object is no perspective camera, if the pinhole has another size or pixel aspect than the scene renders, or if
         a number is too large for Blender. Nothing has changed then.
     """
-    _check_storable(camera_object, look_at=pinhole.look_at, up=pinhole.up, distance=pinhole.distance)
-    _place_closely(camera_object, pinhole, scene)
+    datablocks.check_perspective(camera_object)
+    intrinsics.check_storable(camera_object.name, look_at=pinhole.look_at, up=pinhole.up, distance=pinhole.distance)
+    place(camera_object, pinhole, scene)
     frame = datablocks.frame_of(scene)
     followed = targets.names(camera_object)
     at_full_size = pinhole.distance[0] * (frame.resolution_x / frame.size[0])
     state(camera_object, pinhole.eye, pinhole.look_at, pinhole.up, at_full_size, frame)
     if followed:  # being asked where these are, Blender has brought the camera back to them
-        _place_closely(camera_object, pinhole, scene)
+        place(camera_object, pinhole, scene)
     kept = targets.names(camera_object)
     left = [f"The {words} no longer follows {name!r}" for words, name in followed.items() if words not in kept]
     return left + check(camera_object, pinhole, scene)
@@ -95,42 +95,56 @@ def follow(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
     InputError
         as `stated` and `apply` do. Nothing has changed then.
     """
-    values, level = _level(camera_object, scene)
-    held, angle = values.held_roll, hold.roll(camera_object, values, scene)
-    if hold.is_written_by_edits(camera_object, values):
-        before = _stood_at(camera_object, values, scene)
-        held = angle = hold.after_edit(before, level, held, values.hold_within) if before else held
-    _place_closely(camera_object, rolls.turned(level, angle), scene)
-    storage.settle(camera_object, replace(values.as_set(), held_roll=held), datablocks.frame_of(scene))
+    values, wanted = _level(camera_object, scene)
+    if values.pole == HOLD:
+        angle = hold.roll(camera_object, values, scene)
+        if not datablocks.is_animated(camera_object):  # in an animation the curves say what is held
+            if before := _stood_at(camera_object, values, scene):
+                angle = hold.after_edit(before, wanted, values.held_roll, values.hold_within)
+            values = replace(values, held_roll=angle)
+        wanted = rolls.turned(wanted, angle)
+    place(camera_object, wanted, scene)
+    storage.settle(camera_object, values.as_set(), datablocks.frame_of(scene))
 
 
-def place(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """Move the camera to `pinhole` without stating it and without reading back; otherwise as `apply`."""
-    datablocks.check_perspective(camera_object)
+def place(
+    camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None
+) -> None:
+    """Move a perspective camera to `pinhole` without stating it and without reading back; otherwise as `apply`.
+
+    depsgraph : where to look up what carries the camera; None: that of the scene. A camera whose pose tells what carries it
+        is then placed once more from there, since it may have been far away.
+    """
+
+    def state() -> tuple:
+        """All of the camera that is read or set here, what carries it aside."""
+        lens = (camera.lens, camera.shift_x, camera.shift_y, camera.sensor_width, camera.sensor_height, camera.sensor_fit)
+        return pose.channels_of(camera_object), lens, tuple(camera.virtual_pinhole_sensor)
+
     camera, frame = camera_object.data, datablocks.frame_of(scene)
-    order = (pinhole, frame, pose.parent_matrix(camera_object, depsgraph).tobytes())
-    if (*order, *_state(camera_object)) in _in_place:
-        return
-    plane = intrinsics.ViewPlane(pinhole.distance, pinhole.principal_point, pinhole.width, pinhole.height)
-    sensor = datablocks.own_sensor(camera)
-    data = intrinsics.camera_data(plane, frame, *sensor, camera.sensor_fit)
-    location, turn, scale = pose.channels(camera_object, pinhole, depsgraph)
-    _check_storable(camera_object, distance=(data.lens, data.sensor_width), shift=(data.shift_x, data.shift_y), eye=location)
-    # Nothing fails from here on.
-    _store(camera_object, location=location, scale=scale)
-    pose.set_rotation(camera_object, turn)
-    _store(camera, shift_x=data.shift_x, shift_y=data.shift_y)
-    _set_lens(camera, data, sensor)
-    if len(_in_place) == _MOST_IN_PLACE:
-        _in_place.clear()
-    _in_place.add((*order, *_state(camera_object)))
-
-
-def _state(camera_object: bpy.types.Object) -> tuple:
-    """All of a camera that `place` reads or sets, what carries it aside."""
-    camera = camera_object.data
-    sensor = (camera.sensor_fit, camera.sensor_width, camera.sensor_height, *camera.virtual_pinhole_sensor)
-    return *pose.state(camera_object), camera.lens, camera.shift_x, camera.shift_y, *sensor
+    is_carried = bool(camera_object.parent or camera_object.constraints)
+    within = depsgraph or datablocks.depsgraph_of(scene)
+    parent = pose.parent_matrix(camera_object, within) if is_carried else rotation.IDENTITY
+    before = state()
+    channels, _, grown_from = before
+    order = (pinhole, frame, parent.tobytes())
+    if (*order, *before) not in _in_place:
+        sensor = intrinsics.own_sensor((camera.sensor_width, camera.sensor_height), grown_from)
+        data = intrinsics.camera_data(pinhole.plane, frame, *sensor, camera.sensor_fit)
+        if not np.isfinite(channels.delta_rotation).all():
+            raise pose.no_size(camera_object)
+        location, turn, scale = channels.bringing_to(pinhole, parent)
+        lens, shift = (data.lens, data.sensor_width), (data.shift_x, data.shift_y)
+        intrinsics.check_storable(camera_object.name, distance=lens, shift=shift, eye=location)
+        # Nothing fails from here on.
+        _store(camera_object, location=location, scale=scale)
+        pose.set_rotation(camera_object, turn)
+        _store(camera, shift_x=data.shift_x, shift_y=data.shift_y, **intrinsics.lens_and_sensor(data, sensor))
+        if len(_in_place) == _MOST_IN_PLACE:
+            _in_place.clear()
+        _in_place.add((*order, *state()))
+    if is_carried and depsgraph is None and pose.is_told_by_its_pose(camera_object):
+        place(camera_object, pinhole, scene, datablocks.depsgraph_of(scene))
 
 
 def refit(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
@@ -141,20 +155,13 @@ def refit(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
     InputError
         as `follow` does. Nothing has changed then.
     """
-    datablocks.check_perspective(camera_object)
     camera, frame = camera_object.data, datablocks.frame_of(scene)
-    plane = intrinsics.view_plane(datablocks.camera_data_of(camera), frame)
+    plane = intrinsics.view_plane(datablocks.camera_data_of(camera_object), frame)
     distance = targets.values(camera_object).distances(frame, camera.sensor_fit)
     sensor = datablocks.own_sensor(camera)
     data = intrinsics.camera_data(replace(plane, distance=distance), frame, *sensor, camera.sensor_fit)
-    _check_storable(camera_object, distance=(data.lens, data.sensor_width))
-    _set_lens(camera, data, sensor)
-
-
-def _set_lens(camera: bpy.types.Camera, data: intrinsics.CameraData, sensor: tuple[float, float]) -> None:
-    """Lens and sensor, and beside them the artist's own sensor if it had to grow."""
-    _store(camera, lens=data.lens, sensor_width=data.sensor_width, sensor_height=data.sensor_height)
-    camera.virtual_pinhole_sensor = sensor if data.sensor_width != sensor[0] else (0.0, 0.0)
+    intrinsics.check_storable(camera_object.name, distance=(data.lens, data.sensor_width))
+    _store(camera, **intrinsics.lens_and_sensor(data, sensor))
 
 
 def _store(block: bpy.types.ID, **properties: float | tuple[float, ...]) -> None:
@@ -162,21 +169,6 @@ def _store(block: bpy.types.ID, **properties: float | tuple[float, ...]) -> None
     for name, value in properties.items():
         if not np.array_equal(np.float32(value), getattr(block, name)):
             setattr(block, name, value)
-
-
-def _place_closely(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene) -> None:
-    """`place`, and once more from there if what carries the camera is told by its pose, which may have been far away."""
-    for _ in range(2 if pose.is_told_by_its_pose(camera_object) else 1):
-        place(camera_object, pinhole, scene, datablocks.depsgraph_of(scene))
-
-
-def _check_storable(camera_object: bpy.types.Object, **numbers: tuple[float, ...]) -> None:
-    for name, values in numbers.items():
-        if not all(abs(value) <= _LARGEST_FLOAT32 for value in values):
-            largest = max(values, key=abs)
-            raise InputError(
-                f"the {name} of camera {camera_object.name!r} needs {largest:g}, beyond Blender's numbers: choose another"
-            )
 
 
 def check(camera_object: bpy.types.Object, wanted: Pinhole, scene: bpy.types.Scene) -> list[str]:
@@ -208,7 +200,7 @@ def read(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
             f"camera {camera_object.name!r} takes no part in scene {scene.name!r}: "
             "enable it and its collection in the viewport, or make it the scene's camera"
         )
-    matrix = pose.float64(evaluated.matrix_world)
+    matrix = rotation.float64(evaluated.matrix_world)
     sizes = np.linalg.norm(matrix[:3, :3], axis=0)
     if not np.isfinite(matrix).all() or not sizes.all():
         raise pose.no_size(camera_object)
@@ -222,7 +214,7 @@ def read(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
     eye = matrix[:3, 3]
     # As far away as the eye's largest coordinate: then eye − reach · w loses none of w's digits.
     reach = 2.0 ** math.ceil(math.log2(max(1.0, np.abs(eye).max())))
-    plane = intrinsics.view_plane(datablocks.camera_data_of(evaluated.data), datablocks.frame_of(scene))
+    plane = intrinsics.view_plane(datablocks.camera_data_of(evaluated), datablocks.frame_of(scene))
     return Pinhole(
         tuple(eye.tolist()),
         tuple((eye - reach * w).tolist()),
@@ -254,12 +246,13 @@ def stated(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole |
 
 def _level(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> tuple[CameraValues, Pinhole]:
     """The values, and the Pinhole that they ask for, whatever the roll is."""
-    datablocks.check_perspective(camera_object)
     evaluated = camera_object if camera_object.is_evaluated else camera_object.evaluated_get(datablocks.depsgraph_of(scene))
     frame = datablocks.frame_of(scene)
-    plane = intrinsics.view_plane(datablocks.camera_data_of(evaluated.data), frame)
-    values = targets.values(camera_object)
-    return values, values.pinhole(plane, frame, camera_object.data.sensor_fit, pose.mirrors(evaluated.matrix_world))
+    plane = intrinsics.view_plane(datablocks.camera_data_of(evaluated), frame)
+    values = storage.load(camera_object)
+    if values.follows:
+        values = targets.followed(camera_object, values)
+    return values, values.pinhole(plane, frame, camera_object.data.sensor_fit, rotation.mirrors(evaluated.matrix_world))
 
 
 def _stood_at(camera_object: bpy.types.Object, values: CameraValues, scene: bpy.types.Scene) -> Pinhole | None:
@@ -346,7 +339,7 @@ def simplest_up(eye: tuple, look_at: tuple, v: Array) -> Triple:
 def _focus_distance(camera_object: bpy.types.Object, pinhole: Pinhole, depsgraph: bpy.types.Depsgraph) -> float:
     focus = camera_object.data.dof
     if focus.focus_object:
-        place = pose.float64(focus.focus_object.evaluated_get(depsgraph).matrix_world.translation)
+        place = rotation.float64(focus.focus_object.evaluated_get(depsgraph).matrix_world.translation)
         if np.isfinite(place).all() and (depth := float(pinhole.project(place)[2])) > 0:
             return depth
     return focus.focus_distance if focus.focus_distance > 0 else 10.0  # which nan is not

@@ -6,6 +6,7 @@ import bpy
 
 from .. import intrinsics
 from ..errors import InputError
+from ..terminal import plain
 from . import versions
 
 # Metres: what is shorter, Blender calls zero.
@@ -15,13 +16,15 @@ _KINDS = {"ORTHO": "orthographic", "PANO": "panoramic", "CUSTOM": "a custom came
 
 def check_perspective(camera_object: bpy.types.Object) -> None:
     """Raise InputError, by name, if the object is no perspective camera."""
+    if camera_object.type != "CAMERA" or camera_object.data.type != "PERSP":
+        raise _no_perspective(camera_object)
+
+
+def _no_perspective(camera_object: bpy.types.Object) -> InputError:
     if camera_object.type != "CAMERA":
-        raise InputError(f"object {camera_object.name!r} is no camera: choose a camera")
-    kind = camera_object.data.type
-    if kind != "PERSP":
-        raise InputError(
-            f"camera {camera_object.name!r} is {_KINDS.get(kind, kind)}, no pinhole: set its lens type to Perspective"
-        )
+        return InputError(f"object {camera_object.name!r} is no camera: choose a camera")
+    kind = _KINDS.get(camera_object.data.type, camera_object.data.type)
+    return InputError(f"camera {camera_object.name!r} is {kind}, no pinhole: set its lens type to Perspective")
 
 
 def is_animated(camera_object: bpy.types.Object) -> bool:
@@ -45,14 +48,17 @@ def frame_of(scene: bpy.types.Scene) -> intrinsics.Frame:
     )
 
 
-def camera_data_of(camera: bpy.types.Camera) -> intrinsics.CameraData:
-    """The intrinsics that Blender stores, as plain numbers.
+def camera_data_of(camera_object: bpy.types.Object) -> intrinsics.CameraData:
+    """The intrinsics of a camera as plain numbers; those of the evaluated object are what Cycles renders.
 
     Raises
     ------
     InputError
-        if a script has stored what is no number of a camera.
+        if the object is no perspective camera, or if a script has stored what is no number of a camera.
     """
+    if camera_object.type != "CAMERA" or camera_object.data.type != "PERSP":
+        raise _no_perspective(camera_object)
+    camera = camera_object.data
     try:
         return intrinsics.CameraData(
             camera.lens, camera.sensor_width, camera.sensor_height, camera.sensor_fit, camera.shift_x, camera.shift_y
@@ -63,13 +69,7 @@ def camera_data_of(camera: bpy.types.Camera) -> intrinsics.CameraData:
 
 def own_sensor(camera: bpy.types.Camera) -> tuple[float, float]:
     """The artist's sensor (width, height) in mm: what it was before `place` grew it, unless the artist has changed it since."""
-    current = (camera.sensor_width, camera.sensor_height)
-    before = tuple(camera.virtual_pinhole_sensor)
-    if not all(before):
-        return current
-    growth = current[0] / before[0]
-    grown_by_place = math.frexp(growth)[0] == 0.5 and growth > 1 and growth == current[1] / before[1]
-    return before if grown_by_place else current
+    return intrinsics.own_sensor((camera.sensor_width, camera.sensor_height), tuple(camera.virtual_pinhole_sensor))
 
 
 def length(value: float, scene: bpy.types.Scene, digits: int = 6) -> str:
@@ -134,6 +134,6 @@ def beyond_pinhole(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> l
 
 
 def sentence(error: InputError) -> str:
-    """An error's message with a capital, as it stands alone in a panel or a report."""
-    message = str(error)
+    """An error's message with a capital, plain, as it stands alone in a panel or a report, which Blender prints as well."""
+    message = plain(str(error))
     return message[:1].upper() + message[1:]

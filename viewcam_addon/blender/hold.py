@@ -25,7 +25,6 @@ from .. import roll as rolls
 from ..camera_values import HOLD, CameraValues
 from ..pinhole import Pinhole
 from . import storage, versions
-from .datablocks import is_animated
 from .targets import POINTS, target_of
 
 Array = NDArray[np.float64]
@@ -50,11 +49,6 @@ def roll(camera_object: bpy.types.Object, values: CameraValues, scene: bpy.types
     if not curves or obstacle(camera_object.original):
         return values.held_roll
     return values.held_roll + _carried_since_first_frame(values, curves, scene)
-
-
-def is_written_by_edits(camera_object: bpy.types.Object, values: CameraValues) -> bool:
-    """Whether an edit of the values carries the roll along and writes it; in an animation the curves say what it is."""
-    return values.pole == HOLD and not is_animated(camera_object)
 
 
 def obstacle(camera_object: bpy.types.Object) -> str | None:

@@ -10,7 +10,7 @@ make the right matrix: 1.9e-7 rad at most in every mode. Rejected: Blender's flo
 rounding differs from one processor to another).
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import bpy
 import numpy as np
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from .. import rotation
 from ..errors import InputError
-from ..pinhole import Pinhole
+from ..rotation import Channels, float64
 
 Array = NDArray[np.float64]
 
@@ -26,58 +26,40 @@ Array = NDArray[np.float64]
 # shear.
 LARGEST_SKEW = 32 * 4 * 2.0**-24
 
-_NO_PARENT = np.eye(4)
-
-
-def float64(numbers: Iterable) -> Array:
-    """The numbers of a Blender matrix or vector. From 5.0 on NumPy takes these for float32, and would compute in it."""
-    return np.array(numbers, dtype=np.float64)
-
-
-def channels(
-    camera_object: bpy.types.Object, pinhole: Pinhole, depsgraph: bpy.types.Depsgraph
-) -> tuple[tuple[float, ...], Array, tuple[float, ...]]:
-    """Location, (3, 3) rotation and scale that bring the camera to the pose, relative to its parent and its delta transform."""
-    parent = parent_matrix(camera_object, depsgraph)
-    is_free = np.array_equal(parent, _NO_PARENT)  # as most cameras are, which need no linear algebra
-    if not is_free and not _has_inverse(parent):
-        raise no_size(camera_object)
-    u, v, w = pinhole.basis()
-    wanted = np.column_stack([-u if pinhole.mirrored else u, v, w])
-    scale, signs = float64(camera_object.scale), _signs(camera_object)
-    local = wanted if is_free else np.linalg.solve(parent[:3, :3], wanted)
-    if (pinhole.mirrored if is_free else np.linalg.det(local) < 0) != (signs.prod() < 0):
-        scale[0], signs[0] = -scale[0], -signs[0]
-    turn = local * signs if is_free else rotation.nearest(local / np.linalg.norm(local, axis=0) * signs)
-    eye = np.array(pinhole.eye)
-    location = eye if is_free else np.linalg.solve(parent[:3, :3], eye - parent[:3, 3])
-    location = location - float64(camera_object.delta_location)
-    return tuple(location.tolist()), _delta_rotation(camera_object).T @ turn, tuple(scale.tolist())
-
-
-def state(camera_object: bpy.types.Object) -> tuple:
-    """All that says where the camera stands relative to what carries it."""
-    block = camera_object
-    triples = (block.location, block.scale, block.delta_location, block.delta_scale, block.delta_rotation_euler)
-    turns = (block.rotation_euler, block.rotation_quaternion, block.rotation_axis_angle, block.delta_rotation_quaternion)
-    return block.rotation_mode, *map(tuple, triples), *map(tuple, turns)
+# The property that rotates an object in the mode it has, and that of the rotation which Blender applies after it.
+_ROTATIONS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
+_DELTA_ROTATIONS = {"QUATERNION": "delta_rotation_quaternion", "AXIS_ANGLE": None}
 
 
 def rotation_channel(camera_object: bpy.types.Object) -> str:
     """The property that rotates the object in the mode it has."""
-    names = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
-    return names.get(camera_object.rotation_mode, "rotation_euler")
+    return _ROTATIONS.get(camera_object.rotation_mode, "rotation_euler")
+
+
+def channels_of(block: bpy.types.Object) -> Channels:
+    """What an object's transform holds."""
+    mode = block.rotation_mode
+    delta = _DELTA_ROTATIONS.get(mode, "delta_rotation_euler")
+    return Channels(
+        mode,
+        tuple(block.location),
+        tuple(getattr(block, _ROTATIONS.get(mode, "rotation_euler"))),
+        tuple(block.scale),
+        tuple(block.delta_location),
+        tuple(getattr(block, delta)) if delta else (),
+        tuple(block.delta_scale),
+    )
 
 
 def set_rotation(camera_object: bpy.types.Object, turn: Array, before: Sequence[float] | None = None) -> None:
-    """Rotate the camera, in its own mode, by the (3, 3) rotation that `channels` gives; its scale is set already.
+    """Rotate the camera, in its own mode, by the (3, 3) rotation that `Channels.bringing_to` gives; its scale is set already.
 
     before : the numbers of the frame before, to be as near to as the rotation allows.
     """
-    name = rotation_channel(camera_object)
-    wanted = _delta_rotation(camera_object) @ turn * _signs(camera_object)
-    numbers = rotation.numbers(turn, camera_object.rotation_mode, before)
-    candidates = rotation.neighbours(numbers)
+    channels = channels_of(camera_object)
+    name = _ROTATIONS.get(channels.mode, "rotation_euler")
+    wanted = channels.delta @ turn * channels.signs
+    candidates = rotation.neighbours(rotation.numbers(turn, channels.mode, before))
     made = []
     for candidate in candidates:
         setattr(camera_object, name, candidate)
@@ -88,27 +70,6 @@ def set_rotation(camera_object: bpy.types.Object, turn: Array, before: Sequence[
     setattr(camera_object, name, candidates[np.argmin(errors)])
 
 
-def _signs(camera_object: bpy.types.Object) -> Array:
-    """(3,): −1 for each axis that the camera's own scale turns round."""
-    return np.where(_full_scale(camera_object) < 0, -1.0, 1.0)
-
-
-def _full_scale(block: bpy.types.Object) -> Array:
-    """(3,): an object's own scale, delta included."""
-    return float64(block.scale) * float64(block.delta_scale)
-
-
-def _delta_rotation(camera_object: bpy.types.Object) -> Array:
-    """The (3, 3) rotation that Blender applies after the object's own; for the mode AXIS_ANGLE Blender shows none."""
-    mode = camera_object.rotation_mode
-    if mode == "AXIS_ANGLE":
-        return np.eye(3)
-    numbers = camera_object.delta_rotation_quaternion if mode == "QUATERNION" else camera_object.delta_rotation_euler
-    if not np.isfinite(numbers).all():
-        raise no_size(camera_object)
-    return rotation.from_quaternion(numbers) if mode == "QUATERNION" else rotation.from_euler(numbers, mode)
-
-
 def parent_matrix(camera_object: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Array:
     """(4, 4) float64: the matrix that takes the camera's own location, rotation and scale to world space.
 
@@ -117,22 +78,28 @@ def parent_matrix(camera_object: bpy.types.Object, depsgraph: bpy.types.Depsgrap
     Raises
     ------
     InputError
-        if it can't be told, since the camera is scaled to zero.
+        if it is singular, or can't be told, since the camera or what carries it is scaled to zero.
     """
     parent = camera_object.parent
     inverse = float64(camera_object.matrix_parent_inverse)
     if not is_told_by_its_pose(camera_object):
-        return float64(parent.evaluated_get(depsgraph).matrix_world) @ inverse if parent else _NO_PARENT
+        matrix = float64(parent.evaluated_get(depsgraph).matrix_world) @ inverse if parent else rotation.IDENTITY
+        if not rotation.has_inverse(matrix):
+            raise no_size(camera_object)
+        return matrix
     evaluated = camera_object.evaluated_get(depsgraph)
     if is_carried_by_constraints(camera_object):
         own = float64(evaluated.matrix_basis)
-    elif not _has_inverse(inverse):
+    elif not rotation.has_inverse(inverse):
         raise no_size(camera_object)
     else:  # Blender's local matrix is relative to the bone, the vertices or the place on the path
         own = np.linalg.inv(inverse) @ float64(evaluated.matrix_local)
-    if not _has_inverse(own):
+    if not rotation.has_inverse(own):
         raise no_size(camera_object)
-    return float64(evaluated.matrix_world) @ np.linalg.inv(own)
+    matrix = float64(evaluated.matrix_world) @ np.linalg.inv(own)
+    if not rotation.has_inverse(matrix):
+        raise no_size(camera_object)
+    return matrix
 
 
 def is_told_by_its_pose(camera_object: bpy.types.Object) -> bool:
@@ -143,16 +110,6 @@ def is_told_by_its_pose(camera_object: bpy.types.Object) -> bool:
     parent = camera_object.parent
     is_plain = parent is None or (camera_object.parent_type == "OBJECT" and parent.type != "CURVE")
     return not is_plain or is_carried_by_constraints(camera_object)
-
-
-def _has_inverse(matrix: Array) -> bool:
-    return bool(np.isfinite(matrix).all() and np.linalg.det(matrix) != 0)
-
-
-def mirrors(matrix: Iterable) -> bool:
-    """Whether a (4, 4) matrix of Blender's mirrors; one that is not finite does nothing."""
-    matrix = float64(matrix)
-    return bool(np.isfinite(matrix).all() and np.linalg.det(matrix[:3, :3]) < 0)
 
 
 def active_constraints(block: bpy.types.Object) -> Iterator[bpy.types.Constraint]:
@@ -188,7 +145,7 @@ def no_size(camera_object: bpy.types.Object) -> InputError:
             return InputError(
                 f"the transform of {block.name!r} holds a number that is not finite: clear it, with its deltas and parent"
             )
-        if not all(_full_scale(block)):
+        if not all(channels_of(block).full_scale):
             who = "" if block == camera_object else f" by {block.name!r} above it"
             return InputError(f"camera {camera_object.name!r} is scaled to zero{who}: give {block.name!r} a scale of 1")
     return InputError(f"camera {camera_object.name!r} is scaled to zero, or beyond all numbers: set its scale to 1")
@@ -202,7 +159,7 @@ def who_shears(camera_object: bpy.types.Object) -> str:
             bone = parent.pose.bones.get(child.parent_bone)
             if bone and not _is_uniform(bone.scale):
                 return f"the bone {bone.name!r} above it is scaled non-uniformly: give the bone a uniform scale"
-        if parent and not _is_uniform(_full_scale(parent)):
+        if parent and not _is_uniform(channels_of(parent).full_scale):
             relation = "parent" if child == camera_object else "ancestor"
             return f"its {relation} {parent.name!r} is scaled non-uniformly: apply the scale of {parent.name!r}"
     for constraint in active_constraints(camera_object):

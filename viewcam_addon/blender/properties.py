@@ -26,10 +26,10 @@ from . import datablocks, storage, targets
 
 def _on_enabled(group: "VirtualPinhole", context: bpy.types.Context) -> None:
     """What nobody has stated yet follows the camera, so that enabling for the first time moves nothing."""
-    if storage.is_being_written() or not group.enabled:
+    if storage.is_storing or not group.enabled:
         return
-    keep = frozenset(name for name in storage.EXACT if group.is_property_set(name))
-    if keep != frozenset(storage.EXACT):
+    keep = frozenset(filter(group.is_property_set, storage.EXACT))
+    if keep != storage.EXACT:
         with storage.without_callbacks():
             group.enabled = False  # else a target would move the camera before it is read
         with contextlib.suppress(InputError):
@@ -41,7 +41,7 @@ def _on_enabled(group: "VirtualPinhole", context: bpy.types.Context) -> None:
 
 
 def _on_edited(group: "VirtualPinhole", _context: bpy.types.Context) -> None:
-    if storage.is_being_written() or not group.enabled:
+    if storage.is_storing or not group.enabled:
         return
     with contextlib.suppress(InputError):  # the panel finds the same error and shows it
         cameras.follow(group.id_data, datablocks.scene_of(group.id_data))
@@ -49,7 +49,7 @@ def _on_edited(group: "VirtualPinhole", _context: bpy.types.Context) -> None:
 
 def _on_distance(group: "VirtualPinhole", context: bpy.types.Context) -> None:
     """Who states a distance means the pixels of the picture as it is now."""
-    if not storage.is_being_written():
+    if not storage.is_storing:
         values = storage.load(group.id_data)
         if not storage.is_counted_in_earlier(group.id_data, values):
             _count_in_present_picture(group)
@@ -57,7 +57,7 @@ def _on_distance(group: "VirtualPinhole", context: bpy.types.Context) -> None:
 
 
 def _on_keeps(group: "VirtualPinhole", context: bpy.types.Context) -> None:
-    if not storage.is_being_written():
+    if not storage.is_storing:
         _count_in_present_picture(group)
     _on_edited(group, context)
 
@@ -76,7 +76,7 @@ def _on_pole(group: "VirtualPinhole", context: bpy.types.Context) -> None:
 
 
 def _on_target(group: "VirtualPinhole", context: bpy.types.Context) -> None:
-    if storage.is_being_written():
+    if storage.is_storing:
         return
     targets.connect(group.id_data)
     targets.mirror(group.id_data, group.id_data)

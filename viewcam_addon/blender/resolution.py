@@ -14,7 +14,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import bpy
-from bpy.app.handlers import persistent
 
 from .. import intrinsics
 from ..camera_values import FIELD_OF_VIEW, PIXELS, without_border
@@ -26,12 +25,6 @@ from . import datablocks, storage
 # scene after undo and in another file. Without it every change of a scene's settings would look at every object.
 _seen: dict[str, tuple] = {}
 _is_paused = False
-
-
-@persistent
-def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    if depsgraph.id_type_updated("SCENE") and not _is_paused:
-        follow(scene)
 
 
 @contextlib.contextmanager
@@ -52,6 +45,8 @@ def lens_kept(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterat
 
 def follow(scene: bpy.types.Scene) -> None:
     """Set the lenses of the scene's cameras for its picture, if it is another one than last time."""
+    if _is_paused:
+        return
     with contextlib.suppress(InputError):  # no picture at all: the panel says so
         frame = datablocks.frame_of(scene)
         now = (scene.as_pointer(), without_border(frame))
@@ -63,10 +58,9 @@ def follow(scene: bpy.types.Scene) -> None:
                     storage.settle(camera_object, storage.load(camera_object), frame)
 
 
-@persistent
-def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
+def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """In a render nothing but the lens is touched: the values are counted anew when the scene is next looked at."""
-    if depsgraph is None or depsgraph.mode != "RENDER" or _is_paused:
+    if depsgraph.mode != "RENDER" or _is_paused:
         return
     with contextlib.suppress(InputError):
         for camera_object in _set_for_another(scene, datablocks.frame_of(scene)):
@@ -87,12 +81,5 @@ def _set_for_another(scene: bpy.types.Scene, frame: intrinsics.Frame) -> list[bp
     ]
 
 
-def register() -> None:
-    bpy.app.handlers.depsgraph_update_post.append(on_update)
-    bpy.app.handlers.frame_change_post.append(on_frame_change)
-
-
 def unregister() -> None:
-    bpy.app.handlers.frame_change_post.remove(on_frame_change)
-    bpy.app.handlers.depsgraph_update_post.remove(on_update)
     _seen.clear()

@@ -17,31 +17,26 @@ import bpy
 import numpy as np
 
 from .. import checks
-from ..camera_values import FIELD_OF_VIEW, CameraValues, without_border
+from ..camera_values import FIELD_OF_VIEW, HOLD, CameraValues, without_border
 from ..errors import InputError
 from ..intrinsics import Frame
 from . import datablocks, versions
 
-EXACT = ("eye", "look_at", "up", "distance")  # of these `exact` has the digits
+EXACT = frozenset({"eye", "look_at", "up", "distance"})  # of these `exact` has the digits
 # What is noted of a camera once it has been set.
 _NOTED = ("distance", "counted_in", "set_for", "view_when_set", "held_roll")
-_stating = False
+is_storing = False  # else the artist or a script sets a property, and the camera moves
 
 
 @contextlib.contextmanager
 def without_callbacks() -> Iterator[None]:
-    """Values may be written in here without moving the camera."""
-    global _stating
-    before, _stating = _stating, True
+    """Properties may be set in here without moving the camera."""
+    global is_storing
+    before, is_storing = is_storing, True
     try:
         yield
     finally:
-        _stating = before
-
-
-def is_being_written() -> bool:
-    """Whether a property is set by `store`, and not by the artist or a script."""
-    return _stating
+        is_storing = before
 
 
 def is_enabled(camera_object: bpy.types.Object) -> bool:
@@ -56,11 +51,11 @@ def load(camera_object: bpy.types.Object) -> CameraValues:
     """
     group = camera_object.virtual_pinhole
     exact, shown = _parsed(group.exact, 10), (*group.eye, *group.look_at, *group.up, group.distance)
-    numbers, is_exact = shown, False
+    numbers = shown
     if exact:
         numbers = tuple([full if short == value else value for full, short, value in zip(*exact, shown, strict=True)])
-        is_exact = numbers == exact[0] and not (group.eye_target or group.look_at_target)
-    when_set = _parsed(group.when_set, 9)
+    follows = tuple(name for name in ("eye", "look_at") if getattr(group, f"{name}_target"))
+    when_set = _parsed(group.when_set, 9) if group.pole == HOLD else None  # nobody else asks
     return CameraValues(
         eye=numbers[0:3],
         look_at=numbers[3:6],
@@ -75,32 +70,36 @@ def load(camera_object: bpy.types.Object) -> CameraValues:
         hold_within=group.hold_within,
         held_roll=group.held_roll,
         view_when_set=(when_set[0][0:3], when_set[0][3:6], when_set[0][6:9]) if when_set else None,
-        precision=2.0**-53 if is_exact else 2.0**-24,
+        precision=2.0**-53 if exact and numbers == exact[0] and not follows else 2.0**-24,
+        follows=follows,
     )
 
 
 def store(camera_object: bpy.types.Object, values: CameraValues, *names: str) -> None:
     """Write some of the values, by their names, and move nothing. Eye, look-at, up and distance are kept in float64."""
-    group = camera_object.virtual_pinhole
-    with without_callbacks():
+    global is_storing
+    group, before, is_storing = camera_object.virtual_pinhole, is_storing, True
+    try:
         for name in names:
             value = getattr(values, name)
             if name == "view_when_set":
-                group.when_set = _text(*value)
+                group.when_set = json.dumps([*value[0], *value[1], *value[2]])
             elif isinstance(value, Frame):
                 shape = (value.resolution_x, value.resolution_y, value.percentage, value.pixel_aspect_x, value.pixel_aspect_y)
                 setattr(group, "picture" if name == "set_for" else name, shape)
             else:
                 setattr(group, name, value)
-        if any(name in EXACT for name in names):
-            group.exact = _text(values.eye, values.look_at, values.up, (values.distance,))
+        if not EXACT.isdisjoint(names):
+            group.exact = json.dumps([*values.eye, *values.look_at, *values.up, values.distance])
+    finally:
+        is_storing = before
 
 
 def settle(camera_object: bpy.types.Object, values: CameraValues, frame: Frame) -> None:
     """Take note that the camera has been set by these values for the picture of `frame`; the distance now counts its pixels."""
     before = load(camera_object)
     after = replace(before, view_when_set=values.view_when_set, held_roll=values.held_roll, set_for=without_border(frame))
-    if not is_counted_in_earlier(camera_object, before):
+    if before.keeps != FIELD_OF_VIEW or not is_counted_in_earlier(camera_object, before):
         after = after.counted_anew(frame, camera_object.data.sensor_fit)
     store(camera_object, after, *(name for name in _NOTED if getattr(after, name) != getattr(before, name)))
 
@@ -131,10 +130,6 @@ def restored(camera_object: bpy.types.Object, *names: str) -> Iterator[None]:
         with without_callbacks():
             for name, value in before.items():
                 setattr(group, name, value)
-
-
-def _text(*vectors: tuple[float, ...]) -> str:
-    return json.dumps([number for vector in vectors for number in vector])
 
 
 @functools.lru_cache(maxsize=256)

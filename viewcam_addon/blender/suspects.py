@@ -6,7 +6,6 @@ import bpy
 
 from . import datablocks, pose, storage, versions
 from .findings import APPLY_AGAIN, CENTRE, DISTANCE, EYE, LENS, POSE, REMEDY, VIEW, Suspect
-from .hold import is_animated
 
 
 def suspects(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[Suspect]:
@@ -79,7 +78,7 @@ def _animation(block: bpy.types.ID) -> Iterator[Suspect]:
 
 def _ancestors(camera_object: bpy.types.Object) -> Iterator[Suspect]:
     """Who carries the camera away. Where the four values are animated they are set anew at every frame, and nobody can."""
-    if is_animated(camera_object):
+    if datablocks.is_animated(camera_object):
         return
     remedy = "animate the four values instead, or disable the Virtual Pinhole"
     for ancestor in pose.ancestors(camera_object):

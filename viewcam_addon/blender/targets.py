@@ -29,9 +29,13 @@ _HOOK = "virtual_pinhole.followed"
 
 def values(camera_object: bpy.types.Object) -> CameraValues:
     """The values of a camera, with a followed point where its target is. The evaluated object may be given as well."""
-    found = storage.load(camera_object)
-    followed = {point: place(camera_object, point) for point in POINTS if target_of(camera_object, point)}
-    return replace(found, **{point: at for point, at in followed.items() if at}) if followed else found
+    return followed(camera_object, storage.load(camera_object))
+
+
+def followed(camera_object: bpy.types.Object, stored: CameraValues) -> CameraValues:
+    """Stored values of a camera with a followed point where its target is."""
+    places = {point: place(camera_object, point) for point in stored.follows}
+    return replace(stored, **{point: at for point, at in places.items() if at})
 
 
 def target_of(camera_object: bpy.types.Object, point: str) -> bpy.types.Object | None:

@@ -33,7 +33,26 @@ from types import ModuleType
 from .. import checks
 from ..errors import InputError
 from ..files import written_whole
-from . import bop, colmap, colmap_binary, gltf, opencv, ros, sidecar, transforms, usd
+from . import (
+    arkit,
+    bop,
+    bundler,
+    colmap,
+    colmap_binary,
+    fspy,
+    gltf,
+    llff,
+    meshroom,
+    metashape,
+    opencv,
+    openmvg,
+    realitycapture,
+    ros,
+    sidecar,
+    trajectories,
+    transforms,
+    usd,
+)
 from .axes import moved, moved_back
 from .camera import ANGLES, AXES, PIXELS, Camera, Options, choose
 from .source import Source
@@ -62,8 +81,17 @@ FORMATS: dict[str, ModuleType] = {
     "bop": bop,
     "gltf": gltf,
     "usd": usd,
+    "fspy": fspy,
+    "metashape": metashape,
+    "realitycapture": realitycapture,
+    "meshroom": meshroom,
+    "openmvg": openmvg,
+    "bundler": bundler,
+    "llff": llff,
+    "arkit": arkit,
     "ros": ros,
     "opencv": opencv,
+    "trajectories": trajectories,
 }
 """Name → module, in the order in which they are asked."""
 
@@ -90,8 +118,10 @@ def read(given: str | Path, *, format: str | None = None, options: Options | Non
     """
     options = options or Options()
     source = Source(given)
-    name = format or recognised(source)
-    cameras = _module(name, "read").read(source, options)
+    module = _module(format or recognised(source), "read")
+    if format and not module.recognises(source):
+        raise InputError(f"{source.name} is not {module.TITLE} by its content: leave the format out")
+    cameras = module.read(source, options)
     if not cameras:
         raise InputError(f"{source.name} holds no camera: give another file")
     return [_unmirrored(moved(camera, options), options) for camera in cameras]

@@ -114,13 +114,13 @@ class Options:
         if self.view_plane:
             return self.view_plane
         if self.base:
-            return plane_of(self.base)
+            return self.base.plane
         raise InputError(f"{what} says where the camera is but not how it sees: give --size and --distance (in pixels)")
 
 
 def plane_of(pinhole: Pinhole) -> ViewPlane:
     """The view plane of a pinhole."""
-    return ViewPlane(pinhole.distance, pinhole.principal_point, pinhole.width, pinhole.height)
+    return pinhole.plane
 
 
 def choose(cameras: list[Camera], name: str | None = None) -> Camera:

@@ -92,7 +92,7 @@ class _Worlds:
     def __init__(self, nodes: list[Record]) -> None:
         self._nodes, self._parents, self._known = nodes, {}, {}
         for index, node in enumerate(nodes):
-            for child in node.values.get("children") or []:
+            for child in _list(node.get("children")):
                 if not isinstance(child, int) or not 0 <= child < len(nodes) or child in self._parents:
                     raise InputError(
                         f"{node.place} has the child {checks.shown(child)}, which is none or another's: correct it"
@@ -136,16 +136,17 @@ def _index(node: Record, key: str, count: int) -> int:
 
 
 def _moving(document: Record) -> set[int]:
-    animations = document.values.get("animations")
-    channels = [
-        channel
-        for animation in (animations if isinstance(animations, list) else ())
-        if isinstance(animation, dict)
-        for channel in (animation.get("channels") or ())
-        if isinstance(channel, dict)
-    ]
-    targets = [channel.get("target") for channel in channels]
-    return {target["node"] for target in targets if isinstance(target, dict) and isinstance(target.get("node"), int)}
+    channels = [channel for animation in _list(document.get("animations")) for channel in _list(_key(animation, "channels"))]
+    nodes = [_key(_key(channel, "target"), "node") for channel in channels]
+    return {node for node in nodes if isinstance(node, int)}
+
+
+def _list(value: object) -> list:
+    return value if isinstance(value, list) else []
+
+
+def _key(value: object, key: str) -> object:
+    return value.get(key) if isinstance(value, dict) else None
 
 
 def _camera(name: str, camera: Record, matrix: np.ndarray, options: Options) -> Camera:

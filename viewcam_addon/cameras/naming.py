@@ -55,8 +55,13 @@ def distinct(paths: Sequence[str]) -> list[str]:
 
 
 def image_of(camera: Camera) -> str:
-    """The path by which a dataset names the camera's picture."""
-    return camera.image or f"{camera.name}.png"
+    """The path by which a dataset names the camera's picture: the file's own inside its folder, or its name alone."""
+    if camera.image is None:
+        return f"{camera.name}.png"
+    path = camera.image
+    while path.startswith("./"):
+        path = path[2:]
+    return path.rpartition("/")[2] if path.startswith("/") or ".." in path.split("/") or ":" in path else path
 
 
 def check_image(file: object) -> None:

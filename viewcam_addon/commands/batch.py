@@ -12,6 +12,7 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from .. import cameras
 from .. import shots as lists
 from ..batch import cluster, dataset, one, served
 from ..batch import run as running
@@ -20,8 +21,9 @@ from ..batch.interruption import Interruption
 from ..batch.summary import Summary
 from ..errors import InputError
 from ..shots import Shot, ShotsError
-from ..terminal import silent_libraries
+from ..terminal import say, silent_libraries
 from . import Result
+from .camera import options_of
 from .surroundings import blender_room
 
 _MOST_NAMED = 5
@@ -50,7 +52,7 @@ def run(options: argparse.Namespace) -> Result:
             machines = stack.enter_context(cluster.opened(options.scheduler or None, options.workers, program))
         folder = Folder(options.out, options.shard.strip().replace("/", "-of-") if options.shard else "")
         if _on_cluster(options):
-            about = (job.made_from, options.seed, options.threads, options.check)
+            about = (job.made_from, options.seed, options.threads, options.check, options.trust)
             work = machines.work(blend, folder, job.settings, *about)
         else:
             work = one.in_turn(folder, renderer, job.settings, options.check)
@@ -59,7 +61,7 @@ def run(options: argparse.Namespace) -> Result:
         words = dataset.write(folder, job.all_shots, job.settings, options.transforms) if options.transforms else ""
     _tell(options, summary, folder)
     if words:
-        print(words)
+        say(words)
     return summary.exit_status, summary.to_json()
 
 
@@ -67,7 +69,7 @@ def _refuse_contradictions(options: argparse.Namespace) -> None:
     given = {"SHOTS": options.shots, "--orbit": options.orbit, "--frames": options.frames, "--cameras": options.cameras}
     sources = [name for name, value in given.items() if value is not None]
     if not sources:
-        raise InputError("which shots is not said: give a list (CSV, JSON or JSON Lines), --orbit, --frames or --cameras")
+        raise InputError("which shots is not said: give a list, cameras of any program, --orbit, --frames or --cameras")
     if len(sources) > 1:
         raise InputError(f"{' and '.join(sources)} say each which shots: give one of them")
     if options.camera is not None and sources[0] in ("SHOTS", "--cameras"):
@@ -88,8 +90,8 @@ def _renderer(options: argparse.Namespace) -> contextlib.AbstractContextManager:
     The bpy module puts folders on sys.path in which a worker's children, who get that path, would find half a bpy.
     """
     if options.blend is not None and (os.environ.get(served.BLENDER) or _on_cluster(options)):
-        return served.ServedRenderer(options.blend, options.seed, options.threads)
-    return blender_room("batch.renderer").BlenderRenderer(options.blend, options.seed, options.threads)
+        return served.ServedRenderer(options.blend, options.seed, options.threads, options.trust)
+    return blender_room("batch.renderer").BlenderRenderer(options.blend, options.seed, options.threads, options.trust)
 
 
 def _job(options: argparse.Namespace, renderer: Any) -> _Job:
@@ -109,7 +111,12 @@ def _job(options: argparse.Namespace, renderer: Any) -> _Job:
 
 def _shots(options: argparse.Namespace, renderer: Any) -> list[Shot]:
     if options.shots is not None:
-        return lists.read(options.shots, renderer.cameras)
+        if lists.is_list(options.shots):
+            return lists.read(options.shots, renderer.cameras)
+        found = cameras.read(options.shots, options=options_of(options))
+        for note in dict.fromkeys(note for camera in found for note in camera.notes):
+            options.events.tell("note", command=options.command, text=note)
+        return lists.from_pinholes((camera.name, camera.pinhole) for camera in found)
     if options.cameras is not None:
         return lists.from_cameras(options.cameras, renderer.cameras, spaces=not options.transforms)
     if options.orbit is not None:
@@ -138,7 +145,7 @@ def _tell(options: argparse.Namespace, summary: Summary, folder: Folder) -> None
         options.events.tell("error", command=options.command, text=f"{what}: the same command with --resume renders them")
         return
     kept = f", {summary.kept} of them kept" if summary.kept else ""
-    print(f"{shots}{kept}, in {summary.seconds:.1f} s: {folder.contact_sheet}")
+    say(f"{shots}{kept}, in {summary.seconds:.1f} s: {folder.contact_sheet}")
     if unlike := [shot["name"] for shot in summary.shots if shot.get("passed") is False]:
         named = ", ".join(unlike[:_MOST_NAMED]) + (", …" if len(unlike) > _MOST_NAMED else "")
-        print(f"{len(unlike)} are not what the reference tracer sees: {named}; {folder.summary} says how")
+        say(f"{len(unlike)} are not what the reference tracer sees: {named}; {folder.summary} says how")

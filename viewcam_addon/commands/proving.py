@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..terminal import silent_libraries
+from ..terminal import say, silent_libraries
 from ..tracer.scene.film import MOST_SAMPLES, seeds
 from . import Result
 from .progress import Progress
@@ -30,7 +30,7 @@ def export(options: argparse.Namespace) -> Result:
     with silent_libraries():
         scene = blender_room("rendering.job").export(_request(options))
     scene_file.write(scene, options.scene)
-    print(*_ledger_lines(scene.ledger), sep="\n")
+    say(*_ledger_lines(scene.ledger))
     result = {"scene": str(options.scene), "ledger": _ledger_json(scene.ledger)}
     return 0, result | (_told_level(scene) if options.level != "geometry" else {})
 
@@ -63,14 +63,14 @@ def render(options: argparse.Namespace) -> Result:
             attributes["error"] = str(options.error)
         attributes |= {"samples": str(samples), "seed": str(options.seed)}
     image.write(options.image, image.Image(passes, scene.camera, attributes))
-    print(f"traced {scene.camera.width} × {scene.camera.height} pixels in {seconds:.2f} s")
+    say(f"traced {scene.camera.width} × {scene.camera.height} pixels in {seconds:.2f} s")
     return 0, {"image": str(options.image), "seconds": seconds} | told
 
 
 def cycles(options: argparse.Namespace) -> Result:
     with silent_libraries():
         ledger = blender_room("rendering.job").render(_request(options), options.image)
-    print(*_ledger_lines(ledger), sep="\n")
+    say(*_ledger_lines(ledger))
     return 0, {"image": str(options.image), "ledger": _ledger_json(ledger)}
 
 
@@ -98,9 +98,9 @@ def compare(options: argparse.Namespace) -> Result:
         write_report = report.write_report
     else:
         raise InputError(f"{options.reference} has no noise that several pictures could tell: compare it with one")
-    print(*_ledger_lines(ledger), *comparison.lines(), sep="\n")
+    say(*_ledger_lines(ledger), *comparison.lines())
     if options.report:
-        print(f"report: {write_report(comparison, reference, tests, options.report, ledger, words)}")
+        say(f"report: {write_report(comparison, reference, tests, options.report, ledger, words)}")
     result = {**comparison.to_json(), "ledger": _ledger_json(ledger)}
     if options.difference:
         result["difference"] = difference.write(comparison, options.difference)
@@ -149,7 +149,7 @@ def check(options: argparse.Namespace) -> Result:
 def demo(options: argparse.Namespace) -> Result:
     if not options.blend.is_file():
         raise InputError(f"{options.blend} is not here: run the demo in a clone of the project, where its sample scenes are")
-    print(f"{options.blend.name}: a camera given by four values, rendered by Cycles and by the reference tracer")
+    say(f"{options.blend.name}: a camera given by four values, rendered by Cycles and by the reference tracer")
     return check(options)
 
 
@@ -164,7 +164,7 @@ def _export_and_render(options: argparse.Namespace, scene_path: Path, image_path
     with silent_libraries():
         scene = blender_room("rendering.job").export_and_render(_request(options), image_paths)
     scene_file.write(scene, scene_path)
-    print(f"exported and rendered with Cycles in {time.perf_counter() - started:.1f} s", flush=True)
+    say(f"exported and rendered with Cycles in {time.perf_counter() - started:.1f} s")
     return _told_level(scene)["level"] if options.level == "auto" else options.level
 
 
@@ -173,7 +173,7 @@ def _told_level(scene: Any) -> dict[str, str]:
     from ..tracer.scene.levels import least_level
 
     level, reason = least_level(scene)
-    print(f"level {level} is enough. {reason}", flush=True)
+    say(f"level {level} is enough. {reason}")
     return {"level": level, "reason": reason}
 
 
@@ -190,6 +190,7 @@ def _request(options: argparse.Namespace) -> Any:
         samples=options.samples,
         seed=options.seed,
         clay=options.clay,
+        trust=options.trust,
     )
 
 

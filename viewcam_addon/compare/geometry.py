@@ -6,7 +6,7 @@ so depth, normal and UV are compared with the reference's, and indices and cover
 at this level.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..image import Image
 from ..pinhole import Pinhole
-from . import law, verdict
-from .cameras import ConversionError, Systematic, conversion_error, systematic_error
-from .far_from_home import FarFromHome, far_from_home
+from . import law
+from .cameras import conversion_error, systematic_error
+from .far_from_home import far_from_home
 from .law import Array, Seen, in_float32
 from .mismatches import (
     KINDS,
-    PIXELS_PER_UNEXPLAINED,
     Agreement,
     Mismatches,
     SurfaceAt,
@@ -31,6 +30,7 @@ from .mismatches import (
     reach_of,
 )
 from .statistics import Row, measure
+from .verdict import Comparison, allowed_unexplained
 
 # The passes that are compared with their channels (the third of UV is constant), and which of them both pictures must have.
 _CHANNELS = {"Depth": 1, "Position": 3, "Normal": 3, "UV": 2, "Object Index": 1, "Material Index": 1}
@@ -40,85 +40,6 @@ _NEEDED = ("Depth", "Position", "Object Index")
 _ASKED_OF_THE_REFERENCE = 1000
 # Passes that only the reference has: what the law is evaluated with.
 _LAW = ("Magnitude", "Facing")
-
-
-@dataclass(frozen=True, eq=False)
-class Comparison:
-    """What differs between a reference and a test picture.
-
-    pinhole : the camera of the reference. stated : the camera that was asked for, or None.
-    hits : pixels that hit something in (reference, test).
-    rows : one for each measured pass. mismatches : pixels that see another surface.
-    systematic : what is the same for all pixels, None where nothing was compared.
-    conversion : the camera's own error, None where nobody stated a camera.
-    maps : pass name to (height, width) float32, rows from the bottom: the error of each pixel in the unit of the pass's row,
-    nan
-        where it was not compared.
-    roundings : (n,) float64, the error of each compared position over what one rounding of float32 causes there.
-    far_from_home : what the distance from the origin costs, None where that is nothing to speak of.
-    origin : the point of the world from which the coordinates of both pictures are counted.
-    """
-
-    pinhole: Pinhole
-    stated: Pinhole | None
-    hits: tuple[int, int]
-    rows: tuple[Row, ...]
-    mismatches: Mismatches
-    systematic: Systematic | None
-    conversion: ConversionError | None
-    maps: dict[str, NDArray[np.float32]]
-    roundings: Array
-    far_from_home: FarFromHome | None = None
-    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-    @property
-    def pixels(self) -> int:
-        return self.pinhole.width * self.pinhole.height
-
-    @property
-    def allowed_unexplained(self) -> int:
-        """How many mismatches may stay unexplained in a picture of this size."""
-        return _allowed_unexplained(self.pinhole)
-
-    @property
-    def mismatches_ok(self) -> bool:
-        not_a_number = self.mismatches.counts()["not a number"][0]
-        return not_a_number == 0 and self.mismatches.unexplained_count <= self.allowed_unexplained
-
-    @property
-    def passed(self) -> bool:
-        """Whether the two are the same picture. False, too, where there was nothing to compare."""
-        systematic_ok = self.systematic is not None and self.systematic.ok
-        conversion_ok = self.conversion is None or self.conversion.ok
-        return systematic_ok and conversion_ok and self.mismatches_ok and all(row.ok for row in self.rows)
-
-    @property
-    def sentence(self) -> str:
-        """The verdict in one sentence."""
-        return verdict.sentence(self)
-
-    def lines(self) -> list[str]:
-        """The result for the shell: a line for each pass, and the verdict."""
-        return verdict.lines(self)
-
-    def to_json(self) -> dict:
-        """Everything but the maps, as plain JSON values."""
-        return {
-            "passed": self.passed,
-            "sentence": self.sentence,
-            "size": [self.pinhole.width, self.pinhole.height],
-            "hits": {"reference": self.hits[0], "test": self.hits[1]},
-            "passes": [row.to_json() for row in self.rows],
-            "mismatches": {
-                **self.mismatches.to_json(),
-                "allowed_unexplained": self.allowed_unexplained,
-                "ok": self.mismatches_ok,
-            },
-            "systematic": self.systematic and self.systematic.to_json(),
-            "conversion": self.conversion and self.conversion.to_json(),
-            "far_from_home": self.far_from_home and self.far_from_home.to_json(),
-            "origin": list(self.origin),
-        }
 
 
 @np.errstate(all="ignore")
@@ -161,7 +82,7 @@ def compare(
 
     compared = hit & np.isin(kinds, (-1, KINDS.index("material index"), KINDS.index("surface")))
     # What is explained, or few enough to be let pass, is no error of the passes; what is not, shows in their figures.
-    settled = mismatches.explained | (mismatches.unexplained_count <= _allowed_unexplained(pinhole))
+    settled = mismatches.explained | (mismatches.unexplained_count <= allowed_unexplained(pinhole))
     compared[mismatches.rows[settled] * pinhole.width + mismatches.columns[settled]] = False
     chosen = np.flatnonzero(compared)
     errors = agreement.at(chosen).errors(at(expected, chosen), at(seen, chosen))
@@ -180,10 +101,6 @@ def compare(
     roundings = errors["Position"][0] / errors["Position"][1]
     far = far_from_home(pinhole, expected, chosen, rows[0])
     return Comparison(pinhole, stated, hits, rows, mismatches, systematic, conversion, maps, roundings, far, origin)
-
-
-def _allowed_unexplained(pinhole: Pinhole) -> int:
-    return pinhole.width * pinhole.height // PIXELS_PER_UNEXPLAINED
 
 
 def _passes(reference: Image, test: Image, pinhole: Pinhole) -> tuple[Seen, Seen]:

@@ -1,17 +1,21 @@
-"""The comparison of light in words: one sentence, and aligned lines for the shell."""
+"""What a comparison of light has found, as figures, as one sentence, and as aligned lines for the shell."""
 
 import math
-from typing import TYPE_CHECKING
+from dataclasses import asdict, dataclass
 
-from .law import PERCENTILES
-from .questions import PIXELS, WHOLE
-from .statistics import percentile_name
+import numpy as np
+from numpy.typing import NDArray
+
+from ..pinhole import Pinhole
+from .law import PERCENTILES, Array
+from .perception import Appearance
+from .questions import PIXELS, WHOLE, Place, Question
+from .statistics import Row, percentile_name
+from .steady import Edges
 from .verdict import mark, percent
 
-if TYPE_CHECKING:
-    from .questions import Place, Question
-    from .radiance import LightRow, RadianceComparison
-    from .steady import Edges
+FALSE_ALARMS = 0.01
+"""The probability, at most, that two sides of the same light are called different; shared out evenly over the quantities."""
 
 # Factors that tell what went wrong, and how well a factor has to fit one: a picture without noise tells it to some digits.
 _TELLING = {
@@ -27,7 +31,97 @@ _TELLING = {
 _FIT = 1e-4
 
 
-def sentence(comparison: "RadianceComparison") -> str:
+@dataclass(frozen=True)
+class LightRow:
+    """What was found in one quantity.
+
+    reference, test : means over the picture and its channels. ratio : test over reference, nan where that is 0.
+    ratio_error : its standard error. visible : the relative bias of the whole picture that is found half of the time.
+    questions : the statistical ones, none where there is no noise. steady, edges : the exact comparison, None where there is.
+    broken : pixels that are no numbers on one side or both. factor : the one that explains all of the difference, or None.
+    """
+
+    name: str
+    reference: float
+    test: float
+    ratio_error: float
+    visible: float
+    broken: int
+    questions: tuple[Question, ...] = ()
+    steady: Row | None = None
+    edges: Edges | None = None
+    factor: float | None = None
+
+    @property
+    def ratio(self) -> float:
+        return self.test / self.reference if self.reference else float("nan")
+
+    @property
+    def ok(self) -> bool:
+        exact = self.steady is None or (self.steady.ok and self.edges.ok)
+        return exact and not self.broken and all(question.ok for question in self.questions)
+
+    def to_json(self) -> dict:
+        names = ("name", "reference", "test", "ratio", "ratio_error", "visible", "broken", "factor", "ok")
+        return {
+            **{name: getattr(self, name) for name in names},
+            "questions": [question.to_json() for question in self.questions],
+            "steady": self.steady and self.steady.to_json(),
+            "edges": self.edges and self.edges.to_json(),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class RadianceComparison:
+    """What differs between a reference and the mean of some test pictures, in light.
+
+    samples : of the reference, and of all test pictures together; None where the files do not tell. seeds : test pictures.
+    is_noisy : whether chance had a part in it. rows : one for each quantity, Combined first. equal : further quantities, the
+    same to the last bit. appearance : relMSE and FLIP. test : the mean of the test pictures' Combined, (height, width, 3).
+    maps : name to (height, width) float32, rows from the bottom: what differs in Combined and in quantities that fail.
+    """
+
+    pinhole: Pinhole
+    samples: tuple[int | None, int | None]
+    seeds: int
+    is_noisy: bool
+    rows: tuple[LightRow, ...]
+    equal: tuple[str, ...]
+    appearance: Appearance
+    test: Array
+    maps: dict[str, NDArray[np.float32]]
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing differs by more than chance and rounding."""
+        return all(row.ok for row in self.rows)
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in one sentence."""
+        return sentence(self)
+
+    def lines(self) -> list[str]:
+        """The result for the shell: a line for each quantity, and the verdict."""
+        return lines(self)
+
+    def to_json(self) -> dict:
+        """Everything but the pictures, as plain JSON values."""
+        return {
+            "passed": self.passed,
+            "sentence": self.sentence,
+            "size": [self.pinhole.width, self.pinhole.height],
+            "samples": {"reference": self.samples[0], "test": self.samples[1]},
+            "seeds": self.seeds,
+            "noisy": self.is_noisy,
+            "false_alarms": FALSE_ALARMS,
+            "quantities": [row.to_json() for row in self.rows],
+            "equal": list(self.equal),
+            "appearance": asdict(self.appearance),
+        }
+
+
+def sentence(comparison: RadianceComparison) -> str:
     """The verdict in one sentence, which says where and by how much where there is a difference."""
     combined = comparison.rows[0]
     if not comparison.passed:
@@ -47,7 +141,7 @@ def sentence(comparison: "RadianceComparison") -> str:
     )
 
 
-def lines(comparison: "RadianceComparison") -> list[str]:
+def lines(comparison: RadianceComparison) -> list[str]:
     """A line for each quantity, aligned, what an eye sees, and the verdict last."""
     table = _noisy_lines(comparison) if comparison.is_noisy else _steady_lines(comparison)
     if comparison.equal:
@@ -59,7 +153,7 @@ def lines(comparison: "RadianceComparison") -> list[str]:
     return [*table, comparison.sentence]
 
 
-def samples_words(comparison: "RadianceComparison") -> str:
+def samples_words(comparison: RadianceComparison) -> str:
     """At how many samples: 1,024 samples; or 1,024 and 512 samples."""
     reference, test = comparison.samples
     if reference is None or test is None:
@@ -67,7 +161,7 @@ def samples_words(comparison: "RadianceComparison") -> str:
     return f"{reference:,} samples" if reference == test else f"{reference:,} and {test:,} samples"
 
 
-def place_words(place: "Place", size: int) -> str:
+def place_words(place: Place, size: int) -> str:
     """Where: in columns 32 to 63, rows 0 to 31."""
     if size == WHOLE:
         return "over the whole picture"
@@ -85,7 +179,7 @@ def change_words(reference: float, test: float) -> str:
     return f"{abs(ratio - 1.0):.2%} {'brighter' if ratio > 1.0 else 'darker'}".replace("%", " %")
 
 
-def worst_question(row: "LightRow") -> "Question | None":
+def worst_question(row: LightRow) -> Question | None:
     """Of those that fail, the one that tells where: the smallest tiles, or the whole picture where half of them differ."""
     failing = [question for question in row.questions if not question.ok]
     if not failing:
@@ -95,7 +189,7 @@ def worst_question(row: "LightRow") -> "Question | None":
     return whole if whole and (row.factor is not None or tiles[0].is_everywhere) else tiles[0]
 
 
-def _noisy_lines(comparison: "RadianceComparison") -> list[str]:
+def _noisy_lines(comparison: RadianceComparison) -> list[str]:
     names = [question.name for question in comparison.rows[0].questions]
     table = [f"{'standard errors':<17}{'ratio':>20}" + "".join(f"{name:>18}" for name in names)]
     for row in comparison.rows:
@@ -104,11 +198,11 @@ def _noisy_lines(comparison: "RadianceComparison") -> list[str]:
     return table
 
 
-def _answer(question: "Question") -> str:
+def _answer(question: Question) -> str:
     return "–" if question.is_open else f"{abs(question.worst.errors):.1f} of {question.limit:.1f}"
 
 
-def _steady_lines(comparison: "RadianceComparison") -> list[str]:
+def _steady_lines(comparison: RadianceComparison) -> list[str]:
     head = "".join(f"{percentile_name(p):>10}" for p in PERCENTILES)
     table = [f"{'relative':<17}{'pixels':>11}{head}  of tolerance"]
     for row in comparison.rows:
@@ -119,17 +213,17 @@ def _steady_lines(comparison: "RadianceComparison") -> list[str]:
     return table
 
 
-def edge_words(edges: "Edges") -> str:
+def edge_words(edges: Edges) -> str:
     """12 pixels differ at edges (63 may) and 1 elsewhere (2 may)."""
     at_edges = f"{edges.count:,} pixels differ at edges ({edges.allowed:,} may)"
     return f"{at_edges} and {edges.leaks:,} elsewhere ({edges.allowed_leaks:,} may)"
 
 
-def _edges(row: "LightRow") -> str:
+def _edges(row: LightRow) -> str:
     return f"; {edge_words(row.edges)}" if row.edges.count or row.edges.leaks else ""
 
 
-def _difference(row: "LightRow") -> str:
+def _difference(row: LightRow) -> str:
     if row.broken:
         return f"{row.name} has {row.broken:,} pixel{'s' if row.broken > 1 else ''} without a number"
     question = worst_question(row)
@@ -149,7 +243,7 @@ def _difference(row: "LightRow") -> str:
     )
 
 
-def _hint(row: "LightRow") -> str:
+def _hint(row: LightRow) -> str:
     if row.factor is None:
         return ""
     tolerance = max(_FIT, 4.0 * row.ratio_error / row.ratio)
@@ -158,7 +252,7 @@ def _hint(row: "LightRow") -> str:
     return f" (all of it is a factor of {row.factor:.5g}{error}{f', which is {known}' if known else ''})"
 
 
-def _mean_words(row: "LightRow") -> str:
+def _mean_words(row: LightRow) -> str:
     if not row.reference:
         return "both are black in the mean"
     return (

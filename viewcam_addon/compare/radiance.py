@@ -10,116 +10,19 @@ any threshold is right for one picture; they are told, and judge nothing.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..image import LIGHT_PASSES, Image
 from ..pinhole import Pinhole
-from . import light_verdict, perception, questions, steady
+from . import perception, questions, steady
 from .law import Array, in_float32
-from .perception import Appearance
-from .questions import Question
+from .light_verdict import FALSE_ALARMS, LightRow, RadianceComparison
 from .sides import Sides, all_sides, quiet, samples_of
-from .statistics import Row
-from .steady import Edges
-
-FALSE_ALARMS = 0.01
-"""The probability, at most, that two sides of the same light are called different; shared out evenly over the quantities."""
 
 VARIANCE_BATCHES = 16
 """Of so many means, or of one for each sample, the reference's Variance is estimated at least (tracer/light/sums.py)."""
-
-
-@dataclass(frozen=True)
-class LightRow:
-    """What was found in one quantity.
-
-    reference, test : means over the picture and its channels. ratio : test over reference, nan where that is 0.
-    ratio_error : its standard error. visible : the relative bias of the whole picture that is found half of the time.
-    questions : the statistical ones, none where there is no noise. steady, edges : the exact comparison, None where there is.
-    broken : pixels that are no numbers on one side or both. factor : the one that explains all of the difference, or None.
-    """
-
-    name: str
-    reference: float
-    test: float
-    ratio_error: float
-    visible: float
-    broken: int
-    questions: tuple[Question, ...] = ()
-    steady: Row | None = None
-    edges: Edges | None = None
-    factor: float | None = None
-
-    @property
-    def ratio(self) -> float:
-        return self.test / self.reference if self.reference else float("nan")
-
-    @property
-    def ok(self) -> bool:
-        exact = self.steady is None or (self.steady.ok and self.edges.ok)
-        return exact and not self.broken and all(question.ok for question in self.questions)
-
-    def to_json(self) -> dict:
-        names = ("name", "reference", "test", "ratio", "ratio_error", "visible", "broken", "factor", "ok")
-        return {
-            **{name: getattr(self, name) for name in names},
-            "questions": [question.to_json() for question in self.questions],
-            "steady": self.steady and self.steady.to_json(),
-            "edges": self.edges and self.edges.to_json(),
-        }
-
-
-@dataclass(frozen=True, eq=False)
-class RadianceComparison:
-    """What differs between a reference and the mean of some test pictures, in light.
-
-    samples : of the reference, and of all test pictures together; None where the files do not tell. seeds : test pictures.
-    is_noisy : whether chance had a part in it. rows : one for each quantity, Combined first. equal : further quantities, the
-    same to the last bit. appearance : relMSE and FLIP. test : the mean of the test pictures' Combined, (height, width, 3).
-    maps : name to (height, width) float32, rows from the bottom: what differs in Combined and in quantities that fail.
-    """
-
-    pinhole: Pinhole
-    samples: tuple[int | None, int | None]
-    seeds: int
-    is_noisy: bool
-    rows: tuple[LightRow, ...]
-    equal: tuple[str, ...]
-    appearance: Appearance
-    test: Array
-    maps: dict[str, NDArray[np.float32]]
-
-    @property
-    def passed(self) -> bool:
-        """Whether nothing differs by more than chance and rounding."""
-        return all(row.ok for row in self.rows)
-
-    @property
-    def sentence(self) -> str:
-        """The verdict in one sentence."""
-        return light_verdict.sentence(self)
-
-    def lines(self) -> list[str]:
-        """The result for the shell: a line for each quantity, and the verdict."""
-        return light_verdict.lines(self)
-
-    def to_json(self) -> dict:
-        """Everything but the pictures, as plain JSON values."""
-        return {
-            "passed": self.passed,
-            "sentence": self.sentence,
-            "size": [self.pinhole.width, self.pinhole.height],
-            "samples": {"reference": self.samples[0], "test": self.samples[1]},
-            "seeds": self.seeds,
-            "noisy": self.is_noisy,
-            "false_alarms": FALSE_ALARMS,
-            "quantities": [row.to_json() for row in self.rows],
-            "equal": list(self.equal),
-            "appearance": asdict(self.appearance),
-        }
 
 
 def carries_light(image: Image) -> bool:

@@ -1,21 +1,106 @@
-"""The comparison in words: one sentence, and aligned lines for the shell."""
+"""What a comparison of geometry has found, as figures, as one sentence, and as aligned lines for the shell."""
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .law import PERCENTILES
+from ..pinhole import Pinhole
+from .cameras import ConversionError, Systematic
+from .far_from_home import FarFromHome
+from .law import PERCENTILES, Array
+from .mismatches import PIXELS_PER_UNEXPLAINED, Mismatches
 from .statistics import Row, percentile_name
-
-if TYPE_CHECKING:
-    from .geometry import Comparison
-
 
 # A sentence with more faults is not read; the table has them all.
 _MOST_FAULTS = 2
 
 
-def sentence(comparison: "Comparison") -> str:
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """What differs between a reference and a test picture.
+
+    pinhole : the camera of the reference. stated : the camera that was asked for, or None.
+    hits : pixels that hit something in (reference, test).
+    rows : one for each measured pass. mismatches : pixels that see another surface.
+    systematic : what is the same for all pixels, None where nothing was compared.
+    conversion : the camera's own error, None where nobody stated a camera.
+    maps : pass name to (height, width) float32, rows from the bottom: the error of each pixel in the unit of the pass's row,
+    nan
+        where it was not compared.
+    roundings : (n,) float64, the error of each compared position over what one rounding of float32 causes there.
+    far_from_home : what the distance from the origin costs, None where that is nothing to speak of.
+    origin : the point of the world from which the coordinates of both pictures are counted.
+    """
+
+    pinhole: Pinhole
+    stated: Pinhole | None
+    hits: tuple[int, int]
+    rows: tuple[Row, ...]
+    mismatches: Mismatches
+    systematic: Systematic | None
+    conversion: ConversionError | None
+    maps: dict[str, NDArray[np.float32]]
+    roundings: Array
+    far_from_home: FarFromHome | None = None
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def pixels(self) -> int:
+        return self.pinhole.width * self.pinhole.height
+
+    @property
+    def allowed_unexplained(self) -> int:
+        """How many mismatches may stay unexplained in a picture of this size."""
+        return allowed_unexplained(self.pinhole)
+
+    @property
+    def mismatches_ok(self) -> bool:
+        not_a_number = self.mismatches.counts()["not a number"][0]
+        return not_a_number == 0 and self.mismatches.unexplained_count <= self.allowed_unexplained
+
+    @property
+    def passed(self) -> bool:
+        """Whether the two are the same picture. False, too, where there was nothing to compare."""
+        systematic_ok = self.systematic is not None and self.systematic.ok
+        conversion_ok = self.conversion is None or self.conversion.ok
+        return systematic_ok and conversion_ok and self.mismatches_ok and all(row.ok for row in self.rows)
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in one sentence."""
+        return sentence(self)
+
+    def lines(self) -> list[str]:
+        """The result for the shell: a line for each pass, and the verdict."""
+        return lines(self)
+
+    def to_json(self) -> dict:
+        """Everything but the maps, as plain JSON values."""
+        return {
+            "passed": self.passed,
+            "sentence": self.sentence,
+            "size": [self.pinhole.width, self.pinhole.height],
+            "hits": {"reference": self.hits[0], "test": self.hits[1]},
+            "passes": [row.to_json() for row in self.rows],
+            "mismatches": {
+                **self.mismatches.to_json(),
+                "allowed_unexplained": self.allowed_unexplained,
+                "ok": self.mismatches_ok,
+            },
+            "systematic": self.systematic and self.systematic.to_json(),
+            "conversion": self.conversion and self.conversion.to_json(),
+            "far_from_home": self.far_from_home and self.far_from_home.to_json(),
+            "origin": list(self.origin),
+        }
+
+
+def allowed_unexplained(pinhole: Pinhole) -> int:
+    """How many mismatches may stay unexplained in a picture of this size."""
+    return pinhole.width * pinhole.height // PIXELS_PER_UNEXPLAINED
+
+
+def sentence(comparison: Comparison) -> str:
     """The verdict in one sentence, which names the gravest fault where there is one."""
     if comparison.passed:
         return _praise(comparison)
@@ -24,7 +109,7 @@ def sentence(comparison: "Comparison") -> str:
     return "Not the same picture: " + "; ".join(_faults(comparison)[:_MOST_FAULTS]) + "."
 
 
-def lines(comparison: "Comparison") -> list[str]:
+def lines(comparison: Comparison) -> list[str]:
     """One line for each pass, aligned, and the verdict last."""
     head = (
         f"{'pass':<16}{'pixels':>11}"
@@ -69,7 +154,7 @@ def _row_line(row: Row) -> str:
     return f"{row.name:<16}{row.count:>11,}{figures}  {row.unit:<10}{used}{mark(row.ok)}"
 
 
-def _praise(comparison: "Comparison") -> str:
+def _praise(comparison: Comparison) -> str:
     position = comparison.rows[0]
     count = len(comparison.mismatches.kinds)
     edges = f"; {count:,} on edges, {_explained(comparison)}" if count else ""
@@ -80,7 +165,7 @@ def _praise(comparison: "Comparison") -> str:
     )
 
 
-def _faults(comparison: "Comparison") -> list[str]:
+def _faults(comparison: Comparison) -> list[str]:
     """What is wrong, the gravest first."""
     faults = []
     position = comparison.rows[0]
@@ -111,7 +196,7 @@ def _faults(comparison: "Comparison") -> list[str]:
     return faults
 
 
-def _cause(comparison: "Comparison") -> str:
+def _cause(comparison: Comparison) -> str:
     """What the systematic part looks like: the largest of shift, zoom and roll, in pixels at the picture's border."""
     s = comparison.systematic
     radius = max(comparison.pinhole.width, comparison.pinhole.height) / 2
@@ -129,7 +214,7 @@ def _cause(comparison: "Comparison") -> str:
     return cause if effect > s.tolerance else "the error has no common direction"
 
 
-def _explained(comparison: "Comparison") -> str:
+def _explained(comparison: Comparison) -> str:
     mismatches = comparison.mismatches
     explained = int(mismatches.explained.sum())
     if not explained:
@@ -137,7 +222,7 @@ def _explained(comparison: "Comparison") -> str:
     return f"{explained:,} explained by a shift of at most {np.max(mismatches.shifts[mismatches.explained]):.1e} px"
 
 
-def _why_unexplained(comparison: "Comparison") -> str:
+def _why_unexplained(comparison: Comparison) -> str:
     if not comparison.mismatches.retraced:
         return "which may be edges: give the scene too, so that they can be re-traced"
     return "and no shift within tolerance explains it"

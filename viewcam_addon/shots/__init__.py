@@ -2,6 +2,7 @@
 
     read(path)                      CSV, JSON or JSON Lines (docs/batch.md) → shots
     orbit, frames, from_cameras     shots by rule
+    is_list, from_pinholes          whether a file is such a list; and shots of cameras that were read elsewhere
     shard                           which of them one of several machines renders
     settings_hash                   what a picture was made from, to know whether it must be made again
 
@@ -9,20 +10,35 @@ Nothing here knows Blender: what the .blend says (its cameras' names, a camera's
 """
 
 import codecs
+import json
 import os
 from collections.abc import Collection
 from pathlib import Path
 
 from ..errors import InputError
+from ..files import read_bytes
 from . import documents, table
-from .makers import frames, from_cameras, orbit
+from .makers import frames, from_cameras, from_pinholes, orbit
 from .problems import Problems, ShotsError
 from .rows import shots_of
 from .settings import settings_hash
 from .shards import shard
 from .shot import ENGINES, LEVELS, Shot
 
-__all__ = ["ENGINES", "LEVELS", "Shot", "ShotsError", "frames", "from_cameras", "orbit", "read", "settings_hash", "shard"]
+__all__ = [
+    "ENGINES",
+    "LEVELS",
+    "Shot",
+    "ShotsError",
+    "frames",
+    "from_cameras",
+    "from_pinholes",
+    "is_list",
+    "orbit",
+    "read",
+    "settings_hash",
+    "shard",
+]
 
 _READERS = {
     ".csv": table.read,
@@ -61,10 +77,28 @@ def read(path: str | os.PathLike[str], cameras: Collection[str] | None = None) -
     return shots
 
 
+def is_list(path: str | os.PathLike[str]) -> bool:
+    """Whether a file is a list of shots by its suffix and its first row, and not cameras of another program."""
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in _READERS or path.is_dir():
+        return False
+    try:
+        text = _text(path)
+        if suffix != ".json":
+            return not text.lstrip().startswith("#")  # as the tables of trajectories begin
+        document = json.loads(text)
+    except (InputError, ValueError, RecursionError):
+        return True  # its own reader says what is wrong
+    if isinstance(document, dict):
+        return "shots" in document or "defaults" in document
+    return isinstance(document, list) and not (document and isinstance(document[0], dict) and "name" not in document[0])
+
+
 def _text(path: Path) -> str:
     """The file's text. Bytes that are not UTF-8 become lone surrogates, which are refused where they stand."""
     try:
-        data = path.read_bytes()
+        data = read_bytes(path)
     except OSError as error:
         raise InputError(f"{path} can't be read ({error.strerror}): check its name and permissions") from error
     if data.startswith(_OTHER_ENCODINGS) or b"\0" in data[:100]:

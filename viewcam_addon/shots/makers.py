@@ -92,6 +92,46 @@ def from_cameras(pattern: str, cameras: Iterable[str], spaces: bool = True) -> l
     return [Shot(name, camera=camera) for camera, name in shots.items()]
 
 
+def from_pinholes(pinholes: Iterable[tuple[str, Pinhole]]) -> list[Shot]:
+    """A shot of each named pinhole, with its size, principal point, pixel aspect and mirroring.
+
+    Names that can't be a file's are made so: what may not stand in them is an underscore.
+
+    Raises
+    ------
+    ShotsError
+        if two would be one file, or a camera is beyond Blender's limits; it has all of them.
+    """
+    problems = Problems("the cameras")
+    files: dict[str, str] = {}
+    shots = []
+    for given, pinhole in pinholes:
+        name = names.made_fit(given)
+        other = files.setdefault(names.one_file(name), given)
+        if other != given or len(files) <= len(shots):
+            problems.add(f"the cameras {checks.shown(other)} and {checks.shown(given)} would have one file: rename one")
+            continue
+        (d_x, d_y), (width, height) = pinhole.distance, (pinhole.width, pinhole.height)
+        middle = (width / 2, height / 2)
+        with problems.caught():
+            shots.append(
+                Shot(
+                    name,
+                    pinhole.eye,
+                    pinhole.look_at,
+                    pinhole.up,
+                    d_x,
+                    width=width,
+                    height=height,
+                    principal_point=None if pinhole.principal_point == middle else pinhole.principal_point,
+                    pixel_aspect=d_y / d_x,
+                    mirrored=pinhole.mirrored or None,
+                )
+            )
+    problems.raise_any()
+    return shots
+
+
 def _count(count: int) -> int:
     if count > _MOST:
         raise InputError(f"these are {count} shots: make at most {_MOST} at a time")

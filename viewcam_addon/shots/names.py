@@ -19,6 +19,7 @@ OWN = ("summary", "contact-sheet", "transforms")
 _PART = re.compile(r"-\d+-of-\d+$", re.ASCII)
 
 _FORBIDDEN = '/\\:*?"<>|#'  # Blender puts the frame's number in place of #
+_UNFIT = "_"
 _DEVICES = {
     "con",
     "prn",
@@ -40,6 +41,14 @@ def check(place: str, name: str) -> None:
     """
     if problem := _problem(name):
         raise InputError(f"{place} is {checks.shown(name)}, which {problem}")
+
+
+def made_fit(name: str) -> str:
+    """The name with underscores for what no file's name may hold, and before it where that is not enough."""
+    letters = [_UNFIT if c in _FORBIDDEN or unicodedata.category(c)[0] == "C" or c in "\u2028\u2029" else c for c in name]
+    fit = "".join(letters).strip().rstrip(".") or _UNFIT
+    fit = fit.encode()[: LONGEST // 2].decode(errors="ignore").strip().rstrip(".")
+    return f"{_UNFIT}{fit}" if _problem(fit) else fit
 
 
 def one_file(name: str) -> str:

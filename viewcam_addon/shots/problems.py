@@ -4,6 +4,7 @@ import contextlib
 from collections.abc import Iterator
 
 from ..errors import InputError
+from ..terminal import plain
 
 MOST_SHOWN = 100
 
@@ -17,8 +18,8 @@ class ShotsError(InputError):
 
     def __str__(self) -> str:
         count = len(self.problems)
-        lines = [f"{self.source}: {'one problem' if count == 1 else f'{count} problems'}, nothing is rendered"]
-        lines += [f"  {problem}" for problem in self.problems[:MOST_SHOWN]]
+        lines = [f"{plain(self.source)}: {'one problem' if count == 1 else f'{count} problems'}, nothing is rendered"]
+        lines += [f"  {plain(problem)}" for problem in self.problems[:MOST_SHOWN]]
         if count > MOST_SHOWN:
             lines.append(f"  … and {count - MOST_SHOWN} more")
         return "\n".join(lines)

@@ -11,10 +11,11 @@ from typing import NamedTuple
 from .. import checks
 from . import names
 from .problems import Problems
-from .shot import FIELDS, Shot, conflicts
+from .shot import BESIDE_THEM, FIELDS, Shot, conflicts
 
 VECTORS = ("eye", "look_at", "up")
-TEXTS = ("name", "camera", "engine", "level")
+LISTS = (*VECTORS, "principal_point")
+TEXTS = ("name", "camera", "engine", "level", "mirrored")
 
 # How each field may be written: as a whole, by another name, in three parts.
 _PARTS = {vector: tuple(f"{vector}_{axis}" for axis in "xyz") for vector in VECTORS}
@@ -91,7 +92,7 @@ def with_defaults(row: Mapping[str, Cell], defaults: Mapping[str, Cell]) -> dict
     """A row's cells, and the defaults of the fields that it does not have; its kind of camera displaces the other kind."""
     said = {_FIELD_OF[column] for column in row}
     if "camera" in said:
-        said |= {*VECTORS, "d"}
+        said |= {*VECTORS, "d", *BESIDE_THEM}
     elif said & {*VECTORS, "d"}:
         said.add("camera")
     return {column: cell for column, cell in defaults.items() if _FIELD_OF[column] not in said} | dict(row)

@@ -11,7 +11,7 @@ from functools import partial
 
 from .. import checks
 from ..errors import InputError
-from ..pinhole import Triple
+from ..pinhole import Triple, check_distance
 from ..tracer.scene import film
 from . import names
 
@@ -22,9 +22,11 @@ LEVELS = (*film.LEVELS, "auto")
 _SIZES = (4, 65536)
 _FRAMES = (-1048574, 1048574)
 _SAMPLES = (1, 2**24)
+_ASPECTS = (1 / 200, 200.0)
 _LARGEST_FLOAT32, _SMALLEST_FLOAT32 = (2.0 - 2.0**-23) * 2.0**127, 2.0**-126
 
 FOUR_VALUES = ("eye", "look_at", "up", "d")
+BESIDE_THEM = ("principal_point", "pixel_aspect", "mirrored")
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,9 @@ class Shot:
     name : of its files, without a suffix.
     eye, look_at, up : three floats, world space; d : view-plane distance in pixels, > 0. All four, or `camera`.
     camera : the name of a camera of the .blend, in place of the four values.
+    principal_point : (c_x, c_y), where the view axis meets the picture, pixels from its left and bottom edge; its middle where
+        None. pixel_aspect : width of a pixel over its height, from 1/200 to 200. mirrored : whether the picture is. These go
+        with the four values, `principal_point` with a size as well.
     width, height : pixels of the picture, both or none.
     frame : whole. engine : one of ENGINES. samples : a pixel. level : one of LEVELS.
 
@@ -59,6 +64,9 @@ class Shot:
     engine: str | None = None
     samples: int | None = None
     level: str | None = None
+    principal_point: tuple[float, float] | None = None
+    pixel_aspect: float | None = None
+    mirrored: bool | None = None
 
     def __post_init__(self) -> None:
         for field, check in FIELDS.items():
@@ -76,12 +84,14 @@ def conflicts(values: Mapping[str, object]) -> list[tuple[tuple[str, ...], str]]
     found = []
     if "name" not in values:
         found.append((("name",), "missing, give each shot a name of its own for its files"))
-    given = tuple(field for field in FOUR_VALUES if field in values)
+    given = tuple(field for field in (*FOUR_VALUES, *BESIDE_THEM) if field in values)
     missing = tuple(field for field in FOUR_VALUES if field not in values)
     if "camera" in values and given:
         found.append((("camera", *given), "a shot has either a camera of the file or the four values, leave one of them out"))
     elif "camera" not in values and missing:
         found.append((missing, "missing, give eye, look_at, up and d, or the name of a camera of the file"))
+    if "principal_point" in values and "width" not in values:
+        found.append((("width", "height"), "missing, the principal point counts pixels of a picture: give its size"))
     if values.get("eye") is not None and values.get("eye") == values.get("look_at"):
         found.append((("eye", "look_at"), "they are the same point, and the view has no direction: move one of them"))
     for one, other in (("width", "height"), ("height", "width")):
@@ -125,9 +135,24 @@ def _up(place: str, value: object) -> Triple:
 
 def _distance(place: str, value: object) -> float:
     d = checks.number(place, value)
-    if d <= 0:
-        raise InputError(f"{place} is {d:g} pixels: the view plane must lie before the eye, give d > 0")
+    check_distance(d, place)
     return checks.number(place, d, _SMALLEST_FLOAT32, _LARGEST_FLOAT32)
+
+
+def _pair(place: str, value: object) -> tuple[float, float]:
+    point = checks.vector(place, value, 2)
+    for coordinate in point:
+        checks.number(place, coordinate, -_LARGEST_FLOAT32, _LARGEST_FLOAT32)
+    return point
+
+
+def _aspect(place: str, value: object) -> float:
+    return checks.number(place, value, *_ASPECTS)
+
+
+def _truth(place: str, value: object) -> bool:
+    spoken = {"true": True, "false": False}.get(value.lower(), value) if isinstance(value, str) else value
+    return checks.truth(place, spoken)
 
 
 def _whole(place: str, value: object, *, limits: tuple[int, int]) -> int:
@@ -150,5 +175,8 @@ FIELDS: dict[str, Callable[[str, object], object]] = {
     "engine": partial(_choice, among=ENGINES),
     "samples": partial(_whole, limits=_SAMPLES),
     "level": partial(_choice, among=LEVELS),
+    "principal_point": _pair,
+    "pixel_aspect": _aspect,
+    "mirrored": _truth,
 }
 """The check of each field: (what a sentence calls it, value) → the value as a Shot keeps it, or InputError."""

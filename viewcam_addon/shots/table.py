@@ -95,7 +95,7 @@ def _value(column: str, text: str) -> object:
     """What a cell says: text, a number or a list of them; what is no number stays text, and is refused as such."""
     if column in rows.TEXTS:
         return text
-    if column in rows.VECTORS:
+    if column in rows.LISTS:
         return [_number(part) for part in _BETWEEN_NUMBERS.split(text.strip("()[] "))]
     return _number(text)
 

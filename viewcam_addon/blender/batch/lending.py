@@ -8,7 +8,7 @@ shots (keeping.py), and no camera of the file follows a picture of another size 
 """
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import bpy
 
@@ -21,6 +21,8 @@ from . import keeping, pictures
 
 _ENGINES = {"CYCLES": "CYCLES", "EEVEE": versions.EEVEE, "VIEWCAM": "VIEWCAM"}
 
+_OF_RENDER = ("engine", "resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y")
+
 
 def engine_name(engine: str) -> str:
     """An engine of Blender's as a shot calls it, or as Blender does where no shot could."""
@@ -30,12 +32,14 @@ def engine_name(engine: str) -> str:
 class Lent:
     """A scene while a batch has it. warnings : a sentence for each thing that is another in a render by itself.
 
-    threads, seed : of all shots, the file's where None.
+    threads, seed : of all shots, the file's where None. off : what is off because the file is not trusted (opening.py).
     """
 
-    def __init__(self, borrow: Borrower, scene: bpy.types.Scene, threads: int | None, seed: int | None) -> None:
+    def __init__(
+        self, borrow: Borrower, scene: bpy.types.Scene, threads: int | None, seed: int | None, off: Iterable[str] = ()
+    ) -> None:
         self._scene = scene
-        self.warnings = tuple(_warnings(scene))
+        self.warnings = (*_warnings(scene), *(f"{sentence[:1].upper()}{sentence[1:]}, without --trust" for sentence in off))
         render = scene.render
         cameras_unbound(borrow, scene)
         for name in ("use_multiview", "use_sequencer", "use_stamp"):
@@ -73,10 +77,12 @@ class Lent:
 
     def frame_of(self, shot: Shot) -> intrinsics.Frame:
         """The picture of a shot."""
-        if shot.width is None:
-            return self._frame_of_file
-        size = {"resolution_x": shot.width, "resolution_y": shot.height, "percentage": 100}
-        return dataclasses.replace(self._frame_of_file, **size)
+        said: dict[str, float] = {}
+        if shot.width is not None:
+            said |= {"resolution_x": shot.width, "resolution_y": shot.height, "percentage": 100}
+        if shot.pixel_aspect is not None:
+            said |= _pixel_aspects(shot.pixel_aspect)
+        return dataclasses.replace(self._frame_of_file, **said)
 
     def set(self, shot: Shot) -> None:
         """Set the scene to a shot, but for its camera. What stands so already is not touched, so that nothing is built anew."""
@@ -109,6 +115,9 @@ class Lent:
             yield (render, "resolution_x"), shot.width
             yield (render, "resolution_y"), shot.height
             yield (render, "resolution_percentage"), 100
+        if shot.pixel_aspect is not None:
+            for name, value in _pixel_aspects(shot.pixel_aspect).items():
+                yield (render, name), value
         if shot.samples is not None and engine in (samples := _samples(scene)):
             yield samples[engine], shot.samples
             if engine == "CYCLES":
@@ -119,7 +128,7 @@ class Lent:
     def _properties(self) -> Iterator[tuple[bpy.types.bpy_struct, str]]:
         """All that a shot may set."""
         scene = self._scene
-        yield from ((scene.render, name) for name in ("engine", "resolution_x", "resolution_y", "resolution_percentage"))
+        yield from ((scene.render, name) for name in _OF_RENDER)
         yield from _samples(scene).values()
         if hasattr(scene, "cycles"):
             yield scene.cycles, "use_layer_samples"
@@ -140,6 +149,11 @@ class Lent:
             "scene": scene.name,
             "view_layers": [layer.name for layer in scene.view_layers if layer.use],
         }
+
+
+def _pixel_aspects(aspect: float) -> dict[str, float]:
+    """Blender's two numbers of a pixel's width over its height; neither may be below 1."""
+    return {"pixel_aspect_x": max(1.0, aspect), "pixel_aspect_y": max(1.0, 1 / aspect)}
 
 
 def _samples(scene: bpy.types.Scene) -> dict[str, tuple[bpy.types.bpy_struct, str]]:

@@ -67,7 +67,7 @@ def camera_named(name: str | None, scene: bpy.types.Scene, own: bpy.types.Object
 
 def check_said_by_four_values(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene) -> None:
     """Raise InputError if other views made from a camera of the file would lack something that it has: shift, mirroring."""
-    data = datablocks.camera_data_of(camera_object.evaluated_get(datablocks.depsgraph_of(scene)).data)
+    data = datablocks.camera_data_of(camera_object.evaluated_get(datablocks.depsgraph_of(scene)))
     extra, remedy = "", ""
     if data.shift_x or data.shift_y:
         extra, remedy = f"has a lens shift of {data.shift_x:g}, {data.shift_y:g}", "set it to 0"
@@ -79,13 +79,12 @@ def check_said_by_four_values(camera_object: bpy.types.Object, pinhole: Pinhole,
 
 
 def stated(shot: Shot, frame: intrinsics.Frame) -> Pinhole:
-    """The pinhole that a shot's four values ask for in the picture of `frame`."""
+    """The pinhole that a shot's values ask for in the picture of `frame`."""
     distance = (shot.d, shot.d * (frame.pixel_aspect_x / frame.pixel_aspect_y))
-    whole = Pinhole(shot.eye, shot.look_at, shot.up, distance, *frame.size)
+    whole = Pinhole(shot.eye, shot.look_at, shot.up, distance, *frame.size, shot.principal_point, bool(shot.mirrored))
     return whole.cropped(*frame.window) if frame.crop else whole
 
 
 def _check_storable(pinhole: Pinhole, frame: intrinsics.Frame, camera: bpy.types.Camera) -> None:
     """Raise InputError if Blender's numbers hold no such camera."""
-    plane = intrinsics.ViewPlane(pinhole.distance, pinhole.principal_point, pinhole.width, pinhole.height)
-    intrinsics.camera_data(plane, frame, *datablocks.own_sensor(camera), camera.sensor_fit)
+    intrinsics.camera_data(pinhole.plane, frame, *datablocks.own_sensor(camera), camera.sensor_fit)

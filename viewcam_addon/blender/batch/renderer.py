@@ -6,7 +6,7 @@
 
 A shot is what `blender -b FILE -f N` would render (all view layers, the compositor, samples, world and passes as they are),
 from the shot's camera: `lending.py` has what else is another. The four values go to a camera of the batch's own, which has the
-clip range of the scene's camera; one of the file is rendered as it stands. The file is never saved, and its scripts do not run.
+clip range of the scene's camera; one of the file is rendered as it stands. The file is never saved.
 
 Rejected: `-f` in a process each (a start, a file and an acceleration structure built for each shot), and the artist's own
 camera for the four values (what carries it would carry them).
@@ -24,9 +24,9 @@ from ...datasets.record import record
 from ...pinhole import Pinhole
 from ...shots import Shot
 from .. import camera as cameras
-from .. import datablocks, ensure_registered
-from ..borrowing import Borrower, borrowed
-from ..rendering import job
+from .. import datablocks
+from ..borrowing import Borrower
+from ..opening import opened
 from ..rendering.engine import VIEWCAM_RenderEngine
 from ..scenes.depsgraph import render_still
 from . import obstacles, origins, pictures
@@ -40,7 +40,7 @@ class BlenderRenderer:
     """Renders shots of one .blend (batch.renderer.Renderer); a context manager.
 
     blend : the file, or None for the one that is open. seed : of Cycles' and our noise, threads : of all engines; as the file
-    says where None.
+    says where None. trust : whether what is in the file may run and write (opening.py); its File Output nodes never write.
 
     Raises
     ------
@@ -49,21 +49,22 @@ class BlenderRenderer:
     """
 
     def __init__(
-        self, blend: str | os.PathLike[str] | None = None, seed: int | None = None, threads: int | None = None
+        self,
+        blend: str | os.PathLike[str] | None = None,
+        seed: int | None = None,
+        threads: int | None = None,
+        trust: bool = False,
     ) -> None:
-        self._blend, self._seed, self._threads = blend, seed, threads
+        self._blend, self._seed, self._threads, self._trust = blend, seed, threads, trust
         self._loan = contextlib.ExitStack()
         self._has_drawn = False
 
     def __enter__(self) -> "BlenderRenderer":
-        ensure_registered()
-        if self._blend is not None:
-            job.open_blend(self._blend)
         with contextlib.ExitStack() as stack:
+            borrow, off = stack.enter_context(opened(self._blend, self._trust))
             self.scene = bpy.context.scene
-            borrow = stack.enter_context(borrowed())
             self._of_file = datablocks.render_camera(self.scene)
-            self._lent = Lent(borrow, self.scene, self._threads, self._seed)
+            self._lent = Lent(borrow, self.scene, self._threads, self._seed, off)
             self._own = _own_camera(borrow, self.scene, self._of_file)
             self._checker = stack.enter_context(Checker(self._threads))
             self._loan = stack.pop_all()
@@ -111,14 +112,15 @@ class BlenderRenderer:
         return found
 
     def made_from(self) -> dict[str, Any]:
-        """What the pictures are made from, beside the shots: hashes of the .blend and of all that it links; versions; the seed.
+        """What the pictures are made from, beside the shots: hashes of the .blend and of all that it links; versions; the seed;
+        whether it is trusted.
 
         Raises
         ------
         InputError
             if the open file was never saved.
         """
-        return origins.made_from() | {"seed": self._seed}
+        return origins.made_from() | {"seed": self._seed} | ({"trust": True} if self._trust else {})
 
     def problems(self, shots: Sequence[Shot], check: bool = False) -> tuple[str, ...]:
         """One sentence for each reason why a shot can't be rendered or checked, as far as it is known before anything is."""
@@ -146,7 +148,7 @@ class BlenderRenderer:
         evaluated = self.scene.camera.evaluated_get(datablocks.depsgraph_of(self.scene))
         self._taken = cameras.read(evaluated, self.scene)
         return {
-            **record(self._taken, datablocks.camera_data_of(evaluated.data)),
+            **record(self._taken, datablocks.camera_data_of(evaluated)),
             **({"stated": record(self._stated)["camera"]} if self._stated else {}),
             "rendered": self._lent.rendered(),
             "warnings": [*self._lent.warnings, *warnings],

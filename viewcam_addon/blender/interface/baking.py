@@ -135,7 +135,8 @@ def _look(flight: _Flight, scene: bpy.types.Scene, is_key: bool) -> None:
         cameras.place(camera_object, stated, scene, depsgraph)
         rotation = pose.rotation_channel(camera_object)
         if flight.at:
-            _, turn, _ = pose.channels(camera_object, stated, depsgraph)
+            parent = pose.parent_matrix(camera_object, depsgraph)
+            _, turn, _ = pose.channels_of(camera_object).bringing_to(stated, parent)
             pose.set_rotation(camera_object, turn, flight.keys[rotation][-1])
     except InputError as error:
         raise InputError(f"frame {scene.frame_current + scene.frame_subframe:g}: {error}") from error

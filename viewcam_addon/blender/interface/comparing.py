@@ -266,7 +266,18 @@ def _command(copy: Path, scene: bpy.types.Scene, words: Sequence[str]) -> list[s
     # The file's own scene is that of its first window. The add-on may be enabled for this session only.
     other = ["--scene", scene.name] if any(window.scene != scene for window in bpy.context.window_manager.windows[:1]) else []
     enabled = ["--addons", preferences.PACKAGE] if preferences.PACKAGE in bpy.context.preferences.addons else []
-    return [bpy.app.binary_path, "--background", *enabled, str(copy), *other, "--command", "viewcam", "check", *words]
+    return [
+        bpy.app.binary_path,
+        "--background",
+        "--disable-autoexec",
+        *enabled,
+        str(copy),
+        *other,
+        "--command",
+        "viewcam",
+        "check",
+        *words,
+    ]
 
 
 def _is_compressed() -> bool:

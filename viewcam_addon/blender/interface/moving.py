@@ -13,11 +13,11 @@ from dataclasses import replace
 
 import bpy
 
-from ... import moves
+from ... import moves, rotation
 from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
-from .. import datablocks, pose, preferences
+from .. import datablocks, preferences
 from . import readouts, selection, viewport
 from .operators import CameraOperator
 
@@ -116,7 +116,7 @@ class VIEWCAM_OT_look_at_active(_Move, bpy.types.Operator):
         if active is None or active == camera_object:
             raise InputError("no object but the camera is active: make another one active")
         evaluated = active.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        return replace(pinhole, look_at=tuple(pose.float64(evaluated.matrix_world.translation).tolist()))
+        return replace(pinhole, look_at=tuple(rotation.float64(evaluated.matrix_world.translation).tolist()))
 
 
 class VIEWCAM_OT_dolly_camera(_Move, bpy.types.Operator):

@@ -13,9 +13,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ... import rotation
 from ...errors import InputError
 from ...pinhole import Triple
-from .. import pose
 from ..scenes import export_geometry
 
 Array = NDArray[np.float64]
@@ -71,7 +71,7 @@ def _points_of_objects(blocks: list[bpy.types.Object], depsgraph: bpy.types.Deps
                 empty.pop(owner, None)
                 yield _placed(local, instance.matrix_world)
     for block in empty:
-        yield pose.float64(block.evaluated_get(depsgraph).matrix_world.translation)[None]
+        yield rotation.float64(block.evaluated_get(depsgraph).matrix_world.translation)[None]
 
 
 def _local_points(shown: bpy.types.Object) -> Array:
@@ -91,7 +91,7 @@ def _local_points(shown: bpy.types.Object) -> Array:
 
 def _placed(local: Array, matrix: bpy.types.bpy_prop_array) -> Array:
     """Points in an object's space, (n, 3), in the world."""
-    matrix = pose.float64(matrix)
+    matrix = rotation.float64(matrix)
     return local.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
 
 

@@ -13,7 +13,6 @@ from ... import rotation
 from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
-from .. import pose
 
 # The larger side of a region shows what a sensor of twice Blender's usual 36 mm sees.
 _SENSOR = 72.0
@@ -67,9 +66,9 @@ def pinhole_of(area: bpy.types.Area, like: Pinhole, scene: bpy.types.Scene) -> P
 def _pivot(space: bpy.types.SpaceView3D) -> np.ndarray:
     """(3,): the point about which the view turns, and which it keeps in its middle."""
     if space.lock_object:
-        matrix = pose.float64(space.lock_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
+        matrix = rotation.float64(space.lock_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
         bone = space.lock_object.pose.bones.get(space.lock_bone) if space.lock_object.type == "ARMATURE" else None
-        return matrix[:3, :3] @ pose.float64(bone.head) + matrix[:3, 3] if bone else matrix[:3, 3]
+        return matrix[:3, :3] @ rotation.float64(bone.head) + matrix[:3, 3] if bone else matrix[:3, 3]
     if space.lock_cursor:
-        return pose.float64(bpy.context.scene.cursor.location)
-    return pose.float64(space.region_3d.view_location)
+        return rotation.float64(bpy.context.scene.cursor.location)
+    return rotation.float64(space.region_3d.view_location)

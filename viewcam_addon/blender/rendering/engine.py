@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from ... import errors
 from ...errors import InputError
 from ...image import BACKGROUND_DEPTH, CHANNELS, GEOMETRY_PASSES
+from ...terminal import plain
 from ...tracer.rays.surface import Passes
 from ...tracer.scene import Scene
 from ...tracer.scene.film import LEVELS
@@ -114,7 +115,7 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
         words = [f"Not modelled as it is: {name!r}, {reason}" for name, reason in (*beyond, *lacking)]
         if words:
             others = f" (and {len(words) - 1} more, which viewcam export lists)" if len(words) > 1 else ""
-            self.report({"WARNING"}, words[0] + others)
+            self.report({"WARNING"}, plain(words[0] + others))
         type(self).warnings = tuple(words)
         return scene
 

@@ -1,7 +1,7 @@
 """One job on one .blend, as the command line asks for it: export, render with Cycles, or both from the same state.
 
 A job opens the file (or takes the one that is open), chooses camera, frame and size for its own time only, and never saves.
-Scripts of the file do not run.
+What is in the file does not run (opening.py).
 """
 
 import contextlib
@@ -16,8 +16,9 @@ from ...errors import InputError
 from ...tracer.scene import LedgerEntry, Scene
 from ...tracer.scene.film import LEVELS, NO_BOUNCES, SAMPLES
 from ...tracer.scene.levels import least_level
-from .. import datablocks, ensure_registered, resolution
-from ..borrowing import Borrower, borrowed
+from .. import datablocks, resolution
+from ..borrowing import Borrower
+from ..opening import opened
 from ..scenes import indices, materials, recentering
 from ..scenes.export import Light, export_scene, survey
 from ..scenes.ledger import Ledger
@@ -25,8 +26,6 @@ from . import cycles
 
 AUTO = "auto"
 
-# What a .blend starts with: itself, or a gzip or Zstandard stream.
-_MAGIC = (b"BLENDER", b"\x1f\x8b", b"\x28\xb5\x2f\xfd")
 _LAST_FRAME = 1048574
 
 
@@ -36,7 +35,8 @@ class Request:
 
     recenter : whether both sides see the scene with its origin at the eye. level : one of film.LEVELS, or "auto" for the least
     that models all light of the scene (levels.py). samples : a pixel, of all of Cycles' pictures together, from level `direct`
-    on. clay : whether one and the same material covers all surfaces.
+    on. clay : whether one and the same material covers all surfaces. trust : whether
+    what is in the file may run and write (opening.py).
     """
 
     blend: str | os.PathLike[str] | None = None
@@ -50,6 +50,7 @@ class Request:
     samples: int = SAMPLES
     seed: int = 0
     clay: bool = False
+    trust: bool = False
 
 
 @dataclass(frozen=True)
@@ -154,11 +155,8 @@ def _render(stage: _Stage, request: Request, paths: Sequence[str | os.PathLike[s
 @contextlib.contextmanager
 def _stage(request: Request) -> Iterator[_Stage]:
     """Open the file, and set it to the request until the job is done."""
-    ensure_registered()
-    if request.blend is not None:
-        open_blend(request.blend)
-    scene = bpy.context.scene
-    with borrowed() as borrow:
+    with opened(request.blend, request.trust) as (borrow, off):
+        scene = bpy.context.scene
         if request.frame is not None:
             _borrow_frame(borrow, scene, request.frame)
         camera = _camera(scene, request.camera)
@@ -170,32 +168,10 @@ def _stage(request: Request) -> Iterator[_Stage]:
         level = request.level
         if level == AUTO:
             level, _ = least_level(export_scene(scene, layer, camera, Ledger(), lit=True))
-        yield _Stage(scene, layer, camera, level)
-
-
-def open_blend(path: str | os.PathLike[str]) -> None:
-    """Open a .blend without running its scripts.
-
-    Raises
-    ------
-    InputError
-        if there is no such file, or if Blender can't read it.
-    """
-    path = Path(path).absolute()
-    if not path.is_file():
-        raise InputError(f"{path} does not exist: check the name of the .blend file")
-    try:
-        with open(path, "rb") as file:
-            start = file.read(7)
-    except OSError as error:
-        raise InputError(f"{path} can't be read ({error.strerror}): check its permissions") from error
-    if not start.startswith(_MAGIC):
-        raise InputError(f"{path} is not a .blend file: give a file that Blender has saved")
-    try:
-        bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
-    except RuntimeError as error:
-        reason = str(error).strip().splitlines()[0].removeprefix("Error: ").rstrip(".")
-        raise InputError(f"{path} can't be opened by Blender {bpy.app.version_string} ({reason}): save it again") from error
+        ledger = Ledger()
+        for sentence in off:
+            ledger.note(Path(bpy.data.filepath).name, "approximated", f"{sentence} (without --trust)")
+        yield _Stage(scene, layer, camera, level, ledger)
 
 
 def _camera(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object:

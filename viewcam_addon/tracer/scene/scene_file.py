@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ... import checks
 from ...errors import InputError
-from ...files import is_replaced, written_whole
+from ...files import is_replaced, read_bytes, written_whole
 from ...pinhole import Pinhole
 from . import LedgerEntry, Object, Scene, light_fields, placing
 from .fields import Field, arrays_beside
@@ -141,7 +141,7 @@ def _parsed(path: Path) -> object:
         raise InputError(f"{path.name}: {name} is no number that a scene can hold: give a finite one")
 
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_bytes(path).decode("utf-8")
         document = json.loads(text, object_pairs_hook=unique, parse_constant=finite, parse_int=checks.whole_of_json)
         if r"\ud" in text.lower():
             json.dumps(document, ensure_ascii=False).encode()  # half a character, which only JSON can write, is no text

@@ -1,0 +1,83 @@
+"""The way of an edit, from the property to Blender's camera: as short as it can be read, and down only."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+import viewcam_addon
+
+PACKAGE = Path(viewcam_addon.__file__).parent
+# As they stand on one another, from below. All that is outside blender/ lies below them, and is plain mathematics here.
+ROOMS = ["versions", "datablocks", "storage", "targets", "hold", "pose", "camera", "resolution", "animation", "properties"]
+BY_BLENDER = {"on_update", "on_frame_change"}  # what Blender calls as it evaluates
+MOST = 15
+
+
+def walk_of(action):
+    """What a call runs of this package: ({(room, function)} of blender/, [calls from a room to one above it])."""
+    functions, upward, stack = set(), [], [None]
+
+    def note(frame, event, _argument):
+        if event == "call":
+            path, name = Path(frame.f_code.co_filename), frame.f_code.co_qualname.split(".<locals>")[0]
+            caller = stack[-1]
+            if PACKAGE not in path.parents:
+                stack.append(caller)
+                return
+            inside = path.relative_to(PACKAGE).parts
+            here = (inside[1].removesuffix(".py") if inside[0] == "blender" else "", name)
+            if here[0]:
+                functions.add(here)
+            if caller and name not in BY_BLENDER and level(here[0]) > level(caller[0]):
+                upward.append(f"{caller} → {here}")
+            stack.append(here)
+        elif event == "return" and len(stack) > 1:
+            stack.pop()
+
+    sys.setprofile(note)
+    try:
+        action()
+    finally:
+        sys.setprofile(None)
+    return functions, upward
+
+
+def level(room):
+    return ROOMS.index(room) if room else -1
+
+
+EDITS = {"eye": (7, -6, 6), "look_at": (0, 1, 1), "up": (0, 1, 1), "distance": 800.0, "zoom": 2.0}
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_an_edit_passes_few_functions_and_none_calls_upward(posed_camera, name):
+    group = posed_camera.virtual_pinhole
+    group.eye = (7, -6, 5.5)
+    bpy.context.view_layer.update()
+    functions, upward = walk_of(lambda: setattr(group, name, EDITS[name]))
+    assert ("camera", "place") in functions
+    assert not upward, upward
+    more = 4 if name == "distance" else 0  # it is told in which picture it is counted, which asks whether it is animated
+    assert len(functions) <= MOST + more, sorted(functions)
+
+
+def test_no_edit_calls_upward_whatever_the_camera_is_set_to(posed_camera, empty):
+    group = posed_camera.virtual_pinhole
+    group.look_at_target = empty("Target", (1, 2, 3))
+    group.pole, group.keeps = "HOLD", "FIELD_OF_VIEW"
+    posed_camera.parent = empty("Parent", (0, 0, 1))
+    for name in ("eye", "distance", "roll"):
+        value = 0.5 if name == "roll" else EDITS[name]
+        functions, upward = walk_of(lambda name=name, value=value: setattr(group, name, value))
+        assert ("camera", "place") in functions and not upward, upward
+
+
+def test_a_call_upward_is_seen(posed_camera, monkeypatch):
+    from viewcam_addon.blender import camera, storage
+
+    monkeypatch.setattr(storage, "json", type("Json", (), {"dumps": lambda _: str(camera.roll(posed_camera)), "loads": None}))
+    _, upward = walk_of(lambda: setattr(posed_camera.virtual_pinhole, "eye", (1, 2, 3)))
+    assert any("camera" in each for each in upward)

@@ -1,0 +1,211 @@
+"""Nothing that is read raises anything but InputError, hangs, or runs: files of every format, damaged in every way."""
+
+import copy
+import json
+import struct
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from viewcam_addon import cameras
+from viewcam_addon.cameras import Options
+from viewcam_addon.errors import InputError
+
+from . import test_read_only_formats as files
+from .conftest import camera
+
+SETTINGS = settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+GIVEN = Options(size=(64, 36), base=camera("plain").pinhole)
+
+
+def documents():
+    """A JSON of each format that is one."""
+    known = files.Known("plain")
+    k = {"fx": 1.0, "fy": 1.0, "cx": 1.0, "cy": 1.0, "width": 4, "height": 4}
+    matrix = [*known.opengl.ravel().tolist(), 0, 0, 0, 1]
+    return [
+        json.loads(cameras.write([camera("plain"), camera("shifted")], "transforms")),
+        json.loads(cameras.write([camera("plain")], "transforms"))
+        | {"applied_transform": known.opengl.tolist(), "k1": 0.1, "camera_model": "OPENCV"},
+        json.loads(cameras.write([camera("plain")], "bop")),
+        json.loads(cameras.write([camera("plain")], "gltf")) | {"animations": [{"channels": [{"target": {"node": 0}}]}]},
+        json.loads(cameras.write([camera("plain")], "sidecar")["plain.json"]),
+        {"K": [[1, 0, 1], [0, 1, 1], [0, 0, 1]], "rvec": [0, 0, 1], "t": [1, 2, 3], "image_size": [4, 4], "dist": [0.1] * 5},
+        {f"t_{i}{j}": 1.0 for i in range(3) for j in range(4)} | k,
+        {"cameraPoseARFrame": matrix, "intrinsics": [1.0] * 9},
+        {"poses": [[0, 0, 0, 1, 1, 2, 3]], "K": [1.0] * 9, "w": 4, "h": 4},
+        {
+            "version": ["1", "2", "9"],
+            "views": [{"viewId": "1", "poseId": "1", "intrinsicId": "1", "path": "a.jpg"}],
+            "intrinsics": [
+                {
+                    "intrinsicId": "1", "width": "4", "height": "3", "type": "radial3",
+                    "focalLength": "50", "sensorWidth": "36",
+                    "principalPoint": ["0", "0"], "distortionParams": ["0.1", "0", "0"],
+                }
+            ],
+            "poses": [{"poseId": "1", "pose": {"transform": {"rotation": ["1", "0", "0"] * 3, "center": ["0", "0", "0"]}}}],
+        },
+        {
+            "sfm_data_version": "0.3",
+            "root_path": "",
+            "views": [{"key": 0, "value": {"ptr_wrapper": {"data": {"filename": "a", "id_intrinsic": 0, "id_pose": 0}}}}],
+            "intrinsics": [
+                {
+                    "key": 0,
+                    "value": {
+                        "polymorphic_id": 1,
+                        "polymorphic_name": "pinhole",
+                        "ptr_wrapper": {"data": {"width": 1, "height": 1, "focal_length": 1, "principal_point": [1, 1]}},
+                    },
+                }
+            ],
+            "extrinsics": [{"key": 0, "value": {"rotation": np.eye(3).tolist(), "center": [0, 0, 0]}}],
+        },
+    ]  # fmt: skip
+
+
+JUNK = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(-(10**30), 10**30),
+    st.floats(),
+    st.text(max_size=5),
+    st.sampled_from(
+        [[], {}, [[]], [{}], "", "1e999", "nan", [1, 2], [[1, 0], [0]], {"a": 1}, 0, -1, 1e308, 1e-308, [None] * 16]
+    ),
+)
+
+
+def places(value, path=()):
+    yield path
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, inner in items:
+        yield from places(inner, (*path, key))
+
+
+def read_or_refused(given_, options=GIVEN):
+    try:
+        return cameras.read(given_, options=options)
+    except InputError as error:
+        assert str(error) and "\n" not in str(error), str(error)
+        return []
+
+
+@pytest.mark.parametrize("index", range(len(documents())))
+@SETTINGS
+@given(data=st.data())
+def test_json_with_anything_in_place_of_anything_is_read_or_refused(index, data):
+    document = copy.deepcopy(documents()[index])
+    for _ in range(data.draw(st.integers(1, 2))):
+        if not (found := [path for path in places(document) if path]):
+            break
+        *path, last = data.draw(st.sampled_from(found))
+        holder = document
+        for key in path:
+            holder = holder[key]
+        if data.draw(st.booleans()):
+            holder[last] = copy.deepcopy(data.draw(JUNK))
+        else:
+            del holder[last]
+    read_or_refused(json.dumps(document))
+    read_or_refused(json.dumps(document), Options(axes="y_up", scale=100, without_distortion=True, original_world=True))
+
+
+def texts():
+    known = files.Known("plain")
+    one = [camera("plain")]
+    return [
+        *(cameras.write(one, name) for name in ("transforms", "opencv", "ros", "bop", "gltf")),
+        files.metashape(known),
+        "# Bundle file v0.3\n1 0\n600 0 0\n1 0 0\n0 1 0\n0 0 1\n0 0 0\n",
+        "1 1 2 3 0 0 0 1\n2 1 2 3 0 0 0 1\n",
+        '<x xmlns:xcr="http://www.capturingreality.com/ns/xcr/1.1#" xcr:FocalLength35mm="30"><xcr:Rotation>1 0 0 0 1 0 0 0 1'
+        "</xcr:Rotation><xcr:Position>1 2 3</xcr:Position></x>",
+    ]
+
+
+@pytest.mark.parametrize("index", range(len(texts())))
+@SETTINGS
+@given(data=st.data())
+def test_a_damaged_text_is_read_or_refused(index, data):
+    text = texts()[index]
+    for _ in range(data.draw(st.integers(1, 3))):
+        first = data.draw(st.integers(0, len(text)))
+        last = min(len(text), first + data.draw(st.integers(0, 12)))
+        new = data.draw(
+            st.one_of(st.text(max_size=4), st.sampled_from(["1e999", "nan", "-", "{", "[", "]", "}", '"', "\n", "  ", "0"]))
+        )
+        text = text[:first] + new + text[last:]
+    read_or_refused(text)
+
+
+def binaries(folder):
+    one = [camera("plain"), camera("shifted")]
+    cameras.save(one, folder, "colmap_binary")
+    state = json.dumps({"cameraParameters": None}).encode()
+    document = cameras.write(one[:1], "gltf").encode()
+    np.save(folder / "poses_bounds.npy", np.zeros((2, 17)))
+    np.savez(folder / "k.npz", K=np.eye(3), R=np.eye(3), t=np.zeros(3))
+    (folder / "a.fspy").write_bytes(b"fspy" + struct.pack("<III", 1, len(state), 0) + state)
+    head = struct.pack("<4sIII4s", b"glTF", 2, 20 + len(document), len(document), b"JSON")
+    (folder / "a.glb").write_bytes(head + document)
+    return [folder / name for name in ("cameras.bin", "images.bin", "poses_bounds.npy", "k.npz", "a.fspy", "a.glb")]
+
+
+@SETTINGS
+@given(data=st.data())
+def test_a_damaged_file_is_read_or_refused(tmp_path, data):
+    path = data.draw(st.sampled_from(binaries(tmp_path)))
+    content = bytearray(path.read_bytes())
+    for _ in range(data.draw(st.integers(1, 4))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.sampled_from([0, 1, 127, 128, 255, 10, 200]))
+    path.write_bytes(content[: data.draw(st.integers(0, len(content)))] if data.draw(st.booleans()) else content)
+    read_or_refused(path)
+
+
+LARGE = {
+    "brackets": "[" * 1_000_000,
+    "braces": '{"a":' * 200_000,
+    "comments": '{"a": 1 /*' + "*" * 999_000,
+    "quotes": '{"' + '\\"' * 499_000,
+    "keys": "{" + ", ".join(f'"{i}": 1' for i in range(60_000)) + ', "a": 1, "a": 2}',
+    "elements": "<a>" * 300_000,
+    "numbers": "1 2 3 4 5 6 7 8\n" * 60_000,
+    "words": "eye " * 250_000,
+    "yaml": "camera_matrix: a\n" * 60_000,
+    "indents": "".join(" " * min(i, 50) + "a:\n" for i in range(20_000)),
+    "spaces": " " * 1_000_000,
+    "commas": "," * 1_000_000,
+    "digits": '{"frames": [{"transform_matrix": ' + "9" * 999_000 + "}]}",
+}
+
+
+@pytest.mark.parametrize("name", LARGE)
+def test_a_megabyte_of_anything_is_answered_soon(name):
+    started = time.process_time()
+    read_or_refused(LARGE[name])
+    seconds = time.process_time() - started
+    assert seconds < 10, f"{seconds:.1f} s"  # a text that takes time by its square takes hours
+
+
+def test_no_xml_brings_anything_from_outside_or_grows():
+    bomb = "".join(f'<!ENTITY a{i + 1} "{f"&a{i};" * 10}">' for i in range(10))
+    for inner in (bomb, '<!ENTITY a1 SYSTEM "file:///etc/passwd">'):
+        with pytest.raises(InputError):
+            cameras.read(f'<!DOCTYPE document [<!ENTITY a0 "a">{inner}]><document><chunk>&a1;</chunk></document>')
+
+
+def test_a_path_in_a_file_opens_nothing_but_a_pictures_head(tmp_path):
+    text = cameras.write([camera("plain")], "transforms")
+    document = json.loads(text)
+    del document["w"], document["h"]
+    for path in ("/dev/zero", "/dev/stdin", "../../../etc/passwd", "\0", "a" * 5000):
+        document["frames"][0]["file_path"] = path
+        (tmp_path / "transforms.json").write_text(json.dumps(document))
+        with pytest.raises(InputError, match="size"):
+            cameras.read(Path(tmp_path / "transforms.json"))

@@ -1,0 +1,260 @@
+"""Formats that are only read: files made here by each format's own rule, from the camera's axes alone, are the same camera."""
+
+import json
+import struct
+
+import numpy as np
+import pytest
+
+from viewcam_addon import cameras
+from viewcam_addon.cameras import Options
+from viewcam_addon.errors import InputError
+from viewcam_addon.intrinsics import ViewPlane
+
+from .conftest import CAMERAS, allowed, picture_error, points_before
+
+UNMIRRORED = [name for name, pinhole in CAMERAS.items() if not pinhole.mirrored]
+ONE_FOCAL = [name for name in UNMIRRORED if CAMERAS[name].distance[0] == CAMERAS[name].distance[1]]
+CENTRED = [name for name in ONE_FOCAL if CAMERAS[name].principal_point == (CAMERAS[name].width / 2, CAMERAS[name].height / 2)]
+
+
+class Known:
+    """A camera in the terms in which formats are explained: axes as rows of the world, numbers from the top."""
+
+    def __init__(self, name):
+        self.pinhole = CAMERAS[name]
+        self.u, self.v, self.w = (np.array(axis) for axis in self.pinhole.axes())
+        self.e = np.array(self.pinhole.eye)
+        self.width, self.height = self.pinhole.width, self.pinhole.height
+        self.f_x, self.f_y = self.pinhole.distance
+        self.c_x, self.c_y = self.pinhole.principal_point[0], self.height - self.pinhole.principal_point[1]
+        self.opencv = np.array([self.u, -self.v, -self.w])  # world to camera
+        self.opengl = np.column_stack([self.u, self.v, self.w, self.e])  # camera to world
+
+    def quaternion(self):
+        """x, y, z, w of OpenCV's camera to world, by scipy."""
+        rotation = pytest.importorskip("scipy.spatial.transform").Rotation
+        return rotation.from_matrix(self.opencv.T).as_quat().tolist()
+
+
+def the_same(read, known, unit=2.0**-50):
+    (camera,) = read
+    points = points_before(known.pinhole)
+    column, row, _ = camera.pinhole.project(points)
+    limit = max(1e-3, allowed(known.pinhole, points, unit))
+    error = picture_error(known.pinhole, column, row, points)
+    assert error <= limit, f"{error:.3g} pixels, {limit:.3g} are allowed"
+    assert (camera.pinhole.width, camera.pinhole.height, camera.pinhole.mirrored) == (known.width, known.height, False)
+    return camera
+
+
+def text_of(numbers):
+    return " ".join(map(repr, np.asarray(numbers, dtype=float).ravel().tolist()))
+
+
+@pytest.mark.parametrize("name", ONE_FOCAL)
+def test_fspy_counts_in_halves_of_the_longer_side(tmp_path, name):
+    known = Known(name)
+    half = max(known.width, known.height) / 2
+    camera = {
+        "principalPoint": {
+            "x": (known.c_x - known.width / 2) / half,
+            "y": (known.height / 2 - known.c_y) / half,
+        },
+        "cameraTransform": {"rows": [*known.opengl.tolist(), [0, 0, 0, 1]]},
+        "relativeFocalLength": known.f_x / half,
+        "imageWidth": known.width,
+        "imageHeight": known.height,
+    }
+    state = json.dumps({"cameraParameters": camera, "calibrationSettingsBase": {"referenceDistanceUnit": "Feet"}}).encode()
+    picture = b"\x89PNG picture"
+    (tmp_path / "house.fspy").write_bytes(b"fspy" + struct.pack("<III", 1, len(state), len(picture)) + state + picture)
+    read = the_same(cameras.read(tmp_path / "house.fspy"), known)
+    assert read.picture == picture and read.name == "house" and "feet" in read.notes[0]
+
+
+def metashape(known, lens="", label="left.jpg"):
+    turn = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])  # of the chunk, with a scale of 2.5 and a move
+    moved = np.array([1.0, 2.0, 3.0])
+    local = np.eye(4)
+    local[:3, :3] = turn.T @ known.opencv.T
+    local[:3, 3] = turn.T @ (known.e - moved) / 2.5
+    return f"""<?xml version="1.0" encoding="UTF-8"?>
+<document version="1.2.0"><chunk label="Chunk 1"><sensors><sensor id="0" label="unknown" type="frame">
+<resolution width="{known.width}" height="{known.height}"/><calibration type="frame" class="adjusted">
+<resolution width="{known.width}" height="{known.height}"/><f>{known.f_y!r}</f><b1>{known.f_x - known.f_y!r}</b1>
+<cx>{known.c_x - known.width / 2!r}</cx><cy>{known.c_y - known.height / 2!r}</cy>{lens}</calibration></sensor></sensors>
+<cameras><camera id="0" label="{label}" sensor_id="0"><transform>{text_of(local)}</transform></camera>
+<camera id="1" label="lost.jpg" sensor_id="0"/></cameras>
+<transform><rotation>{text_of(turn)}</rotation><translation>{text_of(moved)}</translation><scale>2.5</scale></transform>
+</chunk></document>"""
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_metashape_stands_in_its_chunk(name):
+    read = the_same(cameras.read(metashape(Known(name))), Known(name))
+    assert read.name == "left" and read.image == "left.jpg" and any("not aligned" in note for note in read.notes)
+
+
+def test_metashapes_distortion_is_refused_with_its_pixels_or_taken_without():
+    known = Known("plain")
+    text = metashape(known, "<k1>-0.1</k1><p1>0.001</p1>")
+    with pytest.raises(InputError, match=r"corner by [\d.]+ pixels"):
+        cameras.read(text)
+    (camera,) = cameras.read(text, options=Options(without_distortion=True))
+    assert any("left out" in note and "pixels" in note for note in camera.notes)
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_reality_capture_counts_in_the_longer_side(name):
+    known = Known(name)
+    longer = max(known.width, known.height)
+    text = f"""<x:xmpmeta xmlns:x="adobe:ns:meta/"><rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#">
+<rdf:Description xmlns:xcr="http://www.capturingreality.com/ns/xcr/1.1#" xcr:Version="3" xcr:PosePrior="exact"
+ xcr:DistortionModel="brown3" xcr:FocalLength35mm="{known.f_x / longer * 36!r}" xcr:Skew="0"
+ xcr:AspectRatio="{known.f_y / known.f_x!r}" xcr:PrincipalPointU="{(known.c_x - known.width / 2) / longer!r}"
+ xcr:PrincipalPointV="{(known.c_y - known.height / 2) / longer!r}">
+<xcr:Rotation>{text_of(known.opencv)}</xcr:Rotation><xcr:Position>{text_of(known.e)}</xcr:Position>
+<xcr:DistortionCoeficients>0 0 0 0 0 0</xcr:DistortionCoeficients></rdf:Description></rdf:RDF></x:xmpmeta>"""
+    the_same(cameras.read(text, options=Options(size=(known.width, known.height))), known)
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_meshroom_lists_its_rotation_column_by_column(name):
+    known = Known(name)
+    sfm = {
+        "version": ["1", "2", "11"],
+        "views": [{"viewId": "7", "poseId": "7", "intrinsicId": "3", "path": "/photos/a.b.jpg"}],
+        "intrinsics": [
+            {
+                "intrinsicId": "3",
+                "width": str(known.width),
+                "height": str(known.height),
+                "sensorWidth": "36",
+                "type": "pinhole",
+                "focalLength": repr(known.f_y / known.width * 36),
+                "pixelRatio": repr(known.f_y / known.f_x),
+                "principalPoint": [repr(known.c_x - known.width / 2), repr(known.c_y - known.height / 2)],
+                "distortionType": "none",
+            }
+        ],
+        "poses": [
+            {
+                "poseId": "7",
+                "pose": {
+                    "transform": {
+                        "rotation": [repr(float(x)) for x in known.opencv.T.ravel()],
+                        "center": [repr(float(x)) for x in known.e],
+                    }
+                },
+            }
+        ],
+    }
+    read = the_same(cameras.read(json.dumps(sfm)), known)
+    assert read.name == "a.b" and read.image == "/photos/a.b.jpg"
+
+
+@pytest.mark.parametrize("name", ONE_FOCAL)
+def test_openmvg_names_a_type_once_and_numbers_it_then(name):
+    known = Known(name)
+    data = {"width": known.width, "height": known.height, "focal_length": known.f_x, "principal_point": [known.c_x, known.c_y]}
+    lens = {"disto_k3": [0.0, 0.0, 0.0]}
+    sfm = {
+        "sfm_data_version": "0.3",
+        "root_path": "/photos",
+        "views": [
+            {
+                "key": 0,
+                "value": {
+                    "polymorphic_id": 1073741824,
+                    "ptr_wrapper": {
+                        "id": 2147483649,
+                        "data": {"local_path": "/", "filename": "a.jpg", "id_view": 0, "id_intrinsic": 5, "id_pose": 9},
+                    },
+                },
+            }
+        ],
+        "intrinsics": [
+            {
+                "key": key,
+                "value": {
+                    "polymorphic_id": 2147483649 if key == 4 else 1,
+                    **({"polymorphic_name": "pinhole_radial_k3"} if key == 4 else {}),
+                    "ptr_wrapper": {"id": 2147483650 + key, "data": {**data, **lens}},
+                },
+            }
+            for key in (4, 5)
+        ],
+        "extrinsics": [{"key": 9, "value": {"rotation": known.opencv.tolist(), "center": known.e.tolist()}}],
+    }
+    read = the_same(cameras.read(json.dumps(sfm)), known)
+    assert any("counts pixels" in note for note in read.notes)
+    sfm["intrinsics"][0]["value"]["polymorphic_name"] = "fisheye"
+    with pytest.raises(InputError, match="fisheye"):
+        cameras.read(json.dumps(sfm))
+
+
+@pytest.mark.parametrize("name", CENTRED)
+def test_bundler_looks_along_minus_z(name):
+    known = Known(name)
+    turn = np.array([known.u, known.v, known.w])
+    rows = [[known.f_x, 0, 0], *turn, -turn @ known.e]
+    text = "# Bundle file v0.3\n2 0\n" + "\n".join(map(text_of, rows)) + "\n0 0 0\n" + "0 0 0\n" * 4
+    read = the_same(cameras.read(text, options=Options(size=(known.width, known.height))), known)
+    assert not read.size_stated and any("1 cameras that were not placed" in note for note in read.notes)
+
+
+@pytest.mark.parametrize("name", CENTRED)
+def test_llff_has_its_axes_down_right_and_backwards(tmp_path, name):
+    known = Known(name)
+    matrix = np.column_stack([-known.v, known.u, known.w, known.e, [known.height, known.width, known.f_x]])
+    np.save(tmp_path / "poses_bounds.npy", np.array([[*matrix.ravel(), 0.1, 100]]))
+    (tmp_path / "images").mkdir()
+    (tmp_path / "images" / "IMG_1.JPG").touch()
+    read = the_same(cameras.read(tmp_path), known)
+    assert read.name == "IMG_1" and read.image == "images/IMG_1.JPG"
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+@pytest.mark.parametrize("kind", ["TUM", "KITTI", "EuRoC"])
+def test_a_trajectory_is_an_animation_through_the_intrinsics_that_are_given(tmp_path, name, kind):
+    known = Known(name)
+    plane = ViewPlane(known.pinhole.distance, known.pinhole.principal_point, known.width, known.height)
+    x, y, z, w = known.quaternion()
+    lines = {
+        "TUM": f"# timestamp tx ty tz qx qy qz qw\n12.5 {text_of(known.e)} {text_of([x, y, z, w])}\n",
+        "KITTI": text_of(np.column_stack([known.opencv.T, known.e])) + "\n",
+        "EuRoC": "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []\n"
+        + ",".join(["12500000000", *map(repr, known.e.tolist()), *map(repr, [w, x, y, z])])
+        + "\n",
+    }
+    path = tmp_path / "state" / "data.csv"
+    path.parent.mkdir()
+    path.write_text(lines[kind])
+    if kind == "EuRoC":
+        with pytest.raises(InputError, match="body"):
+            cameras.read(path, options=Options(view_plane=plane))
+        (tmp_path / "cam0").mkdir()
+        unit = "[1.0, 0.0, 0.0, 0.0,\n  0.0, 1.0, 0.0, 0.0,\n 0.0, 0.0, 1.0, 0.0,\n 0.0, 0.0, 0.0, 1.0]"
+        (tmp_path / "cam0" / "sensor.yaml").write_text(f"T_BS:\n  cols: 4\n  rows: 4\n  data: {unit}\n")
+    read = the_same(cameras.read(path, options=Options(view_plane=plane)), known)
+    assert read.time == (0.0 if kind == "KITTI" else 12.5) and not read.size_stated
+    with pytest.raises(InputError, match="how it sees"):
+        cameras.read(path)
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_polycam_3d_scanner_app_and_record3d_are_arkits(name):
+    known = Known(name)
+    size = {"width": known.width, "height": known.height}
+    k = {"fx": known.f_x, "fy": known.f_y, "cx": known.c_x, "cy": known.c_y}
+    polycam = {f"t_{i}{j}": known.opengl[i, j] for i in range(3) for j in range(4)} | k | size
+    read = the_same(cameras.read(json.dumps(polycam)), known)
+    assert any("y points up" in note for note in read.notes)
+    matrix = np.array([[known.f_x, 0, known.c_x], [0, known.f_y, known.c_y], [0, 0, 1]])
+    scanner = {"cameraPoseARFrame": [*known.opengl.ravel(), 0, 0, 0, 1], "intrinsics": [*matrix.ravel()]}
+    the_same(cameras.read(json.dumps(scanner), options=Options(size=(known.width, known.height))), known)
+    rotation = pytest.importorskip("scipy.spatial.transform").Rotation
+    pose = [*rotation.from_matrix(known.opengl[:, :3]).as_quat(), *known.e]
+    record = {"poses": [pose], "K": [*matrix.T.ravel()], "w": known.width, "h": known.height, "fps": 30}
+    the_same(cameras.read(json.dumps(record)), known)

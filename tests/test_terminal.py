@@ -1,0 +1,197 @@
+"""What is printed shows itself and nothing else: no name from a file writes a line of its own or moves the cursor."""
+
+import ast
+import json
+import os
+import subprocess
+import sys
+import unicodedata
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from viewcam_addon.cli import main
+from viewcam_addon.terminal import plain
+
+PACKAGE = Path(__file__).resolve().parent.parent / "viewcam_addon"
+
+FORGED = "All is well: passed"
+HOSTILE = f"Wall\n{FORGED}\r\x1b[2K\x1b[1A\x9b31m\u2028{FORGED}\u202eklaw\u2066\x07\x08\x7f"
+"""A name that ends its line, clears it, goes up, turns red, and turns the direction of the text."""
+
+
+def assert_shows_itself(said):
+    """Nothing but characters that show themselves, and no line that a name has written."""
+    for line in said.splitlines():
+        assert all(character.isprintable() for character in line), f"{line!r} does not show itself"
+        assert not line.startswith(FORGED), f"a name has written the line {line!r}"
+
+
+@given(st.text() | st.text(st.characters(categories=["C", "Z"])))
+def test_what_is_plain_is_one_line_that_shows_itself_and_is_plain_already(text):
+    shown = plain(text)
+    assert len(shown.splitlines()) <= 1 and plain(shown) == shown
+    assert all(unicodedata.category(character)[0] != "C" for character in shown)
+    shown.encode("utf-8")  # a lone surrogate could not be printed
+
+
+@given(st.text(st.characters(categories=["L", "M", "N", "P", "S", "Zs"])))
+def test_what_people_write_stays_as_it_is(text):
+    assert plain(text) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("a\nb", r"a\nb"),
+        ("\x1b[2K", r"\x1b[2K"),
+        ("\x9b", r"\x9b"),
+        ("\u202e", r"\u202e"),
+        ("\u2028", r"\u2028"),
+        ("\udcff", r"\udcff"),
+        ("left\N{NO-BREAK SPACE}eye: 64 × 48, 10⁻⁶, 左, é", "left\N{NO-BREAK SPACE}eye: 64 × 48, 10⁻⁶, 左, é"),
+    ],
+)
+def test_an_escape_says_which_character_it_was(text, shown):
+    assert plain(text) == shown
+
+
+def test_everything_is_printed_by_the_one_that_makes_it_plain():
+    """`print` and the streams stand where they are plain, or where this list says why they need not be."""
+    allowed = {
+        "terminal.py": {"print", "stdout", "stderr"},  # say() and the streams themselves
+        "events.py": set(),  # its streams are copies; what it writes is plain or JSON in ASCII
+        "blender/animation.py": {"print", "stderr"},  # plain, as the test below sees
+        "files.py": {"stdout", "stderr"},  # flushed
+        "__main__.py": {"stdout", "stderr"},  # flushed
+        "commands/surroundings.py": {"stdout", "stderr"},  # flushed; those of children
+        "children.py": {"stdout", "stderr"},  # those of children
+    }
+    found = {}
+    for path in PACKAGE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            name = None
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+                name = node.func.id
+            elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "sys":
+                name = node.attr
+            if name in ("print", "stdout", "stderr"):
+                found.setdefault(path.relative_to(PACKAGE).as_posix(), set()).add(name)
+    extra = {path: names - allowed.get(path, set()) for path, names in found.items()}
+    assert not {path: names for path, names in extra.items() if names}, "print with terminal.say"
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """A scene file of strangers, with a name that is written to forge."""
+    camera = {"eye": [0, -5, 0], "look_at": [0, 0, 0], "up": [0, 0, 1], "distance": 10, "width": 8, "height": 6}
+    document = {
+        "format": "virtual-pinhole-scene",
+        "version": 1,
+        "camera": camera,
+        "geometries": {"ball": {"type": "spheres", "centers": [[0, 0, 0]], "radii": [1]}},
+        "objects": [{"name": HOSTILE, "geometry": "ball"}],
+        "ledger": [{"object": HOSTILE, "status": "skipped", "reason": HOSTILE}, {"object": HOSTILE, "status": "exported"}],
+    }
+    path = tmp_path / "scene.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    return path
+
+
+def test_a_comparison_prints_the_names_of_a_scene_plain(scene, tmp_path, capfd):
+    picture = tmp_path / "picture.exr"
+    assert main(["render", str(scene), str(picture), "--level", "path", "--samples", "1"]) == 0
+    assert main(["render", str(scene), str(picture)]) == 0
+    assert main(["compare", str(picture), str(picture), "--scene", str(scene), "--report", str(tmp_path / "report")]) == 0
+    said = capfd.readouterr()
+    assert_shows_itself(said.out + said.err)
+    assert rf"skipped: Wall\n{FORGED}\r\x1b[2K" in said.out, "the test's name never reached the terminal"
+
+
+@pytest.mark.parametrize("change", ["key", "name", "geometry", "path", "word", "suffix", "camera"])
+def test_an_error_shows_what_it_names_plain(scene, tmp_path, capfd, change):
+    document, words = json.loads(scene.read_text()), ["render", str(scene), str(tmp_path / "out.exr")]
+    if change == "key":
+        document[HOSTILE] = 1
+    elif change == "name":
+        document["objects"][0]["matrix"] = [[0] * 4] * 4
+    elif change == "geometry":
+        document["objects"][0]["geometry"] = HOSTILE
+    elif change == "camera":
+        document["camera"][HOSTILE] = HOSTILE
+    elif change == "path":
+        words[1] = str(tmp_path / HOSTILE)
+    elif change == "word":
+        words.append(f"--{HOSTILE}")
+    else:
+        words = ["batch", str(tmp_path / "a.blend"), str(tmp_path / f"shots.{HOSTILE}"), "--out", str(tmp_path / HOSTILE)]
+    scene.write_text(json.dumps(document))
+    for more in ([], ["--log-json"]):
+        assert main([*words, *more]) == 2
+        said = capfd.readouterr()
+        assert said.err and len(said.err.splitlines()) == 1
+        assert_shows_itself(said.out + said.err)
+
+
+def test_a_list_of_problems_is_as_many_lines_as_problems(tmp_path, capfd):
+    pytest.importorskip("bpy")
+    rows = [
+        {"name": HOSTILE, "camera": HOSTILE},
+        {"name": "b", "camera": "None", HOSTILE: 1},
+        {"name": "c", "eye": HOSTILE, "look_at": [0, 0, 0], "up": [0, 0, 1], "d": 1},
+    ]
+    path = tmp_path / "shots.json"
+    path.write_text(json.dumps(rows))
+    blend = PACKAGE.parent / "sample_scenes" / "cornell.blend"
+    assert main(["batch", str(blend), str(path), "--out", str(tmp_path / "out"), "--json", str(tmp_path / "out.json")]) == 2
+    said = capfd.readouterr().err
+    assert_shows_itself(said)
+    assert len(said.splitlines()) == 1 + len(json.loads((tmp_path / "out.json").read_text())["problems"])
+
+
+def test_names_in_a_blend_are_printed_plain(fresh_blender, tmp_path):
+    """Blender keeps any character in a name: what is exported, what a batch lists, and what a comparison leaves out."""
+    bpy = fresh_blender
+    name = HOSTILE[:60]
+    data = bpy.data.cameras.new(name)
+    camera = bpy.data.objects.new(name, data)
+    bpy.context.scene.collection.objects.link(camera)
+    bpy.context.scene.camera = camera
+    camera.location.z = 5
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.context.object.name = name
+    bpy.context.object.modifiers.new(name, "PARTICLE_SYSTEM").particle_system.settings.type = "HAIR"
+    bpy.context.object.particle_systems[0].settings.count = 3
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "names.blend"))
+    for words in (
+        ["export", "names.blend", "scene.json", "--size", "8x6"],
+        ["check", "names.blend", "--size", "8x6"],
+        ["export", "names.blend", "scene.json", "--camera", "None"],
+        ["batch", "names.blend", "--cameras", "None*", "--out", "out"],
+        ["batch", "names.blend", "--cameras", "*", "--out", "out"],
+        ["batch", "names.blend", "--frames", "1..2", "--camera", "None", "--out", "out"],
+    ):
+        command = [sys.executable, "-m", "viewcam_addon", *words]
+        environment = os.environ | {"PYTHONPATH": str(PACKAGE.parent)}
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, check=False, text=True)
+        assert "bug" not in done.stderr, done.stderr
+        assert_shows_itself(done.stdout + done.stderr)
+        assert r"\x1b" in done.stdout + done.stderr or words[0] == "check", f"{words}: the name never reached the terminal"
+
+
+def test_what_a_camera_can_not_be_at_a_frame_is_printed_plain(fresh_blender, capfd):
+    bpy = fresh_blender
+    camera = bpy.data.objects.new(HOSTILE[:60], bpy.data.cameras.new("Camera"))
+    bpy.context.scene.collection.objects.link(camera)
+    bpy.context.scene.camera = camera
+    camera.virtual_pinhole.enabled = True
+    camera.virtual_pinhole.keyframe_insert("eye", frame=1)
+    camera.virtual_pinhole.eye = camera.virtual_pinhole.look_at
+    camera.virtual_pinhole.keyframe_insert("eye", frame=10)
+    capfd.readouterr()
+    bpy.context.scene.frame_set(10)
+    said = capfd.readouterr().err
+    assert "viewcam: frame 10" in said
+    assert_shows_itself(said)

@@ -1,0 +1,162 @@
+"""How every command opens a .blend: what in it would run, or write files, is off unless the file is trusted.
+
+Blender itself leaves registered texts and drivers in Python alone when it is told to (`use_scripts`). What it does not guard is
+switched off here, before anything of the file is evaluated: `load_post` comes just before Blender's first evaluation, which
+would write caches already. docs/security.md lists the ways, with the test of each.
+
+Rejected: to switch things off where each is used (the batch had forgotten Freestyle, which export and Cycles remembered), and
+to refuse such files (their cameras and geometry are wanted all the same).
+"""
+
+import contextlib
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ..errors import InputError
+from . import ensure_registered
+from .borrowing import Borrower, borrowed
+
+# What a .blend starts with: itself, or a gzip or Zstandard stream.
+_MAGIC = (b"BLENDER", b"\x1f\x8b", b"\x28\xb5\x2f\xfd")
+
+# What a render would write beside its picture: each pass for the compositor (in the temporary folder), images as tx (5.2).
+_WRITING = ("use_render_cache", "use_auto_generate_texture_cache")
+
+_Put = Callable[[bpy.types.bpy_struct, str, Any], None]
+
+
+@contextlib.contextmanager
+def opened(blend: str | os.PathLike[str] | None, trust: bool = False) -> Iterator[tuple[Borrower, tuple[str, ...]]]:
+    """Open a .blend, or take the file that is open (None), for the time of a job.
+
+    trust : whether what is in it may run and write. A file that is open was opened by Blender, by its own `--enable-autoexec`
+    or preference; here only the rest is decided.
+
+    Gives a Borrower, and a sentence for each thing that is off and might be seen.
+
+    Raises
+    ------
+    InputError
+        if there is no such file, if Blender can't read it, or if it is trusted and was opened without its scripts.
+    """
+    ensure_registered()
+    with borrowed() as borrow:
+        if blend is not None:
+            off = open_blend(blend, trust)
+        elif not trust:
+            off = (*_disarmed(borrow.set), *_unrun())
+        elif any(_unrun()):
+            raise InputError(
+                "Blender has opened the file without running what is in it: write --enable-autoexec before the file, or leave "
+                "--trust out"
+            )
+        else:
+            off = ()
+        yield borrow, off
+
+
+def open_blend(path: str | os.PathLike[str], trust: bool = False) -> tuple[str, ...]:
+    """Open a .blend; a sentence for each thing that is off and might be seen. Raises as `opened` does."""
+    path = Path(path).absolute()
+    if not path.is_file():
+        raise InputError(f"{path} does not exist: check the name of the .blend file")
+    try:
+        with open(path, "rb") as file:
+            start = file.read(7)
+    except OSError as error:
+        raise InputError(f"{path} can't be read ({error.strerror}): check its permissions") from error
+    if not start.startswith(_MAGIC):
+        raise InputError(f"{path} is not a .blend file: give a file that Blender has saved")
+    off: list[str] = []
+    with contextlib.nullcontext() if trust else _after_reading(lambda: off.extend(_disarmed(setattr))):
+        try:
+            bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=trust)
+        except RuntimeError as error:
+            reason = str(error).strip().splitlines()[0].removeprefix("Error: ").rstrip(".")
+            raise InputError(f"{path} can't be opened by Blender {bpy.app.version_string} ({reason}): save it again") from error
+    return (*off, *_unrun())
+
+
+@contextlib.contextmanager
+def _after_reading(work: Callable[[], None]) -> Iterator[None]:
+    """Call `work` when the file that is opened meanwhile is read and not yet evaluated. What it raises is raised at the end."""
+    failures: list[BaseException] = []
+
+    @bpy.app.handlers.persistent
+    def read(*_: object) -> None:
+        try:
+            work()
+        except BaseException as error:  # Blender would print it, and go on
+            failures.append(error)
+
+    bpy.app.handlers.load_post.insert(0, read)
+    try:
+        yield
+    finally:
+        bpy.app.handlers.load_post.remove(read)
+    if failures:
+        raise failures[0]
+
+
+def _disarmed(put: _Put) -> Iterator[str]:
+    """Switch off what Blender does not guard. put : sets a property."""
+    for scene in bpy.data.scenes:  # the compositor renders others, too
+        for name in _WRITING:
+            if hasattr(scene.render, name):
+                put(scene.render, name, False)
+        for layer in scene.view_layers:
+            if layer.use_freestyle and layer.freestyle_settings.mode == "SCRIPT":
+                put(layer, "use_freestyle", False)
+                if scene.render.use_freestyle:
+                    yield f"Freestyle draws no lines in view layer {layer.name!r}: they are a script of the file"
+        if getattr(getattr(scene, "cycles", None), "shading_system", False) and _has_script_nodes():
+            put(scene.cycles, "shading_system", False)
+            yield f"Open Shading Language is off in scene {scene.name!r}: script nodes are programs, and shade nothing"
+    for camera in bpy.data.cameras:
+        if camera.type == "CUSTOM":
+            for name, nothing in (("custom_filepath", ""), ("custom_shader", None), ("custom_bytecode", "")):
+                put(camera, name, nothing)
+    for cache in _point_caches():
+        if cache.use_disk_cache and not cache.is_baked:
+            cache.use_disk_cache = False  # in memory until the end: to give it back would write it
+    for each in bpy.data.objects:
+        for modifier in filter(_writes_always, each.modifiers):
+            put(modifier, "show_viewport", False)
+            put(modifier, "show_render", False)
+            yield f"the modifier {modifier.name!r} of {each.name!r} is off: it is not baked, and would write what it simulates"
+
+
+def _unrun() -> Iterator[str]:
+    """What Blender says of texts and drivers that it has not run."""
+    if bpy.app.autoexec_fail:
+        what = bpy.app.autoexec_fail_message
+        yield f"Python of the file does not run ({what}), and drivers that need it keep their last values"
+
+
+def _has_script_nodes() -> bool:
+    kinds = (bpy.data.materials, bpy.data.worlds, bpy.data.lights, bpy.data.linestyles)
+    trees = [*bpy.data.node_groups, *(block.node_tree for kind in kinds for block in kind if block.node_tree)]
+    return any(node.bl_idname == "ShaderNodeScript" for tree in trees for node in tree.nodes)
+
+
+def _point_caches() -> Iterator[bpy.types.PointCache]:
+    """Of the simulations that can also keep theirs in memory."""
+    for each in bpy.data.objects:
+        for modifier in each.modifiers:
+            if modifier.type in ("CLOTH", "SOFT_BODY"):
+                yield modifier.point_cache
+        yield from (system.point_cache for system in each.particle_systems)
+    yield from (scene.rigidbody_world.point_cache for scene in bpy.data.scenes if scene.rigidbody_world)
+
+
+def _writes_always(modifier: bpy.types.Modifier) -> bool:
+    """Whether it is simulated where a baked one would only be read, and knows nothing but files for it."""
+    if modifier.type == "FLUID" and modifier.fluid_type == "DOMAIN":
+        return modifier.domain_settings.cache_type == "REPLAY" or modifier.domain_settings.is_cache_baking_any
+    if modifier.type == "DYNAMIC_PAINT" and modifier.canvas_settings:
+        return not all(surface.point_cache.is_baked for surface in modifier.canvas_settings.canvas_surfaces)
+    return False

@@ -1,0 +1,100 @@
+"""What phones record: Polycam's and 3D Scanner App's JSON of each picture, and Record3D's metadata.
+
+All are ARKit's: world y up (against gravity), metres, camera x right, y up, z away from the view in the landscape picture.
+Polycam lists the matrix as t_00 … t_23, row after row; of its two folders the corrected one is meant. 3D Scanner App has
+cameraPoseARFrame, row after row. Record3D has a pose as qx qy qz qw tx ty tz and K column after column.
+
+Source: nerfstudio's polycam_utils.py and record3d_utils.py, and ARKit's documentation of ARCamera.
+"""
+
+import numpy as np
+
+from ..errors import InputError
+from . import axes
+from .camera import Camera, Options
+from .source import Record, Source, image_size
+
+TITLE = "ARKit: Polycam, 3D Scanner App, Record3D"
+
+_Y_UP = "ARKit's y points up: the numbers stay as they are unless the axes Y up → Z up are chosen"
+_FOLDERS = ((), ("corrected_cameras",), ("keyframes", "corrected_cameras"), ("cameras",), ("keyframes", "cameras"))
+_POLYCAM = {f"t_{row}{column}" for row in range(3) for column in range(4)}
+
+
+def recognises(source: Source) -> bool:
+    return bool(_files(source)) or _is_record3d(source)
+
+
+def read(source: Source, options: Options) -> list[Camera]:
+    if _is_record3d(source):
+        cameras = _record3d(source if not source.is_folder else source.file("metadata"), options)
+    else:
+        cameras = [_camera(file, options) for file in _files(source)]
+    return cameras if options.axes == "y_up" else [camera.noted(_Y_UP) for camera in cameras]
+
+
+def _files(source: Source) -> list[Source]:
+    if not source.is_folder:
+        return [source] if _is_ours(source) else []
+    for parts in _FOLDERS:
+        folder = Source(source.path.joinpath(*parts))
+        first = next(folder.files("*.json"), None)
+        if first and _is_ours(first):
+            return [file for file in folder.files("*.json") if _is_ours(file)]
+    return []
+
+
+def _is_ours(source: Source) -> bool:
+    keys = source.document.keys()
+    return keys >= _POLYCAM or {"cameraPoseARFrame", "intrinsics"} <= keys
+
+
+def _is_record3d(source: Source) -> bool:
+    source = source.file("metadata") if source.is_folder else source
+    return source is not None and {"poses", "K", "w", "h"} <= source.document.keys()
+
+
+def _camera(source: Source, options: Options) -> Camera:
+    name = source.path.stem if source.path else "camera"
+    values = Record(source.document, name)
+    matrix = np.eye(4)
+    if "cameraPoseARFrame" in values:
+        matrix[:] = np.array(values.numbers("cameraPoseARFrame", 16)).reshape(4, 4)
+        f_x, _, c_x, _, f_y, c_y, *_ = values.numbers("intrinsics", 9)
+        size = (
+            next(filter(None, (image_size(source.path.with_suffix(s)) for s in (".jpg", ".png"))), None)
+            if source.path
+            else None
+        )
+        stated = size is not None
+        size = size or options.size_or_refuse(name)
+    else:
+        matrix[:3] = [[values.number(f"t_{row}{column}") for column in range(4)] for row in range(3)]
+        f_x, f_y, c_x, c_y = (values.number(key) for key in ("fx", "fy", "cx", "cy"))
+        size, stated = (values.size("width"), values.size("height")), True
+    if not (f_x > 0 and f_y > 0):
+        raise InputError(f"{name} has the focal length {min(f_x, f_y):g}: give one above 0")
+    pinhole, notes = axes.pinhole(matrix, axes.view_plane(f_x, f_y, c_x, c_y, size), name)
+    time = values.number("timestamp") * 1e-6 if "timestamp" in values and "t_00" in values else None
+    return Camera(name, pinhole, stated, notes, time=time)
+
+
+def _record3d(source: Source, options: Options) -> list[Camera]:
+    values = Record(source.document, source.name)
+    k = np.array(values.numbers("K", 9)).reshape(3, 3).T
+    if not (k[0, 0] > 0 and k[1, 1] > 0):
+        raise InputError(f"K of {source.name} has no focal lengths above 0: record it again")
+    plane = axes.view_plane(k[0, 0], k[1, 1], k[0, 2], k[1, 2], (values.size("w"), values.size("h")))
+    poses = values.get("poses")
+    if not isinstance(poses, list) or not poses:
+        raise InputError(f"{source.name} has no poses: record it again")
+    rate = values.number("fps", 60.0, 1e-3)
+    cameras = []
+    for index, pose in enumerate(poses):
+        what = f"pose {index}"
+        x, y, z, w, *eye = Record({"pose": pose}, what).numbers("pose", 7)
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = axes.rotation_of((w, x, y, z), what), eye
+        pinhole, notes = axes.pinhole(matrix, plane, what)
+        cameras.append(Camera(f"pose_{index:04d}", pinhole, True, notes, time=index / rate))
+    return cameras

@@ -1,0 +1,133 @@
+"""Agisoft Metashape's cameras as XML.
+
+A camera's transform is from its axes (x right, y down, z into the view) to its component, that one's to the chunk, and the
+chunk's to the world; all three count here. The principal point is an offset from the picture's middle, whose first pixel's
+centre is (0.5, 0.5). b1 is what the distance across has more than the other, b2 is skew, which no pinhole has. P1 and P2 are
+OpenCV's p2 and p1.
+
+Source: the Metashape manual's camera model, and its exported files. nerfstudio's reader leaves out the chunk's transform.
+"""
+
+import contextlib
+from xml.etree import ElementTree
+
+import numpy as np
+
+from .. import checks
+from ..errors import InputError
+from ..intrinsics import ViewPlane
+from . import axes, distortion, naming
+from .camera import Camera, Options, not_a_pinhole
+from .source import Source, flat, number, pixels
+
+TITLE = "Agisoft Metashape XML"
+
+_LENS = ("k1", "k2", "k3", "k4", "p1", "p2", "p3", "p4")
+
+
+def recognises(source: Source) -> bool:
+    head = source.text[:4000]
+    return "<document" in head and "<chunk" in source.text and source.xml is not None and source.xml.tag == "document"
+
+
+def read(source: Source, options: Options) -> list[Camera]:
+    found, lost = [], 0
+    for chunk in source.xml.iter("chunk"):
+        whole = _placed(chunk.find("transform"), "the chunk")
+        components = {
+            component.get("id"): _placed(component.find("transform"), f"component {component.get('id')}")
+            for component in chunk.iter("component")
+        }
+        planes: dict[str | None, tuple[ViewPlane, tuple[str, ...]]] = {}
+        sensors = {sensor.get("id"): sensor for sensor in chunk.iter("sensor")}
+        for camera in chunk.iter("camera"):
+            transform = camera.find("transform")
+            if transform is None or not (transform.text or "").strip():
+                lost += 1
+                continue
+            label = camera.get("label") or f"camera {camera.get('id')}"
+            what = f"camera {checks.shown(label)}"
+            sensor = camera.get("sensor_id")
+            if sensor not in sensors:
+                raise InputError(f"{what} is of the sensor {checks.shown(sensor)}, which is not there: export the XML again")
+            if sensor not in planes:
+                planes[sensor] = _plane(sensors[sensor], options)
+            plane, notes = planes[sensor]
+            numbers = flat(f"the transform of {what}", (transform.text or ""))
+            if len(numbers) != 16:
+                raise InputError(f"the transform of {what} has {len(numbers)} numbers: it should have 16")
+            component = components.get(camera.get("component_id"), np.eye(4))
+            matrix = axes.of_opencv(whole @ component @ np.array(numbers).reshape(4, 4))
+            pinhole, more = axes.pinhole(_without_scale(matrix), plane, what)
+            image = label if naming.has_suffix(label) else None
+            found.append(Camera(naming.stem(label), pinhole, True, (*notes, *more), image))
+    if lost and not found:
+        raise InputError(f"none of the {lost} cameras of {source.name} is aligned: align them in Metashape first")
+    told = (f"{lost} cameras that are not aligned were left out",) if lost else ()
+    return [camera.noted(*told) for camera in found]
+
+
+def _placed(transform: ElementTree.Element | None, what: str) -> np.ndarray:
+    matrix = np.eye(4)
+    if transform is None:
+        return matrix
+    parts = {
+        child.tag: flat(f"the {child.tag} of {what}", child.text or "") for child in transform if (child.text or "").strip()
+    }
+    scale = parts.get("scale", (1.0,))[0]
+    turn = parts.get("rotation", tuple(np.eye(3).flat))
+    moved = parts.get("translation", (0.0, 0.0, 0.0))
+    if len(turn) != 9 or len(moved) != 3 or not scale > 0:
+        raise InputError(f"the transform of {what} should have 9, 3 and 1 numbers above 0: export the XML again")
+    matrix[:3, :3] = scale * np.array(turn).reshape(3, 3)
+    matrix[:3, 3] = moved
+    return matrix
+
+
+def _without_scale(matrix: np.ndarray) -> np.ndarray:
+    matrix = matrix.copy()
+    size = abs(float(np.linalg.det(matrix[:3, :3]))) ** (1 / 3)
+    if 1e-100 < size < 1e100:
+        matrix[:3, :3] /= size
+    return matrix
+
+
+def _plane(sensor: ElementTree.Element, options: Options) -> tuple[ViewPlane, tuple[str, ...]]:
+    what = f"sensor {checks.shown(sensor.get('label') or sensor.get('id'))}"
+    if sensor.get("type", "frame") != "frame":
+        not_a_pinhole(what, f"of the type {checks.shown(sensor.get('type'))}")
+    found = [each for each in sensor.findall("calibration") if each.find("f") is not None]
+    adjusted = [each for each in found if each.get("class") == "adjusted"] or found
+    if not adjusted:
+        raise InputError(f"{what} has no calibration: align the photos in Metashape first")
+    calibration = adjusted[-1]
+    resolution = calibration.find("resolution")
+    resolution = sensor.find("resolution") if resolution is None else resolution
+    if resolution is None:
+        raise InputError(f"{what} has no resolution: export the XML again")
+    size = [pixels(f"the {side} of {what}", resolution.get(side)) for side in ("width", "height")]
+    values: dict[str, float] = {}
+    for child in calibration:
+        with contextlib.suppress(InputError):
+            values[child.tag] = number(f"{child.tag} of {what}", child.text or "")
+    focal = values.get("f", values.get("fy", 0.0))
+    if not (focal > 0 and focal + values.get("b1", 0.0) > 0):
+        raise InputError(f"{what} has the focal length {focal:g}: give one above 0")
+    if abs(values.get("b2", 0.0)) > 1e-9 * focal:
+        raise InputError(
+            f"{what} has a skew of {values['b2']:g} pixels (b2), which no pinhole camera here has: undistort the photos"
+        )
+    across = values.get("fx", focal) + values.get("b1", 0.0)
+    plane = axes.view_plane(
+        across, focal, size[0] / 2 + values.get("cx", 0.0), size[1] / 2 + values.get("cy", 0.0), tuple(size)
+    )
+    bent = {name: values[name] for name in _LENS if name in values}
+    lens = distortion.opencv(
+        {
+            **{name: bent.get(name, 0.0) for name in ("k1", "k2", "k3")},
+            "r8": bent.get("k4", 0.0),
+            "p1": bent.get("p2", 0.0),
+            "p2": bent.get("p1", 0.0),
+        }
+    )
+    return plane, distortion.settle(bent, lens, plane, what, options)

@@ -1,0 +1,83 @@
+"""OpenMVG's sfm_data as JSON: views, intrinsics and extrinsics as the cereal library writes them.
+
+An extrinsic has the rotation from world to camera (x right, y down, z into the view), row by row, and the eye. cereal names a
+type where it first appears and numbers it from then on. From where OpenMVG counts pixels is said nowhere: the principal point
+is taken as it stands, from the picture's corner, and a note says so.
+
+Source: OpenMVG's src/openMVG/sfm/sfm_data_io_cereal.hpp and cameras/Camera_*_io.hpp.
+"""
+
+import numpy as np
+
+from .. import checks
+from ..errors import InputError
+from ..intrinsics import ViewPlane
+from . import axes, distortion, naming, opencv
+from .camera import Camera, Options, not_a_pinhole
+from .source import Record, Source
+
+TITLE = "OpenMVG sfm_data.json"
+
+_NONE = 2**32 - 1
+_LENSES = {"disto_k1": ("k1",), "disto_k3": ("k1", "k2", "k3"), "disto_t2": ("k1", "k2", "k3", "p1", "p2")}
+_PINHOLES = ("pinhole", "pinhole_radial_k1", "pinhole_radial_k3", "pinhole_brown_t2")
+
+
+def recognises(source: Source) -> bool:
+    return {"sfm_data_version", "views", "intrinsics"} <= source.document.keys()
+
+
+def read(source: Source, options: Options) -> list[Camera]:
+    document = Record(source.document, source.name)
+    poses = {each.values.get("key"): each.record("value") for each in document.records("extrinsics", "extrinsic")}
+    kinds: dict[int, str] = {}
+    intrinsics = {}
+    for each in document.records("intrinsics", "intrinsic"):
+        value = each.record("value")
+        number = value.values.get("polymorphic_id")
+        number = number & 0x3FFFFFFF if isinstance(number, int) else -1
+        kinds.setdefault(number, str(value.values.get("polymorphic_name") or "pinhole"))
+        intrinsics[each.values.get("key")] = (kinds[number], value.record("ptr_wrapper").record("data"))
+    root = document.values.get("root_path")
+    found, lost = [], 0
+    for each in document.records("views", "view"):
+        view = each.record("value").record("ptr_wrapper").record("data")
+        pose, intrinsic = view.values.get("id_pose"), view.values.get("id_intrinsic")
+        if pose not in poses or intrinsic not in intrinsics or intrinsic == _NONE:
+            lost += 1
+            continue
+        path = "/".join(part for part in (str(view.get("local_path") or ""), str(view.get("filename") or "")) if part)
+        found.append((path or f"view {view.get('id_view')}", poses[pose], *intrinsics[intrinsic]))
+    if not found:
+        raise InputError(f"none of the {lost} views of {source.name} has a pose: let OpenMVG reconstruct it first")
+    told = (f"{lost} views without a pose were left out",) if lost else ()
+    if not options.pixel:
+        told += ("OpenMVG does not say from where it counts pixels: the principal point was taken from the picture's corner",)
+    planes: dict[int, tuple[ViewPlane, tuple[str, ...]]] = {}
+    cameras = []
+    for (path, pose, kind, data), name in zip(found, naming.distinct([path for path, *_ in found]), strict=True):
+        if id(data) not in planes:
+            planes[id(data)] = _plane(data, kind, options)
+        plane, notes = planes[id(data)]
+        matrix = np.eye(4)
+        matrix[:3, :3] = np.array(pose.numbers("rotation", 9)).reshape(3, 3).T
+        matrix[:3, 3] = pose.numbers("center", 3)
+        pinhole, more = axes.pinhole(axes.of_opencv(matrix), plane, f"view {checks.shown(name)}")
+        image = f"{root}/{path}" if isinstance(root, str) and root else path
+        cameras.append(Camera(name, pinhole, True, (*told, *notes, *more), image))
+    return cameras
+
+
+def _plane(data: Record, kind: str, options: Options) -> tuple[ViewPlane, tuple[str, ...]]:
+    if kind not in _PINHOLES:
+        not_a_pinhole(data.place, f"of the type {checks.shown(kind)}")
+    inner = data.record("value0") if "value0" in data and "focal_length" not in data else data
+    f = inner.number("focal_length", least=1e-9)
+    c_x, c_y = inner.numbers("principal_point", 2)
+    half = opencv.half_pixel(options, "corner")
+    plane = axes.view_plane(f, f, c_x + half, c_y + half, (inner.size("width"), inner.size("height")))
+    key = next((key for key in _LENSES if key in data), None)
+    if key is None:
+        return plane, ()
+    numbers = dict(zip(_LENSES[key], data.numbers(key, len(_LENSES[key])), strict=True))
+    return plane, distortion.settle(numbers, distortion.opencv(numbers), plane, data.place, options)

@@ -1,0 +1,102 @@
+"""Trajectories as evo and the odometry benchmarks have them: TUM, KITTI and EuRoC. Poses alone; how the camera sees is given.
+
+    TUM     t tx ty tz qx qy qz qw      seconds, camera to world
+    KITTI   twelve numbers              3 × 4, row by row, camera to the world of the first one
+    EuRoC   ns, p, q w x y z, …         of the body; a cam0/sensor.yaml of the data set says how the camera stands on it
+
+Camera axes are x right, y down, z into the view. Each pose becomes a camera with its time, so that they make one animation.
+
+Sources: the data sets' own pages, and evo's file_interface.py for the order of numbers.
+"""
+
+import re
+
+import numpy as np
+
+from ..errors import InputError
+from ..intrinsics import ViewPlane
+from . import axes, opencv
+from .camera import Camera, Options
+from .source import Record, Source, flat
+
+TITLE = "trajectories of TUM, KITTI and EuRoC"
+
+_MOST = 1_000_000
+_KITTI_STEP = 0.1  # seconds; its pictures are taken at 10 Hz
+
+
+def recognises(source: Source) -> bool:
+    return _kind(source) is not None
+
+
+def read(source: Source, options: Options) -> list[Camera]:
+    kind = _kind(source)
+    rows = _rows(source)
+    if len(rows) > _MOST:
+        raise InputError(f"{source.name} has {len(rows)} poses: give at most {_MOST}")
+    mounted, plane, notes = np.eye(4), None, ()
+    if kind == "EuRoC":
+        mounted, plane, notes = _sensor(source, options)
+    plane = options.view_plane or plane or options.plane_or_refuse(source.name)
+    digits = max(4, len(str(len(rows) - 1)))
+    stated = kind == "EuRoC" and options.view_plane is None
+    cameras = []
+    for index, row in enumerate(rows):
+        what = f"pose {index}"
+        matrix, time = np.eye(4), index * _KITTI_STEP
+        if kind == "KITTI":
+            matrix[:3] = np.array(row).reshape(3, 4)
+        else:
+            x, y, z, w = row[4:8] if kind == "TUM" else (*row[5:8], row[4])
+            matrix[:3, :3], matrix[:3, 3] = axes.rotation_of((w, x, y, z), what), row[1:4]
+            time = row[0] if kind == "TUM" else row[0] * 1e-9
+        pinhole, more = axes.pinhole(axes.of_opencv(matrix @ mounted), plane, what)
+        cameras.append(Camera(f"pose_{index:0{digits}d}", pinhole, stated, (*notes, *more), time=time))
+    return cameras
+
+
+def _kind(source: Source) -> str | None:
+    """Which of them it is, by its first lines that are none of comments."""
+    if source.is_folder or source.is_binary or source.text[:1] in "{[<%":
+        return None
+    if re.match(r"#\s*timestamp.*p_(?:RS_)?R_?", source.text[:400]):
+        return "EuRoC"
+    counts = set()
+    for line in source.text[:20000].split("\n")[:-1][:20] or [source.text[:20000]]:
+        if line.strip() and not line.lstrip().startswith("#"):
+            words = re.split(r"[\s,]+", line.strip())
+            if not all(re.fullmatch(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", word) for word in words):
+                return None
+            counts.add((len(words), "," in line))
+    return {(8, False): "TUM", (12, False): "KITTI"}.get(*counts) if len(counts) == 1 else None
+
+
+def _rows(source: Source) -> list[tuple[float, ...]]:
+    rows = []
+    for number, line in enumerate(source.text.split("\n"), start=1):
+        if line.strip() and not line.lstrip().startswith("#"):
+            row = flat(f"line {number} of {source.name}", line.strip().rstrip(","))
+            if (rows and len(row) != len(rows[0])) or len(row) < 8:
+                raise InputError(f"line {number} of {source.name} has {len(row)} numbers: a pose has as many as the others")
+            rows.append(row)
+    return rows
+
+
+def _sensor(source: Source, options: Options) -> tuple[np.ndarray, ViewPlane | None, tuple[str, ...]]:
+    """Where EuRoC's cam0 stands on the body, and how it sees."""
+    file = next((found for up in ("..", "../..") if (found := source.file(*up.split("/"), "cam0", "sensor.yaml"))), None)
+    if file is None:
+        raise InputError(
+            f"{source.name} has poses of the body, not of a camera: put it where ../cam0/sensor.yaml of the data set is found"
+        )
+    values = Record(opencv.yaml(file.text), str(file.path))
+    mounted = np.array(values.record("T_BS").numbers("data", 16)).reshape(4, 4)
+    if options.view_plane or "intrinsics" not in values:
+        return mounted, None, ()
+    f_x, f_y, c_x, c_y = values.numbers("intrinsics", 4)
+    size = tuple(int(side) for side in values.numbers("resolution", 2))
+    half = opencv.half_pixel(options)
+    plane = axes.view_plane(f_x, f_y, c_x + half, c_y + half, size)
+    numbers = values.numbers("distortion_coefficients", 4) if "distortion_coefficients" in values else ()
+    notes = opencv.settled(opencv.coefficients(numbers, "cam0"), plane, "cam0", options)
+    return mounted, plane, (*notes, *opencv.told_of_half_pixel(options, "EuRoC"))

@@ -1,0 +1,88 @@
+"""`viewcam camera`: cameras of any program, listed or written for another.
+
+A file, a folder or, as "-", what stands on standard input; see cameras/.
+"""
+
+import argparse
+import dataclasses
+import sys
+from pathlib import Path
+
+from .. import cameras
+from ..cameras import Camera, Options
+from ..cameras.sidecar import record
+from ..errors import InputError
+from ..intrinsics import ViewPlane
+from ..terminal import say
+from . import Result
+
+_MOST_CHARACTERS = 100_000_000
+
+
+def options_of(options: argparse.Namespace) -> Options:
+    """What the words of camera_words.py say, which `viewcam batch` has, too."""
+    plane = None
+    if options.distance is not None:
+        if options.size is None:
+            raise InputError("--distance counts pixels of a picture: give --size as well")
+        width, height = options.size
+        distance = (options.distance, options.distance * options.pixel_aspect)
+        plane = ViewPlane(distance, (width / 2, height / 2), width, height)
+    return Options(
+        axes=options.axes,
+        scale=options.scale,
+        size=options.size,
+        pixel_aspect=options.pixel_aspect,
+        view_plane=plane,
+        angle_unit=options.angles,
+        pixel=options.pixel,
+        without_distortion=options.without_distortion,
+        unmirrored=options.unmirrored,
+        original_world=options.original_world,
+    )
+
+
+def run(options: argparse.Namespace) -> Result:
+    if options.list and options.to:
+        raise InputError("--list and --to say each what to do with the cameras: give one of them")
+    if options.out and not options.to:
+        raise InputError("--out says where to, but not in which format: give --to")
+    given = sys.stdin.read(_MOST_CHARACTERS) if options.file == "-" else Path(options.file)
+    found = cameras.read(given, format=options.format, options=options_of(options))
+    if options.camera is not None:
+        found = [cameras.choose(found, options.camera)]
+    notes = list(dict.fromkeys(note for camera in found for note in camera.notes))
+    for note in notes:
+        options.events.tell("note", command=options.command, text=note)
+    result = {"cameras": [{"name": each.name, **_said(each)} for each in found], "notes": notes}
+    if options.to is None:
+        say(*(_line(camera) for camera in found))
+        return 0, result
+    how = Options(axes=options.out_axes, scale=options.out_scale, pixel=options.pixel)
+    if options.out is None:
+        content = cameras.write(found, options.to, how)
+        if not isinstance(content, str):
+            raise InputError(f"{options.to} is {len(content)} files, {', '.join([*content][:3])}: give a folder with --out")
+        say(*content.removesuffix("\n").split("\n"))
+        return 0, result
+    written = cameras.save(found, options.out, options.to, how)
+    count = "1 camera" if len(found) == 1 else f"{len(found)} cameras"
+    say(f"{count}, as {cameras.FORMATS[options.to].TITLE}: {options.out}")
+    return 0, result | {"written": [str(path) for path in written]}
+
+
+def _said(camera: Camera) -> dict:
+    said = dataclasses.asdict(camera)
+    kept = {key: said[key] for key in ("size_stated", "image", "time", "notes")}
+    return {**kept, "camera": record(camera.pinhole)["camera"]}
+
+
+def _line(camera: Camera) -> str:
+    pinhole = camera.pinhole
+    e, l = (", ".join(f"{number:.6g}" for number in point) for point in (pinhole.eye, pinhole.look_at))
+    d = " × ".join(f"{number:.6g}" for number in dict.fromkeys(pinhole.distance))
+    c = ", ".join(f"{number:.6g}" for number in pinhole.principal_point)
+    shifted = "" if pinhole.principal_point == (pinhole.width / 2, pinhole.height / 2) else f", principal point {c}"
+    mirrored = ", mirrored" if pinhole.mirrored else ""
+    size = f"{pinhole.width} × {pinhole.height}{'' if camera.size_stated else ' (as given)'}"
+    return f"{camera.name}: {size}, d = {d}{shifted}{mirrored}, eye ({e}), look-at ({l})"
