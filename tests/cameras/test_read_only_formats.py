@@ -258,3 +258,63 @@ def test_polycam_3d_scanner_app_and_record3d_are_arkits(name):
     pose = [*rotation.from_matrix(known.opengl[:, :3]).as_quat(), *known.e]
     record = {"poses": [pose], "K": [*matrix.T.ravel()], "w": known.width, "h": known.height, "fps": 30}
     the_same(cameras.read(json.dumps(record)), known)
+
+
+@pytest.mark.parametrize("name", CENTRED)
+def test_gaussian_splatting_lists_camera_to_world(name):
+    known = Known(name)
+    said = {"id": 0, "img_name": "00001", "width": known.width, "height": known.height, "fx": known.f_x, "fy": known.f_y}
+    said |= {"position": known.e.tolist(), "rotation": known.opencv.T.tolist()}
+    read = the_same(cameras.read(json.dumps([said])), known)
+    assert read.name == "00001" and any("principal point" in note for note in read.notes)
+
+
+KALIBR = """cam0:
+  camera_model: pinhole
+  distortion_coeffs: [0.0, 0.0, 0.0, 0.0]
+  distortion_model: radtan
+  intrinsics: [500.0, 510.0, 320.0, 240.0]
+  resolution: [640, 480]
+cam1:
+  T_cn_cnm1:
+  - [1.0, 0.0, 0.0, -0.1]
+  - [0.0, 1.0, 0.0, 0.0]
+  - [0.0, 0.0, 1.0, 0.0]
+  - [0.0, 0.0, 0.0, 1.0]
+  camera_model: pinhole
+  distortion_coeffs: [0.0, 0.0, 0.0, 0.0]
+  distortion_model: radtan
+  intrinsics: [501.0, 511.0, 321.0, 241.0]
+  resolution: [640, 480]
+"""
+
+
+def test_kalibrs_second_camera_stands_beside_the_first():
+    first, second = cameras.read(KALIBR)
+    assert first.pinhole.eye == (0, 0, 0) and second.pinhole.eye == pytest.approx((0.1, 0, 0))
+    assert second.pinhole.principal_point == (321.5, 480 - 241.5) and second.pinhole.distance == (501, 511)
+
+
+K = {"K": [[500, 0, 320], [0, 500, 240], [0, 0, 1]], "image_size": [640, 480]}
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        ({"k1": 0.1}, "corner by"),
+        ({"distortion": [0.1, 0, 0, 0]}, "corner by"),
+        ({"radial_distortion": [0.1, 0.2]}, "radialdistortion"),
+        ({"kc": [0.1, 0.2]}, "kc"),
+        ({"R": [0.1, 0.2, 0.3], "t": [0, 0, 0]}, "rotation vector"),
+        ({"R": np.eye(3).tolist()}, "only a part"),
+        ({"c2w": np.eye(4).tolist()}, "whose axes"),
+        ({"R": (2 * np.eye(3) + np.diag([0, 0, 1])).tolist(), "t": [0, 0, 0]}, "lengths"),
+        ({"R": np.eye(3).tolist(), "rvec": [0, 0, 1], "t": [0, 0, 0]}, "different rotations"),
+        ({"K": [[500, 0, 0], [0, 500, 0], [320, 240, 1]]}, "transpose"),
+        ({"K": [[500, 2, 320], [0, 500, 240], [0, 0, 1]]}, "skew"),
+        ({"model": "fisheye"}, "fisheye"),
+    ],
+)
+def test_what_opencvs_names_leave_open_is_refused_and_not_guessed(more, told):
+    with pytest.raises(InputError, match=told):
+        cameras.read(json.dumps({**K, **more}))

@@ -29,12 +29,12 @@ from ..errors import InputError
 from ..intrinsics import ViewPlane
 from . import axes, distortion, naming
 from .camera import Camera, Options, not_a_pinhole
-from .source import Record, Source, flat, pixels
+from .source import Record, Source, flat, number, pixels
 
 TITLE = "OpenCV K, R, t (FileStorage YAML, JSON or XML; NPZ)"
 SUFFIX = ".yml"
 
-_K = ("k", "cameramatrix", "intrinsicmatrix", "intrinsics", "intrinsic", "mtx", "cammatrix", "camk", "kmatrix", "m", "m1")
+_K = ("k", "cameramatrix", "intrinsicmatrix", "intrinsics", "intrinsic", "mtx", "cammatrix", "camk", "kmatrix")
 _R = ("r", "rot", "rotation", "rmat", "rotationmatrix", "rw2c")
 _RVEC = ("rvec", "rodrigues", "rotationvector", "rvecs")
 _T = ("t", "tvec", "translation", "translationvector", "trans", "tw2c")
@@ -42,11 +42,14 @@ _EXTRINSIC = ("extrinsic", "extrinsics", "rt", "worldtocamera", "w2c", "tcw", "e
 _DISTORTION = (
     "distortioncoefficients", "distcoeffs", "dist", "distortion", "distcoef", "distcoeff", "d", "distortioncoeffs", "dist0",
 )  # fmt: skip
+_OTHER_DISTORTION = re.compile(r"dist(?!ance)|radial|tangential|^kc$|^[kp][1-6]$")
+_OTHER_POSE = ("pose", "c2w", "cam2world", "cameratoworld", "camtoworld", "twc", "camerapose", "quaternion", "q", "qvec")
 _WIDTH = ("imagewidth", "width", "w", "resx")
 _HEIGHT = ("imageheight", "height", "h", "resy")
 _SIZE = ("imagesize", "size", "resolution", "imgsize", "imagesizewh")
 NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tx", "ty")
 """Of the distortion's coefficients, in OpenCV's order."""
+_WAY = "R and t were taken as from world to camera, x right, y down, z into the view"
 
 
 def recognises(source: Source) -> bool:
@@ -54,7 +57,20 @@ def recognises(source: Source) -> bool:
 
 
 def read(source: Source, options: Options) -> list[Camera]:
-    return [_camera(name, values, source, options) for name, values in _found(source)]
+    cameras, before = [], np.eye(4)
+    for name, values in _found(source):
+        if "tcncnm1" in values:  # Kalibr's: from the camera before to this one
+            before = _four_rows(values["tcncnm1"], f"T_cn_cnm1 of camera {checks.shown(name)}") @ before
+            values |= {"r": before[:3, :3].tolist(), "t": before[:3, 3].tolist()}
+        cameras.append(_camera(name, values, options))
+    return cameras
+
+
+def _four_rows(value: Any, name: str) -> np.ndarray:
+    numbers = _numbers(name, value)
+    if len(numbers) != 16 or numbers[12:] != (0, 0, 0, 1):
+        raise InputError(f"{name} is not 4 × 4 with the last row 0 0 0 1: correct it")
+    return np.array(numbers).reshape(4, 4)
 
 
 def write(cameras: Sequence[Camera], options: Options) -> str | dict[str, str]:
@@ -336,7 +352,7 @@ def settled(numbers: dict[str, float], plane: ViewPlane, what: str, options: Opt
     return distortion.settle(numbers, distortion.opencv(numbers), plane, what, options)
 
 
-def _camera(name: str, values: Mapping[str, Any], source: Source, options: Options) -> Camera:
+def _camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
     what = f"camera {checks.shown(name)}"
     model = str(_first(values, ("cameramodel", "distortionmodel", "model", "distortiontype")) or "")
     if re.search(r"fisheye|equidistant|omni|mei|eucm|kannala|spherical|ortho", model.lower()):
@@ -345,13 +361,33 @@ def _camera(name: str, values: Mapping[str, Any], source: Source, options: Optio
     size, stated = _size(values, what, options)
     half = half_pixel(options)
     plane = axes.view_plane(f_x, f_y, c_x + half, c_y + half, size)
-    given = _first(values, _DISTORTION)
-    notes = told_of_half_pixel(options, "OpenCV")
-    if given is not None:
-        notes += settled(coefficients(_numbers("the distortion", given), what), plane, what, options)
+    notes = told_of_half_pixel(options, "OpenCV") + settled(_coefficients(values, what), plane, what, options)
     turn, translation, more = _pose(values, what)
     pinhole, more_of_pose = axes.pinhole(axes.from_world_to_camera(turn, translation, what), plane, what)
     return Camera(name, pinhole, stated, (*notes, *more, *more_of_pose))
+
+
+def _coefficients(values: Mapping[str, Any], what: str) -> dict[str, float]:
+    """The distortion, in a list or as keys of their own.
+
+    Raises
+    ------
+    InputError
+        if there is one in words that nobody knows.
+    """
+    given = _first(values, _DISTORTION)
+    found = coefficients(_numbers("the distortion", given), what) if given is not None else {}
+    for name, value in values.items():
+        if name in _DISTORTION or not _OTHER_DISTORTION.search(name) or isinstance(value, str) or value is None:
+            continue
+        numbers = [value] if isinstance(value, int | float) else list(_numbers(name, value))
+        if name in NAMES and given is None:
+            found[name] = number(f"{name} of {what}", value)
+        elif any(numbers):
+            raise InputError(
+                f"{what} says {name}, which may be lens distortion: call it distortion_coefficients, in OpenCV's order"
+            )
+    return found
 
 
 def _size(values: Mapping[str, Any], what: str, options: Options) -> tuple[tuple[int, int], bool]:
@@ -369,12 +405,16 @@ def _size(values: Mapping[str, Any], what: str, options: Options) -> tuple[tuple
 
 def _pose(values: Mapping[str, Any], what: str) -> tuple[np.ndarray, tuple[float, ...], tuple[str, ...]]:
     extrinsic, turn, vector, translation = (_first(values, names) for names in (_EXTRINSIC, _R, _RVEC, _T))
+    if other := next((name for name in _OTHER_POSE if name in values), None):
+        raise InputError(f"{what} has {other}, and whose axes it means is not said: write R and t, from world to camera")
+    if turn is not None and translation is None and "p" in values:  # of ROS: how a stereo pair is rectified
+        turn = None
     if extrinsic is not None and turn is None and vector is None:
         numbers = _numbers(f"the extrinsic matrix of {what}", extrinsic)
         if len(numbers) not in (12, 16) or (len(numbers) == 16 and numbers[12:] != (0, 0, 0, 1)):
             raise InputError(f"the extrinsic matrix of {what} is not 3 × 4 or 4 × 4 with the last row 0 0 0 1: correct it")
         rows = np.array(numbers).reshape(-1, 4)[:3]
-        return rows[:, :3], tuple(rows[:, 3].tolist()), ()
+        return rows[:, :3], tuple(rows[:, 3].tolist()), (_WAY,)
     if turn is None and vector is None and translation is None:
         return np.eye(3), (0.0, 0.0, 0.0), (f"{what} has no pose: it stands at the origin and looks along z, y down",)
     if (turn is None and vector is None) or translation is None:
@@ -383,12 +423,12 @@ def _pose(values: Mapping[str, Any], what: str) -> tuple[np.ndarray, tuple[float
     numbers = _numbers(f"R of {what}", turn if turn is not None else vector)
     if len(numbers) == 9:
         matrix = np.array(numbers).reshape(3, 3)
-    elif len(numbers) == 3:
+    elif len(numbers) == 3 and turn is None:
         matrix = of_rotation_vector(numbers, what)
     else:
-        raise InputError(f"R of {what} has {len(numbers)} numbers: give nine, or three of a rotation vector")
+        raise InputError(f"R of {what} has {len(numbers)} numbers: give nine, or as rvec the three of a rotation vector")
     if turn is not None and vector is not None and len(numbers) == 9:
         both = _numbers(f"rvec of {what}", vector)
         if len(both) == 3 and np.abs(of_rotation_vector(both, what) - matrix).max() > 1e-3:
             raise InputError(f"R and rvec of {what} are different rotations: take one out")
-    return matrix, translation, ()
+    return matrix, translation, (_WAY,)

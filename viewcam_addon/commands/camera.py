@@ -13,7 +13,7 @@ from ..cameras import Camera, Options
 from ..cameras.sidecar import record
 from ..errors import InputError
 from ..intrinsics import ViewPlane
-from ..terminal import say
+from ..terminal import say, silent_libraries
 from . import Result
 
 _MOST_CHARACTERS = 100_000_000
@@ -48,7 +48,8 @@ def run(options: argparse.Namespace) -> Result:
     if options.out and not options.to:
         raise InputError("--out says where to, but not in which format: give --to")
     given = sys.stdin.read(_MOST_CHARACTERS) if options.file == "-" else Path(options.file)
-    found = cameras.read(given, format=options.format, options=options_of(options))
+    with silent_libraries():  # USD tells of all that a stage lacks
+        found = cameras.read(given, format=options.format, options=options_of(options))
     if options.camera is not None:
         found = [cameras.choose(found, options.camera)]
     notes = list(dict.fromkeys(note for camera in found for note in camera.notes))

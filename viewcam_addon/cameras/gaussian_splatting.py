@@ -1,0 +1,47 @@
+"""cameras.json of 3D Gaussian splatting, which its training leaves beside the model and its viewers read.
+
+A list of pictures, each with `position`, the eye, and `rotation`, camera to world with x right, y down, z into the view, row
+after row; `fx`, `fy` in pixels of `width` × `height`. It has no principal point, and the training takes the middle for it.
+
+Source: gaussian-splatting's utils/camera_utils.py (camera_to_JSON).
+"""
+
+import numpy as np
+
+from ..errors import InputError
+from . import axes, naming
+from .camera import Camera, Options
+from .source import Record, Source
+
+TITLE = "cameras.json of Gaussian splatting"
+
+_KEYS = {"position", "rotation", "fx", "fy", "width", "height"}
+_MIDDLE = "The file says no principal point: it was taken in the picture's middle, as the training does"
+
+
+def recognises(source: Source) -> bool:
+    return (
+        isinstance(source.json, list)
+        and bool(source.json)
+        and isinstance(source.json[0], dict)
+        and source.json[0].keys() >= _KEYS
+    )
+
+
+def read(source: Source, _options: Options) -> list[Camera]:
+    pictures = [Record(values, f"camera {index}") for index, values in enumerate(source.json)]
+    paths = [str(picture.get("img_name") or picture.place) for picture in pictures]
+    cameras = []
+    for picture, path, name in zip(pictures, paths, naming.distinct(paths), strict=True):
+        f_x, f_y = picture.number("fx"), picture.number("fy")
+        if not (f_x > 0 and f_y > 0):
+            raise InputError(f"{picture.place} has the focal length {min(f_x, f_y):g}: give one above 0")
+        width, height = picture.size("width"), picture.size("height")
+        matrix = np.eye(4)
+        matrix[:3, :3] = np.array(picture.numbers("rotation", 9)).reshape(3, 3)
+        matrix[:3, 3] = picture.numbers("position", 3)
+        plane = axes.view_plane(f_x, f_y, width / 2, height / 2, (width, height))
+        pinhole, notes = axes.pinhole(axes.of_opencv(matrix), plane, picture.place)
+        image = path if naming.has_suffix(path) else None
+        cameras.append(Camera(name, pinhole, True, (*notes, _MIDDLE), image))
+    return cameras
