@@ -25,6 +25,16 @@ hypothesis.settings.register_profile("explore", deadline=None)
 hypothesis.settings.load_profile("repeatable")
 
 
+_LONG = 4 * 3600  # seconds
+"""The time limit of what takes minutes by its nature."""
+
+
+def pytest_collection_modifyitems(items):
+    for item in items:
+        if "real_blender" in item.path.parts or any(map(item.get_closest_marker, ("exhaustive", "light", "speed"))):
+            item.add_marker(pytest.mark.timeout(_LONG))
+
+
 @pytest.fixture(scope="session", autouse=True)
 def registered_addon():
     """The add-on, registered once for all tests where Blender is there; None in a session without Blender."""

@@ -1,5 +1,7 @@
 """Shots on several workers: the same files as from one process, whoever is killed. Dask is real, Blender is a stand-in."""
 
+import asyncio
+import contextlib
 import logging
 import os
 import re
@@ -8,11 +10,12 @@ import socket
 import sys
 import threading
 import time
+import urllib.request
 from pathlib import Path
 
 import pytest
 
-from viewcam_addon import children
+from viewcam_addon import children, cli
 from viewcam_addon.batch import cluster, one, run, served
 from viewcam_addon.batch.folder import Folder
 from viewcam_addon.batch.served import ServedRenderer
@@ -21,6 +24,7 @@ from viewcam_addon.shots import Shot
 
 pytest.importorskip("distributed")
 
+ROOT = Path(__file__).resolve().parents[2]
 TIMING = re.compile(rb'"timing": \{[^}]*\}')
 
 
@@ -150,7 +154,7 @@ def test_a_full_disk_ends_the_batch(stand_in, machines, blend, tmp_path):
 
 def test_workers_that_would_make_other_pictures_get_no_shots(stand_in, machines, blend, tmp_path):
     other = MADE_FROM | {"blender": "5.2.2"}
-    with pytest.raises(InputError, match=r"the worker tcp://\S+ can't render: .* another blender there: give all machines"):
+    with pytest.raises(InputError, match=r"the worker tls://\S+ can't render: .* another blender there: give all machines"):
         run_on(machines, blend, tmp_path / "out", shots("a", "b", "c"), made_from=other)
     assert not stand_in.diary("render")
 
@@ -315,6 +319,116 @@ def test_a_scheduler_that_dies_ends_the_batch_with_what_is_left(farm, stand_in, 
         killer.join()
     assert summary.exit_status == 4 and summary.counts["done"] == 1
     assert all("the scheduler is gone" in fields["error"] for fields in ear.all("shot_failed"))
+
+
+def listening(process):
+    """(address, port) of each TCP socket on which a process listens, and all that descend from it."""
+    psutil = pytest.importorskip("psutil")  # Dask brings it
+    family = [psutil.Process(process), *psutil.Process(process).children(recursive=True)]
+    sockets = [each for member in family for each in member.net_connections(kind="tcp") if each.status == "LISTEN"]
+    return {(each.laddr.ip, each.laddr.port) for each in sockets}
+
+
+def test_nobody_else_on_this_machine_can_have_the_workers_run_anything(stand_in, machines, tmp_path):
+    """Neither without credentials nor with others, at any port that scheduler, workers and nannies have."""
+    import distributed
+
+    mark = tmp_path / "mark"
+
+    async def run(address, security):
+        # What Client.run does, and what workers and nannies do among themselves.
+        async with distributed.core.rpc(address, timeout=3, connection_args=security.get_connection_args("client")) as server:
+            return await asyncio.wait_for(server.run(function=distributed.protocol.pickle.dumps(mark.mkdir)), 3)
+
+    ports = listening(os.getpid())
+    assert len(ports) >= 5, "a scheduler, two nannies, two workers"
+    assert {address for address, _ in ports} <= {"127.0.0.1"}
+    own = machines._client.security
+    assert asyncio.run(run(machines.addresses()[0], own))["status"] == "OK" and mark.is_dir(), "the test could not fail"
+    mark.rmdir()
+    for _, port in ports:
+        for security, scheme in ((distributed.Security(), "tcp"), (distributed.Security.temporary(), "tls")):
+            with pytest.raises((OSError, TypeError)):
+                asyncio.run(run(f"{scheme}://127.0.0.1:{port}", security))
+    assert not mark.exists()
+    for _, port in ports:
+        with contextlib.suppress(OSError), urllib.request.urlopen(f"http://127.0.0.1:{port}/info/main/workers.html", timeout=3):
+            raise AssertionError(f"port {port} tells everybody about the workers")
+
+
+def test_a_farm_by_tls_as_the_page_says(stand_in, blend, tmp_path, processes):
+    """The configuration of docs/farm.md, with an authority of this test's own; whoever has none is not let in."""
+    import dask
+    import distributed
+    import yaml
+
+    made = distributed.Security.temporary()
+    for name, text in (("ca", made.tls_ca_file), ("farm", made.tls_worker_cert), ("farm-key", made.tls_worker_key)):
+        (tmp_path / f"{name}.pem").write_text(text)
+    page = (ROOT / "docs" / "farm.md").read_text(encoding="utf-8")
+    settings = re.search(r"(?ms)^```yaml\n(.*?)^```$", page)[1].replace("/shared/tls", str(tmp_path))
+    (tmp_path / "tls.yaml").write_text(settings)
+    family = []
+
+    def start(said, *words):
+        variables = children.environment(
+            DASK_CONFIG=str(tmp_path / "tls.yaml"), DASK_TEMPORARY_DIRECTORY=str(tmp_path / "dask")
+        )
+        family.append(children.Family([sys.executable, "-m", "dask", *words], tmp_path / said, variables))
+        return tmp_path / said
+
+    try:
+        said = start(
+            "scheduler.txt", *["scheduler", "--protocol", "tls", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
+        )
+        assert processes.until(lambda: re.search(r"Scheduler at:\s+(tls://\S+)", said.read_text())), said.read_text()
+        address = re.search(r"Scheduler at:\s+(tls://\S+)", said.read_text())[1]
+        start("worker.txt", "worker", address, "--nthreads", "1", "--no-dashboard")
+        own = dask.config.merge(dask.config.config, yaml.safe_load(settings))
+        with dask.config.set(own), cluster.opened(address, None) as machines:
+            assert run_on(machines, blend, tmp_path / "out", shots("a", "b")).exit_status == 0
+        with pytest.raises(InputError, match="no Dask scheduler answers"), cluster.opened(address, None):
+            pass
+    finally:
+        for each in family:
+            each.end()
+
+
+@pytest.mark.parametrize(("address", "warned"), [("tcp://127.0.0.1:9", True), ("tls://127.0.0.1:9", False)])
+def test_a_plain_scheduler_is_warned_of(stand_in, blend, tmp_path, capfd, address, warned):
+    (tmp_path / "shots.csv").write_text("name,camera\na,Left\n")
+    words = [str(blend), str(tmp_path / "shots.csv"), "--out", str(tmp_path / "out"), "--scheduler", address]
+    assert cli.main(["batch", *words]) == 2
+    sentence = f"viewcam batch: whoever reaches {address} can run any program on its workers: docs/farm.md says how TLS"
+    assert (sentence in capfd.readouterr().err) == warned
+
+
+@pytest.mark.parametrize("hangs", ["the loop", "the client"])
+def test_a_cluster_is_closed_within_seconds_whatever_hangs(stand_in, processes, monkeypatch, hangs):
+    monkeypatch.setattr(cluster, "_CLOSED_WITHIN", 1.0)
+    released = threading.Event()
+    try:
+        with cluster.opened(None, 2) as machines:
+            nannies = machines._client.cluster.workers.values()
+            family = [nanny.pid for nanny in nannies]
+            if hangs == "the loop":
+                machines._client.loop.add_callback(released.wait)
+            else:
+                monkeypatch.setattr(type(machines._client), "close", lambda *_: released.wait())
+        # Nothing here waits for Dask; were it waited for, this test's own time limit would end it.
+        assert processes.until(lambda: not any(map(processes.run, family))), "workers go on"
+        assert not released.is_set()
+    finally:
+        released.set()
+
+
+def test_without_cryptography_a_sentence_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "cryptography", None)
+    with (
+        pytest.raises(InputError, match=r"need cryptography, to be safe from others .*: \S+ -m pip install cryptography"),
+        cluster.opened(None, 2),
+    ):
+        pass
 
 
 def test_workers_that_write_into_another_folder_are_told_and_nothing_is_believed(

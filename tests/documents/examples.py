@@ -53,6 +53,7 @@ ONLY_REAL = {f"blender --command extension install-file -r user_default -e {ZIP}
 """Commands that only a real Blender has, and why."""
 
 WRITTEN = {
+    ("docs/farm.md", "yaml"): "tests/batch/test_cluster.py has a farm that is configured so",
     ("docs/datasets.md", "json"): "its program writes them, as tests/datasets/test_documentation.py compares",
 }
 """Blocks that show what another example writes, and who says so."""

@@ -16,6 +16,7 @@ import math
 import os
 import pkgutil
 import queue
+import signal
 import sys
 import tempfile
 import threading
@@ -38,7 +39,9 @@ _MOMENT = 0.2  # seconds
 _ANSWER_WITHIN = 5.0
 """Seconds for a scheduler to answer, for it to name a worker, and for a picture of another machine to be seen here."""
 _WORKERS_WITHIN = 60.0
-"""Seconds for a worker to come back when all are gone."""
+"""Seconds for a worker to come back when all are gone; and for a connection within this machine, however busy it is."""
+_CLOSED_WITHIN = 10.0
+"""Seconds for Dask to close what it has opened, which takes it a tenth of one; then it is left behind."""
 
 
 @contextlib.contextmanager
@@ -46,6 +49,9 @@ def opened(scheduler: str | None, workers: int | None, blender: str | None = Non
     """A cluster for a batch: that of a scheduler (`tcp://host:port`), or one of `workers` processes of this machine.
 
     blender : for the latter, the Blender that they run, unless VIEWCAM_BLENDER names one.
+
+    The processes of this machine talk by TLS with credentials that exist in their memory alone, so that nobody else on it can
+    have them run anything. Rejected: Unix sockets, which Dask does not have.
 
     Raises
     ------
@@ -56,9 +62,12 @@ def opened(scheduler: str | None, workers: int | None, blender: str | None = Non
     import dask
 
     ways = {
-        "distributed.comm.timeouts.connect": f"{_ANSWER_WITHIN} s",
+        "distributed.comm.timeouts.connect": f"{_ANSWER_WITHIN if scheduler else _WORKERS_WITHIN} s",
         "distributed.nanny.pre-spawn-environ": {},  # it would be this process's, too, and for good
         "distributed.scheduler.allowed-failures": 1,  # of a shot's workers, until it is tried alone
+        "distributed.scheduler.worker-ttl": f"{_WORKERS_WITHIN} s",  # a worker that is stopped says nothing
+        "distributed.scheduler.http.routes": [],  # pages of ours that others on this machine could read
+        "distributed.worker.http.routes": [],
     }
     with _without_logs(), dask.config.set(ways):
         if scheduler:
@@ -72,13 +81,15 @@ def opened(scheduler: str | None, workers: int | None, blender: str | None = Non
                 threads_per_worker=1,
                 processes=True,
                 memory_limit=None,  # it is Blender, another process, that needs memory
+                security=_credentials(distributed),
                 dashboard_address="127.0.0.1:0",
+                scheduler_kwargs={"dashboard": False},
                 local_directory=scratch,
                 silence_logs=logging.CRITICAL,
                 preload=[_WORKER],
                 env={served.BLENDER: os.environ.get(served.BLENDER) or blender or ""},
             )
-            with local, distributed.Client(local) as client:
+            with _ending(local), _ending(distributed.Client(local, set_as_default=False)) as client:
                 yield Cluster(client, max(1, _cores() // count))
 
 
@@ -309,6 +320,37 @@ def _distributed() -> Any:
     return distributed
 
 
+def _credentials(distributed: Any) -> Any:
+    """Of this cluster alone, made anew."""
+    try:
+        return distributed.Security.temporary()
+    except ImportError:
+        install = f"{sys.executable} -m pip install cryptography"
+        raise InputError(f"several workers need cryptography, to be safe from others on this machine: {install}") from None
+
+
+@contextlib.contextmanager
+def _ending(opened: Any) -> Iterator[Any]:
+    """Close Dask's client or cluster at the end, within seconds: where its loop is stuck, its own close waits for ever."""
+    try:
+        yield opened
+    finally:
+        # Its loop may be what hangs, so their numbers are asked for before.
+        processes = [nanny.pid for nanny in getattr(opened, "workers", {}).values()]
+        closing = threading.Thread(target=_close, args=(opened,), daemon=True)
+        closing.start()
+        closing.join(_CLOSED_WITHIN)
+        if closing.is_alive():
+            for process in filter(None, processes):
+                with contextlib.suppress(OSError):
+                    os.kill(process, signal.SIGTERM if sys.platform == "win32" else signal.SIGKILL)
+
+
+def _close(opened: Any) -> None:
+    with contextlib.suppress(Exception):  # there is nobody who could do anything about it
+        opened.close()
+
+
 @contextlib.contextmanager
 def _processes_of_this_package() -> Iterator[None]:
     """Let the processes that start meanwhile import this package by its own name, which inside Blender is another, and not run
@@ -346,7 +388,7 @@ def _connected(distributed: Any, scheduler: str) -> Iterator[Any]:
         raise InputError(
             f"no Dask scheduler answers at {scheduler} ({reason}): see whether it runs there, or give --workers N without it"
         ) from client
-    with client:
+    with _ending(client):
         try:
             client.wait_for_workers(1, timeout=_ANSWER_WITHIN)
         except TimeoutError as error:

@@ -27,6 +27,7 @@ from .camera import options_of
 from .surroundings import blender_room
 
 _MOST_NAMED = 5
+_OPEN_TO_ALL = "whoever reaches {} can run any program on its workers: docs/farm.md says how TLS lets in only your own"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,6 +50,8 @@ def run(options: argparse.Namespace) -> Result:
         if _on_cluster(options):
             blend, program = renderer.blend, renderer.program
             stack.close()  # the workers open the file themselves
+            if (options.scheduler or "").startswith("tcp://"):
+                options.events.tell("warning", command=options.command, text=_OPEN_TO_ALL.format(options.scheduler))
             machines = stack.enter_context(cluster.opened(options.scheduler or None, options.workers, program))
         folder = Folder(options.out, options.shard.strip().replace("/", "-of-") if options.shard else "")
         if _on_cluster(options):
