@@ -9,9 +9,11 @@ Rejected: a copy of the scene to change freely (rigid bodies, caches and drivers
 
 import contextlib
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, TypeVar
 
 import bpy
+
+Made = TypeVar("Made")
 
 
 class Borrower:
@@ -19,6 +21,7 @@ class Borrower:
 
     def __init__(self, stack: contextlib.ExitStack) -> None:
         self._stack = stack
+        self._made: dict[Callable[..., Any], Any] = {}
 
     def set(self, owner: bpy.types.bpy_struct, name: str, value: Any) -> None:
         """Set a property until the loan ends."""
@@ -26,6 +29,12 @@ class Borrower:
         if before != value:
             self.afterwards(setattr, owner, name, before)
             setattr(owner, name, value)
+
+    def shared(self, make: Callable[["Borrower"], Made]) -> Made:
+        """What `make(borrower)` makes for the time of the loan: the same for all who ask, made for the first."""
+        if make not in self._made:
+            self._made[make] = make(self)
+        return self._made[make]
 
     def enter(self, context: contextlib.AbstractContextManager) -> None:
         """Enter a context, and leave it when the loan ends."""

@@ -125,7 +125,7 @@ def keep_normals(borrow: Borrower, material: bpy.types.Material) -> None:
 
 def fill_empty_slots(borrow: Borrower, block: bpy.types.Object) -> None:
     """Give an object a material where it has none, until the loan ends: Cycles' own default bends normals."""
-    material = plain(borrow)
+    material = borrow.shared(plain)  # to remove a material, Blender looks at all that could use it
     if not block.material_slots:
         borrow.afterwards(block.data.materials.clear)  # pop would leave a slot behind on the object
         block.data.materials.append(material)
