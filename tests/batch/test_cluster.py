@@ -399,7 +399,7 @@ def test_a_plain_scheduler_is_warned_of(stand_in, blend, tmp_path, capfd, addres
     (tmp_path / "shots.csv").write_text("name,camera\na,Left\n")
     words = [str(blend), str(tmp_path / "shots.csv"), "--out", str(tmp_path / "out"), "--scheduler", address]
     assert cli.main(["batch", *words]) == 2
-    sentence = f"viewcam batch: whoever reaches {address} can run any program on its workers: docs/farm.md says how TLS"
+    sentence = f"viewcam batch: note: whoever reaches {address} can run any program on its workers: docs/farm.md says how TLS"
     assert (sentence in capfd.readouterr().err) == warned
 
 

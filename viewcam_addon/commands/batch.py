@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> Result:
             blend, program = renderer.blend, renderer.program
             stack.close()  # the workers open the file themselves
             if (options.scheduler or "").startswith("tcp://"):
-                options.events.tell("warning", command=options.command, text=_OPEN_TO_ALL.format(options.scheduler))
+                options.events.tell("note", command=options.command, text=_OPEN_TO_ALL.format(options.scheduler))
             machines = stack.enter_context(cluster.opened(options.scheduler or None, options.workers, program))
         folder = Folder(options.out, options.shard.strip().replace("/", "-of-") if options.shard else "")
         if _on_cluster(options):
