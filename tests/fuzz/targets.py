@@ -138,6 +138,8 @@ Feed = Callable[[random.Random, Path], None]
 
 def scene() -> Feed:
     """Scene files and the arrays beside them, traced at every level."""
+    from viewcam_addon import image
+
     whole = packed(**arrays())
     other = packed(v=np.zeros((1, 3)), t=np.zeros((1, 3), np.int32), n=np.array(["text"]), i=np.zeros(3, complex))
 
@@ -153,6 +155,12 @@ def scene() -> Feed:
         stated = ["--stated"] if chance.random() < 0.2 else []
         spent = ["--samples", chance.choice((1, 2)), "--threads", 1]
         viewcam("render", folder / "scene.json", folder / "out.exr", "--size", "8x6", "--level", level, *spent, *stated)
+        if (folder / "out.exr").exists():
+            passes = image.read(folder / "out.exr").passes
+            passes.pop("Variance", None)  # infinite where one sample does not tell it
+            for name, values in passes.items():
+                if not np.isfinite(values).all():
+                    raise Said(f"{name} holds what is no finite number at level {level}")
 
     return feed
 

@@ -114,3 +114,29 @@ def test_a_scene_of_nothing_has_no_reach():
 def test_a_picture_beyond_all_memory_is_refused():
     with pytest.raises(InputError, match="2147483647 × 2147483647 pixels needs more memory"):
         render(scene(camera().resized(2**31 - 1, 2**31 - 1), spheres((0.0, 0, 0), 1.0), np.eye(4)), threads=1)
+
+
+@pytest.mark.parametrize("srgb", [False, True])
+@pytest.mark.parametrize("component", ["diffuse", "emission", "mirror", "glass", "refraction"])
+@pytest.mark.parametrize("pixel", [1e6, 3e7, 1e17, 1e30, 3e38, -1e30])
+def test_a_hostile_pixel_of_an_image_gives_a_finite_picture_or_a_sentence(component, pixel, srgb, tmp_path):
+    """At every level of light; the variance of a value that float32 just holds may be beyond it, and is then infinite."""
+    document = copy.deepcopy(SCENE)
+    document["images"] = {"hot": {"pixels": [[[pixel, 0, 0], [pixel, pixel, 1]]], "srgb": srgb}}
+    document["materials"] = {"it": {component: {"image": "hot"}}}
+    document["world"] = {"radiance": [1, 1, 1]}
+    for placed in document["objects"]:
+        placed["materials"] = ["it", "it"]
+    file = tmp_path / "scene.json"
+    file.write_text(json.dumps(document), encoding="utf-8")
+    try:
+        scene = scene_file.read(file)
+    except InputError as error:
+        most = "3.16e+07" if srgb else "1e+18"
+        assert f"image 'hot': an image holds {abs(pixel):g}: give numbers up to {most}" in str(error)
+        return
+    with np.errstate(under="ignore"):
+        pictures = [render(scene, level, samples=4, threads=1) for level in ("direct", "path")]
+    for picture in pictures:
+        for name, values in picture.items():
+            assert name == "Variance" or np.isfinite(values).all(), name

@@ -44,6 +44,13 @@ class Picture:
             raise InputError(f"an image has the shape {self.pixels.shape} and must have height × width × 3: check it")
         if not np.isfinite(self.pixels).all():
             raise InputError("an image holds a number that is not finite: check it")
+        # What is encoded as sRGB is raised to the power of 2.4.
+        most = LARGEST_RADIANCE ** (1 / 2.4) if self.srgb else LARGEST_RADIANCE
+        largest = float(np.abs(self.pixels).max())
+        if largest > most:
+            raise InputError(
+                f"an image holds {largest:.3g}: give numbers up to {most:.3g}, so that its light can be computed with"
+            )
 
 
 @dataclass(frozen=True)
