@@ -68,6 +68,8 @@ def add(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     written.add_argument("--out", metavar="DIR", type=Path, required=True, help="the folder of the pictures")
     kept = written.add_mutually_exclusive_group()
     kept.add_argument("--resume", action="store_true", help="keep the shots that are there from the same settings")
+    known = "the same, unless what they were made from can't all be known: then render all of them anew"
+    kept.add_argument("--resume-known", action="store_true", help=known)
     kept.add_argument("--overwrite", action="store_true", help="render all of them anew")
     written.add_argument("--check", action="store_true", help="compare each shot's geometry with the reference tracer")
     written.add_argument(

@@ -159,6 +159,36 @@ def test_cameras_with_spaces_in_their_names_make_a_dataset(tmp_path, capfd):
     assert (out / "sparse" / "0" / "images.txt").read_text().splitlines()[-2].endswith(f" {name}.png")
 
 
+def test_what_can_not_be_known_is_said_and_resume_known_renders_it_anew(tmp_path, capfd, fresh_blender):
+    """Binary USD may read other files, and nobody here can know which: --resume kept pictures of them without a word."""
+    bpy, out, blend = fresh_blender, tmp_path / "out", tmp_path / "usd.blend"
+    bpy.ops.wm.open_mainfile(filepath=str(CORNELL))
+    (tmp_path / "stage.usdc").write_bytes(b"PXR-USDC and more")
+    bpy.ops.cachefile.open(filepath=str(tmp_path / "stage.usdc"))
+    bpy.data.cache_files["stage.usdc"].use_fake_user = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend), copy=True)
+    words = ("--orbit", "2", "--out", out, *SMALL)
+
+    def rendered():
+        return json.loads((out / "summary.json").read_text())["timing"]["rendered"]
+
+    batch(capfd, blend, *words)
+    assert rendered() == 2
+    for warned in (
+        json.loads((out / "orbit_001.json").read_text()),
+        json.loads((out / "summary.json").read_text())["shots"][1],
+    ):
+        assert any("'stage.usdc' is binary USD" in sentence for sentence in warned["warnings"])
+    assert "is binary USD" in (out / "contact-sheet.html").read_text()
+    said = batch(capfd, blend, *words, "--resume").out
+    assert rendered() == 0 and "--resume-known" in said and "'stage.usdc' is binary USD" in said
+    assert "not sure" not in batch(capfd, blend, *words, "--resume-known").out
+    assert rendered() == 2
+    known = ("--orbit", "2", "--out", tmp_path / "known", *SMALL)
+    batch(capfd, CORNELL, *known, "--resume-known")
+    assert "2 of them kept" in batch(capfd, CORNELL, *known, "--resume-known").out
+
+
 def test_every_event_of_a_batch_is_a_line(tmp_path, capfd):
     said = batch(capfd, CORNELL, "--orbit", "2", "--out", tmp_path / "out", *SMALL, "--log-json")
     told = [json.loads(line) for line in said.out.splitlines()]

@@ -32,6 +32,8 @@ class Result:
             told |= {"passed": self.check["passed"], "verdict": self.check["verdict"]}
         if self.error:
             told["error"] = self.error
+        if self.record and self.record.get("warnings"):
+            told["warnings"] = self.record["warnings"]
         if self.record:
             told["timing"] = {"seconds": self.record["timing"]["seconds"]}
         return told

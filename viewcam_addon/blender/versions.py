@@ -1,6 +1,7 @@
 """Every difference between Blender 4.2 and 5.2 that this project meets, each in one place."""
 
 from pathlib import Path
+from typing import Any
 
 import bpy
 
@@ -127,6 +128,13 @@ def adaptive_subdivision(block: bpy.types.Object, scene: bpy.types.Scene) -> tup
     else:
         return None
     return (owner, "use_adaptive_subdivision") if owner.use_adaptive_subdivision else None
+
+
+def modifier_input(modifier: bpy.types.NodesModifier, identifier: str) -> Any:
+    """The value that a modifier gives to an input of its nodes; None where it has none. They were custom properties."""
+    if bpy.app.version < (5, 2):
+        return modifier.get(identifier)
+    return getattr(getattr(modifier.properties.inputs, identifier, None), "value", None)
 
 
 # What EEVEE is called among the render engines. The one of 4.2 was the next one then.

@@ -59,10 +59,12 @@ def run(options: argparse.Namespace) -> Result:
             work = machines.work(blend, folder, job.settings, *about)
         else:
             work = one.in_turn(folder, renderer, job.settings, options.check)
-        how = {"resume": options.resume, "overwrite": options.overwrite, "check": options.check}
+        unknown = tuple(job.made_from.get("unknown", ()))
+        anew = options.overwrite or bool(options.resume_known and unknown)
+        how = {"resume": options.resume or options.resume_known, "overwrite": anew, "check": options.check}
         summary = running.run(job.shots, folder, job.settings, work, options.events, interruption=interruption, **how)
         words = dataset.write(folder, job.all_shots, job.settings, options.transforms) if options.transforms else ""
-    _tell(options, summary, folder)
+    _tell(options, summary, folder, unknown)
     if words:
         say(words)
     return summary.exit_status, summary.to_json()
@@ -139,8 +141,8 @@ def _completed(shot: Shot, options: argparse.Namespace) -> Shot:
     return dataclasses.replace(shot, **{field: value for field, value in said.items() if getattr(shot, field) is None})
 
 
-def _tell(options: argparse.Namespace, summary: Summary, folder: Folder) -> None:
-    """In one line what the batch came to."""
+def _tell(options: argparse.Namespace, summary: Summary, folder: Folder, unknown: Sequence[str]) -> None:
+    """In one line what the batch came to. unknown : what may have changed the pictures that were kept."""
     counts = summary.counts
     shots = "1 shot" if counts["shots"] == 1 else f"{counts['shots']} shots"
     if counts["failed"] or counts["left"]:
@@ -149,6 +151,9 @@ def _tell(options: argparse.Namespace, summary: Summary, folder: Folder) -> None
         return
     kept = f", {summary.kept} of them kept" if summary.kept else ""
     say(f"{shots}{kept}, in {summary.seconds:.1f} s: {folder.contact_sheet}")
+    if summary.kept and unknown:
+        more = f" (and {len(unknown) - 1} more)" if len(unknown) > 1 else ""
+        say(f"whether those that were kept are still right is not sure: --resume-known renders them. {unknown[0]}{more}")
     if unlike := [shot["name"] for shot in summary.shots if shot.get("passed") is False]:
         named = ", ".join(unlike[:_MOST_NAMED]) + (", …" if len(unlike) > _MOST_NAMED else "")
         say(f"{len(unlike)} are not what the reference tracer sees: {named}; {folder.summary} says how")

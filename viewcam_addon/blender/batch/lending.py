@@ -17,7 +17,7 @@ from ...shots import Shot
 from .. import datablocks, resolution, versions
 from ..borrowing import Borrower, cameras_unbound
 from ..rendering.engine import VIEWCAM_RenderEngine
-from . import keeping, pictures
+from . import keeping, origins, pictures
 
 _ENGINES = {"CYCLES": "CYCLES", "EEVEE": versions.EEVEE, "VIEWCAM": "VIEWCAM"}
 
@@ -194,3 +194,4 @@ def _warnings(scene: bpy.types.Scene) -> Iterator[str]:
         yield "Something is simulated: unless it is baked, its picture depends on the frames that were evaluated before"
     if getattr(getattr(scene, "cycles", None), "time_limit", 0.0) > 0:
         yield "Cycles has a time limit: another run may have other samples, and other pixels"
+    yield from origins.unknown()
