@@ -56,6 +56,24 @@ def test_a_shot_that_is_not_whole_is_not_finished(folder, painting, harm):
     assert folder.finished("shot_001", other, check=False), "the other shot is as it was"
 
 
+@pytest.mark.parametrize("value", [None, {"a": 1}, [5], "gone"])
+@pytest.mark.parametrize(
+    "path", ["rendered", "rendered.width", "warnings", "timing", "timing.seconds", "check", "check.verdict"]
+)
+def test_a_sidecar_that_lacks_a_key_or_has_it_otherwise_is_not_finished(folder, painting, path, value):
+    """Nor does it stop the summary and the contact sheet of all the others."""
+    sidecar = folder.sidecar("shot_000")
+    record = json.loads(sidecar.read_text(encoding="utf-8"))
+    *outer, key = path.split(".")
+    owner = record[outer[0]] if outer else record
+    if value == "gone":
+        del owner[key]
+    else:
+        owner[key] = value
+    write_json(sidecar, record)
+    assert folder.finished("shot_000", made_from(painting), check=True) is None
+
+
 def test_a_shot_of_other_settings_is_not_finished(folder):
     assert folder.finished("shot_000", "0" * 64, check=False) is None
 

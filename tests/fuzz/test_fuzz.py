@@ -41,8 +41,8 @@ def assert_met(kind: str, count: int, folder: Path) -> None:
     assert not found, f"{len(found)} of {count} mutants:\n" + "\n".join(found[:20])
 
 
-SAMPLE = {"scene": 60, "exr": 40, "shots": 200}
-ALL = {"scene": 4000, "exr": 2500, "shots": 3000}
+SAMPLE = {"scene": 60, "exr": 40, "shots": 200, "sidecar": 40}
+ALL = {"scene": 4000, "exr": 2500, "shots": 2500, "sidecar": 1000}
 
 
 @pytest.mark.parametrize("kind", SAMPLE)

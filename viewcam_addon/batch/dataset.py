@@ -51,7 +51,7 @@ def write(folder: Folder, shots: Sequence[Shot], settings: Mapping[str, str], su
 def _camera(folder: Folder, name: str, record: Mapping[str, Any]) -> Pinhole:
     try:
         return Pinhole(**record["camera"])
-    except (KeyError, TypeError) as error:
+    except (KeyError, TypeError, InputError) as error:
         raise InputError(
             f"{folder.sidecar(name)} has no camera that can be read: render the shot again, with --overwrite"
         ) from error

@@ -58,7 +58,7 @@ class Folder:
             sizes = {"image": self.image(name).stat().st_size, "preview": self.preview(name).stat().st_size}
         except (OSError, ValueError, RecursionError):  # missing, or somebody else's
             return None
-        if not isinstance(record, dict) or record.get("settings") != settings or record.get("bytes") != sizes:
+        if not _is_sidecar(record) or record.get("settings") != settings or record.get("bytes") != sizes:
             return None
         return None if check and "check" not in record else record
 
@@ -72,6 +72,21 @@ class Folder:
             found = _TEMPORARY.fullmatch(path.name)
             if found and found[1] in ours:
                 path.unlink(missing_ok=True)
+
+
+def _is_sidecar(record: Any) -> bool:
+    """Whether it says all that the summary and the contact sheet tell of a shot; else it is somebody else's, or damaged."""
+
+    def has(owner: Any, **kinds: type | tuple[type, ...]) -> bool:
+        return isinstance(owner, dict) and all(isinstance(owner.get(key), kind) for key, kind in kinds.items())
+
+    return (
+        has(record, rendered=dict, warnings=list, timing=dict)
+        and has(record["rendered"], width=int, height=int)
+        and has(record["timing"], seconds=(int, float))
+        and all(isinstance(warning, str) for warning in record["warnings"])
+        and ("check" not in record or has(record["check"], passed=bool, verdict=str))
+    )
 
 
 def write_json(path: Path, document: Mapping[str, Any]) -> None:
