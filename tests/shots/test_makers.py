@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from viewcam_addon import shots
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.shots import Shot, ShotsError
+from viewcam_addon.shots import Shot, ShotsError, makers
 
 coordinates = st.floats(-1e3, 1e3, allow_subnormal=False)
 triples = st.tuples(coordinates, coordinates, coordinates)
@@ -23,7 +23,7 @@ def test_an_orbit_begins_at_the_camera_and_goes_evenly_around_up(eye, look_at, u
     pinhole = Pinhole(eye, look_at, up, distance, 320, 180)
     assume(pinhole.sine_to_up > 1e-2)
     made = shots.orbit(pinhole, count)
-    assert made[0] == Shot("orbit_000", eye, look_at, up, distance)
+    assert made[0] == Shot("orbit_000", eye, look_at, up, distance, width=320, height=180)
     assert [shot.name for shot in made] == [f"orbit_{i:03d}" for i in range(count)]
     axis = np.array(up) / math.hypot(*up)
     away = np.array([shot.eye for shot in made]) - look_at
@@ -63,7 +63,7 @@ def test_frames_are_a_shot_each_both_ends_included(first, more):
     assert {shot.camera for shot in made} == {"Camera"} and made[0].eye is None
     assert len({shot.name for shot in made}) == len(made)
     if first >= 0:
-        assert sorted(made, key=lambda shot: shot.name) == made, "the files do not sort as the frames do"
+        assert sorted(made, key=lambda shot: shot.name) == list(made), "the files do not sort as the frames do"
 
 
 @pytest.mark.parametrize(
@@ -109,3 +109,30 @@ def test_names_without_spaces_are_made_of_those_with_some_and_the_camera_is_stil
         shots.from_cameras("*", ["A b", "a_B"], spaces=False)
     with pytest.raises(ShotsError, match="begins or ends with a blank"):
         shots.from_cameras("*", [" a"], spaces=True)
+
+
+def test_an_orbit_keeps_the_principal_point_and_the_mirroring():
+    pinhole = Pinhole((5, 0, 0), (0, 0, 0), (0, 0, 1), 400, 320, 180, (100, 120), mirrored=True)
+    for shot in shots.orbit(pinhole, 3):
+        assert (shot.principal_point, shot.mirrored, shot.width, shot.height) == ((100, 120), True, 320, 180)
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda: shots.orbit(Pinhole((5, 0, 0), (0, 0, 0), (0, 0, 1), 400, 320, 180), 1_000_000),
+        lambda: shots.frames("1..1000000", "Camera"),
+    ],
+)
+def test_of_a_million_shots_those_of_a_shard_are_made_and_no_others(made, monkeypatch):
+    """One shot of a million took three minutes."""
+    made_ones = []
+    monkeypatch.setattr(makers, "Shot", lambda name, *values, **named: made_ones.append(name) or Shot(name, *values, **named))
+    (last,) = shots.shard(made(), "999999/1000000")
+    assert last.name in ("orbit_999998", "frame_0999999") and len(made_ones) <= 3
+    several = shots.shard(made(), "2/100000")
+    assert len(several) == 10 and len(made_ones) <= 3 + 12
+    assert several[1].name in ("orbit_100001", "frame_0100002")
+    assert made()[:3][-1] == list(made()[:3])[2]
+    with pytest.raises(IndexError):
+        made()[1_000_000]

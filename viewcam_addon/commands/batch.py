@@ -32,8 +32,8 @@ _OPEN_TO_ALL = "whoever reaches {} can run any program on its workers: docs/farm
 
 @dataclasses.dataclass(frozen=True)
 class _Job:
-    """shots : those of this run, of all_shots. made_from : all but the shot that decides a picture; settings : the hash of
-    what each shot is made from, by its name."""
+    """shots : those of this run. all_shots : those of a dataset, or of this run. made_from : all but the shot that decides a
+    picture; settings : the hash of what each of all_shots is made from, by its name."""
 
     all_shots: Sequence[Shot]
     shots: Sequence[Shot]
@@ -101,8 +101,9 @@ def _renderer(options: argparse.Namespace) -> contextlib.AbstractContextManager:
 
 def _job(options: argparse.Namespace, renderer: Any) -> _Job:
     """All that is to be rendered, once nothing is wrong with it."""
-    all_shots = [_completed(shot, options) for shot in _shots(options, renderer)]
-    shots = lists.shard(all_shots, options.shard) if options.shard else all_shots
+    listed = _shots(options, renderer)
+    shots = [_completed(shot, options) for shot in (lists.shard(listed, options.shard) if options.shard else listed)]
+    all_shots = [_completed(shot, options) for shot in listed] if options.shard and options.transforms else shots
     if problems := renderer.problems(all_shots, options.check):
         raise ShotsError(str(options.shots or options.blend or renderer.blend), tuple(problems))
     if _on_cluster(options) and renderer.blend is None:
@@ -110,11 +111,10 @@ def _job(options: argparse.Namespace, renderer: Any) -> _Job:
     if options.transforms:
         dataset.refuse(all_shots, options.transforms)
     made_from = renderer.made_from()
-    hashed = all_shots if options.transforms else shots  # a dataset is of all of them
-    return _Job(all_shots, shots, made_from, {shot.name: lists.settings_hash(shot, made_from) for shot in hashed})
+    return _Job(all_shots, shots, made_from, {shot.name: lists.settings_hash(shot, made_from) for shot in all_shots})
 
 
-def _shots(options: argparse.Namespace, renderer: Any) -> list[Shot]:
+def _shots(options: argparse.Namespace, renderer: Any) -> Sequence[Shot]:
     if options.shots is not None:
         if lists.is_list(options.shots):
             return lists.read(options.shots, renderer.cameras)

@@ -3,7 +3,8 @@
 import fnmatch
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
 
 from .. import checks, moves
 from ..errors import InputError
@@ -16,11 +17,28 @@ _MOST = 1_000_000
 _RANGE = re.compile(r"([-+]?\d{1,9})\.\.([-+]?\d{1,9})", re.ASCII)
 
 
-def orbit(pinhole: Pinhole, count: int) -> list[Shot]:
+class _Made(Sequence[Shot]):
+    """Shots that are made when they are asked for: of a million views, one of many machines renders a few.
+
+    make : a number → its shot. numbers : those of the shots, in their order.
+    """
+
+    def __init__(self, make: Callable[[int], Shot], numbers: range) -> None:
+        self._make, self._numbers = make, numbers
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    def __getitem__(self, index: int | slice) -> Any:
+        numbers = self._numbers[index]
+        return _Made(self._make, numbers) if isinstance(index, slice) else self._make(numbers)
+
+
+def orbit(pinhole: Pinhole, count: int) -> Sequence[Shot]:
     """`count` views of the pinhole's look-at point, evenly around up from the pinhole itself on, towards u.
 
-    d is the pinhole's distance in pixel widths. What the four values don't say is not asked of the pinhole: pixel aspect, size
-    and border are the scene's, and a camera with shift or mirrored must not come here.
+    The shots have the pinhole's size, principal point and mirroring and, as d, its distance in pixel widths; pixel aspect stays
+    the scene's.
 
     Raises
     ------
@@ -28,15 +46,23 @@ def orbit(pinhole: Pinhole, count: int) -> list[Shot]:
         if the count is not from 1 to a million.
     """
     count = _count(checks.whole("orbit's number of shots", count))
-    shots = []
-    for i in range(count):
+    middle = (pinhole.width / 2, pinhole.height / 2)
+    beside = {
+        "width": pinhole.width,
+        "height": pinhole.height,
+        "principal_point": None if pinhole.principal_point == middle else pinhole.principal_point,
+        "mirrored": pinhole.mirrored or None,
+    }
+
+    def view(i: int) -> Shot:
         moved = moves.orbited(pinhole, math.tau * i / count, 0.0)
         name = f"orbit_{i:0{_digits(count - 1)}d}"
-        shots.append(Shot(name, moved.eye, moved.look_at, moved.up, moved.distance[0]))
-    return shots
+        return Shot(name, moved.eye, moved.look_at, moved.up, moved.distance[0], **beside)
+
+    return _Made(view, range(count))
 
 
-def frames(text: str, camera: str) -> list[Shot]:
+def frames(text: str, camera: str) -> Sequence[Shot]:
     """A shot of the camera at each frame of a range "A..B", both included.
 
     Raises
@@ -52,10 +78,13 @@ def frames(text: str, camera: str) -> list[Shot]:
         raise InputError(f"frames {text} run backwards: write {last}..{first}")
     _count(last - first + 1)
     digits = _digits(max(abs(first), abs(last)))
-    return [
-        Shot(f"frame_{'-' * (frame < 0)}{abs(frame):0{digits}d}", camera=camera, frame=frame)
-        for frame in range(first, last + 1)
-    ]
+
+    def still(frame: int) -> Shot:
+        return Shot(f"frame_{'-' * (frame < 0)}{abs(frame):0{digits}d}", camera=camera, frame=frame)
+
+    for end in (first, last):  # Blender's limits: what lies between them is within, too
+        still(end)
+    return _Made(still, range(first, last + 1))
 
 
 def from_cameras(pattern: str, cameras: Iterable[str], spaces: bool = True) -> list[Shot]:

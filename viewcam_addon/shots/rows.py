@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from .. import checks
 from . import names
-from .problems import Problems
+from .problems import MOST_SHOWN, Problems
 from .shot import BESIDE_THEM, FIELDS, Shot, conflicts
 
 VECTORS = ("eye", "look_at", "up")
@@ -104,6 +104,7 @@ def shots_of(rows: Iterable[Row], problems: Problems, cameras: Collection[str] |
     cameras : the names of the file's cameras, where they are known.
     """
     shots = []
+    known, first, guesses = frozenset(cameras or ()), ", ".join(sorted(cameras or ())[:5]) or "none", MOST_SHOWN
     taken: dict[str, tuple[str, str]] = {}  # one_file(name) → (name, place)
     for row in rows:
         values = _values(row, problems)
@@ -111,9 +112,10 @@ def shots_of(rows: Iterable[Row], problems: Problems, cameras: Collection[str] |
             if left := [name for name in fields if name not in row.excused]:
                 problems.add(f"{row.place_of(left)}: {sentence}")
         _check_name(row, values, taken, problems)
-        if cameras is not None and (camera := values.get("camera")) is not None and camera not in cameras:
-            close = ", ".join(difflib.get_close_matches(camera, cameras) or sorted(cameras)[:5]) or "none"
-            problems.add(f"{row.cells['camera'].place}: the file has no camera {checks.shown(camera)}, but {close}")
+        if cameras is not None and (camera := values.get("camera")) is not None and camera not in known:
+            guesses -= 1  # a guess looks at every camera, and nobody reads those behind the problems that are shown
+            close = ", ".join(difflib.get_close_matches(camera, cameras)) if guesses >= 0 else ""
+            problems.add(f"{row.cells['camera'].place}: the file has no camera {checks.shown(camera)}, but {close or first}")
         if None not in values.values() and not conflicts(values):
             shots.append(Shot(**values))
     return shots

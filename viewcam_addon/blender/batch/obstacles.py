@@ -1,6 +1,7 @@
 """Why a shot can't be rendered, known before anything is: of a batch of a thousand, the last one counts as well."""
 
-from collections.abc import Iterator, Sequence
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
 
 import bpy
 
@@ -30,11 +31,12 @@ def obstacles(shots: Sequence[Shot], check: bool, scene: bpy.types.Scene, own: b
             yield f"{needs}: choose CYCLES or VIEWCAM, or start a display"
     if check and (lacking := judge.lacking()):
         yield lacking
+    among = cameras_of(scene, own)
     read: set[str] = set()
     for shot in shots:
         try:
             if shot.camera is not None:
-                camera_object = camera_named(shot.camera, scene, own)
+                camera_object = camera_named(shot.camera, scene, among)
                 if shot.frame is None and shot.camera not in read:  # at other frames it may be another
                     cameras.read(camera_object, scene)
                     read.add(shot.camera)
@@ -44,38 +46,27 @@ def obstacles(shots: Sequence[Shot], check: bool, scene: bpy.types.Scene, own: b
             yield f"the shot {checks.shown(shot.name)}: {error}"
 
 
-def camera_names(scene: bpy.types.Scene, own: bpy.types.Object) -> tuple[str, ...]:
-    """The names of the scene's cameras but for the batch's own, sorted."""
-    return tuple(sorted(each.name for each in scene.objects if each.type == "CAMERA" and each != own))
+def cameras_of(scene: bpy.types.Scene, own: bpy.types.Object) -> dict[str, bpy.types.Object]:
+    """The scene's cameras but for the batch's own, by name, sorted."""
+    found = {each.name: each for each in scene.objects if each.type == "CAMERA" and each != own}
+    return dict(sorted(found.items()))
 
 
-def camera_named(name: str | None, scene: bpy.types.Scene, own: bpy.types.Object) -> bpy.types.Object:
-    """A camera of the scene. name : None where the scene has none to render with.
+def camera_named(name: str | None, scene: bpy.types.Scene, among: Mapping[str, bpy.types.Object]) -> bpy.types.Object:
+    """A camera of the scene. name : None where the scene has none to render with. among : cameras_of(scene).
 
     Raises
     ------
     InputError
         if none is called so, or if it is no perspective camera.
     """
-    names = camera_names(scene, own)
-    if name not in names:
+    camera_object = among.get(name)
+    if camera_object is None:
         lacking = "no camera of its own" if name is None else f"no camera {name!r}"
-        raise InputError(f"scene {scene.name!r} has {lacking}: choose from {', '.join(names[:8]) or 'none, and add one'}")
-    datablocks.check_perspective(scene.objects[name])
-    return scene.objects[name]
-
-
-def check_said_by_four_values(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene) -> None:
-    """Raise InputError if other views made from a camera of the file would lack something that it has: shift, mirroring."""
-    data = datablocks.camera_data_of(camera_object.evaluated_get(datablocks.depsgraph_of(scene)))
-    extra, remedy = "", ""
-    if data.shift_x or data.shift_y:
-        extra, remedy = f"has a lens shift of {data.shift_x:g}, {data.shift_y:g}", "set it to 0"
-    elif pinhole.mirrored:
-        extra, remedy = "is mirrored", "make its scale positive"
-    if extra:
-        lacking = f"camera {camera_object.name!r} {extra}, which the four values of a shot can't say"
-        raise InputError(f"{lacking}: {remedy}, or take another camera")
+        some = ", ".join(itertools.islice(among, 8))
+        raise InputError(f"scene {scene.name!r} has {lacking}: choose from {some or 'none, and add one'}")
+    datablocks.check_perspective(camera_object)
+    return camera_object
 
 
 def stated(shot: Shot, frame: intrinsics.Frame) -> Pinhole:

@@ -76,7 +76,7 @@ class BlenderRenderer:
     @property
     def cameras(self) -> tuple[str, ...]:
         """The names of the scene's cameras, sorted."""
-        return obstacles.camera_names(self.scene, self._own)
+        return tuple(obstacles.cameras_of(self.scene, self._own))
 
     @property
     def scene_camera(self) -> str | None:
@@ -96,20 +96,23 @@ class BlenderRenderer:
     def pinhole(self, name: str | None, size: tuple[int, int] | None = None) -> Pinhole:
         """A camera of the file as it stands at the file's frame, with a look-at point as people choose it.
 
-        name : that of the scene's camera where None. size : of the whole picture, the file's where None. The four values say
-        all of it; `d` counts pixel widths.
+        name : that of the scene's camera where None. size : of the picture, the file's where None. A border counts for nothing:
+        the pinhole is that of the whole picture.
 
         Raises
         ------
         InputError
-            if there is none of that name, if it is no pinhole, or if it has what the four values can't say.
+            if there is none of that name, or if it is no pinhole.
         """
-        camera_object = obstacles.camera_named(self.scene_camera if name is None else name, self.scene, self._own)
+        among = obstacles.cameras_of(self.scene, self._own)
+        camera_object = obstacles.camera_named(self.scene_camera if name is None else name, self.scene, among)
         width, height = size or (None, None)
-        self._lent.set(Shot("pinhole", camera=camera_object.name, width=width, height=height))
+        shot = Shot("pinhole", camera=camera_object.name, width=width, height=height)
+        self._lent.set(shot)
         found = cameras.as_it_stands(camera_object, self.scene, in_use=camera_object.virtual_pinhole.enabled)
-        obstacles.check_said_by_four_values(camera_object, found, self.scene)
-        return found
+        frame = self._lent.frame_of(shot)
+        column, row, _, _ = frame.window
+        return found.cropped(-column, -row, *frame.size)
 
     def made_from(self) -> dict[str, Any]:
         """What the pictures are made from, beside the shots: hashes of the .blend and of all that it links; versions; the seed;
@@ -168,7 +171,8 @@ class BlenderRenderer:
     def _aim(self, shot: Shot) -> list[str]:
         """Make the shot's camera the scene's; what a reader should know of it."""
         if shot.camera is not None:
-            camera_object = obstacles.camera_named(shot.camera, self.scene, self._own)
+            among = obstacles.cameras_of(self.scene, self._own)
+            camera_object = obstacles.camera_named(shot.camera, self.scene, among)
             self._stated, warnings = None, datablocks.beyond_pinhole(camera_object, self.scene)
         else:
             camera_object, self._stated = self._own, obstacles.stated(shot, self._lent.frame_of(shot))
