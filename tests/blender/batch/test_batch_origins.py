@@ -330,3 +330,46 @@ def test_a_cache_that_is_written_while_rendering_is_no_origin_and_a_baked_one_is
     assert cache.is_baked
     baked = origins.made_from()
     assert baked["linked"] and {name for name, _ in baked["linked"]} >= {f"blendcache_open/{path.name}" for path in written}
+
+
+def named(path):
+    """An image that Blender has not looked for yet."""
+    image = bpy.data.images.new("named", 1, 1)
+    image.source, image.filepath, image.use_fake_user = "FILE", str(path), True
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes in folders here")
+@pytest.mark.parametrize("kind", ["device", "pipe"])
+def test_a_device_or_a_pipe_in_place_of_an_image_is_refused_and_not_read(open_file, tmp_path, kind):
+    """Each would keep its reader for ever."""
+    path = "/dev/zero"
+    if kind == "pipe":
+        path = tmp_path / "pipe.png"
+        os.mkfifo(path)
+    open_file()
+    named(path)
+    with pytest.raises(InputError, match=f"the .blend reads {path}, which is no file"):
+        origins.made_from()
+
+
+def test_more_files_than_anybody_renders_from_are_refused_before_they_are_read(open_file, tmp_path, monkeypatch):
+    """A file of eight exabytes, all of it a hole, is a regular one."""
+    (tmp_path / "huge.png").touch()
+    os.truncate(tmp_path / "huge.png", 2**40)
+    open_file()
+    named(tmp_path / "huge.png")
+    with pytest.raises(InputError, match=r"more than 256 GiB of other files, as .*huge\.png"):
+        origins.made_from()
+
+
+def test_a_cache_in_a_folder_of_too_many_files_is_refused(open_file, tmp_path, monkeypatch):
+    folder = tmp_path / "blendcache_open"
+    folder.mkdir()
+    open_file()
+    monkeypatch.setattr(origins, "_MOST_FILES", 4)
+    for number in range(4):
+        (folder / f"{number}.vdb").touch()
+    assert len(origins.made_from()["linked"]) == 4
+    (folder / "5.vdb").touch()
+    with pytest.raises(InputError, match=r"blendcache_open, which holds more than 4 files: give its cache a folder"):
+        origins.made_from()

@@ -13,9 +13,11 @@ import glob
 import hashlib
 import importlib.metadata
 import io
+import itertools
 import json
 import os
 import re
+import stat
 import tomllib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -30,6 +32,9 @@ _MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
 _TILE = re.compile(r"<(UDIM|UVTILE)>")
 _LAST_NUMBER = re.compile(r"(\d+)(?!.*\d)")
 _NO_FILE = "missing"
+# What is hashed at most: four caches of 25,000 frames in a folder, and of all files what takes some minutes.
+_MOST_FILES = 100_000
+_MOST_BYTES = 256 * 2**30
 
 _USD = (".usd", ".usda", ".usdc")
 _USD_BINARY = b"PXR-USDC"
@@ -91,15 +96,33 @@ def _hash(path: Path) -> str:
     try:
         with open(path, "rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError:
+    except (OSError, ValueError):  # or a name that no file can have
         return _NO_FILE
 
 
 def _hashes(files: Iterable[Path], folder: Path) -> list[list[str]]:
     """[what a file is called, hash] in the order of their paths. folder : its files are called by their path in it."""
     paths = sorted({Path(os.path.normpath(path)) for path in files})
+    _check_kinds(paths)
     inside = [path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.name for path in paths]
     return [[name, _hash(path)] for name, path in zip(inside, paths, strict=True)]
+
+
+def _check_kinds(paths: Iterable[Path]) -> None:
+    """Refuse what can't be hashed in some minutes: a pipe or a device, which may never end, and more than anybody reads."""
+    total = 0
+    for path in paths:
+        try:
+            found = path.stat()
+        except (OSError, ValueError):  # it is told as missing
+            continue
+        if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):
+            raise InputError(f"the .blend reads {path}, which is no file: give a file, or take out what names it")
+        total += found.st_size
+        if total > _MOST_BYTES:
+            raise InputError(
+                f"the .blend reads more than {_MOST_BYTES / 2**30:g} GiB of other files, as {path}: take out what is not needed"
+            )
 
 
 def _digest(hashes: list[list[str]]) -> str:
@@ -121,7 +144,13 @@ def _files(path: str) -> Iterator[Path]:
     if _TILE.search(path):
         yield from map(Path, glob.glob(_TILE.sub("*", glob.escape(path))))
     elif os.path.isdir(path):
-        yield from (each for each in Path(path).rglob("*") if each.is_file())
+        within = list(itertools.islice(Path(path).rglob("*"), _MOST_FILES + 1))
+        if len(within) > _MOST_FILES:
+            raise InputError(
+                f"the .blend names the folder {path}, which holds more than {_MOST_FILES:,} files: give its cache a folder "
+                "of its own"
+            )
+        yield from (each for each in within if each.is_file())
     else:
         yield Path(path)
 
