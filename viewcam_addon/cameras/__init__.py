@@ -126,7 +126,7 @@ def read(given: str | Path, *, format: str | None = None, options: Options | Non
     cameras = module.read(source, options)
     if not cameras:
         raise InputError(f"{source.name} holds no camera: give another file")
-    return [_unmirrored(moved(camera, options), options) for camera in cameras]
+    return [_doubted(_unmirrored(moved(camera, options), options)) for camera in cameras]
 
 
 def recognised(source: str | Path | Source) -> str:
@@ -191,6 +191,15 @@ def _module(name: str, does: str) -> ModuleType:
             f"the format {checks.shown(name)} can't be {'read' if does == 'read' else 'written'}: {', '.join(able)} can"
         )
     return FORMATS[name]
+
+
+def _doubted(camera: Camera) -> Camera:
+    """The camera, with a note where the size that was given can't well be that of its picture."""
+    (c_x, c_y), pinhole = camera.pinhole.principal_point, camera.pinhole
+    if camera.size_stated or (0 <= c_x <= pinhole.width and 0 <= c_y <= pinhole.height):
+        return camera
+    size = f"{pinhole.width} × {pinhole.height}"
+    return camera.noted(f"The principal point of {camera.name} lies outside of a picture of {size} pixels: is that its size?")
 
 
 def _unmirrored(camera: Camera, options: Options) -> Camera:

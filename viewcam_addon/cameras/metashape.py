@@ -3,7 +3,7 @@
 A camera's transform is from its axes (x right, y down, z into the view) to its component, that one's to the chunk, and the
 chunk's to the world; all three count here. The principal point is an offset from the picture's middle, whose first pixel's
 centre is (0.5, 0.5). b1 is what the distance across has more than the other, b2 is skew, which no pinhole has. P1 and P2 are
-OpenCV's p2 and p1.
+OpenCV's p2 and p1. Skew is told and left out as lens distortion is.
 
 Source: the Metashape manual's camera model, and its exported files. nerfstudio's reader leaves out the chunk's transform.
 """
@@ -98,6 +98,8 @@ def _plane(sensor: ElementTree.Element, options: Options) -> tuple[ViewPlane, tu
         not_a_pinhole(what, f"of the type {checks.shown(sensor.get('type'))}")
     found = [each for each in sensor.findall("calibration") if each.find("f") is not None]
     adjusted = [each for each in found if each.get("class") == "adjusted"] or found
+    if not adjusted and sensor.find("calibration/fx") is not None:
+        raise InputError(f"{what} is from before Metashape 1.2, whose numbers mean something else: export it with a newer one")
     if not adjusted:
         raise InputError(f"{what} has no calibration: align the photos in Metashape first")
     calibration = adjusted[-1]
@@ -110,19 +112,15 @@ def _plane(sensor: ElementTree.Element, options: Options) -> tuple[ViewPlane, tu
     for child in calibration:
         with contextlib.suppress(InputError):
             values[child.tag] = number(f"{child.tag} of {what}", child.text or "")
-    focal = values.get("f", values.get("fy", 0.0))
+    focal = values.get("f", 0.0)
     if not (focal > 0 and focal + values.get("b1", 0.0) > 0):
         raise InputError(f"{what} has the focal length {focal:g}: give one above 0")
-    if abs(values.get("b2", 0.0)) > 1e-9 * focal:
-        raise InputError(
-            f"{what} has a skew of {values['b2']:g} pixels (b2), which no pinhole camera here has: undistort the photos"
-        )
-    across = values.get("fx", focal) + values.get("b1", 0.0)
+    across = focal + values.get("b1", 0.0)
     plane = axes.view_plane(
         across, focal, size[0] / 2 + values.get("cx", 0.0), size[1] / 2 + values.get("cy", 0.0), tuple(size)
     )
-    bent = {name: values[name] for name in _LENS if name in values}
-    lens = distortion.opencv(
+    bent = {name: values[name] for name in (*_LENS, "b2") if name in values}
+    brown = distortion.opencv(
         {
             **{name: bent.get(name, 0.0) for name in ("k1", "k2", "k3")},
             "r8": bent.get("k4", 0.0),
@@ -130,4 +128,9 @@ def _plane(sensor: ElementTree.Element, options: Options) -> tuple[ViewPlane, tu
             "p2": bent.get("p1", 0.0),
         }
     )
+
+    def lens(x: float, y: float) -> distortion.Point:
+        x, y = brown(x, y)
+        return x + values.get("b2", 0.0) / across * y, y
+
     return plane, distortion.settle(bent, lens, plane, what, options)

@@ -1,0 +1,142 @@
+"""Whatever the camera, the format and the options: written and read back with the same options it is the same camera."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+
+from viewcam_addon import cameras
+from viewcam_addon.cameras import Camera, Options
+from viewcam_addon.errors import InputError
+from viewcam_addon.pinhole import Pinhole
+
+from .conftest import CAMERAS, points_before
+
+SETTINGS = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+FLOAT64, FLOAT32 = 2.0**-53, 2.0**-24
+
+NO_MIRROR = ("transforms", "colmap", "colmap_binary", "bop", "gltf", "ros", "opencv")
+NO_SHIFT = ("gltf",)
+NO_POSE = ("ros",)
+ANGLES = ("gltf",)
+"""Formats that say the distance by an angle, so that a wide or narrow one keeps fewer digits."""
+OURS = ("sidecar", "transforms", "colmap", "colmap_binary", "bop", "gltf", "usd", "ros", "opencv")
+
+coordinate = st.floats(-1e3, 1e3).map(lambda x: round(x, 6))
+direction = st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda d: math.hypot(*d) > 0.1)
+
+
+@st.composite
+def pinholes(draw):
+    eye = draw(st.tuples(*[coordinate] * 3))
+    view, up = draw(direction), draw(direction)
+    width, height = draw(st.integers(8, 5000)), draw(st.integers(8, 5000))
+    d = draw(st.floats(0.2, 50)) * width
+    middle = (width / 2, height / 2)
+    point = draw(st.one_of(st.none(), st.tuples(*[st.floats(-0.5, 1.5)] * 2)))
+    reach = draw(st.floats(0.01, 100))
+    found = Pinhole(
+        eye,
+        tuple(a + reach * b for a, b in zip(eye, view, strict=True)),
+        up,
+        (d, d * draw(st.sampled_from([1.0, 1.0, 0.5, 1.7]))),
+        width,
+        height,
+        middle if point is None else (point[0] * width, point[1] * height),
+        draw(st.booleans()),
+    )
+    assume(found.sine_to_up > 1e-3)
+    return found
+
+
+def fitting(pinhole, form):
+    """The camera, without what the format can't say."""
+    change = {}
+    if form in NO_MIRROR:
+        change["mirrored"] = False
+    if form in NO_SHIFT:
+        change["principal_point"] = None
+    return dataclasses.replace(pinhole, **change)
+
+
+def read_back(pinhole, form, options, folder):
+    folder.mkdir(exist_ok=True)
+    path = folder / f"a{cameras.FORMATS[form].SUFFIX}" if form not in ("sidecar", "colmap", "colmap_binary") else folder
+    cameras.save([Camera("a", pinhole)], path, form, options)
+    there = Options(
+        **{**dataclasses.asdict(options), "view_plane": None, "base": None, "size": (pinhole.width, pinhole.height)}
+    )
+    (back,) = cameras.read(path, options=there)
+    return back
+
+
+@pytest.mark.parametrize("form", OURS)
+@SETTINGS
+@given(pinhole=pinholes(), axes=st.sampled_from([*cameras.AXES]), scale=st.sampled_from([1.0, 0.01, 1000.0, 0.3048]))
+def test_it_comes_back_as_the_same_camera(tmp_path_factory, form, pinhole, axes, scale):
+    pinhole = fitting(pinhole, form)
+    options = Options(axes=axes, scale=scale)
+    back = read_back(pinhole, form, options, tmp_path_factory.mktemp("a"))
+    assert back.name == ("0" if form == "bop" else "a")  # BOP numbers its images
+    have = back.pinhole
+    unit = FLOAT32 if form == "usd" else FLOAT64
+    assert (have.width, have.height, have.mirrored) == (pinhole.width, pinhole.height, pinhole.mirrored)
+    size = max(have.width, have.height)
+    # An angle θ of half the picture is told to unit · θ, which is d/W + W/d times that of the distance.
+    bent = 1 + max(pinhole.distance) / min(pinhole.width, pinhole.height) if form in ANGLES else 1
+    for one, other in zip(have.distance, pinhole.distance, strict=True):
+        assert abs(one - other) <= 16 * bent * unit * other, f"d is {one!r} and was {other!r}"
+    for one, other in zip(have.principal_point, pinhole.principal_point, strict=True):
+        assert abs(one - other) <= 16 * unit * max(abs(other), size), f"c is {one!r} and was {other!r}"
+    if form in NO_POSE:
+        return
+    # The look-at point is near, and eye and look-at are rounded each where the scale is applied, and where it is taken off.
+    turned = 8 * FLOAT64 * (math.hypot(*pinhole.eye) + math.hypot(*pinhole.look_at)) / math.dist(pinhole.eye, pinhole.look_at)
+    assert np.abs(np.array(have.axes()) - pinhole.axes()).max() < 1e-14 + turned / pinhole.sine_to_up
+    assert math.dist(have.eye, pinhole.eye) <= 1e-14 * max(math.hypot(*pinhole.eye), 1e-3)
+
+
+@pytest.mark.parametrize("form", OURS)
+@pytest.mark.parametrize("name", [*CAMERAS])
+def test_what_it_can_not_say_it_refuses_and_never_leaves_out(tmp_path, form, name):
+    """Written or refused, but never another picture."""
+    pinhole = CAMERAS[name]
+    try:
+        back = read_back(pinhole, form, Options(), tmp_path)
+    except InputError as error:
+        assert ("mirrored" in str(error) and pinhole.mirrored) or ("shifted" in str(error) and form in NO_SHIFT), str(error)
+        return
+    assert not (form in NO_MIRROR and pinhole.mirrored)
+    if form not in NO_POSE:
+        points = points_before(pinhole)
+        ours, theirs = pinhole.project(points), back.pinhole.project(points)
+        limit = max(1e-3, 64 * (FLOAT32 if form == "usd" else FLOAT64) * max(*pinhole.distance) * 1e6)
+        assert np.hypot(ours[0] - theirs[0], ours[1] - theirs[1]).max() < limit
+
+
+@pytest.mark.parametrize("form", [form for form in OURS if form not in NO_POSE])
+def test_several_are_written_in_their_order_and_none_is_chosen_silently(tmp_path, form):
+    given = [Camera(name, CAMERAS[name]) for name in ("plain", "portrait", "wide", "rolled")]
+    several = cameras.FORMATS[form].SUFFIX == "" or form in ("sidecar", "opencv")
+    path = tmp_path if several else tmp_path / f"all{cameras.FORMATS[form].SUFFIX}"
+    if form == "opencv":  # a file for each
+        assert {file.name for file in cameras.save(given, path, form)} == {f"{camera.name}.yml" for camera in given}
+        return
+    cameras.save(given, path, form)
+    back = cameras.read(path, options=Options(size=(640, 360)))
+    names = [camera.name for camera in back]
+    assert names == (
+        ["0", "1", "2", "3"]
+        if form == "bop"
+        else sorted(c.name for c in given)
+        if form == "sidecar"
+        else [c.name for c in given]
+    )
+    with pytest.raises(InputError, match=f"{names[0]}.*{names[3]}"):
+        cameras.choose(back)
+    assert cameras.choose(back, names[2]) is back[2]
+    with pytest.raises(InputError, match="no camera 'nobody'"):
+        cameras.choose(back, "nobody")
