@@ -1,5 +1,7 @@
 """Cycles' settings are borrowed: given back whatever happens, and right while they last."""
 
+import ctypes
+
 import pytest
 
 bpy = pytest.importorskip("bpy")
@@ -294,3 +296,17 @@ def test_more_objects_than_indices_start_again(scene, camera_object, monkeypatch
         bpy.data.objects.new(name, None)
     with indices.numbered():
         assert [block.pass_index for block in bpy.data.objects] == [1, 2, 1, 2]
+
+
+def test_a_file_whose_colour_mode_its_format_does_not_know_is_rendered(crowded, tmp_path):
+    """As some real files have it, and no property of Blender's can set."""
+    settings = crowded.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "IMAGE"
+    settings.file_format, settings.color_mode = "JPEG", "RGB"
+    start = (ctypes.c_ubyte * 8).from_address(settings.as_pointer())
+    start[list(start).index(24)] = 32  # bits a pixel
+    assert settings.color_mode == "", "this Blender keeps it elsewhere"
+    view_layer = crowded.view_layers[0]
+    cycles.render(crowded, view_layer, crowded.camera, tmp_path / "picture.exr")
+    assert settings.file_format == "JPEG" and settings.color_mode in ("BW", "RGB")

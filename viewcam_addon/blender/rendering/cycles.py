@@ -161,14 +161,18 @@ def _borrow_file(borrow: Borrower, scene: bpy.types.Scene, path: os.PathLike[str
 
 
 def borrow_whole(borrow: Borrower, settings: bpy.types.ImageFormatSettings) -> None:
-    """Give back all settings of the file together, since the kind of file changes what the others may be."""
+    """Give back all settings of the file together, since the kind of file changes what the others may be.
+
+    A file may hold one that its kind of file does not know, which reads as "": nobody can set that, Blender chooses another.
+    """
     names = [prop.identifier for prop in settings.bl_rna.properties if not prop.is_readonly]
     names.sort(key=lambda name: ("media_type", "file_format").index(name) if name in ("media_type", "file_format") else 2)
     before = {name: getattr(settings, name) for name in names}
+    unknown = {name for name, value in before.items() if value == "" and settings.bl_rna.properties[name].type == "ENUM"}
 
     def give_back() -> None:
         for name, value in before.items():
-            if getattr(settings, name) != value:
+            if name not in unknown and getattr(settings, name) != value:
                 setattr(settings, name, value)
 
     borrow.afterwards(give_back)
