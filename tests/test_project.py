@@ -40,7 +40,6 @@ ROOMS = {
     "intrinsics": "errors checks pinhole",
     "camera_values": "errors checks pinhole roll intrinsics",
     "cameras": "errors checks files pinhole intrinsics",
-    "camera_text": "errors checks intrinsics",
     "datasets": "files pinhole cameras",
     "compare": "errors files paper pinhole image",
     "tracer": "errors checks memory files exact pinhole image",
@@ -48,7 +47,7 @@ ROOMS = {
     "batch": "errors checks files events paper children pinhole image cameras datasets compare tracer shots",
     "blender": (
         "errors checks files terminal children pinhole roll rotation moves diagram image intrinsics camera_values "
-        "camera_text datasets compare tracer shots batch"
+        "cameras datasets compare tracer shots batch"
     ),
     "commands": "errors terminal events children intrinsics cameras image compare tracer shots batch",
     "camera_words": "words cameras",

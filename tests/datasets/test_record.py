@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from viewcam_addon import camera_text
+from viewcam_addon import cameras
 from viewcam_addon.datasets import View, record, transforms
 from viewcam_addon.intrinsics import CameraData
 from viewcam_addon.pinhole import Pinhole
@@ -25,8 +25,8 @@ def test_the_pinhole_comes_back_bit_for_bit(pinhole):
 
 
 def test_the_record_can_be_pasted_as_a_camera():
-    read = camera_text.read(json.dumps(record.record(PINHOLE)))
-    assert (read.eye, read.look_at, read.up, read.distance) == (PINHOLE.eye, PINHOLE.look_at, PINHOLE.up, 1200)
+    (camera,) = cameras.read(json.dumps(record.record(PINHOLE)))
+    assert camera.pinhole == PINHOLE
 
 
 def test_the_two_matrices_are_inverse_to_each_other_but_for_the_direction_of_y_and_z():

@@ -43,15 +43,24 @@ from . import (
     gaussian_splatting,
     gltf,
     llff,
+    look_at,
+    matrices,
     meshroom,
     metashape,
+    mitsuba,
     opencv,
     openmvg,
+    own,
+    pbrt,
+    pov_ray,
     realitycapture,
     ros,
     sidecar,
+    three_js,
     trajectories,
     transforms,
+    unity,
+    unreal,
     usd,
 )
 from .axes import moved, moved_back
@@ -94,6 +103,15 @@ FORMATS: dict[str, ModuleType] = {
     "ros": ros,
     "opencv": opencv,
     "trajectories": trajectories,
+    "three_js": three_js,
+    "unreal": unreal,
+    "unity": unity,
+    "mitsuba": mitsuba,
+    "pov_ray": pov_ray,
+    "pbrt": pbrt,
+    "matrices": matrices,
+    "look_at": look_at,
+    "text": own,
 }
 """Name → module, in the order in which they are asked."""
 
@@ -145,6 +163,12 @@ def recognised(source: str | Path | Source) -> str:
             return name
     if source.json_problem:
         raise InputError(f"{source.name} looks like JSON and is none ({source.json_problem}): correct it")
+    if source.path is None:
+        place = checks.shown(source.text.strip()[:40])
+        raise InputError(
+            f"the text is no camera that is understood, from its beginning {place} on: copy a whole camera, or write "
+            "eye=1,2,3 look_at=0,0,0 up=0,0,1 d=1000"
+        )
     formats = ", ".join(FORMATS[name].TITLE for name in readable())
     raise InputError(f"{source.name} is no camera that is understood: give one of {formats}")
 
@@ -205,6 +229,8 @@ def _doubted(camera: Camera) -> Camera:
 def _unmirrored(camera: Camera, options: Options) -> Camera:
     if not (options.unmirrored and camera.pinhole.mirrored):
         return camera
-    return replace(camera, pinhole=replace(camera.pinhole, mirrored=False)).noted(
+    pinhole = camera.pinhole
+    turned_over = (pinhole.width - pinhole.principal_point[0], pinhole.principal_point[1])
+    return replace(camera, pinhole=replace(pinhole, mirrored=False, principal_point=turned_over)).noted(
         f"The picture of {camera.name} is mirrored, and was taken without that"
     )

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon import camera_text
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import findings
 from viewcam_addon.blender.interface import clipboard
@@ -65,7 +64,7 @@ def test_what_is_pasted_is_what_is_copied_at_any_percentage_and_pixel_aspect(
 ):
     scene.render.resolution_percentage = percent
     scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = aspect
-    text = camera_text.written(pose[0:3], pose[3:6], pose[6:9], distance)
+    text = json.dumps({"eye": pose[0:3], "look_at": pose[3:6], "up": pose[6:9], "distance": distance})
     try:
         paste(text)
     except RuntimeError as error:  # eye = look-at, up = 0
@@ -74,7 +73,7 @@ def test_what_is_pasted_is_what_is_copied_at_any_percentage_and_pixel_aspect(
     copied = json.loads(clipboard.text_of(posed_camera, scene))
     assert [*copied["eye"], *copied["look_at"], *copied["up"]] == pose
     # To the picture's size and back: two products of one rounding each, and those of their factors.
-    assert copied["distance"] == pytest.approx(distance, rel=0 if percent == 100 else 4 * 2.0**-53, abs=0)
+    assert np.ravel(copied["distance"])[0] == pytest.approx(distance, rel=0 if percent == 100 else 4 * 2.0**-53, abs=0)
 
 
 def test_pasting_enables_a_camera_and_takes_the_rest_from_how_it_stands(camera_object, scene):
@@ -103,7 +102,8 @@ def test_copying_a_camera_that_is_not_in_use_changes_nothing(camera_object, scen
 def test_copying_says_what_it_copied(posed_camera, capfd):
     assert bpy.ops.viewcam.copy_camera() == {"FINISHED"}
     said = capfd.readouterr().out.split("Copied ", 1)[1].splitlines()[0]
-    assert json.loads(said) == {"eye": [7, -6, 5], "look_at": [0, 0, 1], "up": [0, 0, 1], "distance": 1500}
+    values = {"eye": [7, -6, 5], "look_at": [0, 0, 1], "up": [0, 0, 1], "distance": 1500}
+    assert json.loads(said) == values | {"width": 1920, "height": 1080}
 
 
 def test_a_held_roll_is_copied_as_the_up_of_the_same_picture(posed_camera, add_camera, scene):
@@ -137,15 +137,49 @@ def test_what_a_reader_should_know_is_a_warning(posed_camera, capfd):
     posed_camera.driver_add("location", 0).driver.expression = "1.0 + 1.0"
     paste("LookAt 1 2 3 4 5 6 0 0 1")
     printed = capfd.readouterr().out
-    assert "pbrt is left-handed" in printed and "driver" in printed
-    assert "Pasted eye, look-at, up on Camera" in printed
+    assert "pbrt sees with left-handed axes" in printed and "driver" in printed
+    assert "Pasted eye, look-at, mirror on Camera" in printed
+
+
+SHIFTED = '{"eye": [7, -6, 5], "look_at": [0, 0, 1], "up": [0, 0, 1], "distance": 600, "width": 640, "height": 360, '
+SHIFTED += '"principal_point": [300, 200], "mirrored": true}'
+
+
+def test_a_pasted_camera_replaces_shift_and_mirror_of_the_old_one(posed_camera, scene):
+    paste(SHIFTED)
+    found = cameras.read(posed_camera, scene)
+    # The scene's picture is three times as large; lens and shift are float32.
+    assert found.mirrored and found.principal_point == pytest.approx((900, 600), abs=1e-3)
+    assert found.distance == pytest.approx((1800, 1800), rel=2.0**-22)
+    paste("eye=7,-6,5 look_at=0,0,1 up=0,0,1 d=900")
+    found = cameras.read(posed_camera, scene)
+    assert not found.mirrored and found.principal_point == (960, 540)
+
+
+def test_a_paste_can_leave_the_mirror_and_set_the_scenes_size(posed_camera, scene, capfd):
+    paste(SHIFTED.replace('"height": 360', '"height": 480'))
+    assert "The camera is for 640 × 480 pixels and the scene renders 1920 × 1080" in capfd.readouterr().out
+    paste(SHIFTED.replace('"distance": 600', '"distance": [600, 450]'), set_size=True, unmirrored=True)
+    found = cameras.read(posed_camera, scene)
+    assert (found.width, found.height, found.mirrored) == (640, 360, False)
+    assert found.distance == pytest.approx((600, 450), rel=2.0**-22)
+    assert found.principal_point == pytest.approx((340, 200), abs=1e-3)
+
+
+def test_a_text_with_several_cameras_asks_which(posed_camera):
+    sensor = '<sensor type="perspective" id="{}"><transform name="to_world"><lookat origin="{},0,0" target="0,0,1" up="0,0,1"/>'
+    text = "".join(sensor.format(*each) + "</transform></sensor>" for each in (("left", 1), ("right", 2)))
+    with pytest.raises(RuntimeError, match="name one of 'left', 'right'"):
+        paste(f"<scene>{text}</scene>")
+    paste(f"<scene>{text}</scene>", named="right")
+    assert tuple(posed_camera.virtual_pinhole.eye) == (2, 0, 0)
 
 
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
         ("", "There is no text"),
-        ("hello", "not understood at 'hello'"),
+        ("hello", "no camera that is understood, from its beginning 'hello' on"),
         ("eye=0,0,1", "same point"),
         ("up=0,0,0", "(?i)up is"),
         ("eye=1e200,0,0", "beyond Blender's numbers"),

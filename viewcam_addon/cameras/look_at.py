@@ -1,0 +1,647 @@
+"""Cameras that look at a point, as programs write them down: calls and assignments in whatever language.
+
+    gluPerspective(40, 16./9, .1, 100); gluLookAt(7,-6,4, 0,0,1, 0,0,1);                   OpenGL, glm, gl-matrix, Direct3D
+    camera = new THREE.PerspectiveCamera(40, 16/9); camera.position.set(7,-6,4); camera.lookAt(0,0,1)       three.js
+    camera.SetPosition(7,-6,4); camera.SetFocalPoint(0,0,1); camera.SetViewUp(0,0,1); camera.SetViewAngle(40)      VTK, ParaView
+    plotter.camera_position = [(7,-6,4), (0,0,1), (0,0,1)]                                                          PyVista
+    point3 lookfrom(7,-6,4); point3 lookat(0,0,1); vec3 vup(0,0,1); auto vfov = 40;                 Ray Tracing in One Weekend
+    pinhole->set_eye(7,-6,4); pinhole->set_lookat(0,0,1); pinhole->set_view_distance(960); vp.set_hres(640);    textbooks
+
+The statements that say a camera are looked for, wherever they stand; names are followed to plain values (expressions.py), and
+nothing is run. What is set twice to different values, moved by other means (rotate, dolly, quaternions) or computed from what
+the text does not say is refused.
+
+**Angles.** Whose unit a program's documentation says is taken so: degrees of the height in gluPerspective, three.js and
+VTK; radians in glm, gl-matrix, Direct3D and Cesium (there of the longer side). Others: texts.angle_of, as of vfov.
+
+**Textbooks.** The view plane's pixels have the size s and the zoom z magnifies: d · z / s in pixels. roll_angle has no agreed
+sense and is refused unless it is 0.
+
+Sources: the OpenGL reference pages of gluLookAt and gluPerspective; glm's ext/matrix_clip_space.inl; three.js'
+PerspectiveCamera and Object3D.lookAt; VTK's vtkCamera.h and vtkCamera.cxx (WindowCenter, defaults); Shirley's books; Suffern's
+Ray Tracing from the Ground Up, chapters 8 to 10. Rejected: running the code.
+"""
+
+import functools
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from ..errors import InputError
+from . import axes, own, texts
+from .camera import Camera, Options, not_a_pinhole
+from .expressions import Degrees, Expressions, Radians, Unknown, numbers
+from .source import Source
+
+TITLE = "code that places a camera (gluLookAt, three.js, VTK, lookfrom …)"
+SUFFIX = ".txt"
+
+_COMMENT = r"//[^\n]*+|/\*.*?(?:\*/|\Z)|#(?!\s*+define)[^\n]*+"
+_DEFINE = re.compile(r"#\s*+define\s++(\w++)\s++")
+_PATH = r"[A-Za-z_$][\w$]*+(?:(?:\s*+\(\s*+\))?+\s*+(?:\.|->|::)\s*+[A-Za-z_$][\w$]*+)*+"
+_STATEMENT = re.compile(rf"(?<![\w$.])(?<!->)(?<!::)({_PATH})\s*+(?:(=)(?!=)|(\()|(:)(?!:)|(\{{))")
+_PART = re.compile(r"\(\s*\)|\.|->|::|\s")
+_IS_CODE = re.compile(r"\w\s*+\(\s*+[-\w.]|;\s*+$|\w\.\w++\s*+[=(]", re.MULTILINE)
+_CAMERA = re.compile(r"cam|view|eye|lens|observer", re.IGNORECASE)
+
+_EYE = "eye eyepos eyeposition eyepoint eyelocation lookfrom lookfrompoint campos camerapos camposition "
+_EYE += "cameraposition cameralocation camerafrom cameraorigin cameraeye cameracenter"
+_TARGET = "lookat lookatpoint lookatpos lookto focalpoint camerafocalpoint cameratarget camtarget cameralookat cameraat"
+_UP = "up vup upvector viewup cameraviewup cameraup camup camerauup"
+_SPECIFIC = {
+    **dict.fromkeys(_EYE.split(), "eye"),
+    **dict.fromkeys(_TARGET.split(), "target"),
+    **dict.fromkeys(_UP.split(), "up"),
+    **dict.fromkeys(["cameradirection", "cameradir", "camerafront", "camdir", "viewdir", "viewdirection"], "direction"),
+    **dict.fromkeys(["vfov", "fovy", "fovydegrees", "verticalfov", "verticalfieldofview", "yfov"], "fov_y"),
+    **dict.fromkeys(["hfov", "fovx", "horizontalfov", "horizontalfieldofview", "xfov"], "fov_x"),
+    **dict.fromkeys(["viewangle", "cameraviewangle"], "view_angle"),
+    **dict.fromkeys(["fov", "fieldofview", "camerafov"], "fov"),
+    **dict.fromkeys(["aspectratio", "aspect", "cameraaspect"], "aspect"),
+    **dict.fromkeys(["imagewidth", "imgwidth", "screenwidth", "windowwidth", "hres"], "width"),
+    **dict.fromkeys(["imageheight", "imgheight", "screenheight", "windowheight", "vres"], "height"),
+    **dict.fromkeys(["windowsize", "viewsize", "imagesize"], "size"),
+    "viewdistance": "view_distance",
+    "pixelsize": "pixel_size",
+    "zoom": "zoom",
+    "rollangle": "roll",
+    "windowcenter": "window_center",
+    "usehorizontalviewangle": "use_horizontal",
+    **dict.fromkeys(["parallelprojection", "cameraparallelprojection"], "parallel"),
+    **dict.fromkeys(["aperture", "lensradius", "defocusangle", "aperturesize"], "blur"),
+}
+# What says something of a camera only where the object is one.
+_GENERIC = {
+    **dict.fromkeys(["position", "location", "origin", "pos", "from"], "eye"),
+    **dict.fromkeys(["center", "centre", "target", "at", "to"], "target"),
+    **dict.fromkeys(["direction", "forward", "front", "dir"], "direction"),
+    "size": "size",
+    "width": "width",
+    "height": "height",
+}
+_LOOK_AT = {"lookat", "glulookat", "lookatrh", "lookatlh", "createlookat", "xmmatrixlookatrh", "xmmatrixlookatlh", "makelookat"}
+_LOOK_AT |= {
+    "d3dxmatrixlookatlh",
+    "d3dxmatrixlookatrh",
+    "matrixlookatlh",
+    "setlookat",
+    "matrix4lookat",
+    "createlookatlh",
+    "targetto",
+}
+_PERSPECTIVE = {
+    "gluperspective",
+    "perspective",
+    "perspectivecamera",
+    "perspectiverh",
+    "perspectivelh",
+    "perspectivefov",
+    "makeperspective",
+}
+_PERSPECTIVE |= {
+    f"{name}{hand}"
+    for name in ("xmmatrixperspectivefov", "d3dxmatrixperspectivefov", "createperspectivefieldofview", "perspectivefov")
+    for hand in ("lh", "rh", "")
+}
+_PERSPECTIVE |= {"perspectiveprojection", "createperspectiveprojectionmatrix"}
+_FRUSTUM = {"glfrustum", "frustum", "makefrustum"}
+_ORTHOGRAPHIC = {"glortho", "ortho", "orthographiccamera", "gluortho2d", "xmmatrixorthographiclh", "enableparallelprojection"}
+_MOVES = {
+    "rotatex",
+    "rotatey",
+    "rotatez",
+    "rotateonaxis",
+    "translatex",
+    "translatey",
+    "translatez",
+    "azimuth",
+    "elevation",
+    "dolly",
+}
+_MOVES |= {
+    "roll",
+    "yaw",
+    "pitch",
+    "setroll",
+    "orthogonalizeviewup",
+    "applymatrix4",
+    "setviewoffset",
+    "setfocallength",
+    "filmoffset",
+    "quaternion",
+    "rotation",
+    "flyto",
+    "setview",
+}
+_TURNED = {"rotation", "quaternion", "matrix", "matrixworld", "rotate"}
+_PLACES = {"position", "up", "direction"}
+_CHANGED = re.compile(rf"(?<![\w$.])({_PATH})\s*+[-+*/]=")
+_VECTORS = {"eye", "target", "up", "direction"}
+_OTHER_LENSES = re.compile(
+    r"\b(ThinLens|FishEye|Fisheye|Spherical|Stereo(?:Camera)?|Orthographic)\s*+\*|new\s++(ThinLens|FishEye|Spherical|StereoCamera|Orthographic)\b"
+)
+
+
+@dataclass
+class _Said:
+    """What a text says: role → (value, place), and the events whose order counts."""
+
+    values: dict[str, tuple[object, int]] = field(default_factory=dict)
+    mirrored: bool = False
+    aimed: list[tuple[int, tuple]] = field(default_factory=list)  # camera.lookAt(point): it counts where the camera is then
+    moved: list[int] = field(default_factory=list)  # the eye was set
+    frustum: tuple[float, ...] | None = None
+    orthographic: int | None = None
+    three: bool = False
+
+
+def recognises(source: Source) -> bool:
+    if source.is_binary or source.is_folder or source.document or source.xml is not None:
+        return False
+    text = source.text
+    if own.recognises(source):
+        try:
+            own.pairs(text.replace("−", "-"))
+        except InputError:
+            if not _IS_CODE.search(text[:65536]):
+                return False
+        else:
+            return False
+    return _code(text).says_pose()
+
+
+@functools.lru_cache(maxsize=1)
+def _code(text: str) -> "_Code":
+    """What is recognised is then read."""
+    return _Code(text)
+
+
+class _Code:
+    """The statements of a text."""
+
+    def __init__(self, text: str) -> None:
+        self.text = texts.without(_COMMENT, text).replace("−", "-")
+        self.statements = [
+            (_PART.sub(" ", found[1]).split(), found[2] or found[3] or found[4] or found[5], found.end(), found.start())
+            for found in _STATEMENT.finditer(self.text)
+        ]
+        self.assigned: dict[str, list[int]] = {}
+        for parts, sign, at, _ in self.statements:
+            if sign == "=" or (sign in "({" and len(parts) == 1):
+                self.assigned.setdefault(parts[-1], []).append(at if sign == "=" else at - 1)
+        for found in _DEFINE.finditer(self.text):
+            self.assigned.setdefault(found[1], []).append(found.end())
+        self._following: set[str] = set()
+        self._values: dict[str, object] = {}
+        self._lookups = 0
+        self._roles: dict[tuple[str, ...], str | None] = {}
+        self.reader = Expressions(self.text, self._name)
+
+    def says_pose(self) -> bool:
+        for parts, sign, _, _ in self.statements:
+            role = self._role(parts, sign)
+            if role in ("eye", "target", "look_at", "camera_position", "direction", "position_x", "position_y", "position_z"):
+                return True
+        return False
+
+    def _role(self, parts: list[str], sign: str) -> str | None:
+        """What a statement says of a camera; None if nothing."""
+        key = (sign, *parts)
+        if key not in self._roles:
+            self._roles[key] = self._found_role(parts, sign)
+        return self._roles[key]
+
+    def _found_role(self, parts: list[str], sign: str) -> str | None:
+        if any("light" in part.lower() or "shadow" in part.lower() for part in parts):
+            return None
+        key = texts.plain(parts[-1])
+        before = texts.plain(parts[-2]) if len(parts) > 1 else ""
+        if self._is_camera(parts[:-1]) and any(texts.plain(part) in _TURNED for part in parts[1:]):
+            return "moves"
+        if self._is_camera(parts[:-2]) and before in _PLACES and key not in ("set", "x", "y", "z") and sign == "(":
+            return "moves"  # position.copy, .add, .applyAxisAngle
+        if key == "set" and before:  # position.set(…)
+            key, parts = before, parts[:-1]
+            before = texts.plain(parts[-2]) if len(parts) > 1 else ""
+        elif key in ("x", "y", "z") and before in ("position", "up") and sign == "=" and self._is_camera(parts[:-2]):
+            return f"{before}_{key}"
+        if sign == "(" and key in _LOOK_AT and not (key == "setlookat" and before):
+            return "look_at"
+        if sign == "(" and key in _PERSPECTIVE:
+            return "perspective"
+        if sign == "(" and key in _FRUSTUM:
+            return "frustum"
+        if sign == "(" and key in _ORTHOGRAPHIC:
+            return "orthographic"
+        if sign == "(" and key.removeprefix("set") == "size" and "renderer" in before:
+            return "size"
+        if key in ("cameraposition", "cpos", "camera_position") and sign == "=":
+            return "camera_position"
+        bare = key.removeprefix("set")
+        if bare in _SPECIFIC:
+            return _SPECIFIC[bare]
+        if self._is_camera(parts[:-1]):
+            if bare in _MOVES:
+                return "moves"
+            return _GENERIC.get(bare)
+        if bare == "target" and before == "controls":
+            return "target_of_controls"
+        return None
+
+    @staticmethod
+    def _is_camera(parts: list[str]) -> bool:
+        return any(_CAMERA.search(part) for part in parts)
+
+    def _name(self, path: str) -> object:
+        """What a name stands for: the one value that it is given."""
+        last = re.split(r"\.|->|::", path)[-1]
+        if path == "scene.position" and not re.search(r"\bscene\.position\.", self.text):
+            return (0.0, 0.0, 0.0)  # three.js
+        if last in self._values:
+            return self._values[last]
+        self._lookups += 1
+        if last not in self.assigned or last in self._following or max(len(self._following) / 12, self._lookups / 5000) > 1:
+            return None
+        self._following.add(last)
+        try:
+            found = [self._at(place) for place in self.assigned[last][:20]]
+        finally:
+            self._following.discard(last)
+        known = [value for value in found if not isinstance(value, Unknown)]
+        value = known[0] if known and all(value == known[0] for value in known) else None
+        if not self._following:
+            self._values[last] = value
+        return value
+
+    def _at(self, place: int) -> object:
+        if self.text[place : place + 1] in ("(", "{"):  # vec3 eye(1, 2, 3)
+            values, named, _ = Expressions(self.text, self._name).arguments(place)
+            if named:
+                return Unknown(place)
+            return values[0] if len(values) == 1 else tuple(values)
+        return Expressions(self.text, self._name).value(place)[0]
+
+    # ---- what it says
+
+    def said(self) -> _Said:
+        said = _Said(three=bool(re.search(r"\bTHREE\b|PerspectiveCamera", self.text)))
+        if other := _OTHER_LENSES.search(self.text):
+            not_a_pinhole("the text's camera", f"a {other[1] or other[2]}")
+        for changed in _CHANGED.finditer(self.text):
+            parts = _PART.sub(" ", changed[1]).split()
+            if self._is_camera(parts[:1]) and self._role(parts, "=") not in (None, "width", "height", "size"):
+                texts.fail(self.text, changed.start(), "this moves the camera from where it was, write where it is then")
+        parts_of: dict[str, dict[str, float]] = {}
+        for parts, sign, at, start in self.statements:
+            role = self._role(parts, sign)
+            if role is None or (sign == ":" and role in ("width", "height", "size")):
+                continue
+            if role == "moves" and sign != ":":
+                texts.fail(self.text, start, "this moves or bends the camera by other means, write eye, look-at and up")
+            elif role == "moves":
+                continue
+            elif role == "look_at":
+                self._look_at(said, parts, at - 1, start)
+            elif role == "perspective":
+                self._perspective(said, parts, at - 1, start)
+            elif role == "frustum":
+                values, _, _ = self.reader.arguments(at - 1)
+                said.frustum = numbers(tuple(values[:6]), 6) if len(values) >= 6 else None
+                if said.frustum is None:
+                    texts.fail(self.text, start, "give six plain numbers for the frustum")
+            elif role == "orthographic":
+                said.orthographic = start
+            elif role == "camera_position":
+                self._camera_position(said, at, start)
+            elif role[:-1] in ("position_", "up_"):
+                value = self.reader.value(at)[0]
+                if isinstance(value, float):
+                    parts_of.setdefault(role[:-2], {})[role[-1]] = value
+            else:
+                self._plain(said, role, parts, sign, at, start)
+        for name, given in parts_of.items():
+            role = {"position": "eye", "up": "up"}[name]
+            usual = (0.0, 0.0, 0.0) if role == "eye" else (0.0, 1.0, 0.0)
+            now = said.values.get(role, (usual, 0))[0]
+            said.values[role] = (tuple(given.get(axis, old) for axis, old in zip("xyz", now, strict=True)), 0)
+        return said
+
+    def _set(self, said: _Said, role: str, value: object, at: int) -> None:
+        before = said.values.get(role)
+        if before and before[0] != value and not isinstance(value, Unknown) and not isinstance(before[0], Unknown):
+            line = self.text.count("\n", 0, before[1]) + 1
+            texts.fail(self.text, at, f"{role} is something else in line {line}, copy one camera")
+        if before is None or isinstance(before[0], Unknown):
+            said.values[role] = (value, at)
+
+    def _plain(self, said: _Said, role: str, parts: list[str], sign: str, at: int, start: int) -> None:
+        if sign in "({":
+            values, named, _ = self.reader.arguments(at - 1)
+            value: object = values[0] if len(values) == 1 else tuple(values)
+            if not values and not named:
+                return  # a getter
+        else:
+            value = self.reader.value(at)[0]
+        if role in _VECTORS:
+            found = numbers(value, 3)
+            if found is None and sign in "({" and _looks_declared(self.text, at - 1):
+                return
+            if found is None:
+                parts_unknown = [part for part in value if isinstance(part, Unknown)] if isinstance(value, tuple) else [value]
+                value = next((part for part in parts_unknown if isinstance(part, Unknown)), Unknown(start))
+            else:
+                value = found
+            if role == "eye":
+                said.moved.append(start)
+        self._set(said, role, value, start)
+
+    def _look_at(self, said: _Said, parts: list[str], opened: int, start: int) -> None:
+        values, named, _ = self.reader.arguments(opened)
+        if texts.plain(parts[-1]).endswith("lh"):
+            said.mirrored = True
+        if named:
+            spelt = {own._spelt(key): value for key, value in named.items()}
+            values = [spelt.get(name) for name in own.VECTORS]
+        flat = tuple(values)
+        if (nine := numbers(flat[-9:], 9)) and len(flat) in (9, 10):
+            values = [nine[:3], nine[3:6], nine[6:]]
+        if len(values) == 3 and numbers(flat, 3) and not named:
+            said.aimed.append((start, numbers(flat, 3)))
+            return
+        if len(values) == 1:
+            point = numbers(values[0], 3)
+            if point is None:
+                if _looks_declared(self.text, opened):
+                    return
+                texts.fail(self.text, getattr(values[0], "at", 0) or start, "give plain numbers for the point that it looks at")
+            said.aimed.append((start, point))
+            return
+        if not values:
+            return
+        vectors = [numbers(value, 3) for value in values[-3:]]
+        if len(values) not in (3, 4) or None in vectors or len(vectors) < 3:
+            if _looks_declared(self.text, opened):
+                return
+            texts.fail(self.text, start, "give eye, target and up as plain numbers")
+        for role, vector in zip(("eye", "target", "up"), vectors, strict=True):
+            self._set(said, role, vector, start)
+
+    def _camera_position(self, said: _Said, at: int, start: int) -> None:
+        value = self.reader.value(at)[0]
+        if one := numbers(value, 3):
+            said.moved.append(start)
+            return self._set(said, "eye", one, start)
+        vectors = [numbers(part, 3) for part in value] if isinstance(value, tuple) and len(value) == 3 else [None]
+        if None in vectors:
+            texts.fail(self.text, start, "give position, focal point and up as three numbers each")
+        for role, vector in zip(("eye", "target", "up"), vectors, strict=True):
+            self._set(said, role, vector, start)
+
+    def _perspective(self, said: _Said, parts: list[str], opened: int, start: int) -> None:
+        values, named, _ = self.reader.arguments(opened)
+        name = texts.plain(parts[-1])
+        family = texts.plain("".join(parts))
+        if name.endswith("lh") and not any(self._role(other, sign) == "look_at" for other, sign, _, _ in self.statements):
+            said.mirrored = True
+        if values and isinstance(values[0], Unknown) and len(values) >= 5:  # the matrix that gl-matrix and D3DX fill
+            values = values[1:]
+        if not values and not named:
+            if name == "perspectivecamera":
+                self._set(said, "fov_y", Degrees(50.0), start)
+            return
+        angle = named.get("fov", named.get("fovy", values[0] if values else None))
+        if isinstance(angle, float) and not isinstance(angle, Radians | Degrees):
+            if name in ("gluperspective", "perspectivecamera", "perspectiveprojection"):
+                angle = Degrees(angle)
+            elif angle < math.pi and ("glm" in family or "mat4" in family or name.startswith(("xm", "d3dx", "create"))):
+                angle = Radians(angle)
+        self._set(said, "fov_y", angle if angle is not None else Unknown(start), start)
+        if name == "perspectivefov" and len(values) >= 3:
+            self._set(said, "size", (values[1], values[2]), start)
+        elif len(values) > 1 or "aspect" in named:
+            aspect = named.get("aspect", values[1] if len(values) > 1 else None)
+            if isinstance(aspect, float):
+                self._set(said, "aspect_of_lens", aspect, start)
+
+
+def _looks_declared(text: str, opened: int) -> bool:
+    """Whether the brackets are the head of a function's definition."""
+    try:
+        end = texts.closing(text, opened, "()")
+    except InputError:
+        return False
+    return bool(re.match(r"\)\s*(?:const\s*)?(?:->[^;{]{0,40})?[{:]", text[end : end + 60]))
+
+
+def read(source: Source, options: Options) -> list[Camera]:
+    code = _code(source.text)
+    said = code.said()
+    values, text = said.values, code.text
+    if said.orthographic is not None and not {"fov", "fov_x", "fov_y"} & values.keys() and said.frustum is None:
+        not_a_pinhole("the text's camera", "orthographic")
+    if _plain_number(values, "parallel", 0.0, text):
+        not_a_pinhole("the text's camera", "in parallel projection")
+    if _plain_number(values, "blur", 0.0, text) > 0:
+        texts.fail(text, values["blur"][1], "this lens blurs and is no pinhole, set it to 0 for its middle")
+    if _plain_number(values, "roll", 0.0, text):
+        texts.fail(text, values["roll"][1], "which way a roll turns differs between books, write the up that it makes")
+    eye, look_at, up, notes = _pose(said, text, options)
+    plane, stated, more = _plane(said, text, options)
+    singular_is_fine = "view_distance" in values
+    pinhole = texts.posed(eye, look_at, up, plane, said.mirrored, singular_is_fine)
+    camera = Camera("Camera", pinhole, stated, (*notes, *more))
+    return [texts.mirroring(camera, "The text's camera")]
+
+
+def _known(values: dict, role: str, text: str, advice: str) -> object:
+    if role not in values:
+        return None
+    value, at = values[role]
+    if isinstance(value, Unknown):
+        texts.fail(text, value.at or at, advice)
+    return value
+
+
+def _plain_number(values: dict, role: str, usual: float, text: str) -> float:
+    value = _known(values, role, text, f"write the number for {role}")
+    if value is None:
+        return usual
+    if isinstance(value, str):
+        value = {"true": 1.0, "false": 0.0}.get(value.lower(), value)
+    if not isinstance(value, float):
+        texts.fail(text, values[role][1], f"write the number for {role}")
+    return float(value)
+
+
+def _pose(said: _Said, text: str, options: Options) -> tuple:
+    """eye, look_at, up and notes."""
+    values, base = said.values, options.base
+    notes: tuple[str, ...] = ()
+    found = {role: _known(values, role, text, f"write {role} in plain numbers") for role in _VECTORS}
+    eye, target, up, direction = (found[role] for role in ("eye", "target", "up", "direction"))
+    if said.three and eye is None:
+        eye = (0.0, 0.0, 0.0)
+    if target is None and (aims := {point for _, point in said.aimed}):
+        if len(aims) > 1:
+            texts.fail(text, said.aimed[1][0], "it looks at several points, copy one camera")
+        target = said.aimed[0][1]
+        if said.moved and said.moved[-1] > said.aimed[-1][0]:
+            texts.fail(
+                text, said.moved[-1], "the camera moves after it was turned to look at a point, set its position before lookAt"
+            )
+    if target is None and "target_of_controls" in values:
+        target = numbers(_known(values, "target_of_controls", text, "write the target in plain numbers"), 3)
+    if target is None and said.three and direction is None:
+        if "OrbitControls" in text:
+            target, notes = (0.0, 0.0, 0.0), ("OrbitControls turn the camera to the origin",)
+        else:
+            direction = (0.0, 0.0, -1.0)
+    if eye is None:
+        eye = base.eye if base else None
+    if target is None and direction is not None and eye is not None:
+        target = tuple(a + b for a, b in zip(eye, direction, strict=True))
+    if target is None:
+        target = base.look_at if base else None
+    for name, vector in (("eye", eye), ("target", target)):
+        if vector is None:
+            raise InputError(
+                f"the text does not say the camera's {'position' if name == 'eye' else 'target'} in plain numbers: write it"
+            )
+    if up is None:
+        if said.three or re.search(r"vtk|SetViewAngle|SetFocalPoint|pinhole|set_view_distance", text, re.IGNORECASE):
+            up = (0.0, 1.0, 0.0)
+        elif base:
+            up = base.up
+        else:
+            raise InputError("the text does not say which way is up for its camera: write it")
+    return eye, target, up, notes
+
+
+def _plane(said: _Said, text: str, options: Options) -> tuple:
+    """The view plane, whether its size is stated, and notes."""
+    values = said.values
+    what = "the text"
+    aspect = next((v for role in ("aspect_of_lens", "aspect") if isinstance(v := values.get(role, (None, 0))[0], float)), None)
+    if aspect is not None and not 1e-4 < aspect < 1e4:
+        raise InputError(f"the picture's aspect is {aspect:g}: give its width over its height")
+    size = _size(values, aspect)
+    if said.frustum:
+        left, right, bottom, top, near, _ = said.frustum
+        if not (left != right and bottom != top and near > 0):
+            raise InputError("the frustum is empty: give left, right, bottom, top, near and far")
+        film = texts.film(options, what, size, abs((right - left) / (top - bottom)))
+        exact = film.width if film.is_stated else film.height * abs((right - left) / (top - bottom)) / film.pixel_aspect
+        d_x, d_y = near * exact / (right - left), near * film.height / (top - bottom)
+        if d_x <= 0 or d_y <= 0:
+            raise InputError("the frustum turns the picture over: give left < right and bottom < top")
+        c_x = -left / (right - left) * exact + (film.width - exact) / 2
+        plane = axes.view_plane(d_x, d_y, c_x, film.height * top / (top - bottom), (film.width, film.height))
+        return plane, film.is_stated, film.notes
+    if "view_distance" in values:
+        film = texts.film(options, what, size, None if size else aspect)
+        d, zoom, s = (
+            _plain_number(values, role, usual, text)
+            for role, usual in (("view_distance", 0.0), ("zoom", 1.0), ("pixel_size", 1.0))
+        )
+        if s <= 0 or zoom <= 0:
+            raise InputError(f"pixel size and zoom are {s:g} and {zoom:g}: give positive ones")
+        return film.centred(d * zoom / s), film.is_stated, film.notes
+    said_angles = [role for role in ("fov_y", "fov_x", "view_angle", "fov") if role in values]
+    if not said_angles:
+        if "SetViewUp" in text or "SetFocalPoint" in text:
+            film = texts.film(options, what, size)
+            return (
+                film.plane(math.radians(30), "y"),
+                film.is_stated,
+                (*film.notes, "The text says no view angle: it is VTK's own, 30°"),
+            )
+        return options.plane_or_refuse(what), False, ()
+    if not said.three and _plain_number(values, "zoom", 1.0, text) != 1:
+        texts.fail(text, values["zoom"][1], "what this zooms differs between programs, write the field of view that it makes")
+    role = said_angles[0]
+    if len(said_angles) > 1:
+        known = {value for each in said_angles if not isinstance(value := values[each][0], Unknown)}
+        if len({float(x) for x in known if isinstance(x, float)}) > 1:
+            texts.fail(text, values[said_angles[1]][1], "the field of view is said more than once, leave one out")
+        role = next((each for each in said_angles if not isinstance(values[each][0], Unknown)), role)
+    value = _known(values, role, text, "write the field of view as a number")
+    if not isinstance(value, float):
+        texts.fail(text, values[role][1], "write the field of view as a number")
+    axis = {"fov_y": "y", "fov_x": "x", "view_angle": "y"}.get(role)
+    if role == "view_angle":
+        value = value if isinstance(value, Radians) else Degrees(value)
+        axis = "x" if _plain_number(values, "use_horizontal", 0.0, text) else "y"
+    if role == "fov":
+        if said.three:
+            value, axis = Degrees(value), "y"
+        elif "Cesium" in text or "frustum.fov" in text:
+            value, axis = Radians(value), "larger"
+        else:
+            raise InputError(f"a field of view of {value:g} may be meant across or upwards: say vfov or hfov")
+    name = "the field of view"
+    radians = (
+        float(value)
+        if isinstance(value, Radians)
+        else math.radians(value)
+        if isinstance(value, Degrees)
+        else texts.angle_of(value, name, options)
+    )
+    if not 0 < radians < math.pi:
+        raise InputError(f"the field of view is {math.degrees(radians):g}°: give an angle between 0 and 180")
+    if said.three and (zoom := _plain_number(values, "zoom", 1.0, text)) != 1 and zoom > 0:
+        radians = 2 * math.atan(math.tan(radians / 2) / zoom)
+    film = texts.film(options, what, size, aspect)
+    plane = film.plane(radians, axis, name)
+    if not film.is_stated and aspect and axis == "x":
+        half = math.tan(radians / 2)
+        plane = film.centred(film.height * aspect / 2 / half / film.pixel_aspect)
+    if size and "aspect_of_lens" in values and aspect and abs(film.aspect / aspect - 1) * film.width > 1:
+        d_y = plane.distance[1]
+        plane = axes.view_plane(d_y * film.aspect / aspect, d_y, film.width / 2, film.height / 2, size)
+    if "window_center" in values:
+        shift = numbers(_known(values, "window_center", text, "write the window's centre in numbers"), 2)
+        if shift is None:
+            texts.fail(text, values["window_center"][1], "write the window's centre in numbers")
+        c_x, c_top = (1 - shift[0]) / 2 * film.width, (1 + shift[1]) / 2 * film.height
+        plane = axes.view_plane(*plane.distance, c_x, c_top, (film.width, film.height))
+    return plane, film.is_stated, film.notes
+
+
+def _size(values: dict, aspect: float | None) -> tuple[int, int] | None:
+    both = values.get("size", (None, 0))[0]
+    width, height = (values.get(role, (None, 0))[0] for role in ("width", "height"))
+    if isinstance(both, tuple) and (found := numbers(both, 2)):
+        width, height = found
+    if isinstance(width, float) and aspect and not isinstance(height, float):
+        height = float(max(1, int(width / aspect)))
+    if all(isinstance(x, float) and x.is_integer() and 1 <= x < 2**31 for x in (width, height)):
+        return int(width), int(height)
+    return None
+
+
+def write(cameras: Sequence[Camera], options: Options) -> str:
+    """gluLookAt and glFrustum of each camera: exact, whatever its principal point and pixels.
+
+    Raises
+    ------
+    InputError
+        if one is mirrored, which these can't say.
+    """
+    return "\n".join(map(_written, cameras))
+
+
+def _written(camera: Camera) -> str:
+    pinhole = camera.pinhole
+    if pinhole.mirrored:
+        raise InputError(f"gluLookAt can't say that {camera.name} is mirrored: make its scale positive, or write matrices")
+    (d_x, d_y), (c_x, c_y), (width, height) = pinhole.distance, pinhole.principal_point, (pinhole.width, pinhole.height)
+    near, far = 0.1, 1000.0
+    window = [-c_x / d_x * near, (width - c_x) / d_x * near, -c_y / d_y * near, (height - c_y) / d_y * near]
+    vectors = ", ".join(texts.listed(vector, ", ") for vector in texts.look(pinhole))
+    lines = [
+        f"windowSize = ({width}, {height});",
+        f"glFrustum({texts.listed([*window, near, far], ', ')});",
+        f"gluLookAt({vectors});",
+    ]
+    return "\n".join([*lines, ""])

@@ -1,0 +1,306 @@
+"""POV-Ray's camera { … }.
+
+**Vectors.** `right`, `up` and `direction` span the picture: the ray through (x, y), from the top left in parts of the picture,
+goes along direction + (x − ½) right + (½ − y) up. So shape and handedness are in `right` and `up`, whatever the picture's size:
+seen from a right-handed world `right x` gives a mirrored picture, and `right -x` one that is not. `angle` sets the length of
+`direction` for the horizontal field of view. `look_at` turns the camera by `sky`, keeping those lengths.
+
+**Order.** From version 3.5 on these are applied in one order, wherever they stand, and rotate, translate, scale and matrix
+after them as they stand. Of several cameras the last counts. What POV-Ray computes (`#declare`, sums,
+`image_width/image_height`) is computed as far as it is plain arithmetic; what stands under #if,
+in a loop or a macro is refused.
+
+Sources: POV-Ray 3.7's source/backend/parser/parser.cpp (Parse_Camera) and source/backend/render/tracepixel.cpp. Rejected:
+following #include, since a paste has no folder.
+"""
+
+import math
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import InputError
+from . import axes, texts
+from .camera import Camera, Options, not_a_pinhole
+from .expressions import Expressions, Unknown, numbers
+from .source import Source
+
+TITLE = "POV-Ray camera"
+SUFFIX = ".pov"
+
+_CAMERA = re.compile(r"\bcamera\s*+\{")
+_COMMENT = r"//[^\n]*+|/\*.*?(?:\*/|\Z)"
+_DECLARE = re.compile(r"#\s*+(?:declare|local)\s++(\w++)\s*+=\s*+")
+_CONDITION = re.compile(r"#\s*+(if|ifdef|ifndef|while|for|switch|macro|end)\b")
+_VERSION = re.compile(r"#\s*+version\s++([\d.]++)")
+_WORD = re.compile(r"\s*+([A-Za-z_]\w*+)")
+_VECTORS = ("location", "right", "up", "direction", "sky", "look_at")
+_SIZE = (800, 600)
+_MOVES = ("rotate", "translate", "scale", "matrix")
+_KINDS = (
+    *("orthographic", "fisheye", "ultra_wide_angle", "omnimax", "panoramic", "cylinder", "spherical", "mesh_camera"),
+    *("stereo", "octa", "cube", "plate_carree", "mercator", "lambert_azimuthal", "lambert_cylindrical"),
+)
+_BLUR = ("blur_samples", "focal_point", "confidence", "variance", "bokeh", "aperture")
+_PIXELS = re.compile(r"\+([WwHh])(\d{1,6})\b")
+_UNITS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+def recognises(source: Source) -> bool:
+    return (
+        not source.is_binary and bool(_CAMERA.search(source.text)) and _in_use(texts.without(_COMMENT, source.text)) is not None
+    )
+
+
+def read(source: Source, options: Options) -> list[Camera]:
+    text = texts.without(_COMMENT, source.text)
+    version = _VERSION.search(text)
+    if version and float(version[1][:4].rstrip(".") or 4) < 3.5:
+        texts.fail(
+            text, version.start(), "before version 3.5 the order of the statements counted otherwise, write #version 3.7"
+        )
+    found = _in_use(text)
+    if found is None:
+        raise InputError(f"{source.name} has camera {{ … }} in comments only: give one outside of them")
+    start, others = found
+    camera = _Block(text, start, options, _size(source.text)).camera()
+    return [camera.noted(*([f"Of {others + 1} cameras the last is the one in use"] if others else []))]
+
+
+def _size(text: str) -> tuple[int, int] | None:
+    """The pixels that the command line asks for, if a comment repeats it, as in // +W640 +H360."""
+    found = {(letter.upper(), int(number)) for letter, number in _PIXELS.findall(text)}
+    said = dict(found)
+    return (said["W"], said["H"]) if len(found) == 2 and said.keys() == {"W", "H"} and min(said.values()) > 0 else None
+
+
+def _in_use(text: str) -> tuple[int, int] | None:
+    """Where the block of the camera in use opens, and how many others there are; None if there is no camera."""
+    blocks = [found.end() - 1 for found in _CAMERA.finditer(text)]
+    if not blocks:
+        return None
+    declared = {found.end(): found[1] for found in _DECLARE.finditer(text)}
+    starts = {found.end() - 1: found.start() for found in _CAMERA.finditer(text)}
+    used = [opened for opened in blocks if starts[opened] not in declared]
+    chosen = used or blocks
+    if not used and len(blocks) > 1:
+        names = ", ".join(declared[starts[opened]][:40] for opened in blocks[:8])
+        raise InputError(f"there are {len(blocks)} cameras and none is in use: keep one of {names}")
+    return chosen[-1], len(used) - 1 if used else 0
+
+
+class _Block:
+    """A camera whose block opens at a place."""
+
+    def __init__(self, text: str, opened: int, options: Options, size: tuple[int, int] | None) -> None:
+        self.text, self.options, self.size = text, options, size
+        self.conditions = _conditions(text)
+        self._refuse_condition(opened)
+        self.declared = {}
+        for found in _DECLARE.finditer(text, 0, opened):
+            self.declared.setdefault(found[1], []).append(found.end())
+        self._resolving: set[str] = set()
+        self._aspect_of_film = False
+        self.film: texts.Film | None = None
+        self.reader = Expressions(text, self._name, angled=True)
+        self.said: dict[str, object] = {}
+        self.moves: list[tuple[np.ndarray, np.ndarray]] = []
+        self._collect(opened, 0)
+
+    def _refuse_condition(self, at: int) -> None:
+        if any(start < at < end for start, end in self.conditions):
+            texts.fail(self.text, at, "it stands under #if, in a loop or a macro, copy what counts")
+
+    def _name(self, path: str) -> object:
+        if path in _UNITS:
+            return _UNITS[path]
+        if path in ("image_width", "image_height"):
+            self._aspect_of_film = True
+            return float(self._filmed().width if path == "image_width" else self._filmed().height)
+        if path not in self.declared or path in self._resolving or len(self._resolving) > 20:
+            return None
+        places = self.declared[path]
+        self._refuse_condition(places[-1])
+        self._resolving.add(path)
+        try:
+            return Expressions(self.text, self._name, angled=True).value(places[-1])[0]
+        finally:
+            self._resolving.discard(path)
+
+    def _filmed(self) -> texts.Film:
+        if self.film is None:
+            self.film = texts.film(self.options, "POV-Ray's camera", self.size, default=_SIZE)
+        return self.film
+
+    def _collect(self, opened: int, depth: int) -> None:
+        end = texts.closing(self.text, opened, "{}")
+        at, is_first = opened + 1, True
+        while found := _WORD.match(self.text, at, end):
+            word, at = found[1], found.end()
+            at = self._take(word, found.start(1), at, is_first, depth)
+            is_first = False
+            while self.text[at : at + 1] in (",", ";", " ", "\n", "\t") and at < end:
+                at += 1
+        if self.text[at:end].strip():
+            texts.fail(self.text, at, "give location, look_at, sky, angle, right, up and direction")
+
+    def _take(self, word: str, start: int, at: int, is_first: bool, depth: int) -> int:
+        if word == "perspective":
+            return at
+        if word in _KINDS:
+            not_a_pinhole("POV-Ray's camera", word)
+        if word in _VECTORS:
+            value, end = self.reader.value(at)
+            self.said[word] = self._vector(value, at, word)
+            return end
+        if word in ("angle", "aperture", *_BLUR):
+            value, end = self.reader.value(at)
+            if word in ("angle", "aperture") and not isinstance(value, float):
+                texts.fail(self.text, _place(value, at), f"give a plain number for {word}")
+            self.said[word] = value
+            if word == "bokeh":
+                texts.fail(self.text, start, "this camera blurs and is no pinhole, take bokeh out")
+            if self.text[(after := end) : after + 1] == ",":  # angle of a fisheye, confidence
+                end = self.reader.value(after + 1)[1]
+            return end
+        if word in _MOVES:
+            return self._move(word, at)
+        if is_first and word in self.declared and depth < 5:
+            place = self.declared[word][-1]
+            self._refuse_condition(place)
+            if camera := _CAMERA.match(self.text, place):
+                self._collect(camera.end() - 1, depth + 1)
+                return at
+        texts.fail(self.text, start, "a camera of location, look_at, sky, angle, right, up, direction and moves is")
+
+    def _vector(self, value: object, at: int, word: str) -> tuple[float, float, float]:
+        if isinstance(value, float):
+            value = (value,) * 3
+        found = numbers(value, 3)
+        if found is None:
+            texts.fail(self.text, _place(value, at), f"give plain numbers for {word}")
+        return found
+
+    def _move(self, word: str, at: int) -> int:
+        value, end = self.reader.value(at)
+        turn, shift = np.eye(3), np.zeros(3)
+        if word == "matrix":
+            given = numbers(value, 12)
+            if given is None:
+                texts.fail(self.text, _place(value, at), "give twelve plain numbers for matrix")
+            rows = np.array(given).reshape(4, 3)
+            turn, shift = rows[:3].T, rows[3]
+        else:
+            vector = self._vector(value, at, word)
+            if word == "translate":
+                shift = np.array(vector)
+            elif word == "scale":
+                turn = np.diag([part or 1.0 for part in vector])
+            else:
+                for degrees, axis in zip(vector, np.eye(3), strict=True):
+                    turn = texts.turn(degrees, axis) @ turn
+        self.moves.append((turn, shift))
+        return end
+
+    def camera(self) -> Camera:
+        said = self.said
+        if said.get("aperture"):
+            raise InputError("the camera's aperture blurs, so it is no pinhole: set it to 0 for its middle")
+        right = np.array(said.get("right", (1.33, 0.0, 0.0)))
+        up, direction = np.array(said.get("up", _UNITS["y"])), np.array(said.get("direction", _UNITS["z"]))
+        sky, eye = said.get("sky", _UNITS["y"]), np.array(said.get("location", (0.0, 0.0, 0.0)))
+        lengths = [math.hypot(*vector) for vector in (right, up, direction)]
+        if min(lengths) < 1e-12 or max(lengths) > 1e12:
+            raise InputError("right, up or direction of POV-Ray's camera has no length: give each one")
+        if "angle" in said:
+            angle = float(said["angle"])
+            if not 0 < angle < 180:
+                raise InputError(f"angle of POV-Ray's camera is {angle:g}°: give one between 0 and 180")
+            direction = direction / lengths[2] * (lengths[0] / 2 / math.tan(math.radians(angle) / 2))
+            lengths[2] = math.hypot(*direction)
+        is_left_handed = float(np.cross(up, direction) @ right) > 0
+        film = self._film(lengths[0] / lengths[1])
+        size = (film.width, film.height)
+        # A picture whose pixels nobody said has square ones, and a width that is whole: half a pixel may be missing there.
+        exact = size[0] if film.is_stated or self._aspect_of_film else size[1] * lengths[0] / lengths[1] / film.pixel_aspect
+        if "look_at" in said:
+            look_at = said["look_at"]
+            plane = axes.view_plane(
+                lengths[2] * exact / lengths[0], lengths[2] * size[1] / lengths[1], size[0] / 2, size[1] / 2, size
+            )
+            if abs(plane.distance[0] / plane.distance[1] - 1) < 2.0**-20:
+                plane = _square(plane, size)
+            pinhole, notes = texts.posed(tuple(eye.tolist()), look_at, tuple(sky), plane, is_left_handed), ()
+            if self.moves:
+                u, v, w = pinhole.basis()
+                direction, up = -w * lengths[2], v * lengths[1]
+                right = (-u if is_left_handed else u) * lengths[0]
+        if "look_at" not in said or self.moves:
+            for turn, shift in self.moves:
+                eye, right, up, direction = turn @ eye + shift, turn @ right, turn @ up, turn @ direction
+            rays = np.column_stack([right / exact, -up / size[1], direction - right / 2 + up / 2])
+            if abs(np.linalg.det(rays)) < 1e-30:
+                raise InputError("right, up and direction of POV-Ray's camera lie in one plane: turn one of them")
+            centred = np.array([[1, 0, (size[0] - exact) / 2], [0, 1, 0], [0, 0, 1]])
+            pinhole, notes = texts.projected(centred @ np.linalg.inv(rays), tuple(eye.tolist()), size, "POV-Ray's camera")
+        camera = Camera("Camera", pinhole, film.is_stated, (*film.notes, *notes))
+        return texts.mirroring(camera, "POV-Ray")
+
+    def _film(self, aspect: float) -> texts.Film:
+        """The picture: any, if the text takes the shape of whatever it is; else one of the shape that right and up say."""
+        if self._aspect_of_film:
+            return self._filmed()
+        return texts.film(self.options, "POV-Ray's camera", self.size, aspect, _SIZE)
+
+
+def _square(plane, size: tuple[int, int]):
+    """The view plane with one distance, where two differ by their rounding."""
+    d = math.sqrt(plane.distance[0] * plane.distance[1])
+    return axes.view_plane(d, d, size[0] / 2, size[1] / 2, size)
+
+
+def _place(value: object, at: int) -> int:
+    return value.at if isinstance(value, Unknown) and value.at else at
+
+
+def _conditions(text: str) -> list[tuple[int, int]]:
+    """Where #if … #end and their like begin and end."""
+    result, opened = [], []
+    for found in _CONDITION.finditer(text):
+        if found[1] != "end":
+            opened.append(found.start())
+        elif opened:
+            start = opened.pop()
+            if not opened:
+                result.append((start, found.start()))
+    return result + [(start, len(text)) for start in opened[:1]]
+
+
+def write(cameras: Sequence[Camera], options: Options) -> str:
+    """camera { … } of each, without angles, whose lengths say the distances exactly."""
+    return "\n".join(map(_written, cameras))
+
+
+def _written(camera: Camera) -> str:
+    pinhole = camera.pinhole
+    (d_x, d_y), (c_x, c_y), (width, height) = pinhole.distance, pinhole.principal_point, (pinhole.width, pinhole.height)
+    e = texts.listed(pinhole.eye, ", ")
+    lines = [f"// +W{width} +H{height}", "camera {", f"  location <{e}>"]
+    if (c_x, c_y) == (width / 2, height / 2):
+        across = texts.shortest(width / d_x)
+        lines += [
+            f"  right <{across if pinhole.mirrored else '-' + across}, 0, 0>",
+            f"  up <0, {texts.shortest(height / d_y)}, 0>",
+            "  direction <0, 0, 1>",
+            f"  sky <{texts.listed(texts.look(pinhole)[2], ', ')}>",
+            f"  look_at <{texts.listed(pinhole.look_at, ', ')}>",
+        ]
+    else:
+        u, v, w = pinhole.basis()
+        right = (-u if pinhole.mirrored else u) * (width / d_x)
+        up = v * (height / d_y)
+        direction = -w + right * ((width / 2 - c_x) / width) + up * ((height / 2 - c_y) / height)
+        vectors = (("right", right), ("up", up), ("direction", direction))
+        lines += [f"  {name} <{texts.listed(vector.tolist(), ', ')}>" for name, vector in vectors]
+    return "\n".join([*lines, "}", ""])

@@ -1,0 +1,116 @@
+"""three.js' JSON of a PerspectiveCamera, alone or in a scene.
+
+`matrix` is camera to parent, column by column, x right, y up, z back; `fov` the degrees of the height, `aspect` width over
+height as looked at, `zoom` divides both tangents, and `view` cuts a window of width × height pixels, which here says the
+principal point and the size. `filmOffset` moves the picture by filmOffset / film's width · d pixels, not by a part of it.
+
+Source: three.js r187, src/cameras/PerspectiveCamera.js (updateProjectionMatrix) and src/loaders/ObjectLoader.js.
+"""
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ..errors import InputError
+from . import axes, texts
+from .camera import Camera, Options, not_a_pinhole
+from .source import Record, Source
+
+TITLE = "three.js JSON"
+SUFFIX = ".json"
+
+_DEEPEST = 50
+
+
+def recognises(source: Source) -> bool:
+    top = source.document.get("object")
+    return isinstance(top, dict) and isinstance(top.get("type"), str)
+
+
+def read(source: Source, options: Options) -> list[Camera]:
+    found = list(_cameras(source.document["object"], np.eye(4), 0))
+    pinholes = [(item, matrix) for item, matrix in found if item.get("type") == "PerspectiveCamera"]
+    if not pinholes:
+        if found:
+            not_a_pinhole("three.js' camera", f"an {found[0][0].get('type')}")
+        raise InputError(f"{source.name} has no PerspectiveCamera: give a file with one")
+    return [
+        _camera(Record(item, f"the camera {item.get('name') or number + 1}"), matrix, number, options)
+        for number, (item, matrix) in enumerate(pinholes)
+    ]
+
+
+def _cameras(item: object, parent: np.ndarray, depth: int) -> Iterator[tuple[dict, np.ndarray]]:
+    if not isinstance(item, dict):
+        return
+    if depth > _DEEPEST:
+        raise InputError(f"the scene is nested more than {_DEEPEST} objects deep: give the camera alone")
+    record = Record(item, f"the object {str(item.get('name'))[:40]!r}")
+    matrix = parent @ np.array(record.numbers("matrix", 16)).reshape(4, 4).T if "matrix" in record else parent
+    if str(item.get("type", "")).endswith("Camera"):
+        yield item, matrix
+    for child in item.get("children") or ():
+        yield from _cameras(child, matrix, depth + 1)
+
+
+def _camera(record: Record, matrix: np.ndarray, number: int, options: Options) -> Camera:
+    half = math.tan(math.radians(record.number("fov", 50.0, 1e-9, 180 - 1e-9)) / 2) / record.number("zoom", 1.0, 1e-9)
+    view = record.record("view") if record.get("view") and record.get("view").get("enabled") else None
+    aspect = record.number("aspect", 1.0, 1e-4, 1e4)
+    size = (view.size("width"), view.size("height")) if view else None
+    film = texts.film(options, record.place, size, None if size else aspect)
+    height, width = 2 * half, 2 * half * aspect
+    left, top = -width / 2, height / 2
+    if view:
+        whole = view.number("fullWidth", least=1e-9), view.number("fullHeight", least=1e-9)
+        left += view.number("offsetX", 0.0) * width / whole[0]
+        top -= view.number("offsetY", 0.0) * height / whole[1]
+        width, height = width * size[0] / whole[0], height * size[1] / whole[1]
+    if offset := record.number("filmOffset", 0.0):
+        gauge = record.number("filmGauge", 35.0, 1e-9)
+        left += offset / (gauge * min(aspect, 1.0))
+    exact = film.width if size else film.height * aspect / film.pixel_aspect
+    d_x, d_y = exact / width, film.height / height
+    if abs(d_x / d_y - 1) < 2.0**-40:
+        d_x = d_y
+    c_x = -left * d_x + (film.width - exact) / 2
+    plane = axes.view_plane(d_x, d_y, c_x, top * d_y, (film.width, film.height))
+    pinhole, notes = axes.pinhole(matrix, plane, record.place)
+    return Camera(str(record.get("name") or f"camera {number + 1}"), pinhole, film.is_stated, (*film.notes, *notes))
+
+
+def write(cameras: Sequence[Camera], options: Options) -> str:
+    """One camera as an object, several as the children of a group."""
+    written = [_written(camera) for camera in cameras]
+    top = written[0] if len(written) == 1 else {"type": "Group", "children": written}
+    return (
+        json.dumps({"metadata": {"version": 4.6, "type": "Object", "generator": "Virtual Pinhole"}, "object": top}, indent=1)
+        + "\n"
+    )
+
+
+def _written(camera: Camera) -> dict:
+    pinhole = camera.pinhole
+    (d_x, d_y), (c_x, c_y), (width, height) = pinhole.distance, pinhole.principal_point, (pinhole.width, pinhole.height)
+    matrix = np.array(axes.camera_to_world(pinhole)).T.ravel().tolist()
+    return {
+        "type": "PerspectiveCamera",
+        "name": camera.name,
+        "matrix": matrix,
+        "fov": math.degrees(2 * math.atan(height / 2 / d_y)),
+        "zoom": 1,
+        "near": 0.1,
+        "far": 2000,
+        "aspect": width * d_y / (height * d_x),
+        "view": {
+            "enabled": True,
+            "fullWidth": width,
+            "fullHeight": height,
+            "offsetX": width / 2 - c_x + 0.0,
+            "offsetY": c_y - height / 2 + 0.0,
+            "width": width,
+            "height": height,
+        },
+    }
