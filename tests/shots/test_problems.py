@@ -2,6 +2,7 @@
 
 import json
 import sys
+import time
 
 import pytest
 from hypothesis import given
@@ -409,3 +410,12 @@ def test_twice_as_many_rows_are_twice_the_work(tmp_path, suffix, right):
 
         costs.append(steps_of(read))
     assert costs[1] <= 2.05 * costs[0], f"{costs[0]} calls for 400 rows, {costs[1]} for 800"
+
+
+def test_a_key_that_is_there_100000_times_is_told_in_the_time_that_reading_takes(tmp_path):
+    path = tmp_path / "shots.json"
+    path.write_text("{" + ", ".join(['"shots": 0'] * 100_000) + "}")
+    started = time.process_time()
+    with pytest.raises(InputError, match="key shots is there twice"):
+        shots.read(path)
+    assert time.process_time() - started < 3, "to count all keys for each of them takes 7 s, in linear time 0.1 s"

@@ -5,6 +5,7 @@ json.loads takes a key that is there twice and NaN without a word: both are kept
 
 import json
 import re
+from collections import Counter
 from collections.abc import Iterator
 
 from .. import checks
@@ -29,10 +30,10 @@ def read_document(text: str, problems: Problems) -> Iterator[Row]:
     document = _parsed(text)
     defaults: dict[str, Cell] = {}
     if isinstance(document, _Object):
-        for key in document.keys_as_written:
+        for key, count in Counter(document.keys_as_written).items():
             if key not in ("shots", "defaults"):
                 problems.add(f"key {checks.shown(key)} is unknown: the keys beside the list of shots are shots and defaults")
-            elif document.keys_as_written.count(key) > 1:
+            elif count > 1:
                 problems.add(f"key {key} is there twice: take one out")
         defaults = _cells("defaults", document.get("defaults", _Object([])), problems)
         if defaults.pop("name", None):
