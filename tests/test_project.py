@@ -49,7 +49,7 @@ ROOMS = {
         "errors checks files terminal children pinhole roll rotation moves diagram image intrinsics camera_values "
         "cameras datasets compare tracer shots batch"
     ),
-    "commands": "errors terminal events children intrinsics cameras image compare tracer shots batch",
+    "commands": "errors terminal events children pinhole cameras image compare tracer shots batch",
     "camera_words": "words cameras",
     "batch_words": "words camera_words shots",
     "cli": "errors checks files events words tracer commands camera_words batch_words",

@@ -140,3 +140,13 @@ def test_several_are_written_in_their_order_and_none_is_chosen_silently(tmp_path
     assert cameras.choose(back, names[2]) is back[2]
     with pytest.raises(InputError, match="no camera 'nobody'"):
         cameras.choose(back, "nobody")
+
+
+@pytest.mark.parametrize("form", ["transforms", "colmap", "gltf", "usd", "opencv", "ros"])
+def test_what_is_written_remembers_axes_and_scale_and_says_so_where_others_are_chosen(tmp_path, form):
+    given = Options(axes="y_up", scale=0.01)
+    path = tmp_path / f"a{cameras.FORMATS[form].SUFFIX}"
+    cameras.save([Camera("a", CAMERAS["plain"])], path, form, given)
+    (as_written,), (otherwise,) = cameras.read(path, options=given), cameras.read(path)
+    assert not any("was written with" in note for note in as_written.notes)
+    assert any("axes=y_up scale=0.01" in note for note in otherwise.notes)

@@ -25,6 +25,7 @@ stand first, and what takes any text last.
 
 import contextlib
 import os
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -115,6 +116,9 @@ FORMATS: dict[str, ModuleType] = {
 }
 """Name → module, in the order in which they are asked."""
 
+_REMEMBERED = re.compile(r"virtual_pinhole: (axes=\w+ scale=[\d.e+-]+)")
+_REMEMBERING = (("images.txt",), ("sparse", "0", "images.txt"), ("transforms.json",))
+
 
 def readable() -> list[str]:
     """The formats that can be read."""
@@ -144,7 +148,8 @@ def read(given: str | Path, *, format: str | None = None, options: Options | Non
     cameras = module.read(source, options)
     if not cameras:
         raise InputError(f"{source.name} holds no camera: give another file")
-    return [_doubted(_unmirrored(moved(camera, options), options)) for camera in cameras]
+    told = _told_of_world(source, options)
+    return [_doubted(_unmirrored(moved(camera, options), options)).noted(*told) for camera in cameras]
 
 
 def recognised(source: str | Path | Source) -> str:
@@ -215,6 +220,15 @@ def _module(name: str, does: str) -> ModuleType:
             f"the format {checks.shown(name)} can't be {'read' if does == 'read' else 'written'}: {', '.join(able)} can"
         )
     return FORMATS[name]
+
+
+def _told_of_world(source: Source, options: Options) -> tuple[str, ...]:
+    """A note where the file remembers that it was written with other axes or another scale than it is read with."""
+    files = [source, *(source.file(*parts) for parts in _REMEMBERING)] if source.is_folder else [source]
+    said = next((found for file in files if file and (found := _REMEMBERED.search(file.text[:10_000]))), None)
+    if said is None or said[1] == options.remembered.partition(": ")[2]:
+        return ()
+    return (f"The file says that it was written with {said[1]}: choose the same to have the cameras back",)
 
 
 def _doubted(camera: Camera) -> Camera:

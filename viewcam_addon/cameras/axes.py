@@ -24,8 +24,7 @@ from numpy.typing import ArrayLike
 
 from .. import checks
 from ..errors import InputError
-from ..intrinsics import ViewPlane
-from ..pinhole import Pinhole, Triple
+from ..pinhole import Pinhole, Triple, ViewPlane
 from .camera import Camera, Options
 
 Rows = list[list[float]]

@@ -5,8 +5,7 @@ from typing import NoReturn
 
 from .. import checks
 from ..errors import InputError
-from ..intrinsics import ViewPlane
-from ..pinhole import Pinhole
+from ..pinhole import Pinhole, ViewPlane
 
 AXES = {
     "as_is": "As they are: the numbers stay those of the file",
@@ -85,6 +84,11 @@ class Options:
             width, height = self.size
             object.__setattr__(self, "size", (checks.whole("width", width), checks.whole("height", height)))
 
+    @property
+    def remembered(self) -> str:
+        """The axes and scale as what is written says them, for whoever reads it again; empty where they are as always."""
+        return "" if self.axes == "as_is" and self.scale == 1 else f"virtual_pinhole: axes={self.axes} scale={self.scale!r}"
+
     def size_or_refuse(self, what: str) -> tuple[int, int]:
         """The size to take where a file says none.
 
@@ -116,11 +120,6 @@ class Options:
         if self.base:
             return self.base.plane
         raise InputError(f"{what} says where the camera is but not how it sees: give --size and --distance (in pixels)")
-
-
-def plane_of(pinhole: Pinhole) -> ViewPlane:
-    """The view plane of a pinhole."""
-    return pinhole.plane
 
 
 def choose(cameras: list[Camera], name: str | None = None) -> Camera:

@@ -26,8 +26,7 @@ from typing import NamedTuple
 
 from .. import checks
 from ..errors import InputError
-from ..intrinsics import ViewPlane
-from ..pinhole import Pinhole
+from ..pinhole import Pinhole, ViewPlane
 from . import axes, distortion, naming
 from .axes import intrinsics, quaternion, world_to_camera
 from .camera import Camera, Options, not_a_pinhole
@@ -259,8 +258,9 @@ def _binary_images(source: Source) -> Iterator[_Image]:
         yield _Image(name, tuple(pose[:4]), tuple(pose[4:]), camera)
 
 
-def write(cameras: Sequence[Camera], _options: Options) -> dict[str, str]:
-    return texts(cameras)
+def write(cameras: Sequence[Camera], options: Options) -> dict[str, str]:
+    head = f"# {options.remembered}\n" if options.remembered else ""
+    return {name: head + text for name, text in texts(cameras).items()}
 
 
 def check_names(files: Iterable[str]) -> None:

@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Mapping
 
 from ..errors import InputError
-from ..intrinsics import ViewPlane
+from ..pinhole import ViewPlane
 from .camera import Options
 
 Point = tuple[float, float]

@@ -12,7 +12,7 @@ import struct
 import numpy as np
 
 from ..errors import InputError
-from ..intrinsics import ViewPlane
+from ..pinhole import ViewPlane
 from . import axes
 from .camera import Camera, Options
 from .source import Record, Source

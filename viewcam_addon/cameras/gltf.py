@@ -61,10 +61,14 @@ def read(source: Source, options: Options) -> list[Camera]:
     return [_renamed(camera, name).noted(*told) for camera, name in zip(found, names, strict=True)]
 
 
-def write(cameras: Sequence[Camera], _options: Options) -> str:
+def write(cameras: Sequence[Camera], options: Options) -> str:
     naming.refuse_mirrored(cameras, "glTF")
     document = {
-        "asset": {"version": "2.0", "generator": "Virtual Pinhole"},
+        "asset": {
+            "version": "2.0",
+            "generator": "Virtual Pinhole",
+            **({"extras": {"comment": options.remembered}} if options.remembered else {}),
+        },
         "scene": 0,
         "scenes": [{"nodes": [*range(len(cameras))]}],
         "nodes": [_node(i, camera) for i, camera in enumerate(cameras)],

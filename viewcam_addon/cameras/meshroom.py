@@ -13,7 +13,7 @@ import numpy as np
 
 from .. import checks
 from ..errors import InputError
-from ..intrinsics import ViewPlane
+from ..pinhole import ViewPlane
 from . import axes, distortion, naming
 from .camera import Camera, Options, not_a_pinhole
 from .source import Record, Source, number

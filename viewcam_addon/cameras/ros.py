@@ -69,7 +69,8 @@ def _text(camera: Camera, options: Options) -> str:
     half = opencv.half_pixel(options)
     k = [f_x, 0.0, c_x - half, 0.0, f_y, c_y - half, 0.0, 0.0, 1.0]
     p = [*k[:3], 0.0, *k[3:6], 0.0, *k[6:], 0.0]
-    lines = [f"image_width: {camera.pinhole.width}", f"image_height: {camera.pinhole.height}"]
+    lines = [f"# {options.remembered}"] if options.remembered else []
+    lines += [f"image_width: {camera.pinhole.width}", f"image_height: {camera.pinhole.height}"]
     lines += [f"camera_name: {json.dumps(camera.name)}", *_matrix("camera_matrix", 3, k), "distortion_model: plumb_bob"]
     lines += [*_matrix("distortion_coefficients", 5, [0.0] * 5)]
     lines += [*_matrix("rectification_matrix", 3, [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])]

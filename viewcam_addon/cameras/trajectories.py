@@ -14,7 +14,7 @@ import re
 import numpy as np
 
 from ..errors import InputError
-from ..intrinsics import ViewPlane
+from ..pinhole import ViewPlane
 from . import axes, opencv
 from .camera import Camera, Options
 from .source import Record, Source, flat

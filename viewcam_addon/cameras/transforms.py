@@ -28,8 +28,7 @@ import numpy as np
 
 from .. import checks
 from ..errors import InputError
-from ..intrinsics import ViewPlane
-from ..pinhole import Pinhole
+from ..pinhole import Pinhole, ViewPlane
 from . import axes, distortion, naming
 from .camera import Camera, Options, not_a_pinhole
 from .source import Record, Source, image_size
@@ -54,8 +53,8 @@ def read(source: Source, options: Options) -> list[Camera]:
     return [camera for file in _files(source) for camera in _cameras(file, options)]
 
 
-def write(cameras: Sequence[Camera], _options: Options) -> str:
-    return text(document(cameras))
+def write(cameras: Sequence[Camera], options: Options) -> str:
+    return text(({"comment": options.remembered} if options.remembered else {}) | document(cameras))
 
 
 def text(content: dict[str, Any]) -> str:

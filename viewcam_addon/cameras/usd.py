@@ -1,4 +1,5 @@
-"""USD: cameras of a stage, read by OpenUSD itself (`pxr`: in Blender since 4.4, else usd-core of the package index).
+"""USD: cameras of a stage, read by OpenUSD itself (`pxr`: in a Blender built with its Python modules, else usd-core of
+the package index).
 
 The camera's axes are x right, y up, z away from the view, whatever the stage's upAxis is; matrices are for row vectors. Lens,
 apertures and their offsets count in tenths of a scene unit, of which only ratios decide the picture. A stage says no number of
@@ -17,7 +18,7 @@ import numpy as np
 
 from .. import checks
 from ..errors import InputError
-from ..intrinsics import ViewPlane
+from ..pinhole import ViewPlane
 from . import axes
 from .camera import Camera, Options, not_a_pinhole
 from .source import Source
@@ -65,7 +66,8 @@ def write(cameras: Sequence[Camera], options: Options) -> str:
     blocks, taken = [], set()
     for camera in cameras:
         blocks.append(_prim(camera, _identifier(camera.name, taken)))
-    return f'#usda 1.0\n(\n    metersPerUnit = 1\n    upAxis = "{up}"\n)\n\n' + "\n".join(blocks)
+    told = f'    doc = "{options.remembered}"\n' if options.remembered else ""
+    return f'#usda 1.0\n(\n{told}    metersPerUnit = 1\n    upAxis = "{up}"\n)\n\n' + "\n".join(blocks)
 
 
 def _stage(source: Source, usd):

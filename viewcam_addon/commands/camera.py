@@ -12,7 +12,7 @@ from .. import cameras
 from ..cameras import Camera, Options
 from ..cameras.sidecar import record
 from ..errors import InputError
-from ..intrinsics import ViewPlane
+from ..pinhole import ViewPlane
 from ..terminal import say, silent_libraries
 from . import Result
 
