@@ -38,6 +38,7 @@ test-exhaustive: .venv/test
 lint: .venv/test
 	.venv/bin/python -m ruff check .
 	.venv/bin/python -m ruff format --check .
+	.venv/bin/python -m mypy
 
 .venv/demo: $(PROJECT)
 	$(PYTHON_FOUND) .ci/environment.py .venv --editable '.[blender]'

@@ -4,7 +4,7 @@ A sweep towards a failure gives one curve for each candidate method; the method 
 answer somewhere is drawn as a cross at the upper edge, an error of exactly 0 on the lower one. Every chart carries its caption
 with it: what to read off, the machine and the versions, and the command that draws it again.
 
-Drawn with matplotlib, the ecosystem's usual choice. The report of a check draws its own (compare/charts.py), since Blender has
+Drawn with matplotlib, the ecosystem's usual choice. The report of a check draws its own (comparison/charts), since Blender has
 no matplotlib.
 """
 

@@ -41,17 +41,18 @@ ROOMS = {
     "camera_values": "errors checks pinhole roll intrinsics",
     "cameras": "errors checks files pinhole intrinsics",
     "datasets": "files pinhole cameras",
-    "compare": "errors files paper pinhole image",
+    "comparison": "errors files paper pinhole image",
     "tracer": "errors checks memory files exact pinhole image",
+    "api": "errors children image comparison tracer",
     "shots": "errors checks files terminal pinhole moves tracer",
-    "batch": "errors checks files events paper children pinhole image cameras datasets compare tracer shots",
+    "batch": "errors checks files events paper children pinhole image cameras datasets comparison tracer shots",
     "blender": (
         "errors checks files terminal children pinhole roll rotation moves diagram image intrinsics camera_values "
-        "cameras datasets compare tracer shots batch"
+        "cameras datasets comparison tracer shots batch"
     ),
-    "commands": "errors terminal events children pinhole cameras image compare tracer shots batch",
+    "commands": "errors terminal events children pinhole image cameras comparison tracer api shots batch",
     "camera_words": "words cameras",
-    "batch_words": "words camera_words shots",
+    "batch_words": "words shots camera_words",
     "cli": "errors checks files events words tracer commands camera_words batch_words",
 }
 BLENDER_ROOMS = {
@@ -351,6 +352,25 @@ def test_what_the_readme_says_viewcam_does_it_does():
         command = [sys.executable, "-m", "viewcam_addon", name, "--help"]
         outcome = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
         assert outcome.returncode == 0 and name in outcome.stdout, f"viewcam {name}: {outcome.stderr}"
+
+
+def test_what_is_public_is_what_the_page_names_and_can_be_imported_without_blender():
+    page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`vp\.(\w+)`", page))
+    program = f"""
+import sys
+sys.modules.update(dict.fromkeys({sorted(BLENDER_MODULES)}))
+import viewcam_addon as vp
+assert "numpy" not in sys.modules, "Blender's start would wait for it"
+assert {{name: getattr(vp, name).__doc__ for name in vp.__all__}} and set(vp.__all__) == {named | {"Scene", "Image", "Check"}}
+assert callable(vp.compare) and callable(vp.check), "a room has the name of a function"
+try:
+    vp.nothing
+except AttributeError as error:
+    print(error)
+"""
+    outcome = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True)
+    assert outcome.returncode == 0 and "has no attribute 'nothing'" in outcome.stdout, outcome.stderr
 
 
 def test_what_the_readme_says_to_make_can_be_made():

@@ -1,7 +1,44 @@
 """Virtual Pinhole: a camera from eye, look-at, up and view-plane distance, in Blender and in a reference tracer of its own.
 
-Importing this package needs no Blender. `register` and `unregister` are what Blender calls.
+Importing this package needs no Blender, and each name of `__all__` is imported when it is first asked for, since Blender's
+start shall not wait for a tracer. `register` and `unregister` are what Blender calls.
 """
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from . import cameras as cameras
+    from .api import Check as Check
+    from .api import check as check
+    from .api import compare as compare
+    from .api import read_scene as read_scene
+    from .api import render as render
+    from .errors import InputError as InputError
+    from .image import Image as Image
+    from .pinhole import Pinhole as Pinhole
+    from .tracer.scene import Scene as Scene
+
+_HOMES = {
+    "Pinhole": "pinhole",
+    "Scene": "tracer.scene",
+    "Image": "image",
+    "Check": "api",
+    "InputError": "errors",
+    "cameras": "cameras",
+    "read_scene": "api",
+    "render": "api",
+    "compare": "api",
+    "check": "api",
+}
+__all__ = ["Check", "Image", "InputError", "Pinhole", "Scene", "cameras", "check", "compare", "read_scene", "render"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    home = importlib.import_module(f".{_HOMES[name]}", __name__)
+    return home if name == _HOMES[name] else getattr(home, name)
 
 
 def register() -> None:

@@ -5,6 +5,7 @@ that the child could answer by ending them, since Blender does not let Python he
 """
 
 import contextlib
+import importlib.util
 import os
 import signal
 import subprocess
@@ -33,6 +34,16 @@ def environment(apart_from: str = "", **more: str) -> dict[str, str]:
     """
     others = [path for path in sys.path if path and not (apart_from and Path(path).is_relative_to(apart_from))]
     return os.environ | {"PYTHONPATH": os.pathsep.join([str(_PACKAGE.parent), *others])} | more
+
+
+def blender_scripts() -> str:
+    """The folder, if any, that `environment` must leave out for a child which imports bpy, where this process has done so.
+
+    Where bpy is loaded, here or in our parent, the path leads first to Blender's scripts, whose bpy is half of it.
+    """
+    loaded, found = sys.modules.get("bpy"), importlib.util.find_spec("bpy")
+    place = Path(getattr(loaded, "__file__", None) or (found and found.origin) or "")
+    return str(place.parents[2]) if place.name == "__init__.py" else ""
 
 
 class Family:

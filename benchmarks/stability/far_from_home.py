@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from viewcam_addon import image
 from viewcam_addon.blender.camera import apply
 from viewcam_addon.blender.rendering import job
-from viewcam_addon.compare.geometry import compare
+from viewcam_addon.comparison.geometry import compare
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.rays.view import View
 from viewcam_addon.tracer.render import render

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import viewcam_addon
-from viewcam_addon.compare import geometry, law
+from viewcam_addon.comparison import geometry, tolerances
 from viewcam_addon.image import Image
 from viewcam_addon.tracer import render
 from viewcam_addon.tracer.scene import Scene
@@ -140,7 +140,7 @@ def picture_error():
     """A function (pinhole, positions) → (error, tolerance), for what `render_positions` renders.
 
     error : pixels, the largest distance between the centre of a pixel and the picture of the point that was rendered there.
-    tolerance : the most that the law of float32 allows anywhere in it.
+    tolerance : the most that float32 allows anywhere in it.
     """
 
     def measure(pinhole, positions):
@@ -148,7 +148,7 @@ def picture_error():
         column, row, depth = pinhole.project(positions)
         error = np.hypot(column - columns - 0.5, row - rows - 0.5).max()
         largest = max(np.abs(positions).max(), np.linalg.norm(pinhole.eye))
-        return error, law.ROUNDINGS[-1] * law.FLOAT32 * max(pinhole.distance) * largest / np.nanmin(depth)
+        return error, tolerances.ROUNDINGS[-1] * tolerances.FLOAT32 * max(pinhole.distance) * largest / np.nanmin(depth)
 
     return measure
 

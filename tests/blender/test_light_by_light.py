@@ -12,7 +12,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender.rendering import job
-from viewcam_addon.compare import radiance
+from viewcam_addon.comparison import radiance
 from viewcam_addon.image import Image
 from viewcam_addon.tracer.render import render
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from viewcam_addon import image
-from viewcam_addon.compare import law
-from viewcam_addon.compare.cameras import conversion_error
+from viewcam_addon.comparison import tolerances
+from viewcam_addon.comparison.cameras import conversion_error
 from viewcam_addon.pinhole import Pinhole
 
 SCRIPT = Path(__file__).with_name("flight_in_blender.py")
@@ -53,12 +53,12 @@ def flight(real_blender, tmp_path_factory):
 
 
 def places(pinhole, picture):
-    """(n, 2) where each pixel's position lies in the picture of a pinhole, and (n,) how far one rounding moves it (law.py)."""
+    """(n, 2) where each pixel's position lies in the picture of a pinhole, and (n,) how far one rounding moves it."""
     seen = {name: picture.passes[name].reshape(-1, picture.passes[name].shape[-1]) for name in ("Position", "Depth", "Normal")}
-    assert law.is_hit(seen).all()
+    assert tolerances.is_hit(seen).all()
     column, row, _ = pinhole.project(seen["Position"].astype(np.float64))
     found = np.nan_to_num(np.column_stack([column, row]), nan=-pinhole.width)  # behind the eye: outside of the picture
-    return found, law.position_shift(pinhole, seen)
+    return found, tolerances.position_shift(pinhole, seen)
 
 
 def roundings(pinhole, picture):
@@ -69,12 +69,12 @@ def roundings(pinhole, picture):
 
 
 def beyond_the_law(pictures, pinholes):
-    """What is not within the law over all frames, in words; empty where all is."""
+    """What is not within tolerance over all frames, in words; empty where all is."""
     counts = np.concatenate([roundings(pinholes[frame], pictures[frame]) for frame in pinholes])
-    found = np.percentile(counts, law.PERCENTILES)
+    found = np.percentile(counts, tolerances.PERCENTILES)
     return [
         f"{count:.2f} roundings at the {percentile}th percentile, {most} are allowed"
-        for percentile, count, most in zip(law.PERCENTILES, found, law.ROUNDINGS, strict=True)
+        for percentile, count, most in zip(tolerances.PERCENTILES, found, tolerances.ROUNDINGS, strict=True)
         if count > most
     ]
 
@@ -88,7 +88,7 @@ def test_each_way_to_render_the_flight_is_within_the_law(flight, way):
 
 
 def test_the_baked_file_and_f12_render_what_is_rendered_live(flight):
-    """Each may be off by the law, in opposite directions. In fact all pixels had the same position in all bits."""
+    """Each may be off by its tolerance, in opposite directions. In fact all pixels had the same position in all bits."""
     pictures, pinholes, _ = flight
     for way in ("f12", "baked"):
         same = 0
@@ -97,7 +97,7 @@ def test_the_baked_file_and_f12_render_what_is_rendered_live(flight):
             same += int((live.passes["Position"] == other.passes["Position"]).all(axis=-1).sum())
             (one, one_rounding), (two, _) = (places(pinholes[frame][1], each) for each in (live, other))
             apart = (np.linalg.norm(one - two, axis=1) / one_rounding).max()
-            assert apart <= 2 * law.ROUNDINGS[-1], f"{way}, frame {frame}: {apart:.2g} roundings apart"
+            assert apart <= 2 * tolerances.ROUNDINGS[-1], f"{way}, frame {frame}: {apart:.2g} roundings apart"
         print(f"{way}: {same} of {len(FRAMES) * len(one)} pixels have the same position in all bits")
 
 

@@ -20,7 +20,7 @@ from ..pinhole import Pinhole
 from . import partner
 
 if TYPE_CHECKING:
-    from ..compare.geometry import Comparison
+    from ..comparison.geometry import Comparison
 
 
 def lacking() -> str | None:
@@ -97,7 +97,7 @@ class _Bench:
 
     def answer(self, request: dict[str, Any]) -> dict[str, Any]:
         from .. import image
-        from ..compare import geometry
+        from ..comparison import geometry
         from ..tracer.scene import scene_file
 
         if request["scene"] != self._path:

@@ -124,10 +124,6 @@ def _blender() -> tuple[str, list[str], Mapping[str, str]]:
     program = os.environ.get(BLENDER)
     if program:
         return program, [program, "-b", "--disable-autoexec", "--command", "viewcam", "serve"], os.environ
-    module = importlib.util.find_spec("bpy")
-    if module is None:
+    if importlib.util.find_spec("bpy") is None:
         raise InputError(f"there is no Blender on {platform.node()}: name one in {BLENDER}, or pip install bpy")
-    # Where bpy is loaded, here or in our parent, the path leads first to Blender's scripts, whose bpy is half of it.
-    place = Path(module.origin or "")
-    scripts = str(place.parents[2]) if place.name == "__init__.py" else ""
-    return "Blender", children.viewcam("serve"), children.environment(apart_from=scripts)
+    return "Blender", children.viewcam("serve"), children.environment(apart_from=children.blender_scripts())

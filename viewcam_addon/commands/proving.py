@@ -16,7 +16,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..terminal import say, silent_libraries
-from ..tracer.scene.film import MOST_SAMPLES, seeds
+from ..tracer.scene.film import seeds
 from . import Result
 from .progress import Progress
 from .surroundings import blender_room, run_beside
@@ -36,11 +36,9 @@ def export(options: argparse.Namespace) -> Result:
 
 
 def render(options: argparse.Namespace) -> Result:
-    from .. import image
-    from ..tracer.render import render as trace
-    from ..tracer.scene import scene_file
+    from .. import api, image
 
-    scene = scene_file.read(options.scene)
+    scene = api.read_scene(options.scene)
     if options.stated:
         if scene.stated_camera is None:
             raise InputError(
@@ -51,18 +49,11 @@ def render(options: argparse.Namespace) -> Result:
         scene = dataclasses.replace(scene, camera=scene.camera.resized(*options.size))
     told = _told_level(scene) if options.level == "auto" else {}
     level = told.get("level", options.level)
-    samples = MOST_SAMPLES if options.error else options.samples
     progress = Progress(options.events, scene.camera.height)
     started = time.perf_counter()
-    passes = trace(scene, level, samples, options.seed, options.threads, progress, options.error)
+    traced = api.render(scene, level, options.samples, options.seed, options.threads, options.error, progress)
     seconds = time.perf_counter() - started
-    attributes = {"software": "Virtual Pinhole", "level": level}
-    if level != "geometry":
-        if options.error:
-            samples = round(float(passes["Sample Count"].mean(dtype=float)))
-            attributes["error"] = str(options.error)
-        attributes |= {"samples": str(samples), "seed": str(options.seed)}
-    image.write(options.image, image.Image(passes, scene.camera, attributes))
+    image.write(options.image, traced)
     say(f"traced {scene.camera.width} × {scene.camera.height} pixels in {seconds:.2f} s")
     return 0, {"image": str(options.image), "seconds": seconds} | told
 
@@ -75,29 +66,17 @@ def cycles(options: argparse.Namespace) -> Result:
 
 
 def compare(options: argparse.Namespace) -> Result:
-    from .. import image
-    from ..compare import difference, light_report, radiance, report
-    from ..tracer.scene import scene_file
+    from .. import api, image
+    from ..comparison import difference, light_report, radiance, report
 
     image.check_same_frames([options.reference, *options.tests])
     reference, tests = image.read(options.reference), [image.read(path) for path in options.tests]
-    scene = scene_file.read(options.scene) if options.scene else None
-    camera = reference.camera or (scene and scene.camera)
-    if camera is None:
-        raise InputError(
-            f"{options.reference} does not tell its camera: give its scene with --scene, or trace it with viewcam render"
-        )
+    scene = api.read_scene(options.scene) if options.scene else None
+    comparison = api.compare(reference, tests, scene, options.threads, options.test_samples)
     ledger = scene.ledger if scene else ()
     words = f"viewcam {options.repeat or options.words}"
-    if radiance.carries_light(reference):
-        comparison = radiance.compare(reference, tests, camera, options.test_samples)
-        write_report = light_report.write_report
-    elif len(tests) == 1:
-        (tests,) = tests
-        comparison = _compare_geometry(reference, tests, camera, scene, options.threads)
-        write_report = report.write_report
-    else:
-        raise InputError(f"{options.reference} has no noise that several pictures could tell: compare it with one")
+    is_light = radiance.carries_light(reference)
+    write_report, tests = (light_report.write_report, tests) if is_light else (report.write_report, tests[0])
     say(*_ledger_lines(ledger), *comparison.lines())
     if options.report:
         say(f"report: {write_report(comparison, reference, tests, options.report, ledger, words)}")
@@ -105,18 +84,6 @@ def compare(options: argparse.Namespace) -> Result:
     if options.difference:
         result["difference"] = difference.write(comparison, options.difference)
     return 0 if comparison.passed else 1, result
-
-
-def _compare_geometry(reference: Any, test: Any, camera: Any, scene: Any, threads: int | None) -> Any:
-    from ..compare import geometry
-    from ..tracer.render import Tracer
-
-    if scene is None:
-        return geometry.compare(reference, test, camera)
-    # The picture may be of another size than the scene says, or of the stated camera.
-    surface_at = Tracer(dataclasses.replace(scene, camera=camera), threads).surface_at
-    stated = scene.stated_camera if camera == scene.camera else None
-    return geometry.compare(reference, test, camera, surface_at, stated, scene.origin)
 
 
 def check(options: argparse.Namespace) -> Result:

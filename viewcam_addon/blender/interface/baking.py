@@ -21,7 +21,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compare.cameras import conversion_error
+from ...comparison.cameras import conversion_error
 from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras

@@ -5,7 +5,7 @@ import textwrap
 from itertools import product
 from typing import NamedTuple
 
-from ...compare import law
+from ...comparison import tolerances
 from ...pinhole import Pinhole, Triple
 from .. import findings
 
@@ -48,7 +48,9 @@ def roll_warning(stated: Pinhole, precision: float) -> str | None:
     if stated.is_singular:
         return "The view is parallel to up, and the roll is undefined: the axes are the canonical ones"
     roll, corner = stated.roll_uncertainty(precision), _corner(stated)
-    if roll * corner <= law.VISIBLE or roll * stated.sine_to_up * corner > law.VISIBLE:  # the latter is not up's fault
+    if (
+        roll * corner <= tolerances.VISIBLE or roll * stated.sine_to_up * corner > tolerances.VISIBLE
+    ):  # the latter is not up's fault
         return None
     angle = math.degrees(math.asin(min(1.0, stated.sine_to_up)))
     if roll >= math.pi:
@@ -74,11 +76,11 @@ def vector(numbers: Triple) -> str:
 def distance_warning(stated: Pinhole) -> str | None:
     """A sentence on a camera so far from the origin that Blender's and Cycles' float32 is visible where it looks, else None.
 
-    One rounding of the largest coordinate, seen from as far as the look-at point is away (the law of compare/law.py).
+    One rounding of the largest coordinate, seen from as far as the look-at point is away (comparison/tolerances.py).
     """
     largest = max(map(abs, (*stated.eye, *stated.look_at)))
-    pixels = law.FLOAT32 * max(stated.distance) * largest / math.dist(stated.eye, stated.look_at)
-    if pixels <= law.VISIBLE:
+    pixels = tolerances.FLOAT32 * max(stated.distance) * largest / math.dist(stated.eye, stated.look_at)
+    if pixels <= tolerances.VISIBLE:
         return None
     return (
         f"So far from the origin Blender and Cycles may be {_figure(pixels)} px off in float32: bring the scene to the origin"

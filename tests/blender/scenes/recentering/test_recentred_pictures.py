@@ -36,8 +36,8 @@ def test_what_plain_cycles_misses_by_pixels_is_told(place, look, both_sides, add
     add_map(place)
     comparison = both_sides().comparison
     assert comparison.rows[0].values[0] > 0.5, f"only {comparison.rows[0].values[0]:.2g} px"
-    assert "check with --recenter" in comparison.far_from_home.sentence
-    assert both_sides(recenter=True).comparison.far_from_home is None
+    assert "check with --recenter" in comparison.far_from_origin.sentence
+    assert both_sides(recenter=True).comparison.far_from_origin is None
 
 
 def depth_of(comparison):

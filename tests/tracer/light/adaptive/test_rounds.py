@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from viewcam_addon import image
-from viewcam_addon.compare import radiance
+from viewcam_addon.comparison import radiance
 from viewcam_addon.errors import InputError
 from viewcam_addon.tracer.light.adaptive import rounds
 from viewcam_addon.tracer.render import Stopped, Tracer, render

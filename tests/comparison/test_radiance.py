@@ -1,0 +1,154 @@
+"""The whole comparison of light: what it says, in one sentence, in lines and in JSON."""
+
+import json
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from viewcam_addon.comparison import radiance
+from viewcam_addon.errors import InputError
+from viewcam_addon.image import Image
+from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.tracer.light import sums as light
+
+WIDTH, HEIGHT, SAMPLES, SEEDS = 64, 48, 256, 8
+PINHOLE = Pinhole((5, -7, 4), (0.2, 0.1, 0.6), (0, 0, 1), 60.0, WIDTH, HEIGHT)
+rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+TRUTH = np.stack([0.2 + 0.5 * columns / WIDTH, 0.3 + 0.3 * rows / HEIGHT, np.full((HEIGHT, WIDTH), 0.4)], axis=-1)
+
+
+def picture(rng, samples, truth=TRUTH, attribute="samples", **passes):
+    """The mean of so many exponential variates in every pixel, grey noise, and its variance."""
+    colour = rng.gamma(samples, 1.0 / samples, (HEIGHT, WIDTH, 1)) * truth
+    combined = np.concatenate([colour, np.ones((HEIGHT, WIDTH, 1))], axis=-1)
+    made = {"Combined": combined, "Variance": TRUTH**2 / samples, "Depth": np.full((HEIGHT, WIDTH, 1), 8.0), **passes}
+    made = {name: values.astype(np.float32) for name, values in made.items()}
+    return Image(made, PINHOLE, {attribute: str(samples)}, f"{attribute}.exr")
+
+
+def both(truth=TRUTH, seed=0):
+    rng = np.random.default_rng(seed)
+    tests = [picture(rng, SAMPLES // SEEDS, truth, "cycles.ViewLayer.samples") for _ in range(SEEDS)]
+    return picture(rng, SAMPLES), tests
+
+
+@pytest.fixture(scope="module")
+def same():
+    return radiance.compare(*both(), PINHOLE)
+
+
+def test_the_same_light_is_the_same_within_noise(same):
+    assert same.passed and same.is_noisy and same.samples == (SAMPLES, SAMPLES) and same.seeds == SEEDS
+    assert same.sentence.startswith("The same within noise at 256 samples: no pixel and no tile differs by more than chance; ")
+    assert same.equal == ("Alpha",)
+    assert any(line.startswith("To the last bit  Alpha") for line in same.lines())
+    assert same.lines()[-1] == same.sentence
+
+
+def test_noise_explains_the_relative_error_of_the_right_picture(same):
+    """The mean of 3,072 squares of normal errors: within 4 · √(2/3072) = 10 % of what it should be."""
+    assert same.appearance.relmse == pytest.approx(same.appearance.expected_relmse, rel=0.1)
+
+
+def test_a_wrong_corner_is_named_by_its_columns_rows_and_ratio():
+    wrong = TRUTH.copy()
+    wrong[:8, 8:16] *= 1.3
+    comparison = radiance.compare(*both(wrong), PINHOLE)
+    assert not comparison.passed
+    sentence = comparison.sentence
+    assert sentence.startswith("Different here: in columns 8 to 15, rows 0 to 7 Combined"), sentence
+    assert "brighter" in sentence and "standard errors where chance allows" in sentence and "factor" not in sentence
+
+
+@pytest.mark.parametrize(("factor", "words"), [(np.pi, "which is π"), (1 / np.pi, "which is 1/π"), (2.0, "which is 2")])
+def test_a_factor_is_told_by_name_in_spite_of_noise(factor, words):
+    sentence = radiance.compare(*both(factor * TRUTH), PINHOLE).sentence
+    assert sentence.startswith("Different here: over the whole picture Combined") and words in sentence, sentence
+
+
+def test_a_factor_that_is_none_of_the_famous_is_told_as_a_number():
+    sentence = radiance.compare(*both(1.2 * TRUTH), PINHOLE).sentence
+    assert "all of it is a factor of 1.2" in sentence and "which is" not in sentence
+
+
+def test_a_fault_of_one_quantity_is_named():
+    """Emission has the tests' spread only; tiles find it."""
+    rng = np.random.default_rng(2)
+    emission = 0.2 * TRUTH
+    reference = picture(rng, SAMPLES, Emission=emission * rng.gamma(64, 1 / 64, (HEIGHT, WIDTH, 1)))
+    tests = [
+        picture(rng, 32, attribute="cycles.V.samples", Emission=1.2 * emission * rng.gamma(8, 1 / 8, (HEIGHT, WIDTH, 1)))
+        for _ in range(SEEDS)
+    ]
+    comparison = radiance.compare(reference, tests, PINHOLE)
+    assert [row.name for row in comparison.rows if not row.ok] == ["Emission"]
+    assert "Emission" in comparison.sentence and "all of it is a factor of 1.1979 ± 0.0" in comparison.sentence
+
+
+def test_one_noisy_picture_is_compared_by_its_tiles():
+    reference, _ = both()
+    rng = np.random.default_rng(3)
+    assert radiance.compare(reference, [picture(rng, SAMPLES)], PINHOLE).passed
+    assert not radiance.compare(reference, [picture(rng, SAMPLES, 1.05 * TRUTH)], PINHOLE).passed
+
+
+def test_one_pixel_that_is_no_number_fails():
+    reference, tests = both()
+    combined = tests[3]["Combined"].copy()
+    combined[5, 6, 1] = np.nan
+    tests[3] = replace(tests[3], passes={**tests[3].passes, "Combined": combined})
+    comparison = radiance.compare(reference, tests, PINHOLE)
+    assert comparison.sentence == "Different here: Combined has 1 pixel without a number."
+
+
+def test_the_json_is_plain_and_says_what_the_sentence_says(same):
+    told = json.loads(json.dumps(same.to_json(), allow_nan=False))
+    assert told["passed"] is True and told["sentence"] == same.sentence
+    assert told["quantities"][0]["name"] == "Combined" and len(told["quantities"][0]["questions"]) == 4
+    assert told["samples"] == {"reference": 256, "test": 256} and told["equal"] == ["Alpha"]
+
+
+def test_the_maps_are_pictures_of_the_same_size(same):
+    assert {"Combined: difference", "Combined: tiles", "Combined: standard errors", "FLIP"} == same.maps.keys()
+    assert all(values.shape == (HEIGHT, WIDTH) and values.dtype == np.float32 for values in same.maps.values())
+
+
+def test_without_the_package_flip_is_left_out_and_said_so(monkeypatch):
+    monkeypatch.setitem(sys.modules, "flip_evaluator", None)
+    comparison = radiance.compare(*both(), PINHOLE)
+    assert comparison.appearance.flip is None and "FLIP" not in comparison.maps
+    assert any("FLIP needs the package flip-evaluator" in line for line in comparison.lines())
+
+
+def test_flip_is_nothing_for_equal_pictures_and_much_for_others(same):
+    reference, _ = both()
+    one = replace(reference, attributes={"samples": "1"}, passes={**reference.passes, "Variance": 0 * reference["Variance"]})
+    assert radiance.compare(one, [one], PINHOLE).appearance.flip == 0.0
+    black = replace(one, passes={**one.passes, "Combined": 0 * one["Combined"]})
+    assert radiance.compare(one, [black], PINHOLE).appearance.flip > 0.4
+    assert radiance.compare(black, [black], PINHOLE).passed
+    assert 0.0 < same.appearance.flip < 0.3
+
+
+def test_a_reference_without_light_is_not_judged_by_light(paper_scene):
+    assert radiance.carries_light(both()[0])
+    geometry = paper_scene.picture()
+    assert not radiance.carries_light(geometry)
+    combined = np.zeros((*geometry["Depth"].shape[:2], 4), np.float32)
+    assert not radiance.carries_light(replace(geometry, passes=geometry.passes | {"Combined": combined})), "as Cycles writes it"
+    with pytest.raises(InputError, match="no pass 'Depth'"):
+        dark = Image({"Combined": np.zeros((HEIGHT, WIDTH, 4), np.float32)}, PINHOLE)
+        radiance.compare(dark, [dark], PINHOLE)
+
+
+def test_samples_that_the_file_tells_wrongly_can_be_given():
+    reference, tests = both()
+    assert radiance.compare(reference, tests, PINHOLE, test_samples=16).sentence.startswith(
+        "The same within noise at 256 and 128 samples: "
+    )
+
+
+def test_the_references_variance_is_told_from_as_many_batches_as_it_is_judged_by():
+    assert light._BATCHES == radiance.VARIANCE_BATCHES

@@ -1,0 +1,171 @@
+"""A comparison of light must be able to fail: every fault that a renderer of light can have is found, at the samples stated.
+
+Both sides are the tracer's own, with other seeds. The right one passes; each fault is made in the scene or in the formulas that
+light goes through.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from viewcam_addon.comparison.radiance import compare
+from viewcam_addon.image import Image
+from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.tracer.light import emitters
+from viewcam_addon.tracer.render import render
+from viewcam_addon.tracer.scene import Mesh, Object, Scene
+from viewcam_addon.tracer.scene.film import Bounces
+from viewcam_addon.tracer.scene.lamps import Area, Sun, World
+from viewcam_addon.tracer.scene.materials import Colour, Material
+
+CAMERA = Pinhole((4.5, -5.0, 3.0), (0.0, 0.6, 0.8), (0.0, 0.0, 1.0), 60.0, 64, 48)
+SEEDS = 8
+
+
+def quads(*corners, normals=None):
+    corners = np.array(corners, np.float64)
+    first = 4 * np.arange(len(corners))[:, None]
+    triangles = np.concatenate([first + np.array(three) for three in ((0, 1, 2), (0, 2, 3))]).astype(np.int32)
+    return Mesh(corners.reshape(-1, 3), triangles, np.zeros(len(triangles), np.int32), normals)
+
+
+def ball(centre, radius, rings=16):
+    """A smooth ball of triangles."""
+    theta, phi = np.meshgrid(np.linspace(0, np.pi, rings + 1), np.linspace(0, 2 * np.pi, 2 * rings + 1), indexing="ij")
+    points = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1).reshape(-1, 3)
+    row = 2 * rings + 1
+    first = (np.arange(rings)[:, None] * row + np.arange(2 * rings)).ravel()[:, None]
+    triangles = np.concatenate([first + np.array(three) for three in ((0, row, 1), (1, row, row + 1))]).astype(np.int32)
+    normals = points[triangles].astype(np.float32)
+    return Mesh(points * radius + centre, triangles, np.zeros(len(triangles), np.int32), normals)
+
+
+def lambert(*colour):
+    return Material(diffuse=Colour(colour))
+
+
+def build():
+    """A corner of two walls on a floor, with a smooth ball, under a sun, an area lamp and a sky."""
+    wall = 3.0
+    geometries = {
+        "floor": quads([(-wall, -wall, 0), (wall, -wall, 0), (wall, wall, 0), (-wall, wall, 0)]),
+        "walls": quads(
+            [(-wall, wall, 0), (wall, wall, 0), (wall, wall, 4), (-wall, wall, 4)],
+            [(-wall, -wall, 0), (-wall, wall, 0), (-wall, wall, 4), (-wall, -wall, 4)],
+        ),
+        "ball": ball((0.3, 0.2, 1.0), 1.0),
+    }
+    over = np.eye(4)
+    over[:3, 3] = (1.0, -0.5, 3.8)
+    return Scene(
+        camera=CAMERA,
+        geometries=geometries,
+        objects=tuple(Object(name, name, np.eye(4), i, materials=(name,)) for i, name in enumerate(geometries, start=1)),
+        materials={"floor": lambert(0.6, 0.6, 0.6), "walls": lambert(0.7, 0.35, 0.25), "ball": lambert(0.3, 0.5, 0.8)},
+        lamps=(
+            Sun("sun", towards=(1.0, -1.2, 2.0), irradiance=(1.5, 1.4, 1.2), angle=0.05),
+            Area("area", matrix=over, size=(1.0, 0.7), power=(40.0, 42.0, 45.0)),
+        ),
+        world=World((0.08, 0.1, 0.14)),
+        bounces=Bounces(3, 3, 3, 3),
+    )
+
+
+def picture(scene, level, samples, seed):
+    return Image(render(scene, level, samples, seed), CAMERA, {"samples": str(samples)}, f"seed {seed}")
+
+
+def compared(reference, scene, level, samples):
+    """The reference against the scene rendered with eight other seeds, each with an eighth of the samples."""
+    return compare(reference, [picture(scene, level, samples // SEEDS, seed) for seed in range(1, SEEDS + 1)], CAMERA)
+
+
+@pytest.fixture(scope="module")
+def reference():
+    """reference(level, samples) → the right picture, rendered once."""
+    scene, made = build(), {}
+
+    def rendered(level, samples):
+        if (level, samples) not in made:
+            made[level, samples] = picture(scene, level, samples, 0)
+        return made[level, samples]
+
+    return rendered
+
+
+@pytest.mark.parametrize(("level", "samples"), [("direct", 64), ("path", 64), ("path", 256)])
+def test_the_right_picture_is_the_same_within_noise(reference, level, samples):
+    comparison = compared(reference(level, samples), build(), level, samples)
+    assert comparison.passed, "\n".join(comparison.lines())
+    assert comparison.sentence.startswith(f"The same within noise at {samples} samples: ")
+
+
+def recoloured(scene, name, factor):
+    colour = tuple(factor * value for value in scene.materials[name].diffuse.rgb)
+    return replace(scene, materials={**scene.materials, name: lambert(*colour)})
+
+
+def with_normals(scene, change):
+    mesh = scene.geometries["ball"]
+    return replace(scene, geometries={**scene.geometries, "ball": replace(mesh, corner_normals=change(mesh.corner_normals))})
+
+
+def shifted(scene, x, y):
+    """The film's filter beside the pixel's centre: the same as the picture shifted the other way."""
+    (cx, cy), camera = scene.camera.principal_point, scene.camera
+    return replace(scene, camera=replace(camera, principal_point=(cx - x, cy - y)))
+
+
+# fault → (level, samples, what it makes of the scene). The samples are those that this picture of 3,072 pixels needs.
+SCENE_FAULTS = {
+    "albedo of the floor off by 1 %": ("direct", 64, lambda s: recoloured(s, "floor", 1.01)),
+    "albedo of the ball off by 1 %": ("direct", 256, lambda s: recoloured(s, "ball", 0.99)),
+    "the sun dropped": ("direct", 64, lambda s: replace(s, lamps=s.lamps[1:])),
+    "the area lamp dropped": ("direct", 64, lambda s: replace(s, lamps=s.lamps[:1])),
+    "the world dropped": ("direct", 64, lambda s: replace(s, world=World())),
+    "one bounce fewer, 3 to 2": ("path", 256, lambda s: replace(s, bounces=Bounces(2, 2, 2, 2))),
+    "smooth normals inside out": ("direct", 64, lambda s: with_normals(s, lambda n: -n)),
+    "smooth normals with two axes swapped": ("direct", 64, lambda s: with_normals(s, lambda n: n[..., [1, 0, 2]].copy())),
+    "a filter 0.1 px to the right": ("direct", 256, lambda s: shifted(s, 0.1, 0.0)),
+    "a filter 0.25 px up": ("direct", 64, lambda s: shifted(s, 0.0, 0.25)),
+}
+
+
+@pytest.mark.parametrize("fault", SCENE_FAULTS)
+def test_a_fault_of_the_scene_is_found(reference, fault):
+    level, samples, change = SCENE_FAULTS[fault]
+    comparison = compared(reference(level, samples), change(build()), level, samples)
+    assert not comparison.passed, f"{fault}: {comparison.sentence}"
+    assert comparison.sentence.startswith("Different here: ")
+
+
+# fault → what it makes of that which a shadow ray is told of a lamp.
+
+
+def without_cosine(aimed, points):
+    return aimed._replace(light=aimed.light / np.maximum(np.abs((points.shading * aimed.direction).sum(axis=0)), 1e-6))
+
+
+def with_distance(aimed, points):
+    return aimed._replace(light=aimed.light * np.where(np.isfinite(aimed.distance), aimed.distance, 1.0))
+
+
+FORMULA_FAULTS = {
+    "the cosine forgotten": without_cosine,
+    "π lost": lambda aimed, points: aimed._replace(light=aimed.light * np.pi),
+    "the distance taken for its square": with_distance,
+    "no shadows": lambda aimed, points: aimed._replace(shadowed=np.zeros(aimed.shadowed.shape, bool)),
+}
+
+
+@pytest.mark.parametrize("fault", FORMULA_FAULTS)
+def test_a_fault_of_the_formulas_is_found(reference, monkeypatch, fault):
+    right, sample = reference("direct", 64), emitters.Emitters.sample
+
+    def wrong(self, points, *rest, **more):
+        return FORMULA_FAULTS[fault](sample(self, points, *rest, **more), points)
+
+    monkeypatch.setattr(emitters.Emitters, "sample", wrong)
+    comparison = compared(right, build(), "direct", 64)
+    assert not comparison.passed, f"{fault}: {comparison.sentence}"

@@ -1,0 +1,151 @@
+"""What `import viewcam_addon as vp` gives: a camera, a picture traced of a scene, and what two pictures differ by.
+
+Everything here takes what is in memory or the path of a file, and gives what is in memory; the command line is made of the same
+functions. Nothing needs Blender but `check`, which runs it in a process of its own. Where Blender is a module of this process,
+no picture may be read from a file in it or written (image.py says why): those in memory may be compared.
+"""
+
+import json
+import os
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from . import children
+from . import image as images
+from .comparison import geometry, radiance
+from .comparison.light_verdict import RadianceComparison
+from .comparison.verdict import Comparison
+from .errors import InputError
+from .image import Image
+from .tracer import render as tracing
+from .tracer.scene import Scene, scene_file
+from .tracer.scene.film import MOST_SAMPLES, SAMPLES
+from .tracer.scene.levels import least_level
+
+File = str | os.PathLike[str]
+
+
+def read_scene(path: File) -> Scene:
+    """A scene file, as docs/scene-file.md has it and `viewcam export` writes it.
+
+    Raises
+    ------
+    InputError
+        if there is none, or something in it is wrong; it names the key.
+    """
+    return scene_file.read(Path(path))
+
+
+def render(
+    scene: Scene | File,
+    level: str = "auto",
+    samples: int = SAMPLES,
+    seed: int = 0,
+    threads: int | None = None,
+    error: float | None = None,
+    watcher: tracing.Watcher | None = None,
+) -> Image:
+    """Trace a scene with the reference tracer.
+
+    scene : or the path of a scene file; its camera is `scene.camera`, which `dataclasses.replace` changes.
+    level : "geometry", "direct", "path", or "auto" for the least one that leaves nothing out.
+    samples : of each pixel, at the levels of light. seed : another for other noise. threads : all cores where None.
+    error : the standard error of each pixel, scene-linear, instead of a number of samples.
+    watcher : is told of rows that are done, and may stop it.
+
+    Returns the passes by name, (height, width, channels) float32, rows from the bottom, with the camera.
+
+    Raises
+    ------
+    InputError
+        if there is no such level, a number makes no sense, or the scene needs more memory than there is.
+    """
+    scene = scene if isinstance(scene, Scene) else read_scene(scene)
+    level = least_level(scene)[0] if level == "auto" else level
+    passes = tracing.render(scene, level, MOST_SAMPLES if error else samples, seed, threads, watcher, error)
+    attributes = {"software": "Virtual Pinhole", "level": level}
+    if level != "geometry":
+        if error:
+            samples = round(float(passes["Sample Count"].mean(dtype=float)))
+            attributes["error"] = str(error)
+        attributes |= {"samples": str(samples), "seed": str(seed)}
+    return Image(passes, scene.camera, attributes)
+
+
+def compare(
+    reference: Image | File,
+    tests: Image | File | Sequence[Image | File],
+    scene: Scene | File | None = None,
+    threads: int | None = None,
+    test_samples: int | None = None,
+) -> Comparison | RadianceComparison:
+    """What a picture differs from the tracer's by, how much, and whether it is explained.
+
+    reference : the tracer's, of `render` or an EXR. tests : Cycles', say; several of different seeds where there is noise.
+    scene : what the reference shows, with which pixels on edges are traced again. Without it none of them is explained.
+    test_samples : of each test picture, where that is not what its file tells.
+
+    Returns geometry's comparison or that of light: `.passed`, `.sentence`, `.lines()`, `.to_json()`.
+
+    Raises
+    ------
+    InputError
+        if sizes differ, a pass is missing, the camera is not known, or several pictures have no noise to tell.
+    """
+    several = tests if isinstance(tests, Sequence) and not isinstance(tests, str) else [tests]
+    if files := [each for each in (reference, *several) if not isinstance(each, Image)]:
+        images.check_same_frames(files)
+    of = reference if isinstance(reference, Image) else images.read(reference)
+    pictures = [each if isinstance(each, Image) else images.read(each) for each in several]
+    scene = scene if scene is None or isinstance(scene, Scene) else read_scene(scene)
+    camera = of.camera or (scene.camera if scene else None)
+    if camera is None:
+        raise InputError(f"{of.source} does not tell its camera: give its scene with --scene, or trace it with viewcam render")
+    if radiance.carries_light(of):
+        return radiance.compare(of, pictures, camera, test_samples)
+    if len(pictures) != 1:
+        raise InputError(f"{of.source} has no noise that several pictures could tell: compare it with one")
+    if scene is None:
+        return geometry.compare(of, pictures[0], camera)
+    # The picture may be of another size than the scene says, or of the stated camera.
+    surface_at = tracing.Tracer(replace(scene, camera=camera), threads).surface_at
+    stated = scene.stated_camera if camera == scene.camera else None
+    return geometry.compare(of, pictures[0], camera, surface_at, stated, scene.origin)
+
+
+@dataclass(frozen=True)
+class Check:
+    """What `check` has found.
+
+    passed : whether Cycles renders the camera. sentence : by how much. figures : all that --json writes.
+    """
+
+    passed: bool
+    sentence: str
+    figures: dict[str, Any]
+
+
+def check(blend: File, *options: File) -> Check:
+    """Whether Cycles renders the camera of a .blend file, by `viewcam check` in a process of its own.
+
+    options : those of the command, as in `check("shot.blend", "--camera", "Camera", "--level", "direct")`.
+
+    Raises
+    ------
+    InputError
+        as the command does: no Blender, no such file or camera, no such option.
+    """
+    with tempfile.TemporaryDirectory(prefix="viewcam-") as folder:
+        result = Path(folder) / "check.json"
+        words = [str(option) for option in (blend, *options, "--json", result)]
+        variables = children.environment(apart_from=children.blender_scripts())
+        command = children.viewcam("check", *words)
+        done = subprocess.run(command, env=variables, capture_output=True, text=True, check=False)
+        if done.returncode not in (0, 1):
+            raise InputError((done.stderr.strip().splitlines() or ["viewcam check ended without a word"])[-1])
+        figures = json.loads(result.read_text(encoding="utf-8"))
+    return Check(done.returncode == 0, figures["sentence"], figures)

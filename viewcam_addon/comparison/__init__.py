@@ -1,0 +1,11 @@
+"""Two pictures: what differs, by how much, and is it explained.
+
+Geometry: geometry.py compares; tolerances.py says what is allowed; statistics.py measures each pass; mismatches.py finds the
+pixels that see another surface and re-traces them; cameras.py compares the cameras themselves; verdict.py is what was found,
+and says it; report.py draws it.
+
+Light: radiance.py compares; sides.py makes means and variances of several seeds; noise_free.py compares light without noise
+within tolerances, hypothesis_tests.py noisy light by chance, with the distributions of noise.py; perception.py tells what an
+eye sees; light_verdict.py is what was found, and says it; light_report.py draws it. Both reports share page.py, pictures.py and
+charts.py.
+"""

@@ -1,0 +1,207 @@
+"""Compares the geometry passes of two pictures of the same camera.
+
+The reference is the tracer's, the test usually Cycles'. Position is judged in pixels: the test's positions are projected
+through the ideal camera, and must land on the centres of their pixels. That alone would not notice an object that is moved,
+so depth, normal and UV are compared with the reference's, and indices and coverage must be the same. Combined is left alone
+at this level.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..image import Image
+from ..pinhole import Pinhole
+from . import tolerances
+from .cameras import conversion_error, systematic_error
+from .far_from_origin import far_from_origin
+from .mismatches import (
+    KINDS,
+    Agreement,
+    Mismatches,
+    SurfaceAt,
+    at,
+    explain,
+    kinds_of,
+    largest_around,
+    reach_of,
+)
+from .statistics import Row, measure
+from .tolerances import Array, Seen, in_float32
+from .verdict import Comparison, allowed_unexplained
+
+# The passes that are compared with their channels (the third of UV is constant), and which of them both pictures must have.
+_CHANNELS = {"Depth": 1, "Position": 3, "Normal": 3, "UV": 2, "Object Index": 1, "Material Index": 1}
+_UNITS = {"Position": "px", "Position depth": "relative", "Depth": "relative", "Normal": "°", "UV": "absolute"}
+_NEEDED = ("Depth", "Position", "Object Index")
+# Pixels whose centres are traced again, to see whether the reference shows the scene.
+_ASKED_OF_THE_REFERENCE = 1000
+# Passes that only the reference has: what tolerances are evaluated with.
+_FOR_TOLERANCES = ("Magnitude", "Facing")
+
+
+@np.errstate(all="ignore")
+def compare(
+    reference: Image,
+    test: Image,
+    pinhole: Pinhole,
+    surface_at: SurfaceAt | None = None,
+    stated: Pinhole | None = None,
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Comparison:
+    """Compare two pictures of one camera.
+
+    pinhole : the camera that traced the reference. surface_at : re-traces sub-pixel positions of the reference's scene;
+    without it no mismatch can be explained. stated : the camera as the four values state it; with it the conversion's error
+    is measured too. origin : that of both pictures, in the world.
+
+    Whatever float32 can hold may stand in the pictures: what can't be computed with is not within tolerance.
+
+    Raises
+    ------
+    InputError
+        if the sizes differ, a pass is missing, or the reference is not what `surface_at` sees.
+    """
+    expected, seen = _passes(reference, test, pinhole)
+    _check_figures(reference.source, expected, pinhole)
+    size = (pinhole.height, pinhole.width)
+    hit = tolerances.is_hit(expected)
+    shift = np.where(hit, tolerances.ray_shift(pinhole, expected), np.nan)
+    off_x, off_y, along = _displacement(pinhole, seen)
+    agreement = Agreement(pinhole, np.hypot(off_x, off_y), _slopes(expected, hit, size))
+
+    kinds = kinds_of(expected, seen, agreement)
+    # At an edge the ray may meet either surface, so a re-traced one is judged by the steepest slope around.
+    steepest = {name: largest_around(slope.reshape(size)).ravel() for name, slope in agreement.slopes.items()}
+    around = replace(agreement, slopes=steepest)
+    if surface_at is not None:
+        _check_reference(reference.source, expected, np.flatnonzero(kinds >= 0), agreement, surface_at)
+    mismatches = _mismatches(kinds, seen, reach_of(shift.reshape(size)).ravel(), around, surface_at)
+
+    compared = hit & np.isin(kinds, (-1, KINDS.index("material index"), KINDS.index("surface")))
+    # What is explained, or few enough to be let pass, is no error of the passes; what is not, shows in their figures.
+    settled = mismatches.explained | (mismatches.unexplained_count <= allowed_unexplained(pinhole))
+    compared[mismatches.rows[settled] * pinhole.width + mismatches.columns[settled]] = False
+    chosen = np.flatnonzero(compared)
+    errors = agreement.at(chosen).errors(at(expected, chosen), at(seen, chosen))
+    depth = expected["Depth"][chosen, 0].astype(np.float64)
+    errors["Position depth"] = (np.abs(along[chosen] - depth) / depth, *errors["Depth"][1:])
+    systematic = None
+    if len(chosen):
+        systematic = systematic_error(pinhole, chosen, off_x[chosen], off_y[chosen], errors["Position"][1])
+    rows, maps = _measure(errors, chosen, size)
+
+    depths = expected["Depth"][hit, 0]
+    conversion = None
+    if stated is not None and len(depths):
+        conversion = conversion_error(stated, pinhole, np.percentile(depths, (0, 50, 100)))
+    hits = (int(hit.sum()), int(tolerances.is_hit(seen).sum()))
+    roundings = errors["Position"][0] / errors["Position"][1]
+    far = far_from_origin(pinhole, expected, chosen, rows[0])
+    return Comparison(pinhole, stated, hits, rows, mismatches, systematic, conversion, maps, roundings, far, origin)
+
+
+def _passes(reference: Image, test: Image, pinhole: Pinhole) -> tuple[Seen, Seen]:
+    """The passes that both sides are compared in, each as (pixels, channels)."""
+    for image in (reference, test):
+        if image.size != (pinhole.width, pinhole.height):
+            raise InputError(
+                f"{image.source} has {image.size[0]} × {image.size[1]} pixels and the camera "
+                f"{pinhole.width} × {pinhole.height}: compare pictures of the same size"
+            )
+    names = [name for name in _CHANNELS if name in reference.passes or name in _NEEDED]
+    expected = {name: reference[name] for name in names} | {
+        name: reference[name] for name in _FOR_TOLERANCES if name in reference.passes
+    }
+    seen = {name: test[name] for name in names}
+    return _flattened(expected), _flattened(seen)
+
+
+def _flattened(passes: Seen) -> Seen:
+    return {name: values.reshape(-1, values.shape[2])[:, : _CHANNELS.get(name)] for name, values in passes.items()}
+
+
+def _slopes(expected: Seen, hit: NDArray, size: tuple[int, int]) -> dict[str, Array]:
+    belongs = np.where(hit, expected["Object Index"][:, 0], -1).reshape(size)
+    names = [name for name in ("Normal", "UV") if name in expected]
+    return {name: tolerances.slopes(expected[name].reshape(*size, -1), belongs).ravel() for name in names}
+
+
+def _mismatches(kinds: NDArray, seen: Seen, reach: Array, agreement: Agreement, surface_at: SurfaceAt | None) -> Mismatches:
+    found = np.flatnonzero(kinds >= 0)
+    columns, rows = found % agreement.pinhole.width, found // agreement.pinhole.width
+    shifts, retraced = np.full(len(found), np.nan), 0
+    if surface_at is not None:
+        numbers = kinds[found] != KINDS.index("not a number")
+        traced = found[numbers]
+        shifts[numbers], retraced = explain(
+            columns[numbers], rows[numbers], at(seen, traced), reach[traced], agreement.at(traced), surface_at
+        )
+    return Mismatches(columns, rows, kinds[found], shifts, reach[found], retraced)
+
+
+def _check_figures(source: str, expected: Seen, pinhole: Pinhole) -> None:
+    """Refuse a reference whose figures are no numbers or contradict one another: all tolerances are derived from them.
+
+    A position and its depth are rounded once each, the position in three coordinates: 2 · 2⁻²⁴ times its largest two, and 2⁻²⁴
+    times the depth. Twice as much is let pass.
+    """
+    broken = next((name for name, values in expected.items() if not np.isfinite(values).all()), None)
+    if broken is not None:
+        raise InputError(f"{source} holds what is no finite number in its pass {broken!r}: trace it again")
+    hit = tolerances.is_hit(expected)
+    depth, position = (expected[name][hit].astype(np.float64) for name in ("Depth", "Position"))
+    along = -(position - pinhole.eye) @ pinhole.basis()[2]
+    size = np.abs(position).max(axis=-1) + np.abs(pinhole.eye).max() + np.abs(depth[:, 0])
+    apart = ~(np.abs(along - depth[:, 0]) <= 4.0 * tolerances.FLOAT32 * size)
+    if apart.any():
+        raise InputError(
+            f"{source} contradicts itself in {int(apart.sum()):,} pixels, where Position is not at the Depth that its camera "
+            "sees: trace it again"
+        )
+
+
+def _check_reference(source: str, expected: Seen, found: NDArray, agreement: Agreement, surface_at: SurfaceAt) -> None:
+    """Refuse a reference that its own scene does not show, where it differs from the test.
+
+    Else rays would be sent for each of its pixels, as far as its figures say that they may be off. One of an older version of
+    the scene, or a damaged one, is not the same for most of them; a true one is for all.
+
+    found : pixels that see another surface.
+    """
+    found = found[:: max(len(found) // _ASKED_OF_THE_REFERENCE, 1)]
+    rows, columns = np.divmod(found, agreement.pinhole.width)
+    traced, shown = surface_at(columns, rows, 0.5, 0.5), at(expected, found)
+    same = agreement.at(found).same_place(traced, shown) | ~(
+        tolerances.is_hit(traced) | tolerances.is_hit(shown) | np.isnan(shown["Depth"][:, 0])
+    )
+    if len(found) and not same.mean() >= 0.5:
+        raise InputError(f"{source} is not what the tracer sees in the scene: trace it again, or give the scene that it shows")
+
+
+def _displacement(pinhole: Pinhole, seen: Seen) -> tuple[Array, Array, Array]:
+    """How far the positions, projected, lie from the centres of their pixels, to the right and upwards; and their depths."""
+    row, column = np.divmod(np.arange(pinhole.width * pinhole.height), pinhole.width)
+    # A position that is no number, like one behind the eye, has no picture: it counts as far off as the picture is large.
+    numbers = np.isfinite(seen["Position"]).all(axis=-1, keepdims=True)
+    seen_column, seen_row, along = pinhole.project(np.where(numbers, seen["Position"], pinhole.eye))
+    diagonal = float(np.hypot(pinhole.width, pinhole.height))
+    off_x, off_y = (np.nan_to_num(off, nan=diagonal) for off in (seen_column - column - 0.5, seen_row - row - 0.5))
+    return off_x, off_y, along
+
+
+def _measure(errors: dict, chosen: NDArray, size: tuple[int, int]) -> tuple[tuple[Row, ...], dict[str, NDArray[np.float32]]]:
+    """The rows and the maps of the chosen pixels."""
+    rows, maps = [], {}
+    for name, unit in _UNITS.items():
+        if name not in errors:
+            continue
+        # Tolerances are in radians, people of degrees.
+        error, one_rounding, storage = (np.degrees(figure) if unit == "°" else figure for figure in errors[name])
+        rows.append(measure(name, unit, error, one_rounding, storage))
+        flat = np.full(size[0] * size[1], np.nan, dtype=np.float32)
+        flat[chosen] = in_float32(error)
+        maps[name] = flat.reshape(size)
+    return tuple(rows), maps

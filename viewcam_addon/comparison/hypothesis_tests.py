@@ -1,0 +1,180 @@
+"""Hypothesis tests of noisy light: is a difference more than chance, in each pixel, each tile, the whole picture?
+
+The noise that a difference is held against is the larger of what a pixel or tile shows itself and what its 3 × 3 neighbourhood
+shows in the mean. By itself, a place that rare light has missed so far looks both darker and quieter than it is, and an edge
+that crosses the corner of a pixel may have been missed by all of its samples. Where neighbours share their light, a tile shows
+less noise than its sum has: then what the samples of its pixels tell counts as well.
+
+What is within rounding is no difference: a pixel's is taken beyond the largest tolerance, a tile's sum beyond that of the 99th
+percentile of each pixel, since a mean of rounding errors can't exceed what nearly all of them stay below. Nor is what Cycles'
+table of the Blackman-Harris filter does (tracer/light/filters.py): it shifts the picture by 4.9e-4 px to the right and up, and
+changes a pixel by 0.21 % of the contrast around it at most. A shift changes only what passes a tile's border, so that its
+effect is the sum of the slopes, in which noise cancels.
+"""
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import noise, tolerances
+from .mismatches import contrast
+from .noise_free import Allowance
+from .sides import CHANNEL_NAMES, Sides
+from .tolerances import Array
+
+PIXELS, WHOLE = 1, 0
+SIZES = (PIXELS, 8, 32, WHOLE)
+"""Sides of the tiles, in pixels; 0 is one tile over all."""
+
+_NEARLY_ALL = tolerances.ROUNDINGS[tolerances.PERCENTILES.index(99.0)]
+# Of the default filter width of 1.5 px; twice the shift, for what the table does beside shifting.
+_FILTER_SHIFT, _FILTER_CONTRAST = 2 * 4.9e-4, 0.0021
+# Standard errors of what has no noise at all: beyond any limit, and a number still.
+_CERTAIN = 1e6
+_TINY = np.finfo(float).tiny
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a difference is.
+
+    columns, rows : first and last, rows from the bottom. channel : its name, empty where there is one only.
+    reference, test : means there, in that channel. errors : the difference in standard errors, signed.
+    """
+
+    columns: tuple[int, int]
+    rows: tuple[int, int]
+    channel: str
+    reference: float
+    test: float
+    errors: float
+
+
+@dataclass(frozen=True, eq=False)
+class HypothesisTest:
+    """One size of tiles, asked in one quantity.
+
+    size : one of SIZES. errors : (rows, columns, channels), each tile's difference in standard errors, signed.
+    allowed : (rows, columns, channels) what chance allows. limit : that at the worst place.
+    worst : the place that is farthest beyond it, or closest to it.
+    """
+
+    size: int
+    errors: Array
+    allowed: Array
+    limit: float
+    worst: Place
+
+    @property
+    def name(self) -> str:
+        return {WHOLE: "whole picture", PIXELS: "pixels"}.get(self.size, f"tiles of {self.size} × {self.size}")
+
+    @property
+    def is_open(self) -> bool:
+        """Whether nobody knows an answer: of pixels whose noise is not known, or that do not differ."""
+        return not self.errors.any()
+
+    @property
+    def failing(self) -> NDArray[np.bool_]:
+        """(rows, columns) bool: tiles that differ in some channel."""
+        return (np.abs(self.errors) > self.allowed).any(axis=-1)
+
+    @property
+    def ok(self) -> bool:
+        return not self.failing.any()
+
+    @property
+    def is_everywhere(self) -> bool:
+        """Whether half of the tiles differ, so that the place of the worst tells nothing."""
+        return bool(self.failing.mean() > 0.5)
+
+    def to_json(self) -> dict:
+        return {
+            "name": self.name,
+            "size": self.size,
+            "count": self.errors.size,
+            "failing": int(self.failing.sum()),
+            "allowed": self.limit,
+            "worst": asdict(self.worst),
+            "ok": self.ok,
+        }
+
+
+def run(sides: Sides, allowed: Allowance, freedom: tuple[int, int], level: float) -> tuple[HypothesisTest, ...]:
+    """All sizes, asked so that chance makes any of them fail with the probability `level` at most.
+
+    allowed : what rounding may do to these sides. freedom : the degrees of freedom of both sides' variances.
+    level : shared out evenly over the sizes, and over the tiles and channels of each after Šidák.
+    """
+    share = level / len(SIZES)
+    return tuple(_hypothesis_test(sides, *answer) for answer in _statistics(sides, allowed, freedom, share))
+
+
+def worst_channel(errors: Array) -> Array:
+    """(rows, columns): of each tile's channels the one that differs most, with its sign."""
+    return np.take_along_axis(errors, np.abs(errors).argmax(axis=-1)[..., None], axis=-1)[..., 0]
+
+
+def over_pixels(tiles: Array, shape: tuple[int, int], size: int) -> Array:
+    """(height, width): each tile's value in all of its pixels."""
+    for axis, length in enumerate(shape):
+        tiles = np.repeat(tiles, np.diff([*noise.tile_starts(length, size), length]), axis=axis)
+    return tiles
+
+
+def _statistics(sides: Sides, allowed: Allowance, freedom: tuple[int, int], level: float) -> Iterator[tuple[int, Array, Array]]:
+    """For each size: (size, errors, what is allowed)."""
+    difference = sides.difference
+    errors, both = _pixel_errors(sides, allowed.most[..., None] + _FILTER_CONTRAST * contrast(sides.reference), freedom)
+    yield PIXELS, errors, noise.student_critical(both, noise.sidak(level, errors.size))
+    rounding = np.repeat((_NEARLY_ALL * allowed.value + allowed.floor)[..., None], difference.shape[2], axis=2)
+    shift = _FILTER_SHIFT + _NEARLY_ALL * float(allowed.shift.max())
+    across = [np.gradient(sides.reference, axis=axis) for axis in (0, 1) if sides.reference.shape[axis] > 1]
+    for size in SIZES[1:]:
+        total, square, allowance = (noise.tile_sums(values, size) for values in (difference, difference**2, rounding))
+        allowance = allowance + shift * sum(np.abs(noise.tile_sums(slope, size)) for slope in across)
+        square = np.maximum(square, noise.mean_around(square))
+        square = np.maximum(square, noise.tile_sums(np.broadcast_to(sides.shared, difference.shape), size))
+        errors = _errors(_beyond(total, allowance), square)
+        yield size, errors, np.full(errors.shape, noise.sign_critical(noise.sidak(level, errors.size)))
+
+
+def _pixel_errors(sides: Sides, rounding: Array, freedom: tuple[int, int]) -> tuple[Array, Array]:
+    """Each pixel's difference in standard errors, 0 where they are not known, and Welch's degrees of freedom."""
+    variances = [np.maximum(variance, noise.mean_around(variance)) for variance in (sides.variance, sides.spread)]
+    total = variances[0] + variances[1]
+    known = np.isfinite(total) & (total > 0.0)
+    share = np.divide(variances[0], total, out=np.full(total.shape, 0.5), where=known)
+    both = 1.0 / (share**2 / freedom[0] + (1.0 - share) ** 2 / freedom[1])
+    return _errors(_beyond(sides.difference, rounding), total), both
+
+
+def _errors(differences: Array, variances: Array) -> Array:
+    errors = differences / np.sqrt(np.maximum(variances, _TINY))
+    return np.clip(errors, -_CERTAIN, _CERTAIN)
+
+
+def _beyond(values: Array, allowance: Array) -> Array:
+    """What of the values is beyond ± the allowance."""
+    return np.sign(values) * np.maximum(np.abs(values) - allowance, 0.0)
+
+
+def _hypothesis_test(sides: Sides, size: int, errors: Array, allowed: Array) -> HypothesisTest:
+    index = np.unravel_index(np.argmax(np.abs(errors) / allowed), errors.shape)
+    row, column, channel = (int(i) for i in index)
+    (bottom, top), (left, right) = (
+        _extent(length, size, i) for length, i in zip(sides.reference.shape[:2], (row, column), strict=True)
+    )
+    there = (slice(bottom, top + 1), slice(left, right + 1), channel)
+    means = (float(side[there].mean()) for side in (sides.reference, sides.test))
+    name = CHANNEL_NAMES[channel] if errors.shape[2] == len(CHANNEL_NAMES) else ""
+    return HypothesisTest(
+        size, errors, allowed, float(allowed[index]), Place((left, right), (bottom, top), name, *means, float(errors[index]))
+    )
+
+
+def _extent(length: int, size: int, i: int) -> tuple[int, int]:
+    starts = [*noise.tile_starts(length, size), length]
+    return int(starts[i]), int(starts[i + 1]) - 1

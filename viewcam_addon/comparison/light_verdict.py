@@ -1,0 +1,265 @@
+"""What a comparison of light has found, as figures, as one sentence, and as aligned lines for the shell."""
+
+import math
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..pinhole import Pinhole
+from .hypothesis_tests import PIXELS, WHOLE, HypothesisTest, Place
+from .noise_free import Edges
+from .perception import Appearance
+from .statistics import Row, percentile_name
+from .tolerances import PERCENTILES, Array
+from .verdict import mark, percent
+
+FALSE_ALARMS = 0.01
+"""The probability, at most, that two sides of the same light are called different; shared out evenly over the quantities."""
+
+# Factors that tell what went wrong, and how well a factor has to fit one: a picture without noise tells it to some digits.
+_TELLING = {
+    "π": math.pi,
+    "1/π": 1.0 / math.pi,
+    "2": 2.0,
+    "1/2": 0.5,
+    "4": 4.0,
+    "1/4": 0.25,
+    "2π": 2.0 * math.pi,
+    "4π": 4.0 * math.pi,
+}
+_FIT = 1e-4
+
+
+@dataclass(frozen=True)
+class LightRow:
+    """What was found in one quantity.
+
+    reference, test : means over the picture and its channels. ratio : test over reference, nan where that is 0.
+    ratio_error : its standard error. visible : the relative bias of the whole picture that is found half of the time.
+    hypothesis_tests : none where there is no noise. noise_free, edges : the exact comparison, None where there is noise.
+    broken : pixels that are no numbers on one side or both. factor : the one that explains all of the difference, or None.
+    """
+
+    name: str
+    reference: float
+    test: float
+    ratio_error: float
+    visible: float
+    broken: int
+    hypothesis_tests: tuple[HypothesisTest, ...] = ()
+    noise_free: Row | None = None
+    edges: Edges | None = None
+    factor: float | None = None
+
+    @property
+    def ratio(self) -> float:
+        return self.test / self.reference if self.reference else float("nan")
+
+    @property
+    def ok(self) -> bool:
+        exact = self.noise_free is None or (self.noise_free.ok and self.edges.ok)
+        return exact and not self.broken and all(test.ok for test in self.hypothesis_tests)
+
+    def to_json(self) -> dict:
+        names = ("name", "reference", "test", "ratio", "ratio_error", "visible", "broken", "factor", "ok")
+        return {
+            **{name: getattr(self, name) for name in names},
+            "questions": [test.to_json() for test in self.hypothesis_tests],
+            "steady": self.noise_free and self.noise_free.to_json(),
+            "edges": self.edges and self.edges.to_json(),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class RadianceComparison:
+    """What differs between a reference and the mean of some test pictures, in light.
+
+    samples : of the reference, and of all test pictures together; None where the files do not tell. seeds : test pictures.
+    is_noisy : whether chance had a part in it. rows : one for each quantity, Combined first. equal : further quantities, the
+    same to the last bit. appearance : relMSE and FLIP. test : the mean of the test pictures' Combined, (height, width, 3).
+    maps : name to (height, width) float32, rows from the bottom: what differs in Combined and in quantities that fail.
+    """
+
+    pinhole: Pinhole
+    samples: tuple[int | None, int | None]
+    seeds: int
+    is_noisy: bool
+    rows: tuple[LightRow, ...]
+    equal: tuple[str, ...]
+    appearance: Appearance
+    test: Array
+    maps: dict[str, NDArray[np.float32]]
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing differs by more than chance and rounding."""
+        return all(row.ok for row in self.rows)
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in one sentence."""
+        return sentence(self)
+
+    def lines(self) -> list[str]:
+        """The result for the shell: a line for each quantity, and the verdict."""
+        return lines(self)
+
+    def to_json(self) -> dict:
+        """Everything but the pictures, as plain JSON values."""
+        return {
+            "passed": self.passed,
+            "sentence": self.sentence,
+            "size": [self.pinhole.width, self.pinhole.height],
+            "samples": {"reference": self.samples[0], "test": self.samples[1]},
+            "seeds": self.seeds,
+            "noisy": self.is_noisy,
+            "false_alarms": FALSE_ALARMS,
+            "quantities": [row.to_json() for row in self.rows],
+            "equal": list(self.equal),
+            "appearance": asdict(self.appearance),
+        }
+
+
+def sentence(comparison: RadianceComparison) -> str:
+    """The verdict in one sentence, which says where and by how much where there is a difference."""
+    combined = comparison.rows[0]
+    if not comparison.passed:
+        worst = [row for row in comparison.rows if not row.ok]
+        others = f"; {_listed([row.name for row in worst[1:]])} too" if len(worst) > 1 else ""
+        return f"Different here: {_difference(worst[0])}{_hint(worst[0])}{others}."
+    if not comparison.is_noisy:
+        row = combined.noise_free
+        return (
+            f"The same picture: over {row.count:,} pixels without noise the light differs by {row.values[0]:.1e} of its value "
+            f"in the median and by at most {row.values[-1]:.1e}, {percent(row.worst[1])} of what float32 allows"
+            f"{_edges(combined)}."
+        )
+    return (
+        f"The same within noise at {samples_words(comparison)}: no pixel and no tile differs by more than chance; "
+        f"{_mean_words(combined)}."
+    )
+
+
+def lines(comparison: RadianceComparison) -> list[str]:
+    """A line for each quantity, aligned, what an eye sees, and the verdict last."""
+    table = _noisy_lines(comparison) if comparison.is_noisy else _noise_free_lines(comparison)
+    if comparison.equal:
+        table.append(f"{'To the last bit':<17}{', '.join(comparison.equal)}")
+    seen = comparison.appearance
+    expected = "" if seen.expected_relmse is None else f", of which noise explains {seen.expected_relmse:.2e}"
+    flip = "needs the package flip-evaluator" if seen.flip is None else f"{seen.flip:.4f}"
+    table.append(f"{'To the eye':<17}relMSE {seen.relmse:.2e}{expected}; FLIP {flip}")
+    return [*table, comparison.sentence]
+
+
+def samples_words(comparison: RadianceComparison) -> str:
+    """At how many samples: 1,024 samples; or 1,024 and 512 samples."""
+    reference, test = comparison.samples
+    if reference is None or test is None:
+        return "unknown samples"
+    return f"{reference:,} samples" if reference == test else f"{reference:,} and {test:,} samples"
+
+
+def place_words(place: Place, size: int) -> str:
+    """Where: in columns 32 to 63, rows 0 to 31."""
+    if size == WHOLE:
+        return "over the whole picture"
+    (left, right), (bottom, top) = place.columns, place.rows
+    return f"in column {left}, row {bottom}" if size == PIXELS else f"in columns {left} to {right}, rows {bottom} to {top}"
+
+
+def change_words(reference: float, test: float) -> str:
+    """4.1 % darker; 3.1 times as bright; 0.12 instead of 0."""
+    if reference <= 0.0 or test <= 0.0:
+        return f"{test:.3g} instead of {reference:.3g}"
+    ratio = test / reference
+    if not 0.5 < ratio < 2.0:
+        return f"{ratio:.4g} times as bright"
+    return f"{abs(ratio - 1.0):.2%} {'brighter' if ratio > 1.0 else 'darker'}".replace("%", " %")
+
+
+def worst_test(row: LightRow) -> HypothesisTest | None:
+    """Of those that fail, the one that tells where: the smallest tiles, or the whole picture where half of them differ."""
+    failing = [test for test in row.hypothesis_tests if not test.ok]
+    if not failing:
+        return None
+    tiles = [test for test in failing if test.size not in (PIXELS, WHOLE)] or failing
+    whole = failing[-1] if failing[-1].size == WHOLE else None
+    return whole if whole and (row.factor is not None or tiles[0].is_everywhere) else tiles[0]
+
+
+def _noisy_lines(comparison: RadianceComparison) -> list[str]:
+    names = [test.name for test in comparison.rows[0].hypothesis_tests]
+    table = [f"{'standard errors':<17}{'ratio':>20}" + "".join(f"{name:>18}" for name in names)]
+    for row in comparison.rows:
+        cells = "".join(f"{_statistic(test):>18}" for test in row.hypothesis_tests)
+        table.append(f"{row.name:<17}{f'{row.ratio:.5f} ± {row.ratio_error:.5f}':>20}{cells}  {mark(row.ok)}")
+    return table
+
+
+def _statistic(test: HypothesisTest) -> str:
+    return "–" if test.is_open else f"{abs(test.worst.errors):.1f} of {test.limit:.1f}"
+
+
+def _noise_free_lines(comparison: RadianceComparison) -> list[str]:
+    head = "".join(f"{percentile_name(p):>10}" for p in PERCENTILES)
+    table = [f"{'relative':<17}{'pixels':>11}{head}  of tolerance"]
+    for row in comparison.rows:
+        figures = "".join(f"{value:>10.1e}" for value in row.noise_free.values)
+        percentile, share = row.noise_free.worst
+        used = f"{percent(share):>7} at {percentile_name(percentile):<6}{mark(row.ok)}"
+        table.append(f"{row.name:<17}{row.noise_free.count:>11,}{figures}  {used}{_edges(row)}")
+    return table
+
+
+def edge_words(edges: Edges) -> str:
+    """12 pixels differ at edges (63 may) and 1 elsewhere (2 may)."""
+    at_edges = f"{edges.count:,} pixels differ at edges ({edges.allowed:,} may)"
+    return f"{at_edges} and {edges.leaks:,} elsewhere ({edges.allowed_leaks:,} may)"
+
+
+def _edges(row: LightRow) -> str:
+    return f"; {edge_words(row.edges)}" if row.edges.count or row.edges.leaks else ""
+
+
+def _difference(row: LightRow) -> str:
+    if row.broken:
+        return f"{row.name} has {row.broken:,} pixel{'s' if row.broken > 1 else ''} without a number"
+    test = worst_test(row)
+    if test is None:
+        noise_free, edges = row.noise_free, row.edges
+        if not edges.ok:
+            return f"{row.name} differs by more than float32 allows: {edge_words(edges)}"
+        percentile, share = noise_free.worst
+        return f"{row.name} is off by {share:.3g} times its tolerance at {percentile_name(percentile)}"
+    place = test.worst
+    failing, of = int(test.failing.sum()), test.failing.size
+    many = f" and {failing - 1:,} more of {of:,}" if failing > 1 else ""
+    channel = f" ({place.channel})" if place.channel else ""
+    return (
+        f"{place_words(place, test.size)}{many} {row.name}{channel} is {change_words(place.reference, place.test)}, "
+        f"{abs(place.errors):.3g} standard errors where chance allows {test.limit:.3g}"
+    )
+
+
+def _hint(row: LightRow) -> str:
+    if row.factor is None:
+        return ""
+    tolerance = max(_FIT, 4.0 * row.ratio_error / row.ratio)
+    known = next((name for name, value in _TELLING.items() if abs(row.factor / value - 1.0) < tolerance), None)
+    error = f" ± {row.ratio_error:.1g}" if row.ratio_error else ""
+    return f" (all of it is a factor of {row.factor:.5g}{error}{f', which is {known}' if known else ''})"
+
+
+def _mean_words(row: LightRow) -> str:
+    if not row.reference:
+        return "both are black in the mean"
+    return (
+        f"the mean differs by {100.0 * (row.ratio - 1.0):+.3f} % ± {100.0 * row.ratio_error:.3f} %, and a difference of "
+        f"{100.0 * row.visible:.2f} % would have been found"
+    )
+
+
+def _listed(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -1,0 +1,238 @@
+"""Pixels where the two pictures see another surface, and whether the tolerance explains it.
+
+On a silhouette, or on a crease between two faces, the smallest shift of a ray decides what it sees. Whether such a shift is
+within tolerance is proved by re-tracing: rays are sent around the pixel's centre on rings that grow up to the tolerance, and
+the pixel is explained by the first ring on which some ray sees what the test picture shows, in every pass.
+
+One thing no exact ray sees: the back of a silhouette. Where a renderer's ray slips through the edge of the front face it
+meets the face behind, at the same place but with another normal and UV. So on a silhouette (the ring sees something else,
+too, or grazes the surface) the same object at the same depth is enough.
+
+Rejected: accepting a pixel when a neighbour shows the test's object. Next to an edge that is so for any error below a pixel.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..pinhole import Pinhole
+from . import tolerances
+from .tolerances import Array, Seen
+
+# surface_at(columns, rows, px, py) -> dict of pass name to (n, channels) float32: what rays through sub-pixel positions see.
+SurfaceAt = Callable[[NDArray, NDArray, Array, Array], Seen]
+
+KINDS = ("not a number", "coverage", "object index", "material index", "surface")
+
+# One pixel in a million may stay unexplained (what was measured on 11.5 million), and none in smaller pictures.
+PIXELS_PER_UNEXPLAINED = 1_000_000
+
+# The rings, in roundings (tolerances.ROUNDINGS): the smallest that explains tells how far the ray was off.
+_RINGS = (0.25, 0.5, 1.0, 2.0, 3.4, 6.0, tolerances.ROUNDINGS[-1])
+_DIRECTIONS = 16
+# A ray that sees a cosine below this is at the rim of what it grazes: √(2 a / r) for a ball of r = 100 pixels, a = 0.05
+# pixels from its silhouette.
+_RIM = 0.03
+_BATCH = 1_000
+
+
+@dataclass(frozen=True, eq=False)
+class Mismatches:
+    """The pixels that see another surface in the test picture than in the reference.
+
+    columns, rows : (n,) int, rows from the bottom. kinds : (n,) int, index in KINDS.
+    shifts : (n,) float64, pixels: the smallest shift that explains each; nan where none within tolerance does.
+    reach : (n,) float64, pixels: the tolerance up to which shifts were tried.
+    retraced : how many were re-traced; 0 without a scene to trace.
+    """
+
+    columns: NDArray[np.intp]
+    rows: NDArray[np.intp]
+    kinds: NDArray[np.intp]
+    shifts: Array
+    reach: Array
+    retraced: int
+
+    @property
+    def explained(self) -> NDArray[np.bool_]:
+        return np.isfinite(self.shifts)
+
+    @property
+    def unexplained_count(self) -> int:
+        return int((~self.explained).sum())
+
+    def counts(self) -> dict[str, tuple[int, int]]:
+        """For each kind: (how many, how many of them explained)."""
+        return {
+            kind: (int((self.kinds == i).sum()), int((self.explained & (self.kinds == i)).sum()))
+            for i, kind in enumerate(KINDS)
+        }
+
+    def to_json(self) -> dict:
+        """Counts for each kind, and the first hundred unexplained pixels."""
+        counts = {kind: {"count": count, "explained": explained} for kind, (count, explained) in self.counts().items()}
+        first = np.flatnonzero(~self.explained)[:100]
+        unexplained = [
+            {
+                "column": int(self.columns[i]),
+                "row": int(self.rows[i]),
+                "kind": KINDS[self.kinds[i]],
+                "tried_up_to_px": float(self.reach[i]),
+            }
+            for i in first
+        ]
+        largest = float(np.max(self.shifts[self.explained], initial=0.0))
+        return {"kinds": counts, "retraced": self.retraced, "largest_shift_px": largest, "unexplained": unexplained}
+
+
+@dataclass(frozen=True, eq=False)
+class Agreement:
+    """Judges whether the test picture shows the surface that a ray sees, within the tolerance of the last percentile.
+
+    across : (n,) pixels, how far each of the test's positions, projected, lies from the centre of its pixel.
+    slopes : pass name to (n,), how much Normal and UV change per pixel there (tolerances.slopes).
+    """
+
+    pinhole: Pinhole
+    across: Array
+    slopes: dict[str, Array]
+
+    def at(self, chosen: NDArray) -> "Agreement":
+        """That of some of the pixels, by their indices."""
+        return Agreement(self.pinhole, self.across[chosen], {name: slope[chosen] for name, slope in self.slopes.items()})
+
+    def errors(self, expected: Seen, seen: Seen) -> dict[str, tuple[Array, Array, Array | float]]:
+        """For each pass: (error, what one rounding causes, what storage and the filter's bias cause), each (n,).
+
+        The last may be one number. Tolerances are taken at `expected`. Meaningless where either side missed.
+        """
+        depth = expected["Depth"][..., 0].astype(np.float64)
+        errors = {
+            "Position": (self.across, tolerances.position_shift(self.pinhole, expected), tolerances.FILTER_BIAS),
+            "Depth": (
+                np.abs(seen["Depth"][..., 0] - depth) / depth,
+                tolerances.depth_error(self.pinhole, expected),
+                tolerances.FLOAT32 + tolerances.FILTER_BIAS * tolerances.depth_slope(self.pinhole, expected),
+            ),
+        }
+        if "Normal" in self.slopes:
+            one_rounding = tolerances.normal_error(self.pinhole, expected, self.slopes["Normal"])
+            floor = tolerances.NORMAL_STORAGE + tolerances.FILTER_BIAS * self.slopes["Normal"]
+            errors["Normal"] = (tolerances.angle_between(expected["Normal"], seen["Normal"]), one_rounding, floor)
+        if "UV" in self.slopes:
+            apart = np.abs(expected["UV"][..., :2].astype(np.float64) - seen["UV"][..., :2]).max(axis=-1)
+            floor = tolerances.uv_storage(expected) + tolerances.FILTER_BIAS * self.slopes["UV"]
+            errors["UV"] = (apart, tolerances.uv_error(self.pinhole, expected, self.slopes["UV"]), floor)
+        return errors
+
+    def same_surface(self, expected: Seen, seen: Seen) -> NDArray[np.bool_]:
+        """(n,) bool: equal indices, and every pass within tolerance; or a miss on both sides."""
+        same = self.same_place(expected, seen)
+        for name, figures in self.errors(expected, seen).items():
+            if name != "Depth":
+                same &= _within(*figures)
+        return same | ~(tolerances.is_hit(expected) | tolerances.is_hit(seen))
+
+    def same_place(self, expected: Seen, seen: Seen) -> NDArray[np.bool_]:
+        """(n,) bool: a hit on both sides, with equal indices and the same depth within tolerance."""
+        same = tolerances.is_hit(expected) & tolerances.is_hit(seen)
+        for name in ("Object Index", "Material Index"):
+            if name in expected and name in seen:
+                same &= expected[name][..., 0] == seen[name][..., 0]
+        return same & _within(*self.errors(expected, seen)["Depth"])
+
+
+def kinds_of(expected: Seen, seen: Seen, agreement: Agreement) -> NDArray[np.intp]:
+    """(n,) int: for each pixel the index in KINDS of what sets the two sides apart, −1 where nothing does."""
+    kinds = np.where(agreement.same_surface(expected, seen), -1, KINDS.index("surface"))
+    for name, kind in (("Material Index", "material index"), ("Object Index", "object index")):
+        if name in expected and name in seen:
+            kinds[expected[name][..., 0] != seen[name][..., 0]] = KINDS.index(kind)
+    kinds[tolerances.is_hit(expected) != tolerances.is_hit(seen)] = KINDS.index("coverage")
+    for values in seen.values():
+        kinds[~np.isfinite(values).all(axis=-1)] = KINDS.index("not a number")
+    return kinds
+
+
+def reach_of(shift: Array) -> Array:
+    """(height, width) pixels: how far a ray may be off, from tolerances.ray_shift of the reference (nan where nothing was hit).
+
+    At an edge the ray may belong to either surface, so the largest of the 3 × 3 neighbourhood counts; never the test's figures,
+    which may be the fault that is looked for. Where nothing was hit around, the picture's median.
+    """
+    around = largest_around(np.nan_to_num(shift, nan=0.0))
+    hits = shift[np.isfinite(shift)]
+    around[around == 0.0] = np.median(hits) if hits.size else 0.0
+    return tolerances.ROUNDINGS[-1] * around
+
+
+def largest_around(values: Array) -> Array:
+    """(height, width): the largest value of each pixel's 3 × 3 neighbourhood."""
+    height, width = values.shape
+    padded = np.pad(values, 1, mode="edge")
+    across = np.maximum(np.maximum(padded[:, :width], padded[:, 1 : width + 1]), padded[:, 2:])
+    return np.maximum(np.maximum(across[:height], across[1 : height + 1]), across[2:])
+
+
+def contrast(values: Array) -> Array:
+    """(height, width, channels): the largest difference within each pixel's 3 × 3 neighbourhood."""
+    channels = np.moveaxis(values, -1, 0)
+    return np.stack([largest_around(channel) + largest_around(-channel) for channel in channels], axis=-1)
+
+
+def explain(
+    columns: NDArray, rows: NDArray, seen: Seen, reach: Array, agreement: Agreement, surface_at: SurfaceAt
+) -> tuple[Array, int]:
+    """The smallest shift of the ray that explains what the test picture shows.
+
+    columns, rows : (n,) the pixels. seen : what the test shows there. reach : (n,) pixels. agreement : of these pixels.
+
+    Returns (n,) pixels, nan where no shift within reach explains it, and the number of pixels that were re-traced: all, unless
+    most of a batch stays unexplained. Such a picture has failed, and tracing the rest of it would only take time.
+    """
+    shifts = np.full(len(columns), np.nan)
+    for start in range(0, len(columns), _BATCH):
+        batch = np.arange(start, min(start + _BATCH, len(columns)))
+        pending = batch
+        for ring in _RINGS:
+            radius = reach[pending] * (ring / _RINGS[-1])
+            found = _explained_by(columns[pending], rows[pending], at(seen, pending), radius, agreement.at(pending), surface_at)
+            shifts[pending[found]] = radius[found]
+            pending = pending[~found]
+            if not len(pending):
+                break
+        if len(pending) > len(batch) / 2:
+            return shifts, start + len(batch)
+    return shifts, len(columns)
+
+
+def _explained_by(
+    columns: NDArray, rows: NDArray, seen: Seen, radius: Array, agreement: Agreement, surface_at: SurfaceAt
+) -> NDArray[np.bool_]:
+    """(n,) bool: whether some ray on the ring of this radius sees the same."""
+    angles = (np.arange(_DIRECTIONS) + 0.5) * (2.0 * np.pi / _DIRECTIONS)
+    each = np.repeat(np.arange(len(columns)), _DIRECTIONS)
+    px = 0.5 + np.outer(radius, np.cos(angles)).ravel()
+    py = 0.5 + np.outer(radius, np.sin(angles)).ravel()
+    traced, shown, here = surface_at(columns[each], rows[each], px, py), at(seen, each), agreement.at(each)
+    same_surface, same_place, grazed = (
+        figure.reshape(-1, _DIRECTIONS)
+        for figure in (
+            here.same_surface(traced, shown),
+            here.same_place(traced, shown),
+            tolerances.facing(agreement.pinhole, traced) < _RIM,
+        )
+    )
+    on_silhouette = grazed.any(axis=1) | ~same_place.all(axis=1)
+    return same_surface.any(axis=1) | (same_place.any(axis=1) & on_silhouette)
+
+
+def _within(error: Array, one_rounding: Array, floor: Array | float) -> NDArray[np.bool_]:
+    return error <= tolerances.ROUNDINGS[-1] * one_rounding + floor
+
+
+def at(seen: Seen, chosen: NDArray) -> Seen:
+    """The same passes at some of the pixels, by their indices."""
+    return {name: values[chosen] for name, values in seen.items()}

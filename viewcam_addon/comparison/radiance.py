@@ -1,0 +1,116 @@
+"""Compares the light of two pictures of the same camera.
+
+The reference is the tracer's, the tests usually Cycles' pictures of several seeds. Where no pixel has noise, the two must agree
+within what float32 rounds (noise_free.py). Else all that is tested is whether the difference is more than chance, in each
+pixel, in tiles of 8 and of 32 pixels and in the whole picture, since the sum over a tile tells a bias that no pixel shows. All
+tests together raise a false alarm in one comparison of a hundred at most.
+
+Rejected: a threshold for the mean error or for FLIP. Both shrink with the samples and grow with the scene's contrast, so that
+any threshold is right for one picture; they are told, and judge nothing.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..image import LIGHT_PASSES, Image
+from ..pinhole import Pinhole
+from . import hypothesis_tests, noise_free, perception
+from .light_verdict import FALSE_ALARMS, LightRow, RadianceComparison
+from .sides import Sides, all_sides, quiet, samples_of
+from .tolerances import Array, in_float32
+
+VARIANCE_BATCHES = 16
+"""Of so many means, or of one for each sample, the reference's Variance is estimated at least (tracer/light/sums.py)."""
+
+
+def carries_light(image: Image) -> bool:
+    """Whether a reference is to be compared by its light: Combined alone comes with every picture of Cycles."""
+    return "Combined" in image.passes and any(name in image.passes for name in LIGHT_PASSES if name != "Combined")
+
+
+@np.errstate(all="ignore")
+def compare(reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_samples: int | None = None) -> RadianceComparison:
+    """Compare one reference with one test picture or with several of different seeds.
+
+    pinhole : the camera of the reference, which must have the passes Combined and Depth. test_samples : of each test picture,
+    where that is not what its file tells (Cycles counts a first sample that it leaves out).
+
+    Whatever float32 can hold may stand in the pictures: what is no number is told as broken.
+
+    Raises
+    ------
+    InputError
+        if the sizes differ, a pass is missing, or there is no test picture.
+    """
+    found = list(all_sides(reference, tests))
+    combined, equal = found[0], tuple(sides.name for sides in found[1:] if sides.are_equal)
+    unequal = [sides for sides in found if sides.name not in equal]
+    samples, seeds = (samples_of(reference), test_samples or samples_of(tests[0])), len(tests)
+    is_noisy = not quiet(combined.reference, combined.variance).all()
+    is_noisy |= seeds > 1 and not quiet(combined.test, combined.spread).all()
+    freedom = (max(min(samples[0] or 2, VARIANCE_BATCHES) - 1, 1), max(seeds - 1, 1))
+    rounding = noise_free.Rounding(pinhole, reference, tests[0], max(filter(None, samples), default=1))
+
+    rows, maps = [], {}
+    for sides in unequal:
+        if is_noisy:
+            row, drawn = _noisy(sides, rounding, freedom, FALSE_ALARMS / len(unequal))
+        else:
+            row, drawn = _noise_free(sides, rounding)
+        rows.append(row)
+        if sides.name == "Combined" or not row.ok:
+            maps |= {f"{sides.name}: {name}": in_float32(values) for name, values in drawn.items()}
+    appearance, flip = perception.appearance(combined)
+    if flip is not None:
+        maps["FLIP"] = flip
+    together = (samples[0], samples[1] and samples[1] * seeds)
+    return RadianceComparison(pinhole, together, seeds, is_noisy, tuple(rows), equal, appearance, combined.test, maps)
+
+
+def _noise_free(sides: Sides, rounding: noise_free.Rounding) -> tuple[LightRow, dict[str, Array]]:
+    allowed = rounding.of(sides)
+    row, edges, roundings = noise_free.compare(sides, allowed, rounding.belongs)
+    factor = None if row.ok else _factor(sides, lambda scaled: noise_free.compare(scaled, allowed, rounding.belongs)[0].ok)
+    drawn = {"difference": sides.difference.mean(axis=-1), "roundings": roundings}
+    return LightRow(*_means(sides), 0.0, 0.0, int(sides.broken.sum()), noise_free=row, edges=edges, factor=factor), drawn
+
+
+def _noisy(
+    sides: Sides, rounding: noise_free.Rounding, freedom: tuple[int, int], level: float
+) -> tuple[LightRow, dict[str, Array]]:
+    given = (rounding.of(sides), freedom, level)
+    asked = hypothesis_tests.run(sides, *given)
+    errors = sides.difference - sides.difference.mean(axis=(0, 1))
+    # Channels share their samples, so that each pixel's sum over them is one error; but each channel is asked by itself.
+    ratio_error = _relative(np.sqrt((errors.sum(axis=-1) ** 2).sum()), sides.reference.sum())
+    by_channel = map(_relative, np.sqrt((errors**2).sum(axis=(0, 1))), sides.reference.sum(axis=(0, 1)))
+    visible = asked[-1].limit * min(by_channel)
+    row = LightRow(*_means(sides), ratio_error, visible, int(sides.broken.sum()), asked)
+    if not row.ok:
+        scaled_passes = _factor(sides, lambda scaled: all(q.ok for q in hypothesis_tests.run(scaled, *given)))
+        row = replace(row, factor=scaled_passes)
+    pixels, tiles = asked[0], asked[1]
+    spread = hypothesis_tests.over_pixels(hypothesis_tests.worst_channel(tiles.errors), sides.broken.shape, tiles.size)
+    drawn = {"difference": sides.difference.mean(axis=-1), "tiles": spread}
+    if pixels.errors.any():
+        drawn["standard errors"] = hypothesis_tests.worst_channel(pixels.errors)
+    return row, drawn
+
+
+def _means(sides: Sides) -> tuple[str, float, float]:
+    return sides.name, float(sides.reference.mean()), float(sides.test.mean())
+
+
+def _relative(error: float, light: float) -> float:
+    return float(error / light) if light > 0.0 else float("inf")
+
+
+def _factor(sides: Sides, passes: Callable[[Sides], bool]) -> float | None:
+    """What the test is times the reference, if that explains all of the difference."""
+    _, reference, test = _means(sides)
+    if min(reference, test) <= 0.0 or sides.broken.any():
+        return None
+    factor = test / reference
+    return factor if passes(replace(sides, test=sides.test / factor, spread=sides.spread / factor**2)) else None

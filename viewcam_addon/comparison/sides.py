@@ -1,0 +1,140 @@
+"""What light is compared in: for each quantity the reference, the mean of the test pictures, and the variance of both.
+
+Several test pictures are one picture rendered with several seeds: their mean is the test, and their spread tells its noise. The
+reference brings the variance of its Combined pass along. Of the other passes only the spread is known, and that the reference
+has none where its Combined has none: a sum of light that never changes has no part that does.
+
+Cycles divides Diffuse Direct and Diffuse Indirect by the surface's colour, each a mean over the pixel: a quotient of means,
+which on edges depends on the number of samples. So their products with Diffuse Color are compared, the light itself.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..image import Image
+from .mismatches import largest_around
+from .tolerances import FLOAT32, Array
+
+QUANTITIES = ("Combined", "Alpha", "Emission", "Environment", "Diffuse Direct", "Diffuse Indirect", "Diffuse Color")
+_TIMES_COLOUR = ("Diffuse Direct", "Diffuse Indirect")
+CHANNEL_NAMES = ("red", "green", "blue")
+
+# A standard error below so many roundings of float32 of the value itself is no noise but rounding.
+_QUIET = 16.0
+# Of a number of samples: more than anybody renders, and that Python refuses to read.
+_MOST_DIGITS = 9
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """One quantity on both sides, each (height, width, channels) float64, rows from the bottom.
+
+    spread : variance of `test`, which is a mean, from the test pictures' differences; inf where there is one picture only.
+    variance : variance of `reference`; inf where it is not known. broken : (height, width) bool, no number on one side or both;
+    there both are 0. shared : variance of `reference` that its pixels may have shared with their neighbours, or 0.
+    """
+
+    name: str
+    reference: Array
+    test: Array
+    variance: Array
+    spread: Array
+    broken: NDArray[np.bool_]
+    shared: Array | float = 0.0
+
+    @property
+    def difference(self) -> Array:
+        return self.test - self.reference
+
+    @property
+    def are_equal(self) -> bool:
+        """Whether nothing differs, to the last bit, so that there is nothing to ask."""
+        return bool((self.reference == self.test).all() and not self.broken.any())
+
+
+def samples_of(image: Image) -> int | None:
+    """Samples a pixel, as the file tells: the tracer's own attribute, or the one that Cycles writes for each view layer."""
+    told = [
+        value
+        for name, value in image.attributes.items()
+        if name == "samples" or (name.startswith("cycles.") and name.endswith(".samples"))
+    ]
+    return int(told[0]) if told and told[0].isdecimal() and len(told[0]) <= _MOST_DIGITS else None
+
+
+def all_sides(reference: Image, tests: Sequence[Image]) -> Iterator[Sides]:
+    """Every quantity that all pictures have, Combined first.
+
+    Raises
+    ------
+    InputError
+        if there is no test picture, if their sizes differ, or if one has no Combined.
+    """
+    if not tests:
+        raise InputError("there is nothing to compare with the reference: give at least one test picture")
+    for image in tests:
+        if image.size != reference.size:
+            raise InputError(
+                f"{image.source} has {image.size[0]} × {image.size[1]} pixels and {reference.source} "
+                f"{reference.size[0]} × {reference.size[1]}: compare pictures of the same size"
+            )
+    variance = _variance(reference)
+    # Where there are as many samples as a wanted error takes, neighbours' noise is not independent, but adds up to what it was.
+    shared = np.where(np.isfinite(variance), variance, 0.0) if "Sample Count" in reference.passes else 0.0
+    combined = replace(_sides("Combined", reference, tests, variance), shared=shared)
+    yield combined
+    known = quiet(combined.reference, combined.variance)
+    for name in QUANTITIES[1:]:
+        if all(_has(image, name) for image in (reference, *tests)):
+            sides = _sides(name, reference, tests, np.where(known, 0.0, np.inf))
+            yield replace(sides, shared=shared) if name in _TIMES_COLOUR else sides
+
+
+def quiet(values: Array, variance: Array) -> NDArray[np.bool_]:
+    """(height, width, 1) bool: where neither a pixel nor any around it has noise above float32's rounding.
+
+    The surroundings count because the variance of a pixel is an estimate: where an edge crosses a corner of it, all of its
+    samples may miss the corner.
+    """
+    noise = np.sqrt(variance.max(axis=-1))
+    return ~(largest_around(noise - _QUIET * FLOAT32 * np.abs(values).max(axis=-1)) > 0.0)[..., None]
+
+
+def _variance(reference: Image) -> Array:
+    """Of the reference's Combined: as its pass tells; 0 for one sample without that pass; else unknown."""
+    if "Variance" in reference.passes:
+        variance = reference["Variance"].astype(np.float64)
+        return np.where(np.isnan(variance), np.inf, np.maximum(variance, 0.0))
+    return np.full((*reference["Combined"].shape[:2], 3), 0.0 if samples_of(reference) == 1 else np.inf)
+
+
+def _sides(name: str, reference: Image, tests: Sequence[Image], variance: Array) -> Sides:
+    expected = _values(reference, name)
+    mean, squares = np.zeros_like(expected), np.zeros_like(expected)
+    with np.errstate(invalid="ignore"):
+        for count, image in enumerate(tests, 1):  # Welford's running mean and sum of squares
+            step = _values(image, name) - mean
+            mean = mean + step / count
+            squares += step**2 * (count - 1) / count
+    seeds = len(tests)
+    spread = squares / (seeds * (seeds - 1)) if seeds > 1 else np.full_like(mean, np.inf)
+    broken = ~(np.isfinite(expected).all(axis=-1) & np.isfinite(mean).all(axis=-1))
+    if broken.any():
+        expected, mean, spread = (np.where(broken[..., None], 0.0, array) for array in (expected, mean, spread))
+    return Sides(name, expected, mean, np.broadcast_to(variance, expected.shape), spread, broken)
+
+
+def _has(image: Image, name: str) -> bool:
+    needed = ("Combined",) if name == "Alpha" else (name, "Diffuse Color") if name in _TIMES_COLOUR else (name,)
+    return all(pass_name in image.passes for pass_name in needed)
+
+
+def _values(image: Image, name: str) -> Array:
+    if name == "Alpha":
+        return image["Combined"][..., 3:].astype(np.float64)
+    values = image[name][..., :3].astype(np.float64)
+    return values * image["Diffuse Color"] if name in _TIMES_COLOUR else values

@@ -1,0 +1,73 @@
+"""The figures of one pass: percentiles of its error, and their share of the tolerance.
+
+Each pixel has its own tolerance, so the errors are judged as shares of it: at the percentile p the p-th percentile of
+error / tolerance_p must not exceed 1. Rejected: comparing percentiles of the error with percentiles of the tolerance, since
+errors could then gather where little is allowed.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .tolerances import PERCENTILES, ROUNDINGS
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table.
+
+    name, unit : the pass and the unit of its figures.
+    count : pixels compared.
+    values : the error at each of tolerances.PERCENTILES, in `unit`.
+    tolerances : what is allowed at each of them, at the median pixel, in `unit`.
+    shares : the error at each of them as a share of the tolerance of its own pixel; 1 is the limit.
+    """
+
+    name: str
+    unit: str
+    count: int
+    values: tuple[float, ...]
+    tolerances: tuple[float, ...]
+    shares: tuple[float, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether something was compared and stays within tolerance everywhere."""
+        return self.count > 0 and all(share <= 1.0 for share in self.shares)
+
+    @property
+    def worst(self) -> tuple[float, float]:
+        """(percentile, share) where the largest share of the tolerance is used."""
+        return max(zip(PERCENTILES, self.shares, strict=True), key=lambda pair: pair[1], default=(100.0, 0.0))
+
+    def to_json(self) -> dict:
+        """Plain numbers, percentiles as keys."""
+        figures = {}
+        for p, value, tolerance, share in zip(PERCENTILES, self.values, self.tolerances, self.shares, strict=False):
+            figures[percentile_name(p)] = {"value": value, "tolerance": tolerance, "share_of_tolerance": share}
+        return {"name": self.name, "unit": self.unit, "count": self.count, "ok": self.ok, "percentiles": figures}
+
+
+def measure(name: str, unit: str, errors: Array, one_rounding: Array, floor: Array | float = 0.0) -> Row:
+    """Errors against their tolerances.
+
+    errors : (n,) in `unit`, finite. one_rounding : (n,) in `unit`, what one rounding causes at each pixel.
+    floor : in `unit`, what storage alone may cause at every percentile; (n,) or one number.
+    """
+    if not len(errors):
+        return Row(name, unit, 0, (), (), ())
+    values = np.percentile(errors, PERCENTILES)
+    tolerances = [np.median(k * one_rounding + floor) for k in ROUNDINGS]
+    shares = [
+        np.percentile(errors / np.maximum(k * one_rounding + floor, np.finfo(float).tiny), p)
+        for p, k in zip(PERCENTILES, ROUNDINGS, strict=True)
+    ]
+    return Row(name, unit, len(errors), *(tuple(float(x) for x in figures) for figures in (values, tolerances, shares)))
+
+
+def percentile_name(percentile: float) -> str:
+    """p50, p90, p99, p99.9, max."""
+    return "max" if percentile == 100 else f"p{percentile:g}"

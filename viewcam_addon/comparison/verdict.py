@@ -1,0 +1,242 @@
+"""What a comparison of geometry has found, as figures, as one sentence, and as aligned lines for the shell."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..pinhole import Pinhole
+from .cameras import ConversionError, Systematic
+from .far_from_origin import FarFromOrigin
+from .mismatches import PIXELS_PER_UNEXPLAINED, Mismatches
+from .statistics import Row, percentile_name
+from .tolerances import PERCENTILES, Array
+
+# A sentence with more faults is not read; the table has them all.
+_MOST_FAULTS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """What differs between a reference and a test picture.
+
+    pinhole : the camera of the reference. stated : the camera that was asked for, or None.
+    hits : pixels that hit something in (reference, test).
+    rows : one for each measured pass. mismatches : pixels that see another surface.
+    systematic : what is the same for all pixels, None where nothing was compared.
+    conversion : the camera's own error, None where nobody stated a camera.
+    maps : pass name to (height, width) float32, rows from the bottom: the error of each pixel in the unit of the pass's row,
+    nan
+        where it was not compared.
+    roundings : (n,) float64, the error of each compared position over what one rounding of float32 causes there.
+    far_from_origin : what the distance from the origin costs, None where that is nothing to speak of.
+    origin : the point of the world from which the coordinates of both pictures are counted.
+    """
+
+    pinhole: Pinhole
+    stated: Pinhole | None
+    hits: tuple[int, int]
+    rows: tuple[Row, ...]
+    mismatches: Mismatches
+    systematic: Systematic | None
+    conversion: ConversionError | None
+    maps: dict[str, NDArray[np.float32]]
+    roundings: Array
+    far_from_origin: FarFromOrigin | None = None
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def pixels(self) -> int:
+        return self.pinhole.width * self.pinhole.height
+
+    @property
+    def allowed_unexplained(self) -> int:
+        """How many mismatches may stay unexplained in a picture of this size."""
+        return allowed_unexplained(self.pinhole)
+
+    @property
+    def mismatches_ok(self) -> bool:
+        not_a_number = self.mismatches.counts()["not a number"][0]
+        return not_a_number == 0 and self.mismatches.unexplained_count <= self.allowed_unexplained
+
+    @property
+    def passed(self) -> bool:
+        """Whether the two are the same picture. False, too, where there was nothing to compare."""
+        systematic_ok = self.systematic is not None and self.systematic.ok
+        conversion_ok = self.conversion is None or self.conversion.ok
+        return systematic_ok and conversion_ok and self.mismatches_ok and all(row.ok for row in self.rows)
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in one sentence."""
+        return sentence(self)
+
+    def lines(self) -> list[str]:
+        """The result for the shell: a line for each pass, and the verdict."""
+        return lines(self)
+
+    def to_json(self) -> dict:
+        """Everything but the maps, as plain JSON values."""
+        return {
+            "passed": self.passed,
+            "sentence": self.sentence,
+            "size": [self.pinhole.width, self.pinhole.height],
+            "hits": {"reference": self.hits[0], "test": self.hits[1]},
+            "passes": [row.to_json() for row in self.rows],
+            "mismatches": {
+                **self.mismatches.to_json(),
+                "allowed_unexplained": self.allowed_unexplained,
+                "ok": self.mismatches_ok,
+            },
+            "systematic": self.systematic and self.systematic.to_json(),
+            "conversion": self.conversion and self.conversion.to_json(),
+            "far_from_home": self.far_from_origin and self.far_from_origin.to_json(),
+            "origin": list(self.origin),
+        }
+
+
+def allowed_unexplained(pinhole: Pinhole) -> int:
+    """How many mismatches may stay unexplained in a picture of this size."""
+    return pinhole.width * pinhole.height // PIXELS_PER_UNEXPLAINED
+
+
+def sentence(comparison: Comparison) -> str:
+    """The verdict in one sentence, which names the gravest fault where there is one."""
+    if comparison.passed:
+        return _praise(comparison)
+    if comparison.hits == (0, 0):
+        return "Nothing to compare: no pixel of either picture shows an object, point the camera at something."
+    return "Not the same picture: " + "; ".join(_faults(comparison)[:_MOST_FAULTS]) + "."
+
+
+def lines(comparison: Comparison) -> list[str]:
+    """One line for each pass, aligned, and the verdict last."""
+    head = (
+        f"{'pass':<16}{'pixels':>11}"
+        + "".join(f"{percentile_name(p):>10}" for p in PERCENTILES)
+        + f"  {'unit':<10}{'of tolerance':<16}"
+    )
+    table = [head.rstrip(), *(_row_line(row) for row in comparison.rows)]
+    mismatches = comparison.mismatches
+    table.append(
+        f"{'Mismatches':<16}{len(mismatches.kinds):>11,}  {_explained(comparison)}; "
+        f"unexplained {mismatches.unexplained_count} of "
+        f"{comparison.allowed_unexplained} allowed  {mark(comparison.mismatches_ok)}"
+    )
+    table += [
+        f"  {kind:<14}{count:>11,}  {explained:,} explained"
+        for kind, (count, explained) in mismatches.counts().items()
+        if count
+    ]
+    if comparison.systematic:
+        s = comparison.systematic
+        table.append(
+            f"{'Systematic':<16}{'':>11}  shift {s.shift_x:+.1e}, {s.shift_y:+.1e} px; zoom {s.zoom_x:+.1e}, {s.zoom_y:+.1e}; "
+            f"roll {s.roll:+.1e} rad; mean {s.mean:.1e} of {s.tolerance:.1e} px  {mark(s.ok)}"
+        )
+    if comparison.conversion:
+        c = comparison.conversion
+        table.append(
+            f"{'Conversion':<16}{'':>11}  stated camera against the one read back: {c.largest:.1e} px, {c.share:.0%} of what "
+            f"float32 storage allows  {mark(c.ok)}"
+        )
+    if comparison.far_from_origin:
+        table.append(comparison.far_from_origin.sentence)
+    return [*table, comparison.sentence]
+
+
+def _row_line(row: Row) -> str:
+    if not row.count:
+        return f"{row.name:<16}{0:>11}  nothing was compared  {mark(False)}"
+    figures = "".join(f"{value:>10.1e}" for value in row.values)
+    percentile, share = row.worst
+    used = f"{percent(share):>7} at {percentile_name(percentile):<6}"
+    return f"{row.name:<16}{row.count:>11,}{figures}  {row.unit:<10}{used}{mark(row.ok)}"
+
+
+def _praise(comparison: Comparison) -> str:
+    position = comparison.rows[0]
+    count = len(comparison.mismatches.kinds)
+    edges = f"; {count:,} on edges, {_explained(comparison)}" if count else ""
+    median, nearly_all = (position.values[PERCENTILES.index(p)] for p in (50.0, 99.9))
+    return (
+        f"The same picture: over {position.count:,} pixels the median is {median:.1e} px off and 99.9 % are within "
+        f"{nearly_all:.1e} px; every one stays within {percent(position.worst[1])} of what float32 allows there{edges}."
+    )
+
+
+def _faults(comparison: Comparison) -> list[str]:
+    """What is wrong, the gravest first."""
+    faults = []
+    position = comparison.rows[0]
+    if position.count and not (position.ok and comparison.systematic.ok):
+        i = PERCENTILES.index(position.worst[0])
+        faults.append(
+            f"positions are {position.values[i]:.2g} px off at {percentile_name(PERCENTILES[i])}, "
+            f"{_share(position.shares[i])} their tolerance, and {_cause(comparison)}"
+        )
+    mismatches = comparison.mismatches
+    if not comparison.mismatches_ok:
+        kinds = ", ".join(
+            f"{count - explained:,} of {kind}" for kind, (count, explained) in mismatches.counts().items() if count > explained
+        )
+        faults.append(f"{mismatches.unexplained_count:,} pixels see another surface ({kinds}), {_why_unexplained(comparison)}")
+    for row in comparison.rows[1:]:
+        if row.count and not row.ok:
+            percentile, share = row.worst
+            value = row.values[PERCENTILES.index(percentile)]
+            faults.append(
+                f"{row.name} is {value:.2g} {row.unit} off at {percentile_name(percentile)}, {_share(share)} its tolerance"
+            )
+    if not position.count:
+        faults.append("no pixel shows the same object in both")
+    if comparison.conversion and not comparison.conversion.ok:
+        c = comparison.conversion
+        faults.append(f"the camera in Blender is {c.largest:.2g} px from the stated one ({c.tolerance:.1e} px allowed)")
+    return faults
+
+
+def _cause(comparison: Comparison) -> str:
+    """What the systematic part looks like: the largest of shift, zoom and roll, in pixels at the picture's border."""
+    s = comparison.systematic
+    radius = max(comparison.pinhole.width, comparison.pinhole.height) / 2
+    if s.zoom_x < -1:
+        return "the picture looks mirrored left to right"
+    if s.zoom_y < -1:
+        return "the picture looks upside down"
+    zoom = max(s.zoom_x, s.zoom_y, key=abs)
+    effects = {
+        f"the picture is shifted by ({s.shift_x:+.3g}, {s.shift_y:+.3g}) px": np.hypot(s.shift_x, s.shift_y),
+        f"the picture is magnified by {1 + s.zoom_x:.8g} × {1 + s.zoom_y:.8g}": abs(zoom) * radius,
+        f"the picture is rolled by {s.roll:+.3g} rad": abs(s.roll) * radius,
+    }
+    cause, effect = max(effects.items(), key=lambda pair: pair[1])
+    return cause if effect > s.tolerance else "the error has no common direction"
+
+
+def _explained(comparison: Comparison) -> str:
+    mismatches = comparison.mismatches
+    explained = int(mismatches.explained.sum())
+    if not explained:
+        return "none explained" if len(mismatches.kinds) else "none"
+    return f"{explained:,} explained by a shift of at most {np.max(mismatches.shifts[mismatches.explained]):.1e} px"
+
+
+def _why_unexplained(comparison: Comparison) -> str:
+    if not comparison.mismatches.retraced:
+        return "which may be edges: give the scene too, so that they can be re-traced"
+    return "and no shift within tolerance explains it"
+
+
+def percent(share: float) -> str:
+    """87%; 12 times."""
+    return f"{share:.0%}" if share < 10 else f"{share:.3g} times"
+
+
+def _share(share: float) -> str:
+    return f"{percent(share)} of" if share < 10 else percent(share)
+
+
+def mark(ok: bool) -> str:
+    """The last word of a line."""
+    return "ok" if ok else "FAILED"
