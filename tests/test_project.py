@@ -30,6 +30,7 @@ ROOMS = {
     "words": "",
     "paper": "",
     "children": "",
+    "crashes": "",
     "exact": "",
     "pinhole": "errors checks exact",
     "roll": "errors pinhole",

@@ -10,6 +10,8 @@ import signal
 import sys
 from typing import NoReturn
 
+from .crashes import survived
+
 
 def main_and_exit() -> NoReturn:
     """Run the command and end this process with its exit status.
@@ -20,13 +22,14 @@ def main_and_exit() -> NoReturn:
     answer = signal.getsignal(signal.SIGINT)
     if answer is signal.default_int_handler:  # a shell lets those that it starts in the background ignore it
         signal.signal(signal.SIGINT, signal.SIG_DFL)
+    number = survived(sys.argv[1:])
     from .cli import main
     from .terminal import open_closed_streams, share_one_heap
 
     signal.signal(signal.SIGINT, answer)
     open_closed_streams()
     share_one_heap()
-    status = main()
+    status = main(ended_by=number)
     with contextlib.suppress(OSError):  # whoever reads our lines may have gone
         sys.stdout.flush()
         sys.stderr.flush()

@@ -77,6 +77,8 @@ def add(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     )
 
     machines = added.add_argument_group("more than one process")
+    limit = "seconds that a shot may take; then its Blender is ended, and the shot has failed"
+    machines.add_argument("--time-limit", type=words.above_zero, metavar="SECONDS", help=limit)
     machines.add_argument("--workers", type=words.positive, metavar="N", help="render in N processes of this machine")
     where = "render on a Dask cluster, as tcp://host:8786 (without an address: on one of this machine)"
     machines.add_argument("--scheduler", metavar="ADDRESS", nargs="?", const="", type=_address, help=where)

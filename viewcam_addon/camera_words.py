@@ -16,7 +16,7 @@ def add(added: argparse.ArgumentParser) -> None:
     added.add_argument("--out", metavar="FILE", type=Path, help="where to; a folder for some formats (default: printed)")
     taken(added)
     added.add_argument("--out-axes", choices=[*cameras.AXES], default="as_is", help="the axes of what is written")
-    added.add_argument("--out-scale", type=words.error, metavar="S", default=1.0, help="1 unit written is S units here")
+    added.add_argument("--out-scale", type=words.above_zero, metavar="S", default=1.0, help="1 unit written is S units here")
 
 
 def taken(added: argparse._ActionsContainer, size: bool = True) -> None:
@@ -24,10 +24,14 @@ def taken(added: argparse._ActionsContainer, size: bool = True) -> None:
     if size:
         added.add_argument("--size", type=words.size, metavar="WxH", help="pixels, where the file does not say")
     added.add_argument("--axes", choices=[*cameras.AXES], default="as_is", help="y_up: y points up in the file and z here")
-    added.add_argument("--scale", type=words.error, metavar="S", default=1.0, help="1 unit of the file is S units here")
-    added.add_argument("--distance", type=words.error, metavar="D", help="view-plane distance in pixels, for poses alone")
+    added.add_argument("--scale", type=words.above_zero, metavar="S", default=1.0, help="1 unit of the file is S units here")
+    added.add_argument("--distance", type=words.above_zero, metavar="D", help="view-plane distance in pixels, for poses alone")
     added.add_argument(
-        "--pixel-aspect", type=words.error, metavar="A", default=1.0, help="a pixel's width over its height, where not said"
+        "--pixel-aspect",
+        type=words.above_zero,
+        metavar="A",
+        default=1.0,
+        help="a pixel's width over its height if not said",
     )
     added.add_argument("--angles", choices=[*cameras.ANGLES], help="the unit of angles that have none")
     added.add_argument("--pixel", choices=[*cameras.PIXELS], help="where (0, 0) is, in place of the format's habit")

@@ -9,6 +9,7 @@ Here are the words; what they do is in commands/.
 import argparse
 import json
 import shlex
+import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -22,10 +23,11 @@ from .files import check_writable, is_printed_to, written_whole
 from .tracer.scene.film import SAMPLES
 
 
-def main(arguments: Sequence[str] | None = None, blend_is_open: bool = False) -> int:
+def main(arguments: Sequence[str] | None = None, blend_is_open: bool = False, ended_by: int | None = None) -> int:
     """Run one sub-command and return its exit status.
 
     arguments : those of the shell by default. blend_is_open : inside Blender, where FILE.blend is the file that is open.
+    ended_by : the signal that has ended the process that ran it (crashes.py): then it is only told.
     """
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     try:
@@ -38,13 +40,21 @@ def main(arguments: Sequence[str] | None = None, blend_is_open: bool = False) ->
     options.words = shlex.join(arguments)
     started = time.monotonic()
     with events.opened(options.log_json) as options.events:
-        options.events.tell("started", command=options.command, words=options.words)
-        status, result = _outcome(options)
+        if ended_by is None:
+            options.events.tell("started", command=options.command, words=options.words)
+            status, result = _outcome(options)
+        else:
+            status, result = _told(options, InputError.exit_status, _crash(options, ended_by))
         if options.json and result:
             status = _write_json(options, {"exit_status": status, **result}) or status
         seconds = round(time.monotonic() - started, 3)
         options.events.tell("finished", command=options.command, exit_status=status, seconds=seconds)
     return status
+
+
+def _crash(options: argparse.Namespace, number: int) -> str:
+    name = signal.Signals(number).name if number in set(signal.Signals) else number
+    return f"Blender has ended with {name} at {options.blend}: see that the file is whole, and that there is memory enough"
 
 
 class _UsageError(InputError):
@@ -126,7 +136,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
 
     def error(added: argparse._ActionsContainer, text: str) -> None:
         text = f"for light: {text} as many samples of each pixel as it takes for a standard error of E, in the picture's units"
-        added.add_argument("--error", type=words.error, metavar="E", help=text)
+        added.add_argument("--error", type=words.above_zero, metavar="E", help=text)
 
     def report(added: argparse.ArgumentParser) -> None:
         added.add_argument("--report", metavar="DIR", type=Path, help="write an HTML report there")

@@ -11,14 +11,14 @@ def positive(text: str) -> int:
     return int(text)
 
 
-def error(text: str) -> float:
+def above_zero(text: str) -> float:
     try:
-        error = float(text)
+        number = float(text)
     except ValueError:
-        error = math.nan
-    if not 0 < error < math.inf:
+        number = math.nan
+    if not 0 < number < math.inf:
         raise argparse.ArgumentTypeError(f"{text!r} is no number above 0")
-    return error
+    return number
 
 
 def seed(text: str) -> int:

@@ -3,10 +3,12 @@
 import os
 import signal
 import stat
+import threading
+import time
 
 import pytest
 
-from viewcam_addon.batch import one, served
+from viewcam_addon.batch import one, partner, served
 from viewcam_addon.batch.folder import Folder
 from viewcam_addon.batch.served import ServedRenderer
 from viewcam_addon.errors import FullDiskError, InputError
@@ -118,7 +120,10 @@ def test_a_program_that_does_not_serve_is_one_sentence(monkeypatch, blend, tmp_p
     program.write_text("#!/bin/sh\necho unknown command viewcam\nexit 1\n")
     program.chmod(program.stat().st_mode | stat.S_IXUSR)
     monkeypatch.setenv("VIEWCAM_BLENDER", str(program))
-    with ServedRenderer(blend) as renderer, pytest.raises(InputError, match=r"other did not open the file: .* extension"):
+    with (
+        ServedRenderer(blend) as renderer,
+        pytest.raises(InputError, match=r"other has ended with status 1 as it opened .* extension"),
+    ):
         renderer.open()
 
 
@@ -127,3 +132,39 @@ def test_where_there_is_no_blender_at_all_a_sentence_says_how_to_have_one(monkey
     monkeypatch.setattr(served.importlib.util, "find_spec", lambda name: None)
     with ServedRenderer(blend) as renderer, pytest.raises(InputError, match="name one in VIEWCAM_BLENDER, or pip install bpy"):
         renderer.open()
+
+
+def test_a_blender_that_is_stopped_in_a_shot_is_ended_and_the_shot_rendered_by_another(stand_in, blend, tmp_path, monkeypatch):
+    monkeypatch.setattr(partner, "SILENCE", 3.0)
+    stopping = threading.Thread(target=lambda: os.kill(int(waits(stand_in)), signal.SIGSTOP))
+    stopping.start()
+    with ServedRenderer(blend) as renderer:
+        renderer.render(shot("slow_one"), tmp_path / "a.exr", tmp_path / "a.png")
+    stopping.join()
+    assert (tmp_path / "a.exr").stat().st_size == 32 and len(stand_in.diary("open")) == 2
+
+
+def waits(stand_in):
+    """The process that waits in a slow shot."""
+    while not (found := stand_in.diary("waits")):
+        time.sleep(0.02)
+    return found[0][-1]
+
+
+def test_a_shot_that_takes_long_is_left_alone_while_its_blender_gives_signs_of_life(stand_in, blend, tmp_path, monkeypatch):
+    monkeypatch.setattr(partner, "SILENCE", 5.0)
+    stopping = threading.Thread(target=lambda: (waits(stand_in), time.sleep(8), os.kill(int(waits(stand_in)), signal.SIGKILL)))
+    stopping.start()
+    with ServedRenderer(blend) as renderer:
+        renderer.render(shot("slow_one"), tmp_path / "a.exr", tmp_path / "a.png")
+    stopping.join()
+    assert [words[1] for words in stand_in.diary("render")] == ["slow_one", "slow_one"], "it was ended before it was killed"
+
+
+def test_a_shot_beyond_its_time_limit_fails_in_a_sentence_and_the_next_one_is_rendered(stand_in, blend, tmp_path, processes):
+    with ServedRenderer(blend, time_limit=2.0) as renderer:
+        with pytest.raises(InputError, match=r"^the shot took longer than the time limit of 2 s, .* give --time-limit more"):
+            renderer.render(shot("slow_one"), tmp_path / "a.exr", tmp_path / "a.png")
+        assert not processes.run(stand_in.diary("waits")[0][-1])
+        assert renderer.render(shot("b"), tmp_path / "b.exr", tmp_path / "b.png")
+    assert len(stand_in.diary("render")) == 2, "it is not tried again"

@@ -110,6 +110,7 @@ class Cluster:
         threads: int | None = None,
         check: bool = False,
         trust: bool = False,
+        time_limit: float | None = None,
     ) -> Work:
         """The work of the workers on one file; the same bytes as one.in_turn's but for `timing`.
 
@@ -123,6 +124,7 @@ class Cluster:
             "seed": seed,
             "threads": threads or self._threads,
             "trust": trust,
+            "time_limit": time_limit,
             "made_from": dict(made_from),
         }
 

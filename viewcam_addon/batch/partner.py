@@ -2,17 +2,21 @@
 
 Both ends of the connection exist before the process does, which inherits its own. So nothing has to be found, nobody else can
 call, and each side sees the end of the connection as soon as the other is gone, however it went: a process whose asker was
-killed ends by itself. Requests and answers are JSON. Rejected: standard input and output, into which Blender and libraries
-print; a socket with a name and a key, which waits for ever for a process that dies before it calls; pickle, which runs what it
-is sent.
+killed ends by itself. Requests and answers are JSON; while an answer is being found, an
+empty message each second is a sign of life, which a process that is stopped or stuck does not give. Rejected: standard input
+and output, into which Blender and libraries print; a socket with a name and a key, which waits for ever for a process that dies
+before it calls; pickle, which runs what it is sent.
 """
 
+import contextlib
 import json
+import math
 import os
 import queue
 import sys
 import threading
-from collections.abc import Callable, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from multiprocessing import connection
 from pathlib import Path
 from typing import Any
@@ -23,6 +27,15 @@ from ..errors import FullDiskError, InputError, NotModelledError, bug
 _PATIENCE = 10.0
 """Seconds for a partner to end by itself."""
 
+_BEAT = 1.0
+"""Seconds between two signs of life of a process that is finding an answer."""
+
+SILENCE = 60.0
+"""Seconds without one after which a process is given up: Blender lets other threads run in all that takes long."""
+
+STARTED_WITHIN = 300.0
+"""The same for the first sign of life of a new process, which a busy machine may be long in starting."""
+
 _GRACE = 1.0
 """Seconds for an answer to be finished that nobody waits for any more."""
 
@@ -31,7 +44,15 @@ _KINDS = {kind.__name__: kind for kind in (InputError, FullDiskError, NotModelle
 
 
 class Gone(InputError):
-    """The process has ended before it answered."""
+    """The process has ended before it answered. what : the sentence without what to do."""
+
+    def __init__(self, what: str, remedy: str = "") -> None:
+        super().__init__(what + (f": {remedy}" if remedy else ""))
+        self.what = what
+
+
+class TooLong(InputError):
+    """The answer was not there in time. Ask no more then."""
 
 
 class Partner:
@@ -47,7 +68,7 @@ class Partner:
     """
 
     def __init__(self, name: str, command: Sequence[str], variables: Mapping[str, str], log: Path = Path(os.devnull)) -> None:
-        self._name = name
+        self._name, self._patience = name, STARTED_WITHIN
         self._ours, theirs = connection.Pipe()
         try:
             self._family = Family([*command, str(theirs.fileno())], log, variables, theirs.fileno())
@@ -64,8 +85,8 @@ class Partner:
         except OSError:
             return False
 
-    def ask(self, request: Mapping[str, Any]) -> Any:
-        """What the process answers.
+    def ask(self, request: Mapping[str, Any], ends: float = math.inf) -> Any:
+        """What the process answers. ends : when the answer must be there, by time.monotonic().
 
         Raises
         ------
@@ -74,13 +95,17 @@ class Partner:
         OSError
             as the system refused it something.
         Gone
-            if it ended first. Ask no more then.
+            if it ended first, or gave no sign of life for a minute. Ask no more then.
+        TooLong
+            if it did not answer in time. It is ended then.
         """
         try:
             self._ours.send_bytes(json.dumps(request).encode())
-            answer = json.loads(self._ours.recv_bytes())
+            while not (message := self._next(ends)):
+                continue
+            answer = json.loads(message)
         except (EOFError, OSError) as error:
-            raise Gone(f"{self._name} has ended {self._how()}: see whether there is memory enough, then try again") from error
+            raise Gone(f"{self._name} has ended {self._how()}", "see whether there is memory enough, then try again") from error
         if "errno" in answer:
             raise OSError(answer["errno"], answer["error"])
         if "error" in answer:
@@ -98,6 +123,16 @@ class Partner:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def _next(self, ends: float) -> bytes:
+        """The next message."""
+        if self._ours.poll(max(0.0, min(self._patience, ends - time.monotonic()))):
+            self._patience = SILENCE
+            return self._ours.recv_bytes()
+        self._family.end()
+        if time.monotonic() >= ends:
+            raise TooLong(f"{self._name} was ended before it had answered")
+        raise Gone(f"{self._name} gave no sign of life for {self._patience:g} s, and was ended", "see whether it was stopped")
 
     def _how(self) -> str:
         self._family.wait(_PATIENCE)
@@ -119,7 +154,9 @@ def answer(handle: str, answers: Callable[[dict[str, Any]], Any], idle: float | 
     threading.Thread(target=_listen, args=(asked, requests, left), daemon=True).start()
     try:
         while (request := requests.get(timeout=idle)) is not None:
-            asked.send_bytes(json.dumps(_reply(request, answers)).encode())
+            with _beating(asked):
+                reply = json.dumps(_reply(request, answers)).encode()
+            asked.send_bytes(reply)
     except (queue.Empty, OSError):  # nobody asks any more, nobody hears it any more
         return
     finally:
@@ -142,6 +179,25 @@ def _listen(asked: "connection.Connection", requests: queue.SimpleQueue, left: t
         requests.put(None)
     if not left.wait(_GRACE):
         os._exit(1)  # whoever wanted this answer is gone
+
+
+@contextlib.contextmanager
+def _beating(asked: "connection.Connection") -> Iterator[None]:
+    """Give signs of life meanwhile."""
+    done = threading.Event()
+
+    def beat() -> None:
+        with contextlib.suppress(OSError):  # the thread that listens hears it, too
+            while not done.wait(_BEAT):
+                asked.send_bytes(b"")
+
+    beats = threading.Thread(target=beat, daemon=True)
+    beats.start()
+    try:
+        yield
+    finally:
+        done.set()
+        beats.join()
 
 
 def _reply(request: dict[str, Any], answers: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:

@@ -6,8 +6,10 @@ crashes is started again, and what it was doing is done again, a few times.
 
 import dataclasses
 import importlib.util
+import math
 import os
 import platform
+import time
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -16,7 +18,7 @@ from .. import children
 from ..errors import InputError
 from ..pinhole import Pinhole
 from ..shots import Shot
-from .partner import Gone, Partner
+from .partner import Gone, Partner, TooLong
 
 BLENDER = "VIEWCAM_BLENDER"
 """The variable that names the Blender."""
@@ -29,15 +31,24 @@ class ServedRenderer:
     """A scene held open by a Blender in another process, which is started when it is first needed. See BlenderRenderer.
 
     blend : the file. seed, threads, trust : as the command line has them. program : that of this process, which is no Blender.
+    time_limit : seconds that a shot may take, rendered and checked, once the file is open.
 
     Every method raises InputError, also if that Blender can't be started or ends again and again, and OSError where it could
     not write.
     """
 
-    def __init__(self, blend: Path, seed: int | None = None, threads: int | None = None, trust: bool = False) -> None:
+    def __init__(
+        self,
+        blend: Path,
+        seed: int | None = None,
+        threads: int | None = None,
+        trust: bool = False,
+        time_limit: float | None = None,
+    ) -> None:
         self.blend, self.program = blend, None
         self._opening = {"open": {"blend": str(blend), "seed": seed, "threads": threads, "trust": trust}}
         self._partner: Partner | None = None
+        self._limit, self._ends = time_limit, math.inf
         self._rendering: dict[str, Any] = {}
 
     def open(self) -> None:
@@ -101,7 +112,14 @@ class ServedRenderer:
             requests = requests[-1:]
         answer = None
         for request in requests:
-            answer = self._partner.ask(request)
+            if "render" in request:
+                self._ends = time.monotonic() + self._limit if self._limit else math.inf
+            try:
+                answer = self._partner.ask(request, self._ends if request.keys() & {"render", "check"} else math.inf)
+            except TooLong as late:
+                self.close()
+                limit = f"the shot took longer than the time limit of {self._limit:g} s, and its Blender was ended"
+                raise InputError(f"{limit}: give --time-limit more, or the shot fewer samples") from late
         return answer
 
     def _start(self) -> None:
@@ -111,8 +129,8 @@ class ServedRenderer:
             self._partner.ask(self._opening)
         except Gone as gone:
             raise Gone(
-                f"{name} did not open the file: see that it is Blender 4.2 or newer with the extension Virtual Pinhole, "
-                "and that there is memory enough"
+                f"{gone.what} as it opened {self.blend}: see that the file is whole, that this is Blender 4.2 or newer with "
+                "the extension Virtual Pinhole, and that there is memory enough"
             ) from gone
         except InputError:
             self.close()

@@ -29,7 +29,7 @@ class _Blender:
         if self._renderer is None or scene != self._scene:
             self.close()
             _forget_dasks_variables()
-            renderer = ServedRenderer(Path(scene["blend"]), scene["seed"], scene["threads"], scene["trust"])
+            renderer = ServedRenderer(Path(scene["blend"]), *(scene[key] for key in ("seed", "threads", "trust", "time_limit")))
             try:
                 renderer.open()
                 _refuse_other(renderer.made_from(), scene["made_from"])
@@ -52,7 +52,7 @@ _one_at_a_time = threading.Lock()  # a worker may have several threads
 def render(scene: dict[str, Any], folder: str, shot: dict[str, Any], settings: str, check: bool) -> dict[str, str]:
     """Render a shot into the folder.
 
-    scene : `blend`, `seed`, `threads`, `trust` and `made_from`, what the batch says the file is made from.
+    scene : `blend`, `seed`, `threads`, `trust`, `time_limit` and `made_from`, what the batch says the file is made from.
 
     Returns nothing if the shot is there, {"failed": sentence} or {"full": sentence} if it is not, and {"unfit": sentence} if
     no shot of this batch can be rendered here.

@@ -55,7 +55,7 @@ def run(options: argparse.Namespace) -> Result:
             machines = stack.enter_context(cluster.opened(options.scheduler or None, options.workers, program))
         folder = Folder(options.out, options.shard.strip().replace("/", "-of-") if options.shard else "")
         if _on_cluster(options):
-            about = (job.made_from, options.seed, options.threads, options.check, options.trust)
+            about = (job.made_from, options.seed, options.threads, options.check, options.trust, options.time_limit)
             work = machines.work(blend, folder, job.settings, *about)
         else:
             work = one.in_turn(folder, renderer, job.settings, options.check)
@@ -90,12 +90,16 @@ def _on_cluster(options: argparse.Namespace) -> bool:
 
 
 def _renderer(options: argparse.Namespace) -> contextlib.AbstractContextManager:
-    """Blender with the file open, in this process; but where VIEWCAM_BLENDER names one, or workers will, in one of its own.
+    """Blender with the file open, in this process; but where VIEWCAM_BLENDER names one, workers will, or time is limited, in one
+    of its own.
 
     The bpy module puts folders on sys.path in which a worker's children, who get that path, would find half a bpy.
     """
-    if options.blend is not None and (os.environ.get(served.BLENDER) or _on_cluster(options)):
-        return served.ServedRenderer(options.blend, options.seed, options.threads, options.trust)
+    apart = os.environ.get(served.BLENDER) or _on_cluster(options) or options.time_limit
+    if options.blend is not None and apart:
+        return served.ServedRenderer(options.blend, options.seed, options.threads, options.trust, options.time_limit)
+    if options.time_limit and not _on_cluster(options):
+        raise InputError("--time-limit ends the Blender of a shot, and here that is this one: give --workers 1 as well")
     return blender_room("batch.renderer").BlenderRenderer(options.blend, options.seed, options.threads, options.trust)
 
 

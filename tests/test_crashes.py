@@ -1,0 +1,96 @@
+"""A Blender that crashes is a sentence and a status, for every command of the shell that starts one."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from viewcam_addon import children, crashes
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="Windows tells of a crash itself")
+
+
+@pytest.fixture
+def run(tmp_path):
+    """A function: what Blender does as it is loaded, words of viewcam → the process."""
+    (tmp_path / "file.blend").write_bytes(b"BLENDER-v402")
+
+    def start(does, *words):
+        (tmp_path / "bpy.py").write_text(does)
+        variables = children.environment()
+        variables["PYTHONPATH"] = os.pathsep.join([str(tmp_path), variables["PYTHONPATH"]])
+        variables.pop("VIEWCAM_BLENDER", None)
+        how = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "cwd": tmp_path, "env": variables}
+        return subprocess.Popen(children.viewcam(*words), start_new_session=True, **how)
+
+    return start
+
+
+CRASH = "import os, signal\nos.kill(os.getpid(), signal.SIGSEGV)"
+WORDS = {
+    "export": ["file.blend", "scene.json"],
+    "cycles": ["file.blend", "out.exr"],
+    "check": ["file.blend"],
+    "demo": [],
+    "batch": ["file.blend", "--orbit", "2", "--out", "out", "--workers", "1"],
+}
+
+
+def test_every_command_that_opens_a_blend_is_looked_after():
+    assert set(crashes.COMMANDS) | {"batch"} == set(WORDS)
+
+
+@pytest.mark.parametrize("command", list(WORDS))
+def test_a_blender_that_crashes_is_one_sentence_and_status_2(run, command):
+    child = run(CRASH, command, *WORDS[command])
+    _, errors = child.communicate()
+    assert child.returncode == 2, errors
+    (sentence,) = errors.splitlines()
+    assert sentence.startswith(f"viewcam {command}: ") and "see that the file is whole" in sentence
+    assert "SIGSEGV" in sentence or "signal 11" in sentence
+    assert ("studio" if command == "demo" else "file.blend") in sentence
+
+
+def test_the_crash_is_in_the_json_and_among_the_events_too(run, tmp_path):
+    child = run(CRASH, "check", "file.blend", "--json", "result.json", "--log-json")
+    events = [json.loads(line)["event"] for line in child.communicate()[0].splitlines()]
+    assert events == ["started", "error", "finished"]
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert result["exit_status"] == 2 and "SIGSEGV" in result["error"]
+
+
+def test_a_status_of_its_own_is_passed_on(run):
+    child = run("raise ImportError('no bpy for this Python')", "export", "file.blend", "scene.json")
+    assert child.communicate()[1].count("viewcam export: ") == 1 and child.returncode == 2
+
+
+WAIT = "import os, time\nopen('waits', 'w').write(str(os.getpid()))\nos.replace('waits', 'waiting')\ntime.sleep(600)"
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_whoever_ends_the_command_ends_blender(run, tmp_path, number):
+    if number == signal.SIGKILL and sys.platform != "linux":
+        pytest.skip("only Linux tells a process that its parent was killed")
+    child = run(WAIT, "check", "file.blend")
+    while not (tmp_path / "waiting").exists():
+        time.sleep(0.02)
+    blender = int((tmp_path / "waiting").read_text())
+    assert blender != child.pid
+    child.send_signal(number)
+    child.communicate()
+    assert child.returncode == -number
+    while Path(f"/proc/{blender}").exists() and Path(f"/proc/{blender}/stat").read_text().rpartition(")")[2].split()[0] != "Z":
+        time.sleep(0.02)
+
+
+def test_ctrl_c_ends_both_with_its_own_status(run, tmp_path):
+    child = run(WAIT, "check", "file.blend")
+    while not (tmp_path / "waiting").exists():
+        time.sleep(0.02)
+    os.killpg(child.pid, signal.SIGINT)
+    assert child.communicate()[1] == "" and child.returncode == 130
