@@ -90,8 +90,8 @@ def _on_cluster(options: argparse.Namespace) -> bool:
 
 
 def _renderer(options: argparse.Namespace) -> contextlib.AbstractContextManager:
-    """Blender with the file open, in this process; but where VIEWCAM_BLENDER names one, workers will, or time is limited, in one
-    of its own.
+    """Blender with the file open, in this process; but in one of its own where VIEWCAM_BLENDER names one, workers will, or time
+    is limited.
 
     The bpy module puts folders on sys.path in which a worker's children, who get that path, would find half a bpy.
     """

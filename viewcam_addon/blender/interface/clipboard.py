@@ -15,7 +15,6 @@ from bpy.app.translations import pgettext_tip as tip
 
 from ... import cameras as formats
 from ...cameras import own
-from ...cameras.camera import plane_of
 from ...errors import InputError
 from ...intrinsics import Frame
 from ...pinhole import Pinhole
@@ -135,9 +134,8 @@ def paste(
         as `apply` does. Nothing has changed then.
     """
     frame = datablocks.frame_of(scene)
-    if found.pinhole.distance == (before := _at_full_size(present, frame)).distance and plane_of(found.pinhole) == plane_of(
-        before
-    ):
+    before = _at_full_size(present, frame)
+    if found.pinhole.distance == before.distance and found.pinhole.plane == before.plane:
         pinhole, notes = dataclasses.replace(present, **_pose(found.pinhole), mirrored=found.pinhole.mirrored), ()
         return [*found.notes, *notes, *cameras.apply(camera_object, pinhole, scene)]
     if not set_size:
@@ -214,7 +212,7 @@ def _said(pinhole: Pinhole, before: Pinhole) -> str:
     """What differs now."""
     names = [name for key, name in _NAMES.items() if getattr(pinhole, key) != getattr(before, key)]
     names += ["distance"] if pinhole.distance != before.distance else []
-    names += ["shift"] if plane_of(pinhole).principal_point != (pinhole.width / 2, pinhole.height / 2) else []
+    names += ["shift"] if pinhole.plane.principal_point != (pinhole.width / 2, pinhole.height / 2) else []
     names += ["mirror"] if pinhole.mirrored != before.mirrored else []
     return ", ".join(names) or "the same camera"
 
