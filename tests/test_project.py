@@ -246,6 +246,55 @@ def test_imports_inside_the_package_are_relative():
     assert not absolute, f"absolute imports of the package: {absolute}"
 
 
+def names_of(tree: ast.Module) -> set[str]:
+    """What a module defines or imports at its top level, in `if` and `try` as well."""
+    found, waiting = set(), list(tree.body)
+    for node in waiting:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            found.add(node.name)
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            found |= {(each.asname or each.name).split(".")[0] for each in node.names}
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            found |= {each.id for target in targets for each in ast.walk(target) if isinstance(each, ast.Name)}
+        else:
+            waiting += [each for each in ast.iter_child_nodes(node) if isinstance(each, ast.stmt)]
+    return found
+
+
+def missing_names(trees: dict[Path, ast.Module]) -> list[str]:
+    """What files import from others of the package that those do not have."""
+    defined, missing = {path: names_of(tree) for path, tree in trees.items()}, []
+    inside = {}
+    for path in trees:
+        inside.setdefault(path.parent, set()).add(path.stem)
+        inside.setdefault(path.parent.parent, set()).add(path.parent.name)
+    for path, tree in trees.items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom) and node.level:
+                home = path.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+                file = home / "__init__.py" if home / "__init__.py" in trees else home.with_suffix(".py")
+                there = defined.get(file, set()) | inside.get(home, set())
+                missing += [f"{path}: {each.name} from {home}" for each in node.names if each.name not in there]
+    return missing
+
+
+def test_what_is_imported_from_a_module_of_the_package_is_there():
+    """Of modules that need Blender, or something else that is not installed, and in functions, too."""
+    trees = {path.relative_to(ROOT): ast.parse(path.read_text(encoding="utf-8")) for path in sources()}
+    assert not (missing := missing_names(trees)), missing
+
+
+def test_an_import_of_what_is_not_there_is_seen():
+    trees = {
+        Path("a/b.py"): ast.parse("def f(): ...\nx = 1"),
+        Path("a/c.py"): ast.parse("from .b import f, x\nfrom . import b"),
+    }
+    assert missing_names(trees) == []
+    trees[Path("a/d.py")] = ast.parse("def late():\n    from .b import gone")
+    assert missing_names(trees) == ["a/d.py: gone from a/b"]
+
+
 def test_only_blender_knows_blender():
     outside = {
         path: blender_imports(path.read_text(encoding="utf-8")) for path in sources() if NEEDS_BLENDER not in path.parents
