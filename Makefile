@@ -46,7 +46,7 @@ lint: .venv/test
 	touch $@
 
 .venv/test: $(PROJECT)
-	$(PYTHON_FOUND) .ci/environment.py .venv --editable '.[blender,test]'
+	$(PYTHON_FOUND) .ci/environment.py .venv --editable '.[blender,test,judges]'
 	.venv/bin/python -c 'import bpy'
 	touch $@ .venv/demo
 
