@@ -368,3 +368,16 @@ def test_a_pipe_in_place_of_a_file_is_refused_and_not_waited_for(tmp_path, words
 def test_a_pipe_in_place_of_a_sidecar_is_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "shot.json")
     assert Folder(tmp_path).finished("shot", "hash", check=False) is None
+
+
+def test_a_command_with_blender_leaves_no_folder_among_the_temporary_files(tmp_path):
+    if importlib.util.find_spec("bpy") is None:
+        pytest.skip("there is no Blender")
+    temporary, project = tmp_path / "temporary", Path(__file__).parent.parent
+    temporary.mkdir()
+    environment = os.environ | {"PYTHONPATH": str(project), "TMPDIR": str(temporary)}
+    files = [project / "sample_scenes" / "spheres.blend", tmp_path / "scene.json"]
+    command = [sys.executable, "-m", "viewcam_addon", "export", *files]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert list(temporary.iterdir()) == []

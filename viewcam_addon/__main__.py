@@ -33,6 +33,9 @@ def main_and_exit() -> NoReturn:
     with contextlib.suppress(OSError):  # whoever reads our lines may have gone
         sys.stdout.flush()
         sys.stderr.flush()
+    if bpy := sys.modules.get("bpy"):
+        with contextlib.suppress(OSError, AttributeError):  # Blender has put something there, or is none
+            os.rmdir(bpy.app.tempdir)  # its session's own, which its clean-up would remove
     os._exit(status)
 
 
