@@ -102,7 +102,7 @@ NEEDS_BLENDER = PACKAGE / "blender"
 NEEDS_NUMBA = PACKAGE / "tracer" / "kernels"
 
 TOP_LEVEL = {"blender_manifest.toml", "viewcam_addon", "tests", "sample_scenes", "README.md", "docs", "benchmarks"}
-BUILD_FILES = {"__init__.py", "pyproject.toml", "Makefile", "LICENSE"}
+BUILD_FILES = {"__init__.py", "pyproject.toml", "Makefile", "LICENSE", "CONTRIBUTING.md"}
 
 
 def imported_modules(source: str, package: tuple[str, ...]) -> set[str]:
@@ -402,6 +402,39 @@ def test_what_the_readme_says_viewcam_does_it_does():
         command = [sys.executable, "-m", "viewcam_addon", name, "--help"]
         outcome = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
         assert outcome.returncode == 0 and name in outcome.stdout, f"viewcam {name}: {outcome.stderr}"
+
+
+def paths_named_in(text: str) -> set[str]:
+    """What stands in backticks and begins with a folder of the project."""
+    return set(re.findall(r"`((?:viewcam_addon|tests|docs|benchmarks|sample_scenes)/[\w./-]*)`", text))
+
+
+def test_every_path_that_a_document_names_exists():
+    documents = [path for path in tracked_files() if path.endswith(".md")] + ["CONTRIBUTING.md"]
+    named = {path: paths_named_in((ROOT / path).read_text(encoding="utf-8")) for path in documents}
+    missing = {path: gone for path, names in named.items() if (gone := {name for name in names if not (ROOT / name).exists()})}
+    assert len(named["CONTRIBUTING.md"]) > 30 and not missing, missing
+    assert paths_named_in("in `tests/none.py`") == {"tests/none.py"}
+
+
+def test_every_module_that_a_comment_names_exists():
+    """But for the tracer's and those of other programs, which cameras/ names as its sources."""
+    theirs = re.compile(r"(?<![\w/.*-])((?:[a-z_]+/)*[a-z_]+\.py)\b")
+    files = {f"/{path.relative_to(ROOT)}" for path in (*sources(), *(ROOT / "tests").rglob("*.py"))}
+    missing = {}
+    for path in sources():
+        if path.relative_to(PACKAGE).parts[0] not in ("cameras", "tracer"):
+            found = set(theirs.findall(path.read_text(encoding="utf-8")))
+            if gone := {name for name in found if not any(file.endswith(f"/{name}") for file in files)}:
+                missing[str(path.relative_to(PACKAGE))] = gone
+    assert not missing, missing
+
+
+def test_how_to_add_something_is_told_in_fewer_than_ten_lines():
+    page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").partition("## How to add")[2]
+    told = [each for each in page.split("\n\n") if each.strip().startswith("**")]
+    assert len(told) >= 7 and max(each.count("\n") + 1 for each in told) < 10
+    assert {"format", "lamp", "pass", "command", "tolerance", "version"} <= set(re.findall(r"[a-z]+", page))
 
 
 def test_what_is_public_is_what_the_page_names_and_can_be_imported_without_blender():

@@ -61,7 +61,7 @@ def assert_same_camera(found, stated):
     """Equal but for float32 storage: the eye, an orientation of float32 Euler angles, a lens over a sensor, a shift."""
     offset = np.abs(np.subtract(found.eye, stated.eye))
     assert np.all(offset <= FLOAT32 * np.abs(stated.eye)), f"the eye is {offset} off"
-    # A matrix entry is within 2.7e-7 with the worst of rotation modes (cycles.md, section 3, "Setting the pose").
+    # A matrix entry is within 2.7e-7 with the worst of rotation modes.
     turn = np.abs(np.subtract(found.basis(), stated.basis())).max()
     assert turn <= 2.7e-7, f"an axis is {turn:.1e} off"
     # Lens, sensor and their quotient: three roundings.

@@ -22,7 +22,7 @@ PERCENTAGES = [100, 33]
 BORDERS = ["whole", "border", "cropped border"]
 GRID = list(itertools.product(SIZES, FITS, ASPECTS, SHIFTS, PERCENTAGES, BORDERS))
 
-# calc_matrix_camera holds float32 numbers: 60 cameras differed by at most 3.8e-3 px from the ideal (cycles.md section 7).
+# calc_matrix_camera holds float32 numbers: 60 cameras differed by at most 3.8e-3 px from the ideal.
 LARGEST_OF_BLENDERS_MATRIX = 4e-3
 
 
