@@ -313,6 +313,7 @@ K = {"K": [[500, 0, 320], [0, 500, 240], [0, 0, 1]], "image_size": [640, 480]}
         ({"K": [[500, 0, 0], [0, 500, 0], [320, 240, 1]]}, "transpose"),
         ({"K": [[500, 2, 320], [0, 500, 240], [0, 0, 1]]}, "skew"),
         ({"model": "fisheye"}, "fisheye"),
+        ({"K": [[1.2, 0, 0.5], [0, 1.6, 0.5], [0, 0, 1]]}, "widths of the picture"),
     ],
 )
 def test_what_opencvs_names_leave_open_is_refused_and_not_guessed(more, told):

@@ -33,10 +33,8 @@ def read(source: Source, options: Options) -> list[Camera]:
     cameras = []
     for number, values in source.document.items():
         image = Record(values, f"image {number}")
-        f_x, f_y, c_x, c_y = opencv.matrix_of_k(image.numbers("cam_K", 9), image.place)
         name, size, stated = _picture(source, number, image, options)
-        half = opencv.half_pixel(options)
-        plane = axes.view_plane(f_x, f_y, c_x + half, c_y + half, size)
+        plane = opencv.plane_of_k(image.numbers("cam_K", 9), size, opencv.half_pixel(options), image.place)
         notes = (*opencv.told_of_half_pixel(options, "BOP"), *(() if options.scale != 1 else (_UNITS,)))
         turn, translation = np.eye(3), (0.0, 0.0, 0.0)
         if "cam_R_w2c" in image or "cam_t_w2c" in image:

@@ -49,6 +49,7 @@ _HEIGHT = ("imageheight", "height", "h", "resy")
 _SIZE = ("imagesize", "size", "resolution", "imgsize", "imagesizewh")
 NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tx", "ty")
 """Of the distortion's coefficients, in OpenCV's order."""
+_WIDEST = 50  # widths of the picture to a focal length, which are 177.7°
 _WAY = "R and t were taken as from world to camera, x right, y down, z into the view"
 
 
@@ -335,6 +336,23 @@ def matrix_of_k(values: Sequence[float], what: str) -> tuple[float, float, float
     return f_x, f_y, c_x, c_y
 
 
+def plane_of_k(values: Sequence[float], size: tuple[int, int], half: float, what: str) -> ViewPlane:
+    """The view plane of K's numbers. half : what to add to its principal point.
+
+    Raises
+    ------
+    InputError
+        as `matrix_of_k` does, or if K can't count in pixels.
+    """
+    f_x, f_y, c_x, c_y = matrix_of_k(values, what)
+    if max(f_x, f_y) < max(size) / _WIDEST and max(abs(c_x), abs(c_y)) < 2:
+        raise InputError(
+            f"K of {what} has the focal length {f_x:g} and the principal point {c_x:g}, {c_y:g}, which seem to count in widths "
+            "of the picture: multiply its rows by the width and the height"
+        )
+    return axes.view_plane(f_x, f_y, c_x + half, c_y + half, size)
+
+
 def coefficients(numbers: Sequence[float], what: str) -> dict[str, float]:
     """OpenCV's distortion coefficients by name.
 
@@ -358,10 +376,8 @@ def _camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
     model = str(_first(values, ("cameramodel", "distortionmodel", "model", "distortiontype")) or "")
     if re.search(r"fisheye|equidistant|omni|mei|eucm|kannala|spherical|ortho", model.lower()):
         not_a_pinhole(what, f"of the model {checks.shown(model)}")
-    f_x, f_y, c_x, c_y = matrix_of_k(_numbers("K", _first(values, _K)), what)
     size, stated = _size(values, what, options)
-    half = half_pixel(options)
-    plane = axes.view_plane(f_x, f_y, c_x + half, c_y + half, size)
+    plane = plane_of_k(_numbers("K", _first(values, _K)), size, half_pixel(options), what)
     notes = told_of_half_pixel(options, "OpenCV") + settled(_coefficients(values, what), plane, what, options)
     turn, translation, more = _pose(values, what)
     pinhole, more_of_pose = axes.pinhole(axes.from_world_to_camera(turn, translation, what), plane, what)

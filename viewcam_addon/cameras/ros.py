@@ -37,9 +37,8 @@ def read(source: Source, options: Options) -> list[Camera]:
     k = document.record("camera_matrix").numbers("data", 9)
     if k[0] == 0:
         raise InputError(f"{what} is not calibrated, its K[0] is 0: calibrate it")
-    f_x, f_y, c_x, c_y = opencv.matrix_of_k(k, what)
-    half = opencv.half_pixel(options)
-    plane = axes.view_plane(f_x, f_y, c_x + half, c_y + half, (document.size("image_width"), document.size("image_height")))
+    size = (document.size("image_width"), document.size("image_height"))
+    plane = opencv.plane_of_k(k, size, opencv.half_pixel(options), what)
     notes = opencv.told_of_half_pixel(options, "ROS")
     if "distortion_coefficients" in document:
         inner = document.record("distortion_coefficients")
