@@ -12,7 +12,10 @@ import os
 import random
 import shutil
 import signal
+import subprocess
 import sys
+import tempfile
+import traceback
 import warnings
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -167,8 +170,6 @@ def scene() -> Feed:
 
 def exr() -> Feed:
     """Pictures of geometry and of light, on either side of a comparison."""
-    import tempfile
-
     import OpenEXR
 
     with tempfile.TemporaryDirectory() as temporary:
@@ -331,37 +332,49 @@ def broken(kind: str) -> Feed:
 
 
 def blend() -> Feed:
-    """Blender's own files, exported by a command of its own, since no sentence of ours can follow a crash in this process."""
-    import subprocess
+    """Blender's own files, exported in this process: a crash ends it, and `command` says what a user is told of it."""
+    import bpy
 
-    samples = sorted((TESTS.parent / "sample_scenes").glob("*.blend"), key=lambda path: path.stat().st_size)[:3]
+    samples = []
+    with tempfile.TemporaryDirectory() as temporary:
+        for name in ("spheres", "wide"):
+            path = Path(temporary, f"{name}.blend")
+            bpy.ops.wm.open_mainfile(filepath=str(TESTS.parent / "sample_scenes" / path.name))
+            bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=False)
+            samples.append(path.read_bytes())
 
     def feed(chance: random.Random, folder: Path) -> None:
-        data, other = (_unpacked(chance.choice(samples)) for _ in range(2))
+        data, other = chance.sample(samples, 2)
         (folder / "mutant.blend").write_bytes(mutants.of_bytes(data, other, chance))
-        words = [sys.executable, "-m", "viewcam_addon", "export", "mutant.blend", "out.json"]
-        ran = subprocess.run(
-            words, cwd=folder, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(TESTS.parent)}
-        )
-        if ran.returncode not in (0, 2, 3) or (ran.returncode > 0) != bool(ran.stderr.strip()):
-            raise Said(f"status {ran.returncode}: {ran.stderr[-LONGEST:]!r}")
-        judge(ran.stderr.strip())
+        viewcam("export", folder / "mutant.blend", folder / "scene.json")
 
     return feed
 
 
-def _unpacked(path: Path) -> bytes:
-    return path.read_bytes()
+def command(folder: Path) -> None:
+    """Export a mutant as a user does, and raise Said unless all is well or told in a sentence."""
+    words = [sys.executable, "-m", "viewcam_addon", "export", "mutant.blend", "scene.json"]
+    environment = os.environ | {"PYTHONPATH": str(TESTS.parent)}
+    ran = subprocess.run(words, cwd=folder, capture_output=True, text=True, errors="replace", env=environment, timeout=120)
+    if ran.returncode < 0 or (ran.returncode > 1) != bool(ran.stderr.strip()):
+        raise Said(f"the command ended with status {ran.returncode}: {ran.stderr[-LONGEST:]!r}")
+    judge(ran.stderr.strip())
 
 
 KINDS = {"scene": scene, "exr": exr, "shots": shots, "sidecar": sidecar, "blend": blend}
 KINDS |= {kind: partial(broken, kind) for kind in ("bug", "crash", "hang", "greedy")}
 
 
+def tell(stream: int, number: int, said: str) -> None:
+    os.write(stream, json.dumps({"mutant": number, "said": said[:LONGEST]}).encode() + b"\n")
+
+
 def main(kind: str, first: str, count: str, place: str) -> None:
     import resource
 
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    told = os.dup(1)  # Blender prints past Python
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     folder = Path(place)
     feed = KINDS[kind]()
     for number in range(int(first), int(first) + int(count)):
@@ -372,18 +385,16 @@ def main(kind: str, first: str, count: str, place: str) -> None:
         try:
             feed(random.Random(f"{kind} {number}"), work)
         except Said as error:
-            print(json.dumps({"mutant": number, "said": str(error)}), flush=True)
+            tell(told, number, str(error))
         except Exception as error:
-            import traceback
-
             place = traceback.extract_tb(error.__traceback__)[-1]
-            said = f"{type(error).__name__} at {Path(place.filename).name}:{place.lineno}: {error}"
-            print(json.dumps({"mutant": number, "said": said[:LONGEST]}), flush=True)
+            tell(told, number, f"{type(error).__name__} at {Path(place.filename).name}:{place.lineno}: {error}")
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0)
         if len(sys.argv) < 6:
             shutil.rmtree(work, ignore_errors=True)
     (folder / "current").write_text("done")
+    os._exit(0)  # bpy may crash as Python takes it apart
 
 
 if __name__ == "__main__":
