@@ -213,3 +213,32 @@ def test_npz_of_numpy_is_read_and_pickle_is_not(tmp_path):
     np.savez(tmp_path / "camera.npz", **data)
     (back,) = cameras.read(tmp_path / "camera.npz")
     same_picture(back, pinhole)
+
+
+@pytest.mark.parametrize("model", ["SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV", "FOV", "SIMPLE_DIVISION", "DIVISION"])
+def test_the_displacement_by_which_a_lens_is_refused_is_pycolmaps(tmp_path, model):
+    pycolmap = pytest.importorskip("pycolmap")
+    straight = {"f": 600.0, "fx": 600.0, "fy": 610.0, "cx": 310.0, "cy": 190.0}
+    bent = {"k": -0.05, "k1": -0.06, "k2": 0.02, "k3": 0.01, "k4": 0.03, "k5": 0.01, "k6": 0.002, "p1": 0.001, "p2": -0.002}
+    numbers = [(straight | bent | {"omega": 0.7})[name] for name in cameras.FORMATS["colmap"].MODELS[model][1]]
+    theirs = pycolmap.Camera(model=model, width=640, height=360, params=numbers)
+    f_x, f_y = theirs.focal_length_x, theirs.focal_length_y
+    c_x, c_y = theirs.principal_point_x, theirs.principal_point_y
+    corners = np.array([[x, y] for x in (0, 640) for y in (0, 360)], dtype=float)
+    moved = theirs.img_from_cam(np.c_[(corners - [c_x, c_y]) / [f_x, f_y], np.ones(4)])
+    pixels = np.hypot(*(moved - corners).T).max()
+    (tmp_path / "cameras.txt").write_text(f"1 {model} 640 360 {' '.join(map(repr, numbers))}\n")
+    (tmp_path / "images.txt").write_text("1 1 0 0 0 0 0 0 1 a.png\n\n")
+    with pytest.raises(InputError, match=f"corner by {pixels:.3g} pixels"):
+        cameras.read(tmp_path)
+    (taken,) = cameras.read(tmp_path, options=Options(without_distortion=True))
+    assert taken.pinhole.distance == (f_x, f_y) and any(f"{pixels:.3g} pixels" in note for note in taken.notes)
+
+
+@pytest.mark.parametrize("model", ["OPENCV_FISHEYE", "SIMPLE_RADIAL_FISHEYE", "THIN_PRISM_FISHEYE", "EQUIRECTANGULAR", "EUCM"])
+def test_a_colmap_camera_that_is_no_pinhole_is_refused_by_its_name(tmp_path, model):
+    numbers = " ".join("1" for _ in cameras.FORMATS["colmap"].MODELS[model][1])
+    (tmp_path / "cameras.txt").write_text(f"1 {model} 640 360 {numbers}\n")
+    (tmp_path / "images.txt").write_text("1 1 0 0 0 0 0 0 1 a.png\n\n")
+    with pytest.raises(InputError, match=model):
+        cameras.read(tmp_path, options=Options(without_distortion=True))
