@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from . import batch_words, camera_words, checks, events, words
-from .commands import Result, batch, camera, chart, proving, serve
+from .commands import Result, audit, batch, camera, chart, proving, serve
 from .errors import InputError, bug
 from .files import check_writable, is_printed_to, written_whole
 from .tracer.scene.film import SAMPLES
@@ -189,6 +189,12 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     added = command(batch.run, "batch", batch_words.DESCRIPTION)
     blend(added)
     batch_words.add(added, blend_is_open)
+
+    added = command(audit.run, "audit", "Tell what is wrong with a dataset's cameras, by its points or depth maps.")
+    added.add_argument("dataset", metavar="DATASET", type=Path, help="transforms.json, a COLMAP model, or the folder of one")
+    added.add_argument("--points", metavar="COLMAP", type=Path, help="a COLMAP model of the same pictures and world")
+    added.add_argument("--against", metavar="CAMERAS", type=Path, help="true cameras of the same pictures, in any format")
+    added.add_argument("--size", type=words.size, metavar="WxH", help="pixels, where the file does not say")
 
     added = command(camera.run, "camera", "List the cameras of another program's file, or write them for a third one.")
     camera_words.add(added)

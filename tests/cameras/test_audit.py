@@ -1,0 +1,340 @@
+"""The audit of a dataset's cameras: each mistake is made on purpose in right datasets, and named; right ones raise no alarm.
+
+The scenes, the pictures of their points and the mistakes are made here, from formulas of their own."""
+
+import json
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from viewcam_addon import cameras, cli
+from viewcam_addon.cameras import Camera
+from viewcam_addon.cameras.audit import MISTAKES, Depths, Tracks, Views, _audited, audit, tracks_through, views_of
+from viewcam_addon.pinhole import Pinhole
+
+OPENCV = np.array([1.0, -1, -1])
+Y_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+SIZES = [(640, 360), (800, 600), (1080, 1920), (1920, 1080), (1200, 900)]
+
+
+def a_right_dataset(random, size=None):
+    """Views around a place that is not the origin, and that place."""
+    count = int(random.integers(4, 16))
+    size = np.array(size or SIZES[random.integers(len(SIZES))], float)
+    away = random.normal(size=(count, 3))
+    away *= (random.uniform(3, 8) * random.uniform(0.8, 1.2, count) / np.linalg.norm(away, axis=1))[:, None]
+    away[:, 2] = 0.6 * np.abs(away[:, 2])
+    middle = 3 * random.normal(size=3)
+    w = away - 0.3 * random.normal(size=(count, 3))
+    w /= np.linalg.norm(w, axis=1, keepdims=True)
+    u = np.cross(np.array([0, 0, 1.0]) + 0.1 * random.normal(size=(count, 3)), w)
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    center = size / 2 + size * random.uniform(0.02, 0.08, 2) * random.choice([-1, 1], 2)
+    center += 3.7 * (abs(center[0] - center[1]) < 20)  # so that both numbers differ
+    views = Views(
+        np.stack([u, np.cross(w, u), w], axis=-1),
+        away + middle,
+        np.full((count, 2), size[0] * random.uniform(0.6, 2.5)),
+        np.tile(center, (count, 1)),
+        np.tile(size, (count, 1)),
+    )
+    return views, middle
+
+
+def points_in_pictures(random, views, middle, noise):
+    """Tracks with noise, of which one in 30 is an outlier."""
+    points = middle + 0.8 * random.normal(size=(int(random.integers(60, 200)), 3))
+    which, points = np.repeat(np.arange(len(views.eye)), len(points)), np.tile(points, (len(views.eye), 1))
+    seen = np.einsum("mij,mi->mj", views.axes[which], points - views.eye[which])
+    places = views.center[which] + views.focal[which] * seen[:, :2] * [1, -1] / -seen[:, 2:]
+    there = (seen[:, 2] < 0) & (places > 0).all(axis=1) & (places < views.size[which]).all(axis=1)
+    which, points, places = which[there], points[there], places[there]
+    places = places + noise * random.normal(size=places.shape)
+    wild = random.random(len(places)) < 1 / 30
+    places[wild] += 30 * random.normal(size=(wild.sum(), 2))
+    return Tracks(which, places, points)
+
+
+def inverse(views, opencv_in=False, opencv_out=False):
+    turn = np.swapaxes(views.axes * (OPENCV if opencv_in else 1), 1, 2)
+    return replace(views, axes=turn * (OPENCV if opencv_out else 1), eye=-np.einsum("nij,nj->ni", turn, views.eye))
+
+
+def quaternions_in_another_order(views):
+    rotation = pytest.importorskip("scipy.spatial.transform").Rotation
+    turn = np.swapaxes(views.axes * OPENCV, 1, 2)
+    translation = -np.einsum("nij,nj->ni", turn, views.eye)
+    x, y, z, w = rotation.from_matrix(turn).as_quat().T
+    turn = rotation.from_quat(np.stack([y, z, w, x], axis=-1)).as_matrix()  # the file has x y z w and is read as w x y z
+    back = np.swapaxes(turn, 1, 2)
+    return replace(views, axes=back * OPENCV, eye=-np.einsum("nij,nj->ni", back, translation))
+
+
+def with_focal(views, factors):
+    return replace(views, focal=views.focal * np.array(factors))
+
+
+MADE = {
+    "half_pixel": lambda v, r: replace(v, center=v.center - 0.5),
+    "half_pixel_more": lambda v, r: replace(v, center=v.center + 0.5),
+    "center_swapped": lambda v, r: replace(v, center=v.center[:, ::-1]),
+    "center_upside_down": lambda v, r: replace(v, center=v.center * [1, -1] + v.size * [0, 1]),
+    "center_mirrored": lambda v, r: replace(v, center=v.center * [-1, 1] + v.size * [1, 0]),
+    "center_left_out": lambda v, r: replace(v, center=v.size / 2),
+    "opencv_axes": lambda v, r: replace(v, axes=v.axes * OPENCV),
+    "y_flipped": lambda v, r: replace(v, axes=v.axes * [1, -1, 1]),
+    "z_flipped": lambda v, r: replace(v, axes=v.axes * [1, 1, -1]),
+    "x_flipped": lambda v, r: replace(v, axes=v.axes * [-1, 1, 1]),
+    "inverse": lambda v, r: inverse(v, *[(False, False), (True, True), (True, False)][r.integers(3)]),
+    "transposed": lambda v, r: replace(v, axes=np.swapaxes(v.axes, 1, 2)),
+    "translation_as_eye": lambda v, r: replace(v, eye=-np.einsum("nji,nj->ni", v.axes, v.eye)),
+    "eye_as_translation": lambda v, r: replace(v, eye=-np.einsum("nij,nj->ni", v.axes * OPENCV, v.eye)),
+    "quaternion_order": lambda v, r: quaternions_in_another_order(v),
+    "y_up": lambda v, r: replace(v, axes=Y_UP.T @ v.axes, eye=v.eye @ Y_UP),
+    "late": lambda v, r: replace(v, axes=np.roll(v.axes, 1, axis=0), eye=np.roll(v.eye, 1, axis=0)),
+    "fov_axis": lambda v, r: with_focal(v, v.size[:, 1:] / v.size[:, :1]),
+    "size": lambda v, r: (lambda s: replace(v, focal=v.focal * s, center=v.center * s))(r.choice([2, 4, 0.5, 0.25, 1 / 0.75])),
+    "focal_of_another_size": lambda v, r: with_focal(v, r.choice([2, 0.5, 4])),
+    "center_of_another_size": lambda v, r: replace(v, center=v.center * r.choice([2, 0.5, 4, 0.25])),
+    "aspect": lambda v, r: with_focal(v, [1, r.choice([2, 0.5, 11 / 12])]),
+    "unit": lambda v, r: replace(v, eye=v.eye * r.choice([1000, 100, 0.001, 0.01, 1 / 0.3048, 0.0254])),
+}
+
+
+def named(kind, seed):
+    """What the audit makes of a dataset with a mistake: nothing if it is named, alone or with what can't be told from it."""
+    random = np.random.default_rng([seed, len(kind)])
+    views, middle = a_right_dataset(random)
+    tracks = points_in_pictures(random, views, middle, random.uniform(0.1, 1.0))
+    verdict = _audited(MADE[kind](views, random), tracks)
+    return "" if kind in (verdict.kind, *verdict.others) else verdict.kind
+
+
+def alarm(seed):
+    random = np.random.default_rng([seed, 99])
+    views, middle = a_right_dataset(random)
+    return _audited(views, points_in_pictures(random, views, middle, random.uniform(0.1, 1.5))).kind
+
+
+@pytest.mark.parametrize("kind", MADE)
+def test_a_mistake_is_named(kind):
+    assert [named(kind, seed) for seed in range(3)] == [""] * 3
+
+
+def test_right_datasets_raise_no_alarm():
+    assert Counter(map(alarm, range(30))) == {"none": 30}
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("kind", MADE)
+def test_of_a_hundred_datasets_with_a_mistake_99_are_named(kind):
+    wrong = Counter(named(kind, seed) for seed in range(100, 200))
+    assert wrong[""] >= 99, wrong
+
+
+@pytest.mark.exhaustive
+def test_2000_right_datasets_raise_no_alarm():
+    assert Counter(map(alarm, range(1000, 3000))) == {"none": 2000}
+
+
+def test_each_mistake_that_is_looked_for_is_made_here():
+    assert {mistake.kind for mistake in MISTAKES} - MADE.keys() == {"distance_for_depth", "focal_swapped"}
+
+
+def test_too_few_points_tell_nothing():
+    random = np.random.default_rng(1)
+    views, middle = a_right_dataset(random)
+    tracks = points_in_pictures(random, views, middle, 0.5)
+    few = Tracks(tracks.which[:30], tracks.places[:30], tracks.points[:30])
+    assert _audited(replace(views, axes=views.axes * OPENCV), few).kind == "unsure"
+
+
+def test_noise_and_unknown_mistakes_are_given_no_name():
+    random = np.random.default_rng(2)
+    views, middle = a_right_dataset(random)
+    tracks = points_in_pictures(random, views, middle, 0.3)
+    scattered = replace(views, eye=views.eye + random.normal(size=views.eye.shape))
+    assert _audited(scattered, tracks).kind == "unknown"
+
+
+# ---- depth maps of a sphere on a floor
+
+
+def depth_map(views, number):
+    """(height, width) depth along the view, rows from the top; nan where nothing is."""
+    width, height = views.size[number].astype(int)
+    columns, rows = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    x = (columns - views.center[number, 0]) / views.focal[number, 0]
+    y = -(rows - views.center[number, 1]) / views.focal[number, 1]
+    rays = np.stack([x, y, -np.ones_like(x)], axis=-1) @ views.axes[number].T
+    eye = views.eye[number]
+    with np.errstate(all="ignore"):
+        floor = -eye[2] / rays[..., 2]
+        b, c = rays @ (eye - [0, 0, 1]), (eye - [0, 0, 1]) @ (eye - [0, 0, 1]) - 1
+        a = (rays * rays).sum(axis=-1)
+        ball = (-b - np.sqrt(b * b - a * c)) / a
+    depth = np.fmin(np.where(floor > 0, floor, np.nan), np.where(ball > 0, ball, np.nan))
+    return np.where(depth < 30, depth, np.nan)
+
+
+def a_filmed_scene(seed=4, count=8):
+    random = np.random.default_rng(seed)
+    angle = np.arange(count) * 0.3
+    eye = np.stack([5 * np.cos(angle), 5 * np.sin(angle), 2.5 + 0.1 * np.arange(count)], axis=-1)
+    found = [
+        Pinhole(
+            tuple(e), (0.1, 0.2, 0.7), (0.05, 0, 1), 150.0, 160, 100, tuple(np.array([84.0, 47.0]) + random.uniform(-1, 1, 2))
+        )
+        for e in eye
+    ]
+    return [Camera(f"{i}", pinhole, image=f"images/{i}.png") for i, pinhole in enumerate(found)]
+
+
+BY_DEPTH = [
+    *("half_pixel", "center_swapped", "opencv_axes", "y_flipped", "z_flipped", "x_flipped", "inverse", "transposed"),
+    *("translation_as_eye", "late", "fov_axis", "focal_of_another_size", "center_of_another_size", "aspect", "unit"),
+]
+
+
+@pytest.fixture(scope="module")
+def filmed():
+    views = views_of(a_filmed_scene())
+    return views, [depth_map(views, i) for i in range(len(views.eye))]
+
+
+def test_depth_maps_say_that_right_cameras_are_right(filmed):
+    views, maps = filmed
+    assert _audited(views, Depths(maps)).kind == "none"
+
+
+@pytest.mark.parametrize("kind", BY_DEPTH)
+def test_a_mistake_is_named_by_depth_maps_alone(filmed, kind):
+    views, maps = filmed
+    verdict = _audited(MADE[kind](views, np.random.default_rng(5)), Depths(maps))
+    assert kind in (verdict.kind, *verdict.others), verdict
+
+
+def test_distances_in_place_of_depths_are_named(filmed):
+    views, maps = filmed
+    columns, rows = np.meshgrid(np.arange(160) + 0.5, np.arange(100) + 0.5)
+    far = [
+        depth * np.sqrt(1 + (((np.stack([columns, rows], -1) - views.center[i]) / views.focal[i]) ** 2).sum(-1))
+        for i, depth in enumerate(maps)
+    ]
+    assert _audited(views, Depths(far)).kind == "distance_for_depth"
+
+
+# ---- files, and bugs that others reported
+
+
+def written_model(folder, found, tracks):
+    """A COLMAP model of the cameras, with the tracks in its images and points."""
+    cameras.save(found, folder, "colmap")
+    head, *lines = (folder / "images.txt").read_text().splitlines()
+    pictures = iter(range(len(found)))
+    out = [head]
+    for line in lines:
+        if line.startswith("#") or not line.strip():
+            continue
+        number = next(pictures)
+        mine = np.flatnonzero(tracks.which == number)
+        out += [
+            line,
+            " ".join(f"{x!r} {y!r} {i}" for i, (x, y) in zip(mine.tolist(), tracks.places[mine].tolist(), strict=True)),
+        ]
+    (folder / "images.txt").write_text("\n".join(out) + "\n")
+    points = [f"{i} {x!r} {y!r} {z!r} 0 0 0 0.5" for i, (x, y, z) in enumerate(tracks.points.tolist())]
+    (folder / "points3D.txt").write_text("\n".join(points) + "\n")
+
+
+def run(*words):
+    return cli.main([*map(str, words)])
+
+
+@pytest.fixture
+def model(tmp_path):
+    found = a_filmed_scene()
+    tracks = tracks_through(found)
+    written_model(tmp_path / "model", found, tracks)
+    return found, tmp_path / "model"
+
+
+def test_a_right_model_is_told_to_be_right(model, capsys):
+    assert run("audit", model[1]) == 0
+    assert "nothing is wrong" in capsys.readouterr().out
+
+
+def test_a_binary_model_says_the_same(model, tmp_path):
+    pycolmap = pytest.importorskip("pycolmap")
+    pycolmap.Reconstruction(model[1]).write_binary(tmp_path)
+    assert run("audit", tmp_path) == 0
+
+
+def lines_changed(path, change):
+    """The words of each camera or image of a COLMAP text, changed."""
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join(" ".join(change(line.split())) if not line.startswith("#") else line for line in lines) + "\n")
+
+
+def test_a_principal_point_of_opencvs_calibration_in_colmap_is_half_a_pixel_off(model, capsys):
+    """colmap/colmap #2587: OpenCV's c has (0, 0) at the first pixel's centre."""
+    lines_changed(model[1] / "cameras.txt", lambda w: [*w[:-2], *(repr(float(x) - 0.5) for x in w[-2:])])
+    assert run("audit", model[1]) == 1
+    assert "half a pixel too small" in capsys.readouterr().out
+
+
+def test_a_loader_that_leaves_the_principal_point_out_is_named(model, capsys):
+    """colmap/colmap #3111, hbb1/2d-gaussian-splatting #74: cx and cy are not read."""
+    lines_changed(model[1] / "cameras.txt", lambda w: [*w[:-2], repr(int(w[2]) / 2), repr(int(w[3]) / 2)])
+    assert run("audit", model[1]) == 1
+    assert "left out" in capsys.readouterr().out
+
+
+def test_depth_that_is_distance_is_named_of_files(filmed, tmp_path, capsys):
+    """colmap/colmap #1768: z was taken for the distance."""
+    found, (views, maps) = a_filmed_scene(), filmed
+    document = json.loads(cameras.write(found, "transforms"))
+    columns, rows = np.meshgrid(np.arange(160) + 0.5, np.arange(100) + 0.5)
+    for i, frame in enumerate(document["frames"]):
+        frame["depth_file_path"] = f"depth{i}.npy"
+        far = np.sqrt(1 + (((np.stack([columns, rows], -1) - views.center[i]) / views.focal[i]) ** 2).sum(-1))
+        np.save(tmp_path / frame["depth_file_path"], maps[i] * far)
+    (tmp_path / "transforms.json").write_text(json.dumps(document))
+    assert run("audit", tmp_path) == 1
+    assert "distances from the eye" in capsys.readouterr().out
+
+
+def test_a_field_of_view_of_the_other_side_is_named_against_true_cameras(tmp_path, capsys):
+    """KhronosGroup/glTF-Blender-IO #1125: the width's angle stood for the height's."""
+    true = [replace(c, pinhole=replace(c.pinhole, principal_point=None)) for c in a_filmed_scene()]
+    wrong = [replace(c, pinhole=replace(c.pinhole, distance=tuple(d * 100 / 160 for d in c.pinhole.distance))) for c in true]
+    for name, found in (("true", true), ("wrong", wrong)):
+        cameras.save(found, tmp_path / f"{name}.json", "transforms")
+    assert run("audit", tmp_path / "wrong.json", "--against", tmp_path / "true.json") == 1
+    assert "field of view" in capsys.readouterr().out
+
+
+def test_world_to_camera_with_opencvs_axes_in_transforms_json_is_named(tmp_path, capsys):
+    """nerfstudio-project/nerfstudio #2255 and its like: matrices of OpenCV as they are."""
+    found = a_filmed_scene()
+    cameras.save(found, tmp_path / "true.json", "transforms")
+    document = json.loads((tmp_path / "true.json").read_text())
+    for frame in document["frames"]:
+        matrix = np.array(frame["transform_matrix"])
+        frame["transform_matrix"] = np.linalg.inv(matrix @ np.diag([1, -1, -1, 1])).tolist()
+    (tmp_path / "wrong.json").write_text(json.dumps(document))
+    assert run("audit", tmp_path / "wrong.json", "--against", tmp_path / "true.json") == 1
+    assert "world to camera, with OpenCV's axes" in capsys.readouterr().out
+
+
+def test_without_evidence_it_says_what_to_give(tmp_path, capfd):
+    cameras.save(a_filmed_scene(), tmp_path / "transforms.json", "transforms")
+    assert run("audit", tmp_path) == 2
+    assert "--against" in capfd.readouterr().err
+
+
+def test_an_audit_takes_cameras_as_they_are_read(model):
+    found = cameras.read(model[1])
+    assert audit(found, tracks_through(found)).kind == "none"

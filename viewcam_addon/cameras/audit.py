@@ -1,0 +1,500 @@
+"""What is wrong with the cameras of a dataset, told by what their pictures show.
+
+Each mistake that people make has an inverse. All inverses are tried on the cameras, and the evidence says which of them, if
+any, makes the cameras true:
+
+    tracks    points of the scene with the pixels in which pictures show them: a COLMAP model's, or any true cameras' own
+    depths    what one picture's depth map says of the scene, seen in another's
+
+A mistake is named only if its inverse explains the evidence far better than the cameras as they are, and leaves errors that
+pictures may have; what explains it as well is named beside it. Else it is said that nothing is wrong, or that something is,
+of an unknown kind. Robust costs (Cauchy's) let outliers and hidden points be.
+
+Rejected: fitting free parameters, which explains whatever is there (but for a principal point that was left out), and judging
+poses by their looks (do cameras look at their middle?), which is right for most and a false alarm for the rest.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import axes
+from .camera import Camera
+
+Array = NDArray[np.float64]
+
+# log likelihood by which one explanation must beat another: e²⁵ : 1, whatever the number of mistakes that are tried.
+_SURE, _TIED = 25.0, 10.0
+_FEWEST = 40  # observations
+_LEFT_OUT = 2.0  # pixels: less may be anything's
+_COUNTED = 2000  # at most: a systematic error repeats in each, so more of them add no certainty
+_FARTHEST = 1e6  # times the usual error: what is behind the camera counts as that
+_Y_TO_Z = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+_OPENCV = np.array([1.0, -1, -1])
+
+
+@dataclass(frozen=True)
+class Views:
+    """All cameras of a dataset as arrays.
+
+    axes : (n, 3, 3), columns u, v, w; their determinants may be −1. eye : (n, 3). focal : (n, 2), pixels. center : (n, 2),
+    the principal point from the left and the top. size : (n, 2), pixels. depth_scale : world units of one of the depth maps'.
+    along_ray : whether depth is the distance from the eye, and not along w. shifted : by how many pictures the cameras are
+    late.
+    """
+
+    axes: Array
+    eye: Array
+    focal: Array
+    center: Array
+    size: Array
+    depth_scale: float = 1.0
+    along_ray: bool = False
+    shifted: int = 0
+
+    def project(self, which: NDArray, points: Array) -> tuple[Array, Array]:
+        """(m, 2) pixels from the left and the top, and (m,) depth, of points (m, 3) in cameras (m,)."""
+        which = (which + self.shifted) % len(self.eye)
+        x, y, z = np.einsum("mij,mi->jm", self.axes[which], points - self.eye[which])
+        with np.errstate(all="ignore"):
+            places = self.center[which] + self.focal[which] * np.stack([x / -z, -y / -z], axis=-1)
+        return places, -z
+
+    def points(self, which: NDArray, places: Array, depth: Array) -> Array:
+        """(m, 3): what cameras (m,) see at places (m, 2), at depths (m,) of their depth maps."""
+        which = (which + self.shifted) % len(self.eye)
+        x, y = ((places - self.center[which]) / self.focal[which]).T
+        rays = np.stack([x, -y, -np.ones_like(x)], axis=-1)
+        if self.along_ray:
+            rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+        rays = np.einsum("mij,mj->mi", self.axes[which], rays)
+        return self.eye[which] + (self.depth_scale * depth)[:, None] * rays
+
+
+def views_of(cameras: Sequence[Camera]) -> Views:
+    """The cameras as arrays."""
+    matrices = np.array([axes.camera_to_world(camera.pinhole) for camera in cameras])
+    k = np.array([axes.intrinsics(camera.pinhole) for camera in cameras])
+    size = np.array([(camera.pinhole.width, camera.pinhole.height) for camera in cameras], float)
+    return Views(matrices[:, :3, :3], matrices[:, :3, 3], k[:, [0, 1], [0, 1]], k[:, :2, 2], size)
+
+
+# ---- evidence
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """Points and where pictures show them. which : (m,), the picture; places : (m, 2), pixels from the left and the top;
+    points : (m, 3), world space. floor : the least error, in pixels, that such places have. part : of the errors, whose largest
+    is the usual one. plausible : the largest usual error that right cameras have."""
+
+    which: NDArray
+    places: Array
+    points: Array
+    floor: float = 0.02
+    unit: str = "pixels"
+    plausible: float = 4.0
+    part: float = 0.5
+
+    def errors(self, views: Views) -> Array:
+        """(m,) pixels; infinite behind the camera."""
+        places, depth = views.project(self.which, self.points)
+        with np.errstate(all="ignore"):
+            errors = np.hypot(*(places - self.places).T)
+        return np.where((depth > 0) & np.isfinite(errors), errors, np.inf)
+
+
+class Depths:
+    """Depth maps, one a picture: (height, width), rows from the top, not finite or ≤ 0 where nothing is."""
+
+    # What one picture sees the next may not: of the errors the lowest fifth are those of what both see, if anything is.
+    floor, unit, plausible, part = 1e-6, "of the depth", 0.02, 0.2
+
+    def __init__(self, maps: Sequence[Array], samples: int = 60, neighbours: int = 4) -> None:
+        self.maps = [np.asarray(depth, dtype=np.float64) for depth in maps]
+        random = np.random.default_rng(0)
+        count = len(self.maps)
+        self.pairs = [(i, (i + step) % count) for i in range(count) for step in range(1, min(neighbours, count - 1) + 1)]
+        self.samples = []
+        for depth in self.maps:
+            rows, columns = np.nonzero(np.isfinite(depth) & (depth > 0))
+            chosen = random.choice(len(rows), min(samples, len(rows)), replace=False) if len(rows) else []
+            self.samples.append((columns[chosen] + 0.5, rows[chosen] + 0.5, depth[rows[chosen], columns[chosen]]))
+
+    def errors(self, views: Views) -> Array:
+        """Of each sample in each pair of pictures: by which part the two depths differ; ½ where the other picture lacks it."""
+        found = []
+        for i, j in self.pairs:
+            columns, rows, depth = self.samples[i]
+            many = np.full(len(columns), i)
+            points = views.points(many, np.stack([columns, rows], axis=-1), depth)
+            places, z = views.project(np.full(len(columns), j), points)
+            if views.along_ray:
+                z = np.where(z > 0, np.linalg.norm(points - views.eye[(j + views.shifted) % len(views.eye)], axis=-1), z)
+            there = _between(self.maps[j], places) * views.depth_scale
+            with np.errstate(all="ignore"):
+                error = np.abs(np.log(there / z))
+            found.append(np.where((z > 0) & np.isfinite(error), np.minimum(error, 0.5), 0.5))
+        return np.concatenate(found) if found else np.zeros(0)
+
+
+def _between(depth: Array, places: Array) -> Array:
+    """The depth between four pixels' centres: of planes exact, since 1/depth is linear there; nan outside and across edges."""
+    height, width = depth.shape
+    with np.errstate(all="ignore"):
+        x, y = (np.where(np.isfinite(p), p, -9) - 0.5 for p in places.T)
+        left, top = np.floor(x), np.floor(y)
+        inside = (left >= 0) & (top >= 0) & (left < width - 1) & (top < height - 1)
+        i, j = (np.where(inside, p, 0).astype(int) for p in (top, left))
+        four = np.stack([1 / depth[i, j], 1 / depth[i, j + 1], 1 / depth[i + 1, j], 1 / depth[i + 1, j + 1]])
+        a, b = x - left, y - top
+        value = (four[0] * (1 - a) + four[1] * a) * (1 - b) + (four[2] * (1 - a) + four[3] * a) * b
+        smooth = four.max(axis=0) < 1.1 * four.min(axis=0)
+        return np.where(inside & smooth & (value > 0), 1 / value, np.nan)
+
+
+def tracks_through(true: Sequence[Camera], each: int = 60) -> Tracks:
+    """What true cameras, as a .blend's, show of points before them: evidence for cameras that should be the same."""
+    random = np.random.default_rng(0)
+    views = views_of(true)
+    spread = np.linalg.norm(views.eye - views.eye.mean(axis=0), axis=1).max()
+    reach = max(spread, 1e-6 * float(np.abs(views.eye).max()), 1.0 if len(true) == 1 else 0.0) or 1.0
+    which = np.repeat(np.arange(len(true)), each)
+    places = random.uniform(0, 1, (len(which), 2)) * views.size[which]
+    points = views.points(which, places, reach * random.uniform(0.5, 2, len(which)))
+    return Tracks(which, places, points)
+
+
+# ---- mistakes
+
+
+def _scaled(views: Views, focal: float = 1.0, center: float = 1.0) -> Views:
+    return replace(views, focal=views.focal * focal, center=views.center * center)
+
+
+def _inverted(views: Views, before: bool, after: bool) -> Views:
+    """The inverse of the matrices; before, after: with OpenCV's axes in what is inverted, in what comes out."""
+    turn = views.axes * _OPENCV if before else views.axes
+    turned = np.swapaxes(turn, 1, 2)
+    eye = -np.einsum("nij,nj->ni", turned, views.eye)
+    return replace(views, axes=turned * _OPENCV if after else turned, eye=eye)
+
+
+def _flipped(*signs: float) -> Callable[[Views], Views]:
+    return lambda views: replace(views, axes=views.axes * np.array(signs))
+
+
+def _translation_as_eye(views: Views, opencv: bool) -> Views:
+    turn = views.axes * _OPENCV if opencv else views.axes
+    return replace(views, eye=-np.einsum("nij,nj->ni", turn, views.eye))
+
+
+def _eye_as_translation(views: Views) -> Views:
+    """COLMAP's t was the eye."""
+    turn = np.swapaxes(views.axes * _OPENCV, 1, 2)
+    return replace(views, eye=-np.einsum("nij,nj->ni", turn, views.eye))
+
+
+def _reordered(views: Views, order: tuple[int, ...]) -> Views:
+    """World to camera's quaternion, w x y z as read, in another order; the translation stays as it is in the file."""
+    turn = np.swapaxes(views.axes * _OPENCV, 1, 2)
+    translation = -np.einsum("nij,nj->ni", turn, views.eye)
+    if (np.linalg.det(turn) < 0).any():
+        return views
+    read = np.array([axes.quaternion(each.tolist()) for each in turn])
+    turn = np.array([axes.rotation_of(tuple(q[list(order)]), "a view") for q in read])
+    back = np.swapaxes(turn, 1, 2)
+    return replace(views, axes=back * _OPENCV, eye=-np.einsum("nij,nj->ni", back, translation))
+
+
+def _turned_world(views: Views, turn: Array) -> Views:
+    return replace(views, axes=turn @ views.axes, eye=views.eye @ turn.T)
+
+
+def _swapped(views: Views, name: str) -> Views:
+    return replace(views, **{name: getattr(views, name)[:, ::-1]})
+
+
+def _of_other_axis(views: Views, up: bool) -> Views:
+    ratio = views.size[:, :1] / views.size[:, 1:]
+    return replace(views, focal=views.focal * (ratio if up else 1 / ratio))
+
+
+def _stretched(views: Views, aspect: float | Array) -> Views:
+    return replace(views, focal=views.focal * np.stack([np.ones(len(views.eye)), np.broadcast_to(aspect, len(views.eye))], -1))
+
+
+_SIZES = {
+    "1/4": 0.25,
+    "1/3": 1 / 3,
+    "1/2": 0.5,
+    "2/3": 2 / 3,
+    "3/4": 0.75,
+    "4/3": 4 / 3,
+    "3/2": 1.5,
+    "2": 2.0,
+    "3": 3.0,
+    "4": 4.0,
+}
+_HALVES = {"1/4": 0.25, "1/2": 0.5, "2": 2.0, "4": 4.0}
+_ASPECTS = {"2": 2.0, "1/2": 0.5, "3/2": 1.5, "2/3": 2 / 3, "4/3": 4 / 3, "3/4": 0.75}
+_ASPECTS |= {"12/11": 12 / 11, "11/12": 11 / 12, "16/11": 16 / 11, "11/16": 11 / 16, "10/11": 10 / 11, "11/10": 1.1}
+_UNITS = {"1000": 1000.0, "100": 100.0, "10": 10.0, "1/10": 0.1, "1/100": 0.01, "1/1000": 0.001}
+_UNITS |= {"0.3048 (feet)": 0.3048, "0.0254 (inches)": 0.0254, "1/0.3048 (feet)": 1 / 0.3048, "1/0.0254 (inches)": 1 / 0.0254}
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """kind : a name for programs. sentence : what was done. undone : the cameras without it. of_depth : whether only depth maps
+    can show it."""
+
+    kind: str
+    sentence: str
+    undone: Callable[[Views], Views]
+    of_depth: bool = False
+
+
+def _mistakes() -> list[Mistake]:
+    """The more usual ones first: of two that can't be told apart the first is named first."""
+    fine = [
+        Mistake(
+            "half_pixel",
+            "the principal point is half a pixel too small: it counts from the first pixel's centre",
+            lambda v: replace(v, center=v.center + 0.5),
+        ),
+        Mistake(
+            "half_pixel_more", "the principal point is half a pixel too large", lambda v: replace(v, center=v.center - 0.5)
+        ),
+        Mistake("center_swapped", "cx and cy are swapped", lambda v: _swapped(v, "center")),
+        Mistake(
+            "center_upside_down",
+            "cy counts from the bottom",
+            lambda v: replace(v, center=np.stack([v.center[:, 0], v.size[:, 1] - v.center[:, 1]], -1)),
+        ),
+        Mistake(
+            "center_mirrored",
+            "cx counts from the right",
+            lambda v: replace(v, center=np.stack([v.size[:, 0] - v.center[:, 0], v.center[:, 1]], -1)),
+        ),
+        Mistake("focal_swapped", "fl_x and fl_y are swapped", lambda v: _swapped(v, "focal")),
+        Mistake(
+            "opencv_axes",
+            "y and z of the camera's axes are negated: OpenCV's stand where OpenGL's should, or the reverse",
+            _flipped(1, -1, -1),
+        ),
+        Mistake("y_flipped", "the camera's y axis is negated", _flipped(1, -1, 1)),
+        Mistake("z_flipped", "the camera's z axis is negated", _flipped(1, 1, -1)),
+        Mistake("x_flipped", "the camera's x axis is negated: the picture is mirrored", _flipped(-1, 1, 1)),
+        Mistake(
+            "inverse",
+            "the matrices are world to camera where camera to world is wanted, or the reverse",
+            lambda v: _inverted(v, False, False),
+        ),
+        Mistake(
+            "inverse",
+            "the matrices are world to camera, with OpenCV's axes, where camera to world is wanted",
+            lambda v: _inverted(v, False, True),
+        ),
+        Mistake(
+            "inverse", "the matrices are camera to world where world to camera is wanted", lambda v: _inverted(v, True, True)
+        ),
+        Mistake("transposed", "the rotations are transposed", lambda v: replace(v, axes=np.swapaxes(v.axes, 1, 2))),
+        Mistake(
+            "transposed",
+            "the rotations are transposed, with OpenCV's axes",
+            lambda v: replace(v, axes=np.swapaxes(v.axes * _OPENCV, 1, 2) * _OPENCV),
+        ),
+        Mistake(
+            "translation_as_eye",
+            "the translations of world to camera stand where the eyes should",
+            lambda v: _translation_as_eye(v, False),
+        ),
+        Mistake(
+            "translation_as_eye",
+            "the translations of world to camera, with OpenCV's axes, stand where the eyes should",
+            lambda v: _translation_as_eye(v, True),
+        ),
+        Mistake("eye_as_translation", "the eyes stand where the translations of world to camera should", _eye_as_translation),
+        Mistake(
+            "quaternion_order",
+            "the quaternions are x, y, z, w where w, x, y, z is wanted",
+            lambda v: _reordered(v, (3, 0, 1, 2)),
+        ),
+        Mistake(
+            "quaternion_order",
+            "the quaternions are w, x, y, z where x, y, z, w is wanted",
+            lambda v: _reordered(v, (1, 2, 3, 0)),
+        ),
+        Mistake("y_up", "the cameras' world has y up and the scene's has z up", lambda v: _turned_world(v, _Y_TO_Z)),
+        Mistake("y_up", "the cameras' world has z up and the scene's has y up", lambda v: _turned_world(v, _Y_TO_Z.T)),
+        Mistake("late", "each picture has the camera of the one before it", lambda v: replace(v, shifted=1)),
+        Mistake("late", "each picture has the camera of the one after it", lambda v: replace(v, shifted=-1)),
+        Mistake(
+            "fov_axis",
+            "the field of view is that of the width and was taken for the height's",
+            lambda v: _of_other_axis(v, True),
+        ),
+        Mistake(
+            "fov_axis",
+            "the field of view is that of the height and was taken for the width's",
+            lambda v: _of_other_axis(v, False),
+        ),
+        Mistake(
+            "distance_for_depth",
+            "the depth maps hold distances from the eye, not depths along the view",
+            lambda v: replace(v, along_ray=True),
+            True,
+        ),
+    ]
+    for text, s in _SIZES.items():
+        fine.append(
+            Mistake(
+                "size",
+                f"focal lengths and principal points are of another size, or resolution percentage: times {text} is right",
+                lambda v, s=s: _scaled(v, s, s),
+            )
+        )
+    for text, s in _HALVES.items():
+        fine.append(
+            Mistake(
+                "focal_of_another_size",
+                f"the focal lengths are of a picture of another size: times {text} is right",
+                lambda v, s=s: _scaled(v, s),
+            )
+        )
+    for text, s in _SIZES.items():
+        fine.append(
+            Mistake(
+                "center_of_another_size",
+                f"the principal points are of a picture of another size: times {text} is right",
+                lambda v, s=s: _scaled(v, 1, s),
+            )
+        )
+    for text, a in _ASPECTS.items():
+        fine.append(
+            Mistake(
+                "aspect", f"the pixels are not square: fl_y should be {text} times what it is", lambda v, a=a: _stretched(v, a)
+            )
+        )
+    fine.append(
+        Mistake(
+            "aspect",
+            "fl_y is that of a square picture: it should be width / height times what it is",
+            lambda v: _stretched(v, v.size[:, 0] / v.size[:, 1]),
+        )
+    )
+    fine.append(
+        Mistake(
+            "aspect",
+            "fl_y is that of a square picture: it should be height / width times what it is",
+            lambda v: _stretched(v, v.size[:, 1] / v.size[:, 0]),
+        )
+    )
+    for text, s in _UNITS.items():
+        fine.append(
+            Mistake(
+                "unit",
+                f"the cameras' places are in another unit than the scene: times {text} is right",
+                lambda v, s=s: replace(v, eye=v.eye * s),
+            )
+        )
+    return fine
+
+
+MISTAKES = _mistakes()
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the evidence says.
+
+    kind : a Mistake's, "none" if the cameras are right, "unknown" if they are wrong in no known way, "unsure" if the evidence
+    is too little. sentence : for people. others : kinds that explain it as well. error, error_as_is : the usual error with the
+    mistake undone and with the cameras as they are. certainty : log likelihood over the cameras as they are.
+    """
+
+    kind: str
+    sentence: str
+    others: tuple[str, ...] = ()
+    error: float = 0.0
+    error_as_is: float = 0.0
+    certainty: float = 0.0
+    observations: int = 0
+
+
+def audit(cameras: Sequence[Camera], evidence: "Tracks | Depths") -> Verdict:
+    """What is wrong with cameras, of which the evidence counts the same pictures in the same order."""
+    return _audited(views_of(cameras), evidence)
+
+
+def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
+    as_is = evidence.errors(views)
+    if len(as_is) < _FEWEST:
+        return Verdict(
+            "unsure", f"{len(as_is)} observations are too few to tell: {_FEWEST} are needed", observations=len(as_is)
+        )
+    of_depth = isinstance(evidence, Depths)
+    tried = [mistake for mistake in MISTAKES if of_depth or not mistake.of_depth]
+    if not of_depth and np.abs(views.center - views.size / 2).max() <= 0.5:
+        tried += _left_out(views, evidence)
+    errors = [evidence.errors(mistake.undone(views)) for mistake in tried]
+    # The usual error is that of the best explanation, so that it does not hide in the worse ones.
+    usual = max(evidence.floor, min(_usual(each, evidence) for each in (as_is, *errors)))
+    costs = np.array([_cost(each, usual) for each in (as_is, *errors)])
+    best = int(np.argmin(costs))
+    found = (as_is, *errors)[best]
+    error, error_as_is = _usual(found, evidence), _usual(as_is, evidence)
+    certainty = float(costs[0] - costs[best])
+    shown = {"error": error, "error_as_is": error_as_is, "certainty": certainty, "observations": len(as_is)}
+    if certainty < _SURE:
+        if error_as_is <= evidence.plausible:
+            return Verdict(
+                "none", f"nothing is wrong with the cameras: the evidence fits to {error_as_is:.2g} {evidence.unit}", **shown
+            )
+        return Verdict(
+            "unknown",
+            f"something is wrong, in no way that is known: the evidence is off by {error_as_is:.3g} {evidence.unit}",
+            **shown,
+        )
+    if error > evidence.plausible:
+        return Verdict(
+            "unknown",
+            f"something is wrong, in no way that is known: the evidence is off by {error_as_is:.3g} {evidence.unit}",
+            **shown,
+        )
+    mistake = tried[best - 1]
+    tied = [tried[i - 1] for i in np.flatnonzero(costs - costs[best] < _TIED) if i and tried[i - 1] is not mistake]
+    first = min([mistake, *tied], key=tried.index)
+    others = tuple(dict.fromkeys(each.kind for each in (mistake, *tied) if each.kind != first.kind))
+    sentence = f"{first.sentence} (undone, the evidence fits to {error:.2g} {evidence.unit} in place of {error_as_is:.3g})"
+    if others:
+        sentence += f"; the evidence can't tell it from: {', '.join(others)}"
+    return Verdict(first.kind, sentence, others, **shown)
+
+
+def _usual(errors: Array, evidence: "Tracks | Depths") -> float:
+    """The largest of the part of the errors that counts; behind the camera they are infinite."""
+    return float(np.sort(errors)[int(evidence.part * (len(errors) - 1))])
+
+
+def _left_out(views: Views, evidence: Tracks) -> list[Mistake]:
+    """The mistake of cameras whose principal point is the middle: the one that the evidence asks for, if that is another."""
+    places, depth = views.project(evidence.which, evidence.points)
+    with np.errstate(all="ignore"):
+        off = (evidence.places - places)[(depth > 0) & np.isfinite(places).all(axis=-1)]
+    offset = np.median(off, axis=0) if len(off) else np.zeros(2)
+    if np.hypot(*offset) < _LEFT_OUT:
+        return []
+    x, y = offset
+    sentence = (
+        f"the principal points were left out: the middle of the picture stands there, {x:+.1f}, {y:+.1f} pixels are right"
+    )
+    return [Mistake("center_left_out", sentence, lambda v: replace(v, center=v.center + offset))]
+
+
+def _cost(errors: Array, usual: float) -> float:
+    """The negative log likelihood of Cauchy's distribution, but for a constant."""
+    bounded = np.minimum(errors / usual, _FARTHEST)
+    return float(np.log1p(bounded * bounded).mean()) * min(len(errors), _COUNTED)

@@ -1,0 +1,149 @@
+"""The evidence that a dataset's files hold on its cameras: a COLMAP model's points and tracks, depth maps of transforms.json.
+
+COLMAP's points are taken with the pixels at which pictures show them, by the names of the pictures. Depth maps are .npy, or PNG
+of 16 bits, which Pillow decodes where it is installed; `depth_unit_scale_factor` (0.001 for PNG) makes them world units.
+"""
+
+import importlib.util
+import struct
+from collections.abc import Iterator, Sequence
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+
+from .. import checks
+from ..errors import InputError
+from . import colmap
+from .audit import Depths, Tracks
+from .camera import Camera
+from .source import Record, Source
+
+_DEPTH_KEYS = ("depth_file_path", "depth_path")
+_NO_POINT = 2**64 - 1
+
+
+def tracks(path: Path, cameras: Sequence[Camera]) -> Tracks | None:
+    """The points of the COLMAP model at a path, as these cameras' pictures show them; None if there are none."""
+    folder = path if path.is_dir() else path.parent
+    try:
+        model = colmap._model(Source(folder))
+    except OSError:
+        return None
+    if model is None:
+        return None
+    where, suffix = model
+    points = where / f"points3D{suffix}"
+    if not points.is_file():
+        return None
+    binary = suffix == ".bin"
+    places = dict(_binary_points(points) if binary else _text_points(points))
+    numbers = {camera.image or camera.name: number for number, camera in enumerate(cameras)}
+    short = {PurePosixPath(name).name: number for name, number in numbers.items()}
+    which, seen, ids = [], [], []
+    for name, found in _binary_tracks(where / "images.bin") if binary else _text_tracks(where / "images.txt"):
+        number = numbers.get(name, short.get(PurePosixPath(name).name))
+        if number is None:
+            continue
+        for x, y, point in found:
+            if point in places:
+                which.append(number)
+                seen.append((x, y))
+                ids.append(point)
+    if not which:
+        return None
+    return Tracks(np.array(which), np.array(seen), np.array([places[point] for point in ids]))
+
+
+def _text_points(path: Path) -> Iterator[tuple[int, tuple[float, float, float]]]:
+    for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
+        words = line.split()
+        if words and not words[0].startswith("#"):
+            try:
+                yield int(words[0]), checks.vector("a point", [float(word) for word in words[1:4]], 3)
+            except ValueError:
+                raise InputError(f"line {number} of {path} is {checks.shown(line)}: it should be POINT3D_ID X Y Z …") from None
+
+
+def _text_tracks(path: Path) -> Iterator[tuple[str, list[tuple[float, float, int]]]]:
+    lines = [line for line in path.read_text(encoding="utf-8", errors="replace").splitlines() if not line.startswith("#")]
+    while lines and not lines[0].strip():
+        lines.pop(0)
+    for head, points in zip(lines[::2], lines[1::2], strict=False):
+        words = points.split()
+        try:
+            name = head.split(maxsplit=9)[9].strip()
+            yield name, [(float(x), float(y), int(p)) for x, y, p in zip(words[::3], words[1::3], words[2::3], strict=True)]
+        except (ValueError, IndexError):
+            raise InputError(
+                f"{path} has a line {checks.shown(head)}: each image has two lines, the second X Y POINT3D_ID"
+            ) from None
+
+
+def _binary_points(path: Path) -> Iterator[tuple[int, tuple[float, float, float]]]:
+    data = path.read_bytes()
+    try:
+        (count,), at = struct.unpack_from("<Q", data), 8
+        for _ in range(count):
+            point, x, y, z = struct.unpack_from("<Q3d", data, at)
+            (length,) = struct.unpack_from("<Q", data, at + 43)
+            at += 51 + 8 * length
+            yield point, checks.vector("a point", (x, y, z), 3)
+    except struct.error:
+        raise InputError(f"{path} ends too early: copy it again") from None
+
+
+def _binary_tracks(path: Path) -> Iterator[tuple[str, list[tuple[float, float, int]]]]:
+    data = path.read_bytes()
+    try:
+        (count,), at = struct.unpack_from("<Q", data), 8
+        for _ in range(count):
+            end = data.index(b"\0", at + 64)
+            name = data[at + 64 : end].decode("utf-8", errors="replace")
+            (many,) = struct.unpack_from("<Q", data, end + 1)
+            if many > len(data) // 24:
+                raise struct.error
+            found = [struct.unpack_from("<2dQ", data, end + 9 + 24 * i) for i in range(many)]
+            at = end + 9 + 24 * many
+            yield name, [each for each in found if each[2] != _NO_POINT]
+    except (struct.error, ValueError):
+        raise InputError(f"{path} ends too early: copy it again") from None
+
+
+def depths(path: Path, cameras: Sequence[Camera]) -> Depths | None:
+    """The depth maps that transforms.json names, one for each camera; None if it names none."""
+    source = Source(path)
+    if source.is_folder and (source := source.file("transforms.json")) is None:
+        return None
+    document = source.document
+    frames = document.get("frames")
+    if not isinstance(frames, list) or len(frames) != len(cameras):
+        return None
+    key = next((key for key in _DEPTH_KEYS if all(isinstance(frame, dict) and key in frame for frame in frames)), None)
+    if key is None:
+        return None
+    scale = Record(document, source.name).number("depth_unit_scale_factor", 0.001, 1e-12, 1e12)
+    said = "depth_unit_scale_factor" in document
+    maps = []
+    for number, frame in enumerate(frames):
+        file = source.path.parent / Record(frame, f"frame {number}").text(key)
+        maps.append(_depth(file, scale, said))
+    return Depths(maps)
+
+
+def _depth(path: Path, scale: float, said: bool) -> np.ndarray:
+    try:
+        if path.suffix == ".npy":
+            depth = np.load(path, allow_pickle=False)
+            scale = scale if said else 1.0
+        elif importlib.util.find_spec("PIL") is None:
+            raise InputError(f"{path} needs Pillow to be read: pip install pillow, or give depth as .npy")
+        else:
+            from PIL import Image
+
+            depth = np.asarray(Image.open(path))
+        depth = np.squeeze(np.asarray(depth, dtype=np.float64)) * scale
+    except (OSError, ValueError, EOFError) as error:
+        raise InputError(f"{path} can't be read as a depth map ({error}): give .npy or PNG of 16 bits") from None
+    if depth.ndim != 2:
+        raise InputError(f"{path} has the shape {depth.shape}: a depth map has rows and columns only")
+    return depth

@@ -1,0 +1,53 @@
+"""`viewcam audit`: what is wrong with a dataset's cameras, by points, depth maps or true cameras (cameras/audit.py)."""
+
+import argparse
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from .. import cameras
+from ..cameras import Camera, Options
+from ..cameras.audit import Depths, Tracks, audit, tracks_through
+from ..cameras.evidence import depths, tracks
+from ..errors import InputError
+from ..terminal import say, silent_libraries
+from . import Result
+
+
+def run(options: argparse.Namespace) -> Result:
+    taken = Options(size=options.size, original_world=True, without_distortion=True)
+    with silent_libraries():
+        found = cameras.read(options.dataset, options=taken)
+        found, evidence, by = _evidence(options, found, taken)
+    verdict = audit(found, evidence)
+    say(f"{options.dataset}: {verdict.sentence}")
+    if verdict.kind not in ("none", "unsure"):
+        say(f"Sure to e^{verdict.certainty:.0f} : 1 by {verdict.observations} observations of {by}")
+    result: dict[str, Any] = {"dataset": str(options.dataset), "evidence": by, **dataclasses.asdict(verdict)}
+    return (0 if verdict.kind in ("none", "unsure") else 1), result
+
+
+def _evidence(
+    options: argparse.Namespace, found: Sequence[Camera], taken: Options
+) -> tuple[Sequence[Camera], Tracks | Depths, str]:
+    """The cameras that there is evidence on, the evidence, and what it is."""
+    if options.against:
+        true = {_called(camera): camera for camera in cameras.read(options.against, options=taken)}
+        both = [camera for camera in found if _called(camera) in true]
+        if not both:
+            raise InputError(f"{options.against} names none of the pictures of {options.dataset}: give the same names")
+        return both, tracks_through([true[_called(camera)] for camera in both]), str(options.against)
+    if points := tracks(options.points or options.dataset, found):
+        return found, points, "points"
+    if options.points is None and (maps := depths(options.dataset, found)):
+        return found, maps, "depth maps"
+    raise InputError(
+        f"{options.points or options.dataset} has no points with tracks and no depth maps: "
+        "give a COLMAP model with --points, or true cameras with --against"
+    )
+
+
+def _called(camera: Camera) -> str:
+    """The picture's name without folder and suffix, by which two files name the same."""
+    return Path(camera.image or camera.name).stem
