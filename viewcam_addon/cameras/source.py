@@ -18,6 +18,7 @@ from xml.parsers import expat
 
 from .. import checks
 from ..errors import InputError
+from ..files import read_bytes
 
 _MOST_BYTES = 2**30
 _DEEPEST = 100
@@ -55,11 +56,9 @@ class Source:
         if self.is_folder:
             return b""
         try:
-            if self.path.exists() and not self.path.is_file():
-                raise InputError(f"{self.path} is no file: give one, or a folder")
             if self.path.stat().st_size > _MOST_BYTES:
                 raise InputError(f"{self.path} is larger than {_MOST_BYTES >> 20} MiB: give the file of the cameras alone")
-            return self.path.read_bytes()
+            return read_bytes(self.path)
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
             raise InputError(f"{self.path} can't be read ({reason}): check its name and permissions") from None
