@@ -548,6 +548,22 @@ def test_what_code_moves_hides_or_leaves_open_is_refused(text, sentence):
         cameras.read(text, options=GL)
 
 
+def test_what_other_things_look_at_is_no_cameras():
+    text = "const view1 = new THREE.PerspectiveCamera(50, 16 / 9); view1.position.set(1, 2, 3); mesh.lookAt(0, 0, 9);"
+    (camera,) = cameras.read(text, options=GL)
+    assert (camera.pinhole.eye, camera.pinhole.look_at) == ((1, 2, 3), (1, 2, 2))
+    (named,) = cameras.read(
+        text.replace("view1", "this.instance").replace("mesh", "this.instance").replace("const ", ""), options=GL
+    )
+    assert (named.pinhole.eye, named.pinhole.look_at) == ((1, 2, 3), (0, 0, 9))
+
+
+def test_a_film_of_pbrt_without_its_size_has_the_size_that_is_asked_for():
+    text = 'LookAt 1 2 3 4 5 6 0 0 1 Camera "perspective" Film "image" "string filename" "a.exr"'
+    (camera,) = cameras.read(text, options=GL)
+    assert (camera.pinhole.width, camera.pinhole.height, camera.size_stated) == (640, 360, False)
+
+
 def test_an_angle_below_pi_is_taken_as_what_the_options_say():
     text = "lookfrom = vec3(1,2,3); lookat = vec3(0,0,0); vup = vec3(0,1,0); vfov = 0.7"
     for unit, angle in (("radians", 0.7), ("degrees", math.radians(0.7))):

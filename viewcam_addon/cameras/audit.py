@@ -25,8 +25,8 @@ from .camera import Camera
 
 Array = NDArray[np.float64]
 
-# log likelihood by which one explanation must beat another: e²⁵ : 1, whatever the number of mistakes that are tried.
-_SURE, _TIED = 25.0, 10.0
+# log likelihood by which one explanation must beat another: e¹⁴ : 1, whatever the number of mistakes that are tried.
+_SURE, _TIED = 14.0, 10.0
 _FEWEST = 40  # observations
 _LEFT_OUT = 2.0  # pixels: less may be anything's
 _COUNTED = 2000  # at most: a systematic error repeats in each, so more of them add no certainty

@@ -42,6 +42,7 @@ _DEFINE = re.compile(r"#\s*+define\s++(\w++)\s++")
 _PATH = r"[A-Za-z_$][\w$]*+(?:(?:\s*+\(\s*+\))?+\s*+(?:\.|->|::)\s*+[A-Za-z_$][\w$]*+)*+"
 _STATEMENT = re.compile(rf"(?<![\w$.])(?<!->)(?<!::)({_PATH})\s*+(?:(=)(?!=)|(\()|(:)(?!:)|(\{{))")
 _PART = re.compile(r"\(\s*\)|\.|->|::|\s")
+_MADE = re.compile(r"([\w$]++)\s*+[=:]\s*+new\s++(?:THREE\s*+\.\s*+)?+PerspectiveCamera\b")
 _IS_CODE = re.compile(r"\w\s*+\(\s*+[-\w.]|;\s*+$|\w\.\w++\s*+[=(]", re.MULTILINE)
 _CAMERA = re.compile(r"cam|view|eye|lens|observer", re.IGNORECASE)
 
@@ -193,6 +194,7 @@ class _Code:
         for found in _DEFINE.finditer(self.text):
             self.assigned.setdefault(found[1], []).append(found.end())
         self._following: set[str] = set()
+        self._cameras = {found[1] for found in _MADE.finditer(self.text)}
         self._values: dict[str, object] = {}
         self._lookups = 0
         self._roles: dict[tuple[str, ...], str | None] = {}
@@ -249,9 +251,8 @@ class _Code:
             return "target_of_controls"
         return None
 
-    @staticmethod
-    def _is_camera(parts: list[str]) -> bool:
-        return any(_CAMERA.search(part) for part in parts)
+    def _is_camera(self, parts: list[str]) -> bool:
+        return any(part in self._cameras or _CAMERA.search(part) for part in parts)
 
     def _name(self, path: str) -> object:
         """What a name stands for: the one value that it is given."""
@@ -302,6 +303,8 @@ class _Code:
             elif role == "moves":
                 continue
             elif role == "look_at":
+                if said.three and len(parts) > 1 and not self._is_camera(parts[:-1]):
+                    continue  # a mesh's or a lamp's
                 self._look_at(said, parts, at - 1, start)
             elif role == "perspective":
                 self._perspective(said, parts, at - 1, start)
