@@ -90,11 +90,11 @@ def prepare_cycles(contest: Contest, path: Path, threads: int) -> dict[str, race
     import viewcam_addon
     from benchmarks import suzannes
     from viewcam_addon.blender import opening
-    from viewcam_addon.blender.borrowing import borrowed, still_of_one_layer
     from viewcam_addon.blender.rendering import cycles
     from viewcam_addon.blender.scenes.depsgraph import render_still
     from viewcam_addon.blender.scenes.export import export_scene
     from viewcam_addon.blender.scenes.ledger import Ledger
+    from viewcam_addon.blender.temporary_settings import borrowed, still_of_one_layer
 
     viewcam_addon.register()
     if contest.scene == "suzannes":

@@ -16,8 +16,8 @@ import pytest
 from viewcam_addon import image
 from viewcam_addon.batch.folder import Folder
 from viewcam_addon.cli import main
-from viewcam_addon.commands import batch, chart, proving
-from viewcam_addon.commands.proving import DEMO_SCENE
+from viewcam_addon.commands import batch, chart, verification
+from viewcam_addon.commands.verification import DEMO_SCENE
 
 CAMERA = {"eye": [0, -5, 0], "look_at": [0, 0, 0], "up": [0, 0, 1], "distance": 100, "width": 64, "height": 48}
 SCENE = {
@@ -315,7 +315,7 @@ def test_where_nothing_can_be_written_one_line_says_so_and_nothing_is_left(tmp_p
 def test_what_can_not_be_written_is_said_before_anything_is_traced_or_rendered(tmp_path, capfd, monkeypatch, words, output):
     """Before, `render` traced for half a minute and then found that its target is a folder."""
     begun = []
-    for module, name in [(proving, words[0]), (batch, "run")]:
+    for module, name in [(verification, words[0]), (batch, "run")]:
         monkeypatch.setattr(module, name, lambda options: begun.append(options) or (0, {}), raising=False)
     (tmp_path / "file").write_text("no folder")
     bad = str(tmp_path / "file" / "out.png")

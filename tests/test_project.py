@@ -28,7 +28,7 @@ ROOMS = {
     "terminal": "",
     "events": "terminal",
     "words": "",
-    "paper": "",
+    "html_theme": "",
     "children": "",
     "crashes": "",
     "exact": "",
@@ -42,11 +42,11 @@ ROOMS = {
     "camera_values": "errors checks pinhole roll intrinsics",
     "cameras": "errors checks files pinhole intrinsics",
     "datasets": "files pinhole cameras",
-    "comparison": "errors files paper pinhole image",
+    "comparison": "errors files html_theme pinhole image",
     "tracer": "errors checks memory files exact pinhole image",
     "api": "errors children image comparison tracer",
     "shots": "errors checks files terminal pinhole moves tracer",
-    "batch": "errors checks files events paper children pinhole image cameras datasets comparison tracer shots",
+    "batch": "errors checks files events html_theme children pinhole image cameras datasets comparison tracer shots",
     "blender": (
         "errors checks files terminal children pinhole roll rotation moves diagram image intrinsics camera_values "
         "cameras datasets comparison tracer shots batch"
@@ -58,8 +58,8 @@ ROOMS = {
 }
 BLENDER_ROOMS = {
     "versions": "",
-    "borrowing": "",
-    "opening": "borrowing",
+    "temporary_settings": "",
+    "opening": "temporary_settings",
     "findings": "",
     "render_settings": "",
     "preferences": "render_settings",
@@ -73,10 +73,10 @@ BLENDER_ROOMS = {
     "properties": "datablocks storage targets camera",
     "resolution": "datablocks storage camera",
     "animation": "versions datablocks storage targets camera resolution",
-    "scenes": "versions borrowing findings datablocks pose camera",
-    "rendering": "versions borrowing opening datablocks resolution scenes",
+    "scenes": "versions temporary_settings findings datablocks pose camera",
+    "rendering": "versions temporary_settings opening datablocks resolution scenes",
     "interface": "versions findings render_settings preferences datablocks storage targets hold pose camera scenes rendering",
-    "batch": "versions borrowing opening datablocks camera resolution scenes rendering",
+    "batch": "versions temporary_settings opening datablocks camera resolution scenes rendering",
 }
 # Inside the tracer a room may import from all those before it.
 TRACER_FLOORS = ["arrays", "compiled", "scene", "rays", "light", "kernels", "tiles", "render"]

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from . import batch_words, camera_words, checks, events, words
-from .commands import Result, audit, batch, camera, chart, proving, serve
+from .commands import Result, audit, batch, camera, chart, serve, verification
 from .errors import InputError, bug
 from .files import check_writable, is_printed_to, written_whole
 from .tracer.scene.film import SAMPLES
@@ -144,13 +144,13 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         added.set_defaults(writes=("report", "difference"))
         added.add_argument("--repeat", help=argparse.SUPPRESS)  # what the report shall name as its command
 
-    added = command(proving.export, "export", "Write the scene of a .blend as the tracer reads it.")
+    added = command(verification.export, "export", "Write the scene of a .blend as the tracer reads it.")
     blend(added)
     added.add_argument("scene", metavar="SCENE.json", type=Path)
     added.set_defaults(writes=("scene",))
     scene_choices(added)
 
-    added = command(proving.render, "render", "Trace a scene file into an EXR.")
+    added = command(verification.render, "render", "Trace a scene file into an EXR.")
     added.add_argument("scene", metavar="SCENE.json", type=Path)
     added.add_argument("image", metavar="OUT.exr", type=Path)
     added.set_defaults(writes=("image",))
@@ -161,14 +161,14 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     error(spent, "in place of --samples")
 
     added = command(
-        proving.cycles, "cycles", "Render a .blend with Cycles so that it can be compared, and give every setting back."
+        verification.cycles, "cycles", "Render a .blend with Cycles so that it can be compared, and give every setting back."
     )
     blend(added)
     added.add_argument("image", metavar="OUT.exr", type=Path)
     added.set_defaults(writes=("image",))
     scene_choices(added)
 
-    added = command(proving.compare, "compare", "Compare EXRs of one camera against derived tolerances and noise.")
+    added = command(verification.compare, "compare", "Compare EXRs of one camera against derived tolerances and noise.")
     added.add_argument("reference", metavar="REFERENCE.exr", type=Path)
     added.add_argument(
         "tests", metavar="TEST.exr", type=Path, nargs="+", help="several are one picture, rendered with several seeds"
@@ -180,7 +180,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     added.add_argument("--test-samples", type=words.positive, help=argparse.SUPPRESS)
     report(added)
 
-    added = command(proving.check, "check", "Export, trace, render with Cycles and compare, all in one go.")
+    added = command(verification.check, "check", "Export, trace, render with Cycles and compare, all in one go.")
     blend(added)
     scene_choices(added)
     error(added, "the tracer takes")
@@ -199,8 +199,10 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     added = command(camera.run, "camera", "List the cameras of another program's file, or write them for a third one.")
     camera_words.add(added)
 
-    added = command(proving.demo, "demo", "Check the studio still that comes with the project, and write the report.")
-    added.set_defaults(blend=proving.DEMO_SCENE, camera=None, frame=None, size=None, strict=False, recenter=False, clay=False)
+    added = command(verification.demo, "demo", "Check the studio still that comes with the project, and write the report.")
+    added.set_defaults(
+        blend=verification.DEMO_SCENE, camera=None, frame=None, size=None, strict=False, recenter=False, clay=False
+    )
     added.set_defaults(difference=None, repeat=None, trust=False, writes=("report",))
     light(added)
     error(added, "the tracer takes")

@@ -12,7 +12,7 @@ import signal
 import sys
 
 COMMANDS = ("export", "cycles", "check", "demo")
-"""Those that open a .blend in their own process. A batch whose Blender is another process says so itself (batch/served.py)."""
+"""Those that open a .blend in their own process. A batch whose Blender is another process says so itself (render_client.py)."""
 
 _ASKED_FOR = (signal.SIGINT, signal.SIGTERM)
 _PR_SET_PDEATHSIG = 1

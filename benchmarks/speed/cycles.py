@@ -7,11 +7,11 @@ import bpy
 
 import viewcam_addon
 from viewcam_addon.blender import opening, versions
-from viewcam_addon.blender.borrowing import Borrower, still_of_one_layer
 from viewcam_addon.blender.rendering import cycles
 from viewcam_addon.blender.scenes.depsgraph import render_still
 from viewcam_addon.blender.scenes.export import export_scene
 from viewcam_addon.blender.scenes.ledger import Ledger, Remedy
+from viewcam_addon.blender.temporary_settings import Borrower, still_of_one_layer
 from viewcam_addon.tracer.scene import scene_file
 from viewcam_addon.tracer.scene.film import NO_BOUNCES
 

@@ -16,9 +16,9 @@ from pathlib import Path
 import pytest
 
 from viewcam_addon import children, cli
-from viewcam_addon.batch import cluster, one, run, served
+from viewcam_addon.batch import cluster, one, render_client, run
 from viewcam_addon.batch.folder import Folder
-from viewcam_addon.batch.served import ServedRenderer
+from viewcam_addon.batch.render_client import ServedRenderer
 from viewcam_addon.errors import InputError
 from viewcam_addon.shots import Shot
 
@@ -131,7 +131,7 @@ def test_a_shot_that_always_crashes_blender_fails_and_the_rest_go_on(stand_in, m
     assert summary.exit_status == 4
     failed = {fields["shot"]: fields["error"] for fields in ear.all("shot_failed")}
     assert set(failed) == {"crash", "bad"}
-    assert f"{served.ATTEMPTS} times in a row" in failed["crash"] and failed["bad"] == "bad has no light: add some"
+    assert f"{render_client.ATTEMPTS} times in a row" in failed["crash"] and failed["bad"] == "bad has no light: add some"
     assert {fields["shot"] for fields in ear.all("shot_done")} == {"a", "b", "c"}
 
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from viewcam_addon import image
-from viewcam_addon.batch import partner
+from viewcam_addon.batch import child_process
 from viewcam_addon.batch.judge import Judge
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
@@ -200,7 +200,7 @@ def test_a_judge_that_was_lost_is_started_again(scene_path, picture):
     with Judge() as judge:
         assert judge.verdict(scene_path, taken, CAMERA, CLIP)["passed"]
         judge._partner._family.end()
-        with pytest.raises(partner.Gone, match="the judge has ended"):
+        with pytest.raises(child_process.Gone, match="the judge has ended"):
             judge.verdict(scene_path, taken, CAMERA, CLIP)
         assert judge.verdict(scene_path, taken, CAMERA, CLIP)["passed"]
 

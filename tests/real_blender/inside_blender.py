@@ -95,8 +95,8 @@ def export(file, *arguments):
 
 
 def viewcam(*arguments):
-    surroundings = importlib.import_module(f"{enable().__name__}.commands.surroundings")
-    sys.exit(surroundings.run_beside(*arguments))
+    processes = importlib.import_module(f"{enable().__name__}.commands.processes")
+    sys.exit(processes.run_beside(*arguments))
 
 
 def apply(file, output, pinhole):

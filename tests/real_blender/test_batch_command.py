@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from viewcam_addon.commands.proving import DEMO_SCENE
+from viewcam_addon.commands.verification import DEMO_SCENE
 
 CORNELL = DEMO_SCENE.with_name("cornell.blend")
 ORBIT = ("--orbit", "3", "--size", "16x16", "--samples", "1", "--out")

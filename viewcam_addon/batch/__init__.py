@@ -7,9 +7,9 @@
     locks, interruption   shared work; the first signal and the second
     summary, sheet        what it came to, as JSON and as a page of thumbnails
     dataset               what it came to, as those read it who learn a scene from its pictures
-    partner               a process that is kept open and asked; on it stand
+    child_process         a process that is kept open and asked; on it stand
     judge                     is what was rendered what the sidecar says?
-    serving, served           a renderer in a process of its own
+    render_server, render_client    a renderer in a process of its own
     cluster, worker           shots on several workers, each of which keeps such a process
 
 **Nothing lost.** A file appears whole or not at all (files.py), and a shot's sidecar is written last and taken away first: a

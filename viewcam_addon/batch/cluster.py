@@ -29,7 +29,7 @@ from typing import Any
 
 from ..errors import FullDiskError, InputError, bug
 from ..shots import Shot
-from . import served
+from . import render_client
 from .folder import Folder
 from .one import Outcome, Work
 
@@ -87,7 +87,7 @@ def opened(scheduler: str | None, workers: int | None, blender: str | None = Non
                 local_directory=scratch,
                 silence_logs=logging.CRITICAL,
                 preload=[_WORKER],
-                env={served.BLENDER: os.environ.get(served.BLENDER) or blender or ""},
+                env={render_client.BLENDER: os.environ.get(render_client.BLENDER) or blender or ""},
             )
             with _ending(local), _ending(distributed.Client(local, set_as_default=False)) as client:
                 yield Cluster(client, max(1, _cores() // count))

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from .. import checks, children
 from ..errors import InputError
 from ..pinhole import Pinhole
-from . import partner
+from . import child_process
 
 if TYPE_CHECKING:
     from ..comparison.geometry import Comparison
@@ -35,7 +35,7 @@ class Judge:
 
     def __init__(self, threads: int | None = None) -> None:
         self._threads = threads
-        self._partner: partner.Partner | None = None
+        self._partner: child_process.Partner | None = None
 
     def verdict(
         self, scene: Path, image: Path, camera: Pinhole, clip: tuple[float, float], stated: Pinhole | None = None
@@ -58,7 +58,7 @@ class Judge:
         if self._partner is None:
             if sentence := lacking():
                 raise InputError(sentence)
-            self._partner = partner.Partner("the judge", children.module("batch.judge"), children.environment())
+            self._partner = child_process.Partner("the judge", children.module("batch.judge"), children.environment())
         request = {
             "scene": str(scene),
             "image": str(image),
@@ -69,7 +69,7 @@ class Judge:
         }
         try:
             return self._partner.ask(request)
-        except partner.Gone:
+        except child_process.Gone:
             self.close()
             raise
 
@@ -130,4 +130,4 @@ def _figures(comparison: "Comparison") -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    partner.answer(sys.argv[1], _Bench().answer)
+    child_process.answer(sys.argv[1], _Bench().answer)

@@ -12,7 +12,7 @@ from html import escape
 from pathlib import Path
 from urllib.parse import quote
 
-from .. import paper
+from .. import html_theme
 from ..files import written_whole
 from .summary import Result
 
@@ -54,14 +54,14 @@ def write(path: Path, pictures: Sequence[str], counts: Mapping[str, int]) -> Non
     well = counts["done"] == counts["shots"] and not counts["checks_failed"]
     parts = {
         "outcome": "passed" if well else "failed",
-        "icon": paper.MARKS[well],
+        "icon": html_theme.MARKS[well],
         "title": "1 shot" if counts["shots"] == 1 else f"{counts['shots']:,} shots",
         "lede": _lede(counts),
         "choice": "" if well else '<label class="choice"><input type="checkbox" id="wrong"> Only what went wrong</label>',
         "pictures": "\n".join(pictures),
     }
     with written_whole(path) as temporary:
-        text = paper.filled(Path(__file__).with_suffix(".html"), parts)
+        text = html_theme.filled(Path(__file__).with_suffix(".html"), parts)
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 

@@ -14,7 +14,7 @@ from ..errors import FullDiskError, InputError, told
 from ..shots import Shot
 from .folder import Folder
 from .one import render_one
-from .served import ServedRenderer
+from .render_client import ServedRenderer
 
 
 class _Blender:

@@ -18,7 +18,7 @@ import bpy
 
 from ..errors import InputError
 from . import ensure_registered
-from .borrowing import Borrower, borrowed
+from .temporary_settings import Borrower, borrowed
 
 # What a .blend starts with: itself, or a gzip or Zstandard stream.
 _MAGIC = (b"BLENDER", b"\x1f\x8b", b"\x28\xb5\x2f\xfd")

@@ -14,7 +14,7 @@ from typing import Any
 
 from .. import cameras
 from .. import shots as lists
-from ..batch import cluster, dataset, one, served
+from ..batch import cluster, dataset, one, render_client
 from ..batch import run as running
 from ..batch.folder import Folder
 from ..batch.interruption import Interruption
@@ -24,7 +24,7 @@ from ..shots import Shot, ShotsError
 from ..terminal import say, silent_libraries
 from . import Result
 from .camera import options_of
-from .surroundings import blender_room
+from .processes import blender_room
 
 _MOST_NAMED = 5
 _OPEN_TO_ALL = "whoever reaches {} can run any program on its workers: docs/farm.md says how TLS lets in only your own"
@@ -95,9 +95,9 @@ def _renderer(options: argparse.Namespace) -> contextlib.AbstractContextManager:
 
     The bpy module puts folders on sys.path in which a worker's children, who get that path, would find half a bpy.
     """
-    apart = os.environ.get(served.BLENDER) or _on_cluster(options) or options.time_limit
+    apart = os.environ.get(render_client.BLENDER) or _on_cluster(options) or options.time_limit
     if options.blend is not None and apart:
-        return served.ServedRenderer(options.blend, options.seed, options.threads, options.trust, options.time_limit)
+        return render_client.ServedRenderer(options.blend, options.seed, options.threads, options.trust, options.time_limit)
     if options.time_limit and not _on_cluster(options):
         raise InputError("--time-limit ends the Blender of a shot, and here that is this one: give --workers 1 as well")
     return blender_room("batch.renderer").BlenderRenderer(options.blend, options.seed, options.threads, options.trust)

@@ -2,11 +2,11 @@
 
 import argparse
 
-from ..batch import serving
+from ..batch import render_server
 from . import Result
-from .surroundings import blender_room
+from .processes import blender_room
 
 
 def run(options: argparse.Namespace) -> Result:
-    serving.serve(options.handle, blender_room("batch.renderer").BlenderRenderer)
+    render_server.serve(options.handle, blender_room("batch.renderer").BlenderRenderer)
     return 0, {}

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import written_whole
+from ..html_theme import MARKS, filled
 from ..image import Image
-from ..paper import MARKS, filled
 from ..pinhole import Pinhole
 from . import pictures
 from .charts import figure

@@ -6,9 +6,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender.borrowing import borrowed
 from viewcam_addon.blender.rendering import cycles, job
 from viewcam_addon.blender.scenes import depsgraph, indices
+from viewcam_addon.blender.temporary_settings import borrowed
 from viewcam_addon.errors import InputError
 
 # What describes the settings, what follows from them, and brushes (reading some of them crashes 4.2).

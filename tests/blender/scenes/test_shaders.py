@@ -4,8 +4,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender.borrowing import borrowed
 from viewcam_addon.blender.scenes import materials, shaders
+from viewcam_addon.blender.temporary_settings import borrowed
 from viewcam_addon.tracer.scene.materials import PLAIN, Colour, Material
 
 RED, GREEN = (0.5, 0.25, 0.125), (0.0, 1.0, 0.5)

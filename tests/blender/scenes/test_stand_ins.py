@@ -4,8 +4,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender.borrowing import borrowed
 from viewcam_addon.blender.scenes import materials
+from viewcam_addon.blender.temporary_settings import borrowed
 
 
 def bare_objects(count):

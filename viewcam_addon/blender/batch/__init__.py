@@ -1,8 +1,8 @@
 """A batch where Blender is: one .blend, opened once, and many shots of it.
 
 renderer.py    opens, borrows, renders shot after shot, and gives everything back
-lending.py     what of the file's settings a batch changes for its time, and why each
-keeping.py     what Blender keeps from shot to shot, and where it must not
+shot_settings.py     what of the file's settings a batch changes for its time, and why each
+persistent_data.py     what Blender keeps from shot to shot, and where it must not
 pictures.py    a render as files: EXR and preview, the same bytes each time
 origins.py     what the pictures are made from: hashes of the .blend and all it links
 checking.py    whether Cycles and the tracer see the same through a shot's camera

@@ -26,12 +26,12 @@ from ...pinhole import Pinhole
 from ...tracer.scene import LedgerEntry, Scene, scene_file
 from ...tracer.scene.sameness import same_things
 from .. import datablocks
-from ..borrowing import borrowed
 from ..rendering import cycles, job
 from ..scenes import indices
 from ..scenes.export import export_scene
 from ..scenes.ledger import Ledger, Remedy
-from . import keeping
+from ..temporary_settings import borrowed
+from . import persistent_data
 
 _MOST_TOLD = 5
 
@@ -94,7 +94,7 @@ class Checker:
 
     @functools.cached_property
     def _changes(self) -> bool:
-        return keeping.changes_between_renders()
+        return persistent_data.changes_between_renders()
 
     def _exported(self, scene: bpy.types.Scene, layer: bpy.types.ViewLayer, camera_object: bpy.types.Object) -> _Export:
         """The scene as it is now, from the last shot if it can be no other."""

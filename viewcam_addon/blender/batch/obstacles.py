@@ -13,7 +13,7 @@ from ...shots import Shot
 from .. import camera as cameras
 from .. import datablocks, versions
 from . import graphics
-from .lending import Lent, engine_name
+from .shot_settings import Lent, engine_name
 
 _DRAWN = (versions.EEVEE, "BLENDER_WORKBENCH")
 

@@ -13,9 +13,9 @@ import bpy
 
 from ...errors import InputError
 from .. import versions
-from ..borrowing import Borrower
 from ..rendering import exr, png
 from ..rendering.cycles import borrow_whole
+from ..temporary_settings import Borrower
 
 _PASSING = ("Date", "File", "Hostname", "Memory", "RenderTime")
 _PROBE = bytes(2**20)

@@ -5,8 +5,8 @@
             renderer.render(shot, image, preview)
 
 A shot is what `blender -b FILE -f N` would render (all view layers, the compositor, samples, world and passes as they are),
-from the shot's camera: `lending.py` has what else is another. The four values go to a camera of the batch's own, which has the
-clip range of the scene's camera; one of the file is rendered as it stands. The file is never saved.
+from the shot's camera: `shot_settings.py` has what else is another. The four values go to a camera of the batch's own, which
+has the clip range of the scene's camera; one of the file is rendered as it stands. The file is never saved.
 
 Rejected: `-f` in a process each (a start, a file and an acceleration structure built for each shot), and the artist's own
 camera for the four values (what carries it would carry them).
@@ -25,13 +25,13 @@ from ...pinhole import Pinhole
 from ...shots import Shot
 from .. import camera as cameras
 from .. import datablocks
-from ..borrowing import Borrower
 from ..opening import opened
 from ..rendering.engine import VIEWCAM_RenderEngine
 from ..scenes.depsgraph import render_still
+from ..temporary_settings import Borrower
 from . import obstacles, origins, pictures
 from .checking import Checker
-from .lending import Lent
+from .shot_settings import Lent
 
 _NAME = "viewcam batch"
 
@@ -141,7 +141,7 @@ class BlenderRenderer:
         """
         self._lent.set(shot)
         warnings = self._aim(shot)
-        if self._lent.engine == "EEVEE" and not self._has_drawn:  # see keeping.py
+        if self._lent.engine == "EEVEE" and not self._has_drawn:  # see persistent_data.py
             render_still(self.scene)
             self._has_drawn = True
         render_still(self.scene)

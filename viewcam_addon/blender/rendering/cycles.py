@@ -18,10 +18,10 @@ from ...errors import InputError
 from ...files import written_whole
 from ...tracer.scene.film import Bounces, Film
 from .. import versions
-from ..borrowing import Borrower, borrowed, still_of_one_layer
 from ..scenes import film
 from ..scenes.depsgraph import render_still
 from ..scenes.ledger import Remedy
+from ..temporary_settings import Borrower, borrowed, still_of_one_layer
 from .exr import is_whole
 
 _SAMPLING = {

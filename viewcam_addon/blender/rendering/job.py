@@ -17,11 +17,11 @@ from ...tracer.scene import LedgerEntry, Scene
 from ...tracer.scene.film import LEVELS, NO_BOUNCES, SAMPLES
 from ...tracer.scene.levels import least_level
 from .. import datablocks, resolution
-from ..borrowing import Borrower
 from ..opening import opened
 from ..scenes import indices, materials, recentering
 from ..scenes.export import Light, export_scene, survey
 from ..scenes.ledger import Ledger
+from ..temporary_settings import Borrower
 from . import cycles
 
 AUTO = "auto"

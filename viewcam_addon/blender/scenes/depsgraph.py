@@ -12,7 +12,7 @@ from typing import TypeVar
 import bpy
 
 from ...errors import InputError
-from ..borrowing import borrowed
+from ..temporary_settings import borrowed
 
 Result = TypeVar("Result")
 

@@ -20,7 +20,7 @@ from ...tracer.scene import Mesh, Object, Scene, Spheres
 from ...tracer.scene.film import Bounces, Film
 from ...tracer.scene.lamps import RAYS, Lamp, World
 from .. import camera as cameras
-from ..borrowing import borrowed, still_of_one_layer
+from ..temporary_settings import borrowed, still_of_one_layer
 from . import export_geometry, features, film, lamps, world
 from .depsgraph import visit
 from .ledger import Ledger

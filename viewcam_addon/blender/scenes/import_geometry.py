@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...tracer.scene import Mesh, Spheres
 from .. import datablocks, versions
-from ..borrowing import Borrower, borrowed
+from ..temporary_settings import Borrower, borrowed
 from .ledger import Ledger
 
 Array = NDArray[np.generic]

@@ -12,7 +12,7 @@ from ...tracer.scene import Scene
 from ...tracer.scene.film import Bounces, Film
 from ...tracer.scene.lamps import RAYS, Area, Lamp, Spot, Sun, World
 from ...tracer.scene.materials import PLAIN, Material, Picture
-from ..borrowing import Borrower
+from ..temporary_settings import Borrower
 from . import film, materials, nodes, shaders
 from .indices import LARGEST
 from .ledger import Ledger

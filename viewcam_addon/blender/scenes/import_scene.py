@@ -28,7 +28,7 @@ from ...tracer.scene import LedgerEntry, Mesh, Object, Scene
 from ...tracer.scene.depths import visible_depths
 from .. import camera as cameras
 from .. import datablocks, findings
-from ..borrowing import Borrower
+from ..temporary_settings import Borrower
 from . import import_geometry, import_light
 from .indices import LARGEST
 from .ledger import Ledger

@@ -14,7 +14,7 @@ import numpy as np
 from ...tracer.scene.film import Bounces
 from ...tracer.scene.lamps import Area, Lamp, Point, Spot, Sun
 from .. import versions
-from ..borrowing import Borrower
+from ..temporary_settings import Borrower
 from . import features, nodes, shaders
 from .ledger import Ledger
 from .nodes import Input, Output

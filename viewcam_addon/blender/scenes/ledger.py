@@ -10,7 +10,7 @@ import bpy
 
 from ...errors import NotModelledError
 from ...tracer.scene import LedgerEntry
-from ..borrowing import Borrower
+from ..temporary_settings import Borrower
 
 Remedy = Callable[[Borrower], None]
 

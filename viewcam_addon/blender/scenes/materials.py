@@ -13,7 +13,7 @@ import bpy
 
 from ...tracer.scene.materials import PLAIN, Colour
 from .. import versions
-from ..borrowing import Borrower
+from ..temporary_settings import Borrower
 from . import nodes, shaders
 
 # Node types that let something else than the surface's own geometry into the passes.

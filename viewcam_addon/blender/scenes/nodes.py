@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import bpy
 
-from ..borrowing import Borrower
+from ..temporary_settings import Borrower
 
 
 class Input(NamedTuple):

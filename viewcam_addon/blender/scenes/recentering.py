@@ -34,7 +34,7 @@ from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import datablocks, findings, pose
-from ..borrowing import Borrower, borrowed, still_of_one_layer
+from ..temporary_settings import Borrower, borrowed, still_of_one_layer
 from . import features, materials
 from .depsgraph import visit
 from .export import light_in, placements
@@ -233,7 +233,7 @@ def _empty_scene(borrow: Borrower, scene: bpy.types.Scene, view_layer: bpy.types
     borrow.afterwards(bpy.data.scenes.remove, temporary)
     for name in _FRAME:
         setattr(temporary.render, name, getattr(scene.render, name))
-    temporary.render.use_crop_to_border = scene.render.use_border  # as in borrowing.still_of_one_layer
+    temporary.render.use_crop_to_border = scene.render.use_border  # as in temporary_settings.still_of_one_layer
     if hasattr(scene, "cycles"):
         for name in CYCLES_SETTINGS:
             setattr(temporary.cycles, name, getattr(scene.cycles, name))

@@ -4,7 +4,7 @@ import bpy
 
 from ...tracer.scene.lamps import World
 from .. import versions
-from ..borrowing import Borrower
+from ..temporary_settings import Borrower
 from . import images, nodes, shaders
 from .ledger import Ledger
 from .nodes import Input, Output

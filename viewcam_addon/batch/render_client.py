@@ -18,7 +18,7 @@ from .. import children
 from ..errors import InputError
 from ..pinhole import Pinhole
 from ..shots import Shot
-from .partner import Gone, Partner, TooLong
+from .child_process import Gone, Partner, TooLong
 
 BLENDER = "VIEWCAM_BLENDER"
 """The variable that names the Blender."""

@@ -1,7 +1,7 @@
 """What every HTML page of this project has in common: its colours by day and by night, its type, its two marks.
 
 A page is a template of string.Template beside the code that fills it, one file that holds all it needs; `$paper` in it is
-paper.css.
+html_theme.css.
 """
 
 from collections.abc import Mapping

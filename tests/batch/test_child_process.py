@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from viewcam_addon import children, errors
-from viewcam_addon.batch.partner import Gone, Partner
+from viewcam_addon.batch.child_process import Gone, Partner
 
 ECHO = """
 import os, signal, sys, time
 from viewcam_addon import errors
-from viewcam_addon.batch import partner
+from viewcam_addon.batch import child_process
 
 def answers(request):
     print("words that are nobody's business")
@@ -28,13 +28,13 @@ def answers(request):
         time.sleep(request["sleep"])
     return {"heard": request, "process": os.getpid()}
 
-partner.answer(sys.argv[1], answers, idle=float(os.environ.get("IDLE", "600")))
+child_process.answer(sys.argv[1], answers, idle=float(os.environ.get("IDLE", "600")))
 """
 # Asks one thing, tells who answered, and waits to be killed.
 ASKER = """
 import sys, time
 from viewcam_addon import children
-from viewcam_addon.batch.partner import Partner
+from viewcam_addon.batch.child_process import Partner
 echo = Partner("the echo", [sys.executable, "-c", sys.argv[1]], children.environment())
 print(echo.ask({})["process"], flush=True)
 echo.ask({"sleep": float(sys.argv[2])})

@@ -8,9 +8,9 @@ import time
 
 import pytest
 
-from viewcam_addon.batch import one, partner, served
+from viewcam_addon.batch import child_process, one, render_client
 from viewcam_addon.batch.folder import Folder
-from viewcam_addon.batch.served import ServedRenderer
+from viewcam_addon.batch.render_client import ServedRenderer
 from viewcam_addon.errors import FullDiskError, InputError
 from viewcam_addon.shots import Shot
 
@@ -70,20 +70,20 @@ def test_a_blender_that_crashes_in_the_check_renders_the_shot_again_before_it_ch
 
 def test_a_shot_in_which_blender_always_crashes_fails_and_the_next_one_is_rendered(renderer, stand_in, tmp_path):
     with pytest.raises(
-        InputError, match=rf"^{served.ATTEMPTS} times in a row .*blender has ended with signal {signal.SIGKILL:d}"
+        InputError, match=rf"^{render_client.ATTEMPTS} times in a row .*blender has ended with signal {signal.SIGKILL:d}"
     ):
         renderer.render(shot("crash"), tmp_path / "a.exr", tmp_path / "a.png")
-    assert len(stand_in.diary("render")) == served.ATTEMPTS
+    assert len(stand_in.diary("render")) == render_client.ATTEMPTS
     assert renderer.render(shot("b"), tmp_path / "b.exr", tmp_path / "b.png")
 
 
 def test_a_blender_that_was_killed_between_two_shots_costs_no_attempt(renderer, stand_in, tmp_path, processes):
-    for number in range(served.ATTEMPTS + 1):
+    for number in range(render_client.ATTEMPTS + 1):
         renderer.render(shot(f"a{number}"), tmp_path / "a.exr", tmp_path / "a.png")
         process = int(stand_in.diary("open")[-1][-1])
         os.kill(process, signal.SIGKILL)
         assert processes.until(lambda process=process: not processes.run(process))
-    assert len(stand_in.diary("render")) == served.ATTEMPTS + 1
+    assert len(stand_in.diary("render")) == render_client.ATTEMPTS + 1
 
 
 @pytest.mark.parametrize(
@@ -129,13 +129,13 @@ def test_a_program_that_does_not_serve_is_one_sentence(monkeypatch, blend, tmp_p
 
 def test_where_there_is_no_blender_at_all_a_sentence_says_how_to_have_one(monkeypatch, blend):
     monkeypatch.delenv("VIEWCAM_BLENDER", raising=False)
-    monkeypatch.setattr(served.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(render_client.importlib.util, "find_spec", lambda name: None)
     with ServedRenderer(blend) as renderer, pytest.raises(InputError, match="name one in VIEWCAM_BLENDER, or pip install bpy"):
         renderer.open()
 
 
 def test_a_blender_that_is_stopped_in_a_shot_is_ended_and_the_shot_rendered_by_another(stand_in, blend, tmp_path, monkeypatch):
-    monkeypatch.setattr(partner, "SILENCE", 3.0)
+    monkeypatch.setattr(child_process, "SILENCE", 3.0)
     stopping = threading.Thread(target=lambda: os.kill(int(waits(stand_in)), signal.SIGSTOP))
     stopping.start()
     with ServedRenderer(blend) as renderer:
@@ -152,7 +152,7 @@ def waits(stand_in):
 
 
 def test_a_shot_that_takes_long_is_left_alone_while_its_blender_gives_signs_of_life(stand_in, blend, tmp_path, monkeypatch):
-    monkeypatch.setattr(partner, "SILENCE", 5.0)
+    monkeypatch.setattr(child_process, "SILENCE", 5.0)
     stopping = threading.Thread(target=lambda: (waits(stand_in), time.sleep(8), os.kill(int(waits(stand_in)), signal.SIGKILL)))
     stopping.start()
     with ServedRenderer(blend) as renderer:

@@ -1,8 +1,8 @@
 """A Blender that serves: in a process of its own, it holds one scene open and renders shot after shot for another process.
 
-This is what `viewcam serve` does, which served.py starts; both ends of their talk are in these two files. Rejected: a Blender
-for each shot (most of a small shot's time would be Blender's start and the file's loading), and Blender in a worker's own
-process, which a crash of Blender would end, with all that the worker knows.
+This is what `viewcam serve` does, which render_client.py starts; both ends of their talk are in these two files. Rejected: a
+Blender for each shot (most of a small shot's time would be Blender's start and the file's loading), and Blender in a worker's
+own process, which a crash of Blender would end, with all that the worker knows.
 """
 
 import contextlib
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..shots import Shot
-from . import partner
+from . import child_process
 
 IDLE = 120.0
 """Seconds after which a Blender that is asked for nothing ends: a farm's worker outlives the batches that it worked for."""
@@ -25,7 +25,7 @@ def serve(handle: str, opened: Callable[..., Any]) -> None:
     `seed`, `threads` and `trust`.
     """
     with contextlib.ExitStack() as stack:
-        partner.answer(handle, _Served(stack, opened).answer, IDLE)
+        child_process.answer(handle, _Served(stack, opened).answer, IDLE)
 
 
 class _Served:

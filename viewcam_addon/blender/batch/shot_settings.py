@@ -2,7 +2,7 @@
 
 **For all of it.** One camera must be had: markers bound to cameras, stereoscopy and the sequencer's strips would choose others.
 Files are the batch's own: the compositor's File Output nodes are muted. What Blender and Cycles have built is kept between
-shots (keeping.py), and no camera of the file follows a picture of another size (resolution.py).
+shots (persistent_data.py), and no camera of the file follows a picture of another size (resolution.py).
 
 **For each shot**, what it says: engine, size, frame, samples, level. What it does not say is as the file has it.
 """
@@ -15,9 +15,9 @@ import bpy
 from ... import intrinsics
 from ...shots import Shot
 from .. import datablocks, resolution, versions
-from ..borrowing import Borrower, cameras_unbound
 from ..rendering.engine import VIEWCAM_RenderEngine
-from . import keeping, origins, pictures
+from ..temporary_settings import Borrower, cameras_unbound
+from . import origins, persistent_data, pictures
 
 _ENGINES = {"CYCLES": "CYCLES", "EEVEE": versions.EEVEE, "VIEWCAM": "VIEWCAM"}
 
@@ -46,8 +46,8 @@ class Lent:
             borrow.set(render, name, False)
         borrow.set(render, "use_persistent_data", True)
         borrow.set(VIEWCAM_RenderEngine, "keeps_scene", True)
-        keeping.drop(scene)
-        self._drop_at_cameras = keeping.is_driven_by_camera()
+        persistent_data.drop(scene)
+        self._drop_at_cameras = persistent_data.is_driven_by_camera()
         for node in _file_outputs(scene):
             borrow.set(node, "mute", True)
         pictures.borrow_formats(borrow, scene)
@@ -91,7 +91,7 @@ class Lent:
         for owner, name in changed:
             setattr(owner, name, wanted[owner, name])
         if _samples(self._scene).get("CYCLES") in changed:
-            keeping.drop(self._scene)
+            persistent_data.drop(self._scene)
         self._go_to(*(self._time_of_file if shot.frame is None else (shot.frame, 0.0)))
 
     def look_through(self, camera_object: bpy.types.Object) -> None:
@@ -99,12 +99,12 @@ class Lent:
         if self._scene.camera != camera_object:
             self._scene.camera = camera_object
             if self._drop_at_cameras:
-                keeping.drop(self._scene)
+                persistent_data.drop(self._scene)
 
     def _go_to(self, frame: int, subframe: float) -> None:
         if (self._scene.frame_current, self._scene.frame_subframe) != (frame, subframe):
             self._scene.frame_set(frame, subframe=subframe)
-            keeping.drop(self._scene)
+            persistent_data.drop(self._scene)
 
     def _said(self, shot: Shot) -> Iterator[tuple[tuple[bpy.types.bpy_struct, str], object]]:
         """What a shot sets, by owner and name of the property."""
@@ -190,7 +190,7 @@ def _warnings(scene: bpy.types.Scene) -> Iterator[str]:
         yield "The compositor's File Output nodes write nothing in a batch: each shot would write over the last one's files"
     if render.use_border:
         yield "The render border is on: the picture is that part of the frame"
-    if keeping.is_simulated():
+    if persistent_data.is_simulated():
         yield "Something is simulated: unless it is baked, its picture depends on the frames that were evaluated before"
     if getattr(getattr(scene, "cycles", None), "time_limit", 0.0) > 0:
         yield "Cycles has a time limit: another run may have other samples, and other pixels"

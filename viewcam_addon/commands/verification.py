@@ -18,8 +18,8 @@ from ..errors import InputError
 from ..terminal import say, silent_libraries
 from ..tracer.scene.film import seeds
 from . import Result
+from .processes import blender_room, run_beside
 from .progress import Progress
-from .surroundings import blender_room, run_beside
 
 DEMO_SCENE = Path(__file__).parents[2] / "sample_scenes" / "studio.blend"
 

@@ -8,7 +8,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import versions
-from viewcam_addon.blender.batch import keeping
+from viewcam_addon.blender.batch import persistent_data
 from viewcam_addon.blender.batch.renderer import BlenderRenderer
 from viewcam_addon.blender.scenes import export
 from viewcam_addon.shots import Shot
@@ -136,7 +136,7 @@ def grow_hair(scene):
 def test_a_driver_that_reads_the_scenes_camera_reads_that_of_the_shot(stage, pictures):
     drive_by_the_camera(stage)
     shots = (Shot("first", camera="First"), Shot("second", camera="Second"), LEFT)
-    assert keeping.is_driven_by_camera()
+    assert persistent_data.is_driven_by_camera()
     assert differing(pictures, shots) == []
 
 
@@ -155,7 +155,7 @@ def test_hair_at_another_frame_is_as_if_no_frame_was_before(stage, pictures):
 def test_without_dropping_a_leak_is_seen(stage, pictures, monkeypatch, prepare, shots):
     """These two leak in 4.2, 4.5, 5.0 and 5.2; where one does not any more, `drop` is for nothing."""
     prepare(stage)
-    monkeypatch.setattr(keeping, "drop", lambda _: None)
+    monkeypatch.setattr(persistent_data, "drop", lambda _: None)
     assert len(differing(pictures, shots)) == 1
 
 
@@ -232,12 +232,12 @@ def test_no_shot_leaves_a_datablock_behind(stage, tmp_path):
 
 
 def test_simulations_are_found(stage):
-    assert not keeping.is_simulated()
+    assert not persistent_data.is_simulated()
     stage.objects["Ball"].modifiers.new("Cloth", "CLOTH")
-    assert keeping.is_simulated()
+    assert persistent_data.is_simulated()
 
 
 def test_simulation_nodes_are_found(stage):
     tree = bpy.data.node_groups.new("Simulation", "GeometryNodeTree")
     tree.nodes.new("GeometryNodeSimulationOutput")
-    assert keeping.is_simulated() and versions.EEVEE.startswith("BLENDER_EEVEE")
+    assert persistent_data.is_simulated() and versions.EEVEE.startswith("BLENDER_EEVEE")
