@@ -7,10 +7,13 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from viewcam_addon import cameras
 from viewcam_addon.cameras import Camera, Options
 from viewcam_addon.errors import InputError
+from viewcam_addon.pinhole import Pinhole
 
 from .conftest import CAMERAS, allowed, points_before
 from .test_judges import FLOAT32, judged, same_picture
@@ -48,6 +51,32 @@ def test_axes_and_scale_come_back_from_every_format(form, axes):
     options = Options(axes=axes, scale=0.01)
     (camera,) = cameras.read(cameras.write([of("shifted")], form, options), options=options)
     same_picture(camera, CAMERAS["shifted"])
+
+
+places = st.tuples(*[st.floats(-1e4, 1e4)] * 3)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    *(places, st.tuples(*[st.floats(-10, 10)] * 3), st.floats(10, 1e5), st.floats(0.5, 2), st.integers(1, 4000)),
+    *(st.tuples(st.floats(-1, 2), st.floats(-1, 2)), st.booleans(), st.sampled_from(FORMATS)),
+    *(st.sampled_from(["as_is", "y_up"]), st.floats(1e-3, 1e3)),
+)
+def test_any_camera_comes_back_from_every_format(eye, view, distance, aspect, width, point, mirrored, form, axes, scale):
+    look_at = tuple(a + b for a, b in zip(eye, view, strict=True))
+    if math.dist(eye, look_at) < 0.1 or math.hypot(look_at[0] - eye[0], look_at[1] - eye[1]) < 0.01:
+        return  # nearly along up, numbers of four digits say little of a roll
+    pinhole = Pinhole(
+        eye, look_at, (0, 0, 1), (distance, distance * aspect), width, 300, (point[0] * width, point[1] * 300), mirrored
+    )
+    options = Options(axes=axes, scale=scale)
+    try:
+        text = cameras.write([Camera("a", pinhole)], form, options)
+    except InputError:
+        assert (form == "mitsuba" and aspect != 1) or (form == "look_at" and mirrored)
+        return
+    (camera,) = cameras.read(text, options=options)
+    same_picture(camera, pinhole)
 
 
 # ---- Mitsuba
