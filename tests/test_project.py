@@ -60,6 +60,8 @@ BLENDER_ROOMS = {
     "versions": "",
     "temporary_settings": "",
     "opening": "temporary_settings",
+    "picture": "temporary_settings",
+    "keyframes": "versions",
     "findings": "",
     "render_settings": "",
     "preferences": "render_settings",
@@ -73,9 +75,12 @@ BLENDER_ROOMS = {
     "properties": "datablocks storage targets camera",
     "resolution": "datablocks storage camera",
     "animation": "versions datablocks storage targets camera resolution",
-    "scenes": "versions temporary_settings findings datablocks pose camera",
+    "scenes": "versions temporary_settings picture findings datablocks pose camera",
     "rendering": "versions temporary_settings opening datablocks resolution scenes",
-    "interface": "versions findings render_settings preferences datablocks storage targets hold pose camera scenes rendering",
+    "interface": (
+        "versions temporary_settings picture keyframes findings render_settings preferences datablocks storage targets hold "
+        "pose camera scenes rendering"
+    ),
     "batch": "versions temporary_settings opening datablocks camera resolution scenes rendering",
 }
 # Inside the tracer a room may import from all those before it.

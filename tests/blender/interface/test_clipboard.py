@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 bpy = pytest.importorskip("bpy")
 
+from viewcam_addon import cameras as formats
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import findings
 from viewcam_addon.blender.interface import clipboard
@@ -223,3 +224,52 @@ def test_undo_takes_a_pasted_camera_back(camera_object):
 def test_without_a_camera_both_are_off(fresh_blender):
     assert not bpy.ops.viewcam.copy_camera.poll()
     assert not bpy.ops.viewcam.paste_camera.poll()
+
+
+# ROS says no pose, and USD is read where OpenUSD is.
+BOTH_WAYS = sorted({name for name, *_ in clipboard._writable()} & {*formats.readable()} - {"ros", "usd"})
+
+
+@pytest.mark.parametrize("format", BOTH_WAYS)
+def test_what_is_copied_as_any_format_is_the_same_camera_when_it_is_pasted(posed_camera, add_camera, scene, format):
+    before = cameras.read(posed_camera, scene)
+    text = clipboard.text_of(posed_camera, scene, format, formats.Options(axes="y_up", scale=0.5))
+    other = add_camera("Other")
+    paste(text, camera="Other", axes="y_up", scale=0.5)
+    after = cameras.read(other, scene)
+    # Both are float32 in Blender.
+    assert np.subtract(after.basis(), before.basis()) == pytest.approx(0, abs=findings.LARGEST_TURN)
+    assert np.subtract(after.eye, before.eye) == pytest.approx(0, abs=2.0**-20)
+    assert np.divide(after.distance, before.distance) == pytest.approx(1, rel=2.0**-20)
+
+
+def test_copying_in_a_format_names_it_and_leaves_the_scene_alone(posed_camera, capfd):
+    before = everything(posed_camera)
+    assert bpy.ops.viewcam.copy_camera(format="pbrt", axes="y_up") == {"FINISHED"}
+    assert "Copied Camera as pbrt scene, axes y_up, scale 1" in capfd.readouterr().out
+    assert everything(posed_camera) == before
+
+
+def test_what_a_format_can_not_say_is_one_sentence(posed_camera):
+    posed_camera.scale[0] = -1
+    with pytest.raises(RuntimeError, match="mirrored") as error:
+        bpy.ops.viewcam.copy_camera(format="transforms")
+    assert "Traceback" not in str(error.value)
+
+
+def test_pixels_of_another_aspect_are_told_and_set_if_that_is_asked_for(posed_camera, scene, capfd):
+    text = SHIFTED.replace('"distance": 600', '"distance": [600, 450]').replace("640", "1920").replace("360", "1080")
+    paste(text)
+    said = "The camera is for 1920 × 1080 pixels of aspect 0.75 and the scene renders 1920 × 1080 of aspect 1"
+    assert said in capfd.readouterr().out
+    assert cameras.read(posed_camera, scene).distance == pytest.approx((600, 600), rel=2.0**-22)
+    paste(text, set_size=True)
+    assert said not in capfd.readouterr().out
+    assert scene.render.pixel_aspect_y / scene.render.pixel_aspect_x == pytest.approx(4 / 3, rel=2.0**-23)
+    assert cameras.read(posed_camera, scene).distance == pytest.approx((600, 450), rel=2.0**-22)
+
+
+def test_a_size_beyond_blenders_is_refused_and_the_scenes_stays(posed_camera, scene):
+    with pytest.raises(RuntimeError, match="camera's picture is 3 × 360 pixels and Blender's are 4 to 65536"):
+        paste(SHIFTED.replace('"width": 640', '"width": 3'), set_size=True)
+    assert (scene.render.resolution_x, scene.render.resolution_y) == (1920, 1080)

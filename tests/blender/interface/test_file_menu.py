@@ -201,7 +201,7 @@ def test_coordinates_that_count_from_elsewhere_are_told(hand_written):
     [
         ('"version": 1', '"version": 2', "Hand.json: 'version' of the scene is 2"),
         ('"distance": 400', '"distance": 1e300', "needs 1e+300, beyond Blender's numbers"),
-        ('"width": 320', '"width": 3', "the file's picture is 3 × 180 pixels"),
+        ('"width": 320', '"width": 3', "the camera's picture is 3 × 180 pixels"),
         ('"radii": [0.5, 0.25]', '"radii": [0.5, -1]', "radii not negative"),
         ('"name": "lamp"', r'"name": "\ud800"', "this is no JSON text"),
     ],

@@ -136,6 +136,9 @@ class Layout:
         self.drawn.append((kind, name, look, self, properties))
         return properties
 
+    def menu(self, name, **look):
+        self._draw("menu", name, look)
+
     def label(self, text, **look):
         self._draw("label", text, look)
 

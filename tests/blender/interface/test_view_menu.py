@@ -10,10 +10,11 @@ from viewcam_addon.blender.interface import baking, clipboard, moving, operators
 
 def test_every_button_of_a_camera_stands_in_the_menu_which_the_search_reads(registered_addon):
     entries = []
-    layout = SimpleNamespace(operator=entries.append, separator=lambda: None)
+    menus = []
+    layout = SimpleNamespace(operator=entries.append, menu=menus.append, separator=lambda: None)
     view_menu.VIEWCAM_MT_cameras.draw(SimpleNamespace(layout=layout), bpy.context)
-    rooms = (moving, operators, baking, clipboard)
-    assert set(entries) == {each.bl_idname for room in rooms for each in room.CLASSES}
+    classes = (*moving.CLASSES, *operators.CLASSES, *baking.CLASSES, *clipboard.OPERATORS)
+    assert set(entries) == {each.bl_idname for each in classes} and menus == ["VIEWCAM_MT_copy_camera_as"]
     assert all(getattr(bpy.ops.viewcam, entry.split(".")[1]).get_rna_type() for entry in entries)
 
 

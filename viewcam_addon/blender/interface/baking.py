@@ -25,12 +25,11 @@ from ...comparison.cameras import conversion_error
 from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
-from .. import datablocks, pose, versions
+from .. import datablocks, keyframes, pose, versions
 from .operators import CameraOperator
 
 Array = NDArray[np.float64]
 
-_LINEAR = 1  # an enum's number, as foreach_set takes it
 _SENSOR = ("sensor_width", "sensor_height")
 _OF_DATA = ("lens", *_SENSOR)
 _OF_OBJECT = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle")
@@ -164,22 +163,11 @@ def _write(flight: _Flight) -> None:
     camera_object.data.virtual_pinhole_sensor = own if largest > 1 else (0.0, 0.0)
     for path, values in channels.items():
         block = _owner(camera_object, path)
-        versions.remove_curves(block, path)
         if path in _SENSOR and (values == values[0]).all():
+            versions.remove_curves(block, path)
             setattr(block, path, values[0, 0])
             continue
-        for index, column in enumerate(values.T):
-            _key(versions.new_curve(block, path, index), flight.at, column)
-
-
-def _key(curve: bpy.types.FCurve, at: list[float], values: Array) -> None:
-    """Linear keyframes; a single one for what stands still."""
-    count = 1 if (values == values[0]).all() else len(values)
-    points = curve.keyframe_points
-    points.add(count)
-    points.foreach_set("co", np.column_stack([at, values])[:count].ravel())
-    points.foreach_set("interpolation", [_LINEAR] * count)
-    curve.update()
+        keyframes.linear(block, path, flight.at, values)
 
 
 def _agreement(flight: _Flight, baked: Sequence[Pinhole], times: list[float]) -> Agreement:

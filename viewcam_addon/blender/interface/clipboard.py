@@ -14,30 +14,77 @@ from bpy.app.translations import pgettext_iface as iface
 from bpy.app.translations import pgettext_tip as tip
 
 from ... import cameras as formats
-from ...cameras import own
 from ...errors import InputError
-from ...intrinsics import Frame
 from ...pinhole import Pinhole
 from .. import camera as cameras
-from .. import datablocks, targets
+from .. import datablocks, picture, targets
+from ..temporary_settings import Borrower
+from . import camera_options, readouts
+from .camera_options import READING, ReadingOptions, WorldOptions
 from .operators import CameraOperator
 
+_DIALOG_WIDTH = 480
 _NAMES = {"eye": "eye", "look_at": "look-at", "up": "up"}
 
 
-class VIEWCAM_OT_copy_camera(CameraOperator, bpy.types.Operator):
+def _writable() -> list[tuple[str, str, str]]:
+    """The formats that are one text, as an enum has them; the project's own first."""
+    names = [name for name in formats.writable() if formats.FORMATS[name].SUFFIX and name != "sidecar"]
+    return [(name, formats.FORMATS[name].TITLE, "") for name in sorted(names, key=lambda name: name != OWN)]
+
+
+OWN = "text"
+
+
+class VIEWCAM_OT_copy_camera(WorldOptions, CameraOperator, bpy.types.Operator):
     bl_idname = "viewcam.copy_camera"
     bl_label = "Copy Camera"
-    bl_description = "Copy the camera as text, to paste on another camera, in another file or elsewhere"
+    bl_description = "Copy the camera as text, to paste on another camera, in another file or in another program"
     bl_options: ClassVar[set[str]] = {"REGISTER"}
 
+    format: bpy.props.EnumProperty(
+        name="Format", description="Whose text it is", items=_writable(), default=OWN, options={"SKIP_SAVE"}
+    )
+    ask: bpy.props.BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        return context.window_manager.invoke_props_dialog(self) if self.ask else self.execute(context)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        self.layout.use_property_split = True
+        for name in ("format", "axes", "scale"):
+            self.layout.prop(self, name)
+
     def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
-        text = text_of(camera_object, scene)
+        own = self.format == OWN
+        text = text_of(camera_object, scene, self.format, formats.Options() if own and not self.ask else self.chosen())
         bpy.context.window_manager.clipboard = text
-        self.report({"INFO"}, f"Copied {text}")
+        told = "" if self.axes == "as_is" and self.scale == 1 else f", axes {self.axes}, scale {self.scale:.7g}"
+        self.report({"INFO"}, f"Copied {text}" if own else f"Copied {camera_object.name} as {self._title()}{told}")
+
+    def _title(self) -> str:
+        return formats.FORMATS[self.format].TITLE
 
 
-class VIEWCAM_OT_paste_camera(CameraOperator, bpy.types.Operator):
+class VIEWCAM_MT_copy_camera_as(bpy.types.Menu):
+    bl_idname = "VIEWCAM_MT_copy_camera_as"
+    bl_label = "Copy as"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.operator_context = "INVOKE_DEFAULT"
+        camera_object = datablocks.camera_in(context)
+        for name, title, _ in _writable():
+            self._entry(camera_object, title).format = name
+        self.layout.separator()
+        self._entry(camera_object, "Axes and Scale …").ask = True
+
+    def _entry(self, camera_object: bpy.types.Object | None, text: str) -> bpy.types.OperatorProperties:
+        entry = self.layout.operator("viewcam.copy_camera", text=text)
+        entry.camera = camera_object.name if camera_object else ""
+        return entry
+
+
+class VIEWCAM_OT_paste_camera(ReadingOptions, CameraOperator, bpy.types.Operator):
     bl_idname = "viewcam.paste_camera"
     bl_label = "Paste Camera"
     bl_description = (
@@ -45,6 +92,8 @@ class VIEWCAM_OT_paste_camera(CameraOperator, bpy.types.Operator):
         "of its camera. What the text does not say stays as it is"
     )
 
+    axes: camera_options.axes(options={"SKIP_SAVE"})
+    scale: camera_options.scale(options={"SKIP_SAVE"})
     text: bpy.props.StringProperty(
         name="Text", description="In place of what is on the clipboard", options={"HIDDEN", "SKIP_SAVE"}
     )
@@ -53,22 +102,68 @@ class VIEWCAM_OT_paste_camera(CameraOperator, bpy.types.Operator):
         description="Give the scene the resolution and pixel aspect of the pasted camera, where the text says them",
         options={"SKIP_SAVE"},
     )
-    unmirrored: bpy.props.BoolProperty(
-        name="Unmirrored",
-        description="Paste a camera whose picture is mirrored without that",
-        options={"SKIP_SAVE"},
-    )
     named: bpy.props.StringProperty(
-        name="Camera's Name", description="Which one, where the text has several", options={"SKIP_SAVE"}
+        name="Camera's Name",
+        description="Which one, where the text has several",
+        options={"SKIP_SAVE"},
+        search=lambda operator, _context, _typed: operator.names,
     )
+    names: ClassVar[list[str]] = []
+    question: ClassVar[str] = ""
+
+    @classmethod
+    def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+        sized = f". {tip(cls.bl_rna.properties['set_size'].description)}" if properties.set_size else ""
+        return tip(cls.bl_description) + sized
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        """Paste at once; where something must be chosen first, ask for it with the sentence that says what."""
+        cls = type(self)
+        try:
+            text = self.text or _clipboard()
+            formats.recognised(text)
+        except InputError:
+            return self.execute(context)
+        try:
+            camera_object = bpy.data.objects.get(self.camera) or datablocks.camera_in(context)
+            found = self._found(text, camera_object, datablocks.scene_of(camera_object))
+            if len(found) == 1 or self.named:
+                return self.execute(context)
+            cls.names, cls.question = [camera.name for camera in found], f"The text has {len(found)} cameras: name one of them"
+        except InputError as error:
+            cls.names, cls.question = [], datablocks.sentence(error)
+        return context.window_manager.invoke_props_dialog(self, width=_DIALOG_WIDTH)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.layout
+        lines = readouts.wrapped(self.question, _DIALOG_WIDTH - 60) if self.question else []
+        for i, line in enumerate(lines):
+            layout.label(text=line, icon="BLANK1" if i else "QUESTION", translate=False)
+        layout.use_property_split = True
+        for name in ("named", "set_size", *READING):
+            layout.prop(self, name)
 
     def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
-        text, before = self.text or _clipboard(), _present(camera_object, scene)
-        found = read(text, before, scene, self.unmirrored, self.named or None)
+        type(self).question = ""  # it is answered, and the panel of the last operation shows the same properties
+        found = formats.choose(self._found(self.text or _clipboard(), camera_object, scene), self.named or None)
+        before = _present(camera_object, scene)
         findings = paste(found, before, camera_object, scene, self.set_size)
         self.report({"INFO"}, f"Pasted {_said(found.pinhole, before)} on {camera_object.name}")
         for finding in findings:  # after it, since the status bar shows what was reported last
             self.report({"WARNING"}, finding)
+
+    def _found(self, text: str, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> list[formats.Camera]:
+        """The cameras of a text, in the picture that it states, else in the scene's at 100 %.
+
+        What stands where the text says nothing is the camera as it is.
+        """
+        frame = datablocks.frame_of(scene)
+        options = self.chosen(
+            size=(frame.resolution_x, frame.resolution_y),
+            pixel_aspect=frame.pixel_aspect_x / frame.pixel_aspect_y,
+            base=picture.at_full_size(_present(camera_object, scene), frame),
+        )
+        return formats.read(text, options=options)
 
 
 class VIEWCAM_OT_copy_readout(bpy.types.Operator):
@@ -90,8 +185,8 @@ class VIEWCAM_OT_copy_readout(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def text_of(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> str:
-    """A camera as text, in the picture at 100 %; where its values are not in use, those that `adopt` would state.
+def camera_of(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> formats.Camera:
+    """A camera in the picture at 100 %; where its values are not in use, those that `adopt` would state.
 
     Raises
     ------
@@ -101,24 +196,25 @@ def text_of(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> str:
     frame = datablocks.frame_of(scene)
     stated = cameras.stated(camera_object, scene)
     shown = stated or cameras.as_it_stands(camera_object, scene, in_use=False)
-    whole = _at_full_size(shown, frame)
+    whole = picture.at_full_size(shown, frame)
     if stated:  # as it was typed
         across = targets.values(camera_object).distance_at_full_size(frame, camera_object.data.sensor_fit)
         upwards = across * (frame.pixel_aspect_x / frame.pixel_aspect_y)
         whole = dataclasses.replace(whole, distance=(across, upwards))
-    return own.write([formats.Camera(camera_object.name, whole)], formats.Options())
+    return formats.Camera(camera_object.name, whole)
 
 
-def read(text: str, present: Pinhole, scene: bpy.types.Scene, unmirrored: bool, name: str | None) -> formats.Camera:
-    """The camera that a text says, in the picture that it states, else in the scene's at 100 %.
+def text_of(
+    camera_object: bpy.types.Object, scene: bpy.types.Scene, format: str = OWN, options: formats.Options | None = None
+) -> str:
+    """A camera as a program's text.
 
-    present : what stands where the text says nothing.
+    Raises
+    ------
+    InputError
+        as `camera_of` does, or if the format can't say what the camera is.
     """
-    frame = datablocks.frame_of(scene)
-    aspect = frame.pixel_aspect_x / frame.pixel_aspect_y
-    size = (frame.resolution_x, frame.resolution_y)
-    options = formats.Options(size=size, pixel_aspect=aspect, base=_at_full_size(present, frame), unmirrored=unmirrored)
-    return formats.choose(formats.read(text, options=options), name)
+    return formats.write([camera_of(camera_object, scene)], format, options)
 
 
 def paste(
@@ -134,66 +230,16 @@ def paste(
         as `apply` does. Nothing has changed then.
     """
     frame = datablocks.frame_of(scene)
-    before = _at_full_size(present, frame)
-    if found.pinhole.distance == before.distance and found.pinhole.plane == before.plane:
-        pinhole, notes = dataclasses.replace(present, **_pose(found.pinhole), mirrored=found.pinhole.mirrored), ()
-        return [*found.notes, *notes, *cameras.apply(camera_object, pinhole, scene)]
-    if not set_size:
-        pinhole, notes = _fitted(found.pinhole, frame)
-        return [*found.notes, *notes, *cameras.apply(camera_object, pinhole, scene)]
-    render, kept = scene.render, {name: getattr(scene.render, name) for name in _SIZE}
-    try:
-        _set_size(render, found.pinhole)
-        pinhole, notes = _fitted(found.pinhole, datablocks.frame_of(scene))
-        return [*found.notes, *notes, *cameras.apply(camera_object, pinhole, scene)]
-    except InputError:
-        for name, value in kept.items():
-            setattr(render, name, value)
-        raise
-
-
-_SIZE = ("resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y", "use_crop_to_border")
-
-
-def _set_size(render: bpy.types.RenderSettings, pinhole: Pinhole) -> None:
-    """The picture that a pinhole is for, in a scene's settings."""
-    render.resolution_x, render.resolution_y, render.resolution_percentage = pinhole.width, pinhole.height, 100
-    aspect = pinhole.distance[1] / pinhole.distance[0]
-    render.pixel_aspect_x, render.pixel_aspect_y = max(1.0, aspect), max(1.0, 1 / aspect)
-    render.use_crop_to_border = False
-
-
-def _at_full_size(pinhole: Pinhole, frame: Frame) -> Pinhole:
-    """The camera in the picture at 100 %; of a part of the picture it stays as it is."""
-    if (pinhole.width, pinhole.height) != frame.size or frame.size == (frame.resolution_x, frame.resolution_y):
-        return pinhole
-    return pinhole.resized(frame.resolution_x, frame.resolution_y)
-
-
-def _fitted(pinhole: Pinhole, frame: Frame) -> tuple[Pinhole, tuple[str, ...]]:
-    """The camera in the picture of a scene, across which it sees as much, and what is to be said of it."""
-    width, height = frame.size
-    scale = width / pinhole.width
-    across, upwards = (scale * d for d in pinhole.distance)
-    (c_x, c_y), aspect = pinhole.principal_point, frame.pixel_aspect_x / frame.pixel_aspect_y
-    notes: tuple[str, ...] = ()
-    if abs(upwards / across / aspect - 1) < 2.0**-20:
-        upwards = across * aspect  # of a size that was rounded
-    shape = pinhole.height * scale / height * (across * aspect / upwards)
-    if abs(shape - 1) * height > 1:
-        notes = (
-            f"The camera is for {pinhole.width} × {pinhole.height} pixels and the scene renders {width} × {height}: "
-            "it sees as much across, set the scene's size for the same picture",
-        )
-    column, row, window_width, window_height = frame.window
-    point = (
-        width / 2 + (c_x - pinhole.width / 2) * scale - column,
-        height / 2 + (c_y - pinhole.height / 2) * scale * (across * aspect / upwards) - row,
-    )
-    fitted = dataclasses.replace(
-        pinhole, distance=(across, upwards), width=window_width, height=window_height, principal_point=point
-    )
-    return fitted, notes
+    if found.pinhole.plane == picture.at_full_size(present, frame).plane:  # the text says none
+        pinhole = dataclasses.replace(present, **_pose(found.pinhole), mirrored=found.pinhole.mirrored)
+        return [*found.notes, *cameras.apply(camera_object, pinhole, scene)]
+    with contextlib.ExitStack() as undo:
+        if set_size:
+            picture.set_size(Borrower(undo), scene, found.pinhole)
+        pinhole, notes = picture.fitted(found.pinhole, datablocks.frame_of(scene))
+        said = [*found.notes, *notes, *cameras.apply(camera_object, pinhole, scene)]
+        undo.pop_all()
+    return said
 
 
 def _pose(pinhole: Pinhole) -> dict[str, tuple]:
@@ -225,10 +271,14 @@ def _clipboard() -> str:
 
 
 def draw(layout: bpy.types.UILayout, camera_object: bpy.types.Object) -> None:
-    """The row of both buttons, in the panel."""
+    """The row of these buttons, in the panel."""
     row = layout.row(align=True)
     row.operator("viewcam.copy_camera", text="Copy", icon="COPYDOWN").camera = camera_object.name
+    row.menu("VIEWCAM_MT_copy_camera_as", text="", icon="DOWNARROW_HLT")
     row.operator("viewcam.paste_camera", text="Paste", icon="PASTEDOWN").camera = camera_object.name
+    with_size = row.operator("viewcam.paste_camera", text="", icon="OUTPUT")
+    with_size.camera, with_size.set_size = camera_object.name, True
 
 
-CLASSES = (VIEWCAM_OT_copy_camera, VIEWCAM_OT_paste_camera, VIEWCAM_OT_copy_readout)
+OPERATORS = (VIEWCAM_OT_copy_camera, VIEWCAM_OT_paste_camera, VIEWCAM_OT_copy_readout)
+CLASSES = (VIEWCAM_MT_copy_camera_as, *OPERATORS)

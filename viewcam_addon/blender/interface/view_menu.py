@@ -13,11 +13,11 @@ class VIEWCAM_MT_cameras(bpy.types.Menu):
     bl_label = "Virtual Pinhole"
 
     def draw(self, _context: bpy.types.Context) -> None:
-        for group in (moving.CLASSES, operators.CLASSES, baking.CLASSES, clipboard.CLASSES):
+        for group in (moving.CLASSES, operators.CLASSES, baking.CLASSES, clipboard.OPERATORS):
             for each in group:
                 self.layout.operator(each.bl_idname)
-            if group != clipboard.CLASSES:
-                self.layout.separator()
+            self.layout.separator()
+        self.layout.menu(clipboard.VIEWCAM_MT_copy_camera_as.bl_idname)
 
 
 def _draw(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:

@@ -22,12 +22,11 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ... import rotation
-from ...errors import InputError
 from ...pinhole import Pinhole
 from ...tracer.scene import LedgerEntry, Mesh, Object, Scene
 from ...tracer.scene.depths import visible_depths
 from .. import camera as cameras
-from .. import datablocks, findings
+from .. import datablocks, findings, picture
 from ..temporary_settings import Borrower
 from . import import_geometry, import_light
 from .indices import LARGEST
@@ -35,7 +34,6 @@ from .ledger import Ledger
 
 Array = NDArray[np.float64]
 
-_LARGEST_PICTURE, _LEAST_PICTURE = 65536, 4  # Blender's own limits
 _MIRRORS = np.array([[-1, 1, 1], [1, -1, 1], [1, 1, -1], [-1, -1, -1]])  # the scales that mirror, each with its own rotation
 _SHEAR = 2.0**-21  # what float32 may make of a rotation or of one scale for all axes
 _PIXEL_ASPECT = 2.0**-23  # what float32 makes of a ratio of two distances
@@ -113,17 +111,7 @@ class _Import:
     # --- The camera
 
     def _set_picture(self) -> None:
-        width, height = size = self._made.camera.width, self._made.camera.height
-        if min(size) < _LEAST_PICTURE or max(size) > _LARGEST_PICTURE:
-            raise InputError(
-                f"the file's picture is {width} × {height} pixels and Blender's are {_LEAST_PICTURE} to {_LARGEST_PICTURE} "
-                "wide and high: import it without Set Camera and Resolution"
-            )
-        aspect = self._made.camera.distance[1] / self._made.camera.distance[0]
-        settings = {"resolution_x": width, "resolution_y": height, "resolution_percentage": 100, "use_border": False}
-        settings |= {"pixel_aspect_x": max(1.0, aspect), "pixel_aspect_y": max(1.0, 1 / aspect)}
-        for name, value in settings.items():
-            self._borrow.set(self._scene.render, name, value)
+        picture.set_size(self._borrow, self._scene, self._made.camera)
 
     def _camera(self, is_shown: bool) -> bpy.types.Object:
         data = bpy.data.cameras.new(self._name)

@@ -1,0 +1,90 @@
+"""What is chosen as other programs' cameras are read or written (cameras.Options), as an operator's properties.
+
+Blender remembers axes and scale from one use to the next where they are on show before it; so not in Paste, a single click.
+Its floats are float32; a scale of up to seven digits is meant as it is shown.
+"""
+
+from typing import Any
+
+import bpy
+
+from ... import cameras as formats
+from ...cameras import Options
+
+_UNSTATED = "UNSTATED"
+_AXES = {"as_is": "As They Are", "y_up": "Y Up to Z Up"}
+
+
+def axes(**look: Any) -> Any:
+    """The property "axes" of an operator."""
+    return bpy.props.EnumProperty(
+        name="Axes",
+        description="Which axis is up in the other program",
+        items=[(key, _AXES[key], formats.AXES[key]) for key in _AXES],
+        **look,
+    )
+
+
+def scale(**look: Any) -> Any:
+    """The property "scale" of an operator."""
+    return bpy.props.FloatProperty(
+        name="Scale",
+        description="World units here of one unit there, as 0.001 for millimetres",
+        default=1.0,
+        min=1e-12,
+        max=1e12,
+        precision=6,
+        **look,
+    )
+
+
+class WorldOptions:
+    """Axes and scale, in both directions."""
+
+    axes: axes()
+    scale: scale()
+
+    def chosen(self, **more: Any) -> Options:
+        """What is chosen. more : of Options, what the scene says."""
+        return Options(axes=self.axes, scale=float(f"{self.scale:.7g}"), **more)
+
+
+class ReadingOptions(WorldOptions):
+    """What can be chosen as cameras are read, beside axes and scale."""
+
+    unmirrored: bpy.props.BoolProperty(
+        name="Unmirrored",
+        description="Take a camera whose picture is mirrored without that; else its scale becomes negative",
+        options={"SKIP_SAVE"},
+    )
+    without_distortion: bpy.props.BoolProperty(
+        name="Without Distortion",
+        description="Take a camera without its lens distortion, which no pinhole has",
+        options={"SKIP_SAVE"},
+    )
+    angle_unit: bpy.props.EnumProperty(
+        name="Angles",
+        description="The unit of angles where none is stated",
+        items=[
+            (_UNSTATED, "Stated", "Refuse an angle that may be in degrees or radians"),
+            *((key, label, "") for key, label in formats.ANGLES.items()),
+        ],
+        options={"SKIP_SAVE"},
+    )
+    pixel: bpy.props.EnumProperty(
+        name="Pixels Count from",
+        description="Where (0, 0) lies in the picture",
+        items=[
+            (_UNSTATED, "Habit of the Format", ""),
+            *((key, {"corner": "Corner", "center": "Centre of the First"}[key], text) for key, text in formats.PIXELS.items()),
+        ],
+        options={"SKIP_SAVE"},
+    )
+
+    def chosen(self, **more: Any) -> Options:
+        stated = {name: None if getattr(self, name) == _UNSTATED else getattr(self, name) for name in ("angle_unit", "pixel")}
+        return super().chosen(unmirrored=self.unmirrored, without_distortion=self.without_distortion, **stated, **more)
+
+
+READING = ("axes", "scale", "unmirrored", "without_distortion", "angle_unit", "pixel")
+"""The names of all of them, in the order in which they are shown."""
