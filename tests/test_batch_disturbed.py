@@ -1,5 +1,7 @@
 """Criterion of every batch: whatever disturbs it, nothing is lost. `viewcam batch` with the wheel of Blender (disturbed.py)."""
 
+import os
+import signal
 import sys
 from pathlib import Path
 
@@ -11,6 +13,7 @@ if sys.platform == "win32":
 
 sys.path.insert(0, str(Path(__file__).parent))
 import disturbed
+from batch_folders import assert_same
 
 
 class TestWheel(disturbed.Disturbances):
@@ -22,3 +25,16 @@ class TestWheel(disturbed.Disturbances):
             return disturbed.Command(words, {"PYTHONPATH": str(disturbed.ROOT)})
 
         return command
+
+    @pytest.mark.skipif(sys.platform != "linux", reason="the process in which Blender runs is found as Linux has it")
+    def test_a_blender_that_crashes_is_told_and_resume_renders_what_is_left(self, command, undisturbed, tmp_path):
+        with command.start(tmp_path) as batch:
+            batch.until("shot_done")
+            (blender,) = Path(f"/proc/{batch.process.pid}/task/{batch.process.pid}/children").read_text().split()
+            os.kill(int(blender), signal.SIGSEGV)
+            status, events = batch.end()
+        told = [event["text"] for event in events if event["event"] == "error"]
+        assert status == 2 and len(told) == 1 and "Blender has ended with SIGSEGV at " in told[0], (status, events)
+        assert 1 <= len(list(tmp_path.glob("shot_*.json"))) < 6
+        assert command.run(tmp_path, "--resume")[0] == 0
+        assert_same(tmp_path, undisturbed)

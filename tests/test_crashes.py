@@ -37,17 +37,19 @@ WORDS = {
     "cycles": ["file.blend", "out.exr"],
     "check": ["file.blend"],
     "demo": [],
-    "batch": ["file.blend", "--orbit", "2", "--out", "out", "--workers", "1"],
+    "batch": ["file.blend", "--orbit", "2", "--out", "out"],
+    "batch --workers": ["file.blend", "--orbit", "2", "--out", "out", "--workers", "1"],
 }
 
 
 def test_every_command_that_opens_a_blend_is_looked_after():
-    assert set(crashes.COMMANDS) | {"batch"} == set(WORDS)
+    assert set(crashes.COMMANDS) == {command.split()[0] for command in WORDS}
 
 
 @pytest.mark.parametrize("command", list(WORDS))
 def test_a_blender_that_crashes_is_one_sentence_and_status_2(run, command):
-    child = run(CRASH, command, *WORDS[command])
+    words, command = WORDS[command], command.split()[0]
+    child = run(CRASH, command, *words)
     _, errors = child.communicate()
     assert child.returncode == 2, errors
     (sentence,) = errors.splitlines()
@@ -94,3 +96,19 @@ def test_ctrl_c_ends_both_with_its_own_status(run, tmp_path):
         time.sleep(0.02)
     os.killpg(child.pid, signal.SIGINT)
     assert child.communicate()[1] == "" and child.returncode == 130
+
+
+@pytest.mark.parametrize("send", [os.kill, os.killpg], ids=["kill", "terminal"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_to_a_batch_counts_once_whether_one_process_has_it_or_both(run, tmp_path, send, number):
+    child = run(WAIT, "batch", "file.blend", "--orbit", "2", "--out", "out", "--log-json")
+    while not (tmp_path / "waiting").exists():
+        time.sleep(0.02)
+    send(child.pid, number)
+    told = (json.loads(line) for line in child.stdout)
+    assert next(event for event in told if event["event"] == "stopping")["signal"] == number.name
+    time.sleep(0.5)  # in which a second one would have ended it
+    assert child.poll() is None
+    send(child.pid, number)
+    child.communicate()
+    assert child.returncode == 128 + number

@@ -51,7 +51,7 @@ ROOMS = {
         "errors checks files terminal children pinhole roll rotation moves diagram image intrinsics camera_values "
         "cameras datasets comparison tracer shots batch"
     ),
-    "commands": "errors terminal events children pinhole image cameras comparison tracer api shots batch",
+    "commands": "errors terminal events crashes children pinhole image cameras comparison tracer api shots batch",
     "camera_words": "words cameras",
     "batch_words": "words shots camera_words",
     "cli": "errors checks files events words tracer commands camera_words batch_words",

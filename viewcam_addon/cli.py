@@ -54,7 +54,10 @@ def main(arguments: Sequence[str] | None = None, blend_is_open: bool = False, en
 
 def _crash(options: argparse.Namespace, number: int) -> str:
     name = signal.Signals(number).name if number in set(signal.Signals) else number
-    return f"Blender has ended with {name} at {options.blend}: see that the file is whole, and that there is memory enough"
+    sentence = f"Blender has ended with {name} at {options.blend}: see that the file is whole, and that there is memory enough"
+    if options.command != "batch":
+        return sentence
+    return f"{sentence}; what is finished is kept, and with --resume --workers 1 a shot that crashes it does not end the batch"
 
 
 class _UsageError(InputError):

@@ -11,8 +11,15 @@ import os
 import signal
 import sys
 
-COMMANDS = ("export", "cycles", "check", "demo")
-"""Those that open a .blend in their own process. A batch whose Blender is another process says so itself (render_client.py)."""
+COMMANDS = ("export", "cycles", "check", "demo", "batch")
+"""Those that open a .blend in their own process. Of a batch, another one may do so, whose crashes render_client.py tells."""
+
+passed_on: dict[int, int] = {}
+"""In a batch that is waited for: the signals by which it hears of those that the waiting process is sent → what these were.
+
+A terminal sends a signal to both, `kill` to one. By numbers of their own, one that comes both ways is not counted as two,
+the second of which ends a batch at once (batch/interruption.py).
+"""
 
 _ASKED_FOR = (signal.SIGINT, signal.SIGTERM)
 _PR_SET_PDEATHSIG = 1
@@ -25,21 +32,33 @@ def survived(words: list[str]) -> int | None:
     """
     if not words or words[0] not in COMMANDS or not hasattr(os, "fork"):
         return None
-    parent = os.getpid()
+    parent, is_batch = os.getpid(), words[0] == "batch"
+    passing = {signal.SIGINT: signal.SIGUSR1, signal.SIGTERM: signal.SIGUSR2}
     child = os.fork()
     if child == 0:
         if sys.platform == "linux":  # whoever kills this command means Blender, too
             ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
             if os.getppid() != parent:
                 os._exit(1)
+        if is_batch:
+            passed_on.update({number: meant for meant, number in passing.items()})
         return None
-    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-        signal.signal(signal.SIGINT, lambda *_: None)  # the terminal has sent it to both
-    signal.signal(signal.SIGTERM, lambda number, _: os.kill(child, number))
+
+    def answer(number: int, _: object) -> None:
+        if is_batch:
+            os.kill(child, passing[number])
+        elif number == signal.SIGTERM:  # SIGINT the terminal has sent to both
+            os.kill(child, number)
+
+    for asked in _ASKED_FOR:
+        if signal.getsignal(asked) is not signal.SIG_IGN:
+            signal.signal(asked, answer)
     _, status = os.waitpid(child, 0)
     if not os.WIFSIGNALED(status):
         os._exit(os.WEXITSTATUS(status))
     number = os.WTERMSIG(status)
+    if is_batch:
+        number = next((meant for meant, passed in passing.items() if passed == number), number)
     if number in _ASKED_FOR:
         signal.signal(number, signal.SIG_DFL)
         os.kill(parent, number)

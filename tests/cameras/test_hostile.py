@@ -190,7 +190,7 @@ def test_a_megabyte_of_anything_is_answered_soon(name):
     started = time.process_time()
     read_or_refused(LARGE[name])
     seconds = time.process_time() - started
-    assert seconds < 10, f"{seconds:.1f} s"  # a text that takes time by its square takes hours
+    assert seconds < 60, f"{seconds:.1f} s"  # a text that takes time by its square takes hours
 
 
 def test_no_xml_brings_anything_from_outside_or_grows():

@@ -97,7 +97,9 @@ def test_a_thousand_rows_with_forty_kinds_of_bad_ones_are_named_by_line_and_colu
         ([CORNELL, "--orbit", "4", "--scheduler", "tcp://localhost:1", "--workers", "2", "--out", "OUT"], "--workers"),
         ([CORNELL, "--orbit", "4", "--scheduler", "localhost", "--out", "OUT"], "tcp://host:8786"),
         ([CORNELL, "none.csv", "--out", "OUT"], "none.csv"),
-        ([CORNELL, ROOT / "README.md", "--out", "OUT"], "README.md is no camera"),
+        ([CORNELL, ROOT / "LICENSE", "--out", "OUT"], "LICENSE is no camera"),
+        # It has one, in an example.
+        ([CORNELL, ROOT / "README.md", "--out", "OUT"], "README.md: the text says where the camera is but not how it sees"),
         (["none.blend", "--orbit", "4", "--out", "OUT"], "none.blend"),
         ([ROOT / "README.md", "--orbit", "4", "--out", "OUT"], "not a .blend"),
         ([CORNELL, "--orbit", "4", "--out", "FILE"], "can't be a folder"),

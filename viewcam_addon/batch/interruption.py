@@ -9,7 +9,9 @@ import os
 import signal
 import socket
 import threading
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
@@ -19,18 +21,21 @@ class Interruption:
 
     number : of the signal that asked for the end, None so far.
     heard : called once, as heard(signal="SIGINT"), from another thread.
+    passed_on : signals by which one process tells this one of a SIGINT or SIGTERM of its own → which; this one may have had it
+    as well, so that only the second of either way is a second one.
     """
 
-    def __init__(self, heard: Callable[..., None]) -> None:
+    def __init__(self, heard: Callable[..., None], passed_on: Mapping[int, int] = MappingProxyType({})) -> None:
         self.number: int | None = None
-        self._heard = heard
+        self._heard, self._passed_on = heard, passed_on
         self._listens = threading.current_thread() is threading.main_thread()
 
     def __enter__(self) -> "Interruption":
         if self._listens:
             self._ear, self._mouth = socket.socketpair()
             self._mouth.setblocking(False)
-            self._before = [(number, signal.signal(number, _do_nothing)) for number in _SIGNALS]
+            self._meant = {**{number: number for number in _SIGNALS}, **self._passed_on}
+            self._before = [(number, signal.signal(number, _do_nothing)) for number in self._meant]
             self._wakeup_before = signal.set_wakeup_fd(self._mouth.fileno(), warn_on_full_buffer=False)
             self._thread = threading.Thread(target=self._listen, daemon=True)
             self._thread.start()
@@ -40,19 +45,23 @@ class Interruption:
         if self._listens:
             signal.set_wakeup_fd(self._wakeup_before)
             for number, answer in self._before:  # None is an answer that was not Python's, and can't be put back
-                signal.signal(number, signal.SIG_DFL if answer is None else answer)
+                after = signal.SIG_IGN if number in self._passed_on else answer
+                signal.signal(number, signal.SIG_DFL if after is None else after)
             self._mouth.close()
             self._thread.join()
             self._ear.close()
 
     def _listen(self) -> None:
+        came: Counter[bool] = Counter()  # to this process, and passed on to it
         while number := int.from_bytes(self._ear.recv(1), "big"):  # none when the mouth is closed
-            if number not in _SIGNALS:
+            if number not in self._meant:
                 continue
-            if self.number is not None:
-                os._exit(128 + number)
-            self.number = number
-            self._heard(signal=signal.Signals(number).name)
+            came[number in self._passed_on] += 1
+            if max(came.values()) > 1:
+                os._exit(128 + self._meant[number])
+            if self.number is None:
+                self.number = self._meant[number]
+                self._heard(signal=signal.Signals(self.number).name)
 
 
 def _do_nothing(number: int, frame: object) -> None:

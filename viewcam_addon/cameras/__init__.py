@@ -145,7 +145,12 @@ def read(given: str | Path, *, format: str | None = None, options: Options | Non
     module = _module(format or recognised(source), "read")
     if format and not module.recognises(source):
         raise InputError(f"{source.name} is not {module.TITLE} by its content: leave the format out")
-    cameras = module.read(source, options)
+    try:
+        cameras = module.read(source, options)
+    except InputError as error:
+        if source.path and source.path.name not in str(error):
+            raise InputError(f"{source.name}: {error}") from None
+        raise
     if not cameras:
         raise InputError(f"{source.name} holds no camera: give another file")
     told = _told_of_world(source, options)

@@ -12,7 +12,7 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .. import cameras
+from .. import cameras, crashes
 from .. import shots as lists
 from ..batch import cluster, dataset, one, render_client
 from ..batch import run as running
@@ -44,7 +44,7 @@ class _Job:
 def run(options: argparse.Namespace) -> Result:
     _refuse_contradictions(options)
     heard = functools.partial(options.events.tell, "stopping")
-    with silent_libraries(), Interruption(heard) as interruption, contextlib.ExitStack() as stack:
+    with silent_libraries(), Interruption(heard, crashes.passed_on) as interruption, contextlib.ExitStack() as stack:
         renderer = stack.enter_context(_renderer(options))
         job = _job(options, renderer)
         if _on_cluster(options):
