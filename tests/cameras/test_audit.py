@@ -317,7 +317,7 @@ def test_a_field_of_view_of_the_other_side_is_named_against_true_cameras(tmp_pat
 
 
 def test_world_to_camera_with_opencvs_axes_in_transforms_json_is_named(tmp_path, capsys):
-    """nerfstudio-project/nerfstudio #2255 and its like: matrices of OpenCV as they are."""
+    """Matrices of OpenCV, written as they are."""
     found = a_filmed_scene()
     cameras.save(found, tmp_path / "true.json", "transforms")
     document = json.loads((tmp_path / "true.json").read_text())
