@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 from ... import errors
 from ...errors import InputError
 from ...image import BACKGROUND_DEPTH, CHANNELS, GEOMETRY_PASSES
-from ...tracer.rays.surface import Passes
 from ...tracer.scene import Scene
 from ...tracer.scene.film import LEVELS
 from ...tracer.scene.levels import least_level
+from ...tracer.tiles import Passes
 from .. import datablocks, versions
 from ..scenes import export
 from ..scenes.depsgraph import only_cameras_changed

@@ -11,7 +11,7 @@ namespace viewcam::VIEWCAM_ISA {
 
 // A lamp in world space, as capi.h has it.
 struct Lamp {
-    enum Kind { SUN, POINT, SPOT, RECTANGLE, ELLIPSE } kind;
+    enum Kind { SUN, POINT, SPOT, RECTANGLE, ELLIPSE } kind = SUN;
     Affine to_world;  // the lamp's own space to the world's; a sun is seen towards its z
     Vec3 color;       // irradiance of a sun, power of all others
     double radius = 0, angle = 0, blend = 0;

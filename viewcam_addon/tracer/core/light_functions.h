@@ -27,7 +27,8 @@ inline void add_material(Scene& scene, const ViewcamClosure* closures, int count
 }
 
 inline Lamp lamp_of(const ViewcamLamp& given) {
-    Lamp lamp{Lamp::Kind(given.kind), {}, {given.color[0], given.color[1], given.color[2]}};
+    Lamp lamp;
+    lamp.kind = Lamp::Kind(given.kind), lamp.color = {given.color[0], given.color[1], given.color[2]};
     for (int i = 0; i < 12; i++) lamp.to_world.m[i / 4][i % 4] = given.matrix[i];
     lamp.radius = given.radius, lamp.angle = given.angle, lamp.blend = given.blend, lamp.size = {given.size[0], given.size[1]};
     lamp.soft = given.soft, lamp.casts_shadow = given.casts_shadow, lamp.hidden_from = given.hidden_from;
