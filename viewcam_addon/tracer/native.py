@@ -24,6 +24,7 @@ from .scene import Mesh, Object, Scene, Spheres
 from .scene.film import NO_BOUNCES
 from .scene.lamps import RAYS, Area, Lamp, Point, Spot, Sun
 from .scene.materials import PLAIN, Colour, Material
+from .scene.sameness import same_things
 from .tiles import Passes
 
 GEOMETRY = ("Depth", "Position", "Normal", "UV", "Object Index", "Material Index", "Magnitude", "Facing")
@@ -268,11 +269,21 @@ class CoreScene:
         described = _Object(geometry, visible, slots, placed.object_index, _address(indices), _address(numbers))
         self.check(self.core.add_object(self.handle, described))
 
+    def serves(self, scene: Scene) -> bool:
+        """Whether its hierarchies are those of another scene: the same things in the same places, near the same origin."""
+        return (
+            list(scene.materials) == list(self._scene.materials)  # objects name them by their numbers
+            and np.array_equal(self.origin, _origin(scene))
+            and same_things(scene, self._scene)
+        )
+
     def look(self, scene: Scene) -> None:
         """Put the camera of a scene with the same objects in the place of the one before."""
         camera = scene.camera
         u, v, w = camera.basis()
-        described = _Camera(t_min=scene.clip[0], t_max=scene.clip[1], width=camera.width, height=camera.height)
+        # What lies at the ends of the clip range is visible, and what lies at the ends of a ray is not.
+        nearest, farthest = math.nextafter(scene.clip[0], 0.0), math.nextafter(scene.clip[1], math.inf)
+        described = _Camera(t_min=nearest, t_max=farthest, width=camera.width, height=camera.height)
         described.eye[:] = tuple(np.array(camera.eye) - self.origin)
         described.right[:], described.up[:], described.forward[:] = tuple(-u if camera.mirrored else u), tuple(v), tuple(-w)
         described.principal_point[:], described.distance[:] = camera.principal_point, camera.distance
@@ -478,8 +489,3 @@ def _box(geometry: Mesh | Spheres) -> tuple[NDArray, NDArray]:
         return np.zeros(3), np.zeros(3)
     least, greatest = points.min(axis=0), points.max(axis=0)
     return (least + greatest) / 2, (greatest - least) / 2 + reach
-
-
-def origin_of(scene: Scene) -> tuple[float, ...]:
-    """`CoreScene.origin` of a scene, without making it."""
-    return tuple(_origin(scene))

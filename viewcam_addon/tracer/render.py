@@ -19,7 +19,6 @@ from . import native
 from .native import CoreLight, CoreScene, StopFlag
 from .scene import Scene
 from .scene.film import LEVELS, SAMPLES
-from .scene.sameness import same_things
 from .tiles import Passes, Stopped, Watcher, over_threads
 
 __all__ = ["Keeper", "Passes", "Stopped", "Tracer", "Watcher", "render"]
@@ -47,7 +46,7 @@ class Tracer:
         self._scene, self._camera = scene, scene.camera
         self._threads = threads or os.cpu_count() or 1
         former = None if kept is None else kept._used_up()
-        if former is not None and tuple(former[1].origin) == native.origin_of(scene) and same_things(scene, former[0]):
+        if former is not None and former[1].serves(scene):
             self._core = former[1]
             self._core.look(scene)
         else:
