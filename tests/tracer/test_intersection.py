@@ -1,4 +1,4 @@
-"""What rays meet in the core: against brute force over all triangles, at shared edges and vertices, in packets and one by one."""
+"""What rays meet in the core: against brute force, at shared edges and vertices, in packets and one by one."""
 
 import hashlib
 import os
@@ -23,7 +23,7 @@ SCALES, OFFSETS = (1e-6, 1e-3, 1.0, 1e3, 1e6), (0.0, 1e3, 1e7)
 LEAK_RAYS = int(os.environ.get("VIEWCAM_LEAK_RAYS", "100000"))
 """Rays of each leak test, each traced three times: alone, in packets, and as one that asks for a light."""
 INSTANCES = 1 << 19
-"""Triangles that the core writes out where instances could stand for them (core/scene.h): a mesh with more is placed, not copied."""
+"""Triangles that the core writes out where instances could stand for them (core/scene.h); more are placed, not copied."""
 
 
 def corners_of(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
@@ -39,7 +39,7 @@ def corners_of(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
 
 
 def brute_force(corners: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of every triangle: where one ray meets its plane, and the least of its barycentric coordinates there (Möller, Trumbore)."""
+    """Of all triangles: where a ray meets their planes, and the least of its barycentric coordinates (Möller, Trumbore)."""
     a, first, second = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     across = np.cross(direction, second)
     with np.errstate(all="ignore"):
