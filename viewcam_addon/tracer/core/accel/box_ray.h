@@ -31,7 +31,7 @@ struct BoxRay {
     float far;
 
     // Nothing farther than t is asked for any more.
-    void limit(double t) { far = std::fmin(far, round_up(std::fmax(0.0, t * unit - start))); }
+    void limit(double t) { far = std::min(far, round_up(max(t * unit - start, 0.0))); }
 };
 
 // The ray for the boxes of `bvh`; false where it misses them all. Ray's t_max is the farthest.
@@ -52,12 +52,12 @@ inline bool enter(const Bvh& bvh, const Ray& ray, BoxRay& box) {
     last += abs(last) * splat4(4e-15);
     box.unit = longest * bvh.scale;
     double start = ray.t_min * box.unit, end = ray.t_max * box.unit;
-    start = std::fmax(std::fmax(start, first[0]), std::fmax(first[1], first[2]));
-    end = std::fmin(std::fmin(end, last[0]), std::fmin(last[1], last[2]));
+    start = max(max(start, first[0]), max(first[1], first[2]));
+    end = min(min(end, last[0]), min(last[1], last[2]));
     if (!(start <= end)) return false;
 
-    double largest = std::fmax(half[0], std::fmax(half[1], half[2]));
-    double far = std::fmax(std::fabs(from[0]), std::fmax(std::fabs(from[1]), std::fabs(from[2])));
+    double largest = max(half[0], max(half[1], half[2]));
+    double far = max(std::fabs(from[0]), max(std::fabs(from[1]), std::fabs(from[2])));
     double error = largest * (2 * FLOAT_ROUNDING + 2e-12) + 8 * DOUBLE_ROUNDING * (far + std::fabs(start)) +
                    ray.origin_error * bvh.scale;
     double4 entry = from + splat4(start) * unit, forward = copysign(splat4(error), unit);

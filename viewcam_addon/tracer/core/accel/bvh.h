@@ -24,8 +24,8 @@ struct Bounds {
 
     bool is_empty() const { return !(low.x <= high.x); }
     void add(Vec3 p) {
-        low = {std::fmin(low.x, p.x), std::fmin(low.y, p.y), std::fmin(low.z, p.z)};
-        high = {std::fmax(high.x, p.x), std::fmax(high.y, p.y), std::fmax(high.z, p.z)};
+        low = {min(low.x, p.x), min(low.y, p.y), min(low.z, p.z)};
+        high = {max(high.x, p.x), max(high.y, p.y), max(high.z, p.z)};
     }
     void add(const Bounds& other) {
         add(other.low);
@@ -353,7 +353,7 @@ template <class BoxOf> Bvh build_bvh(size_t count, const BoxOf& box_of, uint32_t
 
     bvh.centre = extent.low * 0.5 + extent.high * 0.5;
     Vec3 up = extent.high - bvh.centre, down = bvh.centre - extent.low;
-    bvh.half = {std::fmax(up.x, down.x), std::fmax(up.y, down.y), std::fmax(up.z, down.z)};
+    bvh.half = {max(up.x, down.x), max(up.y, down.y), max(up.z, down.z)};
     double largest = max_component(bvh.half);
     if (largest > 0) bvh.scale = std::ldexp(1.0, -std::max(std::ilogb(largest), -1000) - 2);
     bvh.half = bvh.half * bvh.scale;

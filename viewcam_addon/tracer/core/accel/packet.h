@@ -24,7 +24,7 @@ struct Shear {
 
 // Four triangles and a ray, or four rays and a triangle; corners relative to the rays' origins, in the order of a shear's axes.
 // Which are hit, on either side, however far along; t · determinant, and the determinant.
-inline long4 intersect_triangle(double4 ax, double4 ay, double4 az, double4 bx, double4 by, double4 bz, double4 cx, double4 cy, double4 cz,
+[[gnu::always_inline]] inline long4 intersect_triangle(double4 ax, double4 ay, double4 az, double4 bx, double4 by, double4 bz, double4 cx, double4 cy, double4 cz,
                                 double4 by_x, double4 by_y, double4 by_z, double4& t, double4& determinant) {
     ax -= by_x * az, ay -= by_y * az, bx -= by_x * bz, by -= by_y * bz, cx -= by_x * cz, cy -= by_y * cz;
     double4 u = cx * by - cy * bx, v = ax * cy - ay * cx, w = bx * ay - by * ax, zero = splat4(0.0);
@@ -50,7 +50,7 @@ struct alignas(64) Packet {
         if (!(distance < t[ray] || (distance == t[ray] && other < name[ray]))) return false;
         name[ray] = other;
         t[ray] = ANY ? -INFINITE : distance;
-        far[ray] = ANY ? -1 : std::fmin(far[ray], round_up(std::fmax(0.0, distance * unit[ray] - start[ray])));
+        far[ray] = ANY ? -1 : std::min(far[ray], round_up(max(distance * unit[ray] - start[ray], 0.0)));
         return true;
     }
 

@@ -37,10 +37,10 @@ inline void write_geometry(const Scene& scene, const Ray& ray, const Hit& hit, c
     passes.write(VIEWCAM_UV, pixel, at.uv.x, at.uv.y, at.has_uv ? 1 : 0);
     passes.write(VIEWCAM_OBJECT_INDEX, pixel, scene.objects[hit.object].index);
     passes.write(VIEWCAM_MATERIAL_INDEX, pixel, scene.slots[at.slot].index);
-    passes.write(VIEWCAM_FACING, pixel, std::fmax(0.0, std::fmin(at.cosine, 1.0)));
+    passes.write(VIEWCAM_FACING, pixel, max(0.0, min(at.cosine, 1.0)));
     if (passes.plane[VIEWCAM_MAGNITUDE]) {
         double eye = max_component(abs(scene.origin + ray.origin));
-        passes.write(VIEWCAM_MAGNITUDE, pixel, std::fmax(eye, scene.magnitude(ray, hit)));
+        passes.write(VIEWCAM_MAGNITUDE, pixel, max(eye, scene.magnitude(ray, hit)));
     }
 }
 

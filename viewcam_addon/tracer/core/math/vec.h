@@ -11,6 +11,10 @@ namespace viewcam::VIEWCAM_ISA {
 inline double larger(double a, double b) { return a > b ? a : b; }
 inline double smaller(double a, double b) { return a < b ? a : b; }
 
+// In line everywhere, as the C library's are not; of something that is no number and b, b.
+inline double min(double a, double b) { return a < b ? a : b; }
+inline double max(double a, double b) { return a > b ? a : b; }
+
 struct Vec2 {
     double x = 0, y = 0;
 };

@@ -28,7 +28,7 @@ struct Object {
         Vec3 apart = ray.origin - to_world.translation(), sizes = abs(apart);
         Ray local{to_object(apart), to_object(ray.direction), ray.t_min, ray.t_max};
         for (int row = 0; row < 3; row++)
-            local.origin_error = std::fmax(local.origin_error, std::fabs(inverse[row][0]) * sizes.x + std::fabs(inverse[row][1]) * sizes.y +
+            local.origin_error = max(local.origin_error, std::fabs(inverse[row][0]) * sizes.x + std::fabs(inverse[row][1]) * sizes.y +
                                                                    std::fabs(inverse[row][2]) * sizes.z);
         local.origin_error *= 8 * DOUBLE_ROUNDING;
         return local;
@@ -36,7 +36,7 @@ struct Object {
     // The largest coordinate that the linear part makes of coordinates up to `size`.
     double stretched(double size) const {
         double most = 0;
-        for (auto& row : to_world.m) most = std::fmax(most, std::fabs(row[0]) + std::fabs(row[1]) + std::fabs(row[2]));
+        for (auto& row : to_world.m) most = max(most, std::fabs(row[0]) + std::fabs(row[1]) + std::fabs(row[2]));
         return most * size;
     }
     Vec3 column(int i) const { return {to_world.m[0][i], to_world.m[1][i], to_world.m[2][i]}; }
@@ -47,7 +47,7 @@ struct Object {
         rows[0] = cross(second, third);
         rows[1] = cross(third, first);
         rows[2] = cross(first, second);
-        double largest = std::fmax(max_component(abs(rows[0])), std::fmax(max_component(abs(rows[1])), max_component(abs(rows[2]))));
+        double largest = max(max_component(abs(rows[0])), max(max_component(abs(rows[1])), max_component(abs(rows[2]))));
         if (largest > 0)
             for (int i = 0; i < 3; i++) rows[i] = rows[i] / largest;
     }
@@ -64,8 +64,8 @@ struct Object {
         double determinant = dot(a, bc), largest = 0, largest_inverse = 0;
         Vec3 rows[3] = {bc / determinant, ca / determinant, ab / determinant};
         for (int row = 0; row < 3; row++) {
-            largest = std::fmax(largest, std::fabs(to_world.m[row][0]) + std::fabs(to_world.m[row][1]) + std::fabs(to_world.m[row][2]));
-            largest_inverse = std::fmax(largest_inverse, std::fabs(rows[row].x) + std::fabs(rows[row].y) + std::fabs(rows[row].z));
+            largest = max(largest, std::fabs(to_world.m[row][0]) + std::fabs(to_world.m[row][1]) + std::fabs(to_world.m[row][2]));
+            largest_inverse = max(largest_inverse, std::fabs(rows[row].x) + std::fabs(rows[row].y) + std::fabs(rows[row].z));
             for (int i = 0; i < 3; i++) inverse[row][i] = rows[row][i];
         }
         condition = largest * largest_inverse;

@@ -55,7 +55,7 @@ struct UnitSphere {
         direction = object.to_object(ray.direction) / radius;
         center = (c - origin) / radius;
         tangent = dot(center, center) - 1;
-        double size = std::fmax(max_component(abs(c)), max_component(abs(origin)));
+        double size = max(max_component(abs(c)), max_component(abs(origin)));
         if (tangent < NEAR || size > 16 * radius * max_component(abs(center))) take_care(c, radius, object, ray);
     }
 
@@ -128,7 +128,7 @@ inline Interaction sphere_interaction(const Spheres& spheres, const Object& obje
     double reach = max_component(abs(middle)) + max_component(abs(object.to_world.translation())) +
                    object.stretched(max_component(abs(c)) + radius);
     double rounding = 16 * DOUBLE_ROUNDING * object.condition * reach, size = length(outward);
-    found.position = middle + outward * std::fmax(0.0, 1 - rounding / size);
+    found.position = middle + outward * max(0.0, 1 - rounding / size);
     outward = outward / size;
     found.backside = dot(outward, ray.direction) > 0;
     found.normal = found.shading = found.backside ? -outward : outward;
@@ -146,7 +146,7 @@ inline double sphere_magnitude(const Spheres& spheres, const Object& object, con
     double largest = max_component(abs(object.to_world.translation() + origin)), radius = spheres.radii[i];
     for (int axis = 0; axis < 3; axis++) {
         const double* row = object.to_world.m[axis];
-        largest = std::fmax(largest, world[axis] + radius * std::sqrt(row[0] * row[0] + row[1] * row[1] + row[2] * row[2]));
+        largest = max(largest, world[axis] + radius * std::sqrt(row[0] * row[0] + row[1] * row[1] + row[2] * row[2]));
     }
     return largest + length(middle - ray.origin);
 }

@@ -145,7 +145,7 @@ class TriangleSurface {
         normal = cross(first, second);
         normal_squared = dot(normal, normal);
         double one = dot(first, first), two = dot(second, second);
-        longest_squared = std::fmax(std::fmax(one, two), dot(third, third));
+        longest_squared = max(max(one, two), dot(third, third));
         if (normal_squared * (SLENDER * SLENDER) < one * two) {
             normal = exact_cross(first, second);
             normal_squared = dot(normal, normal);
@@ -157,21 +157,21 @@ class TriangleSurface {
         double per = 1 / ray.direction[axis], least = away[axis] * per, most = least;
         for (int i = 1; i < 3; i++) {
             double reached = (corner[i][axis] - ray.origin[axis]) * per;
-            least = std::fmin(least, reached);
-            most = std::fmax(most, reached);
+            least = min(least, reached);
+            most = max(most, reached);
         }
-        t = std::fmin(std::fmax(t, least), most);
+        t = min(max(t, least), most);
         Vec3 inside = ray.direction * t - away;
         b1 = dot(cross(inside, second), normal) / normal_squared;
         b2 = dot(cross(first, inside), normal) / normal_squared;
-        b1 = std::fmax(std::fmin(b1, 1.0), 0.0);
-        b2 = std::fmax(std::fmin(b2, 1 - b1), 0.0);
+        b1 = max(min(b1, 1.0), 0.0);
+        b2 = max(min(b2, 1 - b1), 0.0);
     }
 
     template <class Value> Value interpolate(Value a, Value b, Value c) const { return a * (1 - b1 - b2) + b * b1 + c * b2; }
 
     // The longest side over the height on it; slimmer triangles than float32 can tell from a line are no surface.
-    double slenderness(double most) const { return std::fmin(longest_squared / std::sqrt(normal_squared), most); }
+    double slenderness(double most) const { return min(longest_squared / std::sqrt(normal_squared), most); }
 
     // How far off the surface rays that leave it must start, with u = 2⁻⁵³, M the largest coordinate of corners and object in
     // rendering space and L the longest side. The point is rounded along the normal by √3 u (M + 6 L) where it is interpolated.
@@ -179,8 +179,8 @@ class TriangleSurface {
     // 2 u L² and their sum is the normal's projection, so that the plane seems to lie off by 6 u L σ, σ = L²/|N|. An instance's
     // ray is rounded by as much again as its matrix's condition enlarges it.
     double offset(const Object& object) const {
-        double reach = std::fmax(max_component(abs(corner[0])), std::fmax(max_component(abs(corner[1])), max_component(abs(corner[2]))));
-        reach = std::fmax(reach, max_component(abs(object.to_world.translation())));
+        double reach = max(max_component(abs(corner[0])), max(max_component(abs(corner[1])), max_component(abs(corner[2]))));
+        reach = max(reach, max_component(abs(object.to_world.translation())));
         double longest = std::sqrt(longest_squared), placing = object.shared || object.visible != ALL_KINDS ? 6 * object.condition : 0;
         return DOUBLE_ROUNDING * ((4 + placing) * reach + (16 + 12 * slenderness(MOST_SLENDER)) * longest);
     }
@@ -245,8 +245,8 @@ inline double triangle_magnitude(const TriangleMesh& mesh, const Object& object,
     TriangleSurface at(mesh, object, triangle, ray);
     double largest = max_component(abs(object.to_world.translation() + origin)), farthest = 0;
     for (Vec3 corner : at.corner) {
-        largest = std::fmax(largest, max_component(abs(corner + origin)));
-        farthest = std::fmax(farthest, length(corner - ray.origin));
+        largest = max(largest, max_component(abs(corner + origin)));
+        farthest = max(farthest, length(corner - ray.origin));
     }
     return largest + farthest * at.slenderness(0x1p24);
 }
