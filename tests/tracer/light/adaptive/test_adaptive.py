@@ -21,7 +21,12 @@ def mirrored(make_lit, floor, make_spheres, soft):
         (make_spheres([(1, 0.5, 0.6)], 0.6), Material(diffuse=Colour((0.8, 0.3, 0.2)))),
     )
     lamp = Area("area", matrix=matrix, size=(0.5, 0.5), power=(100,) * 3)
-    return make_lit(camera, *things, lamps=(lamp,), bounces=Bounces(4, 4, 4, 4))
+    return make_lit(camera, *things, lamps=(lamp,), bounces=Bounces(2, 2, 2, 2))
+
+
+@pytest.fixture(scope="module")
+def reference(mirrored):
+    return render(mirrored, "path", 1024, 99)
 
 
 def grey(passes):
@@ -47,19 +52,16 @@ def off_by(pictures, truth, variance):
     return by_tile, whole
 
 
-@pytest.mark.parametrize("error", [0.05, 0.01])
-def test_means_are_right_over_many_seeds_in_every_tile_and_in_all(mirrored, error):
+def test_means_are_right_over_many_seeds_in_every_tile_and_in_all(mirrored, reference):
     """Pixels that went on for what they had met, and stopped for what they had missed, would be too dark: by some 16 errors."""
-    reference = render(mirrored, "path", 4096, 99)
-    pictures = [grey(render(mirrored, "path", 256, seed, error=error)) for seed in range(24)]
+    pictures = [grey(render(mirrored, "path", 128, seed, error=0.05)) for seed in range(24)]
     by_tile, whole = off_by(pictures, grey(reference), reference["Variance"].astype(float).mean(axis=-1))
     assert abs(whole) < 4, f"the picture is off by {whole:+.1f} standard errors"
     # Student's t of 23 degrees of freedom exceeds 5 once in 40,000 times; there are 28 tiles.
     assert np.abs(by_tile).max() < 5, f"a tile is off by {np.abs(by_tile).max():.1f} standard errors"
 
 
-def test_pictures_that_lost_what_few_samples_met_would_be_told(mirrored):
-    reference = render(mirrored, "path", 4096, 99)
+def test_pictures_that_lost_what_few_samples_met_would_be_told(mirrored, reference):
     pictures = [np.minimum(grey(render(mirrored, "path", 16, seed)), 2 * grey(reference)) for seed in range(24)]
     by_tile, whole = off_by(pictures, grey(reference), reference["Variance"].astype(float).mean(axis=-1))
     assert abs(whole) > 4 or np.abs(by_tile).max() > 5
