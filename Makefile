@@ -21,7 +21,7 @@ ifndef PYTHON
 PYTHON := $(shell .ci/python 3.11 3.13)
 endif
 PYTHON_FOUND = $(if $(PYTHON),$(PYTHON),$(error Python 3.11 or 3.13 is needed, the only ones that bpy 5 has wheels for: install one or say make PYTHON=...))
-PROJECT = pyproject.toml blender_manifest.toml .ci/environment.py
+PROJECT = pyproject.toml blender_manifest.toml .ci/environment.py hatch_build.py $(shell find viewcam_addon/tracer/core -name '*.h' -o -name '*.cpp')
 PYTEST = env -u BLENDER $(1)/bin/python -m pytest
 # A file's tests stay together, since they share what is dear to make. At most four, for each may need a gigabyte or two.
 PARALLEL = $(PYTEST) --numprocesses=auto --maxprocesses=4 --dist=loadfile
@@ -43,6 +43,10 @@ lint: .venv/test
 .venv/demo: $(PROJECT)
 	$(PYTHON_FOUND) .ci/environment.py .venv --editable '.[blender]'
 	.venv/bin/python -c 'import bpy'
+	touch $@
+
+.venv/extension: $(PROJECT)
+	$(PYTHON_FOUND) .ci/environment.py .venv --editable '.[blender,extension]'
 	touch $@
 
 .venv/test: $(PROJECT)
@@ -89,7 +93,7 @@ test-blender: .venv/test $(MATRIX:%=.venvs/%/ready)
 	BLENDER=$$(.ci/find-blender) || exit 1; export BLENDER; \
 	.venv/bin/python -m pytest tests/real_blender
 
-extension: .venv/demo
+extension: .venv/extension
 	blender=$$(.ci/find-blender) || exit 1; \
 	.venv/bin/python .ci/extension.py "$$blender" dist $(PLATFORM)
 

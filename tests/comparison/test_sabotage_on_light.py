@@ -12,7 +12,6 @@ import pytest
 from viewcam_addon.comparison.radiance import compare
 from viewcam_addon.image import Image
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer.light import emitters
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import Mesh, Object, Scene
 from viewcam_addon.tracer.scene.film import Bounces
@@ -140,32 +139,21 @@ def test_a_fault_of_the_scene_is_found(reference, fault):
     assert comparison.sentence.startswith("Different here: ")
 
 
-# fault → what it makes of that which a shadow ray is told of a lamp.
+def brighter(lamp, factor):
+    what = "irradiance" if isinstance(lamp, Sun) else "power"
+    return replace(lamp, **{what: tuple(factor * value for value in getattr(lamp, what))})
 
 
-def without_cosine(aimed, points):
-    return aimed._replace(light=aimed.light / np.maximum(np.abs((points.shading * aimed.direction).sum(axis=0)), 1e-6))
-
-
-def with_distance(aimed, points):
-    return aimed._replace(light=aimed.light * np.where(np.isfinite(aimed.distance), aimed.distance, 1.0))
-
-
-FORMULA_FAULTS = {
-    "the cosine forgotten": without_cosine,
-    "π lost": lambda aimed, points: aimed._replace(light=aimed.light * np.pi),
-    "the distance taken for its square": with_distance,
-    "no shadows": lambda aimed, points: aimed._replace(shadowed=np.zeros(aimed.shadowed.shape, bool)),
+# fault → what it makes of a lamp.
+LAMP_FAULTS = {
+    "π lost": lambda lamp: brighter(lamp, np.pi),
+    "no shadows": lambda lamp: replace(lamp, casts_shadow=False),
 }
 
 
-@pytest.mark.parametrize("fault", FORMULA_FAULTS)
-def test_a_fault_of_the_formulas_is_found(reference, monkeypatch, fault):
-    right, sample = reference("direct", 64), emitters.Emitters.sample
-
-    def wrong(self, points, *rest, **more):
-        return FORMULA_FAULTS[fault](sample(self, points, *rest, **more), points)
-
-    monkeypatch.setattr(emitters.Emitters, "sample", wrong)
-    comparison = compared(right, build(), "direct", 64)
+@pytest.mark.parametrize("fault", LAMP_FAULTS)
+def test_a_fault_of_the_lamps_is_found(reference, fault):
+    scene = build()
+    wrong = replace(scene, lamps=tuple(LAMP_FAULTS[fault](lamp) for lamp in scene.lamps))
+    comparison = compared(reference("direct", 64), wrong, "direct", 64)
     assert not comparison.passed, f"{fault}: {comparison.sentence}"

@@ -1,18 +1,16 @@
 """Scenes for the tracer's tests: builders, as fixtures, of what several modules trace."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+sys.path.insert(0, str(Path(__file__).parent))
+from core_probes import SampledLight, Sampler, radiance_seen
+
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer.arrays import dot
 from viewcam_addon.tracer.compiled import standing
-from viewcam_addon.tracer.light.emitters import Aimed, Emitters
-from viewcam_addon.tracer.light.sampler import Sampler
-from viewcam_addon.tracer.light.textures import Palette
-from viewcam_addon.tracer.rays.ellipsoids import ellipsoids_of
-from viewcam_addon.tracer.rays.points import Points, Surfaces
-from viewcam_addon.tracer.rays.triangles import Planes, triangles_of
-from viewcam_addon.tracer.rays.view import View
 from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres
 
 
@@ -160,53 +158,39 @@ def random_scene(ball, make_scene, make_mesh, make_spheres, random_matrix):
 
 
 class Lighting:
-    """The emitters of a scene, asked in world space."""
+    """Lamps, asked in world space."""
 
-    def __init__(self, scene: Scene) -> None:
-        self.view = View(scene.camera)
-        placed = [(thing, scene.geometries[thing.geometry]) for thing in scene.objects]
-        triangles = triangles_of([pair for pair in placed if isinstance(pair[1], Mesh)], self.view)
-        ellipsoids = ellipsoids_of([pair for pair in placed if isinstance(pair[1], Spheres)], self.view)
-        self.surfaces = Surfaces(scene, self.view, triangles, Planes(triangles, self.view), ellipsoids)
-        self.emitters = Emitters(scene, self.view, self.surfaces, Palette(scene))
+    def __init__(self, *lamps) -> None:
+        self._lamps = lamps
 
-    def points(self, position, normal, count: int) -> Points:
-        """A point of a surface, as many times; position and normal (3,) or (3, count), world space."""
-        position = self.view.axes @ (np.reshape(position, (3, -1)) - self.view.eye[:, None]) * np.ones(count)
+    def aimed(self, position, normal, count: int = 4096, seed: int = 1, skew: float = 1.0) -> tuple[SampledLight, np.ndarray]:
+        """Samples of the only lamp at a point of a surface, and their cosines to its normal, 0 below the horizon.
+
+        skew : a power of the first of two numbers, other than 1 for samples that are not spread evenly.
+        """
+        (lamp,) = self._lamps
         normal = np.reshape(normal, (3, -1)) / np.linalg.norm(np.reshape(normal, (3, -1)), axis=0)
-        normal = self.view.axes @ normal * np.ones(count)
-        zeros = np.zeros(count, np.intp)
-        return Points(position, normal, normal, zeros > 0, zeros.astype(np.int32), zeros, np.zeros(count), None, None)
+        numbers = Sampler(seed, count).numbers(np.zeros(count), np.arange(count), 3, 2) ** [[skew], [1.0]]
+        aimed = SampledLight(lamp, position, normal, numbers)
+        return aimed, np.maximum((normal * aimed.direction).sum(axis=0), 0.0)
 
-    def aimed(self, position, normal, count: int = 4096, seed: int = 1) -> tuple[Aimed, np.ndarray]:
-        """Samples at a point, and their cosines to its normal, 0 below the horizon."""
-        points = self.points(position, normal, count)
-        numbers = Sampler(seed, count).numbers(np.zeros(count, np.int64), np.arange(count), 2, 3)
-        aimed = self.emitters.sample(points, numbers)
-        return aimed, np.maximum(dot(points.normal, aimed.direction), 0.0)
-
-    def irradiance(self, position, normal, count: int = 4096, seed: int = 1) -> tuple[float, float]:
+    def irradiance(self, position, normal, count: int = 4096, seed: int = 1, skew: float = 1.0) -> tuple[float, float]:
         """The mean of the first channel, and its standard error as if the samples were independent."""
-        aimed, cosine = self.aimed(position, normal, count, seed)
+        aimed, cosine = self.aimed(position, normal, count, seed, skew)
         values = aimed.light[0] * cosine
         return values.mean(), values.std() / np.sqrt(count)
 
     def seen(self, starts, directions, kind: str = "camera", nearest=0.0, farthest=np.inf) -> np.ndarray:
-        """(3, n) radiance of all lamps that rays run into; starts, directions (3, n), world space."""
-        starts, directions = self.view.axes @ (starts - self.view.eye[:, None]), self.view.axes @ directions
-        near = self.emitters.lamps_met(starts, directions, nearest, farthest, kind)
-        return near + self.emitters.suns_met(directions, kind)
+        """(3, n) radiance of all lamps that rays run into; starts, directions (3, n)."""
+        lamps = [lamp for lamp in self._lamps if kind not in lamp.hidden_from and not lamp.is_dark]
+        none = np.zeros(np.broadcast_shapes(np.shape(starts), np.shape(directions)))
+        return sum((radiance_seen(lamp, starts, directions, nearest, farthest) for lamp in lamps), start=none)
 
 
 @pytest.fixture(scope="session")
-def make_lighting(make_lit):
-    """make_lighting(lamp, …, surfaces=[(geometry, material), …], world=…) → Lighting, from a camera that looks askew."""
-
-    def build(*lamps, surfaces=(), **light) -> Lighting:
-        camera = Pinhole((0.3, -0.2, 0.4), (-1, 2, 1), (0.1, 0.2, 1), 100, 8, 8, mirrored=True)
-        return Lighting(make_lit(camera, *surfaces, lamps=lamps, **light))
-
-    return build
+def make_lighting():
+    """make_lighting(lamp, …) → Lighting."""
+    return Lighting
 
 
 @pytest.fixture(scope="session")

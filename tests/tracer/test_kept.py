@@ -6,9 +6,6 @@ import numpy as np
 import pytest
 
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer import render as renders
-from viewcam_addon.tracer.compiled import standing
-from viewcam_addon.tracer.rays import embree
 from viewcam_addon.tracer.render import Keeper, Tracer, render
 from viewcam_addon.tracer.scene import Mesh
 from viewcam_addon.tracer.scene.film import NO_BOUNCES
@@ -18,7 +15,6 @@ from viewcam_addon.tracer.scene.sameness import same, same_things
 
 WIDTH, HEIGHT = 96, 64
 GREEN, RED = Material(diffuse=Colour((0.1, 0.8, 0.2))), Material(diffuse=Colour((0.9, 0.1, 0.1)))
-# Higher up in the flight it is no longer wide, and becomes Embree's.
 GROUND = np.array([[-300, -300, -1.2], [300, -300, -1.2], [300, 300, -1.2], [-300, 300, -1.2]], float)
 
 
@@ -66,7 +62,6 @@ def copied(scene):
 
 
 def test_a_flight_with_kept_structures_has_the_pictures_of_fresh_ones(scene):
-    """To the last bit: a refitted hierarchy has other boxes than a new one, and the same triangles in them."""
     kept = Tracer(scene)
     for turn in np.linspace(0, 2 * np.pi, 9):
         frame = replace(copied(scene), camera=camera(turn))
@@ -75,54 +70,13 @@ def test_a_flight_with_kept_structures_has_the_pictures_of_fresh_ones(scene):
         assert not found, f"at {turn:.2f} radians: {found} pixels of {WIDTH * HEIGHT} differ"
 
 
-def test_only_moving_the_camera_refits_and_zooming_makes_nothing_anew(scene, monkeypatch):
-    built, refitted = [], []
-    build, refit = embree.embree_scene, embree._refit
-    monkeypatch.setattr(embree, "embree_scene", lambda *given: built.append(1) or build(*given))
-    monkeypatch.setattr(embree, "_refit", lambda *given: refitted.append(1) or refit(*given))
+def test_moving_the_camera_and_zooming_make_nothing_anew(scene):
     first = Tracer(scene)
+    core = first._core
     pictures(first)
-    assert len(built) == 2, "what the eye sees, and what casts shadows"
-    planes, lit, joints = first._planes, first._lit, first._outlines.joints
     zoomed = Tracer(replace(copied(scene), camera=camera(distance=200.0, width=50)), kept=first)
-    pictures(zoomed)
-    assert zoomed._planes is planes and zoomed._lit is lit
-    assert (len(built), len(refitted)) == (2, 0)
     moved = Tracer(replace(scene, camera=camera(0.05)), kept=zoomed)
-    pictures(moved)
-    assert (len(built), len(refitted)) == (4, 0), "once, so that it can be refitted"
-    moved = Tracer(replace(scene, camera=camera(0.08)), kept=moved)
-    pictures(moved)
-    assert (len(built), len(refitted)) == ((4, 2) if embree._EMBREE else (6, 0))
-    assert moved._joints is joints
-
-
-def test_a_second_picture_of_light_prepares_nothing_again(scene):
-    tracer = Tracer(scene)
-    first = tracer.render_light("direct", 1, 0)
-    lit = tracer._lit
-    assert not differing([tracer.render_light("direct", 1, 0)], [first])
-    assert tracer._lit is lit
-
-
-def test_without_embrees_own_functions_hierarchies_are_built_again(scene, monkeypatch):
-    monkeypatch.setattr(embree, "_EMBREE", None)
-    frame = replace(scene, camera=camera(0.4))
-    assert not differing(pictures(Tracer(frame, kept=Tracer(scene))), pictures(Tracer(frame)))
-
-
-def test_without_embree_planes_are_made_again(scene, monkeypatch, without_embree_anywhere):
-    frame = replace(scene, camera=camera(0.4))
-    assert not differing(pictures(Tracer(frame, kept=Tracer(scene))), pictures(Tracer(frame)))
-
-
-@pytest.fixture
-def without_embree_anywhere(monkeypatch):
-    from viewcam_addon.tracer.rays import crowd, space, visibility
-
-    for module in (visibility, space, crowd):
-        monkeypatch.setattr(module, "EmbreeScene", None)
-    monkeypatch.setattr(standing, "AVAILABLE", False)
+    assert moved._core is core
 
 
 def one_mesh(scene, **changes):
@@ -173,9 +127,9 @@ def test_nothing_is_kept_where_things_have_changed(change, moved, scene):
     now = replace(now, camera=camera(0.2)) if moved else now
     before = Tracer(scene, kept=Tracer(replace(scene, camera=camera(0.1))))  # moved before
     pictures(before)
-    old, fresh = before._triangles, Tracer(now)
+    old, fresh = before._core, Tracer(now)
     kept = Tracer(now, kept=before)
-    assert kept._triangles is not old and not kept._triangles.former_scenes
+    assert kept._core is not old
     assert not differing(pictures(kept), pictures(fresh))
 
 
@@ -205,32 +159,13 @@ def test_a_tracer_whose_structures_were_taken_over_traces_no_more(scene):
         before.render()
 
 
-MANY_OR_FEW = [
-    ("geometry", 64, None, True),
-    ("direct", 9, None, True),
-    ("direct", 11, None, False),
-    ("direct", 11, 0.1, True),
-]
-
-
 def test_a_keeper_hands_each_scene_what_the_one_before_had(scene):
     keeper, frames = Keeper(), [replace(scene, camera=camera(turn)) for turn in (0.0, 0.1, 0.2)]
     shown = [render(frame, "direct", 2, keeper=keeper) for frame in frames]
-    triangles = keeper._tracer._triangles
-    assert not triangles.moving, "many samples of few triangles: hierarchies are built"
+    core = keeper._tracer._core
     assert not differing(shown, [render(frame, "direct", 2) for frame in frames])
     render(frames[-1], keeper=keeper)
-    assert keeper._tracer._triangles is triangles
-
-
-@pytest.mark.parametrize(("level", "samples", "error", "refits"), MANY_OR_FEW)
-def test_hierarchies_are_refitted_where_few_rays_follow(level, samples, error, refits, scene, monkeypatch):
-    rays = WIDTH * HEIGHT  # and 598 triangles
-    monkeypatch.setattr(renders, "_MANY_RAYS", 20 * rays / 598)
-    keeper = Keeper()
-    for turn in (0.0, 0.1):
-        render(replace(scene, camera=camera(turn)), level, samples, keeper=keeper, error=error)
-    assert keeper._tracer._triangles.moving is refits
+    assert keeper._tracer._core is core
 
 
 def test_scenes_are_the_same_by_content(scene):

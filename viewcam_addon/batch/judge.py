@@ -105,7 +105,7 @@ class _Bench:
         camera, stated = Pinhole(**request["camera"]), request["stated"] and Pinhole(**request["stated"])
         scene = dataclasses.replace(self._scene, camera=camera, clip=tuple(request["clip"]))
         test = image.read(request["image"])
-        tracer = self._keeper.tracer(scene, request["threads"], camera.width * camera.height)
+        tracer = self._keeper.tracer(scene, request["threads"])
         reference = image.Image(tracer.render(), camera)
         comparison = geometry.compare(reference, test, camera, tracer.surface_at, stated, scene.origin)
         return {"passed": comparison.passed, "verdict": comparison.sentence, "figures": _figures(comparison)}

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from ..events import Events
 
 if TYPE_CHECKING:
-    from ..tracer.rays.surface import Passes  # brings what the other commands need not wait for
+    from ..tracer.tiles import Passes  # brings what the other commands need not wait for
 
 
 class Progress:

@@ -1,24 +1,23 @@
 """A picture in tiles over threads, watched and stopped by whoever waits for it.
 
-A tile is a run of pixels, row after row: the memory that a render takes beside the passes does not depend on the size of the
-picture. Whoever computes it computes every pixel alone, so that threads and tiles change no bit of the result.
+Whoever computes a tile computes every pixel alone, so that threads and tiles change no bit of the result.
 """
 
 import contextvars
-from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from typing import Protocol
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from typing import Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .rays.surface import Passes
+Passes = dict[str, NDArray[np.float32]]
+"""Pass name → (height, width, channels)."""
 
-# The C library of Linux gives the memory of arrays back to the system as they are freed, and gets it again page by page: a
-# third of the time that light takes. It keeps what is smaller than the largest piece that it ever got back, if that is less
-# than 32 MiB; so it gets such a piece once.
-_KEPT = 31 << 20
-# So that all threads have something to do until the end.
-_PER_THREAD = 4
+# Seconds between two questions whether to stop while tiles are traced.
+_ASKED_EVERY = 0.05
+
+Tile = TypeVar("Tile")
 
 
 class Stopped(Exception):
@@ -35,35 +34,33 @@ class Watcher(Protocol):
         """Whether to give up. Asked often, by any thread."""
 
 
-def tiles(pixels: int, width: int, threads: int, smallest: int, largest: int) -> Iterator[range]:
-    """Runs of pixels: whole rows where one is not too long, no more than `largest` and no fewer than `smallest` pixels."""
-    size = max(smallest, min(largest, pixels // (_PER_THREAD * threads)))
-    if size > width:
-        size -= size % width
-    return (range(first, min(first + size, pixels)) for first in range(0, pixels, size))
-
-
-def over_threads(work: Callable[[range], None], tiles: Iterator[range], threads: int) -> Iterator[range]:
+def over_threads(
+    work: Callable[[Tile], None], tiles: Iterable[Tile], threads: int, ask: Callable[[], None], give_up: Callable[[], None]
+) -> Iterator[Tile]:
     """Call `work` with each tile, in some thread and this one's context; the tiles that are done.
 
-    What `work` raises is raised here, when those that are under way have ended; the others are not begun.
+    ask : called every so often; what it raises ends the work. give_up : called before what `ask` or `work` raises is raised
+    here, so that those that are under way end soon; this is when they have ended, and the others are not begun.
     """
-    np.empty(_KEPT, np.uint8)
     with ThreadPoolExecutor(threads) as pool:
-        under_way = {}
+        under_way: dict[Future, Tile] = {}
         try:
             for tile in tiles:
                 under_way[pool.submit(contextvars.copy_context().run, work, tile)] = tile
                 if len(under_way) > 2 * threads:
-                    yield from _done(under_way)
+                    yield from _done(under_way, ask)
             while under_way:
-                yield from _done(under_way)
+                yield from _done(under_way, ask)
+        except BaseException:
+            give_up()
+            raise
         finally:
             pool.shutdown(cancel_futures=True)
 
 
-def _done(under_way: dict) -> list[range]:
-    done = wait(under_way, return_when=FIRST_COMPLETED).done
+def _done(under_way: "dict[Future, Tile]", ask: Callable[[], None]) -> list[Tile]:
+    while not (done := wait(under_way, _ASKED_EVERY, FIRST_COMPLETED).done):
+        ask()
     for future in done:
         future.result()
     return [under_way.pop(future) for future in done]

@@ -8,9 +8,8 @@ from types import SimpleNamespace
 import pytest
 
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer import compiled, tiles
+from viewcam_addon.tracer import compiled
 from viewcam_addon.tracer.compiled import standing
-from viewcam_addon.tracer.rays import tables
 from viewcam_addon.tracer.scene import scene_file
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -49,25 +48,6 @@ def test_kernels_are_used_where_a_small_picture_turns_out_to_need_many_paths(mon
             assert answer() == "NumPy"
     with standing.compiled_for(paths=999):
         assert answer() == "kernel"
-
-
-def test_what_is_uncompiled_is_so_in_the_threads_that_it_starts_and_until_its_end(monkeypatch):
-    answer = _answering(monkeypatch)
-
-    def in_threads():
-        found = tables.each(lambda _: answer(), range(2), threads=2)
-
-        def work(tile):
-            found.append(answer())
-
-        list(tiles.over_threads(work, iter([range(1)]), threads=2))
-        return set(found)
-
-    with standing.uncompiled(True):
-        with standing.uncompiled(False):
-            assert answer() == "kernel" and in_threads() == {"kernel"}
-        assert answer() == "NumPy" and in_threads() == {"NumPy"}
-    assert answer() == "kernel" and in_threads() == {"kernel"} and answer.plain() == "NumPy"
 
 
 def _answering(monkeypatch):

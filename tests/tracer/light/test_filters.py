@@ -1,13 +1,30 @@
 import numpy as np
 import pytest
+from core_probes import offsets
 from hypothesis import given
 from hypothesis import strategies as st
 
-from viewcam_addon.tracer.light.filters import density, mass, offsets
 from viewcam_addon.tracer.scene.film import Film
 
 WIDTHS = st.floats(0.01, 10.0)
 UNITS = st.integers(0, 2**32 - 1).map(lambda digits: digits / 2**32)
+
+
+COEFFICIENTS = (0.35875, 0.48829, 0.14128, 0.01168)
+
+
+def density(x):
+    """The Blackman-Harris filter at x, in widths from the centre, −1 to 1; 1 at the centre."""
+    a, b, c, d = COEFFICIENTS
+    theta = np.pi * (x + 1.0)
+    return a - b * np.cos(theta) + c * np.cos(2 * theta) - d * np.cos(3 * theta)
+
+
+def mass(x):
+    """The part of the filter's mass that lies below x."""
+    a, b, c, d = COEFFICIENTS
+    theta = np.pi * (x + 1.0)
+    return (a * theta - b * np.sin(theta) + c / 2 * np.sin(2 * theta) - d / 3 * np.sin(3 * theta)) / (2 * np.pi * a)
 
 
 def places(u, width=1.0):

@@ -2,10 +2,9 @@ import hashlib
 
 import numpy as np
 import pytest
+from core_probes import FILM, SCATTERING, Sampler
 from hypothesis import given
 from hypothesis import strategies as st
-
-from viewcam_addon.tracer.light.sampler import FILM, SCATTERING, Sampler
 
 SEEDS = st.integers(0, 2**63)
 # Of the film, and of each scattering: where on a lamp, and which way.
@@ -140,12 +139,6 @@ def test_a_sample_of_a_pixel_is_the_same_whoever_asks_for_it_and_how():
         np.testing.assert_array_equal(sampler.numbers(pixels, sample, 0, 20), all_at_once[:, sample])
     np.testing.assert_array_equal(sampler.numbers(pixels[::-1], 5, 13, 2), all_at_once[13:15, 5, ::-1])
     np.testing.assert_array_equal(Sampler(7, 100).numbers(pixels[17:18], 5, 13, 2)[:, 0], all_at_once[13:15, 5, 17])
-
-
-def test_a_grid_of_samples_and_pixels_is_the_same_numbers_pixel_after_pixel():
-    sampler, pixels, samples = Sampler(7, 100), np.arange(50, 90), np.array([3, 4, 99])
-    expected = sampler.numbers(np.repeat(pixels, 3), np.tile(samples, 40), 1, 4)
-    np.testing.assert_array_equal(sampler.grid(pixels, samples, 1, 4), expected)
 
 
 def test_more_samples_begin_with_those_of_fewer():

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
+from core_probes import looked_up
 from hypothesis import given
 from hypothesis import strategies as st
 
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer.light.textures import Palette, Texture, decoded
-from viewcam_addon.tracer.rays.points import Points
+from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import Mesh, Object, Scene
 from viewcam_addon.tracer.scene.materials import PLAIN, Colour, Material, Picture
 
@@ -25,29 +25,10 @@ def at(u, v):
     return np.array(np.broadcast_arrays(*np.atleast_1d(u, v)), np.float64)
 
 
-def looked_up(picture, uv, closest):
-    return Texture(picture).at(uv, closest)
-
-
-def points(material, uv=None, vertex_colour=None):
-    """Points of materials, where only what colours them matters."""
-    material = np.array(material, np.int32)
-    place = np.zeros((3, len(material)))
-    flags = np.zeros(len(material), bool)
-    return Points(place, place, place, flags, material, material.astype(np.intp), place[0], uv, vertex_colour)
-
-
-def scene_of(*materials, images=None, of_triangles=None):
-    """A triangle for each of the materials, None being none; or triangles of one object with these numbers."""
-    count = len(of_triangles) if of_triangles is not None else 1
-    mesh = Mesh(np.eye(3), np.tile(np.arange(3, dtype=np.int32), (count, 1)), np.array(of_triangles or [0], np.int32))
-    names = ["" if material is None else f"material {number}" for number, material in enumerate(materials)]
-    if of_triangles is not None:
-        objects = (Object("all", "mesh", np.eye(4), material_indices=tuple(range(len(names))), materials=tuple(names)),)
-    else:
-        objects = tuple(Object(f"object of {name}", "mesh", np.eye(4), materials=(name,)) for name in names)
-    table = {name: material for name, material in zip(names, materials, strict=True) if material is not None}
-    return Scene(CAMERA, {"mesh": mesh}, objects, materials=table, images=images or {})
+def decoded(codes):
+    """sRGB values as light."""
+    picture = Picture(np.repeat(np.float32(codes)[None, :, None], 3, axis=2), srgb=True)
+    return looked_up(picture, at((np.arange(len(codes)) + 0.5) / len(codes), 0.5), True)[0]
 
 
 @given(SEEDS, COUNTS, COUNTS, st.booleans())
@@ -122,68 +103,35 @@ def test_colours_that_are_not_finite_nowhere_come_from_uv_that_is_not():
         assert np.isfinite(found).all() and found.min() >= 0.25
 
 
-def test_each_point_has_the_colour_of_its_material_and_black_where_its_material_has_none():
-    palette = Palette(scene_of(None, Material(diffuse=RED), Material(emission=GREEN)))
-    np.testing.assert_array_equal(
-        palette.colour("diffuse", points([0, 1, 2, 1])), np.array([[0.8, 0.8, 0.8], RED.rgb, [0, 0, 0], RED.rgb]).T
+def shown(*materials, pass_name="Diffuse Color", images=None, uv=None, vertex_colours=None):
+    """(3,) of each material, None being none: what a pass shows at a triangle of it, with one UV and one colour all over."""
+    triangle = Mesh(
+        np.array([[-9.0, -9, 0], [9, -9, 0], [0, 9, 0]]),
+        np.array([[0, 1, 2]], np.int32),
+        np.zeros(1, np.int32),
+        corner_uvs=None if uv is None else np.full((1, 3, 2), uv, np.float32),
+        corner_colours=None if vertex_colours is None else np.full((1, 3, 3), vertex_colours, np.float32),
     )
-    np.testing.assert_array_equal(palette.colour("emission", points([0, 1, 2])), np.array([[0] * 3, [0] * 3, GREEN.rgb]).T)
+    found = []
+    for number, material in enumerate(materials):
+        names = ("",) if material is None else (f"material {number}",)
+        table = {f"material {k}": each for k, each in enumerate(materials) if each is not None}
+        placed = Object("triangle", "mesh", np.eye(4), materials=names)
+        scene = Scene(CAMERA, {"mesh": triangle}, (placed,), materials=table, images=images or {})
+        found.append(render(scene, "direct", 1, threads=1)[pass_name][4, 4])
+    return np.array(found)
 
 
-def test_a_palette_has_only_what_surfaces_have():
-    glow, mirror, unlit = Material(emission=GREEN), Material(mirror=RED), Material(diffuse=Colour((0, 0, 0)))
-    palette = Palette(scene_of(glow))
-    assert palette.has("emission") and not palette.has("diffuse") and not palette.scatters, "nothing is of the plain material"
-    assert Palette(scene_of(glow, mirror)).scatters
-    assert not Palette(scene_of(unlit)).has("diffuse")
-    assert Palette(scene_of(None)).has("diffuse")
-    scene = scene_of(glow, mirror, unlit, of_triangles=[0, 2, 0])
-    assert not Palette(scene).has("mirror"), "no triangle has the second material"
-
-
-def test_a_slot_without_a_material_is_plain():
-    scene = scene_of(Material(emission=GREEN), of_triangles=[0, 0])
-    extra = Object("more", "mesh", np.eye(4), material_indices=(0, 0))
-    palette = Palette(Scene(CAMERA, scene.geometries, (*scene.objects, extra), materials=scene.materials))
-    np.testing.assert_array_equal(palette.colour("diffuse", points([0]))[:, 0], PLAIN.diffuse.rgb)
+def test_each_surface_has_the_colour_of_its_material_and_black_where_its_material_has_none():
+    materials = None, Material(diffuse=RED), Material(emission=GREEN)
+    np.testing.assert_allclose(shown(*materials), [PLAIN.diffuse.rgb, RED.rgb, (0, 0, 0)], rtol=1e-7)
+    np.testing.assert_allclose(shown(*materials, pass_name="Emission"), [(0, 0, 0), (0, 0, 0), GREEN.rgb], rtol=1e-7)
 
 
 def test_images_and_vertex_colours_multiply_the_colour_where_their_material_is_and_nowhere_else():
     images = {"ramp": grey([[0.5, 0.25]])}
     textured = Material(diffuse=Colour((1.0, 0.5, 0.0), image="ramp", closest=True, vertex=True))
-    palette = Palette(scene_of(textured, Material(diffuse=RED), images=images))
-    colours = np.array([[1.0, 1.0, 0.5], [1.0, 0.5, 1.0], [1.0, 0.0, 1.0]])
-    found = palette.colour("diffuse", points([1, 2, 1], at([0.1, 0.1, 0.9], 0.5), colours))
-    np.testing.assert_allclose(found.T, [[0.5, 0.25, 0], RED.rgb, [0.125, 0.125, 0]], atol=1e-7)
-
-
-@pytest.mark.parametrize("others", [(), (Material(diffuse=RED),)])
-def test_a_scene_of_one_material_has_the_same_colours_as_among_others(others):
-    images = {"ramp": grey([[0.5, 0.25]])}
-    palette = Palette(scene_of(Material(diffuse=Colour((1.0, 0.5, 0.1), image="ramp")), *others, images=images))
-    found = palette.colour("diffuse", points([1, 1], at([0.25, 0.75], 0.5)))
-    np.testing.assert_allclose(found.T, [[0.5, 0.25, 0.05], [0.25, 0.125, 0.025]], atol=1e-7)
-    found[:] = 0  # its own array, not the palette's
-    assert palette.colour("diffuse", points([1], at(0.25, 0.5))).any()
-
-
-def test_means_count_the_image_and_take_vertex_colours_as_white():
-    images = {"light": grey([[0.0, 1.0], [0.5, 0.5]]), "shown": Picture(grey([[0.0, 1.0], [0.5, 0.5]]).pixels, srgb=True)}
-    colour = (2.0, 1.0, 0.5)
-    palette = Palette(
-        scene_of(
-            Material(emission=Colour(colour, image="light", vertex=True)),
-            Material(emission=Colour(colour, image="shown")),
-            Material(diffuse=RED),
-            images=images,
-        )
-    )
-    np.testing.assert_allclose(palette.mean("emission", 1), np.array(colour) * 0.5, rtol=1e-6)
-    np.testing.assert_allclose(palette.mean("emission", 2), np.array(colour) * (1 + 2 * 0.21404114) / 4, rtol=1e-6)
-    np.testing.assert_array_equal(palette.mean("emission", 3), 0)
-    np.testing.assert_array_equal(palette.mean("glass", 3), 0)
-
-
-def test_indices_of_refraction_are_those_of_the_points_materials():
-    glass = Material(glass=RED, ior=1.33), Material(refraction=GREEN, ior=2.4)
-    np.testing.assert_array_equal(Palette(scene_of(*glass)).ior(points([2, 1, 2])), [2.4, 1.33, 2.4])
+    of_red = Material(diffuse=RED)
+    for u, expected in ((0.1, (0.5, 0.125, 0)), (0.9, (0.25, 0.0625, 0))):
+        found = shown(textured, of_red, images=images, uv=(u, 0.5), vertex_colours=(1.0, 0.5, 0.25))
+        np.testing.assert_allclose(found, [expected, RED.rgb], rtol=1e-6)

@@ -24,10 +24,10 @@ from ... import errors
 from ...errors import InputError
 from ...image import BACKGROUND_DEPTH, CHANNELS, GEOMETRY_PASSES
 from ...terminal import plain
-from ...tracer.rays.surface import Passes
 from ...tracer.scene import Scene
 from ...tracer.scene.film import LEVELS
 from ...tracer.scene.levels import least_level
+from ...tracer.tiles import Passes
 from .. import datablocks, versions
 from ..scenes import export
 from ..scenes.depsgraph import only_cameras_changed

@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
-from ...tracer.rays.surface import Passes
 from ...tracer.scene import Scene
+from ...tracer.tiles import Passes
 
 if TYPE_CHECKING:
     from ...tracer.render import Keeper

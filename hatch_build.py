@@ -1,0 +1,186 @@
+"""Compiles the tracer's core, and puts it into wheels: `python hatch_build.py [PLATFORM …]` makes one wheel of the core each.
+
+The core (viewcam_addon/tracer/core) is a library with a plain C interface: it knows no Python, so that one serves all versions.
+It travels as a package of its own, `viewcam_core`, which holds nothing else: inside the project's wheel when pip installs that,
+editable or not, and as a wheel beside the extension's others, since Blender takes binaries as wheels only.
+
+The system's C++20 compiler ($CXX, c++, g++, clang++) compiles for this machine; where there is none, and for other platforms,
+ziglang does, a clang with the headers of every system that pip installs. Compiled once for each instruction set of x86-64 that
+it chooses among at run time; a library is kept in build/core/ under a name that tells what it was made from.
+
+Rejected: an extension module (one for each Python and platform), CMake and scikit-build-core (a dozen lines of build rules, and
+a second tool where there is no compiler), -ffast-math and -march=native (pictures' bits would depend on the machine).
+"""
+
+import argparse
+import base64
+import concurrent.futures
+import functools
+import hashlib
+import os
+import platform as machine
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tempfile
+import tomllib
+import zipfile
+from pathlib import Path
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+ROOT = Path(__file__).resolve().parent
+CORE = ROOT / "viewcam_addon" / "tracer" / "core"
+PACKAGE = "viewcam_core"
+
+ZIGLANG = "ziglang>=0.16"
+# Blender's name of a platform: zig's, that of wheels, the library's file.
+PLATFORMS = {
+    "linux-x64": ("x86_64-linux-gnu.2.28", "manylinux_2_28_x86_64", "libviewcam.so"),
+    "linux-arm64": ("aarch64-linux-gnu.2.28", "manylinux_2_28_aarch64", "libviewcam.so"),
+    "windows-x64": ("x86_64-windows-gnu", "win_amd64", "viewcam.dll"),
+    "windows-arm64": ("aarch64-windows-gnu", "win_arm64", "viewcam.dll"),
+    "macos-x64": ("x86_64-macos.11.0", "macosx_11_0_x86_64", "libviewcam.dylib"),
+    "macos-arm64": ("aarch64-macos.11.0", "macosx_11_0_arm64", "libviewcam.dylib"),
+}
+# Instances of the core: x86-64's levels; any other processor has one.
+LEVELS = ("v2", "v3", "v4")
+# No contraction: a product and its sum round apart, which the triangle test stands on (core/shapes/triangle_mesh.h). No errno:
+# square roots are instructions.
+FLAGS = ["-std=c++20", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden", "-DNDEBUG", "-g0"]
+_PROBE = "#include <bit>\n#include <thread>\n#include <variant>\nint main() { return std::popcount(0u); }\n"
+
+
+def this_platform() -> str:
+    """Blender's name of this machine's platform."""
+    system = {"Linux": "linux", "Windows": "windows", "Darwin": "macos"}[machine.system()]
+    return f"{system}-{'arm64' if machine.machine().lower() in ('arm64', 'aarch64') else 'x64'}"
+
+
+@functools.cache
+def system_compiler() -> str | None:
+    """The system's C++20 compiler, or None."""
+    for name in (os.environ.get("CXX"), "c++", "g++", "clang++"):
+        if name and shutil.which(name):
+            command = [name, "-std=c++20", "-x", "c++", "-fsyntax-only", "-"]
+            if subprocess.run(command, input=_PROBE, text=True, capture_output=True).returncode == 0:
+                return name
+    return None
+
+
+def build_core(platform: str, flags: tuple[str, ...] = ()) -> Path:
+    """The library for a platform, compiled where it is not there yet. flags : more of them, as sanitizers need."""
+    compiler = system_compiler() if platform == this_platform() else None
+    target, _, name = PLATFORMS[platform]
+    command = [compiler] if compiler else [sys.executable, "-m", "ziglang", "c++", "-target", target]
+    command += [*FLAGS, *([] if platform.startswith("windows") else ["-fPIC"]), *flags]
+    made_from = hashlib.sha256(repr(command).encode() + Path(__file__).read_bytes())
+    for path in sorted(path for path in CORE.rglob("*") if path.suffix in (".h", ".cpp")):
+        made_from.update(f"{path.relative_to(CORE)}\0".encode() + path.read_bytes())
+    library = ROOT / "build" / "core" / f"{platform}-{made_from.hexdigest()[:16]}" / name
+    if not library.exists():
+        library.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=library.parent) as scratch:
+            os.replace(_compiled(platform, command, compiler is None, Path(scratch)), library)
+    return library
+
+
+def _compiled(platform: str, command: list[str], zig: bool, folder: Path) -> Path:
+    """The library, made in a folder: the C interface once, the core once for each instruction set."""
+    march = "-mcpu=x86_64_" if zig else "-march=x86-64-"
+    if platform.endswith("x64"):
+        wide = {"v4": ["-mprefer-vector-width=256"]}  # 512 slows the clock of many processors down
+        parts = [("capi", [march + LEVELS[0]])]
+        parts += [(level, [march + level, f"-DVIEWCAM_ISA={level}", *wide.get(level, [])]) for level in LEVELS]
+    else:
+        parts = [("capi", []), ("base", ["-DVIEWCAM_ISA=base"])]
+
+    def compiled(part: tuple[str, list[str]]) -> str:
+        name, flags = part
+        source, target = CORE / ("capi.cpp" if name == "capi" else "instance.cpp"), folder / f"{name}.o"
+        _run([*command, *flags, "-c", str(source), "-o", str(target)])
+        return str(target)
+
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        objects = list(pool.map(compiled, parts))
+    library = folder / PLATFORMS[platform][2]
+    linked = []
+    if platform.startswith("linux"):
+        exports = folder / "exports"  # the C interface alone: what is inlined of the standard library stays here
+        exports.write_text("{ global: viewcam_*; local: *; };\n", encoding="utf-8")
+        linked = ["-pthread", f"-Wl,--version-script={exports}", *([] if zig else ["-static-libstdc++", "-static-libgcc"])]
+    # Of what several objects define alike, linkers take the first: that of the least instruction set.
+    _run([*command, "-shared", "-s", *linked, *objects, "-o", str(library)])
+    return library
+
+
+def _run(command: list[str]) -> None:
+    outcome = subprocess.run(command, capture_output=True, text=True)
+    if outcome.returncode:
+        sys.exit(f"{' '.join(command)} failed with status {outcome.returncode}:\n{outcome.stderr}")
+
+
+def core_wheel(platform: str, folder: Path) -> Path:
+    """A wheel that holds the library and nothing else, for all Pythons of a platform; what Blender's extension brings along."""
+    library = build_core(platform)
+    version = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))["version"]
+    tag = f"py3-none-{PLATFORMS[platform][1]}"
+    info = f"{PACKAGE}-{version}.dist-info"
+    contents = {
+        f"{PACKAGE}/__init__.py": b"",
+        f"{PACKAGE}/{library.name}": library.read_bytes(),
+        f"{info}/METADATA": f"Metadata-Version: 2.1\nName: {PACKAGE}\nVersion: {version}\nLicense: GPL-3.0-or-later\n".encode(),
+        f"{info}/WHEEL": f"Wheel-Version: 1.0\nGenerator: {PACKAGE}\nRoot-Is-Purelib: false\nTag: {tag}\n".encode(),
+    }
+    record = "".join(
+        f"{name},sha256={base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b'=').decode()},{len(data)}\n"
+        for name, data in contents.items()
+    )
+    contents[f"{info}/RECORD"] = f"{record}{info}/RECORD,,\n".encode()
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{PACKAGE}-{version}-{tag}.whl"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in contents.items():
+            archive.writestr(zipfile.ZipInfo(name), data, zipfile.ZIP_DEFLATED)
+    return path
+
+
+class CoreBuildHook(BuildHookInterface):
+    """What hatchling calls when pip builds the project."""
+
+    def dependencies(self) -> list[str]:
+        """A compiler, where the system has none."""
+        return [] if system_compiler() else [ZIGLANG]
+
+    def initialize(self, version: str, build_data: dict) -> None:
+        """Compile for this machine. version : "standard" or "editable"."""
+        if self.target_name != "wheel":
+            return
+        platform = this_platform()
+        library = build_core(platform)
+        empty = library.with_name("__init__.py")
+        empty.touch()
+        included = {str(library): f"{PACKAGE}/{library.name}", str(empty): f"{PACKAGE}/__init__.py"}
+        build_data["force_include_editable" if version == "editable" else "force_include"].update(included)
+        build_data["pure_python"] = False
+        # What is compiled by ziglang, or on this machine for this machine.
+        tag = sysconfig.get_platform() if system_compiler() else PLATFORMS[platform][1]
+        build_data["tag"] = f"py3-none-{tag.replace('-', '_').replace('.', '_')}"
+
+
+def main() -> None:
+    """Make the core's wheels for platforms, this one by default, into a folder."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("platforms", nargs="*", default=[this_platform()], metavar="PLATFORM", help=", ".join(PLATFORMS))
+    parser.add_argument("--into", type=Path, default=ROOT / "dist", metavar="FOLDER", help="dist by default")
+    arguments = parser.parse_args()
+    for platform in arguments.platforms:
+        if platform not in PLATFORMS:
+            parser.error(f"there is no platform {platform!r}: give some of {', '.join(PLATFORMS)}")
+        path = core_wheel(platform, arguments.into)
+        print(f"{path}  {path.stat().st_size / 1e6:.2f} MB")
+
+
+if __name__ == "__main__":
+    main()

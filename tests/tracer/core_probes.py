@@ -1,0 +1,113 @@
+"""The core's formulas of light, one by one, as its probes answer: what tests ask in NumPy's arrays, (components, n).
+
+No formula is here: each function lays numbers out for the core and takes them back.
+"""
+
+import numpy as np
+
+from viewcam_addon.tracer import native
+from viewcam_addon.tracer.scene.film import Film
+from viewcam_addon.tracer.scene.lamps import Lamp
+from viewcam_addon.tracer.scene.materials import Picture
+
+FILM, SCATTERING = 2, 8
+"""How many dimensions the film has, and each scattering."""
+
+FUNCTIONS = ("sin of turns", "cos of turns", "asin", "acos", "atan2", "pow", "fresnel")
+
+
+def _at(array):
+    return array.ctypes.data
+
+
+class Sampler:
+    def __init__(self, seed: int, samples: int) -> None:
+        self._seed, self._samples = seed & 0xFFFFFFFF, samples
+
+    def numbers(self, pixels, samples, first: int, count: int):
+        """(count, n): the dimensions from `first` on of samples of n pixels."""
+        pixels, samples = np.broadcast_arrays(np.asarray(pixels, np.int64), samples)
+        pixels, samples = (np.ascontiguousarray(values, np.uint32) for values in (pixels & 0xFFFFFFFF, samples))
+        out = np.empty((len(pixels), count))
+        probe = native.core().probe_sobol
+        assert not probe(self._seed, self._samples, 3, len(pixels), _at(pixels), _at(samples), first, count, _at(out))
+        return out.T
+
+
+def offsets(film: Film, u):
+    """(2, n): pixels from a pixel's lower left corner, of (2, n) numbers."""
+    given = np.ascontiguousarray(np.asarray(u, np.float64).T)
+    out = np.empty_like(given)
+    width = 0.0 if film.filter == "BOX" else film.filter_width
+    assert not native.core().probe_filter(width, len(given), _at(given), _at(out))
+    return out.T
+
+
+def function(name: str, a, b=0.0):
+    """One of `FUNCTIONS` of n numbers."""
+    a, b = (np.array(values, np.float64) for values in np.broadcast_arrays(a, b))
+    out = np.empty(a.shape)
+    assert not native.core().probe_function(FUNCTIONS.index(name), a.size, _at(a), _at(b), _at(out))
+    return out
+
+
+def fresnel(cosine, ratio):
+    return function("fresnel", np.atleast_1d(cosine), ratio)
+
+
+def specular(direction, normal, shading, ratio: float = 1.0):
+    """Bent normals, and where mirrors and clear surfaces with these send rays: (3, n) each."""
+    given = np.ascontiguousarray(np.concatenate(np.broadcast_arrays(direction, normal, shading)).T, np.float64)
+    out = np.empty_like(given)
+    assert not native.core().probe_specular(ratio, len(given), _at(given), _at(out))
+    return out.T.reshape(3, 3, -1)
+
+
+def specular_normal(direction, normal, shading):
+    return specular(direction, normal, shading)[0]
+
+
+def reflected(direction, normal):
+    """By a mirror whose smooth normal is its true one, for rays that rise more than a rounding."""
+    return specular(direction, normal, normal)[1]
+
+
+def refracted(direction, normal, ratio: float):
+    """Where rays go, and where that is along the surface since all is reflected."""
+    through = specular(direction, normal, normal, ratio)[2]
+    across = direction - (direction * normal).sum(axis=0) * normal
+    return through, ((across / ratio) ** 2).sum(axis=0) >= 1.0
+
+
+class SampledLight:
+    """One lamp, asked at points: (3, n) position and normal, unit, and (2, n) numbers."""
+
+    def __init__(self, lamp: Lamp, position, normal, u) -> None:
+        u = np.asarray(u, np.float64)
+        rows = [np.broadcast_to(np.reshape(values, (3, -1)), (3, u.shape[1])) for values in (position, normal)]
+        given = np.ascontiguousarray(np.concatenate([*rows, u]).T)
+        out = np.empty((len(given), 11))
+        assert not native.core().probe_sample_light(native.described_lamp(lamp), len(given), _at(given), _at(out))
+        self.direction, self.distance, self.light = out[:, :3].T, out[:, 3], out[:, 4:7].T
+        self.pdf, self.pdf_of_direction, self.cosine, self.estimate = out[:, 7:].T
+
+
+def radiance_seen(lamp: Lamp, starts, directions, nearest=0.0, farthest=np.inf):
+    """(3, n): what rays see of a lamp that they run into."""
+    starts, directions = np.broadcast_arrays(starts, directions)
+    count = directions.shape[1]
+    ends = [np.broadcast_to(values, count) for values in (nearest, farthest, np.isinf(farthest))]
+    given = np.ascontiguousarray(np.concatenate([starts, directions, np.stack(ends)]).T, np.float64)
+    out = np.empty((count, 3))
+    assert not native.core().probe_light_le(native.described_lamp(lamp), count, _at(given), _at(out))
+    return out.T
+
+
+def looked_up(picture: Picture, uv, closest: bool):
+    """(3, n): the linear colours of an image at (2, n) UV."""
+    height, width, _ = picture.pixels.shape
+    pixels, places = np.ascontiguousarray(picture.pixels, np.float32), np.ascontiguousarray(np.asarray(uv, np.float64).T)
+    out = np.empty((len(places), 3))
+    probe = native.core().probe_texture
+    assert not probe(width, height, picture.srgb, _at(pixels), closest, len(places), _at(places), _at(out))
+    return out.T

@@ -1,0 +1,105 @@
+"""Which light a point is lit by: whatever the choice, the mean is the sum of all lights. Pictures of a floor, from above."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.tracer.render import render
+from viewcam_addon.tracer.scene.film import Film
+from viewcam_addon.tracer.scene.lamps import Area, Point, Sun, World
+from viewcam_addon.tracer.scene.materials import Colour, Material
+
+# Looks at a square metre of floor, so far off that its pixels are alike; lamps stand beside its view.
+CAMERA = Pinhole((0, 0, 100), (0, 0, 0), (0, 1, 0), 6400, 64, 64)
+WHITE = Material(diffuse=Colour((1.0, 1.0, 1.0)))
+
+
+@pytest.fixture(scope="module")
+def floor(make_mesh):
+    return make_mesh([(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [(0, 1, 2), (0, 2, 3)])
+
+
+@pytest.fixture(scope="module")
+def lit(make_lit, floor):
+    """lit(lamp, …, samples=…) → the mean radiance of the floor and its standard error, by the first channel."""
+
+    def measure(*lamps, samples=16, things=(), **light):
+        scene = make_lit(CAMERA, (floor, WHITE), *things, lamps=lamps, film=Film(filter="BOX"), **light)
+        passes = {name: values.astype(float) for name, values in render(scene, "direct", samples, 3).items()}
+        pixels = passes["Combined"][..., 0]
+        return pixels.mean(), np.sqrt(passes["Variance"][..., 0].sum()) / pixels.size
+
+    return measure
+
+
+def beside(number, radius=0.0):
+    """A lamp somewhere above, out of view."""
+    rng = np.random.default_rng(number)
+    angle, height = rng.uniform(0, 2 * np.pi), rng.uniform(0.5, 6)
+    place = (3 * np.cos(angle), 3 * np.sin(angle), height)
+    return Point(f"point {number}", position=place, power=(10.0 ** rng.uniform(-1, 3),) * 3, radius=radius)
+
+
+@pytest.mark.parametrize("count", [2, 4, 5, 32, 33, 100])
+@pytest.mark.parametrize("radius", [0.0, 0.3])
+def test_many_lamps_give_the_sum_of_what_each_gives(lit, count, radius):
+    """One by one up to 4, by what each may bring up to 32, by fixed chances beyond."""
+    lamps = [beside(number, radius) for number in range(count)]
+    alone = [lit(lamp, samples=4) for lamp in lamps]
+    expected, known = sum(mean for mean, _ in alone), np.sqrt(sum(error**2 for _, error in alone))
+    mean, error = lit(*lamps)
+    assert error < 0.05 * expected, "that would tell nothing"
+    assert abs(mean - expected) <= 4 * np.hypot(error, known) + 1e-6 * expected, f"{mean:.6g} for {expected:.6g} ± {error:.2g}"
+
+
+def test_a_sky_beside_lamps_gives_its_whole_light(lit):
+    """The sky of 1 gives a white floor a radiance of 1, however seldom it is asked."""
+    for power in (1.0, 1e2, 1e5):
+        lamp = Point("point", position=(3, 0, 3), power=(power,) * 3)
+        alone, _ = lit(lamp)
+        mean, error = lit(lamp, world=World((1, 1, 1)), samples=64)
+        assert abs(mean - alone - 1) <= 4 * error + 1e-6 * mean, f"{mean - alone:.4f} ± {error:.2g}"
+
+
+def test_shining_surfaces_beside_lamps_are_found_as_often_as_it_takes(lit, make_mesh):
+    """Both ways of finding them, weighted, and the choice among them and a lamp."""
+    square = make_mesh([(2, -1, 1), (2, 1, 1), (2, 1, 3), (2, -1, 3)], [(0, 2, 1), (0, 3, 2)])
+    glow = ((square, Material(emission=Colour((5.0,) * 3))),)
+    lamp = Point("point", position=(-3, 0, 3), power=(50.0,) * 3)
+    (first, one), (second, two) = lit(lamp), lit(things=glow, samples=256)
+    mean, error = lit(lamp, things=glow, samples=64)
+    assert error < 0.02 * mean and abs(mean - first - second) <= 4 * np.sqrt(one**2 + two**2 + error**2)
+
+
+@pytest.mark.parametrize("kind", ["camera", "diffuse", "glossy", "transmission"])
+def test_what_a_lamp_hides_from_it_does_not_light_and_is_not_seen_by(make_lit, floor, make_mesh, kind):
+    """Diffuse surfaces get no light of it, mirrors and clear surfaces don't show it, nor does the camera see it."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = (0, 0, 300)  # behind the camera, as large as all that is reflected
+    up = Pinhole((0, 0, 100), (0, 0, 300), (0, 1, 0), 6400, 16, 16)
+    pane = make_mesh(floor.vertices + np.array([0, 0, 150]), floor.triangles)
+    views = {
+        "camera": (up, ()),
+        "diffuse": (CAMERA, ((floor, WHITE),)),
+        "glossy": (CAMERA, ((floor, Material(mirror=Colour((1.0,) * 3))),)),
+        "transmission": (up, ((pane, Material(refraction=Colour((1.0,) * 3))),)),
+    }
+    for hidden in (frozenset(), frozenset({kind})):
+        lamp = Area("area", matrix=matrix, size=(900, 900), power=(1e6,) * 3, hidden_from=hidden)
+        for ray, (camera, things) in views.items():
+            shown = replace(lamp, hidden_from=hidden | {"camera"}) if ray == "transmission" else lamp
+            bright = render(make_lit(camera, *things, lamps=(shown,)), "path", 1)["Combined"][..., :3].any()
+            assert bright == (ray not in hidden), (ray, hidden)
+
+
+def test_a_lamp_without_a_shadow_shines_through_things(lit, make_mesh):
+    roof = make_mesh(
+        [(-9, -9, 1), (9, -9, 1), (9, 9, 1), (-9, 9, 1), (-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)],
+        [(0, 1, 4), (1, 5, 4), (1, 2, 5), (2, 6, 5), (2, 3, 6), (3, 7, 6), (3, 0, 7), (0, 4, 7)],
+    )
+    lamp = Sun("sun", towards=(1, 0, 0.2), irradiance=(2, 2, 2))
+    free, shut = lit(lamp)[0], lit(lamp, things=((roof, WHITE),))[0]
+    through = lit(replace(lamp, casts_shadow=False), things=((roof, WHITE),))[0]
+    assert free > 0 and shut == 0 and through == free

@@ -1,0 +1,77 @@
+// A ray as the boxes of a hierarchy see it: in float32, everything rounded so that no box is missed that the ray meets.
+//
+// The ray is moved, in float64, to where it enters the hierarchy's own box, and counted in units of that box; its largest
+// direction becomes 1. Near and far planes have an origin and a reciprocal each: of the near ones they err forward, so that
+// boxes begin too early, of the far ones backward. With U = 2⁻²⁴ and the hierarchy's half size h < 1:
+// - the origin's rounding to float is U (h + its own error), and a plane's to float is outward already (bvh.h): `error` has
+//   2 U h, the rest being room for the float64 arithmetic before, some 8 · 2⁻⁵³ of what was subtracted;
+// - a product of difference and reciprocal has rounded three times, 3 U; the reciprocals stand off by 6 U.
+// A direction component below 1e-12 has the reciprocal 1e12: the near plane comes earlier, and the far one, 2 U h · 1e12 away or
+// farther for whatever runs between the planes, lies behind the box all the same.
+#pragma once
+#include "../ray.h"
+#include "bvh.h"
+
+namespace viewcam::VIEWCAM_ISA {
+
+constexpr float FLOAT_ROUNDING = 0x1p-24f;
+
+// Rounds a distance of at least 0 up to a float.
+inline float round_up(double distance) { return float(distance * (1 + 2.5e-7) + 1e-37); }
+
+// Which of a direction's components is the largest, without its sign.
+inline int dominant_axis(double x, double y, double z) { return x > y ? (x > z ? 0 : 2) : (y > z ? 1 : 2); }
+
+struct BoxRay {
+    float near_origin[4], far_origin[4], near_reciprocal[4], far_reciprocal[4];
+    bool backward[3];     // which components of the direction are negative
+    int axis;             // the dominant one
+    double start, unit;   // t · unit − start is the distance that boxes count from the entry
+    double axis_factor;   // 1 / direction[axis]
+    float far;
+
+    // Nothing farther than t is asked for any more.
+    void limit(double t) { far = std::min(far, round_up(max(t * unit - start, 0.0))); }
+};
+
+// The ray for the boxes of `bvh`; false where it misses them all. Ray's t_max is the farthest.
+inline bool enter(const Bvh& bvh, const Ray& ray, BoxRay& box) {
+    double4 direction = {ray.direction.x, ray.direction.y, ray.direction.z, 0}, origin = {ray.origin.x, ray.origin.y, ray.origin.z, 0};
+    double4 size = abs(direction);
+    int axis = dominant_axis(size[0], size[1], size[2]);
+    double longest = size[axis];
+    if (!(longest > 0) || !(longest < 1e300)) return false;
+    double inverse = 1 / longest;
+    double4 unit = direction * splat4(inverse), reciprocal = splat4(1.0) / copysign(max(abs(unit), splat4(1e-200)), unit);
+    double4 centre = {bvh.centre.x, bvh.centre.y, bvh.centre.z, 0}, scale = splat4(bvh.scale);
+    double4 half = double4{bvh.half.x, bvh.half.y, bvh.half.z, 0};
+    double4 from = (origin - centre) * scale;
+    double4 edge = half * splat4(1 + 1e-9) + splat4(4e-16) * abs(from) + splat4(ray.origin_error * bvh.scale + 1e-300);
+    double4 one = (-edge - from) * reciprocal, other = (edge - from) * reciprocal, first = min(one, other), last = max(one, other);
+    first -= abs(first) * splat4(4e-15);
+    last += abs(last) * splat4(4e-15);
+    box.unit = longest * bvh.scale;
+    double start = ray.t_min * box.unit, end = ray.t_max * box.unit;
+    start = max(max(start, first[0]), max(first[1], first[2]));
+    end = min(min(end, last[0]), min(last[1], last[2]));
+    if (!(start <= end)) return false;
+
+    double largest = max(half[0], max(half[1], half[2]));
+    double far = max(std::fabs(from[0]), max(std::fabs(from[1]), std::fabs(from[2])));
+    double error = largest * (2 * FLOAT_ROUNDING + 2e-12) + 8 * DOUBLE_ROUNDING * (far + std::fabs(start)) +
+                   ray.origin_error * bvh.scale;
+    double4 entry = from + splat4(start) * unit, forward = copysign(splat4(error), unit);
+    double4 bounded = copysign(min(abs(reciprocal), splat4(1e12)), reciprocal);
+    store(box.near_origin, __builtin_convertvector(entry + forward, float4));
+    store(box.far_origin, __builtin_convertvector(entry - forward, float4));
+    store(box.near_reciprocal, __builtin_convertvector(bounded * splat4(1.0 - 6 * FLOAT_ROUNDING), float4));
+    store(box.far_reciprocal, __builtin_convertvector(bounded * splat4(1.0 + 6 * FLOAT_ROUNDING), float4));
+    for (int i = 0; i < 3; i++) box.backward[i] = std::signbit(unit[i]);
+    box.start = start;
+    box.axis = axis;
+    box.axis_factor = std::copysign(inverse, ray.direction[axis]);
+    box.far = round_up(end - start);
+    return true;
+}
+
+}  // namespace viewcam::VIEWCAM_ISA

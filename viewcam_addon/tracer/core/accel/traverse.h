@@ -1,0 +1,80 @@
+// One ray through a hierarchy, near boxes first.
+#pragma once
+#include "box_ray.h"
+
+namespace viewcam::VIEWCAM_ISA {
+
+// Calls visit(leaf) for the leaves whose boxes the ray meets before ray.far, which `visit` may lower, until one gives true.
+template <class Visit> inline bool traverse(const Bvh& bvh, BoxRay& ray, const Visit& visit) {
+    float8 near_origin[3], far_origin[3], near_reciprocal[3], far_reciprocal[3];
+    int near[3], far[3];
+    for (int axis = 0; axis < 3; axis++) {
+        near_origin[axis] = splat8(ray.near_origin[axis]);
+        far_origin[axis] = splat8(ray.far_origin[axis]);
+        near_reciprocal[axis] = splat8(ray.near_reciprocal[axis]);
+        far_reciprocal[axis] = splat8(ray.far_reciprocal[axis]);
+        near[axis] = 2 * axis + ray.backward[axis];
+        far[axis] = near[axis] ^ 1;
+    }
+    struct Entry {
+        uint32_t child;
+        float distance;
+    } stack[Bvh::STACK];
+    int size = 0;
+    uint32_t current = bvh.root;
+    for (;;) {
+        bool missed = false;
+        while (!(current & LEAF)) {
+            const Bvh::Node& node = bvh.nodes[current];
+            auto enters = [&](int a) { return (load<float8>(node.bounds[near[a]]) - near_origin[a]) * near_reciprocal[a]; };
+            auto leaves = [&](int a) { return (load<float8>(node.bounds[far[a]]) - far_origin[a]) * far_reciprocal[a]; };
+            float8 first = max(max(enters(0), enters(1)), max(enters(2), splat8(0)));
+            float8 last = min(min(leaves(0), leaves(1)), min(leaves(2), splat8(ray.far)));
+            unsigned met = bits(int8(first <= last));
+            if (!met) {
+                missed = true;
+                break;
+            }
+            int i = take_bit(met);
+            if (!met) {
+                current = node.child[i];
+                continue;
+            }
+            float distance[8];
+            store(distance, first);
+            int j = take_bit(met);
+            if (!met) {
+                if (distance[j] < distance[i]) std::swap(i, j);
+                stack[size++] = {node.child[j], distance[j]};
+                current = node.child[i];
+                continue;
+            }
+            int base = size;
+            auto push = [&](int k) {  // farthest first
+                Entry entry{node.child[k], distance[k]};
+                int at = size++;
+                for (; at > base && stack[at - 1].distance < entry.distance; at--) stack[at] = stack[at - 1];
+                stack[at] = entry;
+            };
+            push(i);
+            push(j);
+            while (met) push(take_bit(met));
+            current = stack[--size].child;
+        }
+        if (!missed && visit(current & ~LEAF)) return true;
+        do {
+            if (!size) return false;
+            size--;
+        } while (stack[size].distance > ray.far);
+        current = stack[size].child;
+    }
+}
+
+// The same of a ray as it comes.
+template <class Visit> inline bool traverse(const Bvh& bvh, const Ray& ray, const Visit& visit) {
+    BoxRay box;
+    if (bvh.root == NOTHING || !enter(bvh, ray, box)) return false;
+    return traverse(bvh, box, [&](uint32_t leaf) { return visit(leaf, box); });
+}
+
+}  // namespace viewcam::VIEWCAM_ISA

@@ -1,0 +1,16 @@
+// What sampling a BSDF, or one lobe of it, returns.
+#pragma once
+#include "../ray.h"
+
+namespace viewcam::VIEWCAM_ISA {
+
+// direction: unit. weight: the BSDF times the cosine over the density. pdf: the density by solid angle, INFINITE of mirrors.
+struct LobeSample {
+    Vec3 direction, weight;
+    double pdf = 0;
+};
+struct BSDFSample : LobeSample {
+    RayKind kind = DIFFUSE;
+};
+
+}  // namespace viewcam::VIEWCAM_ISA

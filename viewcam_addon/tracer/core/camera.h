@@ -1,0 +1,21 @@
+// A pinhole camera in rendering space: (x, y, 1) of the view plane at distance 1 are a ray's right, up and forward components, so
+// that t along it is planar depth.
+#pragma once
+#include "ray.h"
+
+namespace viewcam::VIEWCAM_ISA {
+
+struct Camera {
+    Vec3 eye, right, up, forward;        // unit; `right` is −u where the picture is mirrored
+    Vec2 principal_point, distance;      // pixels, along both axes
+    uint32_t width = 0, height = 0;
+    double t_min = 0, t_max = INFINITE;  // of the clip range, whose own ends are visible
+
+    // Through a place in the picture, in pixels from its lower left corner, as pinhole.py's view_plane has it.
+    Ray ray(double column, double row) const {
+        double x = (column - principal_point.x) / distance.x, y = (row - principal_point.y) / distance.y;
+        return {eye, right * x + up * y + forward, t_min, t_max};
+    }
+};
+
+}  // namespace viewcam::VIEWCAM_ISA

@@ -1,0 +1,107 @@
+/* The C interface: structures and one table of functions for each instruction set. tracer/native.py is the only one that calls it.
+ *
+ * Arrays belong to the caller, who has checked them; those of meshes and spheres must outlive their scene, and all others are
+ * copied. Functions that return an int return 0, or another number and leave a message.
+ */
+#pragma once
+#include <stddef.h>
+#include <stdint.h>
+
+#include "capi_light.h"
+
+typedef struct ViewcamScene ViewcamScene;
+typedef struct ViewcamLight ViewcamLight;
+
+enum ViewcamPass {
+    VIEWCAM_DEPTH,
+    VIEWCAM_POSITION,
+    VIEWCAM_NORMAL,
+    VIEWCAM_UV,
+    VIEWCAM_OBJECT_INDEX,
+    VIEWCAM_MATERIAL_INDEX,
+    VIEWCAM_MAGNITUDE,
+    VIEWCAM_FACING,
+    VIEWCAM_PASSES
+};
+
+/* vertices: (vertex_count, 3), object space. triangles: (count, 3). materials: (count,), slots of the object. The rest or null:
+ * corner_normals: (count, 3, 3). corner_uvs: (count, 3, 2). corner_colors: (count, 3, 3), linear. */
+typedef struct {
+    size_t vertex_count, count;
+    const double* vertices;
+    const int32_t *triangles, *materials;
+    const float *corner_normals, *corner_uvs, *corner_colors;
+} ViewcamMesh;
+
+typedef struct {
+    size_t count;
+    const double *centers, *radii;
+    const int32_t* materials;
+} ViewcamSpheres;
+
+/* geometry: its number, as they were added. visible: to which kinds of rays. slots: for each material of the geometry, what the
+ * Material Index pass shows and the number of a material. */
+typedef struct {
+    uint32_t geometry, visible, slot_count;
+    float index;
+    const float* slot_indices;
+    const uint32_t* slot_materials;
+} ViewcamObject;
+
+/* In rendering space. t_min, t_max: planar depths. */
+typedef struct {
+    double eye[3], right[3], up[3], forward[3], principal_point[2], distance[2], t_min, t_max;
+    uint32_t width, height;
+} ViewcamCamera;
+
+typedef struct {
+    const char* name;             /* of the instruction set */
+    const char* (*message)(void); /* what went wrong last in this thread */
+
+    ViewcamScene* (*scene_create)(void);
+    void (*scene_free)(ViewcamScene*);
+    int (*add_mesh)(ViewcamScene*, const ViewcamMesh*);
+    int (*add_spheres)(ViewcamScene*, const ViewcamSpheres*);
+    int (*add_object)(ViewcamScene*, const ViewcamObject*);
+    /* matrices: (objects, 3, 4), to world space. origin: of rendering space, in the world. */
+    int (*commit)(ViewcamScene*, const double* matrices, const double* origin, int threads);
+    void (*set_camera)(ViewcamScene*, const ViewcamCamera*);
+    size_t (*bytes)(const ViewcamScene*);
+
+    /* planes: of each pass or null, its channels `stride` numbers apart. stop: or null; what it points to ends the work. */
+    int (*render_geometry)(const ViewcamScene*, uint32_t first_row, uint32_t end_row, float* const* planes, size_t stride, const volatile int* stop);
+    int (*surface_at)(const ViewcamScene*, size_t count, const double* columns, const double* rows, float* const* planes);
+    /* rays: (count, 8), origin, direction, t_min, t_max, in rendering space. packets: whether they are traced as such. */
+    int (*closest)(const ViewcamScene*, size_t count, const double* rays, uint32_t kind, int packets, double* t, uint32_t* objects, uint32_t* primitives);
+    int (*occluded)(const ViewcamScene*, size_t count, const double* rays, int packets, uint8_t* hidden);
+
+    int (*clear_light)(ViewcamScene*);
+    int (*add_texture)(ViewcamScene*, int width, int height, int srgb, const float* pixels);
+    int (*add_material)(ViewcamScene*, const ViewcamClosure*, int count);
+    int (*add_lamp)(ViewcamScene*, const ViewcamLamp*);
+    void (*set_film)(ViewcamScene*, const ViewcamFilm*);
+    ViewcamLight* (*light_create)(const ViewcamScene*, const ViewcamLightSettings*);
+    void (*light_free)(ViewcamLight*);
+    /* A tile of 32 × 32 pixels, by its lowest row and its first column. */
+    int (*trace_light)(const ViewcamLight*, uint32_t row, uint32_t column, const ViewcamLightPasses*, const volatile int* stop);
+
+    /* For tests: light_functions.h says what they are given and return. */
+    int (*probe_sobol)(uint32_t seed, uint32_t samples, int scatterings, size_t, const uint32_t*, const uint32_t*, int first, int dimensions, double*);
+    int (*probe_filter)(double width, size_t, const double*, double*);
+    int (*probe_function)(int which, size_t, const double*, const double*, double*);
+    int (*probe_specular)(double ratio, size_t, const double*, double*);
+    int (*probe_sample_light)(const ViewcamLamp*, size_t, const double*, double*);
+    int (*probe_light_le)(const ViewcamLamp*, size_t, const double*, double*);
+    int (*probe_texture)(int width, int height, int srgb, const float*, int closest, size_t, const double*, double*);
+} ViewcamCore;
+
+#ifdef _WIN32
+#define VIEWCAM_EXPORT __declspec(dllexport)
+#else
+#define VIEWCAM_EXPORT __attribute__((visibility("default")))
+#endif
+#ifdef __cplusplus
+extern "C"
+#endif
+/* The best instance that this processor runs, or that of an instruction set that is named; null if there is none of that name. */
+VIEWCAM_EXPORT const ViewcamCore* viewcam_core(const char* name);

@@ -1,0 +1,44 @@
+/* The part of the C interface that is about light: see capi.h. tracer/native.py has the same structures. */
+#pragma once
+#include <stdint.h>
+
+/* image: a number of viewcam_add_texture, or −1. */
+typedef struct {
+    double rgb[3];
+    int32_t image, closest, vertex;
+} ViewcamColor;
+
+enum ViewcamClosureKind { VIEWCAM_EMISSION, VIEWCAM_DIFFUSE, VIEWCAM_MIRROR, VIEWCAM_GLASS, VIEWCAM_REFRACTION };
+typedef struct {
+    int32_t kind;
+    ViewcamColor color;
+    double ior;
+} ViewcamClosure;
+
+enum ViewcamLampKind { VIEWCAM_SUN, VIEWCAM_POINT, VIEWCAM_SPOT, VIEWCAM_RECTANGLE, VIEWCAM_ELLIPSE };
+/* matrix: (3, 4), the lamp's space to the world's; a sun is seen towards its z. color: irradiance of a sun, power of others. */
+typedef struct {
+    int32_t kind, soft, casts_shadow;
+    uint32_t hidden_from;
+    double matrix[12], color[3], radius, angle, blend, size[2];
+} ViewcamLamp;
+
+/* filter_width: 0 is a box. */
+typedef struct {
+    double radiance[3];
+    uint32_t hidden_from;
+    int32_t transparent;
+    double filter_width, exposure;
+} ViewcamFilm;
+
+/* bounces: in all, diffuse, glossy, transmission. error: 0 for the same number of samples everywhere. */
+typedef struct {
+    int32_t bounces[4];
+    uint32_t seed, samples;
+    double error;
+} ViewcamLightSettings;
+
+/* Of a whole picture, rows from the bottom. sample_count: or null. */
+typedef struct {
+    float *combined, *emission, *environment, *diffuse_direct, *diffuse_indirect, *diffuse_color, *variance, *sample_count;
+} ViewcamLightPasses;

@@ -1,0 +1,38 @@
+// All of a scene that gives or scatters light, as it was described: images, materials, lights, the world and the film.
+#pragma once
+#include <vector>
+
+#include "film/film.h"
+#include "film/filter.h"
+#include "lights/environment.h"
+#include "material.h"
+
+namespace viewcam::VIEWCAM_ISA {
+
+// A lamp in world space, as capi.h has it.
+struct Lamp {
+    enum Kind { SUN, POINT, SPOT, RECTANGLE, ELLIPSE } kind = SUN;
+    Affine to_world;  // the lamp's own space to the world's; a sun is seen towards its z
+    Vec3 color;       // irradiance of a sun, power of all others
+    double radius = 0, angle = 0, blend = 0;
+    Vec2 size;
+    bool soft = false, casts_shadow = true;
+    uint32_t hidden_from = 0;
+};
+
+// How often light is scattered before it must reach a light: in all, and by each kind of surface. Cycles' own counting.
+struct Bounces {
+    int total = 0, diffuse = 0, glossy = 0, transmission = 0;
+};
+
+struct Illumination {
+    std::vector<Texture> textures;
+    std::vector<Material> materials;
+    std::vector<Lamp> lamps;
+    Environment environment;
+    FilmSettings film;
+    double filter_width = 0;  // of BLACKMAN_HARRIS, 0 is BOX
+    Bounces bounces;
+};
+
+}  // namespace viewcam::VIEWCAM_ISA

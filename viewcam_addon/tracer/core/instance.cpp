@@ -1,0 +1,181 @@
+// All of the core, compiled for one instruction set, VIEWCAM_ISA, as the table of functions that capi.h describes.
+#include <exception>
+#include <new>
+#include <string>
+
+#include "capi.h"
+#include "integrators/geometry.h"
+#include "light_functions.h"
+
+#define VIEWCAM_NAME_OF(x) #x
+#define VIEWCAM_NAME(x) VIEWCAM_NAME_OF(x)
+
+namespace viewcam::VIEWCAM_ISA {
+namespace {
+
+std::string& message() {
+    static thread_local std::string text;
+    return text;
+}
+
+// 0, or what an exception becomes: no C++ exception leaves the library. 1: there is no memory left. 2: anything else.
+template <class Work> int guarded(const Work& work) {
+    try {
+        work();
+        return 0;
+    } catch (const std::bad_alloc&) {
+        message() = "there is not enough memory";
+        return 1;
+    } catch (const std::exception& error) {
+        message() = error.what();
+        return 2;
+    }
+}
+
+Scene& scene_of(ViewcamScene* scene) { return *reinterpret_cast<Scene*>(scene); }
+const Scene& scene_of(const ViewcamScene* scene) { return *reinterpret_cast<const Scene*>(scene); }
+const TileSampler& light_of(const ViewcamLight* light) { return *reinterpret_cast<const TileSampler*>(light); }
+Vec3 vector(const double* v) { return {v[0], v[1], v[2]}; }
+
+Ray ray_of(const double* row) { return {vector(row), vector(row + 3), row[6], row[7]}; }
+
+}  // namespace
+
+extern const ViewcamCore core;
+const ViewcamCore core = {
+    .name = VIEWCAM_NAME(VIEWCAM_ISA),
+    .message = [] { return message().c_str(); },
+
+    .scene_create = []() -> ViewcamScene* { return reinterpret_cast<ViewcamScene*>(new (std::nothrow) Scene); },
+    .scene_free = [](ViewcamScene* scene) { delete &scene_of(scene); },
+    .add_mesh =
+        [](ViewcamScene* scene, const ViewcamMesh* given) {
+            return guarded([&] {
+                TriangleMesh mesh;
+                mesh.vertex_count = given->vertex_count, mesh.count = given->count;
+                mesh.vertices = given->vertices, mesh.triangles = given->triangles, mesh.materials = given->materials;
+                mesh.corner_normals = given->corner_normals, mesh.corner_uvs = given->corner_uvs, mesh.corner_colors = given->corner_colors;
+                scene_of(scene).geometries.push_back(mesh);
+            });
+        },
+    .add_spheres =
+        [](ViewcamScene* scene, const ViewcamSpheres* given) {
+            return guarded([&] {
+                Spheres spheres;
+                spheres.count = given->count, spheres.centers = given->centers, spheres.radii = given->radii, spheres.materials = given->materials;
+                scene_of(scene).geometries.push_back(std::move(spheres));
+            });
+        },
+    .add_object =
+        [](ViewcamScene* scene, const ViewcamObject* given) {
+            return guarded([&] {
+                Scene& to = scene_of(scene);
+                Object object;
+                object.geometry = given->geometry, object.visible = given->visible, object.index = given->index;
+                object.first_slot = uint32_t(to.slots.size());
+                to.objects.push_back(object);
+                for (uint32_t i = 0; i < given->slot_count; i++) to.slots.push_back({given->slot_indices[i], given->slot_materials[i]});
+            });
+        },
+    .commit =
+        [](ViewcamScene* scene, const double* matrices, const double* origin, int threads) {
+            return guarded([&] {
+                scene_of(scene).origin = vector(origin);
+                scene_of(scene).commit(matrices, threads);
+            });
+        },
+    .set_camera =
+        [](ViewcamScene* scene, const ViewcamCamera* given) {
+            Camera& camera = scene_of(scene).camera;
+            camera.eye = vector(given->eye), camera.right = vector(given->right), camera.up = vector(given->up);
+            camera.forward = vector(given->forward);
+            camera.principal_point = {given->principal_point[0], given->principal_point[1]};
+            camera.distance = {given->distance[0], given->distance[1]};
+            camera.t_min = given->t_min, camera.t_max = given->t_max, camera.width = given->width, camera.height = given->height;
+        },
+    .bytes = [](const ViewcamScene* scene) { return scene_of(scene).bytes(); },
+
+    .render_geometry =
+        [](const ViewcamScene* scene, uint32_t first_row, uint32_t end_row, float* const* planes, size_t stride, const volatile int* stop) {
+            return guarded([&] { render_geometry(scene_of(scene), first_row, end_row, {planes, stride}, stop); });
+        },
+    .surface_at =
+        [](const ViewcamScene* scene, size_t count, const double* columns, const double* rows, float* const* planes) {
+            return guarded([&] {
+                const Scene& from = scene_of(scene);
+                for (size_t i = 0; i < count; i++) {
+                    Ray ray = from.camera.ray(columns[i], rows[i]);
+                    write_geometry(from, ray, from.closest(ray, CAMERA), {planes, count}, i);
+                }
+            });
+        },
+    .closest =
+        [](const ViewcamScene* scene, size_t count, const double* rows, uint32_t kind, int packets, double* t, uint32_t* objects, uint32_t* primitives) {
+            return guarded([&] {
+                Ray rays[64];
+                Hit hits[64];
+                for (size_t first = 0; first < count; first += 64) {
+                    int some = int(std::min<size_t>(count - first, 64));
+                    for (int i = 0; i < some; i++) rays[i] = ray_of(rows + 8 * (first + size_t(i)));
+                    if (packets)
+                        scene_of(scene).closest(rays, some, RayKind(kind), hits);
+                    else
+                        for (int i = 0; i < some; i++) hits[i] = scene_of(scene).closest(rays[i], RayKind(kind));
+                    for (int i = 0; i < some; i++) {
+                        size_t k = first + size_t(i);
+                        t[k] = hits[i].t, objects[k] = hits[i].object, primitives[k] = hits[i].primitive;
+                    }
+                }
+            });
+        },
+    .occluded =
+        [](const ViewcamScene* scene, size_t count, const double* rows, int packets, uint8_t* hidden) {
+            return guarded([&] {
+                Ray rays[64];
+                bool found[64];
+                for (size_t first = 0; first < count; first += 64) {
+                    int some = int(std::min<size_t>(count - first, 64));
+                    for (int i = 0; i < some; i++) rays[i] = ray_of(rows + 8 * (first + size_t(i)));
+                    if (packets)
+                        scene_of(scene).occluded(rays, some, found);
+                    else
+                        for (int i = 0; i < some; i++) found[i] = scene_of(scene).occluded(rays[i]);
+                    for (int i = 0; i < some; i++) hidden[first + size_t(i)] = found[i];
+                }
+            });
+        },
+
+    .clear_light = [](ViewcamScene* scene) { return guarded([&] { clear_light(scene_of(scene)); }); },
+    .add_texture = [](ViewcamScene* scene, int width, int height, int srgb,
+                      const float* pixels) { return guarded([&] { add_texture(scene_of(scene), width, height, srgb, pixels); }); },
+    .add_material = [](ViewcamScene* scene, const ViewcamClosure* closures,
+                       int count) { return guarded([&] { add_material(scene_of(scene), closures, count); }); },
+    .add_lamp = [](ViewcamScene* scene, const ViewcamLamp* lamp) { return guarded([&] { add_lamp(scene_of(scene), *lamp); }); },
+    .set_film = [](ViewcamScene* scene, const ViewcamFilm* film) { set_film(scene_of(scene), *film); },
+    .light_create = [](const ViewcamScene* scene, const ViewcamLightSettings* settings) -> ViewcamLight* {
+        TileSampler* made = nullptr;
+        guarded([&] { made = create_light(scene_of(scene), *settings); });
+        return reinterpret_cast<ViewcamLight*>(made);
+    },
+    .light_free = [](ViewcamLight* light) { delete &light_of(light); },
+    .trace_light = [](const ViewcamLight* light, uint32_t row, uint32_t column, const ViewcamLightPasses* passes,
+                      const volatile int* stop) { return guarded([&] { trace_light(light_of(light), row, column, *passes, stop); }); },
+
+    .probe_sobol = [](uint32_t seed, uint32_t samples, int scatterings, size_t count, const uint32_t* pixels, const uint32_t* numbers, int first,
+                      int dimensions, double* out) {
+        return guarded([&] { probe::sobol(seed, samples, scatterings, count, pixels, numbers, first, dimensions, out); });
+    },
+    .probe_filter = [](double width, size_t count, const double* u, double* out) { return guarded([&] { probe::filter(width, count, u, out); }); },
+    .probe_function = [](int which, size_t count, const double* a, const double* b,
+                         double* out) { return guarded([&] { probe::function(which, count, a, b, out); }); },
+    .probe_specular = [](double ratio, size_t count, const double* given,
+                         double* out) { return guarded([&] { probe::specular(ratio, count, given, out); }); },
+    .probe_sample_light = [](const ViewcamLamp* lamp, size_t count, const double* given,
+                             double* out) { return guarded([&] { probe::sample_light(*lamp, count, given, out); }); },
+    .probe_light_le = [](const ViewcamLamp* lamp, size_t count, const double* given,
+                         double* out) { return guarded([&] { probe::light_le(*lamp, count, given, out); }); },
+    .probe_texture = [](int width, int height, int srgb, const float* pixels, int closest, size_t count, const double* uv,
+                        double* out) { return guarded([&] { probe::texture(width, height, srgb, pixels, closest, count, uv, out); }); },
+};
+
+}  // namespace viewcam::VIEWCAM_ISA

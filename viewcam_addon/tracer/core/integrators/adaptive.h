@@ -1,0 +1,187 @@
+// The samples of a tile's pixels: the same number for each, or as many as a wanted error takes.
+//
+// A tile is 32 × 32 pixels, counted from the picture's lower left corner; each is computed alone, so that threads change no bit.
+//
+// As many as an error takes: all pixels get the first few samples, then those whose mean is not yet known well enough get twice
+// as many with every round. Nothing is shared but the decision: a pixel's mean is that of its own samples, all of equal weight.
+//
+// A pixel's own samples have no say in how many it gets. What has missed a bright thing looks both darker and quieter than it is,
+// and would stop for that very reason, while its neighbour, which met it, would go on and average it away: light would be lost.
+// So the variance of a sample, s², is the mean over the pixels around it, without the pixel itself. Measured at a Cornell box with
+// a mirror and a light that it shows (level `path`, E = 0.05): pixels that stop by themselves make the picture's tiles too dark by
+// 16 of their standard errors, those that stop by the larger of themselves and their neighbours by 1.4, these by 0.5. The price is
+// a thing that one pixel alone meets: it keeps the noise that its neighbours have not.
+//
+// The samples of a pixel share its space out among them, so that s²/N is 3 to 11 times the variance of their mean. The means of
+// the two halves of the samples, apart by D, tell more: E[D²]/4 is the variance of the mean where samples are independent, and
+// 1.3 to 2 times that where it falls as N^−3/2 (measured: edges, area lights, a sky). But of a single pixel that is one number, and
+// as often far too small as too large. So s²/N is multiplied by what D²/4 is in the mean over 8 × 8 pixels, over what s²/N is
+// there: again without the pixel itself.
+//
+// Rejected: means over neighbours (a denoiser is no reference), and weighing rounds by their variance, which is bias.
+#pragma once
+#include <vector>
+
+#include "path.h"
+
+namespace viewcam::VIEWCAM_ISA {
+
+class TileSampler {
+   public:
+    static constexpr uint32_t TILE = 32;
+
+    // samples: of each pixel, at most. error: the standard error that is wanted of each pixel's Combined, scene-linear: the root
+    // of the mean of its channels' variances; 0 for the same number of samples everywhere.
+    TileSampler(const Scene& scene, const Bounces& bounces, uint32_t seed, uint32_t samples, double error)
+        : integrator_(scene, bounces, seed, int(samples)), filter_(scene.illumination.filter_width), film_(scene.illumination.film),
+          samples_(samples), error_(error), camera_(scene.camera) {}
+
+    // Traces the tile whose lowest row and first column are given. `*stop`, if there is one, ends it early.
+    void trace(uint32_t row, uint32_t column, const LightPasses& passes, const volatile int* stop) const {
+        Tile tile{row, column, std::min(TILE, camera_.height - row), std::min(TILE, camera_.width - column), {}};
+        tile.pixels.resize(TILE * TILE);
+        if (error_ > 0 && samples_ > 1) {
+            trace_until_known(tile, passes, stop);
+        } else {
+            uint32_t batch = Pixel::batch_size(samples_);
+            sample(tile, all(tile), 0, samples_, batch, stop);
+            if (stop && *stop) return;
+            for (uint32_t place : all(tile)) tile.pixels[place].write(passes, pixel(tile, place), film_, batch, integrator_.is_random());
+        }
+    }
+
+   private:
+    // FIRST: samples of every pixel. AROUND: pixels to either side that tell what a pixel's variance is. BLOCK: rows and columns
+    // over which the efficiency of samples is measured; SHARED: the weight in each block of what is measured over the whole tile.
+    static constexpr uint32_t FIRST = 8, BLOCK = 8;
+    static constexpr int AROUND = 2;
+    static constexpr double SHARED = 0.1;
+
+    struct Tile {
+        uint32_t row, column, height, width;
+        std::vector<Pixel> pixels;  // place: row · TILE + column
+    };
+    // What a pixel's samples tell of its mean: s²/N and D²/4, the mean of the channels.
+    struct Spread {
+        double sample = 0, own = 0, apart = 0;
+    };
+
+    uint32_t pixel(const Tile& tile, uint32_t place) const {
+        return (tile.row + place / TILE) * camera_.width + tile.column + place % TILE;
+    }
+    // The places of all pixels, those that lie close together one after the other.
+    static std::vector<uint16_t> all(const Tile& tile) {
+        constexpr uint32_t CLOSE = 4;
+        std::vector<uint16_t> places;
+        for (uint32_t y = 0; y < tile.height; y += CLOSE)
+            for (uint32_t x = 0; x < tile.width; x += CLOSE)
+                for (uint32_t row = y; row < std::min(y + CLOSE, tile.height); row++)
+                    for (uint32_t column = x; column < std::min(x + CLOSE, tile.width); column++)
+                        places.push_back(uint16_t(row * TILE + column));
+        return places;
+    }
+
+    // Takes samples begin … end of some pixels, in groups that fill a block with a few samples of each.
+    void sample(Tile& tile, const std::vector<uint16_t>& places, uint32_t begin, uint32_t end, uint32_t batch,
+                const volatile int* stop) const {
+        size_t size = PathIntegrator::MOST / std::min(end - begin, 4u);
+        for (size_t i = 0; i < places.size(); i += size)
+            sample_group(tile, &places[i], uint32_t(std::min(size, places.size() - i)), begin, end, batch, stop);
+    }
+    void sample_group(Tile& tile, const uint16_t* group, uint32_t size, uint32_t begin, uint32_t end, uint32_t batch,
+                      const volatile int* stop) const {
+        CameraSample samples[PathIntegrator::MOST];
+        PathLight light[PathIntegrator::MOST];
+        const SobolSampler& sampler = integrator_.sampler();
+        uint32_t at_a_time = PathIntegrator::MOST / size;
+        for (uint32_t first = begin; first < end && !(stop && *stop); first += at_a_time) {
+            uint32_t last = std::min(first + at_a_time, end);
+            int count = 0;
+            for (uint32_t k = 0; k < size; k++) {
+                uint32_t place = group[k], number = pixel(tile, place), key = sampler.key(number);
+                for (uint32_t i = first; i < last; i++) {
+                    Vec2 offset = samples_ > 1 ? filter_.offset(sampler.pair(key, i, 0)) : Vec2{0.5, 0.5};
+                    double column = tile.column + place % TILE + offset.x, row = tile.row + place / TILE + offset.y;
+                    samples[count++] = {number, i, camera_.ray(column, row)};
+                }
+            }
+            integrator_.trace(samples, count, light);
+            for (int i = 0; i < count; i++) tile.pixels[group[uint32_t(i) / (last - first)]].add(light[i], film_, batch);
+        }
+    }
+
+    void trace_until_known(Tile& tile, const LightPasses& passes, const volatile int* stop) const {
+        std::vector<Spread> spreads(TILE * TILE);
+        std::vector<double> efficiencies;
+        std::vector<uint16_t> active = all(tile), going;
+        for (uint32_t taken = 0; !active.empty() && !(stop && *stop);) {
+            uint32_t goal = std::min(std::max(2 * taken, FIRST), samples_), half = taken ? taken : goal / 2;
+            std::vector<Vec3> halves(TILE * TILE);
+            if (!taken) sample(tile, active, 0, half, 1, stop);
+            for (uint16_t place : active) halves[place] = tile.pixels[place].differences();
+            sample(tile, active, half, goal, 1, stop);
+            if (stop && *stop) return;
+            for (uint16_t place : active) spreads[place] = spread(tile.pixels[place], halves[place], half);
+            taken = goal;
+            efficiencies = efficiency(tile, spreads);
+            going.clear();
+            if (taken < samples_)
+                for (uint16_t place : active)
+                    if (around(tile, spreads, place) / taken * efficiencies[place] > error_ * error_) going.push_back(place);
+            active.swap(going);
+        }
+        for (uint16_t place : all(tile)) {
+            const Pixel& one = tile.pixels[place];
+            Vec3 variance = one.sample_variance() / one.count() * (efficiencies[place] * film_.exposure * film_.exposure);
+            one.write(passes, pixel(tile, place), film_, variance);
+        }
+    }
+
+    Spread spread(const Pixel& pixel, Vec3 of_half, uint32_t half) const {
+        double exposure = film_.exposure * film_.exposure, sample = mean(pixel.sample_variance()) * exposure;
+        Vec3 apart = (pixel.differences() - of_half) / (pixel.count() - half) - of_half / half;
+        return {sample, sample / pixel.count(), mean(apart * apart) / 4 * exposure};
+    }
+
+    // Of each pixel, the variance of its mean over s²/N, 1 at most.
+    static std::vector<double> efficiency(const Tile& tile, const std::vector<Spread>& spreads) {
+        constexpr uint32_t BLOCKS = TILE / BLOCK;
+        Spread total, block[BLOCKS * BLOCKS];
+        double known = 0;
+        std::vector<double> found(TILE * TILE, 1.0);
+        for (uint16_t place : all(tile)) {
+            Spread& here = block[place / TILE / BLOCK * BLOCKS + place % TILE / BLOCK];
+            here.own += spreads[place].own, here.apart += spreads[place].apart;
+            total.own += spreads[place].own, total.apart += spreads[place].apart;
+            known += spreads[place].own > 0;
+        }
+        if (!(total.own > 0)) return found;
+        double weight = SHARED * BLOCK * BLOCK * total.own / known;
+        for (uint16_t place : all(tile)) {
+            const Spread &here = block[place / TILE / BLOCK * BLOCKS + place % TILE / BLOCK], &own = spreads[place];
+            double others = total.own - own.own, apart = others > 0 ? (total.apart - own.apart) / others : 1;
+            double share = (here.apart - own.apart + weight * apart) / (here.own - own.own + weight);
+            found[place] = std::clamp(share, 0.0, 1.0);
+        }
+        return found;
+    }
+
+    // The variance of a sample in the mean over the pixels around one.
+    static double around(const Tile& tile, const std::vector<Spread>& spreads, uint16_t place) {
+        int y = place / TILE, x = place % TILE, count = 0;
+        double sum = 0;
+        for (int row = std::max(y - AROUND, 0); row <= std::min(y + AROUND, int(tile.height) - 1); row++)
+            for (int column = std::max(x - AROUND, 0); column <= std::min(x + AROUND, int(tile.width) - 1); column++)
+                if (row != y || column != x) sum += spreads[row * int(TILE) + column].sample, count++;
+        return count ? sum / count : INFINITE;
+    }
+
+    PathIntegrator integrator_;
+    Filter filter_;
+    FilmSettings film_;
+    uint32_t samples_;
+    double error_;
+    Camera camera_;
+};
+
+}  // namespace viewcam::VIEWCAM_ISA

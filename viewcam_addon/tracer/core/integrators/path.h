@@ -1,0 +1,307 @@
+// Light along paths from the eye: what the levels `direct` and `path` compute.
+//
+// Up to 64 paths go at once, scattering by scattering. Where one meets a surface, the surface's own light is added, then that of
+// a light, chosen at random, to which a shadow ray is sent; then the path is scattered and goes on until it leaves the scene or
+// its bounces are used up. Light that both the shadow ray and the scattered ray can find is weighted between them (multiple
+// importance sampling by the power heuristic: Veach, 1997).
+//
+// Level `direct` is level `path` without bounces, as Cycles counts them: a path may be scattered once more than there are
+// bounces, in all and by each kind of surface, and where it comes to then, only what shines there counts.
+//
+// Nothing is traced that can't bring anything: without lights no shadow rays, without anything bright that rays could run into
+// no last ray, without either one ray a sample. What a path brings depends on its own numbers alone, and is added up in an order
+// of its own: whichever paths go along with it, and whether rays are traced in packets, changes no bit.
+//
+// Rejected: splitting a path at glass, which makes work where light is faint.
+#pragma once
+#include "../film/film.h"
+#include "../lights/light_sampler.h"
+#include "../samplers/sobol.h"
+#include "../scene.h"
+
+namespace viewcam::VIEWCAM_ISA {
+
+// A sample of a pixel, row · width + column, and its ray from the eye.
+struct CameraSample {
+    uint32_t pixel, number;
+    Ray ray;
+};
+
+class PathIntegrator {
+   public:
+    static constexpr int MOST = 64;  // paths at a time
+
+    // bounces: of the scene, or none at level `direct`.
+    PathIntegrator(const Scene& scene, const Bounces& bounces, uint32_t seed, int samples)
+        : scene_(scene), lights_(scene), sampler_(seed, samples, std::min(bounces.total, 15) + 1) {
+        most_ = bounces.total + 1;
+        most_of_[DIFFUSE] = bounces.diffuse + 1;
+        most_of_[GLOSSY] = bounces.glossy + 1;
+        most_of_[TRANSMISSION] = bounces.transmission + 1;
+        bool shines = false;
+        for (const Material& material : scene.illumination.materials) {
+            shines |= !material.emission.is_black();
+            kinds_ |= material.kinds();
+        }
+        for (RayKind kind : {DIFFUSE, GLOSSY, TRANSMISSION}) {
+            meets_[kind] = shines || lights_.environment().lights(kind) || lights_.meets_lamps(kind);
+            only_sky_[kind] = !shines && !lights_.meets_lamps(kind) && !scene.hides_anything();
+        }
+        lit_ = !scene.illumination.lamps.empty() || shines || !is_black(lights_.environment().radiance);
+    }
+
+    const SobolSampler& sampler() const { return sampler_; }
+    const Scene& scene() const { return scene_; }
+
+    // Whether paths through the same point of the film may bring different light.
+    bool is_random() const {
+        bool onwards = std::min(most_, most_of_[DIFFUSE]) > 1 || meets_[DIFFUSE];
+        return lit_ && ((kinds_ & GLOSSY && kinds_ & TRANSMISSION) || (kinds_ & DIFFUSE && (lights_.is_random() || onwards)));
+    }
+
+    // The light of up to 64 paths.
+    void trace(const CameraSample* samples, int count, PathLight* light) const {
+        static thread_local Block block;  // too large for a stack, and to be cleared for nothing
+        block.light = light;
+        block.live = 0;
+        start(samples, count, block);
+        for (int depth = 1; block.live > 0 && lit_; depth++) {
+            scatter(samples, depth, block);
+            gather(depth, block);
+            arrive(block);
+        }
+    }
+
+   private:
+    // Light may grow with every scattering by colours beyond 1; with no more than this, no square of it is infinite.
+    static constexpr double MOST_WEIGHT = 1e40;
+    // Scatterings before a path may be ended by chance. Sooner, it costs more noise than it saves time.
+    static constexpr int CERTAIN = 3;
+
+    // A path that goes on. from: which of the block's points its ray leaves.
+    struct Path {
+        int sample, from;
+        Category category = COLOR;
+        RayKind kind = CAMERA;
+        bool last = false;
+        uint16_t scattered[3] = {};  // diffuse, glossy, transmission
+        Vec3 weight{1, 1, 1};
+        Ray ray;
+        double pdf = INFINITE;
+    };
+    // What a light brings to a path if nothing hides it.
+    struct Shadowed {
+        int sample;
+        Category category;
+        bool traced;
+        Vec3 light;
+    };
+    struct Block {
+        PathLight* light;
+        int live = 0, lit[LightSampler::ASKED] = {};
+        Path paths[MOST], onwards[MOST];
+        Interaction tables[2][MOST], *points = tables[0], *arrivals = tables[1];
+        Shadowed shadowed[LightSampler::ASKED][MOST];  // by the light that was asked
+        Ray shadow_rays[LightSampler::ASKED][MOST];
+    };
+
+    static int row(RayKind kind) { return kind == DIFFUSE ? 0 : kind == GLOSSY ? 1 : 2; }
+
+    // Where that belongs which a path brings that is scattered for the depth-th time.
+    static Category after(Category category, RayKind kind, int depth) {
+        if (depth == 1) return kind == DIFFUSE ? DIRECT : OTHER;
+        return depth == 2 && category == DIRECT ? INDIRECT : category;
+    }
+    // The part that counts of a sample whose direction was picked with a density, where another way of picking has the other.
+    static double power_heuristic(double pdf, double other) {
+        double ratio = other / pdf;
+        return ratio > 0 ? 1 / (1 + ratio * ratio) : 1;
+    }
+
+    const Material& material(const Interaction& point) const { return scene_.illumination.materials[point.material]; }
+    ShadingPoint shading(const Interaction& point, Vec3 incoming) const { return {point, incoming, scene_.illumination.textures}; }
+
+    // What the eye's rays come to, and the light that is of this alone.
+    void start(const CameraSample* samples, int count, Block& block) const {
+        Ray rays[MOST];
+        Hit hits[MOST];
+        for (int i = 0; i < count; i++) rays[i] = samples[i].ray;
+        scene_.closest(rays, count, CAMERA, hits);
+        for (int i = 0; i < count; i++) {
+            PathLight& light = block.light[i] = PathLight{};
+            double size = length(rays[i].direction);
+            Vec3 ahead = rays[i].direction / size;
+            if (lights_.meets_lamps(CAMERA)) {
+                double farthest = smaller(rays[i].t_max, hits[i].t);
+                light.of[EMISSION] += lights_.le({rays[i].origin, ahead, rays[i].t_min * size, farthest * size, !hits[i]}, CAMERA);
+            }
+            if (!hits[i]) {
+                light.of[ENVIRONMENT] = lights_.environment().le(ahead, CAMERA);
+                continue;
+            }
+            light.covered = true;
+            Interaction& point = block.points[block.live];
+            point = scene_.interaction(rays[i], hits[i]);
+            const Material& made_of = material(point);
+            if (!made_of.emission.is_black()) light.of[EMISSION] += made_of.emission.at(scene_.illumination.textures, point);
+            if (made_of.closures.empty()) continue;
+            light.of[COLOR] = made_of.diffuse_color(shading(point, ahead));
+            Path& path = block.paths[block.live];
+            path = Path{};
+            path.sample = i, path.from = block.live, path.ray.direction = ahead;
+            block.live++;
+        }
+    }
+
+    // Adds what lights may bring to all points where paths are, and finds the rays on which they go on.
+    void scatter(const CameraSample* samples, int depth, Block& block) const {
+        int onwards = 0;
+        for (int& lit : block.lit) lit = 0;
+        for (int i = 0; i < block.live; i++) {
+            const Path& path = block.paths[i];
+            const Interaction& point = block.points[path.from];
+            BSDF bsdf = material(point).bsdf(shading(point, path.ray.direction));
+            if (bsdf.is_black()) continue;
+            const CameraSample& sample = samples[path.sample];
+            uint32_t key = sampler_.key(sample.pixel);
+            auto number = [&](SobolSampler::Purpose purpose) {
+                return sampler_.number(key, sample.number, SobolSampler::dimension(depth, purpose));
+            };
+            auto pair = [&](SobolSampler::Purpose purpose) {
+                return sampler_.pair(key, sample.number, SobolSampler::dimension(depth, purpose));
+            };
+            double brightest = 0;
+            if (bsdf.is_spread() && lights_.count() > 0) {
+                LightSampler::Choice choices[LightSampler::ASKED];
+                double u = lights_.is_random() ? number(SobolSampler::LIGHT) : 0;
+                int chosen = lights_.choose(point, u, depth == 1, choices, brightest);
+                Vec2 u_light = chosen && lights_.is_random() ? pair(SobolSampler::LIGHT_POINT) : Vec2{};
+                for (int k = 0; k < chosen; k++) ask(choices[k], point, u_light, path, depth, bsdf, block);
+            }
+
+            bool total_used = depth >= most_;
+            uint32_t leading = 0, last = 0;  // kinds of rays that can bring anything, and those on which the path ends
+            for (RayKind kind : {DIFFUSE, GLOSSY, TRANSMISSION}) {
+                bool ends = total_used || path.scattered[row(kind)] + 1 >= most_of_[kind];
+                if (ends) last |= kind;
+                if (!ends || meets_[kind]) leading |= kind;
+            }
+            if (!(bsdf.kinds() & leading)) continue;
+            BSDFSample sampled =
+                bsdf.sample(bsdf.needs_choice() ? number(SobolSampler::LOBE) : 0, [&] { return pair(SobolSampler::DIRECTION); });
+            if (!(sampled.kind & leading)) continue;
+            // A smooth normal may send rays to the wrong side of the true surface: that light is lost, as in Cycles.
+            if ((dot(sampled.direction, point.normal) > 0) == (sampled.kind == TRANSMISSION)) continue;
+            Path& next = block.onwards[onwards];
+            next = path;
+            next.from = path.from;
+            next.kind = sampled.kind;
+            next.last = last & sampled.kind;
+            next.scattered[row(sampled.kind)]++;
+            next.category = after(path.category, sampled.kind, depth);
+            next.weight = min(path.weight * sampled.weight, MOST_WEIGHT);
+            double survival = 1;
+            if (sampled.kind == DIFFUSE && brightest > 0 && next.last)
+                survival = lights_.sky_chance(brightest, DIFFUSE);
+            else if (depth > CERTAIN && !next.last)
+                survival = smaller(std::sqrt(max_component(next.weight)), 1.0);
+            if (survival < 1) {
+                if (number(SobolSampler::ROULETTE) >= survival) continue;
+                next.weight = next.weight / survival;
+            }
+            next.pdf = sampled.pdf;
+            next.ray = {point.ray_origin(sampled.direction), sampled.direction, 0, INFINITE};
+            onwards++;
+        }
+        block.live = onwards;
+    }
+
+    // Notes what a light brings to a point if nothing hides it.
+    void ask(const LightSampler::Choice& choice, const Interaction& point, Vec2 u, const Path& path, int depth, const BSDF& bsdf,
+             Block& block) const {
+        LightSample sample = choice.light->sample_li(point, choice.rest, u);
+        if (!(dot(point.normal, sample.direction) > 0)) return;
+        Vec3 light = bsdf.eval(sample.direction, DIFFUSE) * sample.weight;
+        if (is_black(light)) return;
+        light = light * path.weight / choice.chance;
+        if (choice.light->mesh()) light *= power_heuristic(sample.pdf * choice.chance, bsdf.pdf(sample.direction));
+        int place = block.lit[choice.slot]++;
+        bool traced = choice.light->casts_shadow;
+        block.shadowed[choice.slot][place] = {path.sample, after(path.category, DIFFUSE, depth), traced, light};
+        if (traced) block.shadow_rays[choice.slot][place] = shadow_ray(point, sample);
+    }
+
+    // A ray to a light ends before it by what rounding can move the light's own surface along the ray: what the light touches
+    // does not hide it.
+    Ray shadow_ray(const Interaction& point, const LightSample& sample) const {
+        constexpr double ROUNDINGS = 32 * 0x1p-53, FLATTEST = 1e-6;
+        Vec3 origin = point.ray_origin(sample.direction);
+        if (sample.distance == INFINITE) return {origin, sample.direction, 0, INFINITE};
+        double largest = max_component(abs(origin)) + sample.distance;
+        double slack = (2 * point.offset + ROUNDINGS * largest) / larger(sample.cosine, FLATTEST);
+        return {origin, sample.direction, 0, larger(sample.distance - slack, 0.0)};
+    }
+
+    // Sends the shadow rays, and adds the light that nothing hides.
+    void gather(int depth, Block& block) const {
+        for (int slot = 0; slot < LightSampler::ASKED; slot++) {
+            int count = block.lit[slot];
+            bool hidden[MOST];
+            const Ray* rays = block.shadow_rays[slot];
+            const Shadowed* shadowed = block.shadowed[slot];
+            if (count > 0 && depth == 1 && std::all_of(shadowed, shadowed + count, [](const Shadowed& one) { return one.traced; }))
+                scene_.occluded(rays, count, hidden);
+            else
+                for (int i = 0; i < count; i++) hidden[i] = shadowed[i].traced && scene_.occluded(rays[i]);
+            for (int i = 0; i < count; i++)
+                if (!hidden[i]) block.light[shadowed[i].sample].of[shadowed[i].category] += shadowed[i].light;
+        }
+    }
+
+    // Where rays come to; adds what shines there.
+    void arrive(Block& block) const {
+        int live = 0;
+        for (int i = 0; i < block.live; i++) {
+            const Path& path = block.onwards[i];
+            Vec3& light = block.light[path.sample].of[path.category];
+            if (path.last && only_sky_[path.kind]) {
+                if (!scene_.occluded(path.ray)) light += path.weight * lights_.environment().le(path.ray.direction, path.kind);
+                continue;
+            }
+            Hit hit = scene_.closest(path.ray, path.kind);
+            if (lights_.meets_lamps(path.kind))
+                light += path.weight * lights_.le({path.ray.origin, path.ray.direction, 0, hit.t, !hit}, path.kind);
+            if (!hit) {
+                light += path.weight * lights_.environment().le(path.ray.direction, path.kind);
+                continue;
+            }
+            Interaction& point = block.arrivals[live];
+            point = scene_.interaction(path.ray, hit);
+            const Material& made_of = material(point);
+            if (!made_of.emission.is_black()) {
+                double share = 1;
+                if (path.kind == DIFFUSE && lights_.has_meshes())
+                    share = power_heuristic(path.pdf, lights_.pdf_li(block.points[path.from], point, path.ray.direction, hit.t));
+                light += path.weight * made_of.emission.at(scene_.illumination.textures, point) * share;
+            }
+            if (path.last || made_of.closures.empty()) continue;
+            block.paths[live] = path;
+            block.paths[live].from = live;
+            live++;
+        }
+        block.live = live;
+        std::swap(block.points, block.arrivals);
+    }
+
+    static Vec3 min(Vec3 rgb, double most) { return {smaller(rgb.x, most), smaller(rgb.y, most), smaller(rgb.z, most)}; }
+
+    const Scene& scene_;
+    LightSampler lights_;
+    SobolSampler sampler_;
+    int most_, most_of_[TRANSMISSION + 1] = {};
+    bool meets_[TRANSMISSION + 1] = {}, only_sky_[TRANSMISSION + 1] = {};
+    bool lit_;
+    uint32_t kinds_ = 0;  // of rays that any material scatters
+};
+
+}  // namespace viewcam::VIEWCAM_ISA

@@ -1,0 +1,132 @@
+// What stands behind the part of the C interface that is about light.
+#pragma once
+#include "capi_light.h"
+#include "integrators/adaptive.h"
+
+namespace viewcam::VIEWCAM_ISA {
+
+inline void add_texture(Scene& scene, int width, int height, bool srgb, const float* pixels) {
+    scene.illumination.textures.push_back({width, height, srgb, std::vector<float>(pixels, pixels + 3 * size_t(width) * height)});
+}
+
+inline void add_material(Scene& scene, const ViewcamClosure* closures, int count) {
+    Material material;
+    for (int i = 0; i < count; i++) {
+        const ViewcamColor& c = closures[i].color;
+        Color color{{c.rgb[0], c.rgb[1], c.rgb[2]}, c.image < 0 ? NONE : uint32_t(c.image), bool(c.closest), bool(c.vertex)};
+        double ior = closures[i].ior;
+        switch (closures[i].kind) {
+            case VIEWCAM_EMISSION: material.emission = color; break;
+            case VIEWCAM_DIFFUSE: material.closures.push_back(DiffuseClosure{color}); break;
+            case VIEWCAM_MIRROR: material.closures.push_back(MirrorClosure{color}); break;
+            case VIEWCAM_GLASS: material.closures.push_back(GlassClosure{color, ior}); break;
+            case VIEWCAM_REFRACTION: material.closures.push_back(RefractionClosure{color, ior}); break;
+        }
+    }
+    scene.illumination.materials.push_back(std::move(material));
+}
+
+inline Lamp lamp_of(const ViewcamLamp& given) {
+    Lamp lamp;
+    lamp.kind = Lamp::Kind(given.kind), lamp.color = {given.color[0], given.color[1], given.color[2]};
+    for (int i = 0; i < 12; i++) lamp.to_world.m[i / 4][i % 4] = given.matrix[i];
+    lamp.radius = given.radius, lamp.angle = given.angle, lamp.blend = given.blend, lamp.size = {given.size[0], given.size[1]};
+    lamp.soft = given.soft, lamp.casts_shadow = given.casts_shadow, lamp.hidden_from = given.hidden_from;
+    return lamp;
+}
+inline void add_lamp(Scene& scene, const ViewcamLamp& given) { scene.illumination.lamps.push_back(lamp_of(given)); }
+
+inline void set_film(Scene& scene, const ViewcamFilm& given) {
+    Illumination& light = scene.illumination;
+    light.environment = {{given.radiance[0], given.radiance[1], given.radiance[2]}, given.hidden_from};
+    light.film = {bool(given.transparent), given.exposure};
+    light.filter_width = given.filter_width;
+}
+inline void clear_light(Scene& scene) { scene.illumination = {}; }
+
+inline TileSampler* create_light(const Scene& scene, const ViewcamLightSettings& given) {
+    Bounces bounces{given.bounces[0], given.bounces[1], given.bounces[2], given.bounces[3]};
+    return new TileSampler(scene, bounces, given.seed, given.samples, given.error);
+}
+inline void trace_light(const TileSampler& sampler, uint32_t row, uint32_t column, const ViewcamLightPasses& to, const volatile int* stop) {
+    LightPasses passes{to.combined, to.emission, to.environment, to.diffuse_direct, to.diffuse_indirect, to.diffuse_color, to.variance, to.sample_count};
+    sampler.trace(row, column, passes, stop);
+}
+
+// Probes: the formulas one by one, for tests. All arrays are rows of so many numbers.
+namespace probe {
+
+inline void sobol(uint32_t seed, uint32_t samples, int scatterings, size_t count, const uint32_t* pixels, const uint32_t* numbers, int first,
+                  int dimensions, double* out) {
+    SobolSampler sampler(seed, int(samples), scatterings);
+    for (size_t i = 0; i < count; i++)
+        for (int d = 0; d < dimensions; d++) out[i * size_t(dimensions) + d] = sampler.number(sampler.key(pixels[i]), numbers[i], first + d);
+}
+// u, out: (count, 2).
+inline void filter(double width, size_t count, const double* u, double* out) {
+    Filter filter(width);
+    for (size_t i = 0; i < count; i++) {
+        Vec2 offset = filter.offset({u[2 * i], u[2 * i + 1]});
+        out[2 * i] = offset.x, out[2 * i + 1] = offset.y;
+    }
+}
+// name: "asin", …; b: of atan2 and pow.
+inline void function(int which, size_t count, const double* a, const double* b, double* out) {
+    for (size_t i = 0; i < count; i++) switch (which) {
+            case 0: out[i] = sincos_of_turns(a[i]).sin; break;
+            case 1: out[i] = sincos_of_turns(a[i]).cos; break;
+            case 2: out[i] = asin(a[i]); break;
+            case 3: out[i] = acos(a[i]); break;
+            case 4: out[i] = atan2(a[i], b[i]); break;
+            case 5: out[i] = pow(a[i], b[i]); break;
+            case 6: out[i] = fresnel(a[i], b[i]); break;
+        }
+}
+// given: (count, 9), incoming, normal, shading. out: (count, 9), the bent normal, where a mirror and where a surface of that ratio
+// sends the ray.
+inline void specular(double ratio, size_t count, const double* given, double* out) {
+    auto vector = [](const double* v) { return Vec3{v[0], v[1], v[2]}; };
+    for (size_t i = 0; i < count; i++) {
+        Interaction point;
+        Vec3 incoming = vector(given + 9 * i);
+        point.normal = vector(given + 9 * i + 3), point.shading = vector(given + 9 * i + 6);
+        Vec3 normal = specular_normal(incoming, point), found[3] = {normal, reflected(incoming, normal), refracted(incoming, normal, ratio)};
+        for (int k = 0; k < 3; k++)
+            for (int axis = 0; axis < 3; axis++) out[9 * i + 3 * k + axis] = found[k][axis];
+    }
+}
+// given: (count, 8), position, normal, u. out: (count, 11), direction, distance, weight, pdf, pdf_li of the direction, cosine,
+// estimate.
+inline void sample_light(const ViewcamLamp& lamp, size_t count, const double* given, double* out) {
+    Light light = light_of(lamp_of(lamp), {});
+    for (size_t i = 0; i < count; i++, given += 8, out += 11) {
+        Interaction from;
+        from.position = {given[0], given[1], given[2]};
+        from.normal = from.shading = {given[3], given[4], given[5]};
+        LightSample sample = light.sample_li(from, 0, {given[6], given[7]});
+        double row[11] = {sample.direction.x, sample.direction.y, sample.direction.z, sample.distance, sample.weight.x, sample.weight.y,
+                          sample.weight.z, sample.pdf, light.pdf_li(from, sample.direction), sample.cosine,
+                          light.estimate(from.position, from.normal)};
+        std::copy(row, row + 11, out);
+    }
+}
+// given: (count, 9), origin, direction, nearest and farthest distance, whether the ray escapes. out: (count, 3).
+inline void light_le(const ViewcamLamp& lamp, size_t count, const double* given, double* out) {
+    Light light = light_of(lamp_of(lamp), {});
+    for (size_t i = 0; i < count; i++, given += 9, out += 3) {
+        Vec3 radiance = light.le({{given[0], given[1], given[2]}, {given[3], given[4], given[5]}, given[6], given[7], given[8] != 0});
+        out[0] = radiance.x, out[1] = radiance.y, out[2] = radiance.z;
+    }
+}
+// uv: (count, 2). out: (count, 3).
+inline void texture(int width, int height, bool srgb, const float* pixels, bool closest, size_t count, const double* uv, double* out) {
+    Texture texture{width, height, srgb, std::vector<float>(pixels, pixels + 3 * size_t(width) * height)};
+    for (size_t i = 0; i < count; i++) {
+        Vec3 color = texture.at({uv[2 * i], uv[2 * i + 1]}, closest);
+        out[3 * i] = color.x, out[3 * i + 1] = color.y, out[3 * i + 2] = color.z;
+    }
+}
+
+}  // namespace probe
+
+}  // namespace viewcam::VIEWCAM_ISA

@@ -1,0 +1,43 @@
+// What all lights are asked and answer.
+//
+// Each kind of light is a class with
+//
+// - `sample_li`: for a point of a surface, a direction in which it sees the light, evenly over the solid angle that the light
+//   fills there where that can be. So what a point gets is bounded however near the light, and a light of no size is no special
+//   case: power and solid angle are multiplied out, and the radius cancels. `weight` is the radiance over the density.
+// - `pdf_li`: the density with which `sample_li` chooses a direction that does see the light.
+// - `le`: what a ray sees that runs into the light. Lamps block no ray, as in Cycles: a ray sees all that it runs through.
+// - `estimate`: how much the light brings to a point, roughly, and 0 only where it brings nothing.
+// - `power`: about all that it gives; of a sun, what falls on a scene of so large an extent.
+// - `is_sized`: whether rays can run into it.
+//
+// Rejected: sampling spheres and rectangles by their area, whose samples near a point have the inverse square of their distance,
+// and multiple importance sampling of lamps at diffuse surfaces, which that needs, and which costs a second ray.
+#pragma once
+#include "../bsdf/sampling.h"
+#include "../ray.h"
+
+namespace viewcam::VIEWCAM_ISA {
+
+struct LightSample {
+    Vec3 direction;              // unit, towards the light
+    double distance = INFINITE;  // of the point of the light
+    Vec3 weight;                 // radiance over density
+    double pdf = INFINITE;       // by solid angle; INFINITE of what has no size
+    double cosine = 1;           // under which the light's own surface is seen, of flat lights
+};
+
+// A ray that may run into lights, its direction unit. escaped: whether it meets no surface.
+struct LightRay {
+    Vec3 origin, direction;
+    double nearest = 0, farthest = INFINITE;
+    bool escaped = false;
+};
+
+constexpr double MOST_WEIGHT_OF_LIGHT = 1e100;  // more light than any picture holds, less than makes products overflow
+
+inline double mean(Vec3 rgb) { return (rgb.x + rgb.y + rgb.z) / 3; }
+// Sizes as they are, but 0 where their squares are nothing that float64 can divide by.
+inline double not_tiny(double size) { return size > 1e-100 ? size : 0; }
+
+}  // namespace viewcam::VIEWCAM_ISA

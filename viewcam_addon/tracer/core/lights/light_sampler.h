@@ -1,0 +1,170 @@
+// All that gives light in a scene, and which of it a point is lit by.
+//
+// A point gets the light of one light, chosen at random, divided by the chance that it had. Of a few lights the chance is in
+// proportion to what each may bring to that point; of many it is the same everywhere, half of it by power and half alike for
+// all, so that what is weak but near gets its share.
+//
+// Where the eye sees points in the light of very few lamps, that choice is most of the noise: there each lamp is asked by
+// itself, the brightest at every sample, and others as often as what they may bring is worth it. The sky, too, is then asked no
+// more often than that. In a field of spheres under three lamps and a sky that makes half the noise in the same time.
+//
+// Lamps are sampled by solid angle, which is bounded, so that rays scattered by diffuse surfaces need not look for them.
+// Surfaces that shine are found both ways, weighted by Veach's power heuristic.
+#pragma once
+#include "light.h"
+
+namespace viewcam::VIEWCAM_ISA {
+
+class LightSampler {
+   public:
+    // For so many the chances are computed at each point, and so many lamps are asked one by one where the eye sees points.
+    static constexpr int FEW = 32, ASKED = 4;
+
+    // chance: that the light was chosen, above 0. rest: what is left of the number that chose, in [0, 1). slot: another for
+    // each that is asked at a point, and the same at all points for a lamp that is asked by itself.
+    struct Choice {
+        const Light* light;
+        double chance, rest;
+        int slot = 0;
+    };
+
+    explicit LightSampler(const Scene& scene) : environment_(scene.illumination.environment) {
+        const Illumination& given = scene.illumination;
+        std::vector<Light> unlit;
+        for (const Lamp& lamp : given.lamps) {
+            Light light = light_of(lamp, scene.origin);
+            (lamp.hidden_from & DIFFUSE ? unlit : lights_).push_back(light);
+        }
+        lamps_ = lights_.size();
+        std::vector<Vec3> emissions;
+        for (const Material& material : given.materials) emissions.push_back(material.emission.mean(given.textures));
+        owners_.assign(scene.objects.size(), NONE);
+        for (uint32_t object = 0; object < scene.objects.size(); object++) {
+            if (!(scene.objects[object].visible & DIFFUSE)) continue;
+            MeshLight mesh(scene, object, emissions);
+            if (mesh.is_dark()) continue;
+            owners_[object] = uint32_t(lights_.size());
+            lights_.emplace_back(std::move(mesh), 0, true);
+        }
+        size_t meshes = lights_.size();
+        lights_.insert(lights_.end(), unlit.begin(), unlit.end());
+        for (size_t i = 0; i < lights_.size(); i++)
+            if ((i < lamps_ || i >= meshes) && lights_[i].is_sized())
+                for (RayKind kind : {CAMERA, GLOSSY, TRANSMISSION})
+                    if (!(lights_[i].hidden_from & kind)) met_[kind].push_back(uint32_t(i));
+        count_ = int(meshes);
+        if (count_ > FEW) {
+            double total = 0, extent = scene.extent();
+            for (int i = 0; i < count_; i++) total += lights_[i].power(extent);
+            double reached = 0;
+            for (int i = 0; i < count_; i++) {
+                chances_.push_back(0.5 * lights_[i].power(extent) / total + 0.5 / count_);
+                reached_.push_back(reached += chances_.back());
+            }
+            reached_.back() = 1;
+        }
+    }
+
+    const Environment& environment() const { return environment_; }
+    // How many lights diffuse surfaces can be lit by, and whether what they get depends on chance.
+    int count() const { return count_; }
+    bool has_meshes() const { return size_t(count_) > lamps_; }
+    bool is_random() const { return count_ > 1 || (count_ == 1 && lights_[0].is_sized()); }
+    // Whether rays of a kind run into lamps.
+    bool meets_lamps(RayKind kind) const { return kind <= TRANSMISSION && !met_[kind].empty(); }
+
+    // The radiance of all lamps that a ray of a kind runs through.
+    Vec3 le(const LightRay& ray, RayKind kind) const {
+        Vec3 sum;
+        if (kind <= TRANSMISSION)
+            for (uint32_t light : met_[kind]) sum += lights_[light].le(ray);
+        return sum;
+    }
+
+    // The lights that a point asks, at most ASKED. seen: whether the eye sees it, so that several are worth it. u: in [0, 1).
+    // brightest: receives about what the brightest lamp brings where lamps are asked one by one, else 0.
+    int choose(const Interaction& point, double u, bool seen, Choice (&choices)[ASKED], double& brightest) const {
+        brightest = 0;
+        if (count_ == 0) return 0;
+        if (asks_each() && seen) {
+            double estimates[ASKED];
+            for (int i = 0; i < count_; i++) brightest = larger(brightest, estimates[i] = lights_[i].estimate(point.position, point.normal));
+            int chosen = 0;
+            for (int i = 0; i < count_; i++) {
+                // One without a size has no noise of its own.
+                double chance = lights_[i].is_sized() ? smaller(estimates[i] / (brightest * WORTH), 1.0) : estimates[i] > 0;
+                if (u < chance && chance > SMALLEST_CHANCE) choices[chosen++] = {&lights_[i], chance, u, i};
+            }
+            return chosen;
+        }
+        if (count_ == 1) {
+            choices[0] = {&lights_[0], 1, u};
+            return 1;
+        }
+        if (!chances_.empty()) {
+            size_t which = std::min<size_t>(std::upper_bound(reached_.begin(), reached_.end(), u) - reached_.begin(), count_ - 1);
+            double before = which ? reached_[which - 1] : 0;
+            choices[0] = {&lights_[which], chances_[which], std::clamp((u - before) / chances_[which], 0.0, BELOW_1)};
+            return 1;
+        }
+        double estimates[FEW], total = 0, reached = 0;
+        for (int i = 0; i < count_; i++) total += estimates[i] = lights_[i].estimate(point.position, point.normal);
+        double wanted = u * total;
+        for (int i = 0, last = -1; i <= count_; i++) {  // the last that has a chance is taken even where sums are rounded
+            if (i < count_ && estimates[i] > 0) last = i;
+            bool here = i < count_ ? estimates[i] > 0 && wanted < reached + estimates[i] : last >= 0;
+            if (here) {
+                double share = estimates[last], before = i < count_ ? reached : total - share;
+                if (!(share / total > SMALLEST_CHANCE)) return 0;
+                choices[0] = {&lights_[last], share / total, std::clamp((wanted - before) / share, 0.0, BELOW_1)};
+                return 1;
+            }
+            if (i < count_) reached += estimates[i];
+        }
+        return 0;
+    }
+
+    // How often the sky is worth a ray where lamps bring as much as `brightest` tells.
+    double sky_chance(double brightest, RayKind kind) const {
+        if (!(brightest > 0)) return 1;
+        return smaller(PI / WORTH * mean(environment_.le({}, kind)) / brightest, 1.0);
+    }
+
+    // The density by solid angle with which a point would have sent a ray to a surface that its scattered ray has met.
+    double pdf_li(const Interaction& from, const Interaction& met, Vec3 direction, double distance) const {
+        uint32_t owner = owners_[met.object];
+        if (owner == NONE) return 0;
+        double pdf = lights_[owner].mesh()->pdf_li(met.material, distance, std::fabs(dot(met.normal, direction)));
+        return pdf * chance(from, owner);
+    }
+
+   private:
+    // A light has every sample that may bring this part of what the brightest may, and one that brings less is left out of
+    // samples: half as many of both take as long for the same error. A smaller chance than SMALLEST_CHANCE comes never.
+    static constexpr double WORTH = 0.25, SMALLEST_CHANCE = 1e-80, BELOW_1 = 1 - 0x1p-53;
+
+    // Whether lamps and the sky are asked one by one where the eye sees points.
+    bool asks_each() const { return count_ <= ASKED && !has_meshes() && (count_ > 1 || !is_black(environment_.radiance)); }
+
+    double chance(const Interaction& point, uint32_t light) const {
+        if (count_ == 1) return 1;
+        if (!chances_.empty()) return chances_[light];
+        double total = 0, own = 0;
+        for (int i = 0; i < count_; i++) {
+            double estimate = lights_[i].estimate(point.position, point.normal);
+            total += estimate;
+            if (uint32_t(i) == light) own = estimate;
+        }
+        return total > 0 ? own / total : 0;
+    }
+
+    std::vector<Light> lights_;  // lamps that light diffuse surfaces, meshes, lamps that don't
+    size_t lamps_;
+    int count_;
+    std::vector<uint32_t> owners_;                // of each object, which light it is
+    std::vector<uint32_t> met_[TRANSMISSION + 1];  // by kind of ray, lamps that have a size
+    std::vector<double> chances_, reached_;       // of many lights
+    Environment environment_;
+};
+
+}  // namespace viewcam::VIEWCAM_ISA

@@ -1,0 +1,78 @@
+// Vectors, affine maps and frames in float64.
+//
+// Everything in the core is compiled without contraction (-ffp-contract=off): a product and a sum round one after the other,
+// everywhere alike, which the triangle test's watertightness and the pictures' bits stand on.
+#pragma once
+#include <cmath>
+
+namespace viewcam::VIEWCAM_ISA {
+
+// Of two numbers; the second where the first is none. The library's fmax is a call.
+inline double larger(double a, double b) { return a > b ? a : b; }
+inline double smaller(double a, double b) { return a < b ? a : b; }
+
+// In line everywhere, as the C library's are not; of something that is no number and b, b.
+inline double min(double a, double b) { return a < b ? a : b; }
+inline double max(double a, double b) { return a > b ? a : b; }
+
+struct Vec2 {
+    double x = 0, y = 0;
+};
+
+struct Vec3 {
+    double x = 0, y = 0, z = 0;
+
+    double operator[](int axis) const { return axis == 0 ? x : axis == 1 ? y : z; }
+};
+
+inline Vec3 operator+(Vec3 a, Vec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+inline Vec3 operator-(Vec3 a, Vec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+inline Vec3 operator-(Vec3 a) { return {-a.x, -a.y, -a.z}; }
+inline Vec3 operator*(Vec3 a, Vec3 b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
+inline Vec3 operator*(Vec3 a, double s) { return {a.x * s, a.y * s, a.z * s}; }
+inline Vec3 operator*(double s, Vec3 a) { return a * s; }
+inline Vec3 operator/(Vec3 a, double s) { return {a.x / s, a.y / s, a.z / s}; }
+inline Vec3& operator+=(Vec3& a, Vec3 b) { return a = a + b; }
+inline Vec3& operator*=(Vec3& a, Vec3 b) { return a = a * b; }
+inline Vec3& operator*=(Vec3& a, double s) { return a = a * s; }
+
+inline double dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline Vec3 cross(Vec3 a, Vec3 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
+inline double length(Vec3 a) { return std::sqrt(dot(a, a)); }
+inline Vec3 normalize(Vec3 a) { return a / length(a); }
+inline double max_component(Vec3 a) { return larger(a.x, larger(a.y, a.z)); }
+inline Vec3 abs(Vec3 a) { return {std::fabs(a.x), std::fabs(a.y), std::fabs(a.z)}; }
+inline bool is_black(Vec3 rgb) { return rgb.x == 0 && rgb.y == 0 && rgb.z == 0; }
+
+// A 3 × 4 affine map, rows first: of points by `point`, of directions by `vector`.
+struct Affine {
+    double m[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
+
+    Vec3 vector(Vec3 v) const {
+        return {m[0][0] * v.x + m[0][1] * v.y + m[0][2] * v.z, m[1][0] * v.x + m[1][1] * v.y + m[1][2] * v.z,
+                m[2][0] * v.x + m[2][1] * v.y + m[2][2] * v.z};
+    }
+    Vec3 translation() const { return {m[0][3], m[1][3], m[2][3]}; }
+    Vec3 point(Vec3 p) const { return vector(p) + translation(); }
+    // The transposed linear part: with the inverse map, what takes normals along.
+    Vec3 transposed(Vec3 n) const {
+        return {m[0][0] * n.x + m[1][0] * n.y + m[2][0] * n.z, m[0][1] * n.x + m[1][1] * n.y + m[2][1] * n.z,
+                m[0][2] * n.x + m[1][2] * n.y + m[2][2] * n.z};
+    }
+};
+
+// A right-handed orthonormal frame about a unit vector, without a singularity; its error is 4e-16 for any vector.
+// Duff et al., Building an Orthonormal Basis, Revisited, JCGT 6 (2017).
+struct Frame {
+    Vec3 s, t, n;
+
+    explicit Frame(Vec3 normal) : n(normal) {
+        double sign = std::copysign(1.0, n.z), a = -1 / (sign + n.z), b = n.x * n.y * a;
+        s = {1 + sign * n.x * n.x * a, sign * b, -sign * n.x};
+        t = {b, sign + n.y * n.y * a, -n.y};
+    }
+    Vec3 to_world(Vec3 v) const { return s * v.x + t * v.y + n * v.z; }
+    Vec3 to_local(Vec3 v) const { return {dot(s, v), dot(t, v), dot(n, v)}; }
+};
+
+}  // namespace viewcam::VIEWCAM_ISA

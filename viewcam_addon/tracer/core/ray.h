@@ -1,0 +1,67 @@
+// Rays, what they hit, and what is known of the surface there.
+#pragma once
+#include <cstdint>
+#include <limits>
+
+#include "math/vec.h"
+
+namespace viewcam::VIEWCAM_ISA {
+
+constexpr double INFINITE = std::numeric_limits<double>::infinity();
+constexpr uint32_t NONE = 0xffffffffu;
+constexpr double DOUBLE_ROUNDING = 0x1p-53;
+
+// The kinds of rays that objects and lights may be hidden from, as bits; tracer/native.py numbers scene/lamps.py RAYS so.
+enum RayKind : uint32_t { CAMERA = 1, DIFFUSE = 2, GLOSSY = 4, TRANSMISSION = 8, SHADOW = 16 };
+
+// A ray in rendering space (scene.h). direction: of any length; t counts in it. What is met must lie in t_min < t < t_max.
+struct Ray {
+    Vec3 origin, direction;
+    double t_min = 0, t_max = INFINITE;
+    double origin_error = 0;  // by how much the origin may be off in each coordinate, where it was taken into another space
+};
+
+// What a ray meets first. object: the scene's number of the placed object, NONE where there is nothing. primitive: of the
+// object's geometry, a triangle or a sphere.
+struct Hit {
+    double t = INFINITE;
+    uint32_t object = NONE, primitive = NONE;
+
+    explicit operator bool() const { return object != NONE; }
+};
+
+// The nearest hit so far. Of equal distances that of the smaller object counts, then that of the smaller primitive.
+struct Nearest {
+    double t;
+    uint64_t name = 0;  // object · 2³² + primitive; 0 so that nothing wins a tie with the ray's end
+
+    bool offer(double distance, uint32_t object, uint32_t primitive) {
+        uint64_t other = uint64_t(object) << 32 | primitive;
+        if (!(distance < t || (distance == t && other < name))) return false;
+        t = distance;
+        name = other;
+        return true;
+    }
+};
+
+// The point of a surface that a ray meets, in rendering space.
+struct Interaction {
+    Vec3 position;
+    Vec3 normal;           // unit, of the true geometry, on the side that the ray came from
+    Vec3 shading;          // unit, smooth where the mesh is, turned to the other side where `normal` is
+    Vec2 uv;               // of the mesh's UV map, 0 without one
+    Vec3 vertex_color;     // linear, 0 on what has none
+    double offset = 0;     // how far along ±normal rays that leave must start, so that they do not meet where they start
+    uint32_t material = 0; // index into Scene::materials
+    uint32_t slot = 0;     // index into Scene::slots
+    uint32_t object = NONE, primitive = NONE;
+    double t = INFINITE;   // along the ray that came, of its direction's length
+    double cosine = 0;     // between that ray and the true surface, which an ellipsoid's `normal` is not at a right angle to
+    bool has_uv = false;   // whether the mesh has a UV map
+    bool backside = false; // met from behind: from where the corners run clockwise in the object's own space, as in Cycles
+
+    // Where a ray in `direction` starts that leaves the surface here.
+    Vec3 ray_origin(Vec3 direction) const { return position + normal * std::copysign(offset, dot(normal, direction)); }
+};
+
+}  // namespace viewcam::VIEWCAM_ISA

@@ -1,0 +1,310 @@
+// A scene as the core traces it: geometries with a hierarchy each, objects that place them, and all that gives or scatters light.
+//
+// Rendering space has the world's axes and an origin near camera and scene (`origin`), so that scenes in map coordinates lose
+// no digits; pbrt calls it "camera-world space". Python has checked whatever comes here (native.py): nothing is checked twice.
+//
+// Meshes that only one object places, and others where that takes little memory, are merged in rendering space: one hierarchy for
+// all that the same kinds of rays see. Whatever else is an instance: the ray is taken into its space, where its geometry's own
+// hierarchy was built once.
+#pragma once
+#include <algorithm>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <variant>
+#include <vector>
+
+#include "camera.h"
+#include "illumination.h"
+#include "shapes/sphere.h"
+#include "shapes/triangle_mesh.h"
+
+namespace viewcam::VIEWCAM_ISA {
+
+class Scene {
+   public:
+    // A new shape is one more here, with functions of these names: bounds, intersect, interaction, magnitude.
+    using Shape = std::variant<TriangleMesh, Spheres>;
+    struct Slot {
+        float index;        // what the Material Index pass shows
+        uint32_t material;  // index into materials
+    };
+
+    std::vector<Shape> geometries;
+    std::vector<Object> objects;
+    std::vector<Slot> slots;
+    Camera camera;
+    Vec3 origin;  // of rendering space, in the world
+    Illumination illumination;
+
+    // Makes the scene ready for rays. matrices: (objects, 3, 4), to world space.
+    void commit(const double* matrices, int threads) {
+        std::vector<size_t> users(geometries.size());
+        for (size_t i = 0; i < objects.size(); i++) {
+            objects[i].place(matrices + 12 * i, origin);
+            users[objects[i].geometry]++;
+        }
+        for (Object& object : objects) object.shared = users[object.geometry] > 1;
+        std::vector<bool> merged = choose_merged(users);
+        std::map<uint32_t, std::vector<uint32_t>> still;  // visibility → objects
+        std::vector<uint32_t> placed;
+        for (uint32_t i = 0; i < objects.size(); i++) (merged[i] ? still[objects[i].visible] : placed).push_back(i);
+        merged_.clear();
+        for (auto& [visible, some] : still) merged_.push_back({visible, merge(some, threads)});
+        build_geometries(placed, threads);
+        instances_ = build_bvh(placed.size(), [&](size_t i) { return world_bounds(objects[placed[i]]); }, 1, threads);
+        for (uint32_t& leaf : instances_.leaves) leaf = placed[leaf];
+    }
+
+    // What a ray meets first among the objects that its kind sees.
+    Hit closest(const Ray& ray, RayKind kind) const {
+        Nearest nearest{ray.t_max};
+        for (const Merged& some : merged_)
+            if (some.visible & kind) some.triangles.intersect<false>(ray, NONE, nearest);
+        intersect_instances<false>(ray, kind, nearest);
+        return hit(nearest, ray);
+    }
+    // Whether anything stands in t_min < t < t_max.
+    bool occluded(const Ray& ray) const {
+        Nearest nearest{ray.t_max};
+        for (const Merged& some : merged_)
+            if (some.visible & SHADOW && some.triangles.intersect<true>(ray, NONE, nearest)) return true;
+        return intersect_instances<true>(ray, SHADOW, nearest);
+    }
+    // The same for up to 64 rays, as packets where enough of them go the same way.
+    void closest(const Ray* rays, int count, RayKind kind, Hit* hits) const {
+        Nearest nearest[PACKET];
+        for (int i = 0; i < count; i++) nearest[i] = {rays[i].t_max};
+        for (const Merged& some : merged_)
+            if (some.visible & kind) intersect_packets<false>(some.triangles, rays, count, nearest);
+        for (int i = 0; i < count; i++) {
+            intersect_instances<false>(rays[i], kind, nearest[i]);
+            hits[i] = hit(nearest[i], rays[i]);
+        }
+    }
+    void occluded(const Ray* rays, int count, bool* hidden) const {
+        Nearest nearest[PACKET];
+        for (int i = 0; i < count; i++) nearest[i] = {rays[i].t_max};
+        for (const Merged& some : merged_)
+            if (some.visible & SHADOW) intersect_packets<true>(some.triangles, rays, count, nearest);
+        for (int i = 0; i < count; i++) hidden[i] = nearest[i].t < rays[i].t_max || intersect_instances<true>(rays[i], SHADOW, nearest[i]);
+    }
+
+    // The surface at a hit, with all that light needs to know there.
+    Interaction interaction(const Ray& ray, const Hit& hit) const {
+        const Object& object = objects[hit.object];
+        const Shape& shape = geometries[object.geometry];
+        Interaction found = std::holds_alternative<TriangleMesh>(shape)
+                                ? triangle_interaction(std::get<TriangleMesh>(shape), object, ray, hit.primitive)
+                                : sphere_interaction(std::get<Spheres>(shape), object, ray, hit.primitive);
+        found.slot = object.first_slot + found.material;
+        found.material = slots[found.slot].material;
+        found.object = hit.object;
+        found.primitive = hit.primitive;
+        return found;
+    }
+    // What a renderer's relative rounding applies to there, world units.
+    double magnitude(const Ray& ray, const Hit& hit) const {
+        const Object& object = objects[hit.object];
+        const Shape& shape = geometries[object.geometry];
+        return std::holds_alternative<TriangleMesh>(shape)
+                   ? triangle_magnitude(std::get<TriangleMesh>(shape), object, ray, hit.primitive, origin)
+                   : sphere_magnitude(std::get<Spheres>(shape), object, ray, hit.primitive, origin);
+    }
+
+    // What lights need. triangle_count: 0 of spheres. material: of a triangle, an index into illumination.materials. corners: in
+    // rendering space. extent: half the diagonal of a box round all surfaces, 1 without any.
+    uint32_t triangle_count(uint32_t object) const {
+        auto mesh = std::get_if<TriangleMesh>(&geometries[objects[object].geometry]);
+        return mesh ? uint32_t(mesh->count) : 0;
+    }
+    uint32_t material(uint32_t object, uint32_t triangle) const {
+        const TriangleMesh& mesh = std::get<TriangleMesh>(geometries[objects[object].geometry]);
+        return slots[objects[object].first_slot + mesh.materials[triangle]].material;
+    }
+    void corners(uint32_t object, uint32_t triangle, Vec3 (&corners)[3]) const {
+        const TriangleMesh& mesh = std::get<TriangleMesh>(geometries[objects[object].geometry]);
+        for (int c = 0; c < 3; c++) corners[c] = objects[object].to_world.point(mesh.corner(triangle, c));
+    }
+    double extent() const {
+        Bounds box;
+        for (const Object& object : objects) {
+            const Shape& shape = geometries[object.geometry];
+            if (auto mesh = std::get_if<TriangleMesh>(&shape)) {
+                for (uint32_t triangle = 0; triangle < mesh->count; triangle++)
+                    for (int c = 0; c < 3; c++) box.add(object.to_world.point(mesh->corner(triangle, c)));
+            } else {
+                box.add(world_bounds(object));
+            }
+        }
+        double size = length(box.high - box.low) / 2;
+        return size > 0 && size < INFINITE ? size : 1;
+    }
+    // Whether an object is hidden from any kind of ray.
+    bool hides_anything() const {
+        return std::any_of(objects.begin(), objects.end(), [](const Object& object) { return (object.visible & 31) != 31; });
+    }
+
+    // Of all hierarchies, beside the arrays that came from Python.
+    size_t bytes() const {
+        size_t sum = instances_.bytes() + objects.size() * sizeof(Object) + slots.size() * sizeof(Slot);
+        for (const Merged& some : merged_) sum += some.triangles.bytes();
+        for (const TriangleBvh& some : triangles_) sum += some.bytes();
+        for (const Shape& shape : geometries)
+            if (auto spheres = std::get_if<Spheres>(&shape)) sum += spheres->bvh.bytes();
+        return sum;
+    }
+
+   private:
+    struct Merged {
+        uint32_t visible;
+        TriangleBvh triangles;
+    };
+    // Triangles that are written out although an instance could stand for them: a ray then meets one hierarchy instead of many.
+    static constexpr size_t WRITTEN_OUT = 1 << 19;
+    // A matrix that may enlarge roundings more than this would cost an instance's rays digits that can be seen.
+    static constexpr double ILL_CONDITIONED = 0x1p16;
+
+    std::vector<bool> choose_merged(const std::vector<size_t>& users) const {
+        std::vector<size_t> extra(geometries.size()), order;
+        std::vector<bool> small(geometries.size()), merged(objects.size());
+        for (size_t i = 0; i < geometries.size(); i++)
+            if (auto mesh = std::get_if<TriangleMesh>(&geometries[i]); mesh && users[i]) {
+                extra[i] = (users[i] - 1) * mesh->count;
+                order.push_back(i);
+            }
+        std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return extra[a] < extra[b]; });
+        size_t sum = 0;
+        for (size_t i : order) small[i] = (sum += extra[i]) <= WRITTEN_OUT || !extra[i];
+        for (size_t i = 0; i < objects.size(); i++) {
+            const Object& object = objects[i];
+            bool is_mesh = std::holds_alternative<TriangleMesh>(geometries[object.geometry]);
+            merged[i] = is_mesh && (small[object.geometry] || object.condition > ILL_CONDITIONED);
+        }
+        return merged;
+    }
+
+    TriangleBvh merge(const std::vector<uint32_t>& some, int threads) const {
+        std::vector<size_t> first(some.size() + 1);
+        for (size_t i = 0; i < some.size(); i++)
+            first[i + 1] = first[i] + std::get<TriangleMesh>(geometries[objects[some[i]].geometry]).count;
+        auto place_of = [&](size_t triangle) { return size_t(std::upper_bound(first.begin(), first.end(), triangle) - first.begin()) - 1; };
+        auto corners_of = [&](size_t triangle, Vec3 corner[3]) {
+            size_t i = place_of(triangle);
+            const Object& object = objects[some[i]];
+            const TriangleMesh& mesh = std::get<TriangleMesh>(geometries[object.geometry]);
+            for (int c = 0; c < 3; c++) corner[c] = object.to_world.point(mesh.corner(triangle - first[i], c));
+        };
+        auto name_of = [&](size_t triangle, uint32_t& object, uint32_t& primitive) {
+            size_t i = place_of(triangle);
+            object = some[i];
+            primitive = uint32_t(triangle - first[i]);
+        };
+        TriangleBvh triangles;
+        triangles.build(first.back(), corners_of, name_of, threads);
+        return triangles;
+    }
+
+    void build_geometries(const std::vector<uint32_t>& placed, int threads) {
+        triangles_.clear();
+        triangles_.resize(geometries.size());
+        std::vector<bool> needed(geometries.size());
+        for (uint32_t i : placed) needed[objects[i].geometry] = true;
+        for (size_t i = 0; i < geometries.size(); i++) {
+            if (!needed[i]) continue;
+            if (auto spheres = std::get_if<Spheres>(&geometries[i])) {
+                spheres->build(threads);
+                continue;
+            }
+            const TriangleMesh& mesh = std::get<TriangleMesh>(geometries[i]);
+            auto corners_of = [&](size_t triangle, Vec3 corner[3]) {
+                for (int c = 0; c < 3; c++) corner[c] = mesh.corner(triangle, c);
+            };
+            auto name_of = [](size_t triangle, uint32_t& object, uint32_t& primitive) { object = 0, primitive = uint32_t(triangle); };
+            triangles_[i].build(mesh.count, corners_of, name_of, threads);
+        }
+    }
+
+    // Of what an instance's own hierarchy holds, in rendering space, and what rounding may move it.
+    Bounds world_bounds(const Object& object) const {
+        auto spheres = std::get_if<Spheres>(&geometries[object.geometry]);
+        const Bvh& bvh = spheres ? spheres->bvh : triangles_[object.geometry].bvh;
+        Bounds box;
+        if (bvh.root == NOTHING || object.flat) return box;
+        Vec3 half = bvh.half / bvh.scale, reach = abs(bvh.centre) + half;
+        double rounding = 16 * DOUBLE_ROUNDING * (object.stretched(max_component(reach)) + max_component(abs(object.to_world.translation())));
+        Vec3 middle = object.to_world.point(bvh.centre), size;
+        for (int row = 0; row < 3; row++) {
+            const double* m = object.to_world.m[row];
+            double sum = std::fabs(m[0]) * half.x + std::fabs(m[1]) * half.y + std::fabs(m[2]) * half.z + rounding;
+            (row == 0 ? size.x : row == 1 ? size.y : size.z) = sum;
+        }
+        box.add(middle - size);
+        box.add(middle + size);
+        return box;
+    }
+
+    template <bool ANY> bool intersect_instances(const Ray& ray, RayKind kind, Nearest& nearest) const {
+        if (instances_.root == NOTHING) return false;
+        Ray shortened = ray;
+        shortened.t_max = nearest.t;
+        return traverse(instances_, shortened, [&](uint32_t leaf, BoxRay& box) {
+            uint32_t number = instances_.leaves[leaf];
+            const Object& object = objects[number];
+            if (!(object.visible & kind)) return false;
+            double before = nearest.t;
+            if (auto spheres = std::get_if<Spheres>(&geometries[object.geometry])) {
+                if (intersect_spheres<ANY>(*spheres, object, ray, number, nearest)) return true;
+            } else if (triangles_[object.geometry].intersect<ANY>(object.to_object(ray), number, nearest)) {
+                return true;
+            }
+            if (nearest.t < before) box.limit(nearest.t);
+            return false;
+        });
+    }
+
+    template <bool ANY> static void intersect_packets(const TriangleBvh& triangles, const Ray* rays, int count, Nearest* nearest) {
+        constexpr int FEW = 4;
+        if (triangles.bvh.root == NOTHING || !count) return;
+        static thread_local Packet all, some;
+        enter(triangles.bvh, rays, nearest, count, all);
+        auto trace = [&](Packet& packet) {
+            packet.close();
+            triangles.intersect<ANY>(packet);
+            for (int i = 0; i < packet.count; i++) nearest[packet.source[i]] = {packet.t[i], packet.name[i]};
+        };
+        if (std::all_of(all.key, all.key + count, [&](int key) { return key == all.key[0]; })) {
+            if (all.key[0] >= 0) trace(all);
+            return;
+        }
+        for (int i = 0; i < count; i++) {
+            int key = all.key[i];
+            if (key < 0) continue;
+            some.count = 0;
+            for (int j = i; j < count; j++)
+                if (all.key[j] == key) {
+                    some.add(all, j);
+                    all.key[j] = -1;
+                }
+            if (some.count >= FEW) {
+                trace(some);
+                continue;
+            }
+            for (int j = 0; j < some.count; j++) {
+                int which = some.source[j];
+                if (triangles.intersect<ANY>(rays[which], NONE, nearest[which]) && ANY) nearest[which].t = -INFINITE;
+            }
+        }
+    }
+
+    static Hit hit(const Nearest& nearest, const Ray& ray) {
+        if (!(nearest.t < ray.t_max)) return {};
+        return {nearest.t, uint32_t(nearest.name >> 32), uint32_t(nearest.name)};
+    }
+
+    std::vector<Merged> merged_;
+    std::vector<TriangleBvh> triangles_;  // of geometries that instances stand for
+    Bvh instances_;
+};
+
+}  // namespace viewcam::VIEWCAM_ISA

@@ -1,0 +1,79 @@
+// An object: a geometry of the scene, placed in rendering space.
+#pragma once
+#include "../accel/bvh.h"
+#include "../math/exact.h"
+#include "../ray.h"
+
+namespace viewcam::VIEWCAM_ISA {
+
+struct Object {
+    uint32_t geometry = 0;
+    uint32_t visible = 0;       // to which kinds of rays, RayKind's bits
+    uint32_t first_slot = 0;    // of Scene::slots, one for each of the geometry's materials
+    float index = 0;            // what the Object Index pass shows
+    bool shared = false;        // whether other objects place the same geometry
+    bool flat = false;          // whether the matrix has no inverse to speak of
+    double condition = 1;       // of the matrix: by how much its inverse may enlarge a rounding
+    Affine to_world;            // object space to rendering space
+    double inverse[3][3] = {};  // of its linear part
+    Vec3 translation_low;       // what the translation's rounding took away
+
+    Vec3 to_object(Vec3 v) const {
+        return {inverse[0][0] * v.x + inverse[0][1] * v.y + inverse[0][2] * v.z,
+                inverse[1][0] * v.x + inverse[1][1] * v.y + inverse[1][2] * v.z,
+                inverse[2][0] * v.x + inverse[2][1] * v.y + inverse[2][2] * v.z};
+    }
+    // The same ray in object space; t stays what it is.
+    Ray to_object(const Ray& ray) const {
+        Vec3 apart = ray.origin - to_world.translation(), sizes = abs(apart);
+        Ray local{to_object(apart), to_object(ray.direction), ray.t_min, ray.t_max};
+        for (int row = 0; row < 3; row++)
+            local.origin_error = max(local.origin_error, std::fabs(inverse[row][0]) * sizes.x + std::fabs(inverse[row][1]) * sizes.y +
+                                                                   std::fabs(inverse[row][2]) * sizes.z);
+        local.origin_error *= 8 * DOUBLE_ROUNDING;
+        return local;
+    }
+    // The largest coordinate that the linear part makes of coordinates up to `size`.
+    double stretched(double size) const {
+        double most = 0;
+        for (auto& row : to_world.m) most = max(most, std::fabs(row[0]) + std::fabs(row[1]) + std::fabs(row[2]));
+        return most * size;
+    }
+    Vec3 column(int i) const { return {to_world.m[0][i], to_world.m[1][i], to_world.m[2][i]}; }
+    // The linear part's cofactors, which turn normals as the sides of a triangle turn its own, over the largest of them.
+    void cofactors(Vec3 rows[3]) const {
+        Vec3 first{to_world.m[0][0], to_world.m[0][1], to_world.m[0][2]}, second{to_world.m[1][0], to_world.m[1][1], to_world.m[1][2]},
+            third{to_world.m[2][0], to_world.m[2][1], to_world.m[2][2]};
+        rows[0] = cross(second, third);
+        rows[1] = cross(third, first);
+        rows[2] = cross(first, second);
+        double largest = max(max_component(abs(rows[0])), max(max_component(abs(rows[1])), max_component(abs(rows[2]))));
+        if (largest > 0)
+            for (int i = 0; i < 3; i++) rows[i] = rows[i] / largest;
+    }
+
+    // Places the object. matrix: (3, 4), rows first, to world space. origin: rendering space's, in the world.
+    void place(const double* matrix, Vec3 origin) {
+        for (int row = 0; row < 3; row++) {
+            for (int column = 0; column < 3; column++) to_world.m[row][column] = matrix[4 * row + column];
+            Pair translation = two_sum(matrix[4 * row + 3], -origin[row]);
+            to_world.m[row][3] = translation.high;
+            (row == 0 ? translation_low.x : row == 1 ? translation_low.y : translation_low.z) = translation.low;
+        }
+        Vec3 a = column(0), b = column(1), c = column(2), bc = exact_cross(b, c), ca = exact_cross(c, a), ab = exact_cross(a, b);
+        double determinant = dot(a, bc), largest = 0, largest_inverse = 0;
+        Vec3 rows[3] = {bc / determinant, ca / determinant, ab / determinant};
+        for (int row = 0; row < 3; row++) {
+            largest = max(largest, std::fabs(to_world.m[row][0]) + std::fabs(to_world.m[row][1]) + std::fabs(to_world.m[row][2]));
+            largest_inverse = max(largest_inverse, std::fabs(rows[row].x) + std::fabs(rows[row].y) + std::fabs(rows[row].z));
+            for (int i = 0; i < 3; i++) inverse[row][i] = rows[row][i];
+        }
+        condition = largest * largest_inverse;
+        flat = !(condition < 0x1p50);
+        if (flat) condition = 0x1p50;
+    }
+    // Which side the front of its triangles is on: corners that run counter-clockwise in object space do so in the world, or not.
+    bool is_mirrored() const { return dot(column(0), cross(column(1), column(2))) < 0; }
+};
+
+}  // namespace viewcam::VIEWCAM_ISA

@@ -1,0 +1,491 @@
+"""The core: what knows its C interface (core/capi.h), and nothing else does.
+
+Arrays are checked and laid out here before they cross. ctypes lets go of Python's lock while the core works, so that Python's
+threads trace tiles. The environment variable VIEWCAM_ISA picks an instance of the core by the name of its instruction set.
+
+Rejected: an extension module, which is compiled for each Python anew.
+"""
+
+import ctypes
+import functools
+import importlib.util
+import math
+import os
+from collections.abc import Mapping, Sequence
+from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int, c_int32, c_size_t, c_uint32, c_void_p
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .scene import Mesh, Object, Scene, Spheres
+from .scene.film import NO_BOUNCES
+from .scene.lamps import RAYS, Area, Lamp, Point, Spot, Sun
+from .scene.materials import PLAIN, Colour, Material
+from .scene.sameness import same_things
+from .tiles import Passes
+
+GEOMETRY = ("Depth", "Position", "Normal", "UV", "Object Index", "Material Index", "Magnitude", "Facing")
+"""The passes of level `geometry`, as capi.h numbers them."""
+LIGHT = (
+    "Combined",
+    "Emission",
+    "Environment",
+    "Diffuse Direct",
+    "Diffuse Indirect",
+    "Diffuse Color",
+    "Variance",
+    "Sample Count",
+)
+TILE = 32
+"""Pixels, the side of the tiles in which light is traced."""
+
+_CLOSURES = ("emission", "diffuse", "mirror", "glass", "refraction")
+_KINDS = {kind: 1 << number for number, kind in enumerate(RAYS)}
+# Rendering space's origin is the eye, snapped to a grid so much coarser than the scene that it stays where it is while a camera
+# moves about things: hierarchies then serve frame after frame, and coordinates are no larger than the grid.
+_GRID = 16.0
+
+
+class _Mesh(Structure):
+    _fields_ = [
+        *((name, c_size_t) for name in ("vertex_count", "count")),
+        *((name, c_void_p) for name in ("vertices", "triangles", "materials", "normals", "uvs", "colours")),
+    ]
+
+
+class _Spheres(Structure):
+    _fields_ = [("count", c_size_t), *((name, c_void_p) for name in ("centers", "radii", "materials"))]
+
+
+class _Object(Structure):
+    _fields_ = [
+        *((name, c_uint32) for name in ("geometry", "visible", "slot_count")),
+        ("index", c_float),
+        *((name, c_void_p) for name in ("slot_indices", "slot_materials")),
+    ]
+
+
+class _Camera(Structure):
+    _fields_ = [
+        *((name, c_double * 3) for name in ("eye", "right", "up", "forward")),
+        *((name, c_double * 2) for name in ("principal_point", "distance")),
+        *((name, c_double) for name in ("t_min", "t_max")),
+        *((name, c_uint32) for name in ("width", "height")),
+    ]
+
+
+class _Color(Structure):
+    _fields_ = [("rgb", c_double * 3), *((name, c_int32) for name in ("image", "closest", "vertex"))]
+
+
+class _Closure(Structure):
+    _fields_ = [("kind", c_int32), ("color", _Color), ("ior", c_double)]
+
+
+class _Lamp(Structure):
+    _fields_ = [
+        *((name, c_int32) for name in ("kind", "soft", "casts_shadow")),
+        ("hidden_from", c_uint32),
+        ("matrix", c_double * 12),
+        ("color", c_double * 3),
+        *((name, c_double) for name in ("radius", "angle", "blend")),
+        ("size", c_double * 2),
+    ]
+
+
+class _Film(Structure):
+    _fields_ = [
+        ("radiance", c_double * 3),
+        ("hidden_from", c_uint32),
+        ("transparent", c_int32),
+        ("filter_width", c_double),
+        ("exposure", c_double),
+    ]
+
+
+class _LightSettings(Structure):
+    _fields_ = [("bounces", c_int32 * 4), ("seed", c_uint32), ("samples", c_uint32), ("error", c_double)]
+
+
+class _LightPasses(Structure):
+    _fields_ = [(name, c_void_p) for name in LIGHT]
+
+
+def _function(result: Any, *arguments: Any) -> Any:
+    return ctypes.CFUNCTYPE(result, *arguments)
+
+
+class _Core(Structure):
+    _fields_ = [
+        ("name", c_char_p),
+        ("message", _function(c_char_p)),
+        ("scene_create", _function(c_void_p)),
+        ("scene_free", _function(None, c_void_p)),
+        ("add_mesh", _function(c_int, c_void_p, POINTER(_Mesh))),
+        ("add_spheres", _function(c_int, c_void_p, POINTER(_Spheres))),
+        ("add_object", _function(c_int, c_void_p, POINTER(_Object))),
+        ("commit", _function(c_int, c_void_p, c_void_p, c_void_p, c_int)),
+        ("set_camera", _function(None, c_void_p, POINTER(_Camera))),
+        ("bytes", _function(c_size_t, c_void_p)),
+        ("render_geometry", _function(c_int, c_void_p, c_uint32, c_uint32, c_void_p, c_size_t, c_void_p)),
+        ("surface_at", _function(c_int, c_void_p, c_size_t, c_void_p, c_void_p, c_void_p)),
+        ("closest", _function(c_int, c_void_p, c_size_t, c_void_p, c_uint32, c_int, c_void_p, c_void_p, c_void_p)),
+        ("occluded", _function(c_int, c_void_p, c_size_t, c_void_p, c_int, c_void_p)),
+        ("clear_light", _function(c_int, c_void_p)),
+        ("add_texture", _function(c_int, c_void_p, c_int, c_int, c_int, c_void_p)),
+        ("add_material", _function(c_int, c_void_p, c_void_p, c_int)),
+        ("add_lamp", _function(c_int, c_void_p, POINTER(_Lamp))),
+        ("set_film", _function(None, c_void_p, POINTER(_Film))),
+        ("light_create", _function(c_void_p, c_void_p, POINTER(_LightSettings))),
+        ("light_free", _function(None, c_void_p)),
+        ("trace_light", _function(c_int, c_void_p, c_uint32, c_uint32, POINTER(_LightPasses), c_void_p)),
+        (
+            "probe_sobol",
+            _function(c_int, c_uint32, c_uint32, c_int, c_size_t, c_void_p, c_void_p, c_int, c_int, c_void_p),
+        ),
+        ("probe_filter", _function(c_int, c_double, c_size_t, c_void_p, c_void_p)),
+        ("probe_function", _function(c_int, c_int, c_size_t, c_void_p, c_void_p, c_void_p)),
+        ("probe_specular", _function(c_int, c_double, c_size_t, c_void_p, c_void_p)),
+        ("probe_sample_light", _function(c_int, POINTER(_Lamp), c_size_t, c_void_p, c_void_p)),
+        ("probe_light_le", _function(c_int, POINTER(_Lamp), c_size_t, c_void_p, c_void_p)),
+        (
+            "probe_texture",
+            _function(c_int, c_int, c_int, c_int, c_void_p, c_int, c_size_t, c_void_p, c_void_p),
+        ),
+    ]
+
+
+@functools.cache
+def core(name: str | None = None) -> _Core:
+    """The core for an instruction set, "v2", "v3", "v4" or "base"; the best that this processor runs if it is None.
+
+    Raises
+    ------
+    InputError
+        if there is none of that name, or none for this system.
+    """
+    library = _library()
+    library.viewcam_core.restype, library.viewcam_core.argtypes = POINTER(_Core), [c_char_p]
+    name = name or os.environ.get("VIEWCAM_ISA") or None
+    found = library.viewcam_core(None if name is None else name.encode())
+    if not found:
+        raise InputError(f"this processor has no core for the instruction set {name!r}: unset VIEWCAM_ISA")
+    return found.contents
+
+
+@functools.cache
+def _library() -> ctypes.CDLL:
+    spec = importlib.util.find_spec("viewcam_core")
+    folders = [Path(folder) for folder in (spec.submodule_search_locations or ())] if spec else []
+    built = Path(__file__).parents[2] / "build" / "core"
+    folders += sorted(built.glob("*"), key=lambda folder: folder.stat().st_mtime, reverse=True)
+    for folder in folders:
+        for file in ("libviewcam.so", "viewcam.dll", "libviewcam.dylib"):
+            if (folder / file).exists():
+                return ctypes.CDLL(str(folder / file))
+    raise InputError(
+        "the tracer's core is missing for this system: install the package for it, or a C++20 compiler and pip install"
+    )
+
+
+def _address(array: NDArray | None) -> int | None:
+    return None if array is None else array.ctypes.data
+
+
+def array(values: object, dtype: type, shape: Sequence[int | None]) -> NDArray:
+    """Values as one contiguous array of a shape (None is any size), as the core wants them; ValueError where they are not."""
+    laid_out = np.ascontiguousarray(values, dtype)
+    if laid_out.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, laid_out.shape, strict=True)):
+        raise ValueError(f"an array of the shape {laid_out.shape} in place of {tuple(shape)}")
+    return laid_out
+
+
+class CoreScene:
+    """A scene in the core: its hierarchies, and what gives and scatters light."""
+
+    def __init__(self, scene: Scene, threads: int) -> None:
+        self.core = core()
+        self._scene = scene
+        self.handle = self.core.scene_create()
+        if not self.handle:
+            raise MemoryError
+        self._kept: list[NDArray] = []  # what the core reads in place
+        self.origin = _origin(scene)
+        numbers = {name: number for number, name in enumerate(scene.geometries)}
+        materials = {"": 0, **{name: number for number, name in enumerate(scene.materials, start=1)}}
+        for geometry in scene.geometries.values():
+            self._add_geometry(geometry)
+        for placed in scene.objects:
+            self._add_object(placed, numbers[placed.geometry], materials)
+        matrices = np.array([placed.matrix[:3] for placed in scene.objects], np.float64).reshape(-1, 3, 4)
+        self.check(self.core.commit(self.handle, _address(matrices), _address(self.origin), threads))
+        self._light: Scene | None = None
+        self.look(scene)
+
+    def __del__(self) -> None:
+        if getattr(self, "handle", None):
+            self.core.scene_free(self.handle)
+
+    def check(self, status: int) -> None:
+        """Raise what the core reports: MemoryError, or RuntimeError for what must not happen."""
+        if status == 1:
+            raise MemoryError
+        if status:
+            raise RuntimeError(self.core.message().decode())
+
+    def _keep(self, values: object, dtype: type, shape: Sequence[int | None]) -> int | None:
+        if values is None:
+            return None
+        self._kept.append(array(values, dtype, shape))
+        return _address(self._kept[-1])
+
+    def _add_geometry(self, geometry: Mesh | Spheres) -> None:
+        count = len(geometry.materials)
+        if isinstance(geometry, Spheres):
+            parts = (geometry.centers, np.float64, (count, 3)), (geometry.radii, np.float64, (count,))
+            spheres = _Spheres(count, *(self._keep(*part) for part in (*parts, (geometry.materials, np.int32, (count,)))))
+            self.check(self.core.add_spheres(self.handle, spheres))
+            return
+        parts = (
+            (geometry.vertices, np.float64, (None, 3)),
+            (geometry.triangles, np.int32, (count, 3)),
+            (geometry.materials, np.int32, (count,)),
+            (geometry.corner_normals, np.float32, (count, 3, 3)),
+            (geometry.corner_uvs, np.float32, (count, 3, 2)),
+            (geometry.corner_colours, np.float32, (count, 3, 3)),
+        )
+        mesh = _Mesh(len(geometry.vertices), count, *(self._keep(*part) for part in parts))
+        self.check(self.core.add_mesh(self.handle, mesh))
+
+    def _add_object(self, placed: Object, geometry: int, materials: Mapping[str, int]) -> None:
+        slots = len(placed.material_indices)
+        names = (*placed.materials[:slots], *[""] * (slots - len(placed.materials)))
+        indices = array(placed.material_indices, np.float32, (slots,))
+        numbers = array([materials[name] for name in names], np.uint32, (slots,))
+        visible = sum(_KINDS.values()) & ~kinds(placed.hidden_from)
+        described = _Object(geometry, visible, slots, placed.object_index, _address(indices), _address(numbers))
+        self.check(self.core.add_object(self.handle, described))
+
+    def serves(self, scene: Scene) -> bool:
+        """Whether its hierarchies are those of another scene: the same things in the same places, near the same origin."""
+        return (
+            list(scene.materials) == list(self._scene.materials)  # objects name them by their numbers
+            and np.array_equal(self.origin, _origin(scene))
+            and same_things(scene, self._scene)
+        )
+
+    def look(self, scene: Scene) -> None:
+        """Put the camera of a scene with the same objects in the place of the one before."""
+        camera = scene.camera
+        u, v, w = camera.basis()
+        # What lies at the ends of the clip range is visible, and what lies at the ends of a ray is not.
+        nearest, farthest = math.nextafter(scene.clip[0], 0.0), math.nextafter(scene.clip[1], math.inf)
+        described = _Camera(t_min=nearest, t_max=farthest, width=camera.width, height=camera.height)
+        described.eye[:] = tuple(np.array(camera.eye) - self.origin)
+        described.right[:], described.up[:], described.forward[:] = tuple(-u if camera.mirrored else u), tuple(v), tuple(-w)
+        described.principal_point[:], described.distance[:] = camera.principal_point, camera.distance
+        self.core.set_camera(self.handle, described)
+
+    def illuminate(self, scene: Scene) -> None:
+        """Give the core what gives and scatters light in a scene with the same objects."""
+        if self._light is scene:
+            return
+        self.check(self.core.clear_light(self.handle))
+        used = _used(scene)
+        images: dict[str, int] = {}
+        for name in ["", *scene.materials]:
+            material = (scene.materials[name] if name else PLAIN) if name in used else Material()
+            for colour in material.colours.values():
+                if colour.image is not None and colour.image not in images:
+                    images[colour.image] = len(images)
+                    self._add_texture(scene, colour.image)
+            closures = [
+                _Closure(_CLOSURES.index(component), _color(colour, images), material.ior)
+                for component, colour in sorted(material.colours.items(), key=lambda pair: _CLOSURES.index(pair[0]))
+            ]
+            self.check(self.core.add_material(self.handle, (_Closure * len(closures))(*closures), len(closures)))
+        for lamp in scene.lamps:
+            if not lamp.is_dark:
+                self.check(self.core.add_lamp(self.handle, described_lamp(lamp)))
+        film, world = scene.film, scene.world
+        described = _Film(hidden_from=kinds(world.hidden_from), transparent=film.transparent, exposure=film.exposure)
+        described.radiance[:] = world.radiance
+        described.filter_width = 0.0 if film.filter == "BOX" else film.filter_width
+        self.core.set_film(self.handle, described)
+        self._light = scene
+
+    def _add_texture(self, scene: Scene, name: str) -> None:
+        picture = scene.images[name]
+        height, width, _ = picture.pixels.shape
+        pixels = array(picture.pixels, np.float32, (height, width, 3))
+        self.check(self.core.add_texture(self.handle, width, height, picture.srgb, _address(pixels)))
+
+    def render_geometry(self, passes: Passes, rows: range, stop: Any = None) -> None:
+        """Write the surfaces at the centres of some rows' pixels into those of `GEOMETRY` that are asked for.
+
+        passes : name → (height, width, channels) float32, of planes: each channel in one piece of memory.
+        """
+        height, width, _ = next(iter(passes.values())).shape
+        planes = _planes(passes, height * width)
+        self.check(self.core.render_geometry(self.handle, rows.start, rows.stop, planes, height * width, stop))
+
+    def surface_at(self, passes: Passes, columns: NDArray, rows: NDArray) -> None:
+        """The same of n places in the picture; passes (n, channels)."""
+        columns, rows = array(columns, np.float64, (None,)), array(rows, np.float64, (len(columns),))
+        planes = _planes(passes, len(columns))
+        self.check(self.core.surface_at(self.handle, len(columns), _address(columns), _address(rows), planes))
+
+    def rays(
+        self, origins: NDArray, directions: NDArray, nearest: float | NDArray = 0.0, farthest: float | NDArray = math.inf
+    ) -> NDArray:
+        """Rays as `closest` and `occluded` take them, (n, 8): (n, 3) origins in world space, directions of any length."""
+        origins, directions = np.broadcast_arrays(np.asarray(origins, np.float64) - self.origin, directions)
+        rays = np.empty((len(origins), 8))
+        rays[:, :3], rays[:, 3:6], rays[:, 6], rays[:, 7] = origins, directions, nearest, farthest
+        return rays
+
+    def closest(self, rays: NDArray, kind: str = "camera", packets: bool = True) -> tuple[NDArray, NDArray, NDArray]:
+        """What n rays meet first: the distances in their directions' lengths, inf where nothing is, objects and primitives.
+
+        kind : of `RAYS`. Objects and primitives are (n,) int64, −1 where nothing is.
+        """
+        rays = array(rays, np.float64, (None, 8))
+        t, found = np.empty(len(rays)), np.empty((2, len(rays)), np.uint32)
+        addresses = _address(t), _address(found[0]), _address(found[1])
+        self.check(self.core.closest(self.handle, len(rays), _address(rays), _KINDS[kind], packets, *addresses))
+        objects, primitives = np.where(found == 0xFFFFFFFF, -1, found.astype(np.int64))
+        return t, objects, primitives
+
+    def occluded(self, rays: NDArray, packets: bool = True) -> NDArray[np.bool_]:
+        """Whether anything stands in the way of n rays that ask for a light."""
+        rays = array(rays, np.float64, (None, 8))
+        hidden = np.empty(len(rays), np.uint8)
+        self.check(self.core.occluded(self.handle, len(rays), _address(rays), packets, _address(hidden)))
+        return hidden.astype(bool)
+
+    @property
+    def bytes(self) -> int:
+        """The memory of all hierarchies."""
+        return self.core.bytes(self.handle)
+
+
+class CoreLight:
+    """Light in a scene of the core, which must not change before it is traced. The rest as in render.render."""
+
+    def __init__(self, scene: CoreScene, given: Scene, level: str, samples: int, seed: int, error: float | None) -> None:
+        scene.illuminate(given)
+        bounces = given.bounces if level == "path" else NO_BOUNCES
+        settings = _LightSettings(seed=seed & 0xFFFFFFFF, samples=samples, error=error or 0.0)
+        settings.bounces[:] = bounces.total, bounces.diffuse, bounces.glossy, bounces.transmission
+        self._scene, self._handle = scene, None
+        self._handle = scene.core.light_create(scene.handle, settings)
+        if not self._handle:
+            raise MemoryError
+
+    def __del__(self) -> None:
+        if self._handle:
+            self._scene.core.light_free(self._handle)
+
+    def trace(self, passes: Passes, row: int, column: int, stop: Any) -> None:
+        """Write a tile, by its lowest row and first column, into `LIGHT`'s passes, (height, width, channels), C-contiguous."""
+        addresses = _LightPasses(*(_address(passes.get(name)) for name in LIGHT))
+        self._scene.check(self._scene.core.trace_light(self._handle, row, column, addresses, stop))
+
+
+class StopFlag:
+    """A number that the core looks at while it works; `address` is what its functions take."""
+
+    def __init__(self) -> None:
+        self._value = c_int(0)
+        self.address = ctypes.addressof(self._value)
+
+    def set(self) -> None:
+        self._value.value = 1
+
+
+def kinds(names: frozenset[str]) -> int:
+    """Kinds of rays as the core's bits."""
+    return sum(_KINDS[name] for name in names)
+
+
+def described_lamp(lamp: Lamp) -> _Lamp:
+    """A lamp as the core takes it."""
+    described = _Lamp(hidden_from=kinds(lamp.hidden_from), casts_shadow=lamp.casts_shadow)
+    matrix = np.eye(4)
+    if isinstance(lamp, Sun):
+        described.kind, described.angle, described.color[:] = 0, lamp.angle, lamp.irradiance
+        matrix[:3, 2] = lamp.towards
+    elif isinstance(lamp, Area):
+        described.kind, described.size[:], described.color[:] = 4 if lamp.ellipse else 3, lamp.size, lamp.power
+        matrix = lamp.matrix
+    elif isinstance(lamp, Point | Spot):
+        described.kind, described.radius, described.color[:] = 1, lamp.radius, lamp.power
+        described.soft = lamp.soft_falloff
+        if isinstance(lamp, Spot):
+            described.kind, described.angle, described.blend = 2, lamp.angle, lamp.blend
+            matrix = lamp.matrix
+        else:
+            matrix[:3, 3] = lamp.position
+    described.matrix[:] = tuple(np.asarray(matrix, np.float64)[:3].ravel())
+    return described
+
+
+def _color(colour: Colour, images: Mapping[str, int]) -> _Color:
+    image = -1 if colour.image is None else images[colour.image]
+    described = _Color(image=image, closest=colour.closest, vertex=colour.vertex)
+    described.rgb[:] = colour.rgb
+    return described
+
+
+def _planes(passes: Passes, stride: int) -> Any:
+    addresses = []
+    for name in GEOMETRY:
+        values = passes.get(name)
+        if values is not None and values.size:
+            channels = np.moveaxis(values, -1, 0).reshape(values.shape[-1], -1)
+            if not channels[0].flags.c_contiguous or (len(channels) > 1 and channels.strides[0] != 4 * stride):
+                raise ValueError(f"the pass {name} does not lie in planes")
+            addresses.append(channels.ctypes.data)
+        else:
+            addresses.append(None)
+    return (c_void_p * len(GEOMETRY))(*addresses)
+
+
+def _used(scene: Scene) -> set[str]:
+    """The names of materials that any surface has; "" is the plain one."""
+    slots = {name: np.unique(geometry.materials).tolist() for name, geometry in scene.geometries.items()}
+    used = set()
+    for geometry, materials in {(placed.geometry, placed.materials) for placed in scene.objects}:
+        used.update(materials[slot] if slot < len(materials) else "" for slot in slots[geometry])
+    return used
+
+
+def _origin(scene: Scene) -> NDArray[np.float64]:
+    """Rendering space's origin, world space: (0, 0, 0) unless the scene lies far from it."""
+    boxes = {name: _box(geometry) for name, geometry in scene.geometries.items()}
+    least, greatest = np.full(3, np.inf), np.full(3, -np.inf)
+    for placed in scene.objects:
+        centre, half = boxes[placed.geometry]
+        centre = placed.matrix[:3, :3] @ centre + placed.matrix[:3, 3]
+        half = np.abs(placed.matrix[:3, :3]) @ half
+        least, greatest = np.minimum(least, centre - half), np.maximum(greatest, centre + half)
+    radius = float(np.linalg.norm(greatest - least)) / 2 if np.isfinite(least).all() else 0.0
+    if not radius > 0:
+        return np.array(scene.camera.eye, np.float64)
+    grid = 2.0 ** math.ceil(math.log2(_GRID * radius))
+    return np.round(np.array(scene.camera.eye) / grid) * grid
+
+
+def _box(geometry: Mesh | Spheres) -> tuple[NDArray, NDArray]:
+    """Centre and half sides of a box round a geometry, object space."""
+    if isinstance(geometry, Mesh):
+        points, reach = geometry.vertices, 0.0
+    else:
+        points, reach = geometry.centers, float(geometry.radii.max(initial=0.0))
+    if not len(points):
+        return np.zeros(3), np.zeros(3)
+    least, greatest = points.min(axis=0), points.max(axis=0)
+    return (least + greatest) / 2, (greatest - least) / 2 + reach
