@@ -75,7 +75,7 @@ BLENDER_ROOMS = {
     "properties": "datablocks storage targets camera",
     "resolution": "datablocks storage camera",
     "animation": "versions datablocks storage targets camera resolution",
-    "scenes": "versions temporary_settings picture findings datablocks pose camera",
+    "scenes": "versions temporary_settings picture keyframes findings datablocks pose camera",
     "rendering": "versions temporary_settings opening datablocks resolution scenes",
     "interface": (
         "versions temporary_settings picture keyframes findings render_settings preferences datablocks storage targets hold "

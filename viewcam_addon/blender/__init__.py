@@ -11,6 +11,7 @@ def _rooms() -> list[ModuleType]:
     from . import animation, preferences, properties, render_settings, resolution
     from .interface import (
         baking,
+        camera_files,
         clipboard,
         file_menu,
         gizmos,
@@ -28,7 +29,19 @@ def _rooms() -> list[ModuleType]:
     buttons = [operators, moving, clipboard, baking, presets]
     shown = [panel, proof, overlay, gizmos]
     followers = [animation, resolution]
-    return [preferences, properties, render_settings, *buttons, *shown, engine, render_panels, file_menu, view_menu, *followers]
+    return [
+        preferences,
+        properties,
+        render_settings,
+        *buttons,
+        *shown,
+        engine,
+        render_panels,
+        file_menu,
+        camera_files,
+        view_menu,
+        *followers,
+    ]
 
 
 def register() -> None:

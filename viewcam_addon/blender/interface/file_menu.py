@@ -57,7 +57,7 @@ class VIEWCAM_OT_export_scene(ExportHelper, bpy.types.Operator):
             scene = job.export(job.Request(level="path" if self.light else "geometry", recenter=self.recenter))
             scene_file.write(scene, path)
         except InputError as error:
-            self.report({"ERROR"}, _text(datablocks.sentence(error)))
+            self.report({"ERROR"}, text(datablocks.sentence(error)))
             return {"CANCELLED"}
         _tell(self, scene.ledger, "exported", path, context)
         return {"FINISHED"}
@@ -104,14 +104,12 @@ class VIEWCAM_OT_import_scene(ImportHelper, bpy.types.Operator):
         path = Path(bpy.path.abspath(self.filepath))
         try:
             scene = scene_file.read(path)
-            imported = import_scene.import_scene(
-                scene, _text(path.stem), context.scene, self.set_picture, self.set_surroundings
-            )
+            imported = import_scene.import_scene(scene, text(path.stem), context.scene, self.set_picture, self.set_surroundings)
         except InputError as error:
-            self.report({"ERROR"}, _text(datablocks.sentence(error)))
+            self.report({"ERROR"}, text(datablocks.sentence(error)))
             return {"CANCELLED"}
         if context.mode == "OBJECT":
-            _select(imported.objects, imported.camera, context)
+            select(imported.objects, imported.camera, context)
         _tell(self, imported.ledger, "imported", path, context)
         return {"FINISHED"}
 
@@ -129,7 +127,7 @@ class VIEWCAM_FH_scene(bpy.types.FileHandler):
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
-def _select(objects: Sequence[bpy.types.Object], active: bpy.types.Object, context: bpy.types.Context) -> None:
+def select(objects: Sequence[bpy.types.Object], active: bpy.types.Object, context: bpy.types.Context) -> None:
     for block in context.selected_objects:
         block.select_set(False)
     for block in objects:
@@ -142,12 +140,12 @@ def _tell(
 ) -> None:
     """Report what became of a scene, and show what lacks in it. deed : "exported" or "imported"."""
     lacking = [entry for entry in ledger if entry.status != "exported"]
-    operator.report({"WARNING" if lacking else "INFO"}, _text(f"{path.name}: {summary(ledger, deed)}"))
+    operator.report({"WARNING" if lacking else "INFO"}, text(f"{path.name}: {summary(ledger, deed)}"))
     if lacking and not bpy.app.background:
-        _show(lacking, f"What the {deed.capitalize()} Scene Lacks", context)
+        show(popup_lines(lacking), f"What the {deed.capitalize()} Scene Lacks", context)
 
 
-def _text(name: str) -> str:
+def text(name: str) -> str:
     """What Blender can show of a file's name, whose bytes may be no text."""
     return name.encode("utf-8", "replace").decode()
 
@@ -163,19 +161,25 @@ def summary(ledger: Sequence[LedgerEntry], deed: str) -> str:
 
 def popup_lines(lacking: Sequence[LedgerEntry]) -> list[tuple[str, str]]:
     """(text, icon) of each line that tells what did not come along whole."""
+    icons = {"skipped": "CANCEL"}
+    return lines_of([(f"{each.object}: {each.status}, {each.reason}", icons.get(each.status, "ERROR")) for each in lacking])
+
+
+def lines_of(sentences: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
+    """(text, icon) of each line of a popup. sentences : likewise, of any length and number."""
     lines = []
-    for entry in lacking[:_POPUP_ENTRIES]:
-        icon = "CANCEL" if entry.status == "skipped" else "ERROR"
-        for i, line in enumerate(readouts.wrapped(f"{entry.object}: {entry.status}, {entry.reason}", _POPUP_WIDTH)):
-            lines.append((line, "BLANK1" if i else icon))
-    more = len(lacking) - _POPUP_ENTRIES
+    for sentence, icon in sentences[:_POPUP_ENTRIES]:
+        lines += [(line, "BLANK1" if i else icon) for i, line in enumerate(readouts.wrapped(sentence, _POPUP_WIDTH))]
+    more = len(sentences) - _POPUP_ENTRIES
     return [*lines, (f"and {more} more", "BLANK1")] if more > 0 else lines
 
 
-def _show(lacking: Sequence[LedgerEntry], title: str, context: bpy.types.Context) -> None:
+def show(lines: Sequence[tuple[str, str]], title: str, context: bpy.types.Context) -> None:
+    """Tell lines of (text, icon) in a popup."""
+
     def draw(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
-        for text, icon in popup_lines(lacking):
-            menu.layout.label(text=text, icon=icon)
+        for line, icon in lines:
+            menu.layout.label(text=line, icon=icon)
 
     context.window_manager.popup_menu(draw, title=title, icon="INFO")
 

@@ -1,0 +1,253 @@
+"""File › Import and File › Export: Cameras, of and for other programs (cameras/), also as files dropped on a viewport.
+
+What a format leaves open is the scene's: its size where a file says none, and for poses without a lens how its camera sees.
+glTF and USD are left to Blender's own importers when they are dropped.
+"""
+
+from pathlib import Path
+from typing import ClassVar
+
+import bpy
+from bpy_extras.io_utils import ExportHelper, ImportHelper
+
+from ... import cameras as formats
+from ...errors import InputError
+from ...pinhole import ViewPlane
+from .. import camera as cameras
+from .. import datablocks
+from . import clipboard, file_menu
+from .camera_options import READING, ReadingOptions, WorldOptions
+
+_MENU_TEXT = "Cameras (COLMAP, fSpy, pbrt, …)"
+_DROPPED = ".json;.txt;.bin;.xml;.yaml;.yml;.fspy;.sfm;.xmp;.out;.npy;.csv;.pbrt;.pov"
+_MOST_NOTES = 12
+
+
+class VIEWCAM_OT_import_cameras(ReadingOptions, ImportHelper, bpy.types.Operator):
+    bl_idname = "viewcam.import_cameras"
+    bl_label = "Import Cameras"
+    bl_description = "Add the cameras of another program's file, or of the folder that is shown, in a collection of their own"
+    bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
+
+    directory: bpy.props.StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
+    files: bpy.props.CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
+    made: bpy.props.EnumProperty(
+        name="As",
+        description="What becomes of several cameras",
+        items=[
+            ("BY_FILE", "By the File", "A camera each; of a trajectory one that flies"),
+            ("EACH", "A Camera Each", ""),
+            ("FLIGHT", "One That Flies", "One camera with a keyframe for each"),
+        ],
+        options={"SKIP_SAVE"},
+    )
+    backgrounds: bpy.props.BoolProperty(
+        name="Pictures as Backgrounds",
+        description="Show each camera's picture behind it, where the file names one",
+        default=True,
+    )
+    set_size: bpy.props.BoolProperty(
+        name="Set the Scene's Size",
+        description="Give the scene the resolution and pixel aspect of the first camera",
+        options={"SKIP_SAVE"},
+    )
+    distance: bpy.props.FloatProperty(
+        name="Distance",
+        description="The view-plane distance in pixels, for trajectories, which have none; 0 for that of the scene's camera",
+        min=0.0,
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.scene and not context.scene.library:
+            return True
+        cls.poll_message_set("The scene is linked from another file")
+        return False
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        """Ask for the file, or of a dropped one for the options. A scene without a camera takes the file's size."""
+        if not self.properties.is_property_set("set_size"):
+            self.set_size = context.scene.camera is None
+        return self.invoke_popup(context)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        self.layout.use_property_split = True
+        for name in ("made", "set_size", "backgrounds", *READING, "distance"):
+            self.layout.prop(self, name)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        from ..scenes import import_cameras  # here, since Blender starts without
+
+        try:
+            paths = self._paths()
+            found, notes, kinds = [], [], set()
+            for path in paths:
+                kinds.add(formats.recognised(path))
+                more, told = read(path, context.scene, self.distance, self)
+                found, notes = found + more, notes + told
+            as_flight = self.made == "FLIGHT" or (self.made == "BY_FILE" and kinds == {"trajectories"})
+            folder = paths[0] if paths[0].is_dir() else paths[0].parent
+            imported = import_cameras.import_cameras(
+                found,
+                file_menu.text(paths[0].stem) or "Cameras",
+                context.scene,
+                folder if self.backgrounds else None,
+                self.set_size,
+                as_flight,
+            )
+        except InputError as error:
+            self.report({"ERROR"}, file_menu.text(datablocks.sentence(error)))
+            return {"CANCELLED"}
+        if context.mode == "OBJECT":
+            file_menu.select(imported.objects, imported.objects[0], context)
+        notes = list(dict.fromkeys((*notes, *imported.notes)))
+        title = ", ".join(formats.FORMATS[kind].TITLE for kind in sorted(kinds))
+        what = f"a flight of {len(found)} poses" if as_flight else "1 camera" if len(found) == 1 else f"{len(found)} cameras"
+        pictures = f", {imported.pictures} with pictures" if imported.pictures else ""
+        told = f"; {len(notes)} notes" if len(notes) > 1 else "; 1 note" if notes else ""
+        for note in notes[:_MOST_NOTES]:
+            self.report({"WARNING"}, file_menu.text(note))
+        self.report({"INFO"}, file_menu.text(f"{paths[0].name}: {what}{pictures} ({title}){told}"))
+        if notes and not bpy.app.background:
+            file_menu.show(file_menu.lines_of([(note, "INFO") for note in notes]), "Imported Cameras", context)
+        return {"FINISHED"}
+
+    def _paths(self) -> list[Path]:
+        names = [each.name for each in self.files if each.name]
+        if len(names) > 1:
+            return [Path(bpy.path.abspath(self.directory), name) for name in names]
+        path = bpy.path.abspath(self.filepath or self.directory)
+        if not path:
+            raise InputError("no file is chosen: choose a file or folder of cameras")
+        return [Path(path)]
+
+
+def read(
+    path: Path, scene: bpy.types.Scene, distance: float, properties: ReadingOptions
+) -> tuple[list[formats.Camera], list[str]]:
+    """The cameras of a file or folder, and what was taken from the scene.
+
+    distance : of the view plane in pixels, where the file says none; 0 for that of the scene's camera.
+
+    Raises
+    ------
+    InputError
+        as `cameras.read` does.
+    """
+    frame, notes, plane = datablocks.frame_of(scene), [], None
+    width, height = size = (frame.resolution_x, frame.resolution_y)
+    aspect = frame.pixel_aspect_x / frame.pixel_aspect_y
+    base = None
+    if distance > 0:
+        plane = ViewPlane((distance, distance * aspect), (width / 2, height / 2), width, height)
+    elif formats.recognised(path) == "trajectories":
+        camera_object = datablocks.render_camera(scene)
+        if camera_object is None:
+            raise InputError(f"{path.name} says where the camera is but not how it sees: give the Distance in pixels")
+        base = cameras.read(camera_object, scene)
+        notes.append(f"Where the file does not say how the camera sees, it sees as {camera_object.name}")
+    options = properties.chosen(size=size, pixel_aspect=aspect, view_plane=plane, base=base)
+    found = formats.read(path, options=options)
+    if base is None and plane is None and not all(camera.size_stated for camera in found):
+        notes.append(f"The file does not say how many pixels its pictures have: {width} × {height} of the scene were taken")
+    return found, notes
+
+
+class VIEWCAM_OT_export_cameras(WorldOptions, ExportHelper, bpy.types.Operator):
+    bl_idname = "viewcam.export_cameras"
+    bl_label = "Export Cameras"
+    bl_description = "Write cameras for another program, in the picture at 100 %"
+
+    filename_ext = ""
+    check_extension = None
+    format: bpy.props.EnumProperty(
+        name="Format",
+        description="Whose file or folder it is",
+        items=[(name, formats.FORMATS[name].TITLE, "") for name in formats.writable()],
+        default="transforms",
+    )
+    which: bpy.props.EnumProperty(
+        name="Cameras",
+        description="Which cameras",
+        items=[
+            ("SCENE", "The Scene's", "The camera that a render takes"),
+            ("SELECTED", "Selected", "All selected cameras"),
+            ("ALL", "All", "All cameras of the scene"),
+        ],
+        default="ALL",
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.scene and any(each.type == "CAMERA" for each in context.scene.objects):
+            return True
+        cls.poll_message_set("The scene has no camera")
+        return False
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        self.layout.use_property_split = True
+        for name in ("format", "which", "axes", "scale"):
+            self.layout.prop(self, name)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        try:
+            suffix = formats.FORMATS[self.format].SUFFIX
+            path = Path(bpy.path.abspath(self.filepath))
+            if not path.name:
+                raise InputError("the cameras have no file name: give one")
+            if suffix and self.format != "sidecar" and not path.suffix:
+                path = path.with_suffix(suffix)
+            found = [clipboard.camera_of(each, context.scene) for each in self._chosen_objects(context)]
+            written = formats.save(found, path, self.format, self.chosen())
+        except InputError as error:
+            self.report({"ERROR"}, file_menu.text(datablocks.sentence(error)))
+            return {"CANCELLED"}
+        count = "1 camera" if len(found) == 1 else f"{len(found)} cameras"
+        files = "" if len(written) == 1 else f", {len(written)} files"
+        self.report({"INFO"}, file_menu.text(f"{path.name}: {count} ({formats.FORMATS[self.format].TITLE}{files})"))
+        return {"FINISHED"}
+
+    def _chosen_objects(self, context: bpy.types.Context) -> list[bpy.types.Object]:
+        if self.which == "SCENE":
+            found = [datablocks.render_camera(context.scene)]
+        else:
+            objects = context.selected_objects if self.which == "SELECTED" else context.scene.objects
+            found = [each for each in objects if each.type == "CAMERA"]
+        if found in ([], [None]):
+            raise InputError("there is no such camera: select one, or choose All")
+        return sorted(found, key=lambda each: each.name)
+
+
+class VIEWCAM_FH_cameras(bpy.types.FileHandler):
+    """What Blender does with a file of cameras that is dropped on a viewport."""
+
+    bl_idname = "VIEWCAM_FH_cameras"
+    bl_label = "Cameras"
+    bl_import_operator = "viewcam.import_cameras"
+    bl_file_extensions = _DROPPED
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        return context.area is not None and context.area.type == "VIEW_3D"
+
+
+def _draw_export(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    menu.layout.operator("viewcam.export_cameras", text=_MENU_TEXT)
+
+
+def _draw_import(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    menu.layout.operator("viewcam.import_cameras", text=_MENU_TEXT)
+
+
+CLASSES = (VIEWCAM_OT_import_cameras, VIEWCAM_OT_export_cameras, VIEWCAM_FH_cameras)
+
+
+def register() -> None:
+    bpy.types.TOPBAR_MT_file_export.append(_draw_export)
+    bpy.types.TOPBAR_MT_file_import.append(_draw_import)
+
+
+def unregister() -> None:
+    bpy.types.TOPBAR_MT_file_import.remove(_draw_import)
+    bpy.types.TOPBAR_MT_file_export.remove(_draw_export)

@@ -1,0 +1,224 @@
+"""Other programs' cameras (cameras/) as Blender's, in a collection of their own: one object each, or one that flies.
+
+All of it or nothing: whatever has been made and set is taken back if anything fails. What the artist has set stays, unless
+asked: the scene's camera if it has one, and its size, into which each camera is fitted (picture.py).
+
+A flight is plain keyframes of location, rotation and lens, as Bake writes them. Rejected: curves of the four values, which hold
+eye and look-at in float32 each, and the direction between them in fewer digits.
+
+A picture is looked for by its name beside the file and in the folders where data sets keep theirs. Rejected: paths that lead
+elsewhere, since a file from anybody should make Blender open nothing of whoever imports it, and no share of the network.
+"""
+
+import contextlib
+import dataclasses
+import itertools
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ... import intrinsics, rotation
+from ...cameras import Camera
+from ...cameras.naming import image_of
+from ...errors import InputError
+from .. import camera as cameras
+from .. import datablocks, keyframes, picture, pose
+from ..temporary_settings import Borrower
+
+_PLACES = (".", "images", "..", "../images", "../..", "../../images")
+_SUFFIXES = ("", ".png", ".jpg", ".jpeg", ".JPG", ".PNG")
+_OF_DATA = ("lens", "shift_x", "shift_y", "sensor_width", "sensor_height")
+
+
+@dataclass(frozen=True)
+class Imported:
+    """objects : the new cameras. pictures : how many have theirs as background. notes : sentences for a reader, each once."""
+
+    objects: tuple[bpy.types.Object, ...]
+    pictures: int
+    notes: tuple[str, ...]
+
+
+def import_cameras(
+    found: Sequence[Camera],
+    name: str,
+    scene: bpy.types.Scene,
+    folder: Path | None = None,
+    set_size: bool = False,
+    as_flight: bool = False,
+) -> Imported:
+    """Add cameras to a scene.
+
+    name : of the collection. folder : where the file stands, whose pictures become backgrounds; None for none.
+    set_size : whether the scene gets the size of the first one. as_flight : one camera with a keyframe for each, at its time,
+    or one a frame where the file says no times.
+
+    Raises
+    ------
+    InputError
+        if a camera, or the picture's size, is beyond Blender's numbers. Nothing has changed then.
+    """
+    with contextlib.ExitStack() as undo:
+        imported = _Import(name, scene, Borrower(undo)).run(found, folder, set_size, as_flight)
+        undo.pop_all()
+    return imported
+
+
+class _Import:
+    """One import while it runs."""
+
+    def __init__(self, name: str, scene: bpy.types.Scene, borrow: Borrower) -> None:
+        self._name, self._scene, self._borrow = name, scene, borrow
+        self._notes: dict[str, None] = {}
+        self._collection = bpy.data.collections.new(name)
+        borrow.afterwards(bpy.data.batch_remove, [self._collection])
+        scene.collection.children.link(self._collection)
+
+    def run(self, found: Sequence[Camera], folder: Path | None, set_size: bool, as_flight: bool) -> Imported:
+        if set_size:
+            picture.set_size(self._borrow, self._scene, found[0].pinhole)
+        self._note(note for camera in found for note in camera.notes)
+        if as_flight:
+            objects = (self._new(self._name),)
+            self._fly(objects[0], found)
+        else:
+            objects = tuple(self._new(camera.name) for camera in found)
+        if self._scene.camera is None:
+            self._borrow.set(self._scene, "camera", objects[0])
+        pictures = 0
+        if not as_flight:
+            bpy.context.view_layer.update()
+            for block, camera in zip(objects, found, strict=True):
+                self._place(block, camera)
+            if folder is not None:
+                pictures = sum([self._show(block, camera, folder) for block, camera in zip(objects, found, strict=True)])
+                named = sum(camera.image is not None or camera.picture is not None for camera in found)
+                if pictures < named:
+                    self._note([f"{named - pictures} of {named} pictures were not found beside the file, nor in images/"])
+        return Imported(objects, pictures, tuple(self._notes))
+
+    def _note(self, notes: Iterable[str]) -> None:
+        self._notes |= dict.fromkeys(notes)
+
+    def _new(self, name: str) -> bpy.types.Object:
+        data = bpy.data.cameras.new(name)
+        self._borrow.afterwards(bpy.data.batch_remove, [data])
+        block = bpy.data.objects.new(name, data)
+        self._borrow.afterwards(bpy.data.batch_remove, [block])
+        self._collection.objects.link(block)
+        return block
+
+    def _place(self, block: bpy.types.Object, camera: Camera) -> None:
+        pinhole, notes = picture.fitted(camera.pinhole, datablocks.frame_of(self._scene))
+        try:
+            findings = cameras.apply(block, pinhole, self._scene)
+        except InputError as error:
+            raise InputError(f"camera {camera.name!r}: {error}") from error
+        self._note([*notes, *(f"{camera.name}: {finding}" for finding in findings)])
+
+    # --- A flight
+
+    def _fly(self, block: bpy.types.Object, found: Sequence[Camera]) -> None:
+        scene, frame = self._scene, datablocks.frame_of(self._scene)
+        found, at = self._timed(found)
+        if len({camera.pinhole.mirrored for camera in found}) > 1:
+            raise InputError(
+                "some of the cameras are mirrored and some are not, which no flight can be: import them one by one"
+            )
+        block.rotation_mode = "QUATERNION"
+        sensor = datablocks.own_sensor(block.data)
+        keys: dict[str, list[tuple[float, ...]]] = {path: [] for path in ("location", "rotation_quaternion", *_OF_DATA)}
+        for camera in found:
+            try:
+                fitted, notes = picture.fitted(camera.pinhole, frame)
+                data = intrinsics.camera_data(fitted.plane, frame, *sensor, block.data.sensor_fit)
+                location, turn, scale = pose.channels_of(block).bringing_to(fitted, rotation.IDENTITY)
+                intrinsics.check_storable(camera.name, distance=(data.lens, data.sensor_width), eye=location)
+            except InputError as error:
+                raise InputError(f"camera {camera.name!r}: {error}") from error
+            self._note(notes)
+            block.location, block.scale = location, scale
+            pose.set_rotation(block, turn, keys["rotation_quaternion"][-1] if keys["rotation_quaternion"] else None)
+            for path in ("location", "rotation_quaternion"):
+                keys[path].append(tuple(getattr(block, path)))
+            stored = intrinsics.lens_and_sensor(data, sensor)
+            for path in _OF_DATA:
+                keys[path].append((stored[path] if path in stored else getattr(data, path),))
+        for path, numbers in keys.items():
+            owner, values = (block.data if path in _OF_DATA else block), np.array(numbers)
+            if path in _OF_DATA and (values == values[0]).all():
+                setattr(owner, path, values[0, 0])
+            else:
+                keyframes.linear(owner, path, at, values)
+        for owner in (block, block.data):
+            if owner.animation_data and owner.animation_data.action:
+                self._borrow.afterwards(bpy.data.batch_remove, [owner.animation_data.action])
+        if at[-1] > scene.frame_end:
+            self._note([f"The flight ends at frame {at[-1]:.6g} and the scene at {scene.frame_end}: set its End"])
+
+    def _timed(self, found: Sequence[Camera]) -> tuple[list[Camera], list[float]]:
+        """The cameras in order of time, with the frame of each; the first one is at the scene's start."""
+        start = self._scene.frame_start
+        if any(camera.time is None for camera in found):
+            return [*found], [start + i for i in range(len(found))]
+        found = sorted(found, key=lambda camera: camera.time)
+        twice = next((camera for before, camera in itertools.pairwise(found) if camera.time == before.time), None)
+        if twice is not None:
+            raise InputError(f"two cameras have the time {twice.time!r}, {twice.name!r} one of them: import a camera each")
+        render = self._scene.render
+        return found, [start + (camera.time - found[0].time) * render.fps / render.fps_base for camera in found]
+
+    # --- Pictures
+
+    def _show(self, block: bpy.types.Object, camera: Camera, folder: Path) -> bool:
+        """Give the camera its picture as background, if there is one."""
+        image = self._packed(camera) if camera.picture is not None else self._loaded(camera, folder)
+        if image is None:
+            return False
+        background = block.data.background_images.new()
+        background.image = image
+        # As wide as the view, as the camera is (picture.py); what is higher is cut off in the middle.
+        width, height = datablocks.frame_of(self._scene).size
+        aspect = camera.pinhole.distance[1] / camera.pinhole.distance[0]
+        pixel = self._scene.render.pixel_aspect_x / self._scene.render.pixel_aspect_y
+        is_higher = camera.pinhole.height / aspect * width * pixel > height * camera.pinhole.width
+        background.frame_method = "CROP" if is_higher else "FIT"
+        block.data.show_background_images = True
+        return True
+
+    def _packed(self, camera: Camera) -> bpy.types.Image:
+        image = bpy.data.images.new(camera.name, camera.pinhole.width, camera.pinhole.height)
+        self._borrow.afterwards(bpy.data.batch_remove, [image])
+        image.pack(data=camera.picture, data_len=len(camera.picture))
+        image.source = "FILE"
+        return image
+
+    def _loaded(self, camera: Camera, folder: Path) -> bpy.types.Image | None:
+        if camera.image is None or (path := picture_of(camera, folder)) is None:
+            return None
+        known = set(bpy.data.images)
+        try:
+            image = bpy.data.images.load(str(path), check_existing=True)
+        except RuntimeError:  # no picture by its content
+            return None
+        if image not in known:
+            self._borrow.afterwards(bpy.data.batch_remove, [image])
+        return image
+
+
+def picture_of(camera: Camera, folder: Path) -> Path | None:
+    """The file of a camera's picture, or None where there is none near the camera's own file.
+
+    folder : where that file stands.
+    """
+    path = image_of(dataclasses.replace(camera, image=camera.image.replace("\\", "/")))
+    for name in dict.fromkeys((path, path.rpartition("/")[2])):
+        for place in _PLACES:
+            for suffix in _SUFFIXES:
+                with contextlib.suppress(OSError, ValueError):  # a name that no file can have
+                    if name and (file := folder / place / f"{name}{suffix}").is_file():
+                        return file.resolve()
+    return None
