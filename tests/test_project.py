@@ -1,7 +1,6 @@
 """The project's own rules, held by tests: floors, sizes, one version, a tidy top level, a manifest that Blender accepts."""
 
 import ast
-import importlib.util
 import re
 import subprocess
 import sys
@@ -42,7 +41,7 @@ FLOORS = [
     "cli",
 ]
 # The same inside the tracer.
-TRACER_FLOORS = ["arrays", "compiled", "scene", "rays", "light", "kernels", "tiles", "render"]
+TRACER_FLOORS = ["scene", "tiles", "native", "render"]
 # And where Blender is: first what is of the camera.
 BLENDER_FLOORS = [
     "versions",
@@ -85,7 +84,6 @@ BLENDER_MODULES = {
     "idprop",
 }
 NEEDS_BLENDER = PACKAGE / "blender"
-NEEDS_NUMBA = PACKAGE / "tracer" / "kernels"
 
 TOP_LEVEL = {"blender_manifest.toml", "viewcam_addon", "tests", "sample_scenes", "README.md", "docs", "benchmarks"}
 BUILD_FILES = {"__init__.py", "pyproject.toml", "Makefile", "LICENSE"}
@@ -151,8 +149,8 @@ def test_imports_point_down_only(path):
         ("from ..blender.camera import apply", "tracer/render.py"),
         ("def late():\n    import viewcam_addon.cli", "blender/camera.py"),
         ("from .. import cli", "blender/camera.py"),
-        ("from ..light.emitters import Emitters", "tracer/rays/space.py"),
-        ("from ..rays.view import View", "tracer/scene/lamps.py"),
+        ("from .render import Tracer", "tracer/native.py"),
+        ("from ..native import CoreScene", "tracer/scene/lamps.py"),
         ("from .rendering import job", "blender/camera.py"),
     ],
 )
@@ -206,9 +204,8 @@ def test_only_the_room_of_images_reads_exr_files():
 
 def test_everything_outside_blender_imports_where_there_is_no_blender():
     modules = ["viewcam_addon"]
-    without = {NEEDS_BLENDER} if importlib.util.find_spec("numba") else {NEEDS_BLENDER, NEEDS_NUMBA}
     for path in sources():
-        if not without & set(path.parents) and path.stem not in ROOF:
+        if NEEDS_BLENDER not in path.parents and path.stem not in ROOF:
             modules.append(".".join(path.relative_to(ROOT).with_suffix("").parts))
     program = "\n".join(
         [

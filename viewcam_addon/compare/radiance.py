@@ -29,7 +29,7 @@ FALSE_ALARMS = 0.01
 """The probability, at most, that two sides of the same light are called different; shared out evenly over the quantities."""
 
 VARIANCE_BATCHES = 16
-"""Of so many means, or of one for each sample, the reference's Variance is estimated at least (tracer/light/sums.py)."""
+"""Of so many means, or of one for each sample, the reference's Variance is estimated at least (tracer/core/film/film.h)."""
 
 
 @dataclass(frozen=True)
