@@ -4,7 +4,7 @@
 
 Three subdivided Suzannes (190k triangles), one sample, the same passes on both sides, each in a process of its own. The
 picture: both sides have kept what they built for the frame before (Cycles' persistent data), and write no file. The whole job:
-from the loaded scene to the EXR, nothing kept. What is wanted is said beside each figure; the exit status is 1 if one is missed.
+from the loaded scene to the EXR, nothing kept. What is wanted is said beside each figure; exit status 1 if one is missed.
 
 Needs bpy, embreex and OpenEXR.
 """
