@@ -1,7 +1,5 @@
 import pytest
 
-pytest.importorskip("embreex")
-
 from benchmarks.stability import secondary_rays
 
 
