@@ -68,14 +68,13 @@ MATRIX := 4.2 4.5 5.0 $(if $(shell .ci/python 3.13),5.2)
 test-matrix: $(MATRIX:%=test-wheel-%)
 	@$(if $(filter 5.2,$(MATRIX)),,echo "NOT TESTED: the wheel of Blender 5.2, since there is no Python 3.13 on the PATH or in pyenv")
 
-# The oldest as most users have it, without what the compiled extra brings. Between the oldest and the newest, with their
-# Pythons and NumPys, a version differs by its Blender alone, so only what touches Blender is tested with it.
-compiled-4.2 = VIEWCAM_COMPILED=0
+# Between the oldest and the newest, with their Pythons and NumPys, a version differs by its Blender alone, so only what touches
+# Blender is tested with it.
 tests-4.5 = tests/blender tests/test_*.py
 tests-5.0 = tests/blender tests/test_*.py
 
 test-wheel-%: .venvs/%/ready
-	$(compiled-$*) $(call PARALLEL,.venvs/$*) $(tests-$*)
+	$(call PARALLEL,.venvs/$*) $(tests-$*)
 
 test-light: $(MATRIX:%=test-light-%)
 

@@ -40,7 +40,7 @@ _INK, _PAPER, _FAINT, _GRID = "#1f2328", "#ffffff", "#656d76", "#e5e8eb"
 # brings its paper along.
 _IN_THE_DARK = {_INK: "#e6edf3", _PAPER: "#0d1117", _FAINT: "#9198a1", _GRID: "#30363d", _OURS: "#58a6ff"}
 # What a measurement stands on, as far as it is installed.
-_PACKAGES = ("numpy", "embreex", "numba", "bpy", "mitsuba")
+_PACKAGES = ("numpy", "embreex", "bpy", "mitsuba")
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ threads. Tracer and yardstick take turns, and the median of their ratios counts,
 - adaptive: light of a sun without size, with a wanted error. The yardstick traces the rays of as many samples of each pixel as
   have, without a wanted error, the same RMS error.
 
-Plain NumPy and the compiled extra have a ratio each.
+Each is measured in a process of its own.
 """
 
 import argparse
@@ -21,9 +21,8 @@ import multiprocessing
 import os
 import statistics
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -35,7 +34,6 @@ from numpy.typing import NDArray
 from benchmarks import race
 from benchmarks.scaling import scenes
 from viewcam_addon.files import written_whole
-from viewcam_addon.tracer import compiled
 from viewcam_addon.tracer.render import Tracer
 from viewcam_addon.tracer.scene import Scene
 from viewcam_addon.tracer.scene.lamps import Sun
@@ -44,7 +42,6 @@ Rays = NDArray[np.float32]
 Ratios = dict[str, float]
 
 RECORDED = Path(__file__).with_suffix(".json")
-VARIANTS = ("numpy", "compiled")
 
 # A ratio that has fallen to less of what was recorded is a failure; the machine may be busy, so it is measured again.
 LEAST, ATTEMPTS, ROUNDS = 2 / 3, 3, 5
@@ -55,10 +52,10 @@ _WIDE_SUN = replace(_SUN, angle=0.2)
 _ERROR, _MOST, _CONVERGED, _FEW, _MANY = 0.01, 256, 128, 16, 64
 
 
-def measure(variant: str, names: Sequence[str], sabotage: Callable[[], None] | None = None) -> Ratios:
+def measure(names: Sequence[str], sabotage: Callable[[], None] | None = None) -> Ratios:
     """What is measured → its ratio, in a process of its own. sabotage : picklable; called there before."""
     spawn = multiprocessing.get_context("spawn")
-    with _environment(VIEWCAM_COMPILED=str(int(variant == "compiled"))), ProcessPoolExecutor(1, spawn) as pool:
+    with ProcessPoolExecutor(1, spawn) as pool:
         return pool.submit(_measure, names, sabotage).result()
 
 
@@ -71,12 +68,12 @@ def fallen(measured: Ratios, recorded: Ratios) -> list[str]:
     ]
 
 
-def judged(variant: str, recorded: Ratios) -> tuple[Ratios, list[str]]:
+def judged(recorded: Ratios) -> tuple[Ratios, list[str]]:
     """The best ratios of as many attempts as it takes, and what has fallen in all of them."""
     best: Ratios = dict.fromkeys(recorded, 0.0)
     for _ in range(ATTEMPTS):
         slow = [name for name in recorded if fallen(best, {name: recorded[name]})]
-        best |= {name: max(best[name], ratio) for name, ratio in (measure(variant, slow) if slow else {}).items()}
+        best |= {name: max(best[name], ratio) for name, ratio in (measure(slow) if slow else {}).items()}
     return best, fallen(best, recorded)
 
 
@@ -84,39 +81,19 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--record", action="store_true", help=f"write {RECORDED.name}")
     options = parser.parse_args()
-    recorded = json.loads(RECORDED.read_text(encoding="utf-8")) if RECORDED.is_file() else {}
-    variants = VARIANTS if compiled.AVAILABLE else VARIANTS[:1]
     if options.record:
-        for variant in variants:
-            attempts = [measure(variant, tuple(_MEASURES)) for _ in range(ATTEMPTS)]
-            recorded[variant] = {name: round(statistics.median(ratios[name] for ratios in attempts), 2) for name in _MEASURES}
+        attempts = [measure(tuple(_MEASURES)) for _ in range(ATTEMPTS)]
+        recorded = {name: round(statistics.median(ratios[name] for ratios in attempts), 2) for name in _MEASURES}
         with written_whole(RECORDED) as temporary:
             temporary.write_text(json.dumps(recorded, indent=2) + "\n", encoding="utf-8")
         print(json.dumps(recorded, indent=2))
         return 0
-    failed = []
-    for variant in variants:
-        ratios, sentences = judged(variant, recorded[variant])
-        for name, ratio in ratios.items():
-            print(f"{variant}, {name}: {ratio:.2f} (recorded: {recorded[variant][name]:.2f})")
-        failed += [f"{variant}, {sentence}" for sentence in sentences]
+    recorded = json.loads(RECORDED.read_text(encoding="utf-8"))
+    ratios, failed = judged(recorded)
+    for name, ratio in ratios.items():
+        print(f"{name}: {ratio:.2f} (recorded: {recorded[name]:.2f})")
     print(*failed, sep="\n", end="\n" if failed else "")
     return 1 if failed else 0
-
-
-@contextmanager
-def _environment(**variables: str) -> Iterator[None]:
-    """These variables, also for processes that begin in the meantime."""
-    before = {name: os.environ.get(name) for name in variables}
-    os.environ.update(variables)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
 def _measure(names: Sequence[str], sabotage: Callable[[], None] | None) -> Ratios:

@@ -2,7 +2,7 @@
 
 Linux tells the peak in two places. `ru_maxrss` of a new process begins with what the process that started it had taken, so
 that a small one would seem as large as its parent; VmHWM of /proc/self/status is the process's own, and can be set back.
-Elsewhere `ru_maxrss` has to do, and nothing is forgotten. Rejected: tracemalloc, which sees NumPy's arrays and not Embree's.
+Elsewhere `ru_maxrss` has to do, and nothing is forgotten. Rejected: tracemalloc, which sees NumPy's arrays and not the core's.
 """
 
 import re

@@ -6,7 +6,6 @@ that what documents name exists.
 
 import ast
 import graphlib
-import importlib.util
 import re
 import subprocess
 import sys
@@ -84,7 +83,7 @@ BLENDER_ROOMS = {
     "batch": "versions temporary_settings opening datablocks camera resolution scenes rendering",
 }
 # Inside the tracer a room may import from all those before it.
-TRACER_FLOORS = ["arrays", "compiled", "scene", "rays", "light", "kernels", "tiles", "render"]
+TRACER_FLOORS = ["scene", "tiles", "native", "render"]
 TRACER_ROOMS = {floor: " ".join(TRACER_FLOORS[:i]) for i, floor in enumerate(TRACER_FLOORS)}
 HOUSES = {"": ROOMS, "blender": BLENDER_ROOMS, "tracer": TRACER_ROOMS}
 ROOF = {"__init__", "__main__"}
@@ -104,10 +103,9 @@ BLENDER_MODULES = {
     "idprop",
 }
 NEEDS_BLENDER = PACKAGE / "blender"
-NEEDS_NUMBA = PACKAGE / "tracer" / "kernels"
 
 TOP_LEVEL = {"blender_manifest.toml", "viewcam_addon", "tests", "sample_scenes", "README.md", "docs", "benchmarks"}
-BUILD_FILES = {"__init__.py", "pyproject.toml", "Makefile", "LICENSE", "CONTRIBUTING.md"}
+BUILD_FILES = {"__init__.py", "pyproject.toml", "Makefile", "LICENSE", "CONTRIBUTING.md", "hatch_build.py"}
 
 
 def imported_modules(source: str, package: tuple[str, ...]) -> set[str]:
@@ -187,8 +185,8 @@ def test_the_table_has_no_circle_and_no_arrow_that_nothing_uses():
         ("def late():\n    import viewcam_addon.cli", "blender/camera.py"),
         ("from .. import cli", "blender/camera.py"),
         ("if TYPE_CHECKING:\n    from .blender import camera", "roll.py"),
-        ("from ..light.emitters import Emitters", "tracer/rays/space.py"),
-        ("from ..rays.view import View", "tracer/scene/lamps.py"),
+        ("from .render import Tracer", "tracer/native.py"),
+        ("from ..native import CoreScene", "tracer/scene/lamps.py"),
         ("from .rendering import job", "blender/camera.py"),
     ],
 )
@@ -325,9 +323,8 @@ def test_only_the_room_of_images_reads_exr_files():
 
 def test_everything_outside_blender_imports_where_there_is_no_blender():
     modules = ["viewcam_addon"]
-    without = {NEEDS_BLENDER} if importlib.util.find_spec("numba") else {NEEDS_BLENDER, NEEDS_NUMBA}
     for path in sources():
-        if not without & set(path.parents) and path.stem not in ROOF:
+        if NEEDS_BLENDER not in path.parents and path.stem not in ROOF:
             modules.append(".".join(path.relative_to(ROOT).with_suffix("").parts))
     program = "\n".join(
         [

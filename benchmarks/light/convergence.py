@@ -19,7 +19,7 @@ from math import prod
 import numpy as np
 from numpy.typing import NDArray
 
-from viewcam_addon.tracer.light.sampler import FILM, Sampler
+from viewcam_addon.tracer import native
 
 from ..charts import Chart, Curve
 
@@ -185,10 +185,11 @@ def _padded(pairs: int, pixels: int, samples: int) -> Array:
 
 
 def _ours(pairs: int, pixels: int, samples: int) -> Array:
-    sampler = Sampler(1, samples)
-    pixel, sample = np.repeat(np.arange(pixels), samples), np.tile(np.arange(samples), pixels)
-    numbers = [sampler.numbers(pixel, sample, first, 2) for first in (0, FILM + 1)[:pairs]]
-    return np.concatenate(numbers).reshape(2 * pairs, pixels, samples)
+    """The core's: the place in the pixel, and the place on a lamp at the first scattering."""
+    pixel, sample = np.repeat(np.arange(pixels, dtype=np.uint32), samples), np.tile(np.arange(samples, dtype=np.uint32), pixels)
+    return np.concatenate([native.sobol(1, samples, pixel, sample, first, 2).T for first in (0, 3)[:pairs]]).reshape(
+        2 * pairs, pixels, samples
+    )
 
 
 def _sobol(index: NDArray[np.integer]) -> NDArray[np.uint32]:

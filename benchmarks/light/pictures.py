@@ -4,14 +4,14 @@ RMS error over all pixels, of a mean radiance of about 1: an edge of what shines
 shadow, cast on a floor by a board under a square lamp; and the same in a corner of white walls, at three bounces.
 
 Each contestant is measured against a picture of its own of many more samples and another seed, so that what is compared is
-noise, whatever their filters differ by. Random numbers take the sampler's place in the same integrator.
+noise, whatever their filters differ by. Random numbers are pairs of samples in the same integrator, each pair with a seed of
+its own: a single sample would be the pixel's centre.
 """
 
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from unittest import mock
 
 import bpy
 import numpy as np
@@ -20,11 +20,9 @@ from numpy.typing import NDArray
 from viewcam_addon.blender.rendering import cycles
 from viewcam_addon.blender.scenes.export import export_scene
 from viewcam_addon.blender.scenes.ledger import Ledger
-from viewcam_addon.tracer.light import illumination
 from viewcam_addon.tracer.render import render
 
 from ..charts import Chart, Curve
-from ..noise import Noise
 from ..stability.stage import empty_stage, read_elsewhere
 from .convergence import slope
 
@@ -58,8 +56,7 @@ def _chart(
         return render(exported, level, count, seed)["Combined"][..., :3]
 
     def noise(count: int, seed: int) -> NDArray[np.float32]:
-        with mock.patch.object(illumination, "Sampler", Noise):
-            return ours(count, seed)
+        return np.mean([ours(2, seed + 1000 * (pair + 1)) for pair in range(count // 2)], axis=0)
 
     def theirs(count: int, seed: int) -> NDArray[np.float32]:
         light = cycles.Light(exported.film, exported.bounces, count, seed)

@@ -6,7 +6,7 @@ A picture is traced in tiles of a fixed size, so that memory grows by the bytes 
 from functools import partial
 
 from viewcam_addon.image import CHANNELS, GEOMETRY_PASSES, LIGHT_PASSES
-from viewcam_addon.tracer.light.illumination import CENTRES
+from viewcam_addon.tracer.render import CENTRES
 
 from ..charts import Chart
 from . import growth, scenes

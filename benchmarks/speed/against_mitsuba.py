@@ -1,7 +1,7 @@
 """Six Suzannes beside Mitsuba 3, where it is installed: in a process where all is loaded and compiled, and from a fresh one.
 
 Both see the scene through a box filter, each with the best of its samplers. A fresh process finds on the disk what an earlier
-one compiled: Python's bytecode, Dr.Jit's kernels (~/.drjit), numba's.
+one compiled: Python's bytecode, Dr.Jit's kernels (~/.drjit).
 """
 
 import contextlib
@@ -15,7 +15,7 @@ from . import figures, mitsuba3, references, tracer
 from .contest import Method
 from .figures import Still
 from .mitsuba3 import LLVM, SCALAR
-from .stills import COMPILED, OURS, VARIANTS, prepare_cycles, start_contestant
+from .stills import OUR_METHODS, OURS, prepare_cycles, start_contestant
 
 STILL = Still(
     "mitsuba",
@@ -23,12 +23,12 @@ STILL = Still(
     "direct",
     (640, 360),
     {0.003: (None, 1), 0.001: (None, None)},
-    {COMPILED: 1024, LLVM: 2048},
+    {OURS: 1024, LLVM: 2048},
 )
 _SQUARES = (4.0, 9.0, 25.0, 49.0, 121.0, 289.0)  # of primes, as the orthogonal sampler wants them
 _POWERS = (4.0, 16.0, 64.0, 256.0)
 METHODS = (
-    *OURS,
+    *OUR_METHODS,
     Method("Mitsuba llvm, independent", LLVM, "independent", _POWERS, rival=True),
     Method("Mitsuba llvm, multijitter", LLVM, "multijitter", _POWERS, rival=True, job=True),
     Method("Mitsuba llvm, orthogonal", LLVM, "orthogonal", _SQUARES, rival=True, job=True),
@@ -53,9 +53,8 @@ def charts(quick: bool) -> tuple[Chart, ...]:
         with Contestant(prepare_cycles, "suzannes", still.level, still.size, scene, threads, True):
             pass  # it has written the scene
         sides = {}
-        for side, environment in VARIANTS.items():
-            sides[side] = start_contestant(processes, tracer.prepare, scene, still.level, threads, environment=environment)
-            sides[side]["fresh"] = tracer.fresh(scene, still.level, threads, environment)
+        sides[OURS] = start_contestant(processes, tracer.prepare, scene, still.level, threads)
+        sides[OURS]["fresh"] = tracer.fresh(scene, still.level, threads)
         for variant in variants:
             theirs = Path(folder) / variant
             sides[variant] = start_contestant(processes, mitsuba3.prepare, scene, theirs, variant, threads)

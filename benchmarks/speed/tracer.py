@@ -1,22 +1,17 @@
-"""This project's tracer as a contestant, in a process of its own: compiled or not."""
+"""This project's tracer as a contestant, in a process of its own."""
 
-import contextlib
 import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
-from unittest import mock
 
 from viewcam_addon import image
-from viewcam_addon.tracer.light import illumination
-from viewcam_addon.tracer.render import Keeper, Tracer, render
+from viewcam_addon.tracer.render import Tracer, render
 from viewcam_addon.tracer.scene import scene_file
 from viewcam_addon.tracer.scene.film import MOST_SAMPLES
 
 from .. import race
-from ..noise import Noise
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -27,28 +22,25 @@ def prepare(scene_path: Path, level: str, threads: int) -> dict[str, race.Runner
     tracer = Tracer(scene, threads)
 
     def picture(sampling: str, parameter: float, seed: int, path: Path) -> float:
-        with _sampler(sampling):
-            started = time.perf_counter()
-            if level == "geometry":
-                passes = tracer.render()
-            else:
-                passes = tracer.render_light(level, seed=seed, **_effort(sampling, parameter))
-            seconds = time.perf_counter() - started
+        started = time.perf_counter()
+        if level == "geometry":
+            passes = tracer.render()
+        else:
+            passes = tracer.render_light(level, seed=seed, **_effort(sampling, parameter))
+        seconds = time.perf_counter() - started
         image.write(path, image.Image(passes, scene.camera))
         return seconds
 
     def whole(sampling: str, parameter: float, seed: int, path: Path) -> float:
-        with _sampler(sampling):
-            started = time.perf_counter()
-            # A keeper tells that pictures follow, for which numba is loaded; this one has nothing to take over.
-            passes = render(scene, level, seed=seed, threads=threads, keeper=Keeper(), **_effort(sampling, parameter))
-            image.write(path, image.Image(passes, scene.camera))
-            return time.perf_counter() - started
+        started = time.perf_counter()
+        passes = render(scene, level, seed=seed, threads=threads, **_effort(sampling, parameter))
+        image.write(path, image.Image(passes, scene.camera))
+        return time.perf_counter() - started
 
     return {"picture": picture, "whole": whole}
 
 
-def fresh(scene_path: Path, level: str, threads: int, environment: dict[str, str]) -> race.Runner:
+def fresh(scene_path: Path, level: str, threads: int) -> race.Runner:
     """From a fresh process to the EXR, as the shell does it. The first one leaves bytecode, which an installed package has."""
     bytecode = {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": str(scene_path.with_name("bytecode"))}
     modules = {"PYTHONPATH": os.pathsep.join([str(ROOT), *filter(None, sys.path)])}
@@ -58,7 +50,7 @@ def fresh(scene_path: Path, level: str, threads: int, environment: dict[str, str
         command = [sys.executable, "-m", "viewcam_addon", "render", scene_path, path, "--level", level, *words]
         command += ["--seed", str(seed), "--threads", str(threads)]
         started = time.perf_counter()
-        subprocess.run(command, env=os.environ | environment | bytecode | modules, check=True, stdout=subprocess.DEVNULL)
+        subprocess.run(command, env=os.environ | bytecode | modules, check=True, stdout=subprocess.DEVNULL)
         return time.perf_counter() - started
 
     return runner
@@ -67,10 +59,3 @@ def fresh(scene_path: Path, level: str, threads: int, environment: dict[str, str
 def _effort(sampling: str, parameter: float) -> dict[str, float]:
     """The options of render()."""
     return {"samples": MOST_SAMPLES, "error": parameter} if sampling == "error" else {"samples": int(parameter)}
-
-
-@contextlib.contextmanager
-def _sampler(sampling: str) -> Iterator[None]:
-    """Random numbers in the place of the sampler's, if that is the sampling."""
-    with mock.patch.object(illumination, "Sampler", Noise) if sampling == "random" else contextlib.nullcontext():
-        yield

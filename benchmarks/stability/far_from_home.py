@@ -4,7 +4,7 @@ A place at (K, K, K); the camera stands some ten units beside it, d = 150 px. Tw
 
 Arithmetic: 200 points of an object are projected, against 60 digits of mpmath on the same float64 numbers. Candidates: the
 object's vertices taken to world space and then projected, in float32 (as a renderer does) and in float64; and ours, the
-tracer's camera space, where the eye is taken off the matrix before a vertex is added.
+tracer's core, which takes an origin near the eye off the matrix before a vertex is added.
 
 Cycles: two objects and a ground are rendered, and each pixel's position must project to its centre (`viewcam check`): plain,
 and with the origin moved to the eye (`viewcam check --recenter`). At 1e9 neighbouring float32 numbers are 64 apart, and in the
@@ -27,8 +27,8 @@ from viewcam_addon.blender.camera import apply
 from viewcam_addon.blender.rendering import job
 from viewcam_addon.comparison.geometry import compare
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer.rays.view import View
-from viewcam_addon.tracer.render import render
+from viewcam_addon.tracer.render import Tracer, render
+from viewcam_addon.tracer.scene import Mesh, Object, Scene
 
 from ..charts import Chart, Curve
 from .stage import empty_stage
@@ -83,11 +83,29 @@ def _arithmetic(places: Array, count: int) -> list[Curve]:
     ]
 
 
+_SMALL = 1e-7
+"""The size of the triangles that stand for points: float32's digits of a place on one are 1e-14 units."""
+
+
 def _relative_to_the_eye(pinhole: Pinhole, matrix: Array, points: Array) -> Array:
-    """(2, n) columns and rows by the tracer's camera space."""
-    right, up, forward = View(pinhole).points(matrix, points)
-    (cx, cy), (dx, dy) = pinhole.principal_point, pinhole.distance
-    return np.stack([cx + dx * right / forward, cy + dy * up / forward])
+    """(2, n) columns and rows by the tracer: round each point stands a small triangle, whose UV tells what a pixel shows.
+
+    What is seen where the point must be is as far from the point as the point's picture is from there.
+    """
+    u, v, _ = pinhole.basis()
+    corners = points[:, None] + _SMALL * np.array([-u - v, 2 * u - v, 2 * v - u])
+    uvs = np.tile(np.array([[0, 0], [1, 0], [0, 1]], np.float32), (len(points), 1, 1))
+    places = _exactly(pinhole, matrix, points)
+    shown = []
+    for triangle, uv, (column, row) in zip(corners, uvs, places.T, strict=True):
+        mesh = Mesh(triangle, np.array([[0, 1, 2]], np.int32), np.zeros(1, np.int32), corner_uvs=uv[None])
+        tracer = Tracer(Scene(pinhole, {"point": mesh}, (Object("point", "point", matrix),)), 1)
+        (second, third, _), (depth,) = (tracer.surface_at([0], [0], column, row)[name][0] for name in ("UV", "Depth"))
+        weights = [mpmath.mpf(1) - float(second) - float(third), mpmath.mpf(float(second)), mpmath.mpf(float(third))]
+        with mpmath.workdps(60):
+            seen = [mpmath.fdot(weights, [mpmath.mpf(float(x)) for x in triangle[:, axis]]) for axis in range(3)]
+            shown.append(_projected(pinhole, matrix, seen) if depth < image.BACKGROUND_DEPTH else (float("nan"),) * 2)
+    return 2 * places - np.array(shown).T
 
 
 def _in_world_space(kind: type) -> object:
@@ -114,18 +132,18 @@ METHODS = {
 
 def _exactly(pinhole: Pinhole, matrix: Array, points: Array) -> Array:
     """(2, n) columns and rows, rounded once."""
+    return np.array([_projected(pinhole, matrix, point) for point in points.tolist()]).T
+
+
+def _projected(pinhole: Pinhole, matrix: Array, point: list) -> tuple[float, float]:
     with mpmath.workdps(60):
         e, l, up = (mpmath.matrix(list(vector)) for vector in (pinhole.eye, pinhole.look_at, pinhole.up))
         w = _unit(e - l)
         u = _unit(_cross(up, w))
         v = _cross(w, u)
-        place = mpmath.matrix(matrix[:3, 3].tolist())
-        exact = []
-        for point in points.tolist():
-            relative = mpmath.matrix(point) + place - e
-            right, up_, forward = _dot(relative, u), _dot(relative, v), -_dot(relative, w)
-            exact.append([float(WIDTH / 2 + DISTANCE * right / forward), float(HEIGHT / 2 + DISTANCE * up_ / forward)])
-    return np.array(exact).T
+        relative = mpmath.matrix(point) + mpmath.matrix(matrix[:3, 3].tolist()) - e
+        right, up_, forward = _dot(relative, u), _dot(relative, v), -_dot(relative, w)
+        return float(WIDTH / 2 + DISTANCE * right / forward), float(HEIGHT / 2 + DISTANCE * up_ / forward)
 
 
 def _dot(a: mpmath.matrix, b: mpmath.matrix) -> mpmath.mpf:

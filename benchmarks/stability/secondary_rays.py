@@ -1,35 +1,29 @@
 """Rays that leave a surface: how many meet it again (acne), and how many step over what stands close by (leaks).
 
-Hits are the geometry level's own: seen from the eye, in camera space, refined in float64. From each a ray goes on by Embree, as
-shadow and bounce rays will: its start in float32, its direction anywhere on its side of the surface, every other one nearly
-along it (cosines down to FLATTEST, evenly on the logarithm).
+Hits are the core's own, seen from the eye, and so are the rays that go on from each, as shadow and bounce rays do: anywhere on
+its side of the surface, every other one nearly along it (cosines down to FLATTEST, evenly on the logarithm).
 
 - Acne: rays that go out from a closed convex ball of triangles. None may meet it.
 - Leaks: rays that go into a closed slab through the side that the eye sees, off its rim. Every one must meet it from within.
 
-Candidates: no offset; a fixed distance of 1e-4 along the normal; 1e-6 · max(1, |P|), which was good enough for a room; steps of
-floats in each coordinate (Wächter and Binder, Ray Tracing Gems, 2019, ch. 6); ours, tracer/rays/offset.py.
+Candidates are where rays start: no offset; a fixed distance of 1e-4 along the normal; 1e-6 · max(1, |P|), which was good enough
+for a room; steps of floats in each coordinate (Wächter and Binder, Ray Tracing Gems, 2019, ch. 6); ours, which Interaction in
+tracer/core/ray.h holds and triangle_mesh.h derives.
 
-Exact spheres are tested in float64: acne as above; leaks with another sphere that stands before each hit, closer than any
-float32 could tell. And shadow rays end at lamps: one that lies in a surface must not be hidden by it, and a sheet just before a
-lamp must hide it. There the candidates are where the ray ends.
+Exact spheres: acne as above; leaks with another sphere that stands before each hit, closer than any float32 could tell. And
+shadow rays end at lamps: one that lies in a surface must not be hidden by it, and a sheet just before a lamp must hide it.
+There the candidates are where the ray ends.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer.arrays import dot, gather
-from viewcam_addon.tracer.rays import offset
-from viewcam_addon.tracer.rays.ellipsoids import Ellipsoids, ellipsoids_of
-from viewcam_addon.tracer.rays.embree import embree_scene
-from viewcam_addon.tracer.rays.triangles import Planes, Triangles, triangles_of
-from viewcam_addon.tracer.rays.view import View
-from viewcam_addon.tracer.rays.visibility import visibility
-from viewcam_addon.tracer.scene import Mesh, Object, Spheres
+from viewcam_addon.tracer.native import CoreScene
+from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres
 
 from ..charts import Chart, Curve
 
@@ -39,17 +33,20 @@ Array = NDArray[np.float64]
 TIE = 0.0
 _NONE = " What lies on the lower edge is 0."
 _AWAY = np.array([0.48, 0.36, 0.8])  # where things stand, seen from the eye: askew to all axes
-_THIN = 1e-5  # of the distance: thickness of the slab where scales are swept
+_THIN = 1e-10  # of the distance: thickness of the slab where scales are swept
+# Cosine of the flattest rays.
+FLATTEST = 1e-3
+_CAMERA = Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 1, 1, 1)
 
 
 @dataclass(frozen=True)
 class Leaving:
-    """n rays that leave surfaces. points, normals, directions : (3, n), camera space. offsets : (n,), ours."""
+    """n rays that leave surfaces. points, normals, directions, starts : (n, 3). starts : ours."""
 
     points: Array
     normals: Array
     directions: Array
-    offsets: Array
+    starts: Array
 
 
 Rule = Callable[[Leaving], Array]
@@ -57,10 +54,10 @@ Rule = Callable[[Leaving], Array]
 
 def charts(quick: bool = False) -> tuple[Chart, ...]:
     rays = 2000 if quick else 60_000
-    scales, distances, walls = 10.0 ** np.arange(-6, 7), 10.0 ** np.arange(0.5, 8), 10.0 ** -np.arange(2, 7.5, 0.5)
+    scales, distances, walls = 10.0 ** np.arange(-6, 15), 10.0 ** np.arange(0.5, 15), 10.0 ** -np.arange(2, 16.0)
     by_scale = [(_acne(scale, 4 * scale, rays), _leaks(scale, 4 * scale, _THIN * 4 * scale, rays)) for scale in scales]
     by_distance = [_half(_acne(1, far, rays), _leaks(1, far, 0.1, rays)) for far in distances]
-    sizes = 10.0 ** np.arange(0, 8)
+    sizes = 10.0 ** np.arange(0, 13)
     by_wall = [_half(_acne(1, 4, rays), _leaks(1, 4, 4 * thickness, rays)) for thickness in walls]
     counted = " per million rays"
     return (
@@ -70,7 +67,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             "size of the scene",
             "hits" + counted,
             _curves(scales, [acne for acne, _ in by_scale]),
-            "A ball four of its radii from the eye. A fixed distance works where it is larger than a rounding of float32."
+            "A ball four of its radii from the eye. Every rule works where its distance is larger than a rounding of float64."
             + _NONE,
             tie=TIE,
         ),
@@ -100,7 +97,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             "distance / size of the object",
             "wrong" + counted,
             _curves(distances, by_distance),
-            "A ball of radius 1 and a slab 0.1 thick. Ours fails where float32 does: from 3e5 on the slab is as thin as the "
+            "A ball of radius 1 and a slab 0.1 thick. Ours fails where float64 does: where the slab is as thin as the "
             "roundings of its own corners and of the start." + _NONE,
             tie=TIE,
         ),
@@ -110,9 +107,9 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             "thickness / distance from the eye",
             "wrong" + counted,
             _curves(walls, by_wall, aside="no offset"),
-            "Read where a curve leaves the floor: the thinnest wall that holds. Ours holds 1e-6 of its distance, a "
-            "dozen roundings, and 99 % of the rays at 3e-7. Without offset every second ray has acne, however thick the wall."
-            + _NONE,
+            "Read where a curve leaves the floor: the thinnest wall that holds. Ours holds 1e-14 of its distance, some dozen "
+            "roundings of float64. "
+            "Without offset many rays have acne, however thick the wall." + _NONE,
             tie=TIE,
             reverse=True,
         ),
@@ -141,24 +138,24 @@ def no_offset(leaving: Leaving) -> Array:
 
 
 def fixed(leaving: Leaving) -> Array:
-    return _beside(leaving, np.full(leaving.points.shape[1], 1e-4))
+    return _beside(leaving, np.full(len(leaving.points), 1e-4))
 
 
 def relative(leaving: Leaving) -> Array:
-    return _beside(leaving, 1e-6 * np.maximum(1, np.sqrt(dot(leaving.points, leaving.points))))
+    return _beside(leaving, 1e-6 * np.maximum(1, np.linalg.norm(leaving.points, axis=1)))
 
 
 def float_steps(leaving: Leaving) -> Array:
     """256 steps of floats along each component of the normal; near 0, where steps are tiny, a fixed distance."""
     point = leaving.points.astype(np.float32)
-    normal = (np.sign(dot(leaving.normals, leaving.directions)) * leaving.normals).astype(np.float32)
+    normal = (_side(leaving)[:, None] * leaving.normals).astype(np.float32)
     steps = (256 * normal).astype(np.int32)
     stepped = (point.view(np.int32) + np.where(point < 0, -steps, steps)).view(np.float32)
     return np.where(np.abs(point) < 1 / 32, point + normal / np.float32(65536), stepped).astype(float)
 
 
 def ours(leaving: Leaving) -> Array:
-    return offset.start(leaving.points, leaving.normals, leaving.directions, leaving.offsets)
+    return leaving.starts
 
 
 RULES: dict[str, Rule] = {
@@ -171,7 +168,11 @@ RULES: dict[str, Rule] = {
 
 
 def _beside(leaving: Leaving, distance: Array) -> Array:
-    return leaving.points + distance * np.sign(dot(leaving.normals, leaving.directions)) * leaving.normals
+    return leaving.points + (distance * _side(leaving))[:, None] * leaving.normals
+
+
+def _side(leaving: Leaving) -> Array:
+    return np.sign((leaving.normals * leaving.directions).sum(axis=1))
 
 
 # Triangles.
@@ -180,16 +181,16 @@ def _beside(leaving: Leaving, distance: Array) -> Array:
 def _acne(size: float, distance: float, rays: int) -> dict[str, float]:
     """Hits per million rays that go out from a ball."""
     ball = _ball()
-    triangles, leaving = _hits(ball * size + _AWAY * distance, np.ones(len(ball), bool), size, distance, rays, 1)
-    return {name: 1e6 * np.mean(_met(triangles, rule(leaving), leaving.directions)) for name, rule in RULES.items()}
+    core, leaving = _hits(ball * size + _AWAY * distance, np.ones(len(ball), bool), size, distance, rays, 1)
+    return {name: 1e6 * np.mean(_met(core, rule(leaving), leaving.directions)) for name, rule in RULES.items()}
 
 
 def _large(size: float, rays: int) -> dict[str, float]:
     """Hits per million rays that leave a floor of two triangles, of this size, at a distance of 1 from the eye."""
     floor = _cube(0)[:2] - (0.3, 0.2, 1)
     corners = floor * (size, size, 1) @ _turn() + _AWAY
-    triangles, leaving = _hits(corners, np.ones(2, bool), 0.5, 1, rays, np.sign(-_normals(corners)[0] @ _AWAY))
-    return {name: 1e6 * np.mean(_met(triangles, rule(leaving), leaving.directions)) for name, rule in RULES.items()}
+    core, leaving = _hits(corners, np.ones(2, bool), 0.5, 1, rays, 1)
+    return {name: 1e6 * np.mean(_met(core, rule(leaving), leaving.directions)) for name, rule in RULES.items()}
 
 
 def _leaks(size: float, distance: float, thickness: float, rays: int) -> dict[str, float]:
@@ -197,45 +198,51 @@ def _leaks(size: float, distance: float, thickness: float, rays: int) -> dict[st
     cube = _cube()
     inner = np.abs(cube[..., :2]).max(axis=(1, 2)) < 1
     slab = cube * (size, size, thickness / 2) @ _turn() + _AWAY * distance
-    triangles, leaving = _hits(slab, inner, size, distance, rays, -1)
-    return {name: 1e6 * np.mean(~_met(triangles, rule(leaving), leaving.directions)) for name, rule in RULES.items()}
+    core, leaving = _hits(slab, inner, size, distance, rays, -1)
+    return {name: 1e6 * np.mean(~_met(core, rule(leaving), leaving.directions)) for name, rule in RULES.items()}
 
 
-def _met(triangles: Triangles, starts: Array, directions: Array) -> NDArray[np.bool_]:
-    embree = embree_scene(triangles.vertices.T, triangles.corners.T)
-    return embree.run(starts.T.astype(np.float32), np.ascontiguousarray(directions.T, np.float32)) >= 0
+def _met(core: CoreScene, starts: Array, directions: Array) -> NDArray[np.bool_]:
+    return np.isfinite(core.closest(core.rays(starts, directions))[0])
+
+
+def _core_of(geometry: Mesh | Spheres) -> CoreScene:
+    """The thing, in a rendering space that is the world: the eye is at its origin."""
+    return CoreScene(Scene(_CAMERA, {"thing": geometry}, (Object("thing", "thing", np.eye(4)),)), 1)
+
+
+def _mesh(corners: Array) -> Mesh:
+    """(m, 3, 3) corners; those at one place are one vertex."""
+    vertices, place = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    return Mesh(vertices, place.reshape(-1, 3).astype(np.int32), np.zeros(len(corners), np.int32))
 
 
 def _hits(
     corners: Array, chosen: NDArray[np.bool_], size: float, distance: float, rays: int, side: int
-) -> tuple[Triangles, Leaving]:
-    """What rays from the eye that aim at a thing meet, and a ray from each hit that goes out (side 1) or in (−1).
+) -> tuple[CoreScene, Leaving]:
+    """What rays from the eye that aim at a thing meet, and a ray from each hit to the eye's side (1) or the other (−1).
 
-    corners : (m, 3, 3), of the triangles, world space. chosen : (m,), whose hits count. The eye is at the origin.
+    corners : (m, 3, 3), of the triangles. chosen : (m,), whose hits count. The eye is at the origin.
     """
     random = np.random.default_rng(4)
-    view = View(Pinhole((0, 0, 0), tuple(_AWAY), (0.1, 0.9, -0.2), 1, 1, 1))
-    count = len(corners)
-    mesh = Mesh(corners.reshape(-1, 3), np.arange(3 * count, dtype=np.int32).reshape(-1, 3), np.zeros(count, np.int32))
-    triangles = triangles_of([(Object("thing", "mesh", np.eye(4)), mesh)], view)
-    planes = Planes(triangles, view)
-    x, y = random.uniform(-1, 1, (2, 2 * rays)) * 0.6 * size / distance
-    triangle = visibility(triangles, planes, ellipsoids_of([], view), (0.0, np.inf)).first(x, y)
-    met = np.flatnonzero((triangle >= 0) & chosen[triangle])[:rays]
-    triangle, x, y = triangle[met], x[met], y[met]
-    points = np.stack([x, y, np.ones_like(x)]) * planes.depth(triangle, x, y)
-    normals = view.axes @ _normals(corners)[triangle].T
+    core = _core_of(_mesh(corners))
+    across = _AWAY * distance + random.uniform(-1, 1, (2 * rays, 3)) * 0.6 * size
+    seen = core.rays(np.zeros((1, 3)), across)
+    _, objects, primitives = core.closest(seen)
+    seen = seen[np.flatnonzero((objects >= 0) & chosen[primitives])[:rays]]
+    normals = core.leaving(seen, _AWAY)[1]
     directions = _leaving(normals * side, random)
-    return triangles, Leaving(points, normals, directions, gather(offset.triangle_offsets(triangles), triangle))
+    points, normals, _, starts, _ = core.leaving(seen, directions)
+    return core, Leaving(points, normals, directions, starts)
 
 
 def _leaving(normals: Array, random: np.random.Generator) -> Array:
-    """(3, n) unit directions on the side of the normals, half evenly over the hemisphere, half nearly along the surface."""
-    count = normals.shape[1]
-    flat = offset.FLATTEST ** random.uniform(0, 1, count)
-    cosine = np.where(np.arange(count) % 2, random.uniform(offset.FLATTEST, 1, count), flat)
-    across = np.cross(normals.T, random.normal(size=(count, 3))).T
-    return normals * cosine + across / np.linalg.norm(across, axis=0) * np.sqrt(1 - cosine * cosine)
+    """(n, 3) unit directions on the side of the normals, half evenly over the hemisphere, half nearly along the surface."""
+    count = len(normals)
+    flat = FLATTEST ** random.uniform(0, 1, count)
+    cosine = np.where(np.arange(count) % 2, random.uniform(FLATTEST, 1, count), flat)[:, None]
+    across = np.cross(normals, random.normal(size=(count, 3)))
+    return normals * cosine + across / np.linalg.norm(across, axis=1, keepdims=True) * np.sqrt(1 - cosine * cosine)
 
 
 def _normals(corners: Array) -> Array:
@@ -284,7 +291,7 @@ def _turn() -> Array:
 
 def _chart_of_spheres(rays: int, counted: str) -> tuple[Chart]:
     distances = 10.0 ** np.arange(0.5, 13)
-    counts = [_of_spheres(distance, rays) for distance in distances]
+    counts = [_of_spheres(distance, max(rays // 30, 300)) for distance in distances]
     return (
         Chart(
             "secondary-spheres",
@@ -301,47 +308,34 @@ def _chart_of_spheres(rays: int, counted: str) -> tuple[Chart]:
 
 def _of_spheres(distance: float, rays: int) -> dict[str, float]:
     random = np.random.default_rng(5)
-    view = View(Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 1, 1, 1))
-    center = _AWAY * (1, 1, -1) * distance
-    ellipsoids = _spheres(center[:, None], view)
-    x, y = (center[:2, None] + random.uniform(-0.5, 0.5, (2, rays))) / -center[2]
-    depth = ellipsoids.depth(np.zeros(rays, np.intp), x, y)
-    points = np.stack([x, y, np.ones(rays)]) * depth
-    normals = np.stack(ellipsoids.normal(np.zeros(rays, np.intp), x, y, depth))
-    leaving = Leaving(points, normals, _leaving(normals, random), np.zeros(rays))
-    upwards = replace(leaving, directions=normals + 0.1 * leaving.directions)
-    float32 = np.full(rays, 2.0**-24 * 3.5 * distance)
+    center = _AWAY * distance
+    core = _core_of(Spheres(center[None], np.ones(1), np.zeros(1, np.int32)))
+    seen = core.rays(np.zeros((1, 3)), center + random.uniform(-0.5, 0.5, (rays, 3)))
+    _, normals, _, _, _ = core.leaving(seen, _AWAY)
+    directions = _leaving(normals, random)
+    points, _, _, starts, _ = core.leaving(seen, directions)
+    outwards = normals + 0.1 * directions
+    leaving, upwards = Leaving(points, normals, directions, starts), Leaving(points, normals, outwards, starts)
     rules = {
-        "as from a triangle, for float32": lambda leaving: ours(replace(leaving, offsets=float32)),
+        "as from a triangle, for float32": lambda leaving: _beside(leaving, np.full(rays, 2.0**-24 * 3.5 * distance)),
         **{name: rule for name, rule in RULES.items() if rule in (fixed, relative)},
         "ours": ours,
     }
     counts = {}
     for name, rule in rules.items():
-        acne = _meets_sphere(ellipsoids.positions, rule(leaving), leaving.directions)
-        leaks = ~_meets_sphere(points + normals * (1 + 1e-13 * distance), rule(upwards), upwards.directions)
+        acne = _met(core, rule(leaving), directions)
+        leaks = ~_meets_its_sphere(points + normals * (1 + 1e-13 * distance), rule(upwards), outwards)
         counts[name] = 1e6 * (np.mean(acne) + np.mean(leaks)) / 2
     return counts
 
 
-def _meets_sphere(centres: Array, starts: Array, directions: Array) -> NDArray[np.bool_]:
-    """Whether rays meet unit spheres, each its own, seen from their starts by the tracer's own ellipsoids. All (3, n)."""
-    ahead = np.where(directions[2] < 0, -1.0, 1.0)
-    relative = np.stack([*(centres - starts)[:2], (centres - starts)[2] * ahead])
-    view = View(Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 1, 1, 1))
-    ellipsoids = _spheres(relative * [[1], [1], [-1]], view)
-    ray = ellipsoids.material_index.astype(int)
-    x, y = directions[:2] / np.abs(directions[2])
-    met = np.zeros(directions.shape[1], bool)
-    met[ray] = np.isfinite(ellipsoids.depth(np.arange(ellipsoids.count), x[ray], y[ray]))
+def _meets_its_sphere(centres: Array, starts: Array, directions: Array) -> NDArray[np.bool_]:
+    """Whether rays meet unit spheres, each its own: (n, 3)."""
+    met = np.empty(len(starts), bool)
+    for ray, (centre, start, direction) in enumerate(zip(centres, starts, directions, strict=True)):
+        alone = _core_of(Spheres(centre[None], np.ones(1), np.zeros(1, np.int32)))
+        met[ray] = _met(alone, start[None], direction[None])[0]
     return met
-
-
-def _spheres(centers: Array, view: View) -> Ellipsoids:
-    """Unit spheres, world space, numbered by their materials."""
-    numbers = np.arange(centers.shape[1])
-    spheres = Spheres(np.ascontiguousarray(centers.T), np.ones(len(numbers)), numbers.astype(np.int32))
-    return ellipsoids_of([(Object("spheres", "spheres", np.eye(4), 0, tuple(numbers.tolist())), spheres)], view)
 
 
 # Lamps.
@@ -363,24 +357,30 @@ def _chart_of_lamps(rays: int, scales: Array, counted: str) -> tuple[Chart]:
 
 
 def _of_lamps(scale: float, rays: int) -> dict[str, float]:
-    """Wrong answers per million rays that go from before a sheet to lamps in it, and to lamps behind it."""
+    """Wrong answers per million rays that go from a floor to lamps in a sheet above it, and to lamps behind it."""
     random = np.random.default_rng(7)
-    corners = _divided(_cube(0)[:2] - (0, 0, 1), 3) @ _turn() * scale + _AWAY * 4 * scale
-    normal = _normals(corners)[0]
-    triangles = np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3)
-    sheet = embree_scene(corners.reshape(-1, 3), triangles)
-    shares = random.dirichlet((1, 1, 1), rays)
-    on_sheet = np.einsum("nk,nkd->nd", shares, corners[random.integers(0, len(corners), rays)]).T
-    aside = random.uniform(-0.5, 0.5, (3, rays))
-    starts = on_sheet + (normal[:, None] + aside - np.outer(normal, normal @ aside)) * scale
+    turn, place = _turn(), _AWAY * 4 * scale
+    sheet = _divided(_cube(0)[:2] - (0, 0, 1), 3) @ turn * scale + place
+    floor = (_cube(0)[:2] - (0, 0, 2)) @ turn * scale + place
+    normal = _normals(sheet)[0]
+    core = _core_of(_mesh(np.concatenate([sheet, floor])))
+    shares = random.dirichlet((1, 1, 1), (2, rays))
+    on_sheet, on_floor = (
+        np.einsum("nk,nkd->nd", share, corners[random.integers(0, len(corners), rays)])
+        for share, corners in zip(shares, (sheet, floor), strict=True)
+    )
+    above = on_floor + 0.5 * scale * normal
+    seen = core.rays(above, on_floor - above)
+    points, _, _, _, _ = core.leaving(seen, normal)
     counts = dict.fromkeys(ENDS, 0.0)
     for behind, hidden in ((0.0, False), (_THIN * 4 * scale, True)):
-        lamps = on_sheet - behind * normal[:, None]
-        origins, directions, lengths = offset.shadow_rays(starts, lamps)
-        apart = np.linalg.norm(lamps.T - origins, axis=1)
+        apart = on_sheet + behind * normal - points
+        distances = np.linalg.norm(apart, axis=1)
+        directions = apart / distances[:, None]
+        _, _, _, starts, lengths = core.leaving(seen, directions, distances)
         for name, end in ENDS.items():
-            length = lengths if end is None else end(apart).astype(np.float32)
-            met = sheet.run(origins, directions, dists=length) >= 0
+            length = lengths if end is None else end(distances) * distances
+            met = core.occluded(core.rays(starts, directions, 0.0, length))
             counts[name] += 0.5e6 * np.mean(met != hidden)
     return counts
 

@@ -8,7 +8,7 @@ nothing, as in Cycles, and that counts as right.
 Candidates, each in float32 and in float64: the textbook's quadratic; the same with the near root as c/q (Press et al.,
 Numerical Recipes, 5.6); and that with the discriminant of the perpendicular from the centre to the ray (Haines et al., Ray
 Tracing Gems, 2019, ch. 7). They are given the centre less the eye, subtracted in their own precision. Ours is
-tracer/rays/ellipsoids.py.
+tracer/core/shapes/sphere.h.
 """
 
 from collections.abc import Callable, Iterator
@@ -19,10 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer.arrays import dot
-from viewcam_addon.tracer.rays.ellipsoids import ellipsoids_of
-from viewcam_addon.tracer.rays.view import View
-from viewcam_addon.tracer.scene import Object, Spheres
+from viewcam_addon.tracer.native import CoreScene
+from viewcam_addon.tracer.scene import Object, Scene, Spheres
 
 from ..charts import Chart, Curve
 
@@ -296,13 +294,15 @@ def _near_root(along: Array, discriminant: Array, constant: Array) -> Array:
 
 
 def _ours(shots: Shots) -> Array:
-    """The tracer's own, called. It sorts its spheres and leaves out those that hold the eye; the material tells them apart."""
-    numbers = np.arange(len(shots.radii))
-    spheres = Spheres(shots.centers.T, shots.radii, numbers.astype(np.int32))
-    placed = Object("ellipsoids", "spheres", shots.matrix, 0, tuple(numbers.tolist()))
+    """The core's own, called: each ray with its sphere alone, which another's must not hide."""
     camera = Pinhole(tuple(shots.eye), tuple(shots.eye + _FORWARD), (0, 1, 0), 1, 1, 1)
-    ellipsoids = ellipsoids_of([(placed, spheres)], View(camera))
-    ray = ellipsoids.material_index.astype(int)
-    depths = np.full(len(numbers), np.inf)
-    depths[ray] = ellipsoids.depth(np.arange(ellipsoids.count), shots.x[ray], shots.y[ray])
-    return depths
+    depths = []
+    for center, radius, x, y in zip(shots.centers.T, shots.radii, shots.x, shots.y, strict=True):
+        spheres = Spheres(center[None].copy(), np.array([radius]), np.zeros(1, np.int32))
+        core = CoreScene(Scene(camera, {"spheres": spheres}, (Object("ellipsoid", "spheres", shots.matrix),)), 1)
+        depths.append(core.closest(core.rays(shots.eye[None], np.array([[x, y, -1.0]])))[0][0])
+    return np.array(depths)
+
+
+def dot(a: Array, b: Array) -> Array:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

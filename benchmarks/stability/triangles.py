@@ -7,8 +7,8 @@ float64 numbers that the methods are given.
 
 Candidates, given the corners relative to the eye: Möller and Trumbore (Fast, minimum storage ray/triangle intersection, 1997)
 in float32 and float64; Woop, Benthin and Wald (Watertight ray/triangle intersection, 2013) in both, in float32 with its way out
-to float64; Embree, robust and not, with its own float32 depth. Ours is Embree, robust, with an eye on corners (corners.py in
-tracer/rays) and the depth in float64 (triangles.py there); without Embree it is Plain in visibility.py.
+to float64; Embree, robust and not, with its own float32 depth. Ours is the tracer's core (core/shapes/triangle_mesh.h), which
+traces rays in packets and one by one; its depths are those that it shows.
 """
 
 import math
@@ -22,11 +22,8 @@ from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer.rays import visibility
-from viewcam_addon.tracer.rays.ellipsoids import ellipsoids_of
-from viewcam_addon.tracer.rays.triangles import Planes, Triangles, triangles_of
-from viewcam_addon.tracer.rays.view import View
-from viewcam_addon.tracer.scene import Mesh, Object
+from viewcam_addon.tracer.native import CoreScene
+from viewcam_addon.tracer.scene import Mesh, Object, Scene
 
 from ..charts import Chart, Curve
 
@@ -63,7 +60,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             "leaks per million rays",
             leaks,
             "Möller and Trumbore's test leaks one ray in ten to twenty at any distance, in float64 as in float32, and so does "
-            "Embree outside of its robust mode; within, at vertices. Ours leaks nowhere, with Embree and without. The sweep "
+            "Embree outside of its robust mode; within, at vertices. Ours leaks nowhere, in packets and one by one. The sweep "
             "ends where a triangle is as small as some hundred roundings of float32.",
             tie=RARE,
         ),
@@ -74,7 +71,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             "double hits per million rays",
             double,
             "Counted and not judged: transparency would have to know, but here only the nearest surface is asked for. What "
-            "does not leak reports edges twice; ours has the double hits of Embree's robust mode, up to all of the rays.",
+            "does not leak reports edges twice, and vertices as often as triangles meet there.",
             tie=math.inf,
         ),
         Chart(
@@ -105,7 +102,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             "share of rays at the mat that meet something else",
             ground,
             "Float32 rounds the distance of a plane with the coordinates of its farthest corner: the ground rises over the "
-            "mat, sinks below it or is missed. Ours tests triangles that reach far and come near in float64.",
+            "mat, sinks below it or is missed. Ours tests all triangles in float64.",
             tie=SHARE_TIE,
         ),
     )
@@ -120,7 +117,7 @@ def _leaks(ratios: Array, fans: int) -> tuple[tuple[Curve, ...], tuple[Curve, ..
         tuple(Curve(name, ratios, [pair[kind] for pair in pairs], name.startswith("ours")) for name, pairs in counts.items())
         for kind in range(2)
     )
-    return leaks, tuple(curve for curve in double if curve.name != "ours, without Embree")  # it is asked for one hit only
+    return leaks, double
 
 
 def _hits_of_fans(size: float, fans: int, random: np.random.Generator) -> Iterator[tuple[str, Array]]:
@@ -129,13 +126,12 @@ def _hits_of_fans(size: float, fans: int, random: np.random.Generator) -> Iterat
     groups = [_Fans(size, side, random) for _ in range(min(60, -(-fans // side**2)))]
     for name, test in _FORMULAS.items():
         yield name, np.concatenate([group.hits(lambda *given, test=test: np.isfinite(test(*given))) for group in groups])
-    loose = np.concatenate([group.embree_hits(robust=False) for group in groups])
-    robust = np.concatenate([group.embree_hits(robust=True) for group in groups])
-    yield "Embree", loose
-    yield "Embree, robust", robust
-    for name, kind in (("ours", visibility.Embree), ("ours, without Embree", visibility.Plain)):
-        found = np.concatenate([group.found(kind) for group in groups])
-        yield name, np.where(found, np.maximum(robust, 1), 0)
+    for name, robust in (("Embree", False), ("Embree, robust", True)):
+        yield name, np.concatenate([group.first_hits(lambda *given, r=robust: _embree_depth(*given, r)) for group in groups])
+    for name, packets in (("ours", True), ("ours, one by one", False)):
+        counts = np.concatenate([group.first_hits(lambda *given, p=packets: _core_depth(*given, p)) for group in groups])
+        found = np.concatenate([np.isfinite(_core_depth(group.corners, group.x, group.y, packets)) for group in groups])
+        yield name, np.where(found, np.maximum(counts, 1), 0)
 
 
 class _Fans:
@@ -175,17 +171,12 @@ class _Fans:
             found += test(a, b, c, self.x, self.y)
         return found
 
-    def embree_hits(self, robust: bool) -> Array:
-        """The same of Embree, which reports the first only: a scene for the first triangles of the fans, and so on."""
+    def first_hits(self, depth: Callable[..., Array]) -> Array:
+        """The same of what reports the first hit only: a scene for the first triangles of the fans, and so on."""
         found = np.zeros(len(self.fan), int)
         for number in range(self._TRIANGLES):
-            found += np.isfinite(_embree_depth(self.corners[:, number :: self._TRIANGLES], self.x, self.y, robust))
+            found += np.isfinite(depth(self.corners[:, number :: self._TRIANGLES], self.x, self.y))
         return found
-
-    def found(self, kind: type) -> Array:
-        """Whether the tracer finds something."""
-        triangles, planes, nothing = _prepared(self.corners)
-        return kind(triangles, planes, nothing, (0.0, np.inf)).first(self.x, self.y) >= 0
 
 
 def _depth_errors(shape: Callable[..., Array], sweep: Array, count: int, rays: int) -> tuple[Curve, ...]:
@@ -254,9 +245,9 @@ def _first_on_the_ground(extent: float, random: np.random.Generator) -> Iterator
     angles = np.pi / 2 * (np.arange(4) + random.uniform(-0.4, 0.4, 4))
     ground = np.stack([np.cos(angles), np.sin(angles), np.zeros(4)], axis=-1) * extent * random.uniform(0.6, 1, (4, 1))
     mat = np.array([[-0.4, 0.7, 1e-4], [0.4, 0.7, 1e-4], [0.4, 1.7, 1e-4], [-0.4, 1.7, 1e-4]])
-    view = View(Pinhole((0, 0, 1), (*random.uniform(-0.2, 0.2, 2), 0), (0, 1, 0), 1, 1, 1))
-    points = view.points(np.eye(4), np.concatenate([ground, mat]))
-    corners = points.T[np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]).T]
+    u, v, w = Pinhole((0, 0, 1), (*random.uniform(-0.2, 0.2, 2), 0), (0, 1, 0), 1, 1, 1).basis()
+    points = (np.concatenate([ground, mat]) - (0, 0, 1)) @ np.stack([u, v, -w]).T
+    corners = points[np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]).T]
     weights = random.dirichlet((1, 1, 1), 40)
     aimed = np.concatenate([weights @ corners[:, 2], weights @ corners[:, 3]])
     x, y = aimed[:, 0] / aimed[:, 2], aimed[:, 1] / aimed[:, 2]
@@ -266,8 +257,8 @@ def _first_on_the_ground(extent: float, random: np.random.Generator) -> Iterator
             yield name, np.where(np.isfinite(nearest).any(axis=0), nearest.argmin(axis=0), -1)
     for name, robust in (("Embree", False), ("Embree, robust", True)):
         yield name, _embree(corners, x, y, robust, "INTERSECT")
-    triangles, planes, nothing = _prepared(corners)
-    yield "ours", visibility.Embree(triangles, planes, nothing, (0.0, np.inf)).first(x, y)
+    core, rays = _core(corners, x, y)
+    yield "ours", core.closest(rays)[2]
 
 
 def _true_depths(a: Array, b: Array, c: Array, x: Array, y: Array) -> list[float]:
@@ -286,17 +277,27 @@ def _depths(corners: Array, x: Array, y: Array) -> Iterator[tuple[str, Array]]:
         yield name, test(a, b, c, x, y)
     for name, robust in (("Embree", False), ("Embree, robust", True)):
         yield name, np.stack([_embree_depth(corners[:, [i]], x[i], y[i], robust) for i in range(len(x))])
-    _, planes, _ = _prepared(corners)
-    yield "ours", planes.depth(np.arange(len(x))[:, None], x, y)
+    yield "ours", np.stack([_shown_depth(corners[:, [i]], x[i], y[i]) for i in range(len(x))])
 
 
-def _prepared(corners: Array) -> tuple:
-    """(3, m, 3) corners in camera space, as the tracer prepares them, without spheres."""
-    count, view = corners.shape[1], View(_CAMERA)
+def _core(corners: Array, x: Array, y: Array) -> tuple[CoreScene, Array]:
+    """(3, m, 3) corners in camera space and n rays, as the core takes them."""
     vertices, place = np.unique(corners.transpose(1, 0, 2).reshape(-1, 3), axis=0, return_inverse=True)
-    mesh = Mesh(vertices * _TO_WORLD, place.reshape(-1, 3).astype(np.int32), np.zeros(count, np.int32))
-    triangles: Triangles = triangles_of([(Object("triangles", "mesh", np.eye(4)), mesh)], view)
-    return triangles, Planes(triangles, view), ellipsoids_of([], view)
+    mesh = Mesh(vertices * _TO_WORLD, place.reshape(-1, 3).astype(np.int32), np.zeros(corners.shape[1], np.int32))
+    core = CoreScene(Scene(_CAMERA, {"mesh": mesh}, (Object("triangles", "mesh", np.eye(4)),)), 1)
+    return core, core.rays(np.zeros((1, 3)), np.stack([x, y, np.ones_like(x)], axis=1) * _TO_WORLD)
+
+
+def _core_depth(corners: Array, x: Array, y: Array, packets: bool) -> Array:
+    """Where the core first meets something, inf where nothing is."""
+    core, rays = _core(corners, x, y)
+    return core.closest(rays, packets=packets)[0]
+
+
+def _shown_depth(corners: Array, x: Array, y: Array) -> Array:
+    """Depths as the core shows them, nan where nothing is."""
+    core, rays = _core(corners, x, y)
+    return core.leaving(rays, np.array([0.0, 0.0, 1.0]))[2]
 
 
 def _embree_depth(corners: Array, x: Array, y: Array, robust: bool) -> Array:

@@ -18,7 +18,7 @@ def test_ours_is_the_best_or_tied_everywhere(measured):
     assert [sentence for chart in measured.values() for sentence in chart.behind()] == []
 
 
-@pytest.mark.parametrize("name", ["ours", "ours, without Embree"])
+@pytest.mark.parametrize("name", ["ours", "ours, one by one"])
 def test_ours_leaks_nowhere(measured, name):
     assert max(curve(measured["triangles-leaks"], name).y) == 0
 

@@ -1,8 +1,10 @@
 """The whole comparison of light: what it says, in one sentence, in lines and in JSON."""
 
 import json
+import re
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +13,6 @@ from viewcam_addon.comparison import radiance
 from viewcam_addon.errors import InputError
 from viewcam_addon.image import Image
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer.light import sums as light
 
 WIDTH, HEIGHT, SAMPLES, SEEDS = 64, 48, 256, 8
 PINHOLE = Pinhole((5, -7, 4), (0.2, 0.1, 0.6), (0, 0, 1), 60.0, WIDTH, HEIGHT)
@@ -151,4 +152,5 @@ def test_samples_that_the_file_tells_wrongly_can_be_given():
 
 
 def test_the_references_variance_is_told_from_as_many_batches_as_it_is_judged_by():
-    assert light._BATCHES == radiance.VARIANCE_BATCHES
+    header = Path(__file__).parents[2] / "viewcam_addon" / "tracer" / "core" / "film" / "film.h"
+    assert re.findall(r"BATCHES = (\d+);", header.read_text(encoding="utf-8")) == [str(radiance.VARIANCE_BATCHES)]

@@ -84,7 +84,7 @@ def packages(real_blender) -> Path:
         pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--upgrade"]
         target = [f"--target={folder}", f"--python-version={version}", "--only-binary=:all:"]
         subprocess.run([*pip, *target, "pytest", "hypothesis", "mpmath", "distributed"], check=True)
-        # Without NumPy, which these two ask for: Blender has its own.
-        subprocess.run([*pip, *target, "--no-deps", "OpenEXR", "embreex"], check=True)
+        # Without NumPy, which it asks for: Blender has its own.
+        subprocess.run([*pip, *target, "--no-deps", "OpenEXR"], check=True)
         (folder / "ready").touch()
     return folder

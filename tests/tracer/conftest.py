@@ -10,14 +10,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from core_probes import SampledLight, Sampler, radiance_seen
 
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer.compiled import standing
 from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres
-
-
-@pytest.fixture
-def without_kernels(monkeypatch):
-    """NumPy's functions compute everything: for tests that break one of them on purpose."""
-    monkeypatch.setattr(standing, "AVAILABLE", False)
 
 
 @pytest.fixture(scope="session")

@@ -28,10 +28,7 @@ class Sampler:
         """(count, n): the dimensions from `first` on of samples of n pixels."""
         pixels, samples = np.broadcast_arrays(np.asarray(pixels, np.int64), samples)
         pixels, samples = (np.ascontiguousarray(values, np.uint32) for values in (pixels & 0xFFFFFFFF, samples))
-        out = np.empty((len(pixels), count))
-        probe = native.core().probe_sobol
-        assert not probe(self._seed, self._samples, 3, len(pixels), _at(pixels), _at(samples), first, count, _at(out))
-        return out.T
+        return native.sobol(self._seed, self._samples, pixels, samples, first, count).T
 
 
 def offsets(film: Film, u):

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from viewcam_addon import image
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer import render as render_module
-from viewcam_addon.tracer.rays import visibility
 from viewcam_addon.tracer.render import PASSES, Tracer, render
 from viewcam_addon.tracer.scene import Object, Scene
 
@@ -158,17 +157,6 @@ def test_objects_and_materials_show_their_indices(make_mesh):
     passes = render(Scene(camera, {"squares": squares}, (Object("squares", "squares", np.eye(4), 7, (3, 9)),)))
     assert (passes["Object Index"] == 7)[5, [15, 45]].all()
     assert passes["Material Index"][5, 15] == 3 and passes["Material Index"][5, 45] == 9
-
-
-def test_without_embree_the_picture_is_the_same_but_for_roundings_of_edges(random_scene, monkeypatch):
-    scene = random_scene(11)
-    with_embree = render(scene)
-    monkeypatch.setattr(visibility, "EmbreeScene", None)
-    without = render(scene)
-    for name in PASSES:
-        differ = (with_embree[name] != without[name]).any(axis=-1).mean()
-        # An edge crosses a pixel's centre within float32's rounding, some 1e-4 px, in one pixel of ten thousand.
-        assert differ <= 1e-3, f"{name} differs in {differ:.2%} of the pixels"
 
 
 def test_memory_beside_the_passes_does_not_grow_with_the_picture(ball, make_scene):

@@ -7,7 +7,7 @@ less noise than its sum has: then what the samples of its pixels tell counts as 
 
 What is within rounding is no difference: a pixel's is taken beyond the largest tolerance, a tile's sum beyond that of the 99th
 percentile of each pixel, since a mean of rounding errors can't exceed what nearly all of them stay below. Nor is what Cycles'
-table of the Blackman-Harris filter does (tracer/light/filters.py): it shifts the picture by 4.9e-4 px to the right and up, and
+table of the Blackman-Harris filter does (core/film/filter.h): it shifts the picture by 4.9e-4 px to the right and up, and
 changes a pixel by 0.21 % of the contrast around it at most. A shift changes only what passes a tile's border, so that its
 effect is the sum of the slopes, in which noise cancels.
 """

@@ -22,7 +22,7 @@ from .sides import Sides, all_sides, quiet, samples_of
 from .tolerances import Array, in_float32
 
 VARIANCE_BATCHES = 16
-"""Of so many means, or of one for each sample, the reference's Variance is estimated at least (tracer/light/sums.py)."""
+"""Of so many means, or of one for each sample, the reference's Variance is estimated at least (tracer/core/film/film.h)."""
 
 
 def carries_light(image: Image) -> bool:

@@ -155,6 +155,7 @@ class _Core(Structure):
             "probe_texture",
             _function(c_int, c_int, c_int, c_int, c_void_p, c_int, c_size_t, c_void_p, c_void_p),
         ),
+        ("probe_leaving", _function(c_int, c_void_p, c_size_t, c_void_p, c_void_p, c_void_p)),
     ]
 
 
@@ -366,6 +367,18 @@ class CoreScene:
         self.check(self.core.occluded(self.handle, len(rays), _address(rays), packets, _address(hidden)))
         return hidden.astype(bool)
 
+    def leaving(self, rays: NDArray, directions: NDArray, distances: float | NDArray = math.inf) -> tuple[NDArray, ...]:
+        """Rays to lights that leave what n rays meet, rendering space: points and normals (n, 3), t (n,) of the surface
+        along rays, starts (n, 3) and lengths (n,) of those to the lights.
+
+        directions : (n, 3), unit. distances : of the lights, which face the rays. nan where nothing is met.
+        """
+        rays = array(rays, np.float64, (None, 8))
+        lights, found = np.ones((len(rays), 5)), np.empty((len(rays), 11))
+        lights[:, :3], lights[:, 3] = directions, distances
+        self.check(self.core.probe_leaving(self.handle, len(rays), _address(rays), _address(lights), _address(found)))
+        return found[:, :3], found[:, 3:6], found[:, 6], found[:, 7:10], found[:, 10]
+
     @property
     def bytes(self) -> int:
         """The memory of all hierarchies."""
@@ -404,6 +417,16 @@ class StopFlag:
 
     def set(self) -> None:
         self._value.value = 1
+
+
+def sobol(seed: int, samples: int, pixels: NDArray, numbers: NDArray, first: int, dimensions: int) -> NDArray[np.float64]:
+    """(n, dimensions): the sampler's numbers, from dimension `first` on, of samples of n pixels; for tests and benchmarks."""
+    pixels, numbers = array(pixels, np.uint32, (None,)), array(numbers, np.uint32, (len(pixels),))
+    found = np.empty((len(pixels), dimensions))
+    given = seed & 0xFFFFFFFF, samples, 3, len(pixels), _address(pixels), _address(numbers), first, dimensions, _address(found)
+    if core().probe_sobol(*given):
+        raise MemoryError
+    return found
 
 
 def kinds(names: frozenset[str]) -> int:

@@ -8,13 +8,10 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as blender_camera
-from viewcam_addon.tracer.light.scattering import refracted
-from viewcam_addon.tracer.rays.ellipsoids import ellipsoids_of
-from viewcam_addon.tracer.rays.points import Surfaces
-from viewcam_addon.tracer.rays.space import Space
-from viewcam_addon.tracer.rays.triangles import Planes, triangles_of
-from viewcam_addon.tracer.rays.view import View
+from viewcam_addon.tracer.native import CoreScene
 from viewcam_addon.tracer.scene import Object, Scene, Spheres
+
+from tests.tracer.core_probes import refracted  # isort: skip
 
 IOR = 1.5
 SKY = 40.0  # the radius of what render_positions makes shine
@@ -50,22 +47,17 @@ def beyond(pinhole, scale) -> tuple[np.ndarray, np.ndarray]:
         {"drop": Spheres(np.zeros((1, 3)), np.ones(1), np.zeros(1, np.int32))},
         (Object("drop", "drop", np.diag([*scale, 1.0])),),
     )
-    view = View(pinhole)
-    triangles = triangles_of([], view)
-    ellipsoids = ellipsoids_of([(scene.objects[0], scene.geometries["drop"])], view)
-    surfaces = Surfaces(scene, view, triangles, Planes(triangles, view), ellipsoids)
-    rows, columns = np.mgrid[: pinhole.height, : pinhole.width] + 0.5
-    x, y = pinhole.view_plane(columns.ravel(), rows.ravel())
-    pixels = np.flatnonzero(np.isfinite(ellipsoids.depth(np.zeros(1, np.intp), x, y)))
-    x, y = x[pixels], y[pixels]
-    points = surfaces.seen(np.zeros(len(pixels), np.intp), x, y)
-    ways = np.stack([x, y, np.ones_like(x)])
-    ways /= np.linalg.norm(ways, axis=0)
-    onwards, _ = refracted(ways, points.shading, np.full(len(x), IOR))
-    met, _, _ = Space(surfaces).first(points, onwards, "transmission")
-    assert not len(met), f"{len(met)} rays meet the far side of the sphere that they are in"
-    start = (view.axes.T @ points.position).T + view.eye
-    way = (view.axes.T @ onwards).T
+    core = CoreScene(scene, 1)
+    rows, columns = np.mgrid[: pinhole.height, : pinhole.width]
+    rays = core.rays(np.array(pinhole.eye)[None], pinhole.ray_directions(columns.ravel(), rows.ravel()))
+    pixels = np.flatnonzero(np.isfinite(core.closest(rays)[0]))
+    rays = rays[pixels]
+    points, normals, _, _, _ = core.leaving(rays, np.array([0.0, 0.0, 1.0]))
+    way = refracted(rays[:, 3:6].T, normals.T, IOR)[0].T
+    _, _, _, starts, _ = core.leaving(rays, way)
+    met = np.isfinite(core.closest(core.rays(starts + core.origin, way), "transmission")[0])
+    assert not met.any(), f"{met.sum()} rays meet the far side of the sphere that they are in"
+    start = points + core.origin
     along = np.einsum("ij,ij->i", start, way)
     reach = -along + np.sqrt(along**2 - np.einsum("ij,ij->i", start, start) + SKY**2)
     return pixels, start + reach[:, None] * way

@@ -97,14 +97,14 @@ def test_every_pass_is_what_the_tracer_computes_bit_for_bit(lit, write, level):
 
 @pytest.fixture
 def prepared(monkeypatch):
-    """Of each tracer that is made, whether there was one before it, and whether the camera had moved."""
+    """Of each tracer that is made, whether it has the hierarchies of one before it."""
     made = []
     real = renders.Tracer.__init__
 
-    def init(self, scene, threads=None, kept=None, rays=0):
-        before = None if kept is None else kept._triangles
-        real(self, scene, threads, kept, rays)
-        made.append("new" if before is None else "same" if self._triangles is before else "moved")
+    def init(self, scene, threads=None, kept=None):
+        before = None if kept is None else kept._core
+        real(self, scene, threads, kept)
+        made.append("same" if self._core is before else "new")
 
     monkeypatch.setattr(renders.Tracer, "__init__", init)
     return made
@@ -120,7 +120,7 @@ def test_persistent_data_keeps_what_frames_share(persistent, lit, prepared, tmp_
     lit.render.use_persistent_data = persistent
     lit.render.filepath = str(tmp_path / "frame")
     bpy.ops.render.render(animation=True)
-    assert prepared == (["new", "same", "moved", "same", "moved", "same"] if persistent else ["new", "same"] * 3)
+    assert prepared == (["new"] + ["same"] * 5 if persistent else ["new", "same"] * 3)
     for frame in (1, 2, 3):
         lit.frame_set(frame)
         found = channels(tmp_path / f"frame{frame:04}.exr")

@@ -39,7 +39,7 @@ class _Watcher:
 
 def keeper() -> "Keeper":
     """What `bands` needs to keep what pictures share."""
-    from ...tracer.render import Keeper  # brings Embree, which Blender's start need not wait for
+    from ...tracer.render import Keeper  # loads the tracer, which Blender's start need not wait for
 
     return Keeper()
 

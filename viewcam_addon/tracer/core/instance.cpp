@@ -176,6 +176,8 @@ const ViewcamCore core = {
                          double* out) { return guarded([&] { probe::light_le(*lamp, count, given, out); }); },
     .probe_texture = [](int width, int height, int srgb, const float* pixels, int closest, size_t count, const double* uv,
                         double* out) { return guarded([&] { probe::texture(width, height, srgb, pixels, closest, count, uv, out); }); },
+    .probe_leaving = [](const ViewcamScene* scene, size_t count, const double* rays, const double* lights,
+                        double* out) { return guarded([&] { probe::leaving(scene_of(scene), count, rays, lights, out); }); },
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

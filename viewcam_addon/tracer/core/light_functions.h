@@ -118,6 +118,23 @@ inline void light_le(const ViewcamLamp& lamp, size_t count, const double* given,
         out[0] = radiance.x, out[1] = radiance.y, out[2] = radiance.z;
     }
 }
+// Rays that leave what others meet. rays: (count, 8), from the eye. lights: (count, 5), of each a light's direction, its distance and
+// its cosine. out: (count, 11), position, normal, t, where the ray to the light starts, and how far it goes; nan where nothing is met.
+inline void leaving(const Scene& scene, size_t count, const double* rays, const double* lights, double* out) {
+    for (size_t i = 0; i < count; i++, rays += 8, lights += 5, out += 11) {
+        Ray ray{{rays[0], rays[1], rays[2]}, {rays[3], rays[4], rays[5]}, rays[6], rays[7]};
+        std::fill(out, out + 11, std::numeric_limits<double>::quiet_NaN());
+        Hit hit = scene.closest(ray, CAMERA);
+        if (!hit) continue;
+        Interaction point = scene.interaction(ray, hit);
+        LightSample light;
+        light.direction = {lights[0], lights[1], lights[2]}, light.distance = lights[3], light.cosine = lights[4];
+        Ray onwards = shadow_ray(point, light);
+        for (int axis = 0; axis < 3; axis++)
+            out[axis] = point.position[axis], out[3 + axis] = point.normal[axis], out[7 + axis] = onwards.origin[axis];
+        out[6] = point.t, out[10] = onwards.t_max;
+    }
+}
 // uv: (count, 2). out: (count, 3).
 inline void texture(int width, int height, bool srgb, const float* pixels, bool closest, size_t count, const double* uv, double* out) {
     Texture texture{width, height, srgb, std::vector<float>(pixels, pixels + 3 * size_t(width) * height)};

@@ -21,6 +21,17 @@
 
 namespace viewcam::VIEWCAM_ISA {
 
+// A ray to a light ends before it by what rounding can move the light's own surface along the ray: what the light touches
+// does not hide it.
+inline Ray shadow_ray(const Interaction& point, const LightSample& sample) {
+    constexpr double ROUNDINGS = 32 * 0x1p-53, FLATTEST = 1e-6;
+    Vec3 origin = point.ray_origin(sample.direction);
+    if (sample.distance == INFINITE) return {origin, sample.direction, 0, INFINITE};
+    double largest = max_component(abs(origin)) + sample.distance;
+    double slack = (2 * point.offset + ROUNDINGS * largest) / larger(sample.cosine, FLATTEST);
+    return {origin, sample.direction, 0, larger(sample.distance - slack, 0.0)};
+}
+
 // A sample of a pixel, row · width + column, and its ray from the eye.
 struct CameraSample {
     uint32_t pixel, number;
@@ -229,17 +240,6 @@ class PathIntegrator {
         bool traced = choice.light->casts_shadow;
         block.shadowed[choice.slot][place] = {path.sample, after(path.category, DIFFUSE, depth), traced, light};
         if (traced) block.shadow_rays[choice.slot][place] = shadow_ray(point, sample);
-    }
-
-    // A ray to a light ends before it by what rounding can move the light's own surface along the ray: what the light touches
-    // does not hide it.
-    Ray shadow_ray(const Interaction& point, const LightSample& sample) const {
-        constexpr double ROUNDINGS = 32 * 0x1p-53, FLATTEST = 1e-6;
-        Vec3 origin = point.ray_origin(sample.direction);
-        if (sample.distance == INFINITE) return {origin, sample.direction, 0, INFINITE};
-        double largest = max_component(abs(origin)) + sample.distance;
-        double slack = (2 * point.offset + ROUNDINGS * largest) / larger(sample.cosine, FLATTEST);
-        return {origin, sample.direction, 0, larger(sample.distance - slack, 0.0)};
     }
 
     // Sends the shadow rays, and adds the light that nothing hides.
