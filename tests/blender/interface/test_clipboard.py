@@ -273,3 +273,11 @@ def test_a_size_beyond_blenders_is_refused_and_the_scenes_stays(posed_camera, sc
     with pytest.raises(RuntimeError, match="camera's picture is 3 × 360 pixels and Blender's are 4 to 65536"):
         paste(SHIFTED.replace('"width": 640', '"width": 3'), set_size=True)
     assert (scene.render.resolution_x, scene.render.resolution_y) == (1920, 1080)
+
+
+def test_no_shift_is_told_of_where_a_principal_point_is_rounded(posed_camera, capfd):
+    paste(
+        'Film "rgb" "integer xresolution" [800] "integer yresolution" [600] LookAt 4 -6 3.5 0 0 1 0 0 1 '
+        'Scale -1 1 1 Camera "perspective" "float fov" [40]'
+    )
+    assert "shift on Camera" not in capfd.readouterr().out

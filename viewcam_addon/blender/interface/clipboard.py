@@ -7,6 +7,7 @@ well; size and pixel aspect are the scene's, and where they differ it is told, o
 
 import contextlib
 import dataclasses
+import math
 from typing import ClassVar
 
 import bpy
@@ -24,6 +25,7 @@ from .camera_options import READING, ReadingOptions, WorldOptions
 from .operators import CameraOperator
 
 _DIALOG_WIDTH = 480
+_ROUNDING = 1e-6  # pixels, of principal points that were computed
 _NAMES = {"eye": "eye", "look_at": "look-at", "up": "up"}
 
 
@@ -258,7 +260,8 @@ def _said(pinhole: Pinhole, before: Pinhole) -> str:
     """What differs now."""
     names = [name for key, name in _NAMES.items() if getattr(pinhole, key) != getattr(before, key)]
     names += ["distance"] if pinhole.distance != before.distance else []
-    names += ["shift"] if pinhole.plane.principal_point != (pinhole.width / 2, pinhole.height / 2) else []
+    shift = math.dist(pinhole.plane.principal_point, (pinhole.width / 2, pinhole.height / 2))
+    names += ["shift"] if shift > _ROUNDING else []
     names += ["mirror"] if pinhole.mirrored != before.mirrored else []
     return ", ".join(names) or "the same camera"
 
