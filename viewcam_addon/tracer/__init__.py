@@ -1,5 +1,5 @@
-"""The reference tracer, from the ground: what is traced (`scene/`), what rays meet (`rays/`), what light does (`light/`).
+"""The reference tracer: what is traced (`scene/`), the compiled core that traces it (`core/`), and the pictures that become of it.
 
-`render.py` makes pictures of them, tile by tile (`tiles.py`); `arrays.py` has the few operations on vectors that all share. It
-knows no Blender, and of files only those of scenes.
+`native.py` alone knows the core's C interface; `render.py` makes pictures, tile by tile (`tiles.py`). It knows no Blender, and of
+files only those of scenes.
 """

@@ -11,6 +11,7 @@ import functools
 import importlib.util
 import math
 import os
+import sys
 from collections.abc import Mapping, Sequence
 from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int, c_int32, c_size_t, c_uint32, c_void_p
 from pathlib import Path
@@ -121,6 +122,7 @@ def _function(result: Any, *arguments: Any) -> Any:
 class _Core(Structure):
     _fields_ = [
         ("name", c_char_p),
+        ("size", c_size_t),
         ("message", _function(c_char_p)),
         ("scene_create", _function(c_void_p)),
         ("scene_free", _function(None, c_void_p)),
@@ -174,21 +176,21 @@ def core(name: str | None = None) -> _Core:
     found = library.viewcam_core(None if name is None else name.encode())
     if not found:
         raise InputError(f"this processor has no core for the instruction set {name!r}: unset VIEWCAM_ISA")
+    if found.contents.size != ctypes.sizeof(_Core):
+        raise InputError("the tracer's core that is installed is of another version: install this one's (pip install)")
     return found.contents
 
 
 @functools.cache
 def _library() -> ctypes.CDLL:
+    """What hatch_build.py compiled and pip, or Blender, installed."""
+    name = {"win32": "viewcam.dll", "darwin": "libviewcam.dylib"}.get(sys.platform, "libviewcam.so")
     spec = importlib.util.find_spec("viewcam_core")
-    folders = [Path(folder) for folder in (spec.submodule_search_locations or ())] if spec else []
-    built = Path(__file__).parents[2] / "build" / "core"
-    folders += sorted(built.glob("*"), key=lambda folder: folder.stat().st_mtime, reverse=True)
-    for folder in folders:
-        for file in ("libviewcam.so", "viewcam.dll", "libviewcam.dylib"):
-            if (folder / file).exists():
-                return ctypes.CDLL(str(folder / file))
+    for folder in (spec.submodule_search_locations or ()) if spec else ():
+        if (file := Path(folder, name)).exists():
+            return ctypes.CDLL(str(file))
     raise InputError(
-        "the tracer's core is missing for this system: install the package for it, or a C++20 compiler and pip install"
+        "the tracer's core is missing for this system: install the add-on made for it, or pip install where there is a compiler"
     )
 
 

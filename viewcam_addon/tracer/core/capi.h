@@ -56,6 +56,7 @@ typedef struct {
 
 typedef struct {
     const char* name;             /* of the instruction set */
+    size_t size;                  /* of this table, by which native.py knows a library of another version */
     const char* (*message)(void); /* what went wrong last in this thread */
 
     ViewcamScene* (*scene_create)(void);

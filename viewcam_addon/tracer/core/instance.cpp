@@ -44,6 +44,7 @@ Ray ray_of(const double* row) { return {vector(row), vector(row + 3), row[6], ro
 extern const ViewcamCore core;
 const ViewcamCore core = {
     .name = VIEWCAM_NAME(VIEWCAM_ISA),
+    .size = sizeof(ViewcamCore),
     .message = [] { return message().c_str(); },
 
     .scene_create = []() -> ViewcamScene* { return reinterpret_cast<ViewcamScene*>(new (std::nothrow) Scene); },
