@@ -42,7 +42,7 @@ _DEFINE = re.compile(r"#\s*+define\s++(\w++)\s++")
 _PATH = r"[A-Za-z_$][\w$]*+(?:(?:\s*+\(\s*+\))?+\s*+(?:\.|->|::)\s*+[A-Za-z_$][\w$]*+)*+"
 _STATEMENT = re.compile(rf"(?<![\w$.])(?<!->)(?<!::)({_PATH})\s*+(?:(=)(?!=)|(\()|(:)(?!:)|(\{{))")
 _PART = re.compile(r"\(\s*\)|\.|->|::|\s")
-_MADE = re.compile(r"([\w$]++)\s*+[=:]\s*+new\s++(?:THREE\s*+\.\s*+)?+PerspectiveCamera\b")
+_MADE = re.compile(r"(?<![\w$])([\w$]++)\s*+[=:]\s*+new\s++(?:THREE\s*+\.\s*+)?+PerspectiveCamera\b")
 _IS_CODE = re.compile(r"\w\s*+\(\s*+[-\w.]|;\s*+$|\w\.\w++\s*+[=(]", re.MULTILINE)
 _CAMERA = re.compile(r"cam|view|eye|lens|observer", re.IGNORECASE)
 
