@@ -125,6 +125,27 @@ def test_what_is_killed_in_the_midst_of_a_shot_loses_nothing(stand_in, machines,
     assert processes.run(worker) == (victim == "blender")
 
 
+def test_a_worker_that_is_stopped_holds_no_batch_up_with_a_time_limit_or_without(
+    stand_in, blend, tmp_path, processes, monkeypatch
+):
+    """The time limit is a Blender's; that a worker says nothing is the scheduler's to see."""
+    monkeypatch.setattr(cluster, "_WORKERS_WITHIN", 5.0)
+    listed, folder, ear, outcome = shots("a", "slow_one", "b", "c"), Folder(tmp_path / "out"), Ear(), []
+    with cluster.opened(None, 2) as machines:
+        work = machines.work(blend, folder, settings_of(listed), MADE_FROM, time_limit=40.0)
+        batch = threading.Thread(target=lambda: outcome.append(run.run(listed, folder, settings_of(listed), work, ear)))
+        batch.start()
+        assert processes.until(lambda: stand_in.diary("waits")), "the shot was never begun"
+        blender = int(stand_in.diary("waits")[0][-1])
+        worker = int(Path(f"/proc/{blender}/stat").read_text().rpartition(")")[2].split()[1])
+        os.kill(worker, signal.SIGSTOP)
+        batch.join(60)
+        with contextlib.suppress(ProcessLookupError):  # Dask has ended it
+            os.kill(worker, signal.SIGKILL)
+    assert outcome and outcome[0].counts["done"] == 4 and not ear.all("shot_failed"), ear.told
+    assert len({words[-1] for words in stand_in.diary("render") if words[1] == "slow_one"}) == 2
+
+
 def test_a_shot_that_always_crashes_blender_fails_and_the_rest_go_on(stand_in, machines, blend, tmp_path):
     ear = Ear()
     summary = run_on(machines, blend, tmp_path / "out", shots("a", "crash", "bad", "b", "c"), ear)
