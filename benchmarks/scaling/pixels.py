@@ -22,11 +22,8 @@ BYTES_A_PIXEL = {
 }
 """Of the passes of a picture, float32."""
 
-_KEPT = {ADAPTIVE: 5}
-"""Bytes of each pixel that are kept beside: what its centre sees, and whether an edge may cross it."""
-
-# Pictures of so many pixels fill the tiles of all threads, or a band: what they take beyond their passes does not grow.
-_FULL = {GEOMETRY: 900_000, DIRECT: 900_000, ADAPTIVE: 2_000_000}
+# Pictures of so many pixels fill the tiles of all threads: what they take beyond their passes does not grow.
+_FULL = 900_000
 
 
 def charts(quick: bool = False) -> tuple[Chart, ...]:
@@ -40,8 +37,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
     ]
     limits = []
     for stage, each in BYTES_A_PIXEL.items():
-        each += _KEPT.get(stage, 0)
-        full = [(pixels, measured.peak[stage] - each * pixels) for pixels, measured in sweep if pixels > _FULL[stage]]
+        full = [(pixels, measured.peak[stage] - each * pixels) for pixels, measured in sweep if pixels > _FULL]
         if full:
             name = f"a fixed amount and {each} bytes a pixel: {stage}"
             limits.append(growth.memory_limit([pixels for pixels, _ in full], full[0][1], each, name, stage))

@@ -6,8 +6,8 @@ from ..charts import Chart
 from . import growth, scenes
 from .point import DIRECT, FIRST_DIRECT, FIRST_GEOMETRY, GEOMETRY, PREPARING, Work, measure
 
-# Beyond the scene's own arrays: hierarchy, camera space, planes, and the tables of light.
-BYTES_A_TRIANGLE = 300
+# Beyond the scene's own arrays: the hierarchy, what building it takes, and light's tables.
+BYTES_A_TRIANGLE = 200
 
 
 def charts(quick: bool = False) -> tuple[Chart, ...]:

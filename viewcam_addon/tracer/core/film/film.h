@@ -47,7 +47,7 @@ class Pixel {
 
     uint32_t count() const { return count_; }
 
-    // Adds a sample.
+    // Adds a sample. batch_size: a power of two.
     void add(const PathLight& light, const FilmSettings& film, uint32_t batch_size) {
         Vec3 shown;
         for (int category = 0; category < CATEGORIES; category++) {
@@ -59,7 +59,7 @@ class Pixel {
         differences_ += difference;
         spread_ += difference * difference;
         covered_ += light.covered;
-        if (++count_ % batch_size == 0) {
+        if ((++count_ & (batch_size - 1)) == 0) {
             Vec3 batch = differences_ - before_;
             squares_ += batch * batch;
             before_ = differences_;

@@ -99,8 +99,10 @@ class TileSampler {
             int count = 0;
             for (uint32_t k = 0; k < size; k++) {
                 uint32_t place = group[k], number = pixel(tile, place), key = sampler.key(number);
+                SobolSampler::Scramble scramble[] = {sampler.scramble(key, 0), sampler.scramble(key, 1)};
                 for (uint32_t i = first; i < last; i++) {
-                    Vec2 offset = samples_ > 1 ? filter_.offset(sampler.pair(key, i, 0)) : Vec2{0.5, 0.5};
+                    Vec2 u{sampler.number(scramble[0], i, 0), sampler.number(scramble[1], i, 1)};
+                    Vec2 offset = samples_ > 1 ? filter_.offset(u) : Vec2{0.5, 0.5};
                     double column = tile.column + place % TILE + offset.x, row = tile.row + place / TILE + offset.y;
                     samples[count++] = {number, i, camera_.ray(column, row)};
                 }

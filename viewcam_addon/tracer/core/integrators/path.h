@@ -75,6 +75,7 @@ class PathIntegrator {
         static thread_local Block block;  // too large for a stack, and to be cleared for nothing
         block.light = light;
         block.live = 0;
+        std::fill_n(light, count, PathLight{});
         start(samples, count, block);
         for (int depth = 1; block.live > 0 && lit_; depth++) {
             scatter(samples, depth, block);
@@ -139,7 +140,7 @@ class PathIntegrator {
         for (int i = 0; i < count; i++) rays[i] = samples[i].ray;
         scene_.closest(rays, count, CAMERA, hits);
         for (int i = 0; i < count; i++) {
-            PathLight& light = block.light[i] = PathLight{};
+            PathLight& light = block.light[i];
             double size = length(rays[i].direction);
             Vec3 ahead = rays[i].direction / size;
             if (lights_.meets_lamps(CAMERA)) {
@@ -157,9 +158,12 @@ class PathIntegrator {
             if (!made_of.emission.is_black()) light.of[EMISSION] += made_of.emission.at(scene_.illumination.textures, point);
             if (made_of.closures.empty()) continue;
             light.of[COLOR] = made_of.diffuse_color(shading(point, ahead));
-            Path& path = block.paths[block.live];
-            path = Path{};
-            path.sample = i, path.from = block.live, path.ray.direction = ahead;
+            Path& path = block.paths[block.live];  // the rest is known when it is scattered
+            path.sample = i, path.from = block.live;
+            path.category = COLOR;
+            path.scattered[0] = path.scattered[1] = path.scattered[2] = 0;
+            path.weight = {1, 1, 1};
+            path.ray.direction = ahead;
             block.live++;
         }
     }

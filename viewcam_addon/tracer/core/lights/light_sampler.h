@@ -53,6 +53,7 @@ class LightSampler {
                 for (RayKind kind : {CAMERA, GLOSSY, TRANSMISSION})
                     if (!(lights_[i].hidden_from & kind)) met_[kind].push_back(uint32_t(i));
         count_ = int(meshes);
+        random_ = count_ > 1 || (count_ == 1 && lights_[0].is_sized());
         if (count_ > FEW) {
             double total = 0, extent = scene.extent();
             for (int i = 0; i < count_; i++) total += lights_[i].power(extent);
@@ -69,7 +70,7 @@ class LightSampler {
     // How many lights diffuse surfaces can be lit by, and whether what they get depends on chance.
     int count() const { return count_; }
     bool has_meshes() const { return size_t(count_) > lamps_; }
-    bool is_random() const { return count_ > 1 || (count_ == 1 && lights_[0].is_sized()); }
+    bool is_random() const { return random_; }
     // Whether rays of a kind run into lamps.
     bool meets_lamps(RayKind kind) const { return kind <= TRANSMISSION && !met_[kind].empty(); }
 
@@ -161,6 +162,7 @@ class LightSampler {
     std::vector<Light> lights_;  // lamps that light diffuse surfaces, meshes, lamps that don't
     size_t lamps_;
     int count_;
+    bool random_;
     std::vector<uint32_t> owners_;                // of each object, which light it is
     std::vector<uint32_t> met_[TRANSMISSION + 1];  // by kind of ray, lamps that have a size
     std::vector<double> chances_, reached_;       // of many lights

@@ -54,11 +54,20 @@ class SobolSampler {
     // All that a pixel's numbers share. pixel: row · width + column.
     uint32_t key(uint32_t pixel) const { return mixed(pixel ^ seeds_[0]); }
 
-    // A number in [0, 1). key: of the pixel.
-    double number(uint32_t key, uint32_t sample, int dimension) const {
+    // What scrambles a pixel's numbers in a dimension. key: of the pixel.
+    struct Scramble {
+        uint32_t factor, shift;
+    };
+    Scramble scramble(uint32_t key, int dimension) const {
         uint32_t shift = mixed(key ^ mixed(uint32_t(dimension) + seeds_[1]));
-        return scrambled(digits(sample, dimension), factor(shift), shift);
+        return {factor(shift), shift};
     }
+
+    // A number in [0, 1).
+    double number(Scramble scramble, uint32_t sample, int dimension) const {
+        return reversed(digits(sample, dimension) * scramble.factor + scramble.shift) * 0x1p-32;
+    }
+    double number(uint32_t key, uint32_t sample, int dimension) const { return number(scramble(key, dimension), sample, dimension); }
     Vec2 pair(uint32_t key, uint32_t sample, int dimension) const {
         return {number(key, sample, dimension), number(key, sample, dimension + 1)};
     }
@@ -97,9 +106,6 @@ class SobolSampler {
     static uint32_t factor(uint32_t shift) {
         uint32_t factor = shift * 0x9e3779b1u;
         return (factor ^ factor >> 15) | 1;
-    }
-    static double scrambled(uint32_t digits, uint32_t factor, uint32_t shift) {
-        return reversed(digits * factor + shift) * 0x1p-32;
     }
 
     // Which of Sobol's points a sample has at a scattering: Owen's permutation, each bit flipped, or not, by those above it.

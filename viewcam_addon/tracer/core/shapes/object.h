@@ -13,6 +13,7 @@ struct Object {
     float index = 0;            // what the Object Index pass shows
     bool shared = false;        // whether other objects place the same geometry
     bool flat = false;          // whether the matrix has no inverse to speak of
+    bool mirrored = false;      // whether corners that run counter-clockwise in object space run clockwise in the world
     double condition = 1;       // of the matrix: by how much its inverse may enlarge a rounding
     Affine to_world;            // object space to rendering space
     double inverse[3][3] = {};  // of its linear part
@@ -40,16 +41,14 @@ struct Object {
         return most * size;
     }
     Vec3 column(int i) const { return {to_world.m[0][i], to_world.m[1][i], to_world.m[2][i]}; }
-    // The linear part's cofactors, which turn normals as the sides of a triangle turn its own, over the largest of them.
-    void cofactors(Vec3 rows[3]) const {
-        Vec3 first{to_world.m[0][0], to_world.m[0][1], to_world.m[0][2]}, second{to_world.m[1][0], to_world.m[1][1], to_world.m[1][2]},
-            third{to_world.m[2][0], to_world.m[2][1], to_world.m[2][2]};
-        rows[0] = cross(second, third);
-        rows[1] = cross(third, first);
-        rows[2] = cross(first, second);
-        double largest = max(max_component(abs(rows[0])), max(max_component(abs(rows[1])), max_component(abs(rows[2]))));
-        if (largest > 0)
-            for (int i = 0; i < 3; i++) rows[i] = rows[i] / largest;
+    // A vertex's normal as the sides of a triangle turn the triangle's own, of any length: by the matrix's cofactors, the inverse's
+    // transpose but for a factor.
+    Vec3 turned_normal(Vec3 n) const {
+        if (flat) return turned_by_cofactors(n);
+        Vec3 turned{inverse[0][0] * n.x + inverse[1][0] * n.y + inverse[2][0] * n.z,
+                    inverse[0][1] * n.x + inverse[1][1] * n.y + inverse[2][1] * n.z,
+                    inverse[0][2] * n.x + inverse[1][2] * n.y + inverse[2][2] * n.z};
+        return mirrored ? -turned : turned;
     }
 
     // Places the object. matrix: (3, 4), rows first, to world space. origin: rendering space's, in the world.
@@ -71,9 +70,15 @@ struct Object {
         condition = largest * largest_inverse;
         flat = !(condition < 0x1p50);
         if (flat) condition = 0x1p50;
+        mirrored = flat ? dot(a, cross(b, c)) < 0 : determinant < 0;
     }
-    // Which side the front of its triangles is on: corners that run counter-clockwise in object space do so in the world, or not.
-    bool is_mirrored() const { return dot(column(0), cross(column(1), column(2))) < 0; }
+
+   private:
+    Vec3 turned_by_cofactors(Vec3 n) const {
+        Vec3 a = column(0), b = column(1), c = column(2), cofactors[3] = {cross(b, c), cross(c, a), cross(a, b)};
+        double largest = max(max_component(abs(cofactors[0])), max(max_component(abs(cofactors[1])), max_component(abs(cofactors[2]))));
+        return largest > 0 ? (cofactors[0] * n.x + cofactors[1] * n.y + cofactors[2] * n.z) / largest : Vec3{};
+    }
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

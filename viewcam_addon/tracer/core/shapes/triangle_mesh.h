@@ -207,20 +207,21 @@ inline Interaction triangle_interaction(const TriangleMesh& mesh, const Object& 
         found.normal = -normalize(ray.direction);
     }
     found.cosine = -dot(found.normal, ray.direction) / length(ray.direction);
-    found.backside = (side < 0) != object.is_mirrored();
+    found.backside = (side < 0) != object.mirrored;
     found.shading = found.normal;
     if (mesh.corner_normals) {
-        // By the cofactors of the matrix, as the face's own normal. Cycles turns those of a mesh that only one object uses into
-        // the world before it interpolates, and normalises them there; those of a shared mesh it interpolates in object space.
-        Vec3 rows[3], corner[3];
-        object.cofactors(rows);
+        // Cycles turns those of a mesh that only one object uses into the world before it interpolates, and normalises them
+        // there; those of a shared mesh it interpolates in object space.
+        Vec3 corner[3];
         for (int i = 0; i < 3; i++) {
-            Vec3 given = TriangleMesh::corner_value(mesh.corner_normals, triangle, i);
-            corner[i] = {dot(rows[0], given), dot(rows[1], given), dot(rows[2], given)};
+            corner[i] = TriangleMesh::corner_value(mesh.corner_normals, triangle, i);
+            if (object.shared) continue;
+            corner[i] = object.turned_normal(corner[i]);
             double size = length(corner[i]);
-            if (!object.shared && size > 0) corner[i] = corner[i] / size;
+            if (size > 0) corner[i] = corner[i] / size;
         }
         Vec3 smooth = at.interpolate(corner[0], corner[1], corner[2]);
+        if (object.shared) smooth = object.turned_normal(smooth);
         double size = length(smooth);
         if (size > 0) found.shading = smooth * (side / size);
     }
