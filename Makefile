@@ -2,6 +2,7 @@
 #   make demo          the sample scene rendered by Cycles and by the tracer, compared; ends with the report
 #   make test          lint and the tests, with the newest bpy wheel for the Python found
 #   make test-exhaustive  the tests that take minutes: 10⁸ rays, millions of hostile numbers
+#   make test-sanitizers  the core compiled with sanitizers, and what its tests find of addresses, undefined behaviour and threads
 #   make test-matrix   the tests with Blender 4.2 (and 5.2 where there is a Python 3.13) as wheels; those of Blender with 4.5 and 5.0
 #   make test-light    whole pictures of light, 1024 samples a pixel, against Cycles of each of these
 #   make test-blender  the extension in a real Blender 5.2: $BLENDER, or blender on the PATH, or Debian's in a folder of its own
@@ -13,7 +14,7 @@
 #   make bench-guard   whether the tracer has become slower than it was, as a share of bare Embree's speed; a minute or two
 #   make clean         removes all that these made, but for ~/.cache/virtual-pinhole
 
-.PHONY: demo test test-exhaustive lint test-matrix test-light test-blender extension artist-pictures scenes charts bench bench-guard clean
+.PHONY: demo test test-exhaustive test-sanitizers lint test-matrix test-light test-blender extension artist-pictures scenes charts bench bench-guard clean
 .DELETE_ON_ERROR:
 
 # bpy has wheels for these two only.
@@ -34,6 +35,18 @@ test: lint
 
 test-exhaustive: .venv/test
 	$(call PARALLEL,.venv) --dist=worksteal -m exhaustive
+
+# GCC's sanitizers, which come with it: preloaded, since Python itself is compiled without them.
+sanitizers-address = address,undefined
+preload-address = $(shell g++ -print-file-name=libasan.so) $(shell g++ -print-file-name=libubsan.so)
+sanitizers-thread = thread
+preload-thread = $(shell g++ -print-file-name=libtsan.so)
+test-sanitizers: test-sanitizer-address test-sanitizer-thread
+
+test-sanitizer-%: .venv/test
+	CXX=g++ .venv/bin/python hatch_build.py --sanitize $(sanitizers-$*) --into build/sanitized/$*
+	env -u BLENDER LD_PRELOAD="$(preload-$*)" ASAN_OPTIONS=detect_leaks=0 TSAN_OPTIONS=report_bugs=1 PYTHONPATH=build/sanitized/$* \
+	VIEWCAM_LEAK_RAYS=2000 .venv/bin/python -m pytest tests/tracer/test_intersection.py tests/tracer/test_render.py tests/tracer/test_triangles.py
 
 lint: .venv/test
 	.venv/bin/python -m ruff check .

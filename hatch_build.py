@@ -169,12 +169,23 @@ class CoreBuildHook(BuildHookInterface):
         build_data["tag"] = f"py3-none-{tag.replace('-', '_').replace('.', '_')}"
 
 
+def sanitized(sanitizers: str, folder: Path) -> None:
+    """The package compiled for this machine with sanitizers, as compilers name them, in a folder for PYTHONPATH."""
+    library = build_core(this_platform(), (f"-fsanitize={sanitizers}", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer"))
+    (folder / PACKAGE).mkdir(parents=True, exist_ok=True)
+    (folder / PACKAGE / "__init__.py").touch()
+    shutil.copy(library, folder / PACKAGE)
+
+
 def main() -> None:
     """Make the core's wheels for platforms, this one by default, into a folder."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("platforms", nargs="*", default=[this_platform()], metavar="PLATFORM", help=", ".join(PLATFORMS))
     parser.add_argument("--into", type=Path, default=ROOT / "dist", metavar="FOLDER", help="dist by default")
+    parser.add_argument("--sanitize", metavar="NAMES", help="no wheel: the package for this machine, to be tested")
     arguments = parser.parse_args()
+    if arguments.sanitize:
+        return sanitized(arguments.sanitize, arguments.into)
     for platform in arguments.platforms:
         if platform not in PLATFORMS:
             parser.error(f"there is no platform {platform!r}: give some of {', '.join(PLATFORMS)}")

@@ -1,8 +1,8 @@
 """Builds the extension with its wheels: `python .ci/extension.py BLENDER OUTPUT-FOLDER [PLATFORM…]`, all platforms by default.
 
 The wheels are no part of the checkout, and a manifest that names missing ones can't be built; so the manifest in the checkout
-names none, and Blender builds from a copy to which the wheels and their names are added. One zip a platform (some 50 MB each,
-for the Pythons of Blender 4.2 to 5.2) rather than one for all (200 MB).
+names none, and Blender builds from a copy to which the wheels and their names are added. One zip a platform: the tracer's core
+has one wheel for all Pythons, OpenEXR one for each Python of Blender 4.2 to 5.2.
 """
 
 import os
@@ -13,22 +13,24 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+from hatch_build import core_wheel  # noqa: E402 - only now is it known where that is
+
 CONTENTS = ["__init__.py", "viewcam_addon", "README.md", "LICENSE"]
 
 PYTHONS = ["3.11", "3.13", "3.14"]
-WHEELS = {"embreex": "4.4.0.post1", "OpenEXR": "3.5.3"}
+WHEELS = {"OpenEXR": "3.5.3"}
 # In Python alone: one wheel for all of them.
 PURE_WHEELS = {"tqdm": "4.70.1"}
 # Blender's name of a platform, and pip's: what a wheel may ask for and Blender 4.2's own minimum grants.
 PLATFORMS = {
     "linux-x64": ["manylinux_2_28_x86_64"],
+    "linux-arm64": ["manylinux_2_28_aarch64"],
     "macos-arm64": ["macosx_13_0_arm64", "macosx_11_0_arm64"],
     "macos-x64": ["macosx_13_0_x86_64"],
     "windows-x64": ["win_amd64"],
     "windows-arm64": ["win_arm64"],
 }
-# There NumPy stands in for Embree.
-WITHOUT_EMBREE = ["windows-arm64"]
 
 
 def wheels_of(platform: str) -> list[Path]:
@@ -37,7 +39,6 @@ def wheels_of(platform: str) -> list[Path]:
     return [
         wheel
         for package, version in WHEELS.items()
-        if package != "embreex" or platform not in WITHOUT_EMBREE
         for python in PYTHONS
         for wheel in _wheels(platform, package, version, f"cp{python.replace('.', '')}", f"--python-version={python}", *tags)
     ]
@@ -67,6 +68,7 @@ def stage(folder: Path, platforms: list[str]) -> None:
         else:
             shutil.copy(source, folder)
     wheels = [*pure_wheels(), *(wheel for platform in platforms for wheel in wheels_of(platform))]
+    wheels += [core_wheel(platform, ROOT / "wheels" / platform) for platform in platforms]
     (folder / "wheels").mkdir()
     for wheel in wheels:
         os.symlink(wheel, folder / "wheels" / wheel.name)

@@ -25,6 +25,7 @@ ANGLES = ("gltf",)
 """Formats that say the distance by an angle, so that a wide or narrow one keeps fewer digits."""
 OURS = ("sidecar", "transforms", "colmap", "colmap_binary", "bop", "gltf", "usd", "ros", "opencv")
 
+
 @pytest.fixture(autouse=True)
 def _usd_is_read_by_openusd(request):
     """make test installs usd-core; the environments that differ by their Blender alone do without."""
