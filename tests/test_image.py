@@ -177,6 +177,18 @@ def test_pictures_of_other_sizes_or_pixels_are_told_apart_by_their_headers(tmp_p
             image.check_same_frames([tmp_path / "a.exr", tmp_path / f"{other}.exr"])
 
 
+def test_a_picture_says_the_shape_of_its_cameras_pixels_to_a_rounding_of_float32(tmp_path):
+    """3 : 2 as Blender has it: widths of which two make three heights, so that across there are fewer to the view plane."""
+    passes = {"Depth": np.ones((4, 5, 1), np.float32)}
+    camera = Pinhole((0, -1, 0), (0, 0, 0), (0, 0, 1), (100.0 / 3, 50.0), 5, 4)
+    image.write(tmp_path / "a.exr", image.Image(passes, camera))
+    window(tmp_path / "same.exr", ((0, 0), (4, 3)), ((0, 0), (4, 3)), aspect=1.5)
+    window(tmp_path / "off.exr", ((0, 0), (4, 3)), ((0, 0), (4, 3)), aspect=1.50001)
+    image.check_same_frames([tmp_path / "a.exr", tmp_path / "same.exr"])
+    with pytest.raises(InputError, match=r"each 1\.50001 times as wide"):
+        image.check_same_frames([tmp_path / "a.exr", tmp_path / "off.exr"])
+
+
 def test_what_takes_more_memory_than_there_is_is_refused_by_its_header(tmp_path, monkeypatch):
     """64 MiB of zeros, which are 60 kB as they are packed."""
     monkeypatch.setattr(memory, "most", lambda: 100 * 2**20)

@@ -42,7 +42,7 @@ ROOMS = {
     "cameras": "errors checks files pinhole intrinsics",
     "datasets": "files pinhole cameras",
     "comparison": "errors files html_theme pinhole image",
-    "tracer": "errors checks memory files exact pinhole image",
+    "tracer": "errors checks memory files pinhole image",
     "api": "errors children image comparison tracer",
     "shots": "errors checks files terminal pinhole moves tracer",
     "batch": "errors checks files events html_theme children pinhole image cameras datasets comparison tracer shots",

@@ -20,6 +20,7 @@ must not have a second copy of that library.
 
 import dataclasses
 import json
+import math
 import os
 from collections import defaultdict
 from collections.abc import Collection, Sequence
@@ -79,6 +80,9 @@ LIGHT_PASSES = tuple(_LIGHT)
 
 BACKGROUND_DEPTH = 1e10
 """The Depth pass where there is nothing: Cycles' value."""
+
+# Pixel aspect is float32 in Blender and in files; of a camera it is the quotient of two distances that were made with it.
+_ASPECT_ROUNDING = 4 * 2.0**-24
 
 _LAYER = "ViewLayer"
 _CAMERA_ATTRIBUTE = "virtualPinhole"
@@ -193,7 +197,7 @@ def check_same_frames(paths: Sequence[str | os.PathLike[str]]) -> None:
     expected = _frame(_headers(first), first)
     for path in others:
         found = _frame(_headers(path), path)
-        if found != expected:
+        if found.size != expected.size or not math.isclose(found.aspect, expected.aspect, rel_tol=_ASPECT_ROUNDING):
             raise InputError(f"{path} has {found} and {first} has {expected}: compare pictures of the same size")
 
 
@@ -299,7 +303,7 @@ def _camera(text: str | None, path: Path) -> Pinhole | None:
 
 
 def _camera_attributes(camera: Pinhole) -> dict:
-    """The exact camera, and its matrices unless they are beyond float32."""
+    """The exact camera, the shape of its pixels, and its matrices unless they are beyond float32."""
     u, v, w = camera.basis()
     to_camera, to_ndc = np.eye(4), np.zeros((4, 4))
     to_camera[:3, :3] = np.stack([-u if camera.mirrored else u, v, w], axis=1)
@@ -312,7 +316,7 @@ def _camera_attributes(camera: Pinhole) -> dict:
         matrices = {"worldToCamera": to_camera, "worldToNDC": to_camera @ to_ndc}
         matrices = {name: matrix.astype(np.float32) for name, matrix in matrices.items()}
     finite = {name: matrix for name, matrix in matrices.items() if np.isfinite(matrix).all()}
-    return {**finite, _CAMERA_ATTRIBUTE: json.dumps(dataclasses.asdict(camera))}
+    return {**finite, "pixelAspectRatio": d_y / d_x, _CAMERA_ATTRIBUTE: json.dumps(dataclasses.asdict(camera))}
 
 
 def _first_line(error: Exception) -> str:
