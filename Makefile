@@ -76,20 +76,25 @@ python-4.2 = 3.11
 python-4.5 = 3.11
 python-5.0 = 3.11
 python-5.2 = 3.13
-MATRIX := 4.2 4.5 5.0 $(if $(shell .ci/python 3.13),5.2)
+WHEELS := 4.2 4.5 5.0 $(if $(shell .ci/python 3.13),5.2)
+# make test has one of them.
+TESTED := $(shell $(PYTHON) -c 'import sys; print("5.0" if sys.version_info[:2] == (3, 11) else "5.2")')
+MATRIX := $(filter-out $(TESTED),$(WHEELS))
 
 test-matrix: $(MATRIX:%=test-wheel-%)
-	@$(if $(filter 5.2,$(MATRIX)),,echo "NOT TESTED: the wheel of Blender 5.2, since there is no Python 3.13 on the PATH or in pyenv")
+	@$(if $(filter 5.2,$(WHEELS)),,echo "NOT TESTED: the wheel of Blender 5.2, since there is no Python 3.13 on the PATH or in pyenv")
 
-# Between the oldest and the newest, with their Pythons and NumPys, a version differs by its Blender alone, so only what touches
-# Blender is tested with it.
+# The oldest and the newest have Pythons and NumPys of their own, on which tracer, batch and commands stand as well; between them a
+# version differs by its Blender alone, so only what touches Blender is tested with it.
 tests-4.5 = tests/blender tests/test_*.py
 tests-5.0 = tests/blender tests/test_*.py
+tests-4.2 = $(tests-5.2) tests/cameras
+tests-5.2 = tests/blender tests/batch tests/commands tests/documents tests/tracer tests/test_*.py
 
 test-wheel-%: .venvs/%/ready
 	$(call PARALLEL,.venvs/$*) $(tests-$*)
 
-test-light: $(MATRIX:%=test-light-%)
+test-light: $(WHEELS:%=test-light-%)
 
 test-light-%: .venvs/%/ready
 	$(call PYTEST,.venvs/$*) -m light
@@ -101,7 +106,7 @@ test-light-%: .venvs/%/ready
 .PRECIOUS: .venvs/%/ready
 
 # The zip built by a real Blender, in that Blender and in those that are wheels; and the panel in a window.
-test-blender: .venv/test $(MATRIX:%=.venvs/%/ready)
+test-blender: .venv/test $(WHEELS:%=.venvs/%/ready)
 	BLENDER=$$(.ci/find-blender) || exit 1; export BLENDER; \
 	.venv/bin/python -m pytest tests/real_blender
 
