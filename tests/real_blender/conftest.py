@@ -16,6 +16,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent.parent
 INSIDE = Path(__file__).with_name("inside_blender.py")
 WHEELS = {version: ROOT / ".venvs" / version / "bin" / "python" for version in ("4.2", "4.5", "5.0", "5.2")}
+PACKAGES = ("pytest", "pytest-timeout", "hypothesis", "mpmath", "distributed", "cryptography")
 PLATFORMS = {("Linux", "x86_64"): "linux-x64", ("Darwin", "arm64"): "macos-arm64", ("Darwin", "x86_64"): "macos-x64"}
 
 
@@ -79,11 +80,11 @@ def packages(real_blender) -> Path:
     """A folder with pytest and what the tests and their child processes import, for the Python inside this Blender."""
     script = "import sys; print('PYTHON', '.'.join(map(str, sys.version_info[:2])))"
     version = re.search(r"PYTHON (\S+)", real_blender.run("-b", "--factory-startup", "--python-expr", script).stdout)[1]
-    folder = ROOT / ".venvs" / f"inside-blender-{version}-with-dask"
+    folder = ROOT / ".venvs" / f"inside-blender-{version}-{'-'.join(PACKAGES)}"
     if not (folder / "ready").exists():
         pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--upgrade"]
         target = [f"--target={folder}", f"--python-version={version}", "--only-binary=:all:"]
-        subprocess.run([*pip, *target, "pytest", "hypothesis", "mpmath", "distributed"], check=True)
+        subprocess.run([*pip, *target, *PACKAGES], check=True)
         # Without NumPy, which it asks for: Blender has its own.
         subprocess.run([*pip, *target, "--no-deps", "OpenEXR"], check=True)
         (folder / "ready").touch()
