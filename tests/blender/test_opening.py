@@ -278,8 +278,11 @@ def test_trusted_it_does_so_that_the_test_above_can_fail(fresh_blender, temporar
 @pytest.mark.parametrize("trust", [False, True])
 def test_no_fluid_is_simulated_into_a_folder_of_the_files_choice(tmp_path, way, trust):
     how = {"env": children.environment(apart_from=bpy.utils.system_resource("SCRIPTS")), "capture_output": True, "text": True}
-    subprocess.run([sys.executable, __file__, str(tmp_path), way.__name__], check=True, **how)
-    child = subprocess.run([sys.executable, __file__, str(tmp_path), "trusted" if trust else "untrusted"], check=False, **how)
+    program = [sys.executable, __file__]
+    if bpy.app.binary_path:
+        program = [bpy.app.binary_path, "-b", "--factory-startup", "--python-use-system-env", "--python", __file__, "--"]
+    subprocess.run([*program, str(tmp_path), way.__name__], check=True, **how)
+    child = subprocess.run([*program, str(tmp_path), "trusted" if trust else "untrusted"], check=False, **how)
     left = [str(path.relative_to(tmp_path)) for path in (tmp_path / "hostile" / "marks").rglob("*")]
     if trust:
         assert left, f"the other test could not fail: {child.stderr}"
@@ -411,7 +414,7 @@ def test_every_path_in_a_file_is_known():
 
 
 if __name__ == "__main__":
-    folder, what = Path(sys.argv[1]), sys.argv[2]
+    folder, what = Path(sys.argv[-2]), sys.argv[-1]
     if what in globals():
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         (folder / "out").mkdir()
