@@ -165,16 +165,24 @@ def test_a_picture_may_begin_anywhere(tmp_path):
 
 
 def test_pictures_of_other_sizes_or_pixels_are_told_apart_by_their_headers(tmp_path, monkeypatch):
-    window(tmp_path / "a.exr")
+    window(tmp_path / "a.exr", aspect=1.5)
     window(tmp_path / "wide.exr", aspect=2.0)
-    window(tmp_path / "small.exr", ((0, 0), (3, 3)), ((0, 0), (3, 3)))
+    window(tmp_path / "small.exr", ((0, 0), (3, 3)), ((0, 0), (3, 3)), aspect=1.5)
     image.check_same_frames([tmp_path / "a.exr", tmp_path / "a.exr"])
     for other, words in (
-        ("wide", "wide.exr has 5 × 4 pixels, each 2 times as wide as it is high and .*a.exr has 5 × 4 pixels: compare"),
-        ("small", "small.exr has 4 × 4 pixels and .*a.exr has 5 × 4 pixels: compare pictures of the same size"),
+        ("wide", "wide.exr has 5 × 4 pixels, each 2 times as wide as it is high and .*a.exr has 5 × 4 pixels, each 1.5 times"),
+        ("small", "small.exr has 4 × 4 pixels, each 1.5 .* and .*a.exr has 5 × 4 pixels.*: compare pictures of the same size"),
     ):
         with pytest.raises(InputError, match=words):
             image.check_same_frames([tmp_path / "a.exr", tmp_path / f"{other}.exr"])
+
+
+def test_a_picture_that_states_square_pixels_may_have_others(tmp_path):
+    """Blender 4.2 writes an aspect of 1 of pictures whose pixels are 1.5 times as wide as high."""
+    for name, aspect in (("stated", 1.5), ("not", 1.0)):
+        window(tmp_path / f"{name}.exr", aspect=aspect)
+    image.check_same_frames([tmp_path / "stated.exr", tmp_path / "not.exr"])
+    image.check_same_frames([tmp_path / "not.exr", tmp_path / "stated.exr"])
 
 
 def test_a_picture_says_the_shape_of_its_cameras_pixels_to_a_rounding_of_float32(tmp_path):

@@ -191,13 +191,17 @@ def check_same_frames(paths: Sequence[str | os.PathLike[str]]) -> None:
     Raises
     ------
     InputError
-        as `read` does of a header, or if they differ in their size or in the shape of their pixels.
+        as `read` does of a header, or if they differ in their size, or in the shape of their pixels where both state one.
     """
     first, *others = (Path(path) for path in paths)
     expected = _frame(_headers(first), first)
     for path in others:
         found = _frame(_headers(path), path)
-        if found.size != expected.size or not math.isclose(found.aspect, expected.aspect, rel_tol=_ASPECT_ROUNDING):
+        # Blender up to 4.2 writes 1 whatever its pixels are.
+        stated = 1 not in (found.aspect, expected.aspect)
+        if found.size != expected.size or (
+            stated and not math.isclose(found.aspect, expected.aspect, rel_tol=_ASPECT_ROUNDING)
+        ):
             raise InputError(f"{path} has {found} and {first} has {expected}: compare pictures of the same size")
 
 

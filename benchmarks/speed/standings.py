@@ -132,11 +132,16 @@ def _best(all_reached: Iterable[Reached]) -> Reached | None:
 
 
 def with_point_by_line(points: Sequence[Point], samples: int, error: float) -> list[Point]:
-    """One point more, of samples whose error is known from the reference: its time by the line through the last two."""
+    """One point more, of samples whose error is known from the reference: its time by the line through the last two.
+
+    None more where the last took no longer than the one before it: their times tell nothing of samples yet.
+    """
     if len(points) < 2 or samples <= points[-1].parameter:
         return list(points)
     one, other = points[-2:]
     slope = (other.time - one.time) / (other.parameter - one.parameter)
+    if slope <= 0:
+        return list(points)
     return [*points, Point(samples, [other.time + slope * (samples - other.parameter)], [error])]
 
 

@@ -4,6 +4,7 @@ Bounds on time have a factor of ten of room for slow and busy machines; what mat
 """
 
 import gc
+import itertools
 import resource
 import sys
 import time
@@ -185,17 +186,22 @@ def test_an_update_takes_about_half_a_millisecond(posed_camera, scene, target, k
     assert milliseconds < 10, f"{milliseconds:.2f} ms"
 
 
-def leftovers(once, count):
-    """(bytes of Python, bytes of the process, datablocks, objects of Python) that `count` updates leave."""
+def leftovers(once, count, rounds=3):
+    """(bytes of Python, bytes of the process, datablocks, objects of Python) that `count` updates leave.
+
+    Each the least of a few rounds: a leak is there in every one, a cache or a thread of something else in one.
+    """
     tracemalloc.start()
     for i in range(50):
         once(i)
-    before = kept()
-    for i in range(count):
-        once(50 + i)
-    after = kept()
+    all_kept = [kept()]
+    for _ in range(rounds):
+        for i in range(count):
+            once(50 + i)
+        all_kept.append(kept())
     tracemalloc.stop()
-    return [there - here for here, there in zip(before, after, strict=True)]
+    grown = [[there - here for here, there in zip(*pair, strict=True)] for pair in itertools.pairwise(all_kept)]
+    return [min(each, key=abs) for each in zip(*grown, strict=True)]
 
 
 def kept():
@@ -219,7 +225,7 @@ def datablocks():
 
 @pytest.mark.parametrize(
     ("kind", "count"),
-    [("point", 500), ("target", 500), ("keyed", 500), pytest.param("target", 10000, marks=pytest.mark.exhaustive)],
+    [("point", 200), ("target", 200), ("keyed", 200), pytest.param("target", 10000, marks=pytest.mark.exhaustive)],
 )
 def test_updates_leave_nothing_behind(posed_camera, scene, target, kind, count):
     group = posed_camera.virtual_pinhole
