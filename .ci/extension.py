@@ -2,7 +2,7 @@
 
 The wheels are no part of the checkout, and a manifest that names missing ones can't be built; so the manifest in the checkout
 names none, and Blender builds from a copy to which the wheels and their names are added. One zip a platform: the tracer's core
-has one wheel for all Pythons, OpenEXR one for each Python of Blender 4.2 to 5.2.
+has one wheel for all Pythons, OpenEXR and MarkupSafe, which Jinja2 needs, one for each Python of Blender 4.2 to 5.2.
 """
 
 import os
@@ -19,9 +19,9 @@ from hatch_build import core_wheel  # noqa: E402 - only now is it known where th
 CONTENTS = ["__init__.py", "viewcam_addon", "README.md", "LICENSE"]
 
 PYTHONS = ["3.11", "3.13", "3.14"]
-WHEELS = {"OpenEXR": "3.5.3"}
+WHEELS = {"OpenEXR": "3.5.3", "MarkupSafe": "3.0.4"}
 # In Python alone: one wheel for all of them.
-PURE_WHEELS = {"tqdm": "4.70.1"}
+PURE_WHEELS = {"Jinja2": "3.1.6", "tqdm": "4.70.1"}
 # Blender's name of a platform, and pip's: what a wheel may ask for and Blender 4.2's own minimum grants.
 PLATFORMS = {
     "linux-x64": ["manylinux_2_28_x86_64"],

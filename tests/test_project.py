@@ -27,7 +27,7 @@ ROOMS = {
     "terminal": "",
     "events": "terminal",
     "words": "",
-    "html_theme": "",
+    "html_page": "errors",
     "children": "",
     "crashes": "",
     "exact": "",
@@ -41,13 +41,13 @@ ROOMS = {
     "camera_values": "errors checks pinhole roll intrinsics",
     "cameras": "errors checks files pinhole intrinsics",
     "datasets": "files pinhole cameras",
-    "comparison": "errors files html_theme pinhole image",
+    "comparison": "errors files html_page pinhole image",
     "tracer": "errors checks memory files pinhole image",
     "api": "errors children image comparison tracer",
     "shots": "errors checks files terminal pinhole moves tracer",
-    "batch": "errors checks files events html_theme children pinhole image cameras datasets comparison tracer shots",
+    "batch": "errors checks files events html_page children pinhole image cameras datasets comparison tracer shots",
     "blender": (
-        "errors checks files terminal children pinhole roll rotation moves diagram image intrinsics camera_values "
+        "errors checks files terminal html_page children pinhole roll rotation moves diagram image intrinsics camera_values "
         "cameras datasets comparison tracer shots batch"
     ),
     "commands": "errors terminal events crashes children pinhole image cameras comparison tracer api shots batch",

@@ -5,6 +5,7 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pytest
 
+from viewcam_addon import html_page
 from viewcam_addon.comparison import charts
 from viewcam_addon.comparison.tolerances import ROUNDINGS
 
@@ -35,4 +36,4 @@ def test_a_percentile_beyond_its_limit_is_marked():
     ],
 )
 def test_figures_have_two_digits(value, words):
-    assert charts.figure(value) == words
+    assert html_page.figure(value) == words

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..files import written_whole
+from ..html_page import figure
 from . import pictures
-from .charts import figure
 from .geometry import Comparison
 from .radiance import RadianceComparison
 from .statistics import Row

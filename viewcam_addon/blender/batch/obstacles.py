@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import bpy
 
-from ... import checks, intrinsics
+from ... import checks, html_page, intrinsics
 from ...batch import judge
 from ...errors import InputError
 from ...pinhole import Pinhole
@@ -29,8 +29,9 @@ def obstacles(shots: Sequence[Shot], check: bool, scene: bpy.types.Scene, own: b
         if engine in _DRAWN and not graphics.are_there():
             needs = f"{engine_name(engine)} draws with a GPU, and Blender can't open one here"
             yield f"{needs}: choose CYCLES or VIEWCAM, or start a display"
-    if check and (lacking := judge.lacking()):
-        yield lacking
+    for lacking in (html_page.lacking(), judge.lacking() if check else None):
+        if lacking:
+            yield lacking
     among = cameras_of(scene, own)
     read: set[str] = set()
     for shot in shots:
