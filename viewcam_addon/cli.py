@@ -145,6 +145,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         added.add_argument("--report", metavar="DIR", type=Path, help="write an HTML report there")
         added.add_argument("--difference", metavar="FILE.png", type=words.png, help="draw there what differs, pixel by pixel")
         added.set_defaults(writes=("report", "difference"))
+        added.add_argument("--sides", type=Path, help=argparse.SUPPRESS)  # a folder for both sides as pictures
         added.add_argument("--repeat", help=argparse.SUPPRESS)  # what the report shall name as its command
 
     added = command(verification.export, "export", "Write the scene of a .blend as the tracer reads it.")
@@ -206,7 +207,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     added.set_defaults(
         blend=verification.DEMO_SCENE, camera=None, frame=None, size=None, strict=False, recenter=False, clay=False
     )
-    added.set_defaults(difference=None, repeat=None, trust=False, writes=("report",))
+    added.set_defaults(difference=None, sides=None, repeat=None, trust=False, writes=("report",))
     light(added)
     error(added, "the tracer takes")
     added.add_argument(

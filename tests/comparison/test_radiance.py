@@ -1,6 +1,7 @@
 """The whole comparison of light: what it says, in one sentence, in lines and in JSON."""
 
 import json
+import math
 import re
 import sys
 from dataclasses import replace
@@ -9,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from viewcam_addon.comparison import radiance
+from viewcam_addon.comparison import light_verdict, radiance
 from viewcam_addon.errors import InputError
 from viewcam_addon.image import Image
 from viewcam_addon.pinhole import Pinhole
@@ -46,6 +47,19 @@ def test_the_same_light_is_the_same_within_noise(same):
     assert same.equal == ("Alpha",)
     assert any(line.startswith("To the last bit  Alpha") for line in same.lines())
     assert same.lines()[-1] == same.sentence
+
+
+def test_the_mean_is_told_in_as_many_digits_as_its_error_has():
+    """Never "differs by −0.000 % ± 0.000 %"."""
+
+    def told(difference, error):
+        return light_verdict._mean_words(light_verdict.LightRow("Combined", 1.0, 1.0 + difference, error, 2 * error, 0))
+
+    assert told(-2.5e-7, 4.4e-7).startswith("the mean differs by −0.000025 %, with an error of ± 0.000044 %, and ")
+    assert told(-2.5e-9, 4.4e-7).startswith("the mean is the same within ± 0.000044 %, and a difference of 0.000088 % would")
+    assert told(0.25, 0.3).startswith("the mean differs by +25 %, with an error of ± 30 %")
+    assert told(0.0, 0.0).startswith("the mean is the same within ± 0 %")
+    assert "−0.000 %" not in told(-1e-9, math.inf)
 
 
 def test_noise_explains_the_relative_error_of_the_right_picture(same):

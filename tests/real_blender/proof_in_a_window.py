@@ -122,11 +122,25 @@ def compare_to_the_verdict():
     assert "Rendering with Cycles" in told, told
     assert _of_the_session() == before
     assert [area.ui_type for area in window().screen.areas] == areas, "the artist's layout has changed"
+    assert len(bpy.context.window_manager.windows) == 1, "a pass opens a window"
+    assert "Virtual Pinhole Proof" not in bpy.data.images
+    yield
+    yield
+    yield from push("viewcam.show_difference", across=LEFT)
+    yield
     _, other = bpy.context.window_manager.windows
-    assert other.screen.areas[0].spaces.active.image.name == "Virtual Pinhole Difference"
+    assert other.screen.areas[0].spaces.active.image.name == "Virtual Pinhole Proof"
+    with bpy.context.temp_override(window=other, area=other.screen.areas[0], region=other.screen.areas[0].regions[-1]):
+        bpy.ops.image.view_all()
     yield
     yield
-    picture("difference.png")
+    picture("all_three.png")
+    bpy.context.window_manager.virtual_pinhole_proof.view = "SWIPE"
+    bpy.context.window_manager.virtual_pinhole_proof.swipe = 0.4
+    yield
+    yield
+    picture("swipe.png")
+    bpy.context.window_manager.virtual_pinhole_proof.property_unset("view")
     with bpy.context.temp_override(window=other):
         bpy.ops.wm.window_close()
     yield
@@ -159,7 +173,7 @@ def take_the_edit_back_and_show_the_difference_again():
     yield from push("viewcam.show_difference", across=LEFT)
     yield
     assert len(bpy.context.window_manager.windows) == 1, "there was an Image Editor"
-    assert area.spaces.active.image.name == "Virtual Pinhole Difference"
+    assert area.spaces.active.image.name == "Virtual Pinhole Proof"
 
 
 def press_escape():
@@ -168,6 +182,21 @@ def press_escape():
     press("ESC", *NOWHERE)
     yield from ended(comparison)
     assert proof.latest().passed, "the verdict before is forgotten"
+
+
+def press_escape_during_playback():
+    """Escape ends the playback; the next one the comparison."""
+    comparison, _ = yield from begin()
+    with bpy.context.temp_override(window=window()):
+        bpy.ops.screen.animation_play()
+    yield
+    assert window().screen.is_animation_playing
+    press("ESC", *NOWHERE)
+    yield
+    yield
+    assert not window().screen.is_animation_playing and proof.running() is comparison
+    press("ESC", *NOWHERE)
+    yield from ended(comparison)
 
 
 def press_cancel():
@@ -229,6 +258,7 @@ def steps():
         open_the_report,
         take_the_edit_back_and_show_the_difference_again,
         press_escape,
+        press_escape_during_playback,
         press_cancel,
         undo_while_it_runs,
         open_a_file_while_it_runs,

@@ -83,6 +83,8 @@ def compare(options: argparse.Namespace) -> Result:
     result = {**comparison.to_json(), "ledger": _ledger_json(ledger)}
     if options.difference:
         result["difference"] = difference.write(comparison, options.difference)
+    if options.sides:
+        difference.write_sides(comparison, reference, tests if is_light else [tests], options.sides)
     return 0 if comparison.passed else 1, result
 
 
@@ -102,7 +104,7 @@ def check(options: argparse.Namespace) -> Result:
             return status, {"error": "the reference could not be traced"}
         outputs = [
             word
-            for flag in ("json", "report", "difference")
+            for flag in ("json", "report", "difference", "sides")
             if (to := getattr(options, flag))
             for word in (f"--{flag}", str(to))
         ]

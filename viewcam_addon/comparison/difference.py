@@ -1,4 +1,4 @@
-"""The one picture of what differs, for a viewer of images such as Blender's: a PNG in colours, and words for its scale.
+"""What differs as a picture, and both sides beside it, for a viewer of images such as Blender's: PNGs, and words for the scale.
 
 Geometry is drawn as the error of each position, light as Combined's difference, both in the scales of the report; what sees
 another surface is marked. Rejected: the bare errors as an EXR, a ten-thousandth of a pixel being black on every screen.
@@ -6,12 +6,16 @@ another surface is marked. Rejected: the bare errors as an EXR, a ten-thousandth
 
 import math
 import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..files import written_whole
 from ..html_page import figure
+from ..image import Image
 from . import pictures
 from .geometry import Comparison
 from .radiance import RadianceComparison
@@ -22,18 +26,47 @@ _NOTHING = np.full((1, 3), 64, np.uint8)
 
 
 @np.errstate(all="ignore")
-def write(comparison: Comparison | RadianceComparison, path: str | os.PathLike[str]) -> dict[str, str]:
-    """Write the PNG; returns its path and what its colours say, as plain JSON values.
+def write(comparison: Comparison | RadianceComparison, path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Write the PNG; returns its path, what its colours say, and the ends and unit of their scale, as plain JSON values.
 
     Raises
     ------
     InputError
         if the file can't be written.
     """
-    picture, words = _of_light(comparison) if isinstance(comparison, RadianceComparison) else _of_geometry(comparison)
+    picture, words, scale = _of_light(comparison) if isinstance(comparison, RadianceComparison) else _of_geometry(comparison)
+    _write(picture, path)
+    return {"image": str(path), "colours": words, "scale": scale}
+
+
+def write_sides(
+    comparison: Comparison | RadianceComparison, reference: Image, tests: Sequence[Image], folder: str | os.PathLike[str]
+) -> None:
+    """Write what the report shows of both sides, FOLDER/reference.png and FOLDER/test.png, under one exposure.
+
+    Raises
+    ------
+    InputError
+        if a file can't be written.
+    """
+    for name, picture in zip(("reference", "test"), shown(comparison, reference, tests), strict=True):
+        _write(picture, Path(folder) / f"{name}.png")
+
+
+@np.errstate(all="ignore")
+def shown(
+    comparison: Comparison | RadianceComparison, reference: Image, tests: Sequence[Image]
+) -> tuple[pictures.Picture, pictures.Picture]:
+    """Reference and test as an eye can compare them: light tone-mapped alike, geometry shaded."""
+    if isinstance(comparison, RadianceComparison):
+        bright = pictures.brightness(reference["Combined"][..., :3])
+        return tuple(pictures.tone_mapped(side, bright) for side in (reference["Combined"][..., :3], comparison.test))
+    return pictures.shaded(reference), pictures.shaded(tests[0])
+
+
+def _write(picture: pictures.Picture, path: str | os.PathLike[str]) -> None:
     with written_whole(path) as temporary:
         temporary.write_bytes(pictures.png(picture))
-    return {"image": str(path), "colours": words}
 
 
 def decades(row: Row) -> tuple[float, float]:
@@ -48,7 +81,7 @@ def spread(values: NDArray) -> float:
     return max(float(np.percentile(np.abs(values), 99.5)), 1e-12)
 
 
-def _of_geometry(comparison: Comparison) -> tuple[pictures.Picture, str]:
+def _of_geometry(comparison: Comparison) -> tuple[pictures.Picture, str, dict[str, Any]]:
     row, size = comparison.rows[0], (comparison.pinhole.width, comparison.pinhole.height)
     low, high = decades(row) if row.count else (1e-6, 1.0)
     levels = pictures.on_scale(comparison.maps[row.name], low, high) if row.count else None
@@ -59,14 +92,15 @@ def _of_geometry(comparison: Comparison) -> tuple[pictures.Picture, str]:
     share = marks[..., 3:] / 255.0
     blended = np.round(colours * (1 - share) + marks[..., :3] * share).astype(np.uint8)
     words = f"Dark {figure(low)} px off, light {figure(high)} px. Another surface seen: red, or teal where explained"
-    return blended, words
+    return blended, words, {"kind": "logarithmic", "low": low, "high": high, "unit": "px"}
 
 
-def _of_light(comparison: RadianceComparison) -> tuple[pictures.Picture, str]:
+def _of_light(comparison: RadianceComparison) -> tuple[pictures.Picture, str, dict[str, Any]]:
     values = comparison.maps["Combined: difference"]
     limit = spread(values)
     words = f"Orange where Cycles is brighter, by {figure(limit)} at the full colour, blue where it is darker"
-    return _painted(pictures.signed(values, limit), pictures.signed_scale()), words
+    scale = {"kind": "signed", "low": -limit, "high": limit, "unit": "of light"}
+    return _painted(pictures.signed(values, limit), pictures.signed_scale()), words, scale
 
 
 def _painted(levels: pictures.Picture, scale: NDArray[np.uint8]) -> pictures.Picture:

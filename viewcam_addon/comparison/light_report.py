@@ -39,8 +39,7 @@ def write_report(
     InputError
         if the folder can't be written, or there is no Jinja2.
     """
-    bright = pictures.brightness(reference["Combined"][..., :3])
-    shown = tuple(pictures.tone_mapped(side, bright) for side in (reference["Combined"][..., :3], comparison.test))
+    shown = difference.shown(comparison, reference, tests)
     mean_of = f" The test is the mean of {len(tests)} pictures with other seeds." if len(tests) > 1 else ""
     sides = dict(zip(("reference", "test"), map(pictures.png_uri, shown), strict=True))
     combined = page.View("picture", "Combined", f"{page.SWAP} Both under one exposure.{mean_of}", sides)

@@ -10,7 +10,7 @@ from ..pinhole import Pinhole
 from .hypothesis_tests import PIXELS, WHOLE, HypothesisTest, Place
 from .noise_free import Edges
 from .perception import Appearance
-from .statistics import Row, percentile_name
+from .statistics import Row, percentile_name, plain
 from .tolerances import PERCENTILES, Array
 from .verdict import mark, percent
 
@@ -29,6 +29,9 @@ _TELLING = {
     "4π": 4.0 * math.pi,
 }
 _FIT = 1e-4
+
+# After the point: what float64 leaves of a mean in percent.
+_MOST_DIGITS = 12
 
 
 @dataclass(frozen=True)
@@ -255,10 +258,15 @@ def _hint(row: LightRow) -> str:
 def _mean_words(row: LightRow) -> str:
     if not row.reference:
         return "both are black in the mean"
-    return (
-        f"the mean differs by {100.0 * (row.ratio - 1.0):+.3f} % ± {100.0 * row.ratio_error:.3f} %, and a difference of "
-        f"{100.0 * row.visible:.2f} % would have been found"
+    error = 100.0 * row.ratio_error
+    digits = 1 - math.floor(math.log10(error)) if 0.0 < error < math.inf else _MOST_DIGITS  # two of the error
+    difference = round(100.0 * (row.ratio - 1.0), min(digits, _MOST_DIGITS))
+    differs = (
+        f"differs by {difference:+.{max(digits, 0)}f} %, with an error of".replace("-", "−")
+        if difference
+        else "is the same within"
     )
+    return f"the mean {differs} ± {plain(error)} %, and a difference of {plain(100.0 * row.visible)} % would have been found"
 
 
 def _listed(names: list[str]) -> str:

@@ -36,7 +36,7 @@ def write_report(
     InputError
         if the folder can't be written, or there is no Jinja2.
     """
-    shades = (pictures.shaded(reference), pictures.shaded(test))
+    shades = difference.shown(comparison, reference, [test])
     camera, far = comparison.stated or comparison.pinhole, comparison.far_from_origin
     values = {
         **page.common(comparison, reference, test, ledger, command, facts or {}, camera, comparison.origin),

@@ -5,6 +5,7 @@ error / tolerance_p must not exceed 1. Rejected: comparing percentiles of the er
 errors could then gather where little is allowed.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,6 +67,13 @@ def measure(name: str, unit: str, errors: Array, one_rounding: Array, floor: Arr
         for p, k in zip(PERCENTILES, ROUNDINGS, strict=True)
     ]
     return Row(name, unit, len(errors), *(tuple(float(x) for x in figures) for figures in (values, tolerances, shares)))
+
+
+def plain(value: float | None) -> str:
+    """Two significant digits without powers of ten: 0.000052. None : what JSON can't hold."""
+    if value is None or not math.isfinite(value):
+        return "∞"
+    return np.format_float_positional(float(f"{value:.1e}"), trim="-")
 
 
 def percentile_name(percentile: float) -> str:

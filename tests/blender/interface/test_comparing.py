@@ -4,6 +4,7 @@ import contextlib
 import errno
 import json
 import os
+import re
 import shutil
 import sys
 import time
@@ -13,12 +14,13 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender.interface import comparing, proof
+from viewcam_addon.blender.interface import comparing, proof, proof_image
 from viewcam_addon.errors import InputError
 
 # What `viewcam check` leaves behind, in place of it: a process that writes the files one by one, when it is told to.
 STAND_IN = """
 import json, pathlib, sys, time
+PICTURES = ["report/difference.png", "report/test.png", "report/reference.png"]
 folder = pathlib.Path(sys.argv[1])
 def step(name, text="x"):
     while not (folder / "go").exists() or int((folder / "go").read_text() or 0) < step.number:
@@ -27,7 +29,7 @@ def step(name, text="x"):
     (folder / "report").mkdir(exist_ok=True)
     (folder / name).write_text(text)
 step.number = 1
-for name in ("report/cycles.exr", "report/scene.json", "report/reference.exr", "report/index.html", "report/difference.png"):
+for name in ("report/cycles.exr", "report/scene.json", "report/reference.exr", "report/index.html", *PICTURES):
     step(name)
 result = {"passed": True, "sentence": "The same picture: as told.", "passes": [], "ledger": []}
 step("result.json", json.dumps(result))
@@ -130,7 +132,7 @@ def test_the_same_picture_is_the_verdict_and_the_file_stays_as_it_is(seen):
     assert told[0][1] == "Rendering with Cycles" and told[-1][1] == "Comparing"
     rows = dict(outcome.rows)
     assert rows["Median"].endswith(" px") and "Mismatches" in rows and rows["Modelled"] == "1 of 1 objects"
-    assert outcome.report.is_file() and outcome.difference.is_file() and outcome.colours
+    assert outcome.report.is_file() and all(path.is_file() for path in outcome.pictures.values()) and outcome.colours
     assert "check untitled.blend --camera Camera --level geometry" in outcome.report.read_text()
     exported = json.loads((outcome.folder / "scene.json").read_text())
     assert "0.25" in json.dumps(exported["objects"]), "the edit is not in the picture that was compared"
@@ -140,7 +142,7 @@ def test_the_same_picture_is_the_verdict_and_the_file_stays_as_it_is(seen):
     assert not outcome.is_of(seen.camera, seen), "the camera has changed since"
     assert [path.name for path in comparison.folder.iterdir()] == ["report"]
     outcome.discard()
-    assert not comparison.folder.exists() and outcome.report is None and outcome.difference is None
+    assert not comparison.folder.exists() and outcome.report is None and outcome.pictures == {}
 
 
 def test_a_camera_that_is_not_where_it_was_put_differs_and_then_is_mended(seen):
@@ -150,15 +152,17 @@ def test_a_camera_that_is_not_where_it_was_put_differs_and_then_is_mended(seen):
     assert bpy.ops.viewcam.compare_with_cycles() == {"FINISHED"}
     first = proof.latest()
     assert first.passed is False and "from the stated one" in first.verdict
-    image = bpy.data.images["Virtual Pinhole Difference"]
+    image = bpy.data.images["Virtual Pinhole Proof"]
     bytes_before = image.packed_file.data
-    assert tuple(image.size) == (64, 48)
+    assert tuple(image.size) == (3 * 64 + 2 * proof_image._GAP, 48)
     seen.camera.virtual_pinhole.distance = 50
     assert bpy.ops.viewcam.compare_with_cycles(camera="Camera") == {"FINISHED"}
     second = proof.latest()
     assert second.passed and not first.temporary.exists() and second.report.is_file()
-    (again,) = [each for each in bpy.data.images if each.name.startswith("Virtual Pinhole Difference")]
-    assert again.packed_file.data == second.difference.read_bytes() != bytes_before
+    assert image.packed_file.data == bytes_before, "a pass shows nothing that nobody asked for"
+    assert bpy.ops.viewcam.show_difference() == {"FINISHED"}
+    (again,) = [each for each in bpy.data.images if each.name.startswith("Virtual Pinhole Proof")]
+    assert again.packed_file.data != bytes_before and not again.is_dirty
 
 
 def test_light_is_compared_with_as_many_samples_as_said(seen, add_lamp):
@@ -204,7 +208,7 @@ def test_the_files_that_appear_tell_how_far_it_is(stand_in):
     words = ["Rendering with Cycles", "Rendering with Cycles", "Tracing", "Comparing"]
     assert told == list(zip((0, 0.25, 0.5, 0.75), words, strict=True))
     assert comparison.poll() is None
-    comparison.let(6)
+    comparison.let(8)
     outcome = wait_for(comparison.poll)
     assert outcome.verdict == "The same picture: as told."
     outcome.discard()
@@ -229,9 +233,10 @@ def test_a_report_that_is_kept_stands_in_its_folder_and_nothing_else_changes_the
     cancelled.cancel()
     assert [path.name for path in tmp_path.iterdir()] == ["own.txt"]
     comparison = stand_in(keep_in=tmp_path / "new")
-    comparison.let(6)
+    comparison.let(8)
     outcome = wait_for(comparison.poll)
-    assert outcome.report == tmp_path / "new" / "index.html" and not comparison.folder.exists()
+    assert outcome.report.parent.parent == tmp_path / "new" and not comparison.folder.exists()
+    assert re.fullmatch(r"untitled Camera 0001 \d{4}-\d\d-\d\d \d\d\.\d\d\.\d\d", outcome.report.parent.name)
     outcome.discard()
     assert outcome.report.is_file(), "what the artist keeps is the artist's"
 
@@ -239,7 +244,7 @@ def test_a_report_that_is_kept_stands_in_its_folder_and_nothing_else_changes_the
 def test_where_the_report_can_not_be_kept_a_sentence_says_so(stand_in, tmp_path):
     (tmp_path / "file").write_text("")
     comparison = stand_in(keep_in=tmp_path / "file" / "report")
-    comparison.let(6)
+    comparison.let(8)
     outcome = wait_for(comparison.poll)
     assert outcome.passed is None and "can't be kept in" in outcome.verdict and not comparison.folder.exists()
 
@@ -251,10 +256,10 @@ def test_a_full_disk_leaves_no_half_of_a_report_s_file(stand_in, tmp_path, monke
 
     monkeypatch.setattr(shutil, "copyfile", copy_half)
     comparison = stand_in(keep_in=tmp_path / "new")
-    comparison.let(6)
+    comparison.let(8)
     outcome = wait_for(comparison.poll)
     assert outcome.passed is None and "No space left" in outcome.verdict and "free some space" in outcome.verdict
-    assert list((tmp_path / "new").iterdir()) == [] and not comparison.folder.exists()
+    assert [path for path in (tmp_path / "new").rglob("*") if path.is_file()] == [] and not comparison.folder.exists()
 
 
 @pytest.mark.parametrize("ends", ["another file", "the add-on"])
@@ -272,7 +277,7 @@ def test_another_file_and_turning_the_add_on_off_end_it(stand_in, registered_add
 
 def test_cancel_ends_it_and_keeps_what_the_last_one_came_to(stand_in):
     comparison = stand_in()
-    comparison.let(6)
+    comparison.let(8)
     wait_for(lambda: comparison._family.status() is not None)
     proof._running = comparison
     assert proof._look() is proof.latest() and proof.running() is None
@@ -346,7 +351,7 @@ def test_what_can_not_be_compared_is_refused_at_once_in_one_sentence(seen, monke
     with pytest.raises(InputError, match="camera 'Camera' is not in scene 'Other'"):
         comparing.Comparison(seen.camera, other)
     with monkeypatch.context() as patch:
-        patch.setattr(comparing, "_COPY", "no/such/folder/copy.blend")
+        patch.setattr(comparing, "_file_name", lambda: "no/such/folder/copy.blend")
         with pytest.raises(RuntimeError, match="A copy of the file can't be saved"):
             bpy.ops.viewcam.compare_with_cycles()
     with monkeypatch.context() as patch:

@@ -1,11 +1,15 @@
 """The sub-panel Proof: what it starts from, and what is left without the add-on. What it does is in test_comparing.py."""
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import preferences
-from viewcam_addon.blender.interface import proof
+from viewcam_addon.blender.interface import comparing, proof, proof_image
+from viewcam_addon.comparison import pictures
 
 
 def test_the_level_is_the_preferred_one_until_another_is_chosen(fresh_blender, monkeypatch):
@@ -33,3 +37,124 @@ def test_the_render_menu_and_the_status_bar_are_as_before_without_the_add_on(reg
         without = [each for each in entries() if each in ours]
         registered_addon.register()
         assert without == [] and len([each for each in entries() if each in ours]) == 3
+
+
+WIDTH, HEIGHT = 12, 5
+
+
+@pytest.fixture
+def outcome(tmp_path, fresh_blender):
+    """A verdict whose pictures are red (Cycles), green (the tracer) and blue (the difference) all over."""
+    for name, colour in (("test", (255, 0, 0)), ("reference", (0, 255, 0)), ("difference", (0, 0, 255))):
+        (tmp_path / f"{name}.png").write_bytes(pictures.png(np.full((HEIGHT, WIDTH, 3), colour, np.uint8)))
+    proof_image._pixels.cache_clear()
+    yield comparing.Outcome("", "Camera", None, True, "The same picture: so it is.", folder=tmp_path)
+    proof_image._pixels.cache_clear()
+
+
+def columns(image):
+    """Which of r, g, b each column of the image is, all the way up."""
+    pixels = np.empty(image.size[0] * image.size[1] * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    pixels = pixels.reshape(image.size[1], image.size[0], 4)
+    assert (pixels == pixels[:1]).all()
+    return "".join("rgb"[int(colour[:3].argmax())] if colour[:3].any() else " " for colour in pixels[0])
+
+
+def test_each_view_is_one_image_of_its_own_that_is_saved_with_the_file(outcome):
+    gap = " " * proof_image._GAP
+    for view, swipe, shown in (
+        ("ALL", 0.5, gap.join(letter * WIDTH for letter in "rgb")),
+        ("SWIPE", 0.25, "r" * 3 + "g" * 9),
+        ("SWIPE", 0.0, "g" * WIDTH),
+        ("SWIPE", 1.0, "r" * WIDTH),
+        ("CYCLES", 0.5, "r" * WIDTH),
+        ("TRACER", 0.5, "g" * WIDTH),
+        ("DIFFERENCE", 0.5, "b" * WIDTH),
+    ):
+        image = proof_image.load(outcome, view, swipe)
+        assert columns(image) == shown, view
+        assert image.packed_file and not image.is_dirty
+    assert [each.name for each in bpy.data.images] == [proof_image.NAME]
+
+
+def test_the_view_that_is_chosen_is_what_the_image_shows(outcome, monkeypatch):
+    settings = bpy.context.window_manager.virtual_pinhole_proof
+    monkeypatch.setattr(proof, "_latest", outcome)
+    settings.view = "CYCLES"
+    assert proof_image.loaded() is None, "nobody has asked to see it"
+    assert bpy.ops.viewcam.show_difference() == {"FINISHED"}
+    try:
+        assert columns(proof_image.loaded()) == "r" * WIDTH
+        settings.view, settings.swipe = "SWIPE", 0.75
+        assert columns(proof_image.loaded()) == "r" * 9 + "g" * 3
+    finally:
+        settings.property_unset("view")
+        settings.property_unset("swipe")
+
+
+def editor(image=None, pinned=False, mode="VIEW", ui_type="IMAGE_EDITOR"):
+    space = SimpleNamespace(image=image, use_image_pin=pinned, mode=mode)
+    return SimpleNamespace(ui_type=ui_type, spaces=SimpleNamespace(active=space))
+
+
+def test_no_editor_loses_the_render_result_the_viewer_or_the_artist_s_own_image():
+    def chosen(*areas):
+        screen = SimpleNamespace(areas=areas)
+        return proof_image._free_image_editor(SimpleNamespace(windows=[SimpleNamespace(screen=screen)]))
+
+    def image(name):
+        return SimpleNamespace(name=name, library=None)
+
+    taken = [editor(image(name)) for name in ("Render Result", "Viewer Node", "Reference")]
+    taken += [editor(pinned=True), editor(mode="PAINT"), editor(ui_type="UV")]
+    assert chosen(*taken) is None
+    free, ours = editor(), editor(image(proof_image.NAME), pinned=True)
+    assert chosen(*taken, free) is free.spaces.active
+    assert chosen(*taken, free, ours) is ours.spaces.active
+
+
+def escape(monkeypatch, playing):
+    """What the modal operator does with Escape while a comparison is on its way: (its answer, whether it was ended)."""
+    ended, said = [], []
+    monkeypatch.setattr(proof, "_running", object())
+    monkeypatch.setattr(proof, "end", lambda forget: ended.append(setattr(proof, "_running", None)))
+    screen = SimpleNamespace(is_animation_playing=playing, areas=[])
+    context = SimpleNamespace(window_manager=SimpleNamespace(windows=[SimpleNamespace(screen=screen)]), workspace=None)
+    operator = SimpleNamespace(report=lambda *words: said.append(words), _leave=lambda _context: None)
+    answer = proof.VIEWCAM_OT_compare_with_cycles.modal(operator, context, SimpleNamespace(type="ESC", value="PRESS"))
+    return answer, bool(ended)
+
+
+def test_escape_during_playback_ends_the_playback_and_not_the_comparison(monkeypatch):
+    assert escape(monkeypatch, playing=True) == ({"PASS_THROUGH"}, False)
+    assert escape(monkeypatch, playing=False) == ({"CANCELLED"}, True)
+
+
+@pytest.mark.parametrize(
+    ("result", "words"),
+    [
+        (
+            {"passed": True, "passes": [{"name": "Position", "percentiles": {"max": {"value": 3.04e-4}}}]},
+            "Identical to 0.0003 px",
+        ),
+        ({"passed": True, "passes": [{"name": "Position", "percentiles": {}}]}, "Identical"),
+        ({"passed": True, "quantities": [{"steady": None, "ratio_error": 3e-4}]}, "The same light, but for noise of 0.03 %"),
+        (
+            {"passed": True, "quantities": [{"steady": {"percentiles": {"max": {"value": 2e-7}}}}]},
+            "Identical to 0.00002 % of the light",
+        ),
+        ({"passed": False}, "Cycles renders another picture"),
+    ],
+)
+def test_the_first_line_says_it_in_words(result, words):
+    assert comparing.headline(result) == words
+
+
+def test_what_is_approximated_is_told_by_name():
+    ledger = [
+        {"object": "Fog", "status": "skipped", "reason": "a volume"},
+        {"object": "Suzanne", "status": "exported", "reason": ""},
+        {"object": "Hair", "status": "approximated", "reason": "curves as tubes"},
+    ]
+    assert comparing.lacking(ledger) == [("Fog", "skipped: a volume"), ("Hair", "approximated: curves as tubes")]

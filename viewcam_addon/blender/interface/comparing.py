@@ -16,22 +16,25 @@ import shutil
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import bpy
-import numpy as np
 
 from ... import children
+from ...comparison.statistics import plain
 from ...errors import InputError
 from ...files import written_whole
 from ...pinhole import Pinhole
+from ...shots.names import made_fit
 from ...tracer.scene.film import LEVELS, SAMPLES, seeds
 from .. import camera as cameras
 from .. import datablocks, preferences
 
-_COPY, _RESULT, _SAID, _REPORT, _DIFFERENCE = "copy.blend", "result.json", "said.txt", "report", "difference.png"
+_RESULT, _SAID, _REPORT = "result.json", "said.txt", "report"
+_PICTURES = {"cycles": "test.png", "tracer": "reference.png", "difference": "difference.png"}
 _COMPRESSED = (b"\x1f\x8b", b"\x28\xb5\x2f\xfd")
 
 
@@ -40,8 +43,9 @@ class Outcome:
     """What a comparison has come to.
 
     what : of what it was: camera, frame and level. camera : the camera's name. seen : the camera then, None if it was none.
-    passed : whether both sides are the same picture, None where there are none. verdict : one sentence.
-    rows : (label, text) of the figures. folder : that of the report. colours : what those of the difference say.
+    passed : whether both sides are the same picture, None where there are none. verdict : one sentence. headline : a few words
+    of it. rows : (label, text) of the figures. lacking : (object, sentence) of what is not modelled as it is.
+    folder : that of the report. colours : what those of the difference say. scale : their ends, as difference.write has them.
     temporary : what `discard` removes.
     """
 
@@ -50,9 +54,12 @@ class Outcome:
     seen: Pinhole | None
     passed: bool | None
     verdict: str
+    headline: str = ""
     rows: tuple[tuple[str, str], ...] = ()
+    lacking: tuple[tuple[str, str], ...] = ()
     folder: Path | None = None
     colours: str = ""
+    scale: dict[str, Any] = field(default_factory=dict)
     temporary: Path | None = None
 
     @property
@@ -60,8 +67,10 @@ class Outcome:
         return self._there("index.html")
 
     @property
-    def difference(self) -> Path | None:
-        return self._there(_DIFFERENCE)
+    def pictures(self) -> dict[str, Path]:
+        """The PNGs of Cycles, the tracer and what differs, by these names; empty where one is missing."""
+        found = {name: self._there(file) for name, file in _PICTURES.items()}
+        return found if all(found.values()) else {}
 
     def is_of(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> bool:
         """Whether the camera is still the one that was compared."""
@@ -81,7 +90,8 @@ class Comparison:
     """One comparison on its way, from the moment it is made.
 
     scene : the one of the window. level : one of film.LEVELS, or "auto". samples : a pixel, for light. clay : whether one matte
-    material covers everything. keep_in : where the report is kept; by default it is gone with Blender.
+    material covers everything. keep_in : a folder that gets one for each report, named by file, camera, frame and time; by
+    default the report is gone with Blender.
 
     Raises
     ------
@@ -101,7 +111,8 @@ class Comparison:
         _check_possible(camera_object, scene)
         self._camera, self._seen = camera_object.name, camera_seen(camera_object, scene)
         self._what = f"{camera_object.name}, frame {scene.frame_current}, {level}"
-        self._keep_in, self._pictures = keep_in, seeds(level, samples)
+        self._keep_in = keep_in and keep_in / report_name(camera_object.name, scene.frame_current)
+        self._pictures = seeds(level, samples)
         self._started = time.monotonic()
         words = ["--camera", camera_object.name, "--level", level]
         words += ["--samples", str(samples)] if level != LEVELS[0] else []
@@ -111,7 +122,7 @@ class Comparison:
         except OSError as error:
             raise InputError(f"no folder for the comparison can be made ({error.strerror}): free some space") from error
         try:
-            save_copy(self.folder / _COPY)
+            save_copy(self.folder / _file_name())
             self._family = self._child(scene, words)
         except OSError as error:
             _remove(self.folder)
@@ -123,9 +134,10 @@ class Comparison:
     def _child(self, scene: bpy.types.Scene, words: Sequence[str]) -> children.Family:
         """`viewcam check` with these words, on its way; the report names them and the artist's file."""
         report = self.folder / _REPORT
-        repeat = shlex.join(["check", Path(bpy.data.filepath).name or "untitled.blend", *words])
-        written = ["--json", str(self.folder / _RESULT), "--report", str(report), "--difference", str(report / _DIFFERENCE)]
-        command = _command(self.folder / _COPY, scene, [*words, *written, "--repeat", repeat])
+        repeat = shlex.join(["check", _file_name(), *words])
+        written = ["--json", str(self.folder / _RESULT), "--report", str(report), "--sides", str(report)]
+        written += ["--difference", str(report / _PICTURES["difference"])]
+        command = _command(self.folder / _file_name(), scene, [*words, *written, "--repeat", repeat])
         # Blender's own scripts hold what the inside of a `bpy` looks like, which hides the module from a new process.
         scripts = bpy.utils.system_resource("SCRIPTS")
         variables = children.environment(scripts, **{name: str(self.folder) for name in ("TMPDIR", "TMP", "TEMP")})
@@ -185,11 +197,23 @@ class Comparison:
                 folder, temporary = self._keep_in, None
             except (OSError, InputError) as error:
                 return Outcome(*of, None, f"The report can't be kept in {self._keep_in} ({error}): choose another folder")
-        colours = result.get("difference", {}).get("colours", "")
-        return Outcome(*of, result["passed"], result["sentence"], tuple(figures(result)), folder, colours, temporary)
+        drawn = result.get("difference", {})
+        told = result["passed"], result["sentence"], headline(result), tuple(figures(result)), tuple(lacking(result["ledger"]))
+        return Outcome(*of, *told, folder, drawn.get("colours", ""), drawn.get("scale", {}), temporary)
 
     def _said(self) -> str:
         return (self.folder / _SAID).read_text(encoding="utf-8", errors="replace")
+
+
+def report_name(camera: str, frame: int) -> str:
+    """What a report's folder is called: by file, camera, frame and the time now."""
+    name = made_fit(f"{Path(_file_name()).stem} {camera} {frame:04d}")
+    return f"{name} {datetime.now():%Y-%m-%d %H.%M.%S}"
+
+
+def _file_name() -> str:
+    """The open file's, as a copy of it is called."""
+    return f"{Path(bpy.data.filepath).stem or 'untitled'}.blend"
 
 
 def save_copy(path: Path) -> None:
@@ -218,6 +242,26 @@ def camera_seen(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinh
         return None
 
 
+def headline(result: dict[str, Any]) -> str:
+    """The verdict in a few words, for a panel."""
+    if not result["passed"]:
+        return "Cycles renders another picture"
+    for row in (row for row in result.get("passes", ()) if row["name"] == "Position"):
+        if row["percentiles"]:
+            return f"Identical to {plain(row['percentiles']['max']['value'])} px"
+    for light in result.get("quantities", ())[:1]:  # Combined
+        if light["steady"] and light["steady"]["percentiles"]:
+            return f"Identical to {plain(100 * light['steady']['percentiles']['max']['value'])} % of the light"
+        if light["ratio_error"] is not None:
+            return f"The same light, but for noise of {plain(100 * light['ratio_error'])} %"
+    return "Identical"
+
+
+def lacking(ledger: Sequence[dict[str, str]]) -> list[tuple[str, str]]:
+    """(object, sentence) of each entry of a ledger that is not modelled as it is."""
+    return [(entry["object"], f"{entry['status']}: {entry['reason']}") for entry in ledger if entry["status"] != "exported"]
+
+
 def figures(result: dict[str, Any]) -> list[tuple[str, str]]:
     """(label, text) of what `viewcam check` wrote as JSON, for a panel."""
     rows = []
@@ -231,7 +275,7 @@ def figures(result: dict[str, Any]) -> list[tuple[str, str]]:
         if light["steady"]:
             rows += _percentiles(light["steady"], "of the light")
         else:
-            ratio = "nothing" if light["ratio"] is None else f"{light['ratio']:.5f} ± {_plain(light['ratio_error'])}"
+            ratio = "nothing" if light["ratio"] is None else f"{light['ratio']:.5f} ± {plain(light['ratio_error'])}"
             rows.append(("Light, to Tracer's", ratio))
     ledger = result["ledger"]
     whole = sum(entry["status"] == "exported" for entry in ledger)
@@ -306,19 +350,12 @@ def _percentiles(row: dict[str, Any], unit: str) -> list[tuple[str, str]]:
     """Of a row of a table that has any, as JSON has it."""
     names = (("Median", "p50"), ("99.9 % within", "p99.9"))
     found = row["percentiles"]
-    return [(label, f"{_plain(found[name]['value'])} {unit}") for label, name in names if name in found]
+    return [(label, f"{plain(found[name]['value'])} {unit}") for label, name in names if name in found]
 
 
 def _copy_whole(source: str, target: str) -> None:
     with written_whole(target) as temporary:
         shutil.copyfile(source, temporary)
-
-
-def _plain(value: float | None) -> str:
-    """Two significant digits without powers of ten: 0.000052."""
-    if value is None:  # what JSON can't hold
-        return "∞"
-    return np.format_float_positional(float(f"{value:.1e}"), trim="-")
 
 
 def _of_all(part: int, whole: int) -> str:

@@ -1,8 +1,8 @@
 """The sub-panel "Proof": Compare with Cycles in one click, while the artist works on.
 
 comparing.py does the work; here a modal operator with a timer looks how far it is. What it came to belongs to this session of
-Blender: nothing of it is in the file but, while an Image Editor shows it, the packed image of the difference. Escape, Cancel,
-another file, turning the add-on off and leaving Blender end a comparison without a trace.
+Blender: nothing of it is in the file but, while an Image Editor shows it, its packed image. Escape (but not the one that ends
+playback), Cancel, another file, turning the add-on off and leaving Blender end a comparison without a trace.
 """
 
 import atexit
@@ -16,10 +16,11 @@ from ...errors import InputError
 from ...tracer.scene.film import SAMPLES
 from .. import datablocks, preferences
 from ..render_settings import LEVELS
-from . import difference_image, readouts
+from . import icons, proof_image, readouts
 from .comparing import Comparison, Outcome
 
 _SECONDS = 0.2  # between two looks
+_MOST_LACKING = 4  # objects that the panel names
 _NAMES = tuple(name for name, *_ in LEVELS)
 
 _timer: bpy.types.Timer | None = None
@@ -74,6 +75,11 @@ def _stop_timer() -> None:
     _timer = None
 
 
+def _on_view(settings: "ProofSettings", _context: bpy.types.Context) -> None:
+    if _latest and _latest.pictures and proof_image.loaded():
+        proof_image.load(_latest, settings.view, settings.swipe)
+
+
 class ProofSettings(bpy.types.PropertyGroup):
     """`window_manager.virtual_pinhole_proof`: how the next comparison is made."""
 
@@ -97,8 +103,19 @@ class ProofSettings(bpy.types.PropertyGroup):
     )
     folder: bpy.props.StringProperty(
         name="Report",
-        description="Where the report is kept. Without a folder it is there until another comparison or the end of Blender",
+        description="Where reports are kept, each in a folder named by file, camera, frame and time. "
+        "Without it the report is there until another comparison or the end of Blender",
         subtype="DIR_PATH",
+    )
+    view: bpy.props.EnumProperty(name="View", description="What is shown", items=proof_image.VIEWS, update=_on_view)
+    swipe: bpy.props.FloatProperty(
+        name="Swipe",
+        description="Where Cycles' picture ends and the tracer's begins",
+        subtype="FACTOR",
+        default=0.5,
+        min=0.0,
+        max=1.0,
+        update=_on_view,
     )
 
 
@@ -139,7 +156,7 @@ class VIEWCAM_OT_compare_with_cycles(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if event.type == "ESC" and event.value == "PRESS":
+        if event.type == "ESC" and event.value == "PRESS" and not _is_playing(context):
             end(forget=False)
         elif event.type != "TIMER":
             return {"PASS_THROUGH"}
@@ -198,7 +215,8 @@ class VIEWCAM_OT_compare_with_cycles(bpy.types.Operator):
             self.report({"ERROR"}, outcome.verdict)
             return {"CANCELLED"}
         self.report({"INFO" if outcome.passed else "WARNING"}, outcome.verdict)
-        difference_image.show(outcome, context)
+        if not outcome.passed:
+            proof_image.show(outcome, context)
         return {"FINISHED"}
 
 
@@ -219,15 +237,15 @@ class VIEWCAM_OT_cancel_comparison(bpy.types.Operator):
 
 class VIEWCAM_OT_show_difference(bpy.types.Operator):
     bl_idname = "viewcam.show_difference"
-    bl_label = "Show Difference"
-    bl_description = "Show what differs pixel by pixel, in an Image Editor"
+    bl_label = "Show"
+    bl_description = "Show Cycles' picture, the tracer's and what differs, in an Image Editor"
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
-        return bool(_latest and _latest.difference)
+        return bool(_latest and _latest.pictures)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        difference_image.show(_latest, context, anyway=True)
+        proof_image.show(_latest, context, anyway=True)
         return {"FINISHED"}
 
 
@@ -301,31 +319,53 @@ def _draw_outcome(
     layout: bpy.types.UILayout, outcome: Outcome, camera_object: bpy.types.Object, context: bpy.types.Context
 ) -> None:
     width = context.region.width / context.preferences.system.ui_scale - 60
-    headline, _, rest = outcome.verdict.partition(": ") if outcome.passed is not None else (outcome.verdict, "", "")
-    lines = [(headline, "CHECKMARK" if outcome.passed else "ERROR")]
-    if not outcome.passed:
+    lines = [(outcome.headline or outcome.verdict, "ERROR")]
+    if outcome.passed is False:
+        rest = outcome.verdict.partition(": ")[2]
         lines.append((rest[:1].upper() + rest[1:], "BLANK1"))
+    column = layout.column(align=True)
+    if outcome.passed:
+        column.label(text=outcome.headline, icon_value=icons.tick())
+        lines = []
     if camera_object.name != outcome.camera:
         lines.append((f"Of another camera: {outcome.what}", "INFO"))
     elif not outcome.is_of(camera_object, context.scene):
         lines.append((f"The camera has changed since: {outcome.what}", "INFO"))
-    column = layout.column(align=True)
+    lines += [(f"{name}: {reason}", "INFO") for name, reason in outcome.lacking[:_MOST_LACKING]]
+    more = len(outcome.lacking) - _MOST_LACKING
+    lines += [(f"and {more} more, in the report", "BLANK1")] if more > 0 else []
     for sentence, icon in lines:
         for i, line in enumerate(readouts.wrapped(sentence, width)):
-            column.label(text=line, icon="BLANK1" if i else icon)
+            column.label(text=line, icon="BLANK1" if i else icon, translate=False)
+    if outcome.report:
+        row = layout.row(align=True)
+        row.operator("viewcam.show_difference", icon="IMAGE_DATA")
+        row.operator("viewcam.open_report", text="Report", icon="URL")
+        if proof_image.loaded():
+            proof_image.draw_view(layout.row(align=True), context)
+    if outcome.rows:
+        _draw_figures(layout, outcome, width)
+
+
+def _draw_figures(layout: bpy.types.UILayout, outcome: Outcome, width: float) -> None:
+    header, body = layout.panel("viewcam_proof_figures", default_closed=True)
+    header.label(text="Figures")
+    if body is None:
+        return
+    column = body.column(align=True)
     for label, text in outcome.rows:
         split = column.split(factor=0.46)
         name = split.row()
         name.alignment = "RIGHT"
         name.label(text=label)
-        split.label(text=text)
-    if outcome.report:
-        row = layout.row(align=True)
-        row.operator("viewcam.show_difference", text="Difference", icon="IMAGE_DATA")
-        row.operator("viewcam.open_report", text="Report", icon="URL")
-        column = layout.column(align=True)
-        for line in readouts.wrapped(outcome.colours, width):
-            column.label(text=line)
+        split.label(text=text, translate=False)
+    for line in readouts.wrapped(outcome.colours, width):
+        column.label(text=line, translate=False)
+
+
+def _is_playing(context: bpy.types.Context) -> bool:
+    """Whether some window plays: Escape is then for that."""
+    return any(window.screen.is_animation_playing for window in context.window_manager.windows)
 
 
 def _draw_status_bar(header: bpy.types.Header, _context: bpy.types.Context) -> None:
@@ -375,10 +415,13 @@ def register() -> None:
     bpy.types.STATUSBAR_HT_header.append(_draw_status_bar)
     bpy.app.handlers.load_pre.append(_on_load)
     atexit.register(end)
+    proof_image.register()
 
 
 def unregister() -> None:
     end()
+    proof_image.unregister()
+    icons.forget()
     _stop_timer()  # Blender takes a modal operator that is unregistered away without its cancel()
     atexit.unregister(end)
     bpy.app.handlers.load_pre.remove(_on_load)
