@@ -1,0 +1,451 @@
+"""A camera from a photograph: from edges that run along known axes, or from points whose places are known.
+
+Pixels count from the lower left corner of the picture, with centres at + 0.5. The principal point is given (the picture's
+middle, unless it is known better) and pixels are square. What is unknown is d, the turn of the camera and, for points, the eye.
+
+An edge is where the picture of a straight line begins and ends; which way it was drawn says which way its axis points, and so
+two axes are enough for one camera without a mirror image. All of an axis' edges meet in its vanishing point, and by how far
+they miss it is weighed in pixels of their ends. A start comes from vanishing points (edges), a homography (points in a plane)
+or a direct linear transform (six or more points in space); then Gauss-Newton steps, damped as Levenberg and Marquardt have it,
+minimise the sum of squares in pixels. How certain the result is follows from how well pixels are known: the covariance is
+precision² · (JᵀJ)⁻¹.
+
+Everything runs over leading axes (..., n, 2), so that ten thousand cameras are matched at once; `from_edges`, `from_points` and
+`from_rectangle` are for one, and say what is wrong. Rejected: scipy and OpenCV, which Blender does not have; a search for more
+than one answer (a plane seen nearly head-on has two, and the better one is found from its homography).
+
+Sources: B. Caprile and V. Torre, Using vanishing points for camera calibration (1990); Z. Zhang, A flexible new technique for
+camera calibration (2000), for the homography's constraint; R. Hartley and A. Zisserman, Multiple View Geometry (2004), 7.1.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import checks
+from .errors import InputError
+from .pinhole import Pair, Pinhole, Triple
+
+Array = NDArray[np.float64]
+
+_STEPS = 60
+_CONVERGED = 1e-11  # of the parameters: what is left of them after one step more is their rounding
+_SHORTEST, _LONGEST = 0.02, 200.0  # d of a start, of half the picture's larger side
+_LARGEST_ERROR = math.log(2.0)  # of d, as a factor: what is less certain than that is no answer
+_OPEN = 1e-13  # an eigenvalue of 7 by 7 numbers near 1 that is less than this is rounding
+# Of the coordinates' spread: what lies nearer to a plane than this is in it.
+_FLAT = 1e-6
+
+
+@dataclass(frozen=True)
+class Match:
+    """A camera that was found.
+
+    pinhole : the camera. precision : how well the pixels were known, one standard deviation.
+    error : root mean square in pixels of what is left, 0 where there was nothing to spare.
+    distance_between : d with a probability of 68 %, lowest and highest.
+    eye_error : one standard deviation along each axis, world units; None where the eye is not asked.
+    pixels : by how many pixels the picture moves as each value goes off by one standard deviation: "look_at" (where its middle
+    is), "up" (the roll, at the corners), "distance" (the lens, at the corners), and "eye" where it is asked.
+    """
+
+    pinhole: Pinhole
+    precision: float
+    error: float
+    distance_between: Pair
+    eye_error: Triple | None
+    pixels: dict[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Cameras that were found, over leading axes.
+
+    rotation : (..., 3, 3), its rows are u, v, w. eye : (..., 3). distance : (...). residuals : (..., m) in pixels.
+    covariance : (..., p, p) for a precision of one pixel, of the turn about u, v and w in radians, of log d, and of the eye.
+    """
+
+    rotation: Array
+    eye: Array
+    distance: Array
+    residuals: Array
+    covariance: Array
+
+
+def from_edges(
+    edges: Sequence[tuple[str, ArrayLike, ArrayLike]],
+    like: Pinhole,
+    precision: float = 1.0,
+) -> Match:
+    """The camera whose picture has these edges.
+
+    edges : (axis, start, end), at least two along each of two axes. axis : "X", "Y" or "Z". start, end : (2,) pixels, drawn
+    towards where the axis points. like : its eye, distance to the look-at point, size and principal point are kept.
+    precision : of start and end, pixels, one standard deviation.
+
+    Raises
+    ------
+    InputError
+        if edges are missing or contradict one another, or leave the lens open.
+    """
+    precision = checks.number("precision", precision, least=1e-9)
+    named = [axis for axis, *_ in edges]
+    if any(axis not in _AXES for axis in named):
+        raise InputError(f"an edge runs along {next(axis for axis in named if axis not in _AXES)!r}: choose X, Y or Z")
+    enough = [axis for axis in _AXES if named.count(axis) >= 2]
+    if len(enough) < 2:
+        raise InputError("too few edges: draw two or more along each of two axes")
+    used = [edge for edge in edges if edge[0] in enough]
+    axes = np.array([_AXES.index(axis) for axis, *_ in used])
+    ends = checks.array("edges", [[start, end] for _, start, end in used])
+    if (np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) < 1.0).any():
+        raise InputError("an edge is shorter than a pixel: draw it along more of the line")
+    solution, is_mirrored = solve_edges(ends - np.array(like.principal_point), axes, _half(like))
+    if is_mirrored:
+        raise InputError("the edges' directions are those of a mirrored picture: draw each towards where its axis points")
+    eye = np.array(like.eye)
+    solution = Solution(solution.rotation, eye, solution.distance, solution.residuals, solution.covariance)
+    return _match(solution, like, precision, math.dist(like.eye, like.look_at), len(used) - 4, None)
+
+
+def from_points(points: ArrayLike, pixels: ArrayLike, like: Pinhole, precision: float = 1.0) -> Match:
+    """The camera that sees points of known place.
+
+    points : (n, 3) world space; at least four in one plane, or six. pixels : (n, 2), where they are in the picture.
+    like : its size, principal point and distance to the look-at point are kept. precision : of pixels, as for from_edges.
+
+    Raises
+    ------
+    InputError
+        if there are too few points, if they lie on a line or in a plane seen head-on, or if no camera sees them so.
+    """
+    precision = checks.number("precision", precision, least=1e-9)
+    points, pixels = checks.array("points", points), checks.array("pixels", pixels)
+    if points.ndim != 2 or points.shape[1:] != (3,) or pixels.shape != (len(points), 2):
+        raise InputError(f"{len(points)} points and {len(pixels)} pixels do not belong together: give as many of both")
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    is_flat = len(points) < 4 or spread[2] <= _FLAT * spread[0]
+    if len(points) < (4 if is_flat else 6):
+        raise InputError(f"{len(points)} points are too few: give four in one plane, or six in space")
+    if spread[1] <= _FLAT * spread[0]:
+        raise InputError("the points lie on one line: give some beside it")
+    solution = solve_points(points, pixels - np.array(like.principal_point), _half(like), is_flat)
+    away = float(np.mean((points - solution.eye) @ -solution.rotation[2]))
+    return _match(solution, like, precision, away, 2 * len(points) - 7, away)
+
+
+def from_rectangle(
+    corners: ArrayLike,
+    sides: Pair,
+    like: Pinhole,
+    precision: float = 1.0,
+    origin: Triple = (0.0, 0.0, 0.0),
+    axes: str = "XY",
+) -> Match:
+    """The camera that sees a rectangle of known sides.
+
+    corners : (4, 2) pixels: that at the origin, then around, first along the first axis. sides : lengths along both axes, world
+    units. origin : world space. axes : the two that the sides run along, as "XY" on the floor or "XZ" on a wall.
+
+    Raises
+    ------
+    InputError
+        as from_points does, and if a side has no length.
+    """
+    if len(axes) != 2 or any(axis not in _AXES for axis in axes) or axes[0] == axes[1]:
+        raise InputError(f"a rectangle's sides run along {axes!r}: name two axes, such as XY")
+    sides = checks.vector("sides", sides, 2)
+    if min(sides) <= 0.0:
+        raise InputError(f"a rectangle has sides of {sides[0]:g} and {sides[1]:g}: give lengths above 0")
+    first, second = (length * np.eye(3)[_AXES.index(axis)] for length, axis in zip(sides, axes, strict=True))
+    places = np.array(checks.vector("origin", origin, 3)) + np.array([0 * first, first, first + second, second])
+    return from_points(places, corners, like, precision)
+
+
+def solve_edges(ends: Array, axes: NDArray[np.int_], half: float) -> tuple[Solution, NDArray[np.bool_]]:
+    """The cameras of edges, and whether those that were drawn are of a mirrored picture.
+
+    ends : (..., n, 2, 2): edge, end, pixels from the principal point. axes : (n,) which of the world's axes each runs along.
+    half : of the picture's larger side, pixels.
+    """
+    found = np.unique(axes)
+    scaled = np.concatenate([ends / half, np.ones((*ends.shape[:-1], 1))], axis=-1)
+    normals = np.cross(scaled[..., 0, :], scaled[..., 1, :])
+    normals /= np.linalg.norm(normals[..., :2], axis=-1, keepdims=True)
+    vanishing = np.stack([np.linalg.svd(normals[..., axes == axis, :])[2][..., -1, :] for axis in found], axis=-2)
+    above = below = 0.0
+    for i, j in combinations(range(len(found)), 2):
+        across = (vanishing[..., i, :2] * vanishing[..., j, :2]).sum(axis=-1)
+        away = vanishing[..., i, 2] * vanishing[..., j, 2]
+        above, below = above - across * away, below + away * away
+    square = np.where(below > 0.0, above / np.where(below > 0.0, below, 1.0), _LONGEST**2)
+    distance = np.sqrt(np.clip(square, _SHORTEST**2, _LONGEST**2))
+    seen = vanishing * np.stack([1 / distance, 1 / distance, -np.ones_like(distance)], axis=-1)[..., None, :]
+    seen /= np.linalg.norm(seen, axis=-1, keepdims=True)
+    # What moves along an axis moves in the picture by V − p W, where (V, W) is its vanishing point.
+    along = scaled[..., 1, :2] - scaled[..., 0, :2]
+    for k, axis in enumerate(found):
+        of = axes == axis
+        towards = vanishing[..., k, None, :2] - scaled[..., of, 0, :2] * vanishing[..., k, None, 2:]
+        seen[..., k, :] *= np.where((along[..., of, :] * towards).sum(axis=(-1, -2)) < 0.0, -1.0, 1.0)[..., None]
+    is_mirrored = np.linalg.det(seen) < 0.0 if len(found) == 3 else np.zeros(distance.shape, bool)
+    rotation = _nearest_rotation(np.einsum("...ki,kj->...ij", seen, np.eye(3)[found]))
+    directions = np.eye(3)[axes]
+
+    def measured(rotation: Array, _eye: Array, distance: Array) -> tuple[Array, Array]:
+        return _edge_residuals(ends, directions, rotation, distance)
+
+    eye = np.zeros((*distance.shape, 3))
+    return _refined(measured, rotation, eye, distance * half, 4), is_mirrored
+
+
+def solve_points(points: Array, pixels: Array, half: float, is_flat: bool) -> Solution:
+    """The cameras that see points. points : (..., n, 3). pixels : (..., n, 2) from the principal point. half : see above.
+
+    is_flat : whether the points lie in a plane, where four are enough.
+    """
+    centre = points.mean(axis=-2, keepdims=True)
+    scale = np.sqrt(((points - centre) ** 2).sum(axis=-1).mean(axis=-1))[..., None, None]
+    local, scaled = (points - centre) / scale, pixels / half
+    rotation, shift, distance = (_pose_of_a_plane if is_flat else _pose_in_space)(local, scaled)
+    eye = centre[..., 0, :] - scale[..., 0] * np.einsum("...ij,...i->...j", rotation, shift)
+
+    def measured(rotation: Array, eye: Array, distance: Array) -> tuple[Array, Array]:
+        return _point_residuals(points, pixels, rotation, eye, distance, scale[..., 0, 0])
+
+    return _refined(measured, rotation, eye, distance * half, 7, scale[..., 0, 0])
+
+
+_AXES = "XYZ"
+
+
+def _half(like: Pinhole) -> float:
+    return max(like.width, like.height) / 2
+
+
+def _nearest_rotation(matrix: Array) -> Array:
+    left, _, right = np.linalg.svd(matrix)
+    sign = np.sign(np.linalg.det(left @ right))
+    left = left.copy()
+    left[..., :, 2] *= sign[..., None]
+    return left @ right
+
+
+def _turned(rotation: Array, turn: Array) -> Array:
+    """The rotation after a turn (..., 3) about u, v and w, in radians (Rodrigues)."""
+    angle = np.linalg.norm(turn, axis=-1)[..., None, None]
+    cross = _cross_matrix(turn)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        first = np.where(angle > 1e-8, np.sin(angle) / angle, 1.0)
+        second = np.where(angle > 1e-8, (1.0 - np.cos(angle)) / angle**2, 0.5)
+    return (np.eye(3) + first * cross + second * cross @ cross) @ rotation
+
+
+def _cross_matrix(vector: Array) -> Array:
+    x, y, z = np.moveaxis(vector, -1, 0)
+    zero = np.zeros_like(x)
+    return np.stack([np.stack(row, axis=-1) for row in ((zero, -z, y), (z, zero, -x), (-y, x, zero))], axis=-2)
+
+
+def _edge_residuals(ends: Array, directions: Array, rotation: Array, distance: Array) -> tuple[Array, Array]:
+    """(..., n) by how far each edge misses its vanishing point, counted at its ends, and what changes that: (..., n, 4).
+
+    The sum of squares of both ends' distances from the line through the vanishing point that suits them best is, but for terms
+    of higher order, the square of det(start, end, vanishing point) / √(|W start − V|² + |W end − V|²).
+    """
+    axis = np.einsum("...ij,nj->...ni", rotation, directions)
+    d = distance[..., None, None]
+    # Columns: the vanishing point (V, W) itself, then its change with the turn about u, v, w and with log d.
+    turned = -_cross_matrix(axis)
+    lens = np.concatenate([axis[..., :2] * d, np.zeros_like(axis[..., :1])], axis=-1)
+    to_picture = np.stack([np.broadcast_to(d, axis[..., :1].shape)] * 2 + [-np.ones_like(axis[..., :1])], axis=-2)
+    point = axis * to_picture[..., 0]
+    changes = np.concatenate([turned * to_picture, lens[..., None]], axis=-1)
+    start, end = ends[..., 0, :], ends[..., 1, :]
+    normal = np.stack(
+        [start[..., 1] - end[..., 1], end[..., 0] - start[..., 0], start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0]],
+        axis=-1,
+    )
+    arms = [each * point[..., 2:] - point[..., :2] for each in (start, end)]
+    size = np.sqrt(sum((arm**2).sum(axis=-1) for arm in arms))
+    residual = (normal * point).sum(axis=-1) / size
+    growth = sum(
+        np.einsum("...c,...cp->...p", arm, each[..., :, None] * changes[..., 2:, :] - changes[..., :2, :])
+        for arm, each in zip(arms, (start, end), strict=True)
+    )
+    slope = np.einsum("...c,...cp->...p", normal, changes) / size[..., None]
+    return residual, slope - residual[..., None] * growth / (size**2)[..., None]
+
+
+def _point_residuals(
+    points: Array, pixels: Array, rotation: Array, eye: Array, distance: Array, scale: Array
+) -> tuple[Array, Array]:
+    """(..., 2 n) pixels that points are off, and what changes that: (..., 2 n, 7), the eye in units of `scale`."""
+    seen = np.einsum("...ij,...nj->...ni", rotation, points - eye[..., None, :])
+    away = -seen[..., 2]
+    slope = seen[..., :2] / away[..., None]
+    d = distance[..., None, None]
+    # ∂(column, row)/∂(seen)
+    over = (distance[..., None] / away)[..., None, None]
+    to_picture = over * np.concatenate(
+        [np.broadcast_to(np.eye(2), (*away.shape, 2, 2)), slope[..., None]],
+        axis=-1,
+    )
+    turned = to_picture @ -_cross_matrix(seen)
+    moved = -to_picture @ (rotation * scale[..., None, None])[..., None, :, :]
+    jacobian = np.concatenate([turned, (slope * d)[..., None], moved], axis=-1)
+    residual = slope * d - pixels
+    flat = (*residual.shape[:-2], -1)
+    return residual.reshape(flat), jacobian.reshape(*flat, 7)
+
+
+def _refined(
+    measured: Callable[[Array, Array, Array], tuple[Array, Array]],
+    rotation: Array,
+    eye: Array,
+    distance: Array,
+    unknowns: int,
+    scale: Array | float = 1.0,
+) -> Solution:
+    """The least squares near a start. scale : of the eye's parameters, world units."""
+    scale = np.broadcast_to(scale, distance.shape)
+    damping = np.full(distance.shape, 1e-4)
+    residual, jacobian = measured(rotation, eye, distance)
+    cost = (residual**2).sum(axis=-1)
+    for _ in range(_STEPS):
+        normal = np.swapaxes(jacobian, -1, -2) @ jacobian
+        gradient = np.einsum("...mp,...m->...p", jacobian, residual)
+        diagonal = np.einsum("...pp->...p", normal)
+        damped = normal + (damping[..., None] * diagonal + 1e-300)[..., None] * np.eye(unknowns)
+        step = -_solved(damped, gradient)
+        step[..., 3] = np.clip(step[..., 3], -1.0, 1.0)
+        tried_rotation = _turned(rotation, step[..., :3])
+        tried_distance = distance * np.exp(step[..., 3])
+        tried_eye = eye + scale[..., None] * step[..., 4:] if unknowns > 4 else eye
+        with np.errstate(all="ignore"):
+            tried_residual, tried_jacobian = measured(tried_rotation, tried_eye, tried_distance)
+            tried = (tried_residual**2).sum(axis=-1)
+        better = np.isfinite(tried_jacobian).all(axis=(-1, -2)) & (tried <= cost)
+
+        def chosen(new: Array, old: Array, better: NDArray[np.bool_] = better) -> Array:
+            return np.where(better.reshape(better.shape + (1,) * (old.ndim - better.ndim)), new, old)
+
+        rotation, eye, distance = chosen(tried_rotation, rotation), chosen(tried_eye, eye), chosen(tried_distance, distance)
+        residual, jacobian, cost = chosen(tried_residual, residual), chosen(tried_jacobian, jacobian), chosen(tried, cost)
+        damping = np.where(better, np.maximum(damping / 10.0, 1e-15), np.minimum(damping * 10.0, 1e12))
+        if (np.abs(step).max(axis=-1) < _CONVERGED).all():
+            break
+    normal = np.swapaxes(jacobian, -1, -2) @ jacobian
+    size = np.sqrt(np.maximum(np.einsum("...pp->...p", normal), 1e-300))
+    both = size[..., :, None] * size[..., None, :]
+    values, vectors = np.linalg.eigh(normal / both)
+    # Where a step changes nothing (lens and distance of a plane seen head-on) all is open.
+    variances = np.where(values[..., :1] > _OPEN, 1.0 / np.maximum(values, _OPEN), 1e300)
+    covariance = np.einsum("...pk,...k,...qk->...pq", vectors, variances, vectors) / both
+    if unknowns > 4:
+        units = np.concatenate([np.ones((*distance.shape, 4)), np.repeat(scale[..., None], 3, axis=-1)], axis=-1)
+        covariance = covariance * units[..., :, None] * units[..., None, :]
+    return Solution(_nearest_rotation(rotation), eye, distance, residual, covariance)
+
+
+def _solved(matrix: Array, vector: Array) -> Array:
+    """The solution of a symmetric positive system, columns brought to one size first."""
+    size = np.sqrt(np.maximum(np.einsum("...pp->...p", matrix), 1e-300))
+    even = matrix / size[..., :, None] / size[..., None, :]
+    try:
+        return np.linalg.solve(even, (vector / size)[..., None])[..., 0] / size
+    except np.linalg.LinAlgError:
+        return np.einsum("...pq,...q->...p", np.linalg.pinv(even, hermitian=True), vector / size) / size
+
+
+def _pose_of_a_plane(points: Array, pixels: Array) -> tuple[Array, Array, Array]:
+    """Rotation, R (centre − eye) and d of points in a plane, from their homography. pixels : of half the picture."""
+    _, _, within = np.linalg.svd(points)
+    frame = within[..., :2, :]  # two directions in the plane
+    flat = np.einsum("...ij,...nj->...ni", frame, points)
+    homography = _null(_direct_rows(flat, pixels)).reshape(*points.shape[:-2], 3, 3)
+    a, b = homography[..., 0], homography[..., 1]
+    # a and b are (d x, d y, −z) of two directions that are perpendicular and of one length.
+    across = (a[..., :2] * b[..., :2]).sum(axis=-1), ((a[..., :2] ** 2) - (b[..., :2] ** 2)).sum(axis=-1)
+    away = a[..., 2] * b[..., 2], a[..., 2] ** 2 - b[..., 2] ** 2
+    below = away[0] ** 2 + away[1] ** 2 / 4.0
+    above = -(across[0] * away[0] + across[1] * away[1] / 4.0)
+    square = np.where(below > 0.0, above / np.where(below > 0.0, below, 1.0), _LONGEST**2)
+    distance = np.sqrt(np.clip(square, _SHORTEST**2, _LONGEST**2))
+    seen = homography / np.stack([distance, distance, -np.ones_like(distance)], axis=-1)[..., None]
+    length = np.linalg.norm(seen[..., :2], axis=-2).mean(axis=-1)
+    seen = seen / (length * np.where(seen[..., 2, 2] > 0.0, -1.0, 1.0))[..., None, None]  # before the eye, w is below 0
+    third = np.cross(seen[..., 0], seen[..., 1])
+    plane = np.concatenate([frame, np.cross(frame[..., 0, :], frame[..., 1, :])[..., None, :]], axis=-2)
+    rotation = _nearest_rotation(np.stack([seen[..., 0], seen[..., 1], third], axis=-1) @ plane)
+    return rotation, seen[..., 2], distance
+
+
+def _pose_in_space(points: Array, pixels: Array) -> tuple[Array, Array, Array]:
+    """The same of points in space, from the direct linear transform."""
+    matrix = _null(_direct_rows(points, pixels)).reshape(*points.shape[:-2], 3, 4)
+    ones = np.ones((*points.shape[:-1], 1))
+    behind = np.einsum("...j,...nj->...n", matrix[..., 2, :], np.concatenate([points, ones], axis=-1)).sum(axis=-1) < 0.0
+    matrix = matrix * np.where(behind, -1.0, 1.0)[..., None, None]
+    matrix = matrix / np.linalg.norm(matrix[..., 2, :3], axis=-1)[..., None, None]
+    rows = matrix[..., :2, :3] - (matrix[..., :2, :3] @ matrix[..., 2, :3, None]) * matrix[..., 2, None, :3]
+    distance = np.clip(np.linalg.norm(rows, axis=-1).mean(axis=-1), _SHORTEST, _LONGEST)
+    rotation = _nearest_rotation(np.concatenate([rows / distance[..., None, None], -matrix[..., 2:, :3]], axis=-2))
+    shift = np.stack([matrix[..., 0, 3] / distance, matrix[..., 1, 3] / distance, -matrix[..., 2, 3]], axis=-1)
+    return rotation, shift, distance
+
+
+def _direct_rows(points: Array, pixels: Array) -> Array:
+    """The linear equations of the direct linear transform: (..., 2 n, 3 (k + 1)) for points of k coordinates."""
+    known = np.concatenate([points, np.ones((*points.shape[:-1], 1))], axis=-1)
+    zero = np.zeros_like(known)
+    columns = np.concatenate([known, zero, -pixels[..., :1] * known], axis=-1)
+    rows = np.concatenate([zero, known, -pixels[..., 1:] * known], axis=-1)
+    return np.concatenate([columns, rows], axis=-2)
+
+
+def _null(matrix: Array) -> Array:
+    """The vector that the matrix takes nearest to zero."""
+    return np.linalg.svd(matrix)[2][..., -1, :]
+
+
+def _match(solution: Solution, like: Pinhole, precision: float, reach: float, spare: int, depth: float | None) -> Match:
+    """One camera's answer. reach : from the eye to the look-at point. spare : residuals beyond the unknowns."""
+    covariance = solution.covariance * precision**2
+    errors = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
+    distance = float(solution.distance)
+    if not (np.isfinite(errors).all() and errors[3] < _LARGEST_ERROR and _is_before(depth)):
+        raise InputError(
+            "the lens can't be told from these: draw longer edges, or choose a view that is not head-on, so that lines converge"
+        )
+    rotation, eye = solution.rotation, solution.eye
+    pinhole = Pinhole(
+        tuple(eye.tolist()),
+        tuple((eye - reach * rotation[2]).tolist()),
+        tuple(rotation[1].tolist()),
+        distance,
+        like.width,
+        like.height,
+        like.principal_point,
+    )
+    corner = math.hypot(like.width, like.height) / 2
+    pixels = {
+        "look_at": distance * math.hypot(errors[0], errors[1]),
+        "up": float(errors[2]) * corner,
+        "distance": float(errors[3]) * corner,
+    }
+    if depth is not None:
+        across = rotation[:2] @ covariance[4:, 4:] @ rotation[:2].T
+        pixels["eye"] = distance / depth * math.sqrt(max(float(np.trace(across)), 0.0))
+    factor = math.exp(errors[3])
+    left = math.sqrt(float((solution.residuals**2).sum()) / spare) if spare > 0 else 0.0
+    eye_error = tuple(errors[4:].tolist()) if depth is not None else None
+    return Match(pinhole, precision, left, (distance / factor, distance * factor), eye_error, pixels)
+
+
+def _is_before(depth: float | None) -> bool:
+    return depth is None or depth > 0.0
