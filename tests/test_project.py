@@ -36,6 +36,7 @@ ROOMS = {
     "rotation": "pinhole",
     "moves": "errors checks exact pinhole",
     "diagram": "pinhole",
+    "photo_match": "errors checks pinhole",
     "image": "errors memory files terminal pinhole",
     "intrinsics": "errors checks pinhole",
     "camera_values": "errors checks pinhole roll intrinsics",

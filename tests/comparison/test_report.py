@@ -82,6 +82,15 @@ def test_a_failed_comparison_says_so_at_the_top(paper_scene, tmp_path):
     assert '<html lang="en" class="failed">' in text
 
 
+def test_the_report_is_called_by_file_camera_and_frame(compared, tmp_path):
+    comparison, reference, test = compared
+    stamp = {"File": r"C:\films\shot <7>.blend", "Camera": "Hero", "Frame": "012"}
+    _, page = written(tmp_path, comparison, reference, replace(test, attributes=stamp))
+    assert "shot <7>.blend · camera Hero · frame 12" in page.text
+    _, page = written(tmp_path, *compared)
+    assert "a<b>.exr" in page.text, "without a stamp the picture's own name is all that is known"
+
+
 def test_the_report_stands_alone(compared, tmp_path):
     text, page = written(tmp_path, *compared, ledger=LEDGER)
     assert list((tmp_path / "report").iterdir()) == [tmp_path / "report" / "index.html"]

@@ -10,7 +10,7 @@ import platform
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
 import numpy as np
@@ -108,8 +108,8 @@ def common(
     return {
         "comparison": comparison,
         "passed": comparison.passed,
-        "title": f"{headline} · {names[1]}",
-        "about": f"{names[0]} against {names[1]}",
+        "title": f"{headline} · {_subject(test)}",
+        "about": _subject(test),
         "headline": f"{headline}.",
         "lede": with_powers(rest[:1].upper() + rest[1:]),
         "plates": {"reference": f"reference · {names[0]}", "test": f"test · {names[1]}"},
@@ -121,6 +121,17 @@ def common(
         "command": command,
         **_camera(pinhole, origin),
     }
+
+
+def _subject(test: Image) -> str:
+    """What was rendered, by file, camera and frame as Blender stamps them in its pictures, else the picture's own name."""
+    stamp = test.attributes
+    if "File" not in stamp:
+        return Path(test.source).name
+    parts = [PureWindowsPath(stamp["File"]).name]
+    parts += [f"camera {stamp['Camera']}"] if "Camera" in stamp else []
+    parts += [f"frame {stamp['Frame'].lstrip('0') or '0'}"] if "Frame" in stamp else []
+    return " · ".join(parts)
 
 
 def logarithmic_legend(low: float, high: float, limits: Mapping[str, float], unit: str) -> Legend:
