@@ -22,12 +22,13 @@ def _rooms() -> list[ModuleType]:
         presets,
         proof,
         render_panels,
+        scene_cameras,
         view_menu,
     )
     from .rendering import engine
 
     buttons = [operators, moving, clipboard, baking, presets]
-    shown = [panel, proof, overlay, gizmos]
+    shown = [panel, scene_cameras, proof, overlay, gizmos]
     followers = [animation, resolution]
     return [
         preferences,

@@ -19,7 +19,7 @@ from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import datablocks, findings, hold, targets
-from . import baking, clipboard, presets, readouts
+from . import baking, clipboard, presets, readouts, scene_cameras
 
 
 @dataclass(frozen=True)
@@ -45,13 +45,22 @@ class _MainPanel(_CameraPanel):
     bl_label = "Virtual Pinhole"
 
     def draw_header(self, context: bpy.types.Context) -> None:
-        self.layout.prop(datablocks.camera_in(context).virtual_pinhole, "enabled", text="")
+        camera_object = datablocks.camera_in(context)
+        if camera_object is None:
+            return
+        group, row = camera_object.virtual_pinhole, self.layout.row()
+        row.enabled = camera_object.data.type == "PERSP" or group.enabled
+        row.prop(group, "enabled", text="")
 
     def draw_header_preset(self, _context: bpy.types.Context) -> None:
         presets.VIEWCAM_PT_presets.draw_panel_header(self.layout)
 
     def draw(self, context: bpy.types.Context) -> None:
         camera_object, layout = datablocks.camera_in(context), self.layout
+        if camera_object is None:
+            scene_cameras.draw_none(layout)
+            return
+        scene_cameras.draw_header(layout, camera_object, context)
         layout.use_property_split = layout.use_property_decorate = True
         _draw_values(layout.column(), camera_object.virtual_pinhole)
         found = notices(camera_object, context.scene)
@@ -217,6 +226,10 @@ class VIEWCAM_PT_sidebar(_MainPanel, bpy.types.Panel):
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Pinhole"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.scene is not None
 
 
 class VIEWCAM_PT_data_move(_MovePanel, bpy.types.Panel):
