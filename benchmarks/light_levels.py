@@ -94,7 +94,7 @@ def prepare_cycles(contest: Contest, path: Path, threads: int) -> dict[str, race
     from viewcam_addon.blender.scenes.depsgraph import render_still
     from viewcam_addon.blender.scenes.export import export_scene
     from viewcam_addon.blender.scenes.ledger import Ledger
-    from viewcam_addon.blender.temporary_settings import borrowed, still_of_one_layer
+    from viewcam_addon.blender.temporary_settings import overridden, still_of_one_layer
 
     viewcam_addon.register()
     if contest.scene == "suzannes":
@@ -107,16 +107,16 @@ def prepare_cycles(contest: Contest, path: Path, threads: int) -> dict[str, race
     scene.render.resolution_x, scene.render.resolution_y = contest.size
     exported = export_scene(scene, view_layer, camera_object, ledger, lit=True)
     scene_file.write(exported, path)
-    light = cycles.Light(exported.film, NO_BOUNCES if contest.level == "direct" else exported.bounces, contest.samples)
+    light = cycles.LightSettings(exported.film, NO_BOUNCES if contest.level == "direct" else exported.bounces, contest.samples)
 
     def picture() -> float:
-        with borrowed() as borrow:
-            still_of_one_layer(borrow, scene, view_layer, camera_object)
-            cycles.borrow_settings(borrow, scene, view_layer, light)
-            borrow.set(scene.render, "threads_mode", "FIXED")
-            borrow.set(scene.render, "threads", threads)
+        with overridden() as overrides:
+            still_of_one_layer(overrides, scene, view_layer, camera_object)
+            cycles.override_settings(overrides, scene, view_layer, light)
+            overrides.set(scene.render, "threads_mode", "FIXED")
+            overrides.set(scene.render, "threads", threads)
             for remedy in ledger.remedies.values():
-                remedy(borrow)
+                remedy(overrides)
             return race.timed(lambda: render_still(scene))()
 
     return {"Cycles": picture}

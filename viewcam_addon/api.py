@@ -18,7 +18,7 @@ from . import children
 from . import image as images
 from .comparison import geometry, radiance
 from .comparison.light_verdict import RadianceComparison
-from .comparison.verdict import Comparison
+from .comparison.verdict import GeometryComparison
 from .errors import InputError
 from .image import Image
 from .tracer import render as tracing
@@ -82,7 +82,7 @@ def compare(
     scene: Scene | File | None = None,
     threads: int | None = None,
     test_samples: int | None = None,
-) -> Comparison | RadianceComparison:
+) -> GeometryComparison | RadianceComparison:
     """What a picture differs from the tracer's by, how much, and whether it is explained.
 
     reference : the tracer's, of `render` or an EXR. tests : Cycles', say; several of different seeds where there is noise.

@@ -172,7 +172,7 @@ def read(path: str | os.PathLike[str], only: Collection[str] | None = None) -> I
 
 
 @dataclass(frozen=True)
-class Frame:
+class FrameSize:
     """What the pixels of a file are, by its header alone. size : width and height. aspect : of a pixel, width over height."""
 
     size: tuple[int, int]
@@ -225,7 +225,7 @@ def _unreadable(path: Path, error: Exception) -> InputError:
     return InputError(f"{path} can't be read as an EXR file ({_first_line(error)}): render it again")
 
 
-def _frame(headers: Sequence[dict[str, Any]], path: Path) -> Frame:
+def _frame(headers: Sequence[dict[str, Any]], path: Path) -> FrameSize:
     """The frame of all parts. What is not stored pixel by pixel, and the whole picture, is refused.
 
     A part of a picture (a data window that is not its display window) would have to be put in its place, with something around
@@ -246,7 +246,7 @@ def _frame(headers: Sequence[dict[str, Any]], path: Path) -> Frame:
                 f"{tuple(display[1])}: render all of it"
             )
         (left, top), (right, bottom) = data
-        frames.add(Frame((right - left + 1, bottom - top + 1), float(header["pixelAspectRatio"])))
+        frames.add(FrameSize((right - left + 1, bottom - top + 1), float(header["pixelAspectRatio"])))
     if len(frames) > 1:
         raise InputError(f"{path} holds passes of different sizes: render it again")
     return frames.pop()

@@ -59,7 +59,7 @@ def _chart(
         return np.mean([ours(2, seed + 1000 * (pair + 1)) for pair in range(count // 2)], axis=0)
 
     def theirs(count: int, seed: int) -> NDArray[np.float32]:
-        light = cycles.Light(exported.film, exported.bounces, count, seed)
+        light = cycles.LightSettings(exported.film, exported.bounces, count, seed)
         with TemporaryDirectory() as folder:
             path = Path(folder) / "picture.exr"
             cycles.render(scene, scene.view_layers[0], camera, path, ledger.remedies.values(), light=light)

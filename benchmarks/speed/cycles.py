@@ -11,7 +11,7 @@ from viewcam_addon.blender.rendering import cycles
 from viewcam_addon.blender.scenes.depsgraph import render_still
 from viewcam_addon.blender.scenes.export import export_scene
 from viewcam_addon.blender.scenes.ledger import Ledger, Remedy
-from viewcam_addon.blender.temporary_settings import Borrower, still_of_one_layer
+from viewcam_addon.blender.temporary_settings import Overrides, still_of_one_layer
 from viewcam_addon.tracer.scene import scene_file
 from viewcam_addon.tracer.scene.film import NO_BOUNCES
 
@@ -47,24 +47,24 @@ def prepare(
     exported = export_scene(scene, view_layer, camera_object, ledger, lit=level != "geometry")
     scene_file.write(exported, path)
 
-    def light(sampling: str, parameter: float, seed: int) -> cycles.Light | None:
+    def light(sampling: str, parameter: float, seed: int) -> cycles.LightSettings | None:
         if level == "geometry":
             return None
         samples = int(parameter) if sampling == "samples" else _MOST_SAMPLES
-        return cycles.Light(exported.film, NO_BOUNCES if level == "direct" else exported.bounces, samples, seed)
+        return cycles.LightSettings(exported.film, NO_BOUNCES if level == "direct" else exported.bounces, samples, seed)
 
-    borrow = Borrower(contextlib.ExitStack())  # given back with the process
-    still_of_one_layer(borrow, scene, view_layer, camera_object)
-    borrow.set(scene.render, "threads_mode", "FIXED")
-    borrow.set(scene.render, "threads", threads)
+    overrides = Overrides(contextlib.ExitStack())  # given back with the process
+    still_of_one_layer(overrides, scene, view_layer, camera_object)
+    overrides.set(scene.render, "threads_mode", "FIXED")
+    overrides.set(scene.render, "threads", threads)
     for remedy in ledger.remedies.values():
-        remedy(borrow)
+        remedy(overrides)
     versions.set_multilayer_file(scene.render.image_settings)
     scene.render.use_persistent_data = True
 
     def picture(sampling: str, parameter: float, seed: int, file: Path) -> float:
-        cycles.borrow_settings(borrow, scene, view_layer, light(sampling, parameter, seed))
-        _adaptive(scene, sampling, parameter)(borrow)
+        cycles.override_settings(overrides, scene, view_layer, light(sampling, parameter, seed))
+        _adaptive(scene, sampling, parameter)(overrides)
         scene.update_tag()  # what is kept would else keep the samples as well
         view_layer.update()
         seconds = race.timed(lambda: render_still(scene))()
@@ -82,12 +82,12 @@ def prepare(
 def _adaptive(scene: bpy.types.Scene, sampling: str, parameter: float) -> Remedy:
     """Cycles' own adaptive sampling, where a noise threshold is asked for: settings that come after all others."""
 
-    def set_all(borrow: Borrower) -> None:
+    def set_all(overrides: Overrides) -> None:
         if sampling == "error":
-            borrow.set(scene.cycles, "use_adaptive_sampling", True)
-            borrow.set(scene.cycles, "adaptive_threshold", parameter)
-            borrow.set(scene.cycles, "adaptive_min_samples", 0)  # Cycles' own choice, by the threshold
-            borrow.set(scene.cycles, "use_sample_subset", False)
-            borrow.set(scene.cycles, "samples", _MOST_SAMPLES)
+            overrides.set(scene.cycles, "use_adaptive_sampling", True)
+            overrides.set(scene.cycles, "adaptive_threshold", parameter)
+            overrides.set(scene.cycles, "adaptive_min_samples", 0)  # Cycles' own choice, by the threshold
+            overrides.set(scene.cycles, "use_sample_subset", False)
+            overrides.set(scene.cycles, "samples", _MOST_SAMPLES)
 
     return set_all

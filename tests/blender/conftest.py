@@ -160,7 +160,7 @@ class BothSides:
     exported: Scene
     traced: dict
     cycles: dict
-    comparison: geometry.Comparison
+    comparison: geometry.GeometryComparison
 
     def hits(self, object_index):
         """How many pixels of Cycles' picture show the object."""

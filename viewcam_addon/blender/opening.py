@@ -18,7 +18,7 @@ import bpy
 
 from ..errors import InputError
 from . import ensure_registered
-from .temporary_settings import Borrower, borrowed
+from .temporary_settings import Overrides, overridden
 
 # What a .blend starts with: itself, or a gzip or Zstandard stream.
 _MAGIC = (b"BLENDER", b"\x1f\x8b", b"\x28\xb5\x2f\xfd")
@@ -30,13 +30,13 @@ _Put = Callable[[bpy.types.bpy_struct, str, Any], None]
 
 
 @contextlib.contextmanager
-def opened(blend: str | os.PathLike[str] | None, trust: bool = False) -> Iterator[tuple[Borrower, tuple[str, ...]]]:
+def opened(blend: str | os.PathLike[str] | None, trust: bool = False) -> Iterator[tuple[Overrides, tuple[str, ...]]]:
     """Open a .blend, or take the file that is open (None), for the time of a job.
 
     trust : whether what is in it may run and write. A file that is open was opened by Blender, by its own `--enable-autoexec`
     or preference; here only the rest is decided.
 
-    Gives a Borrower, and a sentence for each thing that is off and might be seen.
+    Gives a Overrides, and a sentence for each thing that is off and might be seen.
 
     Raises
     ------
@@ -44,11 +44,11 @@ def opened(blend: str | os.PathLike[str] | None, trust: bool = False) -> Iterato
         if there is no such file, if Blender can't read it, or if it is trusted and was opened without its scripts.
     """
     ensure_registered()
-    with borrowed() as borrow:
+    with overridden() as overrides:
         if blend is not None:
             off = open_blend(blend, trust)
         elif not trust:
-            off = (*_disarmed(borrow.set), *_unrun())
+            off = (*_disarmed(overrides.set), *_unrun())
         elif any(_unrun()):
             raise InputError(
                 "Blender has opened the file without running what is in it: write --enable-autoexec before the file, or leave "
@@ -56,7 +56,7 @@ def opened(blend: str | os.PathLike[str] | None, trust: bool = False) -> Iterato
             )
         else:
             off = ()
-        yield borrow, off
+        yield overrides, off
 
 
 def open_blend(path: str | os.PathLike[str], trust: bool = False) -> tuple[str, ...]:

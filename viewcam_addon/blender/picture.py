@@ -11,7 +11,7 @@ import bpy
 from ..errors import InputError
 from ..intrinsics import Frame
 from ..pinhole import Pinhole
-from .temporary_settings import Borrower
+from .temporary_settings import Overrides
 
 _LARGEST, _LEAST = 65536, 4  # Blender's own limits
 _LARGEST_ASPECT = 200
@@ -81,7 +81,7 @@ def fitted(pinhole: Pinhole, frame: Frame) -> tuple[Pinhole, tuple[str, ...]]:
     )
 
 
-def set_size(borrow: Borrower, scene: bpy.types.Scene, pinhole: Pinhole) -> None:
-    """Let the scene render the picture that a pinhole is for; a Borrower gives back what was, if that is called for."""
+def set_size(overrides: Overrides, scene: bpy.types.Scene, pinhole: Pinhole) -> None:
+    """Let the scene render the picture that a pinhole is for; overrides restore what was, if that is called for."""
     for name, value in settings_of(pinhole).items():
-        borrow.set(scene.render, name, value)
+        overrides.set(scene.render, name, value)

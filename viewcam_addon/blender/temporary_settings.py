@@ -1,7 +1,7 @@
-"""Settings of Blender that are changed for a while and given back, whatever happens in between.
+"""Settings of Blender that are overridden for a while and restored, whatever happens in between.
 
-    with borrowed() as borrow:
-        borrow.set(scene.cycles, "samples", 1)
+    with overridden() as overrides:
+        overrides.set(scene.cycles, "samples", 1)
         ...
 
 Rejected: a copy of the scene to change freely (rigid bodies, caches and drivers that name the scene would see another scene).
@@ -16,44 +16,44 @@ import bpy
 Made = TypeVar("Made")
 
 
-class Borrower:
-    """Hands settings out, and remembers how to give each back."""
+class Overrides:
+    """Sets what is Blender's for a while, and remembers how to restore it."""
 
     def __init__(self, stack: contextlib.ExitStack) -> None:
         self._stack = stack
         self._made: dict[Callable[..., Any], Any] = {}
 
     def set(self, owner: bpy.types.bpy_struct, name: str, value: Any) -> None:
-        """Set a property until the loan ends."""
+        """Set a property until the overrides end."""
         before = getattr(owner, name)
         if before != value:
             self.afterwards(setattr, owner, name, before)
             setattr(owner, name, value)
 
-    def shared(self, make: Callable[["Borrower"], Made]) -> Made:
-        """What `make(borrower)` makes for the time of the loan: the same for all who ask, made for the first."""
+    def shared(self, make: Callable[["Overrides"], Made]) -> Made:
+        """What `make(overrides)` makes while the overrides last: the same for all who ask, made for the first."""
         if make not in self._made:
             self._made[make] = make(self)
         return self._made[make]
 
     def enter(self, context: contextlib.AbstractContextManager) -> None:
-        """Enter a context, and leave it when the loan ends."""
+        """Enter a context, and leave it when the overrides end."""
         self._stack.enter_context(context)
 
     def afterwards(self, undo: Callable[..., Any], *arguments: Any, **options: Any) -> None:
-        """Call `undo` when the loan ends; what was borrowed last is given back first."""
+        """Call `undo` when the overrides end; what was set last is restored first."""
         self._stack.callback(undo, *arguments, **options)
 
 
 @contextlib.contextmanager
-def borrowed() -> Iterator[Borrower]:
-    """Give a Borrower; at the end of the block everything is as it was."""
+def overridden() -> Iterator[Overrides]:
+    """Give overrides; at the end of the block everything is as it was."""
     with contextlib.ExitStack() as stack:
-        yield Borrower(stack)
+        yield Overrides(stack)
 
 
 def still_of_one_layer(
-    borrow: Borrower,
+    overrides: Overrides,
     scene: bpy.types.Scene,
     view_layer: bpy.types.ViewLayer,
     camera_object: bpy.types.Object,
@@ -66,7 +66,7 @@ def still_of_one_layer(
     for the next render.
     """
     render = scene.render
-    borrow.set(render, "use_persistent_data", keep)
+    overrides.set(render, "use_persistent_data", keep)
     for name in (
         "use_compositing",
         "use_sequencer",
@@ -76,19 +76,19 @@ def still_of_one_layer(
         "use_single_layer",
         "use_stamp",
     ):
-        borrow.set(render, name, False)
-    borrow.set(render, "use_crop_to_border", render.use_border)
-    cameras_unbound(borrow, scene)
+        overrides.set(render, name, False)
+    overrides.set(render, "use_crop_to_border", render.use_border)
+    cameras_unbound(overrides, scene)
     scene.camera = camera_object
     for each in scene.view_layers:
-        borrow.set(each, "use", each == view_layer)
+        overrides.set(each, "use", each == view_layer)
 
 
-def cameras_unbound(borrow: Borrower, scene: bpy.types.Scene) -> None:
-    """Let `scene.camera` be the one that renders, whatever it is set to until the loan ends.
+def cameras_unbound(overrides: Overrides, scene: bpy.types.Scene) -> None:
+    """Let `scene.camera` be the one that renders, whatever it is set to until the overrides end.
 
     Markers bound to cameras would choose among them: in a render, and while they are unbound and bound again.
     """
-    borrow.afterwards(setattr, scene, "camera", scene.camera)
+    overrides.afterwards(setattr, scene, "camera", scene.camera)
     for marker in scene.timeline_markers:
-        borrow.set(marker, "camera", None)
+        overrides.set(marker, "camera", None)

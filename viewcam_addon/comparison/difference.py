@@ -17,16 +17,16 @@ from ..files import written_whole
 from ..html_page import figure
 from ..image import Image
 from . import pictures
-from .geometry import Comparison
+from .geometry import GeometryComparison
 from .radiance import RadianceComparison
-from .statistics import Row
+from .statistics import PassErrors
 
 # sRGB, where nothing was compared.
 _NOTHING = np.full((1, 3), 64, np.uint8)
 
 
 @np.errstate(all="ignore")
-def write(comparison: Comparison | RadianceComparison, path: str | os.PathLike[str]) -> dict[str, Any]:
+def write(comparison: GeometryComparison | RadianceComparison, path: str | os.PathLike[str]) -> dict[str, Any]:
     """Write the PNG; returns its path, what its colours say, and the ends and unit of their scale, as plain JSON values.
 
     Raises
@@ -40,7 +40,10 @@ def write(comparison: Comparison | RadianceComparison, path: str | os.PathLike[s
 
 
 def write_sides(
-    comparison: Comparison | RadianceComparison, reference: Image, tests: Sequence[Image], folder: str | os.PathLike[str]
+    comparison: GeometryComparison | RadianceComparison,
+    reference: Image,
+    tests: Sequence[Image],
+    folder: str | os.PathLike[str],
 ) -> None:
     """Write what the report shows of both sides, FOLDER/reference.png and FOLDER/test.png, under one exposure.
 
@@ -55,7 +58,7 @@ def write_sides(
 
 @np.errstate(all="ignore")
 def shown(
-    comparison: Comparison | RadianceComparison, reference: Image, tests: Sequence[Image]
+    comparison: GeometryComparison | RadianceComparison, reference: Image, tests: Sequence[Image]
 ) -> tuple[pictures.Picture, pictures.Picture]:
     """Reference and test as an eye can compare them: light tone-mapped alike, geometry shaded."""
     if isinstance(comparison, RadianceComparison):
@@ -69,7 +72,7 @@ def _write(picture: pictures.Picture, path: str | os.PathLike[str]) -> None:
         temporary.write_bytes(pictures.png(picture))
 
 
-def decades(row: Row) -> tuple[float, float]:
+def decades(row: PassErrors) -> tuple[float, float]:
     """The ends of a scale for a pass's errors: from a hundredth of the median's tolerance up to the largest error."""
     high = math.ceil(math.log10(max(row.values[-1], row.tolerances[-1])))
     low = math.floor(math.log10(row.tolerances[0] / 100))
@@ -81,7 +84,7 @@ def spread(values: NDArray) -> float:
     return max(float(np.percentile(np.abs(values), 99.5)), 1e-12)
 
 
-def _of_geometry(comparison: Comparison) -> tuple[pictures.Picture, str, dict[str, Any]]:
+def _of_geometry(comparison: GeometryComparison) -> tuple[pictures.Picture, str, dict[str, Any]]:
     row, size = comparison.rows[0], (comparison.pinhole.width, comparison.pinhole.height)
     low, high = decades(row) if row.count else (1e-6, 1.0)
     levels = pictures.on_scale(comparison.maps[row.name], low, high) if row.count else None

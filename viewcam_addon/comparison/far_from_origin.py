@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..pinhole import Pinhole
 from . import tolerances
-from .statistics import Row
+from .statistics import PassErrors
 from .tolerances import ROUNDINGS, Array, Seen
 
 
@@ -39,7 +39,7 @@ class FarFromOrigin:
         return {**asdict(self), "unit": "px", "sentence": self.sentence}
 
 
-def far_from_origin(pinhole: Pinhole, expected: Seen, compared: NDArray, position: Row) -> FarFromOrigin | None:
+def far_from_origin(pinhole: Pinhole, expected: Seen, compared: NDArray, position: PassErrors) -> FarFromOrigin | None:
     """What there is to be said about the distance from the origin; None unless another origin would mend a visible error.
 
     expected : the reference's passes, (pixels, channels). compared : (n,), the pixels of `position`.

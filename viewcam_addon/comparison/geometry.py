@@ -19,8 +19,8 @@ from .cameras import conversion_error, systematic_error
 from .far_from_origin import far_from_origin
 from .mismatches import (
     KINDS,
-    Agreement,
     Mismatches,
+    SurfaceAgreement,
     SurfaceAt,
     at,
     explain,
@@ -28,9 +28,9 @@ from .mismatches import (
     largest_around,
     reach_of,
 )
-from .statistics import Row, measure
+from .statistics import PassErrors, measure
 from .tolerances import Array, Seen, in_float32
-from .verdict import Comparison, allowed_unexplained
+from .verdict import GeometryComparison, allowed_unexplained
 
 # The passes that are compared with their channels (the third of UV is constant), and which of them both pictures must have.
 _CHANNELS = {"Depth": 1, "Position": 3, "Normal": 3, "UV": 2, "Object Index": 1, "Material Index": 1}
@@ -50,7 +50,7 @@ def compare(
     surface_at: SurfaceAt | None = None,
     stated: Pinhole | None = None,
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
-) -> Comparison:
+) -> GeometryComparison:
     """Compare two pictures of one camera.
 
     pinhole : the camera that traced the reference. surface_at : re-traces sub-pixel positions of the reference's scene;
@@ -70,7 +70,7 @@ def compare(
     hit = tolerances.is_hit(expected)
     shift = np.where(hit, tolerances.ray_shift(pinhole, expected), np.nan)
     off_x, off_y, along = _displacement(pinhole, seen)
-    agreement = Agreement(pinhole, np.hypot(off_x, off_y), _slopes(expected, hit, size))
+    agreement = SurfaceAgreement(pinhole, np.hypot(off_x, off_y), _slopes(expected, hit, size))
 
     kinds = kinds_of(expected, seen, agreement)
     # At an edge the ray may meet either surface, so a re-traced one is judged by the steepest slope around.
@@ -100,7 +100,7 @@ def compare(
     hits = (int(hit.sum()), int(tolerances.is_hit(seen).sum()))
     roundings = errors["Position"][0] / errors["Position"][1]
     far = far_from_origin(pinhole, expected, chosen, rows[0])
-    return Comparison(pinhole, stated, hits, rows, mismatches, systematic, conversion, maps, roundings, far, origin)
+    return GeometryComparison(pinhole, stated, hits, rows, mismatches, systematic, conversion, maps, roundings, far, origin)
 
 
 def _passes(reference: Image, test: Image, pinhole: Pinhole) -> tuple[Seen, Seen]:
@@ -129,7 +129,9 @@ def _slopes(expected: Seen, hit: NDArray, size: tuple[int, int]) -> dict[str, Ar
     return {name: tolerances.slopes(expected[name].reshape(*size, -1), belongs).ravel() for name in names}
 
 
-def _mismatches(kinds: NDArray, seen: Seen, reach: Array, agreement: Agreement, surface_at: SurfaceAt | None) -> Mismatches:
+def _mismatches(
+    kinds: NDArray, seen: Seen, reach: Array, agreement: SurfaceAgreement, surface_at: SurfaceAt | None
+) -> Mismatches:
     found = np.flatnonzero(kinds >= 0)
     columns, rows = found % agreement.pinhole.width, found // agreement.pinhole.width
     shifts, retraced = np.full(len(found), np.nan), 0
@@ -163,7 +165,7 @@ def _check_figures(source: str, expected: Seen, pinhole: Pinhole) -> None:
         )
 
 
-def _check_reference(source: str, expected: Seen, found: NDArray, agreement: Agreement, surface_at: SurfaceAt) -> None:
+def _check_reference(source: str, expected: Seen, found: NDArray, agreement: SurfaceAgreement, surface_at: SurfaceAt) -> None:
     """Refuse a reference that its own scene does not show, where it differs from the test.
 
     Else rays would be sent for each of its pixels, as far as its figures say that they may be off. One of an older version of
@@ -192,7 +194,9 @@ def _displacement(pinhole: Pinhole, seen: Seen) -> tuple[Array, Array, Array]:
     return off_x, off_y, along
 
 
-def _measure(errors: dict, chosen: NDArray, size: tuple[int, int]) -> tuple[tuple[Row, ...], dict[str, NDArray[np.float32]]]:
+def _measure(
+    errors: dict, chosen: NDArray, size: tuple[int, int]
+) -> tuple[tuple[PassErrors, ...], dict[str, NDArray[np.float32]]]:
     """The rows and the maps of the chosen pixels."""
     rows, maps = [], {}
     for name, unit in _UNITS.items():

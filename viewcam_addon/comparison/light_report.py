@@ -42,7 +42,7 @@ def write_report(
     shown = difference.shown(comparison, reference, tests)
     mean_of = f" The test is the mean of {len(tests)} pictures with other seeds." if len(tests) > 1 else ""
     sides = dict(zip(("reference", "test"), map(pictures.png_uri, shown), strict=True))
-    combined = page.View("picture", "Combined", f"{page.SWAP} Both under one exposure.{mean_of}", sides)
+    combined = page.Tab("picture", "Combined", f"{page.SWAP} Both under one exposure.{mean_of}", sides)
     asked = comparison.rows[0].hypothesis_tests
     if comparison.is_noisy:
         chart = charts.bell(asked[1].errors.ravel(), asked[1].limit)
@@ -62,7 +62,7 @@ def write_report(
     return page.write(folder, "report_light.html", values)
 
 
-def _view(comparison: RadianceComparison, name: str, values: np.ndarray) -> page.View:
+def _view(comparison: RadianceComparison, name: str, values: np.ndarray) -> page.Tab:
     """One map, in the scale that suits its kind."""
     quantity, _, kind = name.partition(": ")
     words = kind if quantity == "Combined" else name.replace(": ", " · ")
@@ -71,13 +71,13 @@ def _view(comparison: RadianceComparison, name: str, values: np.ndarray) -> page
     if name == "FLIP":
         caption = "What an eye notices when the two are swapped on a screen, from 0 to 1, on a logarithmic scale."
         picture, legend = pictures.on_scale(values, 0.01, 1.0), page.logarithmic_legend(0.01, 1.0, {}, "FLIP")
-        return page.View(view, words, caption, {"image": pictures.png_uri(picture)}, legend)
+        return page.Tab(view, words, caption, {"image": pictures.png_uri(picture)}, legend)
     if kind == "roundings":
         high = 10.0 ** max(2, math.ceil(math.log10(max(float(values.max()), 1e-9))))
         caption = "Error of each pixel in roundings of float32, on a logarithmic scale."
         limits = {"allowed in the median": ROUNDINGS[0], "at most": ROUNDINGS[-1]}
         picture, legend = pictures.on_scale(values, 1e-2, high), page.logarithmic_legend(1e-2, high, limits, "roundings")
-        return page.View(view, words, caption, {"image": pictures.png_uri(picture)}, legend)
+        return page.Tab(view, words, caption, {"image": pictures.png_uri(picture)}, legend)
     if kind == "difference":
         caption = f"Test minus reference: {_COLOURS}."
         limit, unit, allowed = difference.spread(values), "radiance", None
@@ -87,7 +87,7 @@ def _view(comparison: RadianceComparison, name: str, values: np.ndarray) -> page
         caption = f"{what} in standard errors of its own noise: {_COLOURS}."
         limit, unit, allowed = max(6.0, 1.25 * test.limit), "standard errors", test.limit
     picture = pictures.png_uri(pictures.signed(values, limit), pictures.signed_scale())
-    return page.View(view, words, caption, {"image": picture}, page.signed_legend(limit, unit, allowed))
+    return page.Tab(view, words, caption, {"image": picture}, page.signed_legend(limit, unit, allowed))
 
 
 def _maker(image: Image) -> str:

@@ -10,7 +10,7 @@ from ..pinhole import Pinhole
 from .hypothesis_tests import PIXELS, WHOLE, HypothesisTest, Place
 from .noise_free import Edges
 from .perception import Appearance
-from .statistics import Row, percentile_name, plain
+from .statistics import PassErrors, percentile_name, plain
 from .tolerances import PERCENTILES, Array
 from .verdict import mark, percent
 
@@ -51,7 +51,7 @@ class LightRow:
     visible: float
     broken: int
     hypothesis_tests: tuple[HypothesisTest, ...] = ()
-    noise_free: Row | None = None
+    noise_free: PassErrors | None = None
     edges: Edges | None = None
     factor: float | None = None
 

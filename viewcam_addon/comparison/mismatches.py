@@ -88,7 +88,7 @@ class Mismatches:
 
 
 @dataclass(frozen=True, eq=False)
-class Agreement:
+class SurfaceAgreement:
     """Judges whether the test picture shows the surface that a ray sees, within the tolerance of the last percentile.
 
     across : (n,) pixels, how far each of the test's positions, projected, lies from the centre of its pixel.
@@ -99,9 +99,9 @@ class Agreement:
     across: Array
     slopes: dict[str, Array]
 
-    def at(self, chosen: NDArray) -> "Agreement":
+    def at(self, chosen: NDArray) -> "SurfaceAgreement":
         """That of some of the pixels, by their indices."""
-        return Agreement(self.pinhole, self.across[chosen], {name: slope[chosen] for name, slope in self.slopes.items()})
+        return SurfaceAgreement(self.pinhole, self.across[chosen], {name: slope[chosen] for name, slope in self.slopes.items()})
 
     def errors(self, expected: Seen, seen: Seen) -> dict[str, tuple[Array, Array, Array | float]]:
         """For each pass: (error, what one rounding causes, what storage and the filter's bias cause), each (n,).
@@ -144,7 +144,7 @@ class Agreement:
         return same & _within(*self.errors(expected, seen)["Depth"])
 
 
-def kinds_of(expected: Seen, seen: Seen, agreement: Agreement) -> NDArray[np.intp]:
+def kinds_of(expected: Seen, seen: Seen, agreement: SurfaceAgreement) -> NDArray[np.intp]:
     """(n,) int: for each pixel the index in KINDS of what sets the two sides apart, −1 where nothing does."""
     kinds = np.where(agreement.same_surface(expected, seen), -1, KINDS.index("surface"))
     for name, kind in (("Material Index", "material index"), ("Object Index", "object index")):
@@ -183,7 +183,7 @@ def contrast(values: Array) -> Array:
 
 
 def explain(
-    columns: NDArray, rows: NDArray, seen: Seen, reach: Array, agreement: Agreement, surface_at: SurfaceAt
+    columns: NDArray, rows: NDArray, seen: Seen, reach: Array, agreement: SurfaceAgreement, surface_at: SurfaceAt
 ) -> tuple[Array, int]:
     """The smallest shift of the ray that explains what the test picture shows.
 
@@ -209,7 +209,7 @@ def explain(
 
 
 def _explained_by(
-    columns: NDArray, rows: NDArray, seen: Seen, radius: Array, agreement: Agreement, surface_at: SurfaceAt
+    columns: NDArray, rows: NDArray, seen: Seen, radius: Array, agreement: SurfaceAgreement, surface_at: SurfaceAt
 ) -> NDArray[np.bool_]:
     """(n,) bool: whether some ray on the ring of this radius sees the same."""
     angles = (np.arange(_DIRECTIONS) + 0.5) * (2.0 * np.pi / _DIRECTIONS)

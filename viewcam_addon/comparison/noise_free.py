@@ -21,7 +21,7 @@ from . import tolerances
 from .mismatches import contrast, largest_around
 from .noise import poisson_allowance
 from .sides import Sides
-from .statistics import Row, measure
+from .statistics import PassErrors, measure
 from .tolerances import Array
 
 # Pixels on edges are independent events; their number exceeds what is allowed once in a thousand pictures, and so do leaks,
@@ -115,7 +115,7 @@ class Rounding:
         return self._storage * np.sqrt(np.maximum(self._brightest**2 - value**2, 0.0))
 
 
-def compare(sides: Sides, allowed: Allowance, belongs: NDArray) -> tuple[Row, Edges, Array]:
+def compare(sides: Sides, allowed: Allowance, belongs: NDArray) -> tuple[PassErrors, Edges, Array]:
     """The figures of all pixels, those on edges, and the error of each pixel in roundings.
 
     allowed : of these sides. belongs : the object of each pixel.

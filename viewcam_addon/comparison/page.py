@@ -44,7 +44,7 @@ class Legend:
 
 
 @dataclass(frozen=True)
-class View:
+class Tab:
     """One of the pictures to choose from.
 
     name : in the page's address. words : what it shows. caption : a sentence. pictures : data: URIs by side, "image", or

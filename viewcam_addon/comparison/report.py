@@ -9,7 +9,7 @@ import numpy as np
 
 from ..image import Image
 from . import charts, difference, page, pictures
-from .geometry import Comparison
+from .geometry import GeometryComparison
 
 # Under the loupe: so many mismatches, the unexplained ones first.
 _MOST_CROPS = 8
@@ -18,7 +18,7 @@ _UNIT_WORDS = {"px": "in pixels", "relative": "relative to its depth", "°": "in
 
 @np.errstate(all="ignore")
 def write_report(
-    comparison: Comparison,
+    comparison: GeometryComparison,
     reference: Image,
     test: Image,
     folder: str | os.PathLike[str],
@@ -49,18 +49,18 @@ def write_report(
     return page.write(folder, "report_geometry.html", values)
 
 
-def _views(comparison: Comparison, shades: tuple, reference: Image, test: Image) -> list[page.View]:
+def _views(comparison: GeometryComparison, shades: tuple, reference: Image, test: Image) -> list[page.Tab]:
     def both(painted: Sequence[pictures.Picture]) -> dict[str, str]:
         return dict(zip(("reference", "test"), map(pictures.png_uri, painted), strict=True))
 
     caption = f"{page.SWAP} Shaded here from depth, normals and object indices."
-    views = [page.View("picture", "Both pictures", caption, both(shades))]
+    views = [page.Tab("picture", "Both pictures", caption, both(shades))]
     lit = [pictures.tone_mapped(image["Combined"][..., :3]) for image in (reference, test) if "Combined" in image.passes]
     if len(lit) == 2:
-        views.append(page.View("combined", "Combined", page.SWAP, both(lit)))
+        views.append(page.Tab("combined", "Combined", page.SWAP, both(lit)))
     elif "Combined" in test.passes:
         caption = "What the renderer made of it; the tracer has no light at this level."
-        views.append(page.View("combined", "As rendered", caption, {"image": pictures.png_uri(lit[0])}))
+        views.append(page.Tab("combined", "As rendered", caption, {"image": pictures.png_uri(lit[0])}))
     for row in comparison.rows:
         if row.count:
             low, high = difference.decades(row)
@@ -70,11 +70,11 @@ def _views(comparison: Comparison, shades: tuple, reference: Image, test: Image)
             limits = {"allowed in the median": row.tolerances[0], "at most": row.tolerances[-1]}
             legend = page.logarithmic_legend(low, high, limits, row.unit)
             name = row.name.lower().replace(" ", "-")
-            views.append(page.View(name, f"{row.name} error", caption, {"image": picture}, legend))
+            views.append(page.Tab(name, f"{row.name} error", caption, {"image": picture}, legend))
     return views
 
 
-def _crops(comparison: Comparison, shades: tuple) -> list[page.Crop]:
+def _crops(comparison: GeometryComparison, shades: tuple) -> list[page.Crop]:
     mismatches = comparison.mismatches
     order = np.argsort(mismatches.explained, kind="stable")
     chosen = order[np.unique(np.linspace(0, len(order) - 1, _MOST_CROPS).astype(int))] if len(order) > _MOST_CROPS else order

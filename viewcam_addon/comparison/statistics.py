@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Row:
+class PassErrors:
     """One line of the table.
 
     name, unit : the pass and the unit of its figures.
@@ -52,21 +52,21 @@ class Row:
         return {"name": self.name, "unit": self.unit, "count": self.count, "ok": self.ok, "percentiles": figures}
 
 
-def measure(name: str, unit: str, errors: Array, one_rounding: Array, floor: Array | float = 0.0) -> Row:
+def measure(name: str, unit: str, errors: Array, one_rounding: Array, floor: Array | float = 0.0) -> PassErrors:
     """Errors against their tolerances.
 
     errors : (n,) in `unit`, finite. one_rounding : (n,) in `unit`, what one rounding causes at each pixel.
     floor : in `unit`, what storage alone may cause at every percentile; (n,) or one number.
     """
     if not len(errors):
-        return Row(name, unit, 0, (), (), ())
+        return PassErrors(name, unit, 0, (), (), ())
     values = np.percentile(errors, PERCENTILES)
     tolerances = [np.median(k * one_rounding + floor) for k in ROUNDINGS]
     shares = [
         np.percentile(errors / np.maximum(k * one_rounding + floor, np.finfo(float).tiny), p)
         for p, k in zip(PERCENTILES, ROUNDINGS, strict=True)
     ]
-    return Row(name, unit, len(errors), *(tuple(float(x) for x in figures) for figures in (values, tolerances, shares)))
+    return PassErrors(name, unit, len(errors), *(tuple(float(x) for x in figures) for figures in (values, tolerances, shares)))
 
 
 def plain(value: float | None) -> str:

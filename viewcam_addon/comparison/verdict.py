@@ -9,7 +9,7 @@ from ..pinhole import Pinhole
 from .cameras import ConversionError, Systematic
 from .far_from_origin import FarFromOrigin
 from .mismatches import PIXELS_PER_UNEXPLAINED, Mismatches
-from .statistics import Row, percentile_name
+from .statistics import PassErrors, percentile_name
 from .tolerances import PERCENTILES, Array
 
 # A sentence with more faults is not read; the table has them all.
@@ -17,7 +17,7 @@ _MOST_FAULTS = 2
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class GeometryComparison:
     """What differs between a reference and a test picture.
 
     pinhole : the camera of the reference. stated : the camera that was asked for, or None.
@@ -36,7 +36,7 @@ class Comparison:
     pinhole: Pinhole
     stated: Pinhole | None
     hits: tuple[int, int]
-    rows: tuple[Row, ...]
+    rows: tuple[PassErrors, ...]
     mismatches: Mismatches
     systematic: Systematic | None
     conversion: ConversionError | None
@@ -100,7 +100,7 @@ def allowed_unexplained(pinhole: Pinhole) -> int:
     return pinhole.width * pinhole.height // PIXELS_PER_UNEXPLAINED
 
 
-def sentence(comparison: Comparison) -> str:
+def sentence(comparison: GeometryComparison) -> str:
     """The verdict in one sentence, which names the gravest fault where there is one."""
     if comparison.passed:
         return _praise(comparison)
@@ -109,7 +109,7 @@ def sentence(comparison: Comparison) -> str:
     return "Not the same picture: " + "; ".join(_faults(comparison)[:_MOST_FAULTS]) + "."
 
 
-def lines(comparison: Comparison) -> list[str]:
+def lines(comparison: GeometryComparison) -> list[str]:
     """One line for each pass, aligned, and the verdict last."""
     head = (
         f"{'pass':<16}{'pixels':>11}"
@@ -145,7 +145,7 @@ def lines(comparison: Comparison) -> list[str]:
     return [*table, comparison.sentence]
 
 
-def _row_line(row: Row) -> str:
+def _row_line(row: PassErrors) -> str:
     if not row.count:
         return f"{row.name:<16}{0:>11}  nothing was compared  {mark(False)}"
     figures = "".join(f"{value:>10.1e}" for value in row.values)
@@ -154,7 +154,7 @@ def _row_line(row: Row) -> str:
     return f"{row.name:<16}{row.count:>11,}{figures}  {row.unit:<10}{used}{mark(row.ok)}"
 
 
-def _praise(comparison: Comparison) -> str:
+def _praise(comparison: GeometryComparison) -> str:
     position = comparison.rows[0]
     count = len(comparison.mismatches.kinds)
     edges = f"; {count:,} on edges, {_explained(comparison)}" if count else ""
@@ -165,7 +165,7 @@ def _praise(comparison: Comparison) -> str:
     )
 
 
-def _faults(comparison: Comparison) -> list[str]:
+def _faults(comparison: GeometryComparison) -> list[str]:
     """What is wrong, the gravest first."""
     faults = []
     position = comparison.rows[0]
@@ -196,7 +196,7 @@ def _faults(comparison: Comparison) -> list[str]:
     return faults
 
 
-def _cause(comparison: Comparison) -> str:
+def _cause(comparison: GeometryComparison) -> str:
     """What the systematic part looks like: the largest of shift, zoom and roll, in pixels at the picture's border."""
     s = comparison.systematic
     radius = max(comparison.pinhole.width, comparison.pinhole.height) / 2
@@ -214,7 +214,7 @@ def _cause(comparison: Comparison) -> str:
     return cause if effect > s.tolerance else "the error has no common direction"
 
 
-def _explained(comparison: Comparison) -> str:
+def _explained(comparison: GeometryComparison) -> str:
     mismatches = comparison.mismatches
     explained = int(mismatches.explained.sum())
     if not explained:
@@ -222,7 +222,7 @@ def _explained(comparison: Comparison) -> str:
     return f"{explained:,} explained by a shift of at most {np.max(mismatches.shifts[mismatches.explained]):.1e} px"
 
 
-def _why_unexplained(comparison: Comparison) -> str:
+def _why_unexplained(comparison: GeometryComparison) -> str:
     if not comparison.mismatches.retraced:
         return "which may be edges: give the scene too, so that they can be re-traced"
     return "and no shift within tolerance explains it"

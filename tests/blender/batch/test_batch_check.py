@@ -10,7 +10,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon import cli
-from viewcam_addon.batch.judge import Judge
+from viewcam_addon.batch.comparer import Comparer
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import versions
 from viewcam_addon.blender.batch import checking
@@ -29,18 +29,18 @@ def add(kind, **options):
 
 
 @pytest.fixture(scope="module")
-def judge():
+def comparer():
     """One for all tests, since to start it takes as long as a test."""
-    with Judge() as judge:
-        yield judge
+    with Comparer() as comparer:
+        yield comparer
 
 
 @pytest.fixture(autouse=True)
-def one_judge(judge, monkeypatch):
-    class Lent(Judge):
-        verdict = staticmethod(judge.verdict)  # its own process is never started
+def one_comparer(comparer, monkeypatch):
+    class Kept(Comparer):
+        verdict = staticmethod(comparer.verdict)  # its own process is never started
 
-    monkeypatch.setattr(checking, "Judge", Lent)
+    monkeypatch.setattr(checking, "Comparer", Kept)
 
 
 @pytest.fixture

@@ -56,7 +56,7 @@ def nothing_left():
 def stand_in(monkeypatch, seen):
     """A function that starts a comparison whose child is the stand-in, with a method `let(steps)`."""
 
-    class Slow(comparing.Comparison):
+    class Slow(comparing.RunningComparison):
         def let(self, steps):
             (self.folder / "go").write_text(str(steps))
 
@@ -64,7 +64,7 @@ def stand_in(monkeypatch, seen):
         return [sys.executable, "-c", STAND_IN, str(copy.parent)]
 
     monkeypatch.setattr(comparing, "_command", command)
-    monkeypatch.setattr(proof, "Comparison", Slow)
+    monkeypatch.setattr(proof, "RunningComparison", Slow)
     return lambda **options: Slow(seen.camera, seen, **options)
 
 
@@ -122,7 +122,7 @@ def changed(before, after):
 def test_the_same_picture_is_the_verdict_and_the_file_stays_as_it_is(seen):
     seen.objects["Suzanne"].location.x = 0.25  # an edit that nobody has saved
     before = state(seen)
-    comparison, told = comparing.Comparison(seen.camera, seen), []
+    comparison, told = comparing.RunningComparison(seen.camera, seen), []
     while (outcome := comparison.poll()) is None:
         told.append(comparison.progress())
         time.sleep(0.01)
@@ -188,7 +188,7 @@ def test_cancelled_while_it_renders_it_leaves_no_process_and_no_file(seen):
     seen.render.resolution_x, seen.render.resolution_y = 1920, 1080
     bpy.context.view_layer.update()
     before, there = state(seen), set(Path(bpy.app.tempdir).iterdir())
-    comparison = comparing.Comparison(seen.camera, seen)
+    comparison = comparing.RunningComparison(seen.camera, seen)
     # Blender in the child has begun when it has a temporary folder.
     wait_for(lambda: list(comparison.folder.glob("blender_*")))
     assert processes_of(comparison.folder)
@@ -346,10 +346,10 @@ def test_what_can_not_be_compared_is_refused_at_once_in_one_sentence(seen, monke
     with monkeypatch.context() as patch:
         patch.setattr("importlib.util.find_spec", lambda name: None)
         with pytest.raises(InputError, match="OpenEXR is missing"):
-            comparing.Comparison(seen.camera, seen)
+            comparing.RunningComparison(seen.camera, seen)
     other = bpy.data.scenes.new("Other")
     with pytest.raises(InputError, match="camera 'Camera' is not in scene 'Other'"):
-        comparing.Comparison(seen.camera, other)
+        comparing.RunningComparison(seen.camera, other)
     with monkeypatch.context() as patch:
         patch.setattr(comparing, "_file_name", lambda: "no/such/folder/copy.blend")
         with pytest.raises(RuntimeError, match="A copy of the file can't be saved"):

@@ -1,4 +1,4 @@
-"""The render engine's panels, and those of Blender that it borrows: all gone with the add-on."""
+"""The render engine's panels, and those of Blender that it takes over: all gone with the add-on."""
 
 import pytest
 

@@ -171,7 +171,7 @@ def test_a_stand_in_is_the_same_on_both_sides(pictures, floor, change):
 def test_without_its_stand_in_the_comparison_fails(pictures, floor, change, monkeypatch):
     """The test above must be able to fail."""
     change(floor)
-    monkeypatch.setattr(materials, "stand_in", lambda borrow, material, reading: None)
+    monkeypatch.setattr(materials, "stand_in", lambda overrides, material, reading: None)
     sides = pictures(scenes=1)
     with pytest.raises(AssertionError):
         check(sides, TEXTURED)

@@ -1,4 +1,4 @@
-"""Cycles' settings are borrowed: given back whatever happens, and right while they last."""
+"""Cycles' settings are overridden: restored whatever happens, and right while they last."""
 
 import ctypes
 
@@ -8,7 +8,7 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender.rendering import cycles, job
 from viewcam_addon.blender.scenes import depsgraph, indices
-from viewcam_addon.blender.temporary_settings import borrowed
+from viewcam_addon.blender.temporary_settings import overridden
 from viewcam_addon.errors import InputError
 
 # What describes the settings, what follows from them, and brushes (reading some of them crashes 4.2).
@@ -125,7 +125,7 @@ def crowded(scene, camera_object):
 
 @pytest.mark.parametrize("file_format", ["PNG", "JPEG", "OPEN_EXR", "OPEN_EXR_MULTILAYER", "FFMPEG"])
 @pytest.mark.parametrize("engine", ["CYCLES", "EEVEE", "BLENDER_WORKBENCH"])
-def test_everything_borrowed_is_given_back(crowded, both_sides, engine, file_format):
+def test_every_override_is_restored(crowded, both_sides, engine, file_format):
     if engine == "EEVEE":
         engine = "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0) else "BLENDER_EEVEE"
     crowded.render.engine = engine
@@ -144,7 +144,7 @@ def test_everything_borrowed_is_given_back(crowded, both_sides, engine, file_for
 
 
 @pytest.mark.parametrize("request_", [{}, {"clay": True}, {"recenter": True}], ids=str)
-def test_everything_borrowed_for_light_is_given_back(crowded, tmp_path, request_):
+def test_every_override_for_light_is_restored(crowded, tmp_path, request_):
     crowded.render.image_settings.file_format = "PNG"
     before = state(crowded)
     paths = [tmp_path / "first.exr", tmp_path / "second.exr"]
@@ -235,10 +235,10 @@ def test_a_loan_is_given_back_in_reverse_even_when_giving_back_fails(scene):
         order.append("failed")
         raise ValueError("gone")
 
-    with pytest.raises(ValueError, match="gone"), borrowed() as borrow:
-        borrow.set(scene.cycles, "samples", 1)
-        borrow.afterwards(fail)
-        borrow.afterwards(order.append, "first")
+    with pytest.raises(ValueError, match="gone"), overridden() as overrides:
+        overrides.set(scene.cycles, "samples", 1)
+        overrides.afterwards(fail)
+        overrides.afterwards(order.append, "first")
     assert order == ["first", "failed"] and scene.cycles.samples == 5
 
 

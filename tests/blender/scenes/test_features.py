@@ -114,7 +114,7 @@ def test_a_plain_material_stands_in(monkey, material, both_sides, depart):
 def test_without_its_stand_in_the_comparison_fails(monkey, material, both_sides, depart, monkeypatch):
     """The tests above must be able to fail."""
     depart(material)
-    monkeypatch.setattr(materials, "make_plain", lambda borrow, material: None)
+    monkeypatch.setattr(materials, "make_plain", lambda overrides, material: None)
     assert not both_sides().comparison.passed
 
 

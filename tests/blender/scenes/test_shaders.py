@@ -5,7 +5,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender.scenes import materials, shaders
-from viewcam_addon.blender.temporary_settings import borrowed
+from viewcam_addon.blender.temporary_settings import overridden
 from viewcam_addon.tracer.scene.materials import PLAIN, Colour, Material
 
 RED, GREEN = (0.5, 0.25, 0.125), (0.0, 1.0, 0.5)
@@ -263,8 +263,8 @@ def test_the_stand_in_of_everything_is_read_as_what_it_stands_for(diffuse, image
         ior=1.25,
     )
     before = [node.name for node in diffuse.node_tree.nodes]
-    with borrowed() as borrow:
-        materials.stand_in(borrow, diffuse, shaders.Reading(made))
+    with overridden() as overrides:
+        materials.stand_in(overrides, diffuse, shaders.Reading(made))
         assert exactly(diffuse) == made
     assert [node.name for node in diffuse.node_tree.nodes] == before
     assert exactly(diffuse) == Material(diffuse=Colour(RED))
@@ -276,8 +276,8 @@ def test_products_of_colours_are_read_as_what_they_stand_for(diffuse, image):
         emission=Colour((4.0, 2.0, 1.0), vertex=True),
         mirror=Colour((0.5, 0.5, 0.5), image.name_full),
     )
-    with borrowed() as borrow:
-        materials.stand_in(borrow, diffuse, shaders.Reading(made, {image.name_full: image}, "Paint"))
+    with overridden() as overrides:
+        materials.stand_in(overrides, diffuse, shaders.Reading(made, {image.name_full: image}, "Paint"))
         assert exactly(diffuse) == made and shaders.read(diffuse).vertex == "Paint"
         (multiply, *_) = [node for node in diffuse.node_tree.nodes if node.type == "VECT_MATH"]
         multiply.operation = "ADD"
@@ -285,6 +285,6 @@ def test_products_of_colours_are_read_as_what_they_stand_for(diffuse, image):
 
 
 def test_the_plain_material_is_the_tracers(fresh_blender):
-    with borrowed() as borrow:
-        assert exactly(materials.plain(borrow)).diffuse.rgb == pytest.approx(PLAIN.diffuse.rgb, rel=2.0**-24)
+    with overridden() as overrides:
+        assert exactly(materials.plain(overrides)).diffuse.rgb == pytest.approx(PLAIN.diffuse.rgb, rel=2.0**-24)
     assert not bpy.data.materials

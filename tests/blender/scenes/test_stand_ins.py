@@ -5,7 +5,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender.scenes import materials
-from viewcam_addon.blender.temporary_settings import borrowed
+from viewcam_addon.blender.temporary_settings import overridden
 
 
 def bare_objects(count):
@@ -21,9 +21,9 @@ def bare_objects(count):
 
 def test_all_objects_without_a_material_share_one_stand_in_which_is_removed_once(fresh_blender):
     objects = bare_objects(30)
-    with borrowed() as borrow:
+    with overridden() as overrides:
         for each in objects:
-            materials.fill_empty_slots(borrow, each)
+            materials.fill_empty_slots(overrides, each)
         (stand_in,) = bpy.data.materials
         assert all([slot.material for slot in each.material_slots] == [stand_in] for each in objects)
     assert not bpy.data.materials and not any(each.material_slots for each in objects)
@@ -34,8 +34,8 @@ def test_empty_slots_are_filled_and_empty_again_beside_those_that_are_not(fresh_
     own = bpy.data.materials.new("Own")
     bare.data.materials.append(None)
     bare.data.materials.append(own)
-    with borrowed() as borrow:
-        materials.fill_empty_slots(borrow, bare)
+    with overridden() as overrides:
+        materials.fill_empty_slots(overrides, bare)
         assert None not in [slot.material for slot in bare.material_slots]
     assert [slot.material for slot in bare.material_slots] == [None, own] and list(bpy.data.materials) == [own]
 
@@ -43,7 +43,7 @@ def test_empty_slots_are_filled_and_empty_again_beside_those_that_are_not(fresh_
 def test_each_loan_has_a_stand_in_of_its_own(fresh_blender):
     first, second = bare_objects(2)
     for each in (first, second):
-        with borrowed() as borrow:
-            materials.fill_empty_slots(borrow, each)
+        with overridden() as overrides:
+            materials.fill_empty_slots(overrides, each)
             assert len(bpy.data.materials) == 1
     assert not bpy.data.materials

@@ -1,13 +1,13 @@
 """The check of a shot: is the camera that its sidecar tells the one through which Blender renders?
 
 Cycles renders the passes of geometry through the very camera object that took the picture, whatever engine did; the tracer
-traces the same scene with the camera of the sidecar; and the judge (batch/judge.py), a process beside this one, compares the
-two. So a check is about camera and geometry: not about light, nor about another engine's own rasteriser. Of a shot with the
-four values, their conversion to Blender's camera is judged as well.
+traces the same scene with the camera of the sidecar; and batch/comparer.py, a process beside this one, compares the two.
+So a check is about camera and geometry: not about light, nor about another engine's own rasteriser. Of a shot with the four
+values, their conversion to Blender's camera is checked as well.
 
 The scene is exported anew for another frame, camera object or size of the picture, and for each shot where more may change: in
-a batch nothing else does. It is written for the judge when it is another than the last one. Whatever the check changes (engine,
-samples, passes, indices where nothing has any) it gives back, so that the pictures are the same bytes with and without it. What
+a batch nothing else does. It is written when it is another than the last one. Whatever the check changes (engine,
+samples, passes, indices where nothing has any) it restores, so that the pictures are the same bytes with and without it. What
 Cycles has built serves checks and pictures alike. Rejected: a second Blender for checks alone, with all of the scene in memory
 once more; and to ask Blender what has changed, as our engine does, since giving back is a change, too.
 """
@@ -21,7 +21,7 @@ from typing import Any
 
 import bpy
 
-from ...batch.judge import Judge
+from ...batch.comparer import Comparer
 from ...pinhole import Pinhole
 from ...tracer.scene import LedgerEntry, Scene, scene_file
 from ...tracer.scene.sameness import same_things
@@ -30,7 +30,7 @@ from ..rendering import cycles, job
 from ..scenes import indices
 from ..scenes.export import export_scene
 from ..scenes.ledger import Ledger, Remedy
-from ..temporary_settings import borrowed
+from ..temporary_settings import overridden
 from . import persistent_data
 
 _MOST_TOLD = 5
@@ -53,9 +53,9 @@ class Checker:
 
     def __init__(self, threads: int | None = None) -> None:
         self._threads = threads
-        self._judge = Judge(threads)
+        self._comparer = Comparer(threads)
         self._ends = contextlib.ExitStack()
-        self._ends.enter_context(self._judge)
+        self._ends.enter_context(self._comparer)
         self._export: _Export | None = None
         self._written = 0
         self._written_scene: Scene | None = None
@@ -67,23 +67,23 @@ class Checker:
 
         pinhole : the camera of the picture, as its sidecar has it. stated : the four values it was made from.
 
-        Returns `passed`, `verdict` and `figures` as Judge.verdict does, and `not_modelled`: what both sides leave out, the
+        Returns `passed`, `verdict` and `figures` as Comparer.verdict does, and `not_modelled`: what both sides leave out, the
         first few of it, a sentence each.
 
         Raises
         ------
         InputError
-            if the scene can't be exported or rendered by Cycles, or if the judge can't judge.
+            if the scene can't be exported or rendered by Cycles, or if the comparer can't compare.
         """
         layer, image = job.rendered_layer(scene), self._folder / "cycles.exr"
-        with indices.numbered(), borrowed() as borrow:
+        with indices.numbered(), overridden() as overrides:
             if not scene.render.use_crop_to_border:  # the picture is of the whole frame then
-                borrow.set(scene.render, "use_border", False)
+                overrides.set(scene.render, "use_border", False)
             export = self._exported(scene, layer, camera_object)
             cycles.render(scene, layer, camera_object, image, export.remedies, self._threads, keep=True)
         data = camera_object.evaluated_get(datablocks.depsgraph_of(scene)).data
         clip = data.clip_start, data.clip_end
-        said = self._judge.verdict(self._file_of(export.scene), image, pinhole, clip, stated)
+        said = self._comparer.verdict(self._file_of(export.scene), image, pinhole, clip, stated)
         return said | {"not_modelled": _told(export.scene.ledger)}
 
     @functools.cached_property

@@ -6,30 +6,32 @@ from collections.abc import Iterator, Mapping, Sequence
 import bpy
 
 from ... import checks, html_page, intrinsics
-from ...batch import judge
+from ...batch import comparer
 from ...errors import InputError
 from ...pinhole import Pinhole
 from ...shots import Shot
 from .. import camera as cameras
 from .. import datablocks, versions
 from . import graphics
-from .shot_settings import Lent, engine_name
+from .shot_settings import ShotSettings, engine_name
 
 _DRAWN = (versions.EEVEE, "BLENDER_WORKBENCH")
 
 
-def obstacles(shots: Sequence[Shot], check: bool, scene: bpy.types.Scene, own: bpy.types.Object, lent: Lent) -> Iterator[str]:
+def obstacles(
+    shots: Sequence[Shot], check: bool, scene: bpy.types.Scene, own: bpy.types.Object, settings: ShotSettings
+) -> Iterator[str]:
     """One sentence for each obstacle. check : whether each shot will be checked. own : the camera for the four values."""
     if not any(layer.use for layer in scene.view_layers):
         yield f"scene {scene.name!r} renders nothing: all of its view layers are off, let one render"
-    engines = sorted({lent.engine_of(shot) for shot in shots})
+    engines = sorted({settings.engine_of(shot) for shot in shots})
     if ("CYCLES" in engines or check) and not hasattr(scene, "cycles"):
         yield "Cycles is disabled: enable the add-on Cycles Render Engine in Blender's preferences"
     for engine in engines:
         if engine in _DRAWN and not graphics.are_there():
             needs = f"{engine_name(engine)} draws with a GPU, and Blender can't open one here"
             yield f"{needs}: choose CYCLES or VIEWCAM, or start a display"
-    for lacking in (html_page.lacking(), judge.lacking() if check else None):
+    for lacking in (html_page.lacking(), comparer.lacking() if check else None):
         if lacking:
             yield lacking
     among = cameras_of(scene, own)
@@ -42,7 +44,7 @@ def obstacles(shots: Sequence[Shot], check: bool, scene: bpy.types.Scene, own: b
                     cameras.read(camera_object, scene)
                     read.add(shot.camera)
             else:
-                _check_storable(stated(shot, lent.frame_of(shot)), lent.frame_of(shot), own.data)
+                _check_storable(stated(shot, settings.frame_of(shot)), settings.frame_of(shot), own.data)
         except InputError as error:
             yield f"the shot {checks.shown(shot.name)}: {error}"
 

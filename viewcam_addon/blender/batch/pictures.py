@@ -14,16 +14,16 @@ import bpy
 from ...errors import InputError
 from .. import versions
 from ..rendering import exr, png
-from ..rendering.cycles import borrow_whole
-from ..temporary_settings import Borrower
+from ..rendering.cycles import override_whole
+from ..temporary_settings import Overrides
 
 _PASSING = ("Date", "File", "Hostname", "Memory", "RenderTime")
 _PROBE = bytes(2**20)
 
 
-def borrow_formats(borrow: Borrower, scene: bpy.types.Scene) -> None:
-    """Let `write` choose formats until the loan ends. Both follow the scene's colour management."""
-    borrow_whole(borrow, scene.render.image_settings)
+def override_formats(overrides: Overrides, scene: bpy.types.Scene) -> None:
+    """Let `write` choose formats until the overrides end. Both follow the scene's colour management."""
+    override_whole(overrides, scene.render.image_settings)
     scene.render.image_settings.color_management = "FOLLOW_SCENE"
 
 

@@ -28,10 +28,10 @@ from .. import datablocks
 from ..opening import opened
 from ..rendering.engine import VIEWCAM_RenderEngine
 from ..scenes.depsgraph import render_still
-from ..temporary_settings import Borrower
+from ..temporary_settings import Overrides
 from . import obstacles, origins, pictures
 from .checking import Checker
-from .shot_settings import Lent
+from .shot_settings import ShotSettings
 
 _NAME = "viewcam batch"
 
@@ -61,11 +61,11 @@ class BlenderRenderer:
 
     def __enter__(self) -> "BlenderRenderer":
         with contextlib.ExitStack() as stack:
-            borrow, off = stack.enter_context(opened(self._blend, self._trust))
+            overrides, off = stack.enter_context(opened(self._blend, self._trust))
             self.scene = bpy.context.scene
             self._of_file = datablocks.render_camera(self.scene)
-            self._lent = Lent(borrow, self.scene, self._threads, self._seed, off)
-            self._own = _own_camera(borrow, self.scene, self._of_file)
+            self._settings = ShotSettings(overrides, self.scene, self._threads, self._seed, off)
+            self._own = _own_camera(overrides, self.scene, self._of_file)
             self._checker = stack.enter_context(Checker(self._threads))
             self._loan = stack.pop_all()
         return self
@@ -108,9 +108,9 @@ class BlenderRenderer:
         camera_object = obstacles.camera_named(self.scene_camera if name is None else name, self.scene, among)
         width, height = size or (None, None)
         shot = Shot("pinhole", camera=camera_object.name, width=width, height=height)
-        self._lent.set(shot)
+        self._settings.set(shot)
         found = cameras.as_it_stands(camera_object, self.scene, in_use=camera_object.virtual_pinhole.enabled)
-        frame = self._lent.frame_of(shot)
+        frame = self._settings.frame_of(shot)
         column, row, _, _ = frame.window
         return found.cropped(-column, -row, *frame.size)
 
@@ -127,7 +127,7 @@ class BlenderRenderer:
 
     def problems(self, shots: Sequence[Shot], check: bool = False) -> tuple[str, ...]:
         """One sentence for each reason why a shot can't be rendered or checked, as far as it is known before anything is."""
-        return tuple(obstacles.obstacles(shots, check, self.scene, self._own, self._lent))
+        return tuple(obstacles.obstacles(shots, check, self.scene, self._own, self._settings))
 
     def render(self, shot: Shot, image: Path, preview: Path) -> dict[str, Any]:
         """Write the shot's picture and preview to these two paths; what the sidecar says of it (batch.renderer.Renderer).
@@ -139,9 +139,9 @@ class BlenderRenderer:
         OSError
             if the disk is full.
         """
-        self._lent.set(shot)
+        self._settings.set(shot)
         warnings = self._aim(shot)
-        if self._lent.engine == "EEVEE" and not self._has_drawn:  # see persistent_data.py
+        if self._settings.engine == "EEVEE" and not self._has_drawn:  # see persistent_data.py
             render_still(self.scene)
             self._has_drawn = True
         render_still(self.scene)
@@ -153,8 +153,8 @@ class BlenderRenderer:
         return {
             **record(self._taken, datablocks.camera_data_of(evaluated)),
             **({"stated": record(self._stated)["camera"]} if self._stated else {}),
-            "rendered": self._lent.rendered(),
-            "warnings": [*self._lent.warnings, *warnings],
+            "rendered": self._settings.rendered(),
+            "warnings": [*self._settings.warnings, *warnings],
             "versions": origins.versions(),
         }
 
@@ -175,19 +175,19 @@ class BlenderRenderer:
             camera_object = obstacles.camera_named(shot.camera, self.scene, among)
             self._stated, warnings = None, datablocks.beyond_pinhole(camera_object, self.scene)
         else:
-            camera_object, self._stated = self._own, obstacles.stated(shot, self._lent.frame_of(shot))
+            camera_object, self._stated = self._own, obstacles.stated(shot, self._settings.frame_of(shot))
             warnings = cameras.apply(camera_object, self._stated, self.scene)
             warnings += datablocks.beyond_pinhole(camera_object, self.scene)
-        self._lent.look_through(camera_object)
+        self._settings.look_through(camera_object)
         return warnings
 
 
-def _own_camera(borrow: Borrower, scene: bpy.types.Scene, like: bpy.types.Object | None) -> bpy.types.Object:
-    """A camera for the time of the loan, sharp, with the clip range of another."""
+def _own_camera(overrides: Overrides, scene: bpy.types.Scene, like: bpy.types.Object | None) -> bpy.types.Object:
+    """A camera while the overrides last, sharp, with the clip range of another."""
     data = bpy.data.cameras.new(_NAME)
-    borrow.afterwards(bpy.data.cameras.remove, data)
+    overrides.afterwards(bpy.data.cameras.remove, data)
     camera_object = bpy.data.objects.new(_NAME, data)
-    borrow.afterwards(bpy.data.objects.remove, camera_object)
+    overrides.afterwards(bpy.data.objects.remove, camera_object)
     if like and like.type == "CAMERA":
         data.clip_start, data.clip_end = like.data.clip_start, like.data.clip_end
     scene.collection.objects.link(camera_object)

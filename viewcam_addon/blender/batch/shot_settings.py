@@ -16,7 +16,7 @@ from ... import intrinsics
 from ...shots import Shot
 from .. import datablocks, resolution, versions
 from ..rendering.engine import VIEWCAM_RenderEngine
-from ..temporary_settings import Borrower, cameras_unbound
+from ..temporary_settings import Overrides, cameras_unbound
 from . import origins, persistent_data, pictures
 
 _ENGINES = {"CYCLES": "CYCLES", "EEVEE": versions.EEVEE, "VIEWCAM": "VIEWCAM"}
@@ -29,42 +29,42 @@ def engine_name(engine: str) -> str:
     return next((ours for ours, theirs in _ENGINES.items() if theirs == engine), engine)
 
 
-class Lent:
+class ShotSettings:
     """A scene while a batch has it. warnings : a sentence for each thing that is another in a render by itself.
 
     threads, seed : of all shots, the file's where None. off : what is off because the file is not trusted (opening.py).
     """
 
     def __init__(
-        self, borrow: Borrower, scene: bpy.types.Scene, threads: int | None, seed: int | None, off: Iterable[str] = ()
+        self, overrides: Overrides, scene: bpy.types.Scene, threads: int | None, seed: int | None, off: Iterable[str] = ()
     ) -> None:
         self._scene = scene
         self.warnings = (*_warnings(scene), *(f"{sentence[:1].upper()}{sentence[1:]}, without --trust" for sentence in off))
         render = scene.render
-        cameras_unbound(borrow, scene)
+        cameras_unbound(overrides, scene)
         for name in ("use_multiview", "use_sequencer", "use_stamp"):
-            borrow.set(render, name, False)
-        borrow.set(render, "use_persistent_data", True)
-        borrow.set(VIEWCAM_RenderEngine, "keeps_scene", True)
+            overrides.set(render, name, False)
+        overrides.set(render, "use_persistent_data", True)
+        overrides.set(VIEWCAM_RenderEngine, "keeps_scene", True)
         persistent_data.drop(scene)
         self._drop_at_cameras = persistent_data.is_driven_by_camera()
         for node in _file_outputs(scene):
-            borrow.set(node, "mute", True)
-        pictures.borrow_formats(borrow, scene)
+            overrides.set(node, "mute", True)
+        pictures.override_formats(overrides, scene)
         if threads:
-            borrow.set(render, "threads_mode", "FIXED")
-            borrow.set(render, "threads", threads)
+            overrides.set(render, "threads_mode", "FIXED")
+            overrides.set(render, "threads", threads)
         for camera_object in (each for each in scene.objects if each.type == "CAMERA"):
-            borrow.enter(resolution.lens_kept(camera_object, scene))
+            overrides.enter(resolution.lens_kept(camera_object, scene))
         self._of_file = {owner_name: getattr(*owner_name) for owner_name in self._properties()}
         for (owner, name), value in self._of_file.items():
-            borrow.afterwards(setattr, owner, name, value)
+            overrides.afterwards(setattr, owner, name, value)
         self._frame_of_file = datablocks.frame_of(scene)
         self._time_of_file = (scene.frame_current, scene.frame_subframe)
-        borrow.afterwards(self._go_to, *self._time_of_file)
+        overrides.afterwards(self._go_to, *self._time_of_file)
         if seed is not None:
             for owner in _seeds(scene).values():
-                borrow.set(owner, "seed", seed)
+                overrides.set(owner, "seed", seed)
 
     @property
     def engine(self) -> str:

@@ -53,7 +53,7 @@ class _Flight:
 
 
 @dataclass(frozen=True)
-class Agreement:
+class BakedAgreement:
     """A baked camera against the live one.
 
     at_keys, between : the largest displacement over corners, edges and centre of the picture, at the look-at point's distance,
@@ -75,7 +75,7 @@ class Agreement:
 
 def bake(
     camera_objects: Sequence[bpy.types.Object], scene: bpy.types.Scene, first: int, last: int, keys_per_frame: int = 1
-) -> list[Agreement]:
+) -> list[BakedAgreement]:
     """Give cameras keyframes from the frame `first` to the frame `last`, and turn their Virtual Pinholes off.
 
     Where motion blur is on, a frame before and one behind are keyed too, for the shutter looks there.
@@ -170,14 +170,14 @@ def _write(flight: _Flight) -> None:
         keyframes.linear(block, path, flight.at, values)
 
 
-def _agreement(flight: _Flight, baked: Sequence[Pinhole], times: list[float]) -> Agreement:
+def _agreement(flight: _Flight, baked: Sequence[Pinhole], times: list[float]) -> BakedAgreement:
     errors = [conversion_error(live, found, np.array([reach])) for (live, reach), found in zip(flight.live, baked, strict=True)]
     off = np.array([error.largest for error in errors])
     ok = all(error.share <= _SHARE_OF_ROUNDING for error in errors[::2])
     if len(off) == 1:
-        return Agreement(flight.camera_object.name, off[0], 0.0, math.nan, ok)
+        return BakedAgreement(flight.camera_object.name, off[0], 0.0, math.nan, ok)
     worst = 1 + 2 * int(np.argmax(off[1::2]))
-    return Agreement(flight.camera_object.name, off[::2].max(), off[worst], times[worst], ok)
+    return BakedAgreement(flight.camera_object.name, off[::2].max(), off[worst], times[worst], ok)
 
 
 def _check(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:

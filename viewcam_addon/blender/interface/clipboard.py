@@ -19,7 +19,7 @@ from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import datablocks, picture, targets
-from ..temporary_settings import Borrower
+from ..temporary_settings import Overrides
 from . import camera_options, readouts
 from .camera_options import READING, ReadingOptions, WorldOptions
 from .operators import CameraOperator
@@ -237,7 +237,7 @@ def paste(
         return [*found.notes, *cameras.apply(camera_object, pinhole, scene)]
     with contextlib.ExitStack() as undo:
         if set_size:
-            picture.set_size(Borrower(undo), scene, found.pinhole)
+            picture.set_size(Overrides(undo), scene, found.pinhole)
         pinhole, notes = picture.fitted(found.pinhole, datablocks.frame_of(scene))
         said = [*found.notes, *notes, *cameras.apply(camera_object, pinhole, scene)]
         undo.pop_all()

@@ -86,7 +86,7 @@ class Outcome:
         return path if path and path.is_file() else None
 
 
-class Comparison:
+class RunningComparison:
     """One comparison on its way, from the moment it is made.
 
     scene : the one of the window. level : one of film.LEVELS, or "auto". samples : a pixel, for light. clay : whether one matte

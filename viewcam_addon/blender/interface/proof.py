@@ -17,18 +17,18 @@ from ...tracer.scene.film import SAMPLES
 from .. import datablocks, preferences
 from ..render_settings import LEVELS
 from . import icons, proof_image, readouts
-from .comparing import Comparison, Outcome
+from .comparing import Outcome, RunningComparison
 
 _SECONDS = 0.2  # between two looks
 _MOST_LACKING = 4  # objects that the panel names
 _NAMES = tuple(name for name, *_ in LEVELS)
 
 _timer: bpy.types.Timer | None = None
-_running: Comparison | None = None
+_running: RunningComparison | None = None
 _latest: Outcome | None = None
 
 
-def running() -> Comparison | None:
+def running() -> RunningComparison | None:
     """The comparison on its way, if there is one."""
     return _running
 
@@ -54,7 +54,7 @@ def _begin(camera_object: bpy.types.Object, context: bpy.types.Context) -> None:
     settings = context.window_manager.virtual_pinhole_proof
     folder = Path(bpy.path.abspath(settings.folder)) if settings.folder else None
     level = settings.level.lower()
-    _running = Comparison(camera_object, context.scene, level, settings.samples, settings.clay, folder)
+    _running = RunningComparison(camera_object, context.scene, level, settings.samples, settings.clay, folder)
 
 
 def _look() -> Outcome | None:

@@ -3,7 +3,7 @@
 The settings are those under which Cycles follows a pinhole best. Its first sample stands in the middle of the pixel but for a
 bias of the filter table, 3e-6 px at the narrowest Blackman-Harris filter; adaptive sampling, denoising and light thresholds
 would make of it something else. A picture of light is what the scene's own film and bounces make of it, without all that trades
-truth for less noise: clamping, filtered gloss, culled lights, guesses of indirect light. Everything is borrowed and given back.
+truth for less noise: clamping, filtered gloss, culled lights, guesses of indirect light. Everything is overridden and restored.
 """
 
 import errno
@@ -21,7 +21,7 @@ from .. import versions
 from ..scenes import film
 from ..scenes.depsgraph import render_still
 from ..scenes.ledger import Remedy
-from ..temporary_settings import Borrower, borrowed, still_of_one_layer
+from ..temporary_settings import Overrides, overridden, still_of_one_layer
 from .exr import is_whole
 
 _SAMPLING = {
@@ -68,7 +68,7 @@ _LIGHT = {
 
 
 @dataclass(frozen=True)
-class Light:
+class LightSettings:
     """A picture of light. samples : a pixel, in all; one is the pixel's centre."""
 
     film: Film
@@ -84,7 +84,7 @@ def render(
     path: str | os.PathLike[str],
     remedies: Iterable[Remedy] = (),
     threads: int | None = None,
-    light: Light | None = None,
+    light: LightSettings | None = None,
     keep: bool = False,
 ) -> None:
     """Render one view layer at the current frame to a multilayer EXR, whole or not at all.
@@ -99,35 +99,35 @@ def render(
     """
     if not hasattr(scene, "cycles"):
         raise InputError("Cycles is disabled: enable the add-on Cycles Render Engine in Blender's preferences")
-    with written_whole(path) as temporary, borrowed() as borrow:
-        still_of_one_layer(borrow, scene, view_layer, camera_object, keep)
-        borrow_settings(borrow, scene, view_layer, light)
-        _borrow_file(borrow, scene, temporary)
+    with written_whole(path) as temporary, overridden() as overrides:
+        still_of_one_layer(overrides, scene, view_layer, camera_object, keep)
+        override_settings(overrides, scene, view_layer, light)
+        _override_file(overrides, scene, temporary)
         if threads:
-            borrow.set(scene.render, "threads_mode", "FIXED")
-            borrow.set(scene.render, "threads", threads)
+            overrides.set(scene.render, "threads_mode", "FIXED")
+            overrides.set(scene.render, "threads", threads)
         for remedy in remedies:
-            remedy(borrow)
+            remedy(overrides)
         render_still(scene, to_file=True)
         if not is_whole(temporary):
             raise OSError(errno.EIO, "Blender did not finish the file")
 
 
-def borrow_settings(
-    borrow: Borrower, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, light: Light | None = None
+def override_settings(
+    overrides: Overrides, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, light: LightSettings | None = None
 ) -> None:
     """Everything but the file; benchmarks render without one."""
-    borrow.set(scene.render, "engine", "CYCLES")
-    _borrow_all(borrow, scene.cycles, _SAMPLING)
+    overrides.set(scene.render, "engine", "CYCLES")
+    _override_all(overrides, scene.cycles, _SAMPLING)
     passes = _PASSES
     if light:
-        borrow.set(scene.render, "film_transparent", light.film.transparent)
-        _borrow_all(borrow, scene.cycles, _LIGHT | _settings_of(light))
+        overrides.set(scene.render, "film_transparent", light.film.transparent)
+        _override_all(overrides, scene.cycles, _LIGHT | _settings_of(light))
         passes = _PASSES_OF_LIGHT + (_PASSES_OF_CENTRES if light.samples == 1 else ())
-    _borrow_passes(borrow, view_layer, passes)
+    _override_passes(overrides, view_layer, passes)
 
 
-def _settings_of(light: Light) -> dict[str, object]:
+def _settings_of(light: LightSettings) -> dict[str, object]:
     settings = {name: getattr(light.bounces, ours) for ours, name in film.BOUNCES.items()}
     settings |= {"samples": light.samples, "seed": light.seed % 2**31, "film_exposure": light.film.exposure}
     if light.samples > 1:
@@ -136,31 +136,31 @@ def _settings_of(light: Light) -> dict[str, object]:
     return settings
 
 
-def _borrow_all(borrow: Borrower, owner: bpy.types.bpy_struct, settings: dict[str, object]) -> None:
+def _override_all(overrides: Overrides, owner: bpy.types.bpy_struct, settings: dict[str, object]) -> None:
     for name, value in settings.items():
         if hasattr(owner, name):  # versions know fewer of them
-            borrow.set(owner, name, value)
+            overrides.set(owner, name, value)
 
 
-def _borrow_passes(borrow: Borrower, view_layer: bpy.types.ViewLayer, passes: Iterable[str]) -> None:
+def _override_passes(overrides: Overrides, view_layer: bpy.types.ViewLayer, passes: Iterable[str]) -> None:
     """Passes beside those that are on; surfaces, without hair and volumes."""
     for name in passes:
-        borrow.set(view_layer, f"use_pass_{name}", True)
-    borrow.set(view_layer, "use_strand", False)
-    borrow.set(view_layer, "use_volumes", False)
+        overrides.set(view_layer, f"use_pass_{name}", True)
+    overrides.set(view_layer, "use_strand", False)
+    overrides.set(view_layer, "use_volumes", False)
 
 
-def _borrow_file(borrow: Borrower, scene: bpy.types.Scene, path: os.PathLike[str]) -> None:
-    borrow.set(scene.render, "filepath", versions.literal_path(Path(path).absolute()))
-    borrow.set(scene.render, "use_file_extension", False)
-    borrow.set(scene.render, "use_overwrite", True)
+def _override_file(overrides: Overrides, scene: bpy.types.Scene, path: os.PathLike[str]) -> None:
+    overrides.set(scene.render, "filepath", versions.literal_path(Path(path).absolute()))
+    overrides.set(scene.render, "use_file_extension", False)
+    overrides.set(scene.render, "use_overwrite", True)
     settings = scene.render.image_settings
-    borrow_whole(borrow, settings)
+    override_whole(overrides, settings)
     settings.color_management = "FOLLOW_SCENE"
     versions.set_multilayer_file(settings)
 
 
-def borrow_whole(borrow: Borrower, settings: bpy.types.ImageFormatSettings) -> None:
+def override_whole(overrides: Overrides, settings: bpy.types.ImageFormatSettings) -> None:
     """Give back all settings of the file together, since the kind of file changes what the others may be.
 
     A file may hold one that its kind of file does not know, which reads as "": nobody can set that, Blender chooses another.
@@ -175,4 +175,4 @@ def borrow_whole(borrow: Borrower, settings: bpy.types.ImageFormatSettings) -> N
             if name not in unknown and getattr(settings, name) != value:
                 setattr(settings, name, value)
 
-    borrow.afterwards(give_back)
+    overrides.afterwards(give_back)

@@ -19,9 +19,9 @@ from ...tracer.scene.levels import least_level
 from .. import datablocks, resolution
 from ..opening import opened
 from ..scenes import indices, materials, recentering
-from ..scenes.export import Light, export_scene, survey
+from ..scenes.export import Lighting, export_scene, survey
 from ..scenes.ledger import Ledger
-from ..temporary_settings import Borrower
+from ..temporary_settings import Overrides
 from . import cycles
 
 AUTO = "auto"
@@ -118,7 +118,7 @@ def export_and_render(request: Request, paths: Sequence[str | os.PathLike[str]])
     """
     with _stage(request) as stage, indices.numbered(), _seen_from(stage, request) as stage:
         scene = _export(stage, request)
-        _render(stage, request, paths, Light(scene.lamps, scene.world, scene.film, scene.bounces))
+        _render(stage, request, paths, Lighting(scene.lamps, scene.world, scene.film, scene.bounces))
         return scene
 
 
@@ -139,14 +139,14 @@ def _seen_from(stage: _Stage, request: Request) -> Iterator[_Stage]:
         yield _Stage(moved.scene, layer, moved.camera, stage.level, origin=moved.origin, names=moved.names, told=stage.ledger)
 
 
-def _render(stage: _Stage, request: Request, paths: Sequence[str | os.PathLike[str]], light: Light | None) -> None:
+def _render(stage: _Stage, request: Request, paths: Sequence[str | os.PathLike[str]], light: Lighting | None) -> None:
     """Cycles' pictures. light : as exported, of a stage that is lit."""
     share = max(request.samples // len(paths), 1)
     for number, path in enumerate(paths):
         picture = None
         if stage.is_lit:
             bounces = NO_BOUNCES if stage.level == "direct" else light.bounces
-            picture = cycles.Light(light.film, bounces, share, request.seed + number)
+            picture = cycles.LightSettings(light.film, bounces, share, request.seed + number)
         cycles.render(
             stage.scene, stage.view_layer, stage.camera, path, stage.ledger.remedies.values(), request.threads, picture
         )
@@ -155,16 +155,16 @@ def _render(stage: _Stage, request: Request, paths: Sequence[str | os.PathLike[s
 @contextlib.contextmanager
 def _stage(request: Request) -> Iterator[_Stage]:
     """Open the file, and set it to the request until the job is done."""
-    with opened(request.blend, request.trust) as (borrow, off):
+    with opened(request.blend, request.trust) as (overrides, off):
         scene = bpy.context.scene
         if request.frame is not None:
-            _borrow_frame(borrow, scene, request.frame)
+            _override_frame(overrides, scene, request.frame)
         camera = _camera(scene, request.camera)
         if request.size:
-            _borrow_size(borrow, scene, camera, request.size)
+            _override_size(overrides, scene, camera, request.size)
         layer = rendered_layer(scene)
         if request.clay:
-            borrow.set(layer, "material_override", materials.plain(borrow))
+            overrides.set(layer, "material_override", materials.plain(overrides))
         level = request.level
         if level == AUTO:
             level, _ = least_level(export_scene(scene, layer, camera, Ledger(), lit=True))
@@ -195,21 +195,21 @@ def rendered_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
     return current if current.use else next((layer for layer in scene.view_layers if layer.use), current)
 
 
-def _borrow_frame(borrow: Borrower, scene: bpy.types.Scene, frame: int) -> None:
+def _override_frame(overrides: Overrides, scene: bpy.types.Scene, frame: int) -> None:
     before = (scene.frame_current, scene.frame_subframe)
     if before == (frame, 0.0):
         return
     if abs(frame) > _LAST_FRAME:
         raise InputError(f"frame {frame} is beyond Blender's last, {_LAST_FRAME}: give another")
-    borrow.afterwards(setattr, scene, "camera", scene.camera)  # a marker may change it, here and on the way back
-    borrow.afterwards(scene.frame_set, before[0], subframe=before[1])
+    overrides.afterwards(setattr, scene, "camera", scene.camera)  # a marker may change it, here and on the way back
+    overrides.afterwards(scene.frame_set, before[0], subframe=before[1])
     scene.frame_set(frame)
 
 
-def _borrow_size(borrow: Borrower, scene: bpy.types.Scene, camera: bpy.types.Object, size: tuple[int, int]) -> None:
+def _override_size(overrides: Overrides, scene: bpy.types.Scene, camera: bpy.types.Object, size: tuple[int, int]) -> None:
     """Another number of pixels for the same lens; the stated distance counts pixels and goes with the lens."""
     if not all(4 <= number <= 65536 for number in size):
         raise InputError(f"Blender can't render {size[0]} × {size[1]} pixels: choose from 4 to 65536 each way")
-    borrow.enter(resolution.lens_kept(camera, scene))
+    overrides.enter(resolution.lens_kept(camera, scene))
     for name, value in zip(("resolution_x", "resolution_y", "resolution_percentage"), (*size, 100), strict=True):
-        borrow.set(scene.render, name, value)
+        overrides.set(scene.render, name, value)

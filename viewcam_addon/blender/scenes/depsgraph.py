@@ -12,7 +12,7 @@ from typing import TypeVar
 import bpy
 
 from ...errors import InputError
-from ..temporary_settings import borrowed
+from ..temporary_settings import overridden
 
 Result = TypeVar("Result")
 
@@ -46,8 +46,8 @@ def visit(scene: bpy.types.Scene, work: Callable[[bpy.types.Depsgraph], Result])
     _Visitor.work = staticmethod(guarded)
     bpy.utils.register_class(_Visitor)
     try:
-        with borrowed() as borrow:
-            borrow.set(scene.render, "engine", _Visitor.bl_idname)
+        with overridden() as overrides:
+            overrides.set(scene.render, "engine", _Visitor.bl_idname)
             render_still(scene)
     finally:
         bpy.utils.unregister_class(_Visitor)

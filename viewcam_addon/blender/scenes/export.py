@@ -20,7 +20,7 @@ from ...tracer.scene import Mesh, Object, Scene, Spheres
 from ...tracer.scene.film import Bounces, Film
 from ...tracer.scene.lamps import RAYS, Lamp, World
 from .. import camera as cameras
-from ..temporary_settings import borrowed, still_of_one_layer
+from ..temporary_settings import overridden, still_of_one_layer
 from . import export_geometry, features, film, lamps, world
 from .depsgraph import visit
 from .ledger import Ledger
@@ -30,7 +30,7 @@ Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Source:
+class Surface:
     """A visible surface that stands in the world once or many times.
 
     data : evaluated. key : the same for all that share a geometry in Cycles. slots : the materials, evaluated, at least 1.
@@ -51,7 +51,7 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Light:
+class Lighting:
     """What of a Scene gives light, and makes a picture of it."""
 
     lamps: tuple[Lamp, ...]
@@ -78,8 +78,8 @@ def export_scene(
         if the camera is no pinhole (orthographic, panoramic, sheared), or if Blender can't render the scene.
     """
     features.note_render(scene, view_layer, camera_object, ledger, lit)
-    with borrowed() as borrow:
-        still_of_one_layer(borrow, scene, view_layer, camera_object)
+    with overridden() as overrides:
+        still_of_one_layer(overrides, scene, view_layer, camera_object)
         return visit(scene, lambda depsgraph: scene_in(depsgraph, camera_object, ledger, lit))
 
 
@@ -89,25 +89,25 @@ def survey(
     camera_object: bpy.types.Object,
     ledger: Ledger,
     lit: bool = False,
-) -> Light | None:
+) -> Lighting | None:
     """Fill the ledger as `export_scene` does, without reading any geometry; returns the light of the scene, if wanted."""
 
-    def look(depsgraph: bpy.types.Depsgraph) -> Light | None:
+    def look(depsgraph: bpy.types.Depsgraph) -> Lighting | None:
         for _ in placements(depsgraph, ledger, Shading() if lit else None):
             pass
         return light_in(depsgraph, ledger) if lit else None
 
     features.note_render(scene, view_layer, camera_object, ledger, lit)
-    with borrowed() as borrow:
-        still_of_one_layer(borrow, scene, view_layer, camera_object)
+    with overridden() as overrides:
+        still_of_one_layer(overrides, scene, view_layer, camera_object)
         return visit(scene, look)
 
 
-def light_in(depsgraph: bpy.types.Depsgraph, ledger: Ledger) -> Light:
+def light_in(depsgraph: bpy.types.Depsgraph, ledger: Ledger) -> Lighting:
     """What gives light in a depsgraph, and how it becomes a picture."""
     scene = depsgraph.scene
     bounces = film.bounces_of(scene, ledger)
-    return Light(
+    return Lighting(
         lamps=tuple(lamps.lamps_in(depsgraph, bounces, ledger)),
         world=world.world_of(world.shown_world(scene, depsgraph.view_layer_eval), ledger),
         film=film.film_of(scene, ledger),
@@ -155,12 +155,12 @@ def _view_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) ->
 
 def placements(
     depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading | None = None
-) -> Iterator[tuple[Source, Matrix]]:
+) -> Iterator[tuple[Surface, Matrix]]:
     """Each surface that the camera may see, and its (4, 4) matrix to world space, one for each instance.
 
     shading : reads the materials, where there shall be light; then other rays than the camera's may see a surface.
     """
-    known: dict[tuple[int, ...], Source | None] = {}
+    known: dict[tuple[int, ...], Surface | None] = {}
     for instance in depsgraph.object_instances:
         features.note_hair(instance, ledger)
         shown = instance.object
@@ -176,7 +176,7 @@ def placements(
             yield source, np.array(instance.matrix_world, dtype=np.float64)
 
 
-def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading | None) -> Source | None:
+def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading | None) -> Surface | None:
     """What one object shows, or None if nothing of it is seen."""
     if not features.is_surface(placed, ledger, shading):
         return None
@@ -201,7 +201,7 @@ def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Led
     features.note_object(placed, slots, depsgraph, ledger, shading)
     # Cycles shares a geometry among objects unless a slot belongs to the object (BlenderSync::BKE_object_is_modified).
     own = any(slot.link == "OBJECT" for slot in shown.material_slots)
-    return Source(
+    return Surface(
         name=placed.name,
         data=data,
         key=(data.as_pointer(), real.as_pointer() if own else 0),
@@ -211,7 +211,7 @@ def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Led
     )
 
 
-def _geometry(source: Source, ledger: Ledger, shading: Shading | None) -> Mesh | Spheres:
+def _geometry(source: Surface, ledger: Ledger, shading: Shading | None) -> Mesh | Spheres:
     if not isinstance(source.data, bpy.types.Mesh):
         return export_geometry.spheres_of(source.data)
     colours = shading.vertex_colours(source.slots) if shading else None

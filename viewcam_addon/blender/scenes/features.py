@@ -31,7 +31,7 @@ def note_render(
     ledger: Ledger,
     light: bool = False,
 ) -> None:
-    """What the camera and the render settings do beyond a pinhole. To be asked before the settings are borrowed."""
+    """What the camera and the render settings do beyond a pinhole. To be asked before the settings are overridden."""
     for sentence in datablocks.beyond_pinhole(camera_object, scene):
         ledger.note(camera_object.name, "approximated", f"{sentence} (off on both sides)")
     ledger.set_for_cycles(camera_object.data.dof, "use_dof", False)

@@ -26,7 +26,7 @@ from ...cameras.naming import image_of
 from ...errors import InputError
 from .. import camera as cameras
 from .. import datablocks, keyframes, picture, pose
-from ..temporary_settings import Borrower
+from ..temporary_settings import Overrides
 
 _PLACES = (".", "images", "..", "../images", "../..", "../../images")
 _SUFFIXES = ("", ".png", ".jpg", ".jpeg", ".JPG", ".PNG")
@@ -34,7 +34,7 @@ _OF_DATA = ("lens", "shift_x", "shift_y", "sensor_width", "sensor_height")
 
 
 @dataclass(frozen=True)
-class Imported:
+class ImportedCameras:
     """objects : the new cameras. pictures : how many have theirs as background. notes : sentences for a reader, each once."""
 
     objects: tuple[bpy.types.Object, ...]
@@ -49,7 +49,7 @@ def import_cameras(
     folder: Path | None = None,
     set_size: bool = False,
     as_flight: bool = False,
-) -> Imported:
+) -> ImportedCameras:
     """Add cameras to a scene.
 
     name : of the collection. folder : where the file stands, whose pictures become backgrounds; None for none.
@@ -62,24 +62,24 @@ def import_cameras(
         if a camera, or the picture's size, is beyond Blender's numbers. Nothing has changed then.
     """
     with contextlib.ExitStack() as undo:
-        imported = _Import(name, scene, Borrower(undo)).run(found, folder, set_size, as_flight)
+        imported = _CameraImport(name, scene, Overrides(undo)).run(found, folder, set_size, as_flight)
         undo.pop_all()
     return imported
 
 
-class _Import:
+class _CameraImport:
     """One import while it runs."""
 
-    def __init__(self, name: str, scene: bpy.types.Scene, borrow: Borrower) -> None:
-        self._name, self._scene, self._borrow = name, scene, borrow
+    def __init__(self, name: str, scene: bpy.types.Scene, overrides: Overrides) -> None:
+        self._name, self._scene, self._overrides = name, scene, overrides
         self._notes: dict[str, None] = {}
         self._collection = bpy.data.collections.new(name)
-        borrow.afterwards(bpy.data.batch_remove, [self._collection])
+        overrides.afterwards(bpy.data.batch_remove, [self._collection])
         scene.collection.children.link(self._collection)
 
-    def run(self, found: Sequence[Camera], folder: Path | None, set_size: bool, as_flight: bool) -> Imported:
+    def run(self, found: Sequence[Camera], folder: Path | None, set_size: bool, as_flight: bool) -> ImportedCameras:
         if set_size:
-            picture.set_size(self._borrow, self._scene, found[0].pinhole)
+            picture.set_size(self._overrides, self._scene, found[0].pinhole)
         self._note(note for camera in found for note in camera.notes)
         if as_flight:
             objects = (self._new(self._name),)
@@ -87,7 +87,7 @@ class _Import:
         else:
             objects = tuple(self._new(camera.name) for camera in found)
         if self._scene.camera is None:
-            self._borrow.set(self._scene, "camera", objects[0])
+            self._overrides.set(self._scene, "camera", objects[0])
         pictures = 0
         if not as_flight:
             bpy.context.view_layer.update()
@@ -98,16 +98,16 @@ class _Import:
                 named = sum(camera.image is not None or camera.picture is not None for camera in found)
                 if pictures < named:
                     self._note([f"{named - pictures} of {named} pictures were not found beside the file, nor in images/"])
-        return Imported(objects, pictures, tuple(self._notes))
+        return ImportedCameras(objects, pictures, tuple(self._notes))
 
     def _note(self, notes: Iterable[str]) -> None:
         self._notes |= dict.fromkeys(notes)
 
     def _new(self, name: str) -> bpy.types.Object:
         data = bpy.data.cameras.new(name)
-        self._borrow.afterwards(bpy.data.batch_remove, [data])
+        self._overrides.afterwards(bpy.data.batch_remove, [data])
         block = bpy.data.objects.new(name, data)
-        self._borrow.afterwards(bpy.data.batch_remove, [block])
+        self._overrides.afterwards(bpy.data.batch_remove, [block])
         self._collection.objects.link(block)
         return block
 
@@ -155,7 +155,7 @@ class _Import:
                 keyframes.linear(owner, path, at, values)
         for owner in (block, block.data):
             if owner.animation_data and owner.animation_data.action:
-                self._borrow.afterwards(bpy.data.batch_remove, [owner.animation_data.action])
+                self._overrides.afterwards(bpy.data.batch_remove, [owner.animation_data.action])
         if at[-1] > scene.frame_end:
             self._note([f"The flight ends at frame {at[-1]:.6g} and the scene at {scene.frame_end}: set its End"])
 
@@ -191,7 +191,7 @@ class _Import:
 
     def _packed(self, camera: Camera) -> bpy.types.Image:
         image = bpy.data.images.new(camera.name, camera.pinhole.width, camera.pinhole.height)
-        self._borrow.afterwards(bpy.data.batch_remove, [image])
+        self._overrides.afterwards(bpy.data.batch_remove, [image])
         image.pack(data=camera.picture, data_len=len(camera.picture))
         image.source = "FILE"
         return image
@@ -205,7 +205,7 @@ class _Import:
         except RuntimeError:  # no picture by its content
             return None
         if image not in known:
-            self._borrow.afterwards(bpy.data.batch_remove, [image])
+            self._overrides.afterwards(bpy.data.batch_remove, [image])
         return image
 
 

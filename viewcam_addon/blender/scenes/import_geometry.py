@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...tracer.scene import Mesh, Spheres
 from .. import datablocks, versions
-from ..temporary_settings import Borrower, borrowed
+from ..temporary_settings import Overrides, overridden
 from .ledger import Ledger
 
 Array = NDArray[np.generic]
@@ -21,13 +21,13 @@ UV_MAP, COLOURS = "UVMap", "Color"
 _ROUNDING = 3 * 2.0**-23
 
 
-def mesh_from(made: Mesh, name: str, borrow: Borrower, ledger: Ledger) -> bpy.types.Mesh:
+def mesh_from(made: Mesh, name: str, overrides: Overrides, ledger: Ledger) -> bpy.types.Mesh:
     """A mesh of triangles, without materials. Triangles that name a vertex twice have no area, and are left out."""
     first, second, third = made.triangles.T
     drawn = (first != second) & (second != third) & (third != first)
     corners = np.ascontiguousarray(made.triangles[drawn]).ravel()
     mesh = bpy.data.meshes.new(name)
-    borrow.afterwards(bpy.data.batch_remove, [mesh])
+    overrides.afterwards(bpy.data.batch_remove, [mesh])
     mesh.vertices.add(len(made.vertices))
     mesh.vertices.foreach_set("co", made.vertices.astype(np.float32).ravel())
     mesh.loops.add(len(corners))
@@ -64,21 +64,21 @@ def _set_normals(mesh: bpy.types.Mesh, normals: Array) -> float:
     return float(np.linalg.norm(found - normals, axis=1).max())
 
 
-def points_from(made: Spheres, name: str, borrow: Borrower) -> bpy.types.PointCloud:
+def points_from(made: Spheres, name: str, overrides: Overrides) -> bpy.types.PointCloud:
     """A point cloud whose points have these radii, without materials."""
-    with borrowed() as inner:
+    with overridden() as inner:
         block = _points_maker(made, inner)
         scene = bpy.data.scenes.new("Virtual Pinhole")
         inner.afterwards(bpy.data.scenes.remove, scene)
         scene.collection.objects.link(block)
         shown = (instance.object.data for instance in datablocks.depsgraph_of(scene).object_instances)
         points = next(data for data in shown if isinstance(data, bpy.types.PointCloud)).copy()
-    borrow.afterwards(bpy.data.batch_remove, [points])
+    overrides.afterwards(bpy.data.batch_remove, [points])
     points.name = name
     return points
 
 
-def _points_maker(made: Spheres, inner: Borrower) -> bpy.types.Object:
+def _points_maker(made: Spheres, inner: Overrides) -> bpy.types.Object:
     """An object whose vertices geometry nodes make points of."""
     mesh = bpy.data.meshes.new("Virtual Pinhole")
     inner.afterwards(bpy.data.batch_remove, [mesh])

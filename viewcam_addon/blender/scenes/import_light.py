@@ -12,7 +12,7 @@ from ...tracer.scene import Scene
 from ...tracer.scene.film import Bounces, Film
 from ...tracer.scene.lamps import RAYS, Area, Lamp, Spot, Sun, World
 from ...tracer.scene.materials import PLAIN, Material, Picture
-from ..temporary_settings import Borrower
+from ..temporary_settings import Overrides
 from . import film, materials, nodes, shaders
 from .indices import LARGEST
 from .ledger import Ledger
@@ -36,8 +36,8 @@ def store(owner: bpy.types.bpy_struct, name: str, value: float, who: str, ledger
 class Paints:
     """Makes the Blender materials of a scene, each once."""
 
-    def __init__(self, scene: Scene, borrow: Borrower, ledger: Ledger) -> None:
-        self._scene, self._borrow, self._ledger = scene, borrow, ledger
+    def __init__(self, scene: Scene, overrides: Overrides, ledger: Ledger) -> None:
+        self._scene, self._overrides, self._ledger = scene, overrides, ledger
         self._made: dict[tuple[str, int], bpy.types.Material] = {}
         self._images: dict[str, bpy.types.Image] = {}
 
@@ -56,7 +56,7 @@ class Paints:
 
     def _new(self, name: str, index: int) -> bpy.types.Material:
         material = bpy.data.materials.new(name or f"Index {index}")
-        self._borrow.afterwards(bpy.data.batch_remove, [material])
+        self._overrides.afterwards(bpy.data.batch_remove, [material])
         material.pass_index = min(index, LARGEST)
         if index > LARGEST:
             self._ledger.note(material.name, "approximated", f"its index is {index}, and Blender's end at {LARGEST}")
@@ -66,7 +66,7 @@ class Paints:
 
     def _image(self, key: str) -> bpy.types.Image:
         if key not in self._images:
-            self._images[key] = image_from(self._scene.images[key], key, self._borrow, self._ledger)
+            self._images[key] = image_from(self._scene.images[key], key, self._overrides, self._ledger)
         return self._images[key]
 
 
@@ -98,11 +98,11 @@ def _arrange(node: bpy.types.Node, column: int, taken: dict[int, int]) -> None:
             _arrange(link.from_node, column + 1, taken)
 
 
-def image_from(picture: Picture, name: str, borrow: Borrower, ledger: Ledger) -> bpy.types.Image:
+def image_from(picture: Picture, name: str, overrides: Overrides, ledger: Ledger) -> bpy.types.Image:
     """A packed image with these pixels: bytes where they are encoded, floats where they are linear."""
     height, width, _ = picture.pixels.shape
     image = bpy.data.images.new(name, width, height, float_buffer=not picture.srgb, is_data=not picture.srgb)
-    borrow.afterwards(bpy.data.batch_remove, [image])
+    overrides.afterwards(bpy.data.batch_remove, [image])
     pixels = np.concatenate([picture.pixels, np.ones((height, width, 1), np.float32)], axis=2)
     if picture.srgb and np.abs(pixels - np.rint(pixels * 255) / 255).max() > 2.0**-20:
         ledger.note(name, "approximated", "its sRGB pixels are rounded to the 256 levels that Blender keeps")
@@ -112,10 +112,10 @@ def image_from(picture: Picture, name: str, borrow: Borrower, ledger: Ledger) ->
     return image
 
 
-def light_from(lamp: Lamp, borrow: Borrower, ledger: Ledger) -> tuple[bpy.types.Light, np.ndarray]:
+def light_from(lamp: Lamp, overrides: Overrides, ledger: Ledger) -> tuple[bpy.types.Light, np.ndarray]:
     """The light, and the (4, 4) matrix that it stands by."""
     data = bpy.data.lights.new(lamp.name, lamp.kind.upper())
-    borrow.afterwards(bpy.data.batch_remove, [data])
+    overrides.afterwards(bpy.data.batch_remove, [data])
     strength = lamp.irradiance if isinstance(lamp, Sun) else lamp.power
     data.energy = max(strength)
     data.color = tuple(value / max(strength) for value in strength) if any(strength) else (1.0, 1.0, 1.0)
@@ -153,10 +153,10 @@ def hide(block: bpy.types.Object, hidden_from: frozenset[str]) -> None:
         setattr(block, f"visible_{ray}", ray not in hidden_from)
 
 
-def set_surroundings(scene: bpy.types.Scene, made: Scene, name: str, borrow: Borrower, ledger: Ledger) -> None:
+def set_surroundings(scene: bpy.types.Scene, made: Scene, name: str, overrides: Overrides, ledger: Ledger) -> None:
     """Give a scene the file's world, film and bounces. name : of the new world."""
     world = bpy.data.worlds.new(name)
-    borrow.afterwards(bpy.data.batch_remove, [world])
+    overrides.afterwards(bpy.data.batch_remove, [world])
     if not world.node_tree:
         world.use_nodes = True
     world.node_tree.nodes.clear()
@@ -165,8 +165,8 @@ def set_surroundings(scene: bpy.types.Scene, made: Scene, name: str, borrow: Bor
     background = adder.add("ShaderNodeBackground", Color=(*made.world.radiance, 1.0), Strength=1.0)
     adder.link(background.outputs[0], output.inputs["Surface"])
     _arrange(output, 0, {})
-    borrow.set(scene, "world", world)
-    borrow.set(scene.render, "film_transparent", made.film.transparent)
+    overrides.set(scene, "world", world)
+    overrides.set(scene.render, "film_transparent", made.film.transparent)
     if not hasattr(scene, "cycles"):
         ledger.note(scene.name, "skipped", "film and bounces are Cycles' settings, and Cycles is disabled")
         return
@@ -175,8 +175,8 @@ def set_surroundings(scene: bpy.types.Scene, made: Scene, name: str, borrow: Bor
     numbers = {"filter_width": made.film.filter_width, "film_exposure": made.film.exposure}
     numbers |= {theirs: getattr(made.bounces, ours) for ours, theirs in film.BOUNCES.items()}
     for name, value in numbers.items():
-        borrow.afterwards(setattr, scene.cycles, name, getattr(scene.cycles, name))
+        overrides.afterwards(setattr, scene.cycles, name, getattr(scene.cycles, name))
         store(scene.cycles, name, value, scene.name, ledger)
-    borrow.set(scene.cycles, "pixel_filter_type", made.film.filter)
+    overrides.set(scene.cycles, "pixel_filter_type", made.film.filter)
     for name in film.CAUSTICS:
-        borrow.set(scene.cycles, name, True)
+        overrides.set(scene.cycles, name, True)

@@ -27,7 +27,7 @@ from ...tracer.scene import LedgerEntry, Mesh, Object, Scene
 from ...tracer.scene.depths import visible_depths
 from .. import camera as cameras
 from .. import datablocks, findings, picture
-from ..temporary_settings import Borrower
+from ..temporary_settings import Overrides
 from . import import_geometry, import_light
 from .indices import LARGEST
 from .ledger import Ledger
@@ -40,7 +40,7 @@ _PIXEL_ASPECT = 2.0**-23  # what float32 makes of a ratio of two distances
 
 
 @dataclass(frozen=True)
-class Imported:
+class ImportedScene:
     """camera : the new one. objects : all that are new, the camera among them. ledger : what became of each thing."""
 
     camera: bpy.types.Object
@@ -50,7 +50,7 @@ class Imported:
 
 def import_scene(
     made: Scene, name: str, scene: bpy.types.Scene, set_picture: bool = False, set_surroundings: bool = False
-) -> Imported:
+) -> ImportedScene:
     """Add a scene of the tracer to one of Blender's.
 
     name : of the collection, the camera and the world. set_picture : the scene shows the file's camera in its
@@ -62,36 +62,36 @@ def import_scene(
         if the camera, or a picture of its size, is beyond Blender's numbers. Nothing has changed then.
     """
     with contextlib.ExitStack() as undo:
-        imported = _Import(made, name, scene, Borrower(undo)).run(set_picture, set_surroundings)
+        imported = _SceneImport(made, name, scene, Overrides(undo)).run(set_picture, set_surroundings)
         undo.pop_all()
     return imported
 
 
-class _Import:
+class _SceneImport:
     """One import while it runs. Its ledger tells of things by the names that they have in the file."""
 
-    def __init__(self, made: Scene, name: str, scene: bpy.types.Scene, borrow: Borrower) -> None:
-        self._made, self._name, self._scene, self._borrow = made, name, scene, borrow
+    def __init__(self, made: Scene, name: str, scene: bpy.types.Scene, overrides: Overrides) -> None:
+        self._made, self._name, self._scene, self._overrides = made, name, scene, overrides
         self._ledger = Ledger()
         self._objects: list[bpy.types.Object] = []
         self._root: bpy.types.Object | None = None
         self._collection = bpy.data.collections.new(name)
-        borrow.afterwards(bpy.data.batch_remove, [self._collection])
+        overrides.afterwards(bpy.data.batch_remove, [self._collection])
         scene.collection.children.link(self._collection)
 
-    def run(self, set_picture: bool, set_surroundings: bool) -> Imported:
+    def run(self, set_picture: bool, set_surroundings: bool) -> ImportedScene:
         made, scene, ledger = self._made, self._scene, self._ledger
         if set_picture:
             self._set_picture()
         camera = self._camera(set_picture or scene.camera is None)
         self._surfaces()
         for lamp in made.lamps:
-            data, matrix = import_light.light_from(lamp, self._borrow, ledger)
+            data, matrix = import_light.light_from(lamp, self._overrides, ledger)
             import_light.hide(self._placed(lamp.name, data, matrix), lamp.hidden_from)
             ledger.placed(lamp.name)
         if import_light.has_light(made):
             if set_surroundings:
-                import_light.set_surroundings(scene, made, self._name, self._borrow, ledger)
+                import_light.set_surroundings(scene, made, self._name, self._overrides, ledger)
             else:
                 ledger.note(scene.name, "approximated", "the scene keeps its own world, film and bounces")
         if any(made.origin):
@@ -99,11 +99,11 @@ class _Import:
             ledger.note(
                 self._name, "approximated", f"its coordinates count from the point {at} of the world, and here from 0, 0, 0"
             )
-        return Imported(camera, tuple(self._objects), ledger.entries())
+        return ImportedScene(camera, tuple(self._objects), ledger.entries())
 
     def _new(self, name: str, data: bpy.types.ID | None) -> bpy.types.Object:
         block = bpy.data.objects.new(name, data)
-        self._borrow.afterwards(bpy.data.batch_remove, [block])
+        self._overrides.afterwards(bpy.data.batch_remove, [block])
         self._collection.objects.link(block)
         self._objects.append(block)
         return block
@@ -111,18 +111,18 @@ class _Import:
     # --- The camera
 
     def _set_picture(self) -> None:
-        picture.set_size(self._borrow, self._scene, self._made.camera)
+        picture.set_size(self._overrides, self._scene, self._made.camera)
 
     def _camera(self, is_shown: bool) -> bpy.types.Object:
         data = bpy.data.cameras.new(self._name)
-        self._borrow.afterwards(bpy.data.batch_remove, [data])
+        self._overrides.afterwards(bpy.data.batch_remove, [data])
         block = self._new(self._name, data)
         pinhole = self._fitted(self._shown())
         depths = visible_depths(dataclasses.replace(self._made, camera=pinhole))
         for name, depth in zip(("clip_start", "clip_end"), depths, strict=True):
             import_light.store(data, name, depth, self._name, self._ledger)
         if is_shown:
-            self._borrow.set(self._scene, "camera", block)
+            self._overrides.set(self._scene, "camera", block)
         for finding in cameras.apply(block, pinhole, self._scene):
             self._ledger.note(self._name, "approximated", finding)
         self._ledger.placed(self._name)
@@ -160,7 +160,7 @@ class _Import:
 
     def _surfaces(self) -> None:
         """Every object, those of one geometry sharing its data."""
-        paints = import_light.Paints(self._made, self._borrow, self._ledger)
+        paints = import_light.Paints(self._made, self._overrides, self._ledger)
         data: dict[str, list[tuple[int, bpy.types.Mesh | bpy.types.PointCloud]]] = {}
         for placed in self._made.objects:
             if placed.geometry not in data:
@@ -177,9 +177,10 @@ class _Import:
         """(first material, data) of each datablock that a geometry becomes."""
         geometry = self._made.geometries[name]
         if isinstance(geometry, Mesh):
-            return [(0, import_geometry.mesh_from(geometry, name, self._borrow, self._ledger))]
+            return [(0, import_geometry.mesh_from(geometry, name, self._overrides, self._ledger))]
         return [
-            (first, import_geometry.points_from(part, name, self._borrow)) for first, part in import_geometry.parts_of(geometry)
+            (first, import_geometry.points_from(part, name, self._overrides))
+            for first, part in import_geometry.parts_of(geometry)
         ]
 
     def _surface(

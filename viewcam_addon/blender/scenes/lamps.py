@@ -14,7 +14,7 @@ import numpy as np
 from ...tracer.scene.film import Bounces
 from ...tracer.scene.lamps import Area, Lamp, Point, Spot, Sun
 from .. import versions
-from ..temporary_settings import Borrower
+from ..temporary_settings import Overrides
 from . import features, nodes, shaders
 from .ledger import Ledger
 from .nodes import Input, Output
@@ -118,8 +118,8 @@ def _emission(name: str, light: bpy.types.Light, ledger: Ledger) -> RGB:
     return _WHITE
 
 
-def _make_plain(borrow: Borrower, light: bpy.types.Light) -> None:
-    output, adder = nodes.borrow_output(borrow, light.node_tree, "ShaderNodeOutputLight")
+def _make_plain(overrides: Overrides, light: bpy.types.Light) -> None:
+    output, adder = nodes.override_output(overrides, light.node_tree, "ShaderNodeOutputLight")
     adder.link(adder.add("ShaderNodeEmission", Strength=1.0).outputs[0], output.inputs["Surface"])
 
 

@@ -1,6 +1,6 @@
 """What became of each thing that the exporter met, and what Cycles must leave out so that both sides show the same.
 
-One entry an object, however often it is placed; its worst finding decides the status. A remedy is a change that, borrowed for
+One entry an object, however often it is placed; its worst finding decides the status. A remedy is a change that, made for
 Cycles' render, takes out of it what the tracer does not model, so that the rest can be compared.
 """
 
@@ -10,9 +10,9 @@ import bpy
 
 from ...errors import NotModelledError
 from ...tracer.scene import LedgerEntry
-from ..temporary_settings import Borrower
+from ..temporary_settings import Overrides
 
-Remedy = Callable[[Borrower], None]
+Remedy = Callable[[Overrides], None]
 
 _WORSE = ("exported", "approximated", "skipped")
 
@@ -33,11 +33,11 @@ class Ledger:
 
     def set_for_cycles(self, owner: bpy.types.bpy_struct, attribute: str, value: object) -> None:
         """The remedy is a property of an original datablock."""
-        self.remedies[owner.as_pointer(), attribute] = lambda borrow: borrow.set(owner, attribute, value)
+        self.remedies[owner.as_pointer(), attribute] = lambda overrides: overrides.set(owner, attribute, value)
 
     def call_for_cycles(self, owner: bpy.types.bpy_struct, remedy: Callable[..., None], *arguments: object) -> None:
-        """The remedy is a function (borrow, owner, *arguments)."""
-        self.remedies[owner.as_pointer(), remedy.__name__] = lambda borrow: remedy(borrow, owner, *arguments)
+        """The remedy is a function (overrides, owner, *arguments)."""
+        self.remedies[owner.as_pointer(), remedy.__name__] = lambda overrides: remedy(overrides, owner, *arguments)
 
     def add(self, other: "Ledger", names: Mapping[str, str]) -> None:
         """Note what another ledger found of objects that stand for these. names : object there → object here."""

@@ -13,7 +13,7 @@ import bpy
 
 from ...tracer.scene.materials import PLAIN, Colour
 from .. import versions
-from ..temporary_settings import Borrower
+from ..temporary_settings import Overrides
 from . import nodes, shaders
 
 # Node types that let something else than the surface's own geometry into the passes.
@@ -56,14 +56,14 @@ def departures(material: bpy.types.Material) -> list[str]:
     return reasons
 
 
-def make_plain(borrow: Borrower, material: bpy.types.Material) -> None:
-    """Let Cycles see a diffuse surface of the viewport colour until the loan ends."""
-    stand_in(borrow, material, shaders.in_the_viewport(material))
+def make_plain(overrides: Overrides, material: bpy.types.Material) -> None:
+    """Let Cycles see a diffuse surface of the viewport colour until the overrides end."""
+    stand_in(overrides, material, shaders.in_the_viewport(material))
 
 
-def stand_in(borrow: Borrower, material: bpy.types.Material, reading: shaders.Reading) -> None:
-    """Let Cycles see the components of a tracer's material until the loan ends."""
-    output, adder = nodes.borrow_output(borrow, material.node_tree, "ShaderNodeOutputMaterial")
+def stand_in(overrides: Overrides, material: bpy.types.Material, reading: shaders.Reading) -> None:
+    """Let Cycles see the components of a tracer's material until the overrides end."""
+    output, adder = nodes.override_output(overrides, material.node_tree, "ShaderNodeOutputMaterial")
     add_surface(adder, output, reading)
 
 
@@ -118,30 +118,30 @@ def _set(node: bpy.types.Node, name: str, value: float) -> None:
         node.inputs[name].default_value = value
 
 
-def keep_normals(borrow: Borrower, material: bpy.types.Material) -> None:
+def keep_normals(overrides: Overrides, material: bpy.types.Material) -> None:
     """Keep Cycles from bending the normals of smooth surfaces, seen at a grazing angle, so far that they reflect."""
-    borrow.set(material.cycles, "use_bump_map_correction", False)
+    overrides.set(material.cycles, "use_bump_map_correction", False)
 
 
-def fill_empty_slots(borrow: Borrower, block: bpy.types.Object) -> None:
-    """Give an object a material where it has none, until the loan ends: Cycles' own default bends normals."""
-    material = borrow.shared(plain)  # to remove a material, Blender looks at all that could use it
+def fill_empty_slots(overrides: Overrides, block: bpy.types.Object) -> None:
+    """Give an object a material where it has none, until the overrides end: Cycles' own default bends normals."""
+    material = overrides.shared(plain)  # to remove a material, Blender looks at all that could use it
     if not block.material_slots:
-        borrow.afterwards(block.data.materials.clear)  # pop would leave a slot behind on the object
+        overrides.afterwards(block.data.materials.clear)  # pop would leave a slot behind on the object
         block.data.materials.append(material)
     for slot in block.material_slots:
         if slot.material is None:
-            borrow.set(slot, "material", material)
+            overrides.set(slot, "material", material)
 
 
-def plain(borrow: Borrower) -> bpy.types.Material:
-    """The tracer's own plain material, which leaves all passes of geometry alone, gone when the loan ends."""
+def plain(overrides: Overrides) -> bpy.types.Material:
+    """The tracer's own plain material, which leaves all passes of geometry alone, gone when the overrides end."""
     material = bpy.data.materials.new("Virtual Pinhole")
-    borrow.afterwards(bpy.data.materials.remove, material)
+    overrides.afterwards(bpy.data.materials.remove, material)
     material.cycles.use_bump_map_correction = False
     if not material.node_tree:  # from 5.0 on new materials have one
         material.use_nodes = True
-    stand_in(borrow, material, shaders.Reading(PLAIN))
+    stand_in(overrides, material, shaders.Reading(PLAIN))
     return material
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import bpy
 
-from ..temporary_settings import Borrower
+from ..temporary_settings import Overrides
 
 
 class Input(NamedTuple):
@@ -66,8 +66,8 @@ def _by_identifier(node: bpy.types.Node, socket: bpy.types.NodeSocket, groups: t
     return inner and Input(inner, groups)
 
 
-def borrow_output(borrow: Borrower, tree: bpy.types.NodeTree, kind: str) -> tuple[bpy.types.Node, "Adder"]:
-    """Let Cycles see another output of a tree until the loan ends.
+def override_output(overrides: Overrides, tree: bpy.types.NodeTree, kind: str) -> tuple[bpy.types.Node, "Adder"]:
+    """Let Cycles see another output of a tree until the overrides end.
 
     kind : the output's class, "ShaderNodeOutputMaterial", … Returns it, and what adds nodes that go with it.
     """
@@ -82,7 +82,7 @@ def borrow_output(borrow: Borrower, tree: bpy.types.NodeTree, kind: str) -> tupl
             node.is_active_output = was_active
         nodes.active = active
 
-    borrow.afterwards(undo)
+    overrides.afterwards(undo)
     output = adder.add(kind)
     output.target = "CYCLES"
     for node, _ in before:

@@ -34,7 +34,7 @@ from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import datablocks, findings, pose
-from ..temporary_settings import Borrower, borrowed, still_of_one_layer
+from ..temporary_settings import Overrides, overridden, still_of_one_layer
 from . import features, materials
 from .depsgraph import visit
 from .export import light_in, placements
@@ -125,35 +125,35 @@ def recentred(
         as `export.export_scene` does, and if something does not stand where it should.
     """
     features.note_render(scene, view_layer, camera_object, ledger, lit)
-    with borrowed() as borrow:
+    with overridden() as overrides:
         keys = set(bpy.data.shape_keys)
-        borrow.afterwards(_remove_keys_but, keys)
+        overrides.afterwards(_remove_keys_but, keys)
         view, placed, copies = _visit(
-            scene, view_layer, camera_object, lambda depsgraph: _seen(depsgraph, camera_object, ledger, borrow, lit)
+            scene, view_layer, camera_object, lambda depsgraph: _seen(depsgraph, camera_object, ledger, overrides, lit)
         )
         _remove_keys_but(keys)
-        temporary = _empty_scene(borrow, scene, view_layer)
-        camera = _camera(borrow, temporary, view)  # before all others: it asks for a depsgraph
-        shown = _place(borrow, temporary, placed)
+        temporary = _empty_scene(overrides, scene, view_layer)
+        camera = _camera(overrides, temporary, view)  # before all others: it asks for a depsgraph
+        shown = _place(overrides, temporary, placed)
         _visit(temporary, temporary.view_layers[0], camera, lambda depsgraph: _verify(depsgraph, shown, copies))
         yield Recentred(temporary, camera, view.shown.eye, {each.name: source.name for each, source in shown.items()})
 
 
 def _visit(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_object: bpy.types.Object, work: Callable) -> Any:
-    with borrowed() as borrow:
-        still_of_one_layer(borrow, scene, view_layer, camera_object)
+    with overridden() as overrides:
+        still_of_one_layer(overrides, scene, view_layer, camera_object)
         return visit(scene, work)
 
 
 def _seen(
-    depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, ledger: Ledger, borrow: Borrower, lit: bool
+    depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, ledger: Ledger, overrides: Overrides, lit: bool
 ) -> tuple[_View, list[_Placed], dict[bpy.types.ID, _Copy]]:
-    """What of the file is rendered; geometries are copied, and the copies gone when the loan ends."""
+    """What of the file is rendered; geometries are copied, and the copies gone when the overrides end."""
     if lit:
         light_in(depsgraph, ledger)  # for what the ledger tells of the file's own lamps
     view = _view(depsgraph, camera_object)
     eye = np.array(view.shown.eye)
-    plain = materials.plain(borrow)
+    plain = materials.plain(overrides)
     copies: dict[tuple[int, int], _Copy] = {}
     placed = []
     for source, matrix in placements(depsgraph, ledger, Shading() if lit else None):
@@ -162,7 +162,7 @@ def _seen(
         matrix[:3, 3] -= eye
         if source.key not in copies:
             data = source.data.copy()
-            borrow.afterwards(bpy.data.batch_remove, [data])
+            overrides.afterwards(bpy.data.batch_remove, [data])
             _set_materials(data, [(material and material.original) or plain for material in source.slots])
             copies[source.key] = _moved(data, matrix)
         copy = copies[source.key]
@@ -227,10 +227,10 @@ def _moved(data: Geometry, matrix: Array) -> _Copy:
     return _Copy(data, points, anchor)
 
 
-def _empty_scene(borrow: Borrower, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> bpy.types.Scene:
+def _empty_scene(overrides: Overrides, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> bpy.types.Scene:
     """A scene that renders pictures of the same frame and film, with the same world."""
     temporary = bpy.data.scenes.new("Virtual Pinhole")
-    borrow.afterwards(bpy.data.scenes.remove, temporary)
+    overrides.afterwards(bpy.data.scenes.remove, temporary)
     for name in _FRAME:
         setattr(temporary.render, name, getattr(scene.render, name))
     temporary.render.use_crop_to_border = scene.render.use_border  # as in temporary_settings.still_of_one_layer
@@ -242,11 +242,11 @@ def _empty_scene(borrow: Borrower, scene: bpy.types.Scene, view_layer: bpy.types
     return temporary
 
 
-def _place(borrow: Borrower, temporary: bpy.types.Scene, placed: list[_Placed]) -> dict[bpy.types.Object, _Placed]:
+def _place(overrides: Overrides, temporary: bpy.types.Scene, placed: list[_Placed]) -> dict[bpy.types.Object, _Placed]:
     """An object for each thing, all of them children of one at the origin."""
     root = bpy.data.objects.new("Virtual Pinhole", None)
     objects = [root]
-    borrow.afterwards(bpy.data.batch_remove, objects)
+    overrides.afterwards(bpy.data.batch_remove, objects)
     temporary.collection.objects.link(root)
     shown = {}
     for each in placed:
@@ -262,12 +262,12 @@ def _place(borrow: Borrower, temporary: bpy.types.Scene, placed: list[_Placed]) 
     return shown
 
 
-def _camera(borrow: Borrower, temporary: bpy.types.Scene, view: _View) -> bpy.types.Object:
+def _camera(overrides: Overrides, temporary: bpy.types.Scene, view: _View) -> bpy.types.Object:
     """A camera that shows `view.shown`, and states `view.claimed`."""
     data = bpy.data.cameras.new("Virtual Pinhole")
-    borrow.afterwards(bpy.data.batch_remove, [data])
+    overrides.afterwards(bpy.data.batch_remove, [data])
     block = bpy.data.objects.new("Virtual Pinhole", data)
-    borrow.afterwards(bpy.data.batch_remove, [block])
+    overrides.afterwards(bpy.data.batch_remove, [block])
     temporary.collection.objects.link(block)
     temporary.camera = block
     data.sensor_fit, (data.sensor_width, data.sensor_height) = view.sensor_fit, view.sensor

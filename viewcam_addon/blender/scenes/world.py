@@ -4,7 +4,7 @@ import bpy
 
 from ...tracer.scene.lamps import World
 from .. import versions
-from ..temporary_settings import Borrower
+from ..temporary_settings import Overrides
 from . import images, nodes, shaders
 from .ledger import Ledger
 from .nodes import Input, Output
@@ -38,8 +38,8 @@ def world_of(world: bpy.types.World | None, ledger: Ledger) -> World:
     return World(radiance, frozenset(ray for ray in _RAYS if not getattr(world.cycles_visibility, ray)))
 
 
-def _make_constant(borrow: Borrower, world: bpy.types.World, radiance: RGB) -> None:
-    output, adder = nodes.borrow_output(borrow, world.node_tree, "ShaderNodeOutputWorld")
+def _make_constant(overrides: Overrides, world: bpy.types.World, radiance: RGB) -> None:
+    output, adder = nodes.override_output(overrides, world.node_tree, "ShaderNodeOutputWorld")
     background = adder.add("ShaderNodeBackground", Color=(*radiance, 1.0), Strength=1.0)
     adder.link(background.outputs[0], output.inputs["Surface"])
 

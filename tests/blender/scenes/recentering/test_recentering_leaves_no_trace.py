@@ -108,8 +108,8 @@ def test_an_object_that_did_not_follow_is_named(sabotage, look, add, mesh_from, 
     add(mesh_from("cube"), "Cube", np.add(ECEF, (20, 0, 0)))
     place = recentering._place
 
-    def place_wrongly(borrow, temporary, placed):
-        shown = place(borrow, temporary, placed)
+    def place_wrongly(overrides, temporary, placed):
+        shown = place(overrides, temporary, placed)
         for block, each in shown.items():
             block.matrix_parent_inverse = recentering.Matrix(sabotage(each))
         return shown
@@ -126,8 +126,8 @@ def test_a_vertex_that_did_not_follow_and_an_object_that_is_gone_are_named(look,
     place = recentering._place
 
     def spoil(change):
-        def place_wrongly(borrow, temporary, placed):
-            shown = place(borrow, temporary, placed)
+        def place_wrongly(overrides, temporary, placed):
+            shown = place(overrides, temporary, placed)
             change(next(iter(shown)))
             return shown
 

@@ -1,11 +1,11 @@
-"""The judge of a batch's shots: is what Cycles renders through a camera what the camera's numbers say?
+"""The comparer of a batch's shots: is what Cycles renders through a camera what the camera's numbers say?
 
 A process of its own, kept open: it reads Cycles' passes of geometry, traces the same scene with the camera of the sidecar, and
 compares the two as `viewcam compare` does. Scene and tracer are kept from shot to shot, so that a shot costs its own pixels
 only. It is no part of Blender's process, where there must be no second copy of OpenEXR. Rejected: `viewcam render` and
 `viewcam compare` for each shot, two processes and a scene to read and build each time.
 
-    python -m viewcam_addon.batch.judge HANDLE
+    python -m viewcam_addon.batch.comparer HANDLE
 """
 
 import dataclasses
@@ -20,18 +20,18 @@ from ..pinhole import Pinhole
 from . import child_process
 
 if TYPE_CHECKING:
-    from ..comparison.geometry import Comparison
+    from ..comparison.geometry import GeometryComparison
 
 
 def lacking() -> str | None:
-    """What a judge needs and does not find here, as a sentence; its search path is ours."""
+    """What a check needs and does not find here, as a sentence; its search path is ours."""
     if importlib.util.find_spec("OpenEXR") is None:
         return "a check needs OpenEXR: install the extension from its zip, or pip install OpenEXR"
     return None
 
 
-class Judge:
-    """The judge, as the one who asks has it. The process is started with the first question, and again if it was lost."""
+class Comparer:
+    """The comparer, as the one who asks has it. The process is started with the first question, and again if it was lost."""
 
     def __init__(self, threads: int | None = None) -> None:
         self._threads = threads
@@ -53,12 +53,12 @@ class Judge:
         Raises
         ------
         InputError
-            if scene or picture can't be read or are not of the same size, if there is no OpenEXR, or if the judge ended first.
+            if scene or picture can't be read or are not of the same size, there is no OpenEXR, or the process ended first.
         """
         if self._partner is None:
             if sentence := lacking():
                 raise InputError(sentence)
-            self._partner = child_process.Partner("the judge", children.module("batch.judge"), children.environment())
+            self._partner = child_process.Partner("the comparer", children.module("batch.comparer"), children.environment())
         request = {
             "scene": str(scene),
             "image": str(image),
@@ -79,14 +79,14 @@ class Judge:
             self._partner.close()
             self._partner = None
 
-    def __enter__(self) -> "Judge":
+    def __enter__(self) -> "Comparer":
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
 
 
-class _Bench:
+class _Scenes:
     """What the process keeps from question to question."""
 
     def __init__(self) -> None:
@@ -111,7 +111,7 @@ class _Bench:
         return {"passed": comparison.passed, "verdict": comparison.sentence, "figures": _figures(comparison)}
 
 
-def _figures(comparison: "Comparison") -> dict[str, Any]:
+def _figures(comparison: "GeometryComparison") -> dict[str, Any]:
     """What is kept of a comparison."""
     position = comparison.rows[0].to_json()
     return checks.for_json(
@@ -130,4 +130,4 @@ def _figures(comparison: "Comparison") -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    child_process.answer(sys.argv[1], _Bench().answer)
+    child_process.answer(sys.argv[1], _Scenes().answer)

@@ -1,4 +1,4 @@
-"""The judge: right pictures pass, pictures of a wrong camera don't, and nothing of one shot shows in the verdict on the next.
+"""The comparer: right pictures pass, those of a wrong camera don't, and nothing of one shot shows in the verdict on the next.
 
 Cycles' side is traced here, with the camera that Blender is made to have.
 """
@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from viewcam_addon import image
 from viewcam_addon.batch import child_process
-from viewcam_addon.batch.judge import Judge
+from viewcam_addon.batch.comparer import Comparer
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import render
@@ -60,7 +60,7 @@ def made_scene(camera=CAMERA):
 
 @pytest.fixture(scope="module")
 def scene_path(tmp_path_factory):
-    path = tmp_path_factory.mktemp("judge") / "scene.json"
+    path = tmp_path_factory.mktemp("comparer") / "scene.json"
     scene_file.write(made_scene(), path)
     return path
 
@@ -79,13 +79,13 @@ def picture(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def judge():
-    with Judge() as judge:
-        yield judge
+def comparer():
+    with Comparer() as comparer:
+        yield comparer
 
 
-def test_a_right_picture_passes_with_figures_that_a_sidecar_keeps(judge, scene_path, picture):
-    said = judge.verdict(scene_path, picture(CAMERA), CAMERA, CLIP)
+def test_a_right_picture_passes_with_figures_that_a_sidecar_keeps(comparer, scene_path, picture):
+    said = comparer.verdict(scene_path, picture(CAMERA), CAMERA, CLIP)
     assert said["passed"] and said["verdict"].startswith("The same picture: over ")
     figures = said["figures"]
     assert figures["pixels"] > 3000 and figures["conversion"] is None and figures["mismatches"]["unexplained"] == 0
@@ -115,66 +115,66 @@ def cameras(draw):
 @settings(max_examples=15)
 @given(cameras(), st.floats(0, 6.28))
 def test_any_camera_passes_as_itself_and_fails_half_a_pixel_off_in_any_direction(
-    judge, scene_path, tmp_path_factory, camera, way
+    comparer, scene_path, tmp_path_factory, camera, way
 ):
     path = tmp_path_factory.mktemp("any") / "cycles.exr"
     image.write(path, image.Image(render(made_scene(camera))))
-    right = judge.verdict(scene_path, path, camera, CLIP, stated=camera)
+    right = comparer.verdict(scene_path, path, camera, CLIP, stated=camera)
     assert right["passed"], right["verdict"]
     c_x, c_y = camera.principal_point
     off = replace(camera, principal_point=(c_x + 0.5 * np.cos(way), c_y + 0.5 * np.sin(way)))
-    assert not judge.verdict(scene_path, path, off, CLIP)["passed"]
+    assert not comparer.verdict(scene_path, path, off, CLIP)["passed"]
 
 
 @pytest.mark.parametrize("fault", WRONG)
-def test_a_picture_of_a_wrong_camera_fails(judge, scene_path, picture, fault):
-    said = judge.verdict(scene_path, picture(WRONG[fault]), CAMERA, CLIP)
+def test_a_picture_of_a_wrong_camera_fails(comparer, scene_path, picture, fault):
+    said = comparer.verdict(scene_path, picture(WRONG[fault]), CAMERA, CLIP)
     assert not said["passed"] and said["verdict"].startswith("Not the same picture: "), said
 
 
 @pytest.mark.parametrize("flip", FLIPS)
-def test_a_picture_that_is_flipped_or_moved_in_its_file_fails(judge, scene_path, picture, flip):
-    said = judge.verdict(scene_path, picture(CAMERA, FLIPS[flip]), CAMERA, CLIP)
+def test_a_picture_that_is_flipped_or_moved_in_its_file_fails(comparer, scene_path, picture, flip):
+    said = comparer.verdict(scene_path, picture(CAMERA, FLIPS[flip]), CAMERA, CLIP)
     assert not said["passed"], said
 
 
-def test_a_wrong_conversion_fails_even_where_the_picture_is_right(judge, scene_path, picture):
+def test_a_wrong_conversion_fails_even_where_the_picture_is_right(comparer, scene_path, picture):
     taken = picture(CAMERA)
-    right = judge.verdict(scene_path, taken, CAMERA, CLIP, stated=CAMERA)
+    right = comparer.verdict(scene_path, taken, CAMERA, CLIP, stated=CAMERA)
     assert right["passed"] and right["figures"]["conversion"]["largest"] < 1e-9
-    wrong = judge.verdict(scene_path, taken, CAMERA, CLIP, stated=replace(CAMERA, distance=110.11))
+    wrong = comparer.verdict(scene_path, taken, CAMERA, CLIP, stated=replace(CAMERA, distance=110.11))
     assert not wrong["passed"] and "from the stated one" in wrong["verdict"]
     # 0.1 % of the distance moves the farthest corner, which is 96 − 46 and 28 pixels away, by as much.
     assert wrong["figures"]["conversion"]["largest"] == pytest.approx(0.001 * np.hypot(50, 28), rel=1e-2)
 
 
-def test_what_lies_beyond_the_clip_range_is_not_there(judge, scene_path, picture):
+def test_what_lies_beyond_the_clip_range_is_not_there(comparer, scene_path, picture):
     taken = picture(CAMERA)
-    assert not judge.verdict(scene_path, taken, CAMERA, (0.1, 6.0))["passed"]
-    assert judge.verdict(scene_path, taken, CAMERA, CLIP)["passed"]
+    assert not comparer.verdict(scene_path, taken, CAMERA, (0.1, 6.0))["passed"]
+    assert comparer.verdict(scene_path, taken, CAMERA, CLIP)["passed"]
 
 
-def test_the_verdicts_of_one_judge_on_many_are_those_of_a_new_one_on_each(judge, scene_path, picture):
+def test_the_verdicts_of_one_comparer_on_many_are_those_of_a_new_one_on_each(comparer, scene_path, picture):
     """To the last digit: what is kept changes nothing, so that a resumed batch writes the same sidecars."""
     for camera in (CAMERA, OTHER, replace(OTHER, width=64, height=64, principal_point=None), CAMERA):
         taken = picture(camera)
-        with Judge() as fresh:
-            assert judge.verdict(scene_path, taken, camera, CLIP) == fresh.verdict(scene_path, taken, camera, CLIP)
+        with Comparer() as fresh:
+            assert comparer.verdict(scene_path, taken, camera, CLIP) == fresh.verdict(scene_path, taken, camera, CLIP)
 
 
-def test_another_scene_is_another_file(judge, scene_path, picture, tmp_path):
+def test_another_scene_is_another_file(comparer, scene_path, picture, tmp_path):
     taken = picture(CAMERA)
-    assert judge.verdict(scene_path, taken, CAMERA, CLIP)["passed"]
+    assert comparer.verdict(scene_path, taken, CAMERA, CLIP)["passed"]
     scene = made_scene()
     without = replace(scene, objects=scene.objects[:2])
     scene_file.write(without, tmp_path / "without-balls.json")
-    assert not judge.verdict(tmp_path / "without-balls.json", taken, CAMERA, CLIP)["passed"]
-    assert judge.verdict(scene_path, taken, CAMERA, CLIP)["passed"]
+    assert not comparer.verdict(tmp_path / "without-balls.json", taken, CAMERA, CLIP)["passed"]
+    assert comparer.verdict(scene_path, taken, CAMERA, CLIP)["passed"]
 
 
-def test_a_picture_without_a_single_hit_is_no_proof(judge, scene_path, picture):
+def test_a_picture_without_a_single_hit_is_no_proof(comparer, scene_path, picture):
     upwards = replace(CAMERA, look_at=(3, -6, 9))
-    said = judge.verdict(scene_path, picture(upwards), upwards, CLIP, stated=upwards)
+    said = comparer.verdict(scene_path, picture(upwards), upwards, CLIP, stated=upwards)
     assert not said["passed"] and "Nothing to compare" in said["verdict"]
     assert json.dumps(said, allow_nan=False)
 
@@ -188,25 +188,27 @@ def test_a_picture_without_a_single_hit_is_no_proof(judge, scene_path, picture):
     ],
     ids=["no picture", "no scene", "another size"],
 )
-def test_what_can_not_be_judged_is_one_sentence_and_the_next_is_judged(judge, scene_path, picture, tmp_path, change, sentence):
+def test_what_can_not_be_checked_is_one_sentence_and_the_next_is_checked(
+    comparer, scene_path, picture, tmp_path, change, sentence
+):
     given = {"scene": scene_path, "image": picture(CAMERA), "camera": CAMERA, "clip": CLIP}
     with pytest.raises(InputError, match=sentence):
-        judge.verdict(**given | change(tmp_path))
-    assert judge.verdict(**given)["passed"]
+        comparer.verdict(**given | change(tmp_path))
+    assert comparer.verdict(**given)["passed"]
 
 
-def test_a_judge_that_was_lost_is_started_again(scene_path, picture):
+def test_a_comparer_that_was_lost_is_started_again(scene_path, picture):
     taken = picture(CAMERA)
-    with Judge() as judge:
-        assert judge.verdict(scene_path, taken, CAMERA, CLIP)["passed"]
-        judge._partner._family.end()
-        with pytest.raises(child_process.Gone, match="the judge has ended"):
-            judge.verdict(scene_path, taken, CAMERA, CLIP)
-        assert judge.verdict(scene_path, taken, CAMERA, CLIP)["passed"]
+    with Comparer() as comparer:
+        assert comparer.verdict(scene_path, taken, CAMERA, CLIP)["passed"]
+        comparer._partner._family.end()
+        with pytest.raises(child_process.Gone, match="the comparer has ended"):
+            comparer.verdict(scene_path, taken, CAMERA, CLIP)
+        assert comparer.verdict(scene_path, taken, CAMERA, CLIP)["passed"]
 
 
 def test_without_openexr_it_is_said_what_to_install(scene_path, picture, monkeypatch):
     taken = picture(CAMERA)
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
-    with Judge() as judge, pytest.raises(InputError, match="a check needs OpenEXR: install"):
-        judge.verdict(scene_path, taken, CAMERA, CLIP)
+    with Comparer() as comparer, pytest.raises(InputError, match="a check needs OpenEXR: install"):
+        comparer.verdict(scene_path, taken, CAMERA, CLIP)
