@@ -151,6 +151,7 @@ class Disturbances:
         print(f"{left} of 24 shots were left after 20 kills")
         assert_same(killed, undisturbed)
 
+    @pytest.mark.exhaustive
     def test_two_batches_at_once_share_the_work_and_leave_what_one_leaves(self, command, undisturbed, tmp_path):
         with command.start(tmp_path, "--resume") as one, command.start(tmp_path, "--resume") as other:
             ends = [one.end(), other.end()]
@@ -159,6 +160,7 @@ class Disturbances:
         assert sum(done) == 6, f"shots were rendered {sum(done)} times: {done[0]} by one, {done[1]} by the other"
         assert_same(tmp_path, undisturbed)
 
+    @pytest.mark.exhaustive
     def test_of_two_batches_the_one_that_is_not_killed_does_all(self, command, undisturbed, tmp_path):
         with command.start(tmp_path, "--resume") as other, command.start(tmp_path, "--resume") as one:
             other.until("shot_started")
@@ -167,7 +169,7 @@ class Disturbances:
         assert status == 0, events
         assert_same(tmp_path, undisturbed)
 
-    @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+    @pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.exhaustive), signal.SIGTERM])
     def test_a_signal_ends_the_batch_after_the_shot(self, command, undisturbed, tmp_path, number):
         with command.start(tmp_path) as batch:
             batch.until("shot_started")
@@ -181,6 +183,7 @@ class Disturbances:
         assert command.run(tmp_path, "--resume")[0] == 0
         assert_same(tmp_path, undisturbed)
 
+    @pytest.mark.exhaustive
     def test_a_signal_at_the_very_start_ends_the_batch_after_one_shot_at_most(self, command, tmp_path):
         with command.start(tmp_path) as batch:
             batch.until("started")
@@ -191,6 +194,7 @@ class Disturbances:
         told = [event["event"] for event in events]
         assert told[told.index("stopping") :].count("shot_done") <= 1, told
 
+    @pytest.mark.exhaustive
     def test_a_second_signal_ends_it_at_once(self, blender, tmp_path):
         """The shot would take an hour or more."""
         long, folder = tmp_path / "shots.csv", tmp_path / "folder"
@@ -205,6 +209,7 @@ class Disturbances:
             assert batch.end()[0] == 130
         assert not list(folder.glob("shot*"))
 
+    @pytest.mark.exhaustive
     @pytest.mark.parametrize("share", [0.3, 0.6])
     def test_a_full_disk_ends_the_batch_and_one_with_room_finishes_it(self, command, undisturbed, tmp_path, share):
         """A disk that has room for a share of what the batch writes, and is then made larger."""
@@ -228,6 +233,7 @@ class Disturbances:
         assert len(failed) == 1 and "No space left on device" in failed[0] and "free some space" in failed[0], failed
         assert_same(tmp_path / "end", undisturbed)
 
+    @pytest.mark.exhaustive
     def test_pictures_beyond_a_limit_end_the_batch_and_without_it_resume_finishes_it(self, command, undisturbed, tmp_path):
         """What needs no right to mount: files may not be larger than the smallest of the pictures."""
         sizes = sorted(file.stat().st_size for file in undisturbed.glob("*.exr"))

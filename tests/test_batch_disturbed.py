@@ -26,6 +26,7 @@ class TestWheel(disturbed.Disturbances):
 
         return command
 
+    @pytest.mark.exhaustive
     @pytest.mark.skipif(sys.platform != "linux", reason="the process in which Blender runs is found as Linux has it")
     def test_a_blender_that_crashes_is_told_and_resume_renders_what_is_left(self, command, undisturbed, tmp_path):
         with command.start(tmp_path) as batch:

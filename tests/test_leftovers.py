@@ -56,7 +56,7 @@ def test_what_is_forgotten_is_found():
 
 
 @pytest.mark.skipif(bpy.app.version < (4, 5), reason="Blender 4.2 keeps all classes of properties alive itself")
-@pytest.mark.parametrize("held", HELD)
+@pytest.mark.parametrize("held", [HELD[0], *(pytest.param(held, marks=pytest.mark.exhaustive) for held in HELD[1:])])
 def test_what_blender_still_holds_is_found(held):
     outcome = leftovers("wheel", "1", held)
     assert outcome.returncode == 1, outcome.stdout + outcome.stderr

@@ -12,6 +12,8 @@ bpy = pytest.importorskip("bpy")
 from viewcam_addon.blender import camera
 from viewcam_addon.pinhole import Pinhole
 
+pytestmark = pytest.mark.exhaustive
+
 
 @pytest.mark.parametrize("name", ["spot", "teapot", "stanford-bunny"])
 @pytest.mark.parametrize("smooth", [True, False], ids=["smooth", "flat"])

@@ -5,6 +5,7 @@ that what documents name exists.
 """
 
 import ast
+import functools
 import graphlib
 import re
 import subprocess
@@ -13,6 +14,8 @@ import tomllib
 from pathlib import Path
 
 import pytest
+
+from viewcam_addon import cli
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "viewcam_addon"
@@ -156,6 +159,11 @@ def sources() -> list[Path]:
     return sorted(PACKAGE.rglob("*.py"))
 
 
+@functools.cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def tracked_files() -> list[str]:
     return subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.split("\0")[
         :-1
@@ -243,7 +251,7 @@ def test_imports_inside_the_package_are_relative():
     absolute = [
         f"{path.relative_to(ROOT)}:{node.lineno}"
         for path in sources()
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in ast.walk(parsed(path))
         if (isinstance(node, ast.Import) and any(name.name.split(".")[0] == "viewcam_addon" for name in node.names))
         or (isinstance(node, ast.ImportFrom) and node.level == 0 and node.module.split(".")[0] == "viewcam_addon")
     ]
@@ -285,7 +293,7 @@ def missing_names(trees: dict[Path, ast.Module]) -> list[str]:
 
 def test_what_is_imported_from_a_module_of_the_package_is_there():
     """Of modules that need Blender, or something else that is not installed, and in functions, too."""
-    trees = {path.relative_to(ROOT): ast.parse(path.read_text(encoding="utf-8")) for path in sources()}
+    trees = {path.relative_to(ROOT): parsed(path) for path in sources()}
     assert not (missing := missing_names(trees)), missing
 
 
@@ -364,7 +372,7 @@ def test_below_the_interface_nothing_takes_the_property_group():
     for name in ("storage.py", "targets.py"):
         calls = {
             node.func.attr
-            for node in ast.walk(ast.parse((NEEDS_BLENDER / name).read_text(encoding="utf-8")))
+            for node in ast.walk(parsed(NEEDS_BLENDER / name))
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
         }
         assert not calls & METHODS, f"{name} calls methods of the property group: {calls & METHODS}"
@@ -398,13 +406,12 @@ def test_the_top_level_is_the_fixed_one():
     assert not extra, f"not a part of the top level: {sorted(extra)}"
 
 
-def test_what_the_readme_says_viewcam_does_it_does():
+def test_what_the_readme_says_viewcam_does_it_does(capsys):
     promised = set(re.findall(r"(?m)(?:`|--command |^ *)viewcam ([a-z]+)", (ROOT / "README.md").read_text(encoding="utf-8")))
     assert {"check", "demo"} <= promised
     for name in sorted(promised):
-        command = [sys.executable, "-m", "viewcam_addon", name, "--help"]
-        outcome = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
-        assert outcome.returncode == 0 and name in outcome.stdout, f"viewcam {name}: {outcome.stderr}"
+        status, said = cli.main([name, "--help"]), capsys.readouterr()
+        assert status == 0 and f"viewcam {name}" in said.out, said.err
 
 
 def paths_named_in(text: str) -> set[str]:

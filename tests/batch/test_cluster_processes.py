@@ -44,6 +44,7 @@ def offspring(process):
     return found
 
 
+@pytest.mark.exhaustive
 def test_a_script_that_has_workers_is_not_run_again_by_them(stand_in, blend, tmp_path):
     script = tmp_path / "script.py"  # as people write them: nothing asks for __main__
     script.write_text("print('run')" + COORDINATOR)
@@ -52,7 +53,10 @@ def test_a_script_that_has_workers_is_not_run_again_by_them(stand_in, blend, tmp
     assert done.returncode == 0 and done.stdout == "run\n", done.stdout + done.stderr
 
 
-@pytest.mark.parametrize("how", ["finished", signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "how",
+    [signal.SIGKILL, *(pytest.param(how, marks=pytest.mark.exhaustive) for how in ("finished", signal.SIGINT, signal.SIGTERM))],
+)
 def test_nothing_is_left_running_and_nothing_is_said(stand_in, blend, tmp_path, processes, how):
     """Also when the coordinator is killed, or when Ctrl-C reaches the whole group."""
     command = [sys.executable, "-c", COORDINATOR, str(Path(__file__).parent), str(blend), str(tmp_path / "out"), "a", "b"]

@@ -13,6 +13,8 @@ from viewcam_addon import children
 
 pytest.importorskip("distributed")
 
+pytestmark = pytest.mark.exhaustive
+
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "farm.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"(?m)^```(sh|text)\n((?:.*\n)*?)```$", PAGE)

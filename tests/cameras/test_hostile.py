@@ -18,7 +18,7 @@ from viewcam_addon.errors import InputError
 from . import test_read_only_formats as files
 from .conftest import camera
 
-SETTINGS = settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+SETTINGS = settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 GIVEN = Options(size=(64, 36), base=camera("plain").pinhole)
 
 
@@ -169,28 +169,28 @@ def test_a_damaged_file_is_read_or_refused(tmp_path, data):
 
 
 LARGE = {
-    "brackets": "[" * 1_000_000,
-    "braces": '{"a":' * 200_000,
-    "comments": '{"a": 1 /*' + "*" * 999_000,
-    "quotes": '{"' + '\\"' * 499_000,
-    "keys": "{" + ", ".join(f'"{i}": 1' for i in range(60_000)) + ', "a": 1, "a": 2}',
-    "elements": "<a>" * 300_000,
-    "numbers": "1 2 3 4 5 6 7 8\n" * 60_000,
-    "words": "eye " * 250_000,
-    "yaml": "camera_matrix: a\n" * 60_000,
-    "indents": "".join(" " * min(i, 50) + "a:\n" for i in range(20_000)),
-    "spaces": " " * 1_000_000,
-    "commas": "," * 1_000_000,
-    "digits": '{"frames": [{"transform_matrix": ' + "9" * 999_000 + "}]}",
+    "brackets": "[" * 250_000,
+    "braces": '{"a":' * 50_000,
+    "comments": '{"a": 1 /*' + "*" * 249_000,
+    "quotes": '{"' + '\\"' * 125_000,
+    "keys": "{" + ", ".join(f'"{i}": 1' for i in range(15_000)) + ', "a": 1, "a": 2}',
+    "elements": "<a>" * 75_000,
+    "numbers": "1 2 3 4 5 6 7 8\n" * 15_000,
+    "words": "eye " * 62_500,
+    "yaml": "camera_matrix: a\n" * 15_000,
+    "indents": "".join(" " * min(i, 50) + "a:\n" for i in range(5_000)),
+    "spaces": " " * 250_000,
+    "commas": "," * 250_000,
+    "digits": '{"frames": [{"transform_matrix": ' + "9" * 249_000 + "}]}",
 }
 
 
 @pytest.mark.parametrize("name", LARGE)
-def test_a_megabyte_of_anything_is_answered_soon(name):
+def test_a_quarter_of_a_megabyte_of_anything_is_answered_soon(name):
     started = time.process_time()
     read_or_refused(LARGE[name])
     seconds = time.process_time() - started
-    assert seconds < 60, f"{seconds:.1f} s"  # a text that takes time by its square takes hours
+    assert seconds < 20, f"{seconds:.1f} s"  # a text that takes time by its square takes many minutes
 
 
 def test_no_xml_brings_anything_from_outside_or_grows():

@@ -4,7 +4,8 @@ A block of sh is as many examples as it has commands. They run in the page's ord
 and `blender` are the ones under test, and the files that the pages speak of are small scenes (scenes.py). Any other block is an
 example as a whole: programs are run, lists of shots and scenes rendered.
 
-test_examples.py runs all of them with a wheel, tests/real_blender/test_documents.py in the real Blender.
+test_examples.py runs all of them with a wheel, tests/real_blender/test_documents.py in the real Blender: a page is a test, for
+what stands further down in it needs what was done above.
 """
 
 import json
@@ -97,6 +98,11 @@ def is_run(example: Example, real: bool) -> bool:
     return not only_shown and example.text not in NOT_RUN and is_possible
 
 
+def pages(real: bool) -> list[str]:
+    """Those of which something is run."""
+    return list(dict.fromkeys(example.page for example in examples() if is_run(example, real)))
+
+
 def _commands(block: str) -> list[str]:
     lines = re.sub(r"\\\n\s*", "", block).splitlines()
     return [command for line in lines if (command := re.sub(r"(^|\s+)#.*", "", line).strip())]
@@ -134,6 +140,17 @@ class Reader:
             (self._files / name).write_text(first.text, encoding="utf-8")
         if extension:
             shutil.copy(extension, self._files / ZIP)
+
+    def follow(self, page: str, real: bool) -> None:
+        """Run all of a page's examples; AssertionError with each that does not do what the page says."""
+        failed = []
+        for example in examples():
+            if example.page == page and is_run(example, real):
+                try:
+                    self.run(example)
+                except (AssertionError, ValueError) as error:
+                    failed.append(f"{example}\n{error}")
+        assert not failed, "\n\n".join(failed)
 
     def run(self, example: Example) -> None:
         """Run it; AssertionError if it does not do what its page says."""

@@ -19,9 +19,10 @@ def reader(tmp_path_factory):
     return examples.with_wheel(tmp_path_factory.mktemp("reader"))
 
 
-@pytest.mark.parametrize("example", [each for each in ALL if examples.is_run(each, real=False)], ids=str)
-def test_an_example_does_what_its_page_says(reader, example):
-    reader.run(example)
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("page", examples.pages(real=False))
+def test_the_examples_do_what_their_page_says(reader, page):
+    reader.follow(page, real=False)
 
 
 def test_what_is_not_run_is_still_in_the_pages_and_has_a_reason():
@@ -38,6 +39,7 @@ def test_every_page_is_read_and_most_of_it_is_run():
     assert len(run) >= 30 and {"sh", "python", "csv", "json", "jsonl"} <= {each.language for each in run}
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(
     "block",
     [

@@ -21,9 +21,9 @@ def reader(tmp_path_factory, real_blender, extension_zip):
     )
 
 
-@pytest.mark.parametrize("example", [each for each in examples.examples() if examples.is_run(each, real=True)], ids=str)
-def test_an_example_does_what_its_page_says(reader, example):
-    reader.run(example)
+@pytest.mark.parametrize("page", examples.pages(real=True))
+def test_the_examples_do_what_their_page_says(reader, page):
+    reader.follow(page, real=True)
 
 
 def test_an_example_that_does_not_work_is_found(reader):

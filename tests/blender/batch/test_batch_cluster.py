@@ -19,7 +19,10 @@ from viewcam_addon.batch.folder import Folder
 from viewcam_addon.blender.batch.renderer import BlenderRenderer
 from viewcam_addon.shots import Shot, settings_hash
 
-pytestmark = pytest.mark.skipif(not Path("/proc/self").exists(), reason="whether a process runs is read off Linux's /proc")
+pytestmark = [
+    pytest.mark.exhaustive,
+    pytest.mark.skipif(not Path("/proc/self").exists(), reason="whether a process runs is read off Linux's /proc"),
+]
 
 TIMING = re.compile(rb'"timing": \{[^}]*\}')
 WAITS = 120
