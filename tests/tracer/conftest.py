@@ -35,6 +35,19 @@ def ball():
 
 
 @pytest.fixture(scope="session")
+def closed_ball(ball):
+    """closed_ball(rings) → Mesh: the same without its seam, vertices at one place being one, and without flat triangles."""
+
+    def build(rings: int) -> Mesh:
+        made = ball(rings)
+        vertices, place = np.unique(made.vertices, axis=0, return_inverse=True)
+        triangles = place.reshape(-1)[made.triangles]
+        return mesh(vertices, triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)])
+
+    return build
+
+
+@pytest.fixture(scope="session")
 def make_mesh():
     """make_mesh(vertices, triangles, **more) → Mesh with the array types that Mesh wants."""
     return mesh
