@@ -41,12 +41,17 @@ sanitizers-address = address,undefined
 preload-address = $(shell g++ -print-file-name=libasan.so) $(shell g++ -print-file-name=libubsan.so)
 sanitizers-thread = thread
 preload-thread = $(shell g++ -print-file-name=libtsan.so)
+# What goes wrong between threads shows where there are some; the rest is tried on one.
+tests-address = tests/tracer/test_c_interface.py tests/tracer/test_intersection.py tests/tracer/test_leaks.py \
+	tests/tracer/test_render.py tests/tracer/test_render_light.py tests/tracer/test_triangles.py tests/tracer/light/test_textures.py
+calls-address = VIEWCAM_FUZZ_CALLS=1500
+tests-thread = tests/tracer/test_render.py tests/tracer/test_render_light.py tests/tracer/test_kept.py
 test-sanitizers: test-sanitizer-address test-sanitizer-thread
 
 test-sanitizer-%: .venv/test
 	CXX=g++ .venv/bin/python hatch_build.py --sanitize $(sanitizers-$*) --into build/sanitized/$*
-	env -u BLENDER LD_PRELOAD="$(preload-$*)" ASAN_OPTIONS=detect_leaks=0 TSAN_OPTIONS=report_bugs=1 PYTHONPATH=build/sanitized/$* \
-	VIEWCAM_LEAK_RAYS=2000 .venv/bin/python -m pytest tests/tracer/test_intersection.py tests/tracer/test_render.py tests/tracer/test_triangles.py
+	env -u BLENDER LD_PRELOAD="$(preload-$*)" ASAN_OPTIONS=detect_leaks=0 TSAN_OPTIONS=halt_on_error=1 PYTHONPATH=build/sanitized/$* \
+	VIEWCAM_LEAK_RAYS=300 $(calls-$*) .venv/bin/python -m pytest -p no:cacheprovider $(tests-$*)
 
 lint: .venv/test
 	.venv/bin/python -m ruff check .

@@ -44,8 +44,9 @@ PLATFORMS = {
     "macos-x64": ("x86_64-macos.11.0", "macosx_11_0_x86_64", "libviewcam.dylib"),
     "macos-arm64": ("aarch64-macos.11.0", "macosx_11_0_arm64", "libviewcam.dylib"),
 }
-# Instances of the core: x86-64's levels; any other processor has one.
+# Instances of the core: x86-64's levels; any other processor has one, and so has what is only to be tested.
 LEVELS = ("v2", "v3", "v4")
+ONE_INSTANCE = "-DVIEWCAM_ONE_INSTANCE"
 # No contraction: a product and its sum round apart, which the triangle test stands on (core/shapes/triangle_mesh.h). No errno:
 # square roots are instructions.
 FLAGS = ["-std=c++20", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden", "-DNDEBUG", "-g0"]
@@ -89,7 +90,7 @@ def build_core(platform: str, flags: tuple[str, ...] = ()) -> Path:
 def _compiled(platform: str, command: list[str], zig: bool, folder: Path) -> Path:
     """The library, made in a folder: the C interface once, the core once for each instruction set."""
     march = "-mcpu=x86_64_" if zig else "-march=x86-64-"
-    if platform.endswith("x64"):
+    if platform.endswith("x64") and ONE_INSTANCE not in command:
         wide = {"v4": ["-mprefer-vector-width=256"]}  # 512 slows the clock of many processors down
         parts = [("capi", [march + LEVELS[0]])]
         parts += [(level, [march + level, f"-DVIEWCAM_ISA={level}", *wide.get(level, [])]) for level in LEVELS]
@@ -171,7 +172,8 @@ class CoreBuildHook(BuildHookInterface):
 
 def sanitized(sanitizers: str, folder: Path) -> None:
     """The package compiled for this machine with sanitizers, as compilers name them, in a folder for PYTHONPATH."""
-    library = build_core(this_platform(), (f"-fsanitize={sanitizers}", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer"))
+    told = f"-fsanitize={sanitizers}", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer", "-g1"
+    library = build_core(this_platform(), (*told, "-O1", ONE_INSTANCE))
     (folder / PACKAGE).mkdir(parents=True, exist_ok=True)
     (folder / PACKAGE / "__init__.py").touch()
     shutil.copy(library, folder / PACKAGE)

@@ -147,9 +147,10 @@ class Yardstick:
         self._camera, eye = scene.camera, np.array(scene.camera.eye)
         self._embree = EmbreeScene(robust=True)
         for placed in scene.objects:
-            mesh, matrix = scene.geometries[placed.geometry], placed.matrix
-            vertices = mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
-            TriangleMesh(self._embree, (vertices - eye).astype(np.float32), mesh.triangles)
+            mesh = scene.geometries[placed.geometry]
+            for matrix in placed.matrices:
+                vertices = mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+                TriangleMesh(self._embree, (vertices - eye).astype(np.float32), mesh.triangles)
         self._embree.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))  # builds the hierarchy
 
     def eye_rays(self, px: float | NDArray[np.float64], py: float | NDArray[np.float64]) -> Rays:

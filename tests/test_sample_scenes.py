@@ -127,7 +127,8 @@ def test_spheres_are_exact_spheres_and_one_is_an_ellipsoid(fresh_blender):
     exported = job.export(job.Request(blend=FOLDER / "spheres.blend", strict=True))
     spheres = {name: shape for name, shape in exported.geometries.items() if isinstance(shape, Spheres)}
     assert sum(len(shape.radii) for shape in spheres.values()) >= 6000
-    scales = [np.linalg.norm(thing.matrix[:3, :3], axis=0) for thing in exported.objects if thing.geometry in spheres]
+    matrices = [matrix for thing in exported.objects if thing.geometry in spheres for matrix in thing.matrices]
+    scales = [np.linalg.norm(matrix[:3, :3], axis=0) for matrix in matrices]
     assert any(np.ptp(scale) > 0.1 for scale in scales), "no sphere is scaled to an ellipsoid"
 
 

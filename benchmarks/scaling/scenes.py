@@ -37,10 +37,10 @@ def many_meshes(triangles: int, size: tuple[int, int] = SIZE) -> Scene:
 def instances(count: int, size: tuple[int, int] = SIZE) -> Scene:
     """One mesh of a thousand triangles, placed so many times side by side."""
     side = math.ceil(math.sqrt(count))
-    placed = [
-        _placed("patch", 1 / side, ((2 * (i % side) + 1) / side - 1, (2 * (i // side) + 1) / side - 1, 0)) for i in range(count)
-    ]
-    return _scene({"patch": _patch(_cells(1000), (-1, 1), (-1, 1))}, placed, size)
+    row, column = np.divmod(np.arange(count), side)
+    matrices = np.tile(np.diag([1 / side, 1 / side, 1 / side, 1.0]), (count, 1, 1))
+    matrices[:, 0, 3], matrices[:, 1, 3] = (2 * column + 1) / side - 1, (2 * row + 1) / side - 1
+    return _scene({"patch": _patch(_cells(1000), (-1, 1), (-1, 1))}, [Object("patch", "patch", matrices)], size)
 
 
 def spheres(count: int, size: tuple[int, int] = SIZE) -> Scene:
@@ -74,7 +74,7 @@ def under_areas(count: int, triangles: int, size: tuple[int, int] = SIZE) -> Sce
 def triangles_of(scene: Scene) -> int:
     """How many triangles its objects have, those of shared meshes counted each time."""
     counts = {name: len(mesh.triangles) for name, mesh in scene.geometries.items() if isinstance(mesh, Mesh)}
-    return sum(counts.get(placed.geometry, 0) for placed in scene.objects)
+    return sum(counts.get(placed.geometry, 0) * len(placed.matrices) for placed in scene.objects)
 
 
 def own_bytes(scene: Scene) -> int:

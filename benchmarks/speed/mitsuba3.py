@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from viewcam_addon import image
 from viewcam_addon.errors import InputError
-from viewcam_addon.tracer.scene import Mesh, Object, Scene, scene_file
+from viewcam_addon.tracer.scene import Mesh, Scene, scene_file
 from viewcam_addon.tracer.scene.lamps import Sun
 from viewcam_addon.tracer.scene.materials import PLAIN
 
@@ -111,10 +111,11 @@ def write(scene: Scene, folder: Path) -> None:
         material = scene.materials.get(placed.materials[0], PLAIN) if placed.materials else PLAIN
         if not isinstance(geometry, Mesh) or set(material.colours) != {"diffuse"} or len(set(placed.materials)) > 1:
             raise InputError(f"object {placed.name!r} is more than one matte mesh: race Mitsuba on another scene")
-        file = folder / f"{number}.ply"
-        _mesh(mitsuba, geometry, placed).write_ply(str(file))
         smooth = geometry.corner_normals is not None
-        document["objects"].append({"file": file.name, "smooth": smooth, "colour": material.diffuse.rgb})
+        for place, matrix in enumerate(placed.matrices):
+            file = folder / f"{number}.{place}.ply"
+            _mesh(mitsuba, geometry, placed.name, matrix).write_ply(str(file))
+            document["objects"].append({"file": file.name, "smooth": smooth, "colour": material.diffuse.rgb})
     for lamp in scene.lamps:
         if not isinstance(lamp, Sun) or lamp.angle:
             raise InputError(f"light {lamp.name!r} is no sun without size: race Mitsuba on another scene")
@@ -131,9 +132,9 @@ def _camera(scene: Scene) -> dict[str, Any]:
     return pose | {"fov": fov, "width": camera.width, "height": camera.height, "clip": list(scene.clip)}
 
 
-def _mesh(mitsuba: Any, geometry: Mesh, placed: Object) -> Any:
+def _mesh(mitsuba: Any, geometry: Mesh, name: str, matrix: NDArray[np.float64]) -> Any:
     """World space; a vertex for each normal that it has."""
-    linear, offset = placed.matrix[:3, :3], placed.matrix[:3, 3]
+    linear, offset = matrix[:3, :3], matrix[:3, 3]
     corners, normals = geometry.triangles, None
     if geometry.corner_normals is not None:
         turned = geometry.corner_normals.reshape(-1, 3) @ np.linalg.inv(linear)
@@ -143,7 +144,7 @@ def _mesh(mitsuba: Any, geometry: Mesh, placed: Object) -> Any:
         normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     else:
         vertices = geometry.vertices
-    mesh = mitsuba.Mesh(placed.name, len(vertices), corners.size // 3, has_vertex_normals=normals is not None)
+    mesh = mitsuba.Mesh(name, len(vertices), corners.size // 3, has_vertex_normals=normals is not None)
     parameters = mitsuba.traverse(mesh)
     parameters["vertex_positions"] = _flat(vertices @ linear.T + offset)
     parameters["faces"] = corners.reshape(-1).astype(np.uint32)

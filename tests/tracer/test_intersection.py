@@ -146,17 +146,34 @@ def test_a_kind_of_rays_passes_what_is_hidden_from_it(make_scene, make_mesh, mak
         assert core.closest(ray, other)[1].tolist() == [0 if geometry is square else 1]
 
 
+@settings(max_examples=3)
+@given(seed=SEEDS)
+def test_an_object_that_stands_in_many_places_is_as_many_objects(ball, make_mesh, random_matrix, seed):
+    """Written out, and as instances: 400 of 2,700 triangles are more than the core writes out."""
+    rng = np.random.default_rng(seed)
+    mesh = make_mesh(rng.normal(size=(2700 * 3, 3)) * 0.1, np.arange(2700 * 3))
+    for geometry, count in ((ball(6), 20), (mesh, 400)):
+        matrices = np.array([random_matrix(rng, 9.0) for _ in range(count)])
+        one = (Object("all", "thing", matrices),)
+        each = tuple(Object(f"{number}", "thing", matrix) for number, matrix in enumerate(matrices))
+        rays = random_rays(rng, 500, 9.0)
+        found = []
+        for objects in (one, each):
+            core = CoreScene(Scene(CAMERA, {"thing": geometry}, objects), 2)
+            found.append(core.closest(core.rays(*rays)))
+        for first, second in zip(*found, strict=True):
+            assert np.array_equal(first, second)
+        assert (found[0][1] > 0).any(), "nothing but the first place is met"
+
+
 def test_many_instances_take_no_more_than_three_hundred_bytes_each(make_mesh):
     rng = np.random.default_rng(4)
     tuft = make_mesh(rng.normal(size=(3000, 3)), np.arange(3000))
 
     def memory(count: int) -> int:
-        objects = []
-        for number in range(count):
-            matrix = np.eye(4)
-            matrix[:2, 3] = divmod(number, 64)
-            objects.append(Object(f"tuft {number}", "tuft", matrix))
-        return CoreScene(Scene(CAMERA, {"tuft": tuft}, tuple(objects)), 2).bytes
+        matrices = np.tile(np.eye(4), (count, 1, 1))
+        matrices[:, 0, 3], matrices[:, 1, 3] = np.divmod(np.arange(count), 64)
+        return CoreScene(Scene(CAMERA, {"tuft": tuft}, (Object("tuft", "tuft", matrices),)), 2).bytes
 
     few, many = memory(2000), memory(4000)
     assert (many - few) / 2000 <= 300, f"{(many - few) / 2000:.0f} bytes each"

@@ -123,6 +123,38 @@ def test_smooth_normals_are_those_of_the_corners_turned_with_the_face_towards_th
     assert np.abs(passes["Normal"][row, column] - expected).max() <= 8 * FLOAT32
 
 
+def turned_by_cofactors(linear, normals):
+    """Normals as cross products of sides turn: (n, 3), unit."""
+    a, b, c = linear.T
+    turned = normals @ np.array([np.cross(b, c), np.cross(c, a), np.cross(a, b)])
+    return turned / np.linalg.norm(turned, axis=-1, keepdims=True)
+
+
+@settings(max_examples=30)
+@given(seed=SEEDS, squeezed=st.sampled_from([1.0, 1e-3, 1e-9, 1e-30, 0.0]))
+def test_smooth_normals_are_turned_by_the_cofactors_of_any_matrix_mirrored_sheared_or_flat(
+    make_mesh, make_scene, random_matrix, seed, squeezed
+):
+    """Flattened along the triangle's own normal it stays what it is, and all of its normals become one."""
+    rng = np.random.default_rng(seed)
+    mesh, matrix = smooth_triangle(make_mesh), random_matrix(rng)
+    matrix[:3, 2] *= squeezed
+    weights = rng.dirichlet((3, 3, 3))
+    corners = mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+    eye = corners.mean(axis=0) + rng.normal(size=3) * 5
+    passes = Tracer(make_scene(Pinhole(tuple(eye), tuple(weights @ corners), (0, 0, 1), 500, 9, 9), (mesh, matrix))).surface_at(
+        [4], [4]
+    )
+    if passes["Facing"][0, 0] < 1e-3:
+        return  # seen edge-on
+    side = -np.sign(np.cross(corners[1] - corners[0], corners[2] - corners[0]) @ (weights @ corners - eye))
+    expected = weights @ turned_by_cofactors(matrix[:3, :3], mesh.corner_normals[0].astype(float))
+    expected *= side / np.linalg.norm(expected)
+    # Weights are off by rounding over the cosine under which the triangle is seen, at most 1e-12.
+    off = np.abs(passes["Normal"][0] - expected).max()
+    assert off <= FLOAT32, f"{passes['Normal'][0]} instead of {expected}"
+
+
 def test_normals_of_a_mesh_with_one_user_are_normalised_at_its_corners_and_shared_ones_are_not(make_mesh):
     """What Cycles does with a mesh that it moves to world space beforehand, and with one that it can't."""
     mesh = smooth_triangle(make_mesh)

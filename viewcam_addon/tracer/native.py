@@ -63,7 +63,7 @@ class _Spheres(Structure):
 
 class _Object(Structure):
     _fields_ = [
-        *((name, c_uint32) for name in ("geometry", "visible", "slot_count")),
+        *((name, c_uint32) for name in ("geometry", "visible", "slot_count", "count")),
         ("index", c_float),
         *((name, c_void_p) for name in ("slot_indices", "slot_materials")),
     ]
@@ -128,9 +128,9 @@ class _Core(Structure):
         ("scene_free", _function(None, c_void_p)),
         ("add_mesh", _function(c_int, c_void_p, POINTER(_Mesh))),
         ("add_spheres", _function(c_int, c_void_p, POINTER(_Spheres))),
-        ("add_object", _function(c_int, c_void_p, POINTER(_Object))),
+        ("add_objects", _function(c_int, c_void_p, POINTER(_Object))),
         ("commit", _function(c_int, c_void_p, c_void_p, c_void_p, c_int)),
-        ("set_camera", _function(None, c_void_p, POINTER(_Camera))),
+        ("set_camera", _function(c_int, c_void_p, POINTER(_Camera))),
         ("bytes", _function(c_size_t, c_void_p)),
         ("render_geometry", _function(c_int, c_void_p, c_uint32, c_uint32, c_void_p, c_size_t, c_void_p)),
         ("surface_at", _function(c_int, c_void_p, c_size_t, c_void_p, c_void_p, c_void_p)),
@@ -140,8 +140,8 @@ class _Core(Structure):
         ("add_texture", _function(c_int, c_void_p, c_int, c_int, c_int, c_void_p)),
         ("add_material", _function(c_int, c_void_p, c_void_p, c_int)),
         ("add_lamp", _function(c_int, c_void_p, POINTER(_Lamp))),
-        ("set_film", _function(None, c_void_p, POINTER(_Film))),
-        ("light_create", _function(c_void_p, c_void_p, POINTER(_LightSettings))),
+        ("set_film", _function(c_int, c_void_p, POINTER(_Film))),
+        ("light_create", _function(c_int, c_void_p, POINTER(_LightSettings), POINTER(c_void_p))),
         ("light_free", _function(None, c_void_p)),
         ("trace_light", _function(c_int, c_void_p, c_uint32, c_uint32, POINTER(_LightPasses), c_void_p)),
         (
@@ -222,8 +222,12 @@ class CoreScene:
         for geometry in scene.geometries.values():
             self._add_geometry(geometry)
         for placed in scene.objects:
-            self._add_object(placed, numbers[placed.geometry], materials)
-        matrices = np.array([placed.matrix[:3] for placed in scene.objects], np.float64).reshape(-1, 3, 4)
+            self._add_objects(placed, numbers[placed.geometry], materials)
+        matrices = array(
+            np.concatenate([np.empty((0, 3, 4)), *(placed.matrices[:, :3] for placed in scene.objects)]),
+            np.float64,
+            (None, 3, 4),
+        )
         self.check(self.core.commit(self.handle, _address(matrices), _address(self.origin), threads))
         self._light: Scene | None = None
         self.look(scene)
@@ -263,14 +267,14 @@ class CoreScene:
         mesh = _Mesh(len(geometry.vertices), count, *(self._keep(*part) for part in parts))
         self.check(self.core.add_mesh(self.handle, mesh))
 
-    def _add_object(self, placed: Object, geometry: int, materials: Mapping[str, int]) -> None:
+    def _add_objects(self, placed: Object, geometry: int, materials: Mapping[str, int]) -> None:
         slots = len(placed.material_indices)
         names = (*placed.materials[:slots], *[""] * (slots - len(placed.materials)))
         indices = array(placed.material_indices, np.float32, (slots,))
         numbers = array([materials[name] for name in names], np.uint32, (slots,))
         visible = sum(_KINDS.values()) & ~kinds(placed.hidden_from)
-        described = _Object(geometry, visible, slots, placed.object_index, _address(indices), _address(numbers))
-        self.check(self.core.add_object(self.handle, described))
+        shared = geometry, visible, slots, len(placed.matrices), placed.object_index
+        self.check(self.core.add_objects(self.handle, _Object(*shared, _address(indices), _address(numbers))))
 
     def serves(self, scene: Scene) -> bool:
         """Whether its hierarchies are those of another scene: the same things in the same places, near the same origin."""
@@ -290,7 +294,7 @@ class CoreScene:
         described.eye[:] = tuple(np.array(camera.eye) - self.origin)
         described.right[:], described.up[:], described.forward[:] = tuple(-u if camera.mirrored else u), tuple(v), tuple(-w)
         described.principal_point[:], described.distance[:] = camera.principal_point, camera.distance
-        self.core.set_camera(self.handle, described)
+        self.check(self.core.set_camera(self.handle, described))
 
     def illuminate(self, scene: Scene) -> None:
         """Give the core what gives and scatters light in a scene with the same objects."""
@@ -317,7 +321,7 @@ class CoreScene:
         described = _Film(hidden_from=kinds(world.hidden_from), transparent=film.transparent, exposure=film.exposure)
         described.radiance[:] = world.radiance
         described.filter_width = 0.0 if film.filter == "BOX" else film.filter_width
-        self.core.set_film(self.handle, described)
+        self.check(self.core.set_film(self.handle, described))
         self._light = scene
 
     def _add_texture(self, scene: Scene, name: str) -> None:
@@ -353,7 +357,8 @@ class CoreScene:
     def closest(self, rays: NDArray, kind: str = "camera", packets: bool = True) -> tuple[NDArray, NDArray, NDArray]:
         """What n rays meet first: the distances in their directions' lengths, inf where nothing is, objects and primitives.
 
-        kind : of `RAYS`. Objects and primitives are (n,) int64, −1 where nothing is.
+        kind : of `RAYS`. Objects and primitives are (n,) int64, −1 where nothing is; an object that stands in n places counts
+        as n.
         """
         rays = array(rays, np.float64, (None, 8))
         t, found = np.empty(len(rays)), np.empty((2, len(rays)), np.uint32)
@@ -391,14 +396,12 @@ class CoreLight:
     """Light in a scene of the core, which must not change before it is traced. The rest as in render.render."""
 
     def __init__(self, scene: CoreScene, given: Scene, level: str, samples: int, seed: int, error: float | None) -> None:
+        self._scene, self._handle = scene, c_void_p()
         scene.illuminate(given)
         bounces = given.bounces if level == "path" else NO_BOUNCES
         settings = _LightSettings(seed=seed & 0xFFFFFFFF, samples=samples, error=error or 0.0)
         settings.bounces[:] = bounces.total, bounces.diffuse, bounces.glossy, bounces.transmission
-        self._scene, self._handle = scene, None
-        self._handle = scene.core.light_create(scene.handle, settings)
-        if not self._handle:
-            raise MemoryError
+        scene.check(scene.core.light_create(scene.handle, settings, ctypes.byref(self._handle)))
 
     def __del__(self) -> None:
         if self._handle:
@@ -494,9 +497,10 @@ def _origin(scene: Scene) -> NDArray[np.float64]:
     least, greatest = np.full(3, np.inf), np.full(3, -np.inf)
     for placed in scene.objects:
         centre, half = boxes[placed.geometry]
-        centre = placed.matrix[:3, :3] @ centre + placed.matrix[:3, 3]
-        half = np.abs(placed.matrix[:3, :3]) @ half
-        least, greatest = np.minimum(least, centre - half), np.maximum(greatest, centre + half)
+        centres = placed.matrices[:, :3, :3] @ centre + placed.matrices[:, :3, 3]
+        halves = np.abs(placed.matrices[:, :3, :3]) @ half
+        least = np.minimum(least, (centres - halves).min(axis=0, initial=np.inf))
+        greatest = np.maximum(greatest, (centres + halves).max(axis=0, initial=-np.inf))
     radius = float(np.linalg.norm(greatest - least)) / 2 if np.isfinite(least).all() else 0.0
     if not radius > 0:
         return np.array(scene.camera.eye, np.float64)

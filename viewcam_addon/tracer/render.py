@@ -25,6 +25,8 @@ __all__ = ["Keeper", "Passes", "Stopped", "Tracer", "Watcher", "render"]
 
 # Rows that a thread traces at a time at level `geometry`: the core takes blocks of 8.
 BAND = 16
+# The sampler tells no more of them apart (core/samplers/sobol.h).
+MOST_SAMPLES = 2**24
 CENTRES = ("Depth", "Object Index")
 """The passes that tell what is at the pixels' centres, at the levels of light."""
 PASSES = {name: len(CHANNELS[name]) for name in GEOMETRY_PASSES}
@@ -183,8 +185,8 @@ def render(
     """
     if level not in LEVELS:
         raise InputError(f"the level is {level!r}: give one of {', '.join(LEVELS)}")
-    if samples < 1:
-        raise InputError(f"the number of samples is {samples}: give at least 1")
+    if not 1 <= samples <= MOST_SAMPLES:
+        raise InputError(f"the number of samples is {samples}: give 1 to {MOST_SAMPLES}")
     if error is not None and not 0.0 < error < math.inf:
         raise InputError(f"the error is {error}: give a number above 0")
     try:

@@ -104,7 +104,8 @@ def test_collection_instances_share_one_geometry(add, scene, both_sides, mesh_fr
         )
     sides = both_sides()
     sides.check()
-    assert len(sides.exported.geometries) == 2 and len(sides.exported.objects) == 10
+    assert len(sides.exported.geometries) == len(sides.exported.objects) == 2
+    assert [len(placed.matrices) for placed in sides.exported.objects] == [5, 5]
     assert entry(sides.exported, "Cone").reason == "placed 5 times"
 
 
@@ -119,7 +120,7 @@ def test_instances_on_vertices_and_faces(add, both_sides, mesh_from):
     bpy.data.objects.remove(child)
     sides = both_sides()
     sides.check()
-    assert len(sides.exported.objects) == 8 + 6 + 1
+    assert sorted(len(placed.matrices) for placed in sides.exported.objects) == [1, 6, 8]
 
 
 def test_particles_are_instances(add, scene, both_sides, mesh_from):
@@ -134,7 +135,7 @@ def test_particles_are_instances(add, scene, both_sides, mesh_from):
     scene.frame_set(2)
     sides = both_sides()
     sides.check()
-    assert sum(placed.name == "Stone" for placed in sides.exported.objects) == 61
+    assert {placed.name: len(placed.matrices) for placed in sides.exported.objects} == {"Stone": 61, "Ground": 1}
 
 
 def test_a_scatter_of_geometry_nodes(add, both_sides, mesh_from, node_group):
@@ -159,9 +160,28 @@ def test_a_scatter_of_geometry_nodes(add, both_sides, mesh_from, node_group):
     ground.modifiers.new("Scatter", "NODES").node_group = tree
     sides = both_sides()
     sides.check()
-    names = [placed.name for placed in sides.exported.objects]
-    assert len(names) == 50 and set(names) == {"Ground", "Round", "Square"}
-    assert len(sides.exported.geometries) == 3
+    counts = {placed.name: len(placed.matrices) for placed in sides.exported.objects}
+    assert sum(counts.values()) == 50 and set(counts) == {"Ground", "Round", "Square"}
+    assert len(sides.exported.geometries) == len(sides.exported.objects) == 3
+
+
+def test_a_lawn_of_ten_thousand_tufts_is_one_object_of_as_many_matrices(add, both_sides, mesh_from, node_group):
+    tuft = add(mesh_from("ico_sphere", radius=0.03), "Tuft", location=(0, 0, -9))
+    lawn = add(mesh_from("grid", size=5, x_subdivisions=99, y_subdivisions=99), "Lawn")
+    corners = np.array([vertex.co for vertex in lawn.data.vertices])
+    tree, source, target = node_group()
+    shown, scatter = tree.nodes.new("GeometryNodeObjectInfo"), tree.nodes.new("GeometryNodeInstanceOnPoints")
+    shown.inputs["Object"].default_value, shown.inputs["As Instance"].default_value = tuft, True
+    tree.links.new(source.outputs[0], scatter.inputs["Points"])
+    tree.links.new(shown.outputs["Geometry"], scatter.inputs["Instance"])
+    tree.links.new(scatter.outputs[0], target.inputs[0])
+    lawn.modifiers.new("Scatter", "NODES").node_group = tree
+    sides = both_sides()
+    sides.check()
+    (tufts,) = sides.exported.objects
+    places = {tuple(place) for place in tufts.matrices[:, :3, 3].astype(np.float32).tolist()}
+    assert places == {*map(tuple, corners.astype(np.float32).tolist()), (0, 0, -9)}
+    assert len(tufts.matrices) == 100 * 100 + 1 and entry(sides.exported, "Tuft").reason == "placed 10001 times"
 
 
 def test_geometry_nodes_know_that_this_is_a_render(add, both_sides, mesh_from, node_group):

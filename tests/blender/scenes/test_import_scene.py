@@ -52,10 +52,10 @@ def there_and_back(made):
 
 def things(scene, light=True):
     """All that stands in a scene, whatever its order and its names: the arrays' bytes and the materials, counted."""
-    return Counter(_thing(scene, placed, light) for placed in scene.objects)
+    return Counter(_thing(scene, placed, matrix, light) for placed in scene.objects for matrix in placed.matrices)
 
 
-def _thing(scene, placed, light):
+def _thing(scene, placed, matrix, light):
     geometry = scene.geometries[placed.geometry]
     names = (
         ("vertices", "triangles", "materials", "corner_uvs")
@@ -65,7 +65,7 @@ def _thing(scene, placed, light):
     arrays = tuple(getattr(geometry, name) for name in names)
     hidden = placed.hidden_from if light else frozenset()
     bytes_of = tuple(array is not None and array.tobytes() for array in arrays)
-    return bytes_of, placed.matrix.tobytes(), placed.object_index, placed.material_indices, hidden
+    return bytes_of, matrix.tobytes(), placed.object_index, placed.material_indices, hidden
 
 
 def surfaces(scene):
@@ -178,6 +178,15 @@ def test_an_object_without_material_shows_none_of_the_one_whose_geometry_it_shar
     objects = [Object("Red", "ball", np.eye(4), material_indices=(5,)), Object("Plain", "ball", np.eye(4))]
     made = scene_of(objects, {"ball": tetrahedron()})
     check_same(made, there_and_back(made))
+
+
+def test_an_object_that_stands_in_many_places_becomes_as_many_that_share_their_data(fresh_blender):
+    matrices = np.tile(np.eye(4), (3, 1, 1))
+    matrices[:, 0, 3], matrices[2, 1, 1] = (0, 2, 4), -2
+    made = scene_of([Object("Balls", "ball", matrices, 7)], {"ball": tetrahedron()})
+    found = there_and_back(made)
+    check_same(made, found)
+    assert len(found.objects) == 3 and len(found.geometries) == 1
 
 
 def test_a_pixel_more_is_seen(fresh_blender):

@@ -90,7 +90,7 @@ def test_the_documented_example_shows_its_floor_beads_and_tent(example, read_doc
     assert seen == {0, 1, 2, 3}
     assert scene.clip == (0.1, math.inf)
     assert set(example["geometries"]) == {"floor", "beads", "tent"}
-    for key in ("stated_camera", "principal_point", "corner_normals", "material_indices", "arrays", "ledger"):
+    for key in ("matrices", "stated_camera", "principal_point", "corner_normals", "material_indices", "arrays", "ledger"):
         assert f"`{key}`" in DOCUMENTATION.read_text(encoding="utf-8"), f"{key} is not documented"
 
 
@@ -102,6 +102,24 @@ def test_rotations_are_degrees_about_x_then_y_then_z_and_scale_comes_first(examp
     matrix = read_document(example).objects[0].matrix
     # (1, 1, 1) → scaled (1, 2, 3) → about x (1, −3, 2) → about z (3, 1, 2) → moved
     assert np.allclose(matrix @ (1, 1, 1, 1), (13, 1, 2, 1), atol=1e-15)
+
+
+def test_an_object_stands_as_often_as_it_has_matrices(example, read_document):
+    example = copy.deepcopy(example)
+    there = [[1, 0, 0, 5], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+    example["objects"] = [{"name": "beads", "geometry": "beads", "matrices": [np.eye(4).tolist(), there]}]
+    (placed,) = read_document(example).objects
+    assert np.array_equal(placed.matrices, [np.eye(4), there])
+
+
+def test_many_instances_are_one_array_beside_the_scene(make_scene, ball, random_matrix, random_scene, tmp_path):
+    rng = np.random.default_rng(1)
+    matrices = np.array([random_matrix(rng) for _ in range(20)])
+    scene = make_scene(random_scene(0).camera, (ball(3), matrices))
+    scene_file.write(scene, tmp_path / "many.json")
+    with np.load(tmp_path / "many.npz") as arrays:
+        assert [array.shape for array in arrays.values()].count((20, 4, 4)) == 1
+    assert_same_scene(scene, scene_file.read(tmp_path / "many.json"))
 
 
 def test_a_plane_is_two_triangles_with_a_uv_map_along_its_edges(example, read_document):

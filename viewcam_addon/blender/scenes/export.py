@@ -3,14 +3,16 @@
 Everything comes from the depsgraph of a render (depsgraph.py) through its object instances, as in Cycles' own synchronisation
 (intern/cycles/blender/object.cpp and geometry.cpp): modifiers, shape keys, armatures and drivers are evaluated; curves, text,
 surfaces and metaballs arrive as meshes; collections, geometry nodes and particles as instances that share their data. A
-geometry is stored once for each evaluated mesh. Rejected: `to_mesh` per object, which sees no instances and copies each mesh.
+geometry is stored once for each evaluated mesh, and an object once for all the places where an instance of it stands: a million
+take seconds, since their matrices are read in one go and Python asks each only what it is an instance of. Rejected: `to_mesh`
+per object, which sees no instances and copies each mesh.
 
 What has no counterpart is noted in the ledger, with the remedy that takes it out of Cycles' render.
 """
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import bpy
 import numpy as np
@@ -29,16 +31,16 @@ from .shading import Shading
 Matrix = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Surface:
-    """A visible surface that stands in the world once or many times.
+    """A visible surface that stands in the world once or many times; two that are equal are one.
 
     data : evaluated. key : the same for all that share a geometry in Cycles. slots : the materials, evaluated, at least 1.
     hidden_from : the kinds of rays that don't see it.
     """
 
     name: str
-    data: bpy.types.Mesh | bpy.types.PointCloud
+    data: bpy.types.Mesh | bpy.types.PointCloud = field(compare=False)
     key: tuple[int, int]
     object_index: int
     slots: tuple[bpy.types.Material | None, ...]
@@ -93,8 +95,7 @@ def survey(
     """Fill the ledger as `export_scene` does, without reading any geometry; returns the light of the scene, if wanted."""
 
     def look(depsgraph: bpy.types.Depsgraph) -> Lighting | None:
-        for _ in placements(depsgraph, ledger, Shading() if lit else None):
-            pass
+        placements(depsgraph, ledger, Shading() if lit else None)
         return light_in(depsgraph, ledger) if lit else None
 
     features.note_render(scene, view_layer, camera_object, ledger, lit)
@@ -121,14 +122,14 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
     names: dict[tuple[int, int], str] = {}
     geometries: dict[str, Mesh | Spheres] = {}
     objects = []
-    for source, matrix in placements(depsgraph, ledger, shading):
+    for source, matrices in placements(depsgraph, ledger, shading):
         if source.key not in names:
             geometry = _geometry(source, ledger, shading)
             names[source.key] = _free_name(source.data.name, geometries)
             geometries[names[source.key]] = geometry
         materials = shading.names(source.slots) if shading else ()
         placed = (source.object_index, source.materials, materials, source.hidden_from)
-        objects.append(Object(source.name, names[source.key], matrix, *placed))
+        objects.append(Object(source.name, names[source.key], matrices, *placed))
     return Scene(
         **_view_in(depsgraph, camera_object),
         geometries=geometries,
@@ -153,27 +154,34 @@ def _view_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) ->
     }
 
 
-def placements(
-    depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading | None = None
-) -> Iterator[tuple[Surface, Matrix]]:
-    """Each surface that the camera may see, and its (4, 4) matrix to world space, one for each instance.
+def placements(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading | None = None) -> list[tuple[Surface, Matrix]]:
+    """Each surface that the camera may see, and its matrices to world space, (n, 4, 4), one for each instance.
 
     shading : reads the materials, where there shall be light; then other rays than the camera's may see a surface.
     """
-    known: dict[tuple[int, ...], Surface | None] = {}
-    for instance in depsgraph.object_instances:
+    matrices = export_geometry.read(depsgraph.object_instances, "matrix_world", np.float32, 16)
+    found: dict[Surface, list[int]] = {}
+    known: dict[tuple[int, ...], list[int]] = {}
+    for number, instance in enumerate(depsgraph.object_instances):
         features.note_hair(instance, ledger)
         shown = instance.object
-        if not instance.show_self or shown.data is None:
+        data = shown.data
+        if not instance.show_self or data is None:
             continue
         placed = features.placed_by(instance)
-        identity = tuple(each.as_pointer() for each in (placed.real, placed.parent, shown.data))
+        identity = placed.real.as_pointer(), placed.parent.as_pointer(), data.as_pointer()
         if identity not in known:
-            known[identity] = _source(placed, depsgraph, ledger, shading)
-        source = known[identity]
-        if source:
-            ledger.placed(source.name)
-            yield source, np.array(instance.matrix_world, dtype=np.float64)
+            source = _source(placed, depsgraph, ledger, shading)
+            known[identity] = found.setdefault(source, []) if source else []
+        known[identity].append(number)
+    for source, numbers in found.items():
+        ledger.placed(source.name, len(numbers))
+    return [(source, _by_rows(matrices[numbers])) for source, numbers in found.items()]
+
+
+def _by_rows(matrices: NDArray[np.float32]) -> Matrix:
+    """(n, 4, 4) of (n, 16), as Blender has them: by columns."""
+    return np.ascontiguousarray(np.swapaxes(matrices.reshape(-1, 4, 4), 1, 2), np.float64)
 
 
 def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading | None) -> Surface | None:
@@ -225,13 +233,17 @@ def _geometry(source: Surface, ledger: Ledger, shading: Shading | None) -> Mesh 
 
 def _drawn(objects: list[Object], geometries: dict[str, Mesh | Spheres], ledger: Ledger) -> Iterator[Object]:
     """The objects without those that a scale of 0 flattens, of which Cycles draws only meshes that no other object uses."""
-    users = Counter(placed.geometry for placed in objects)
-    flat = np.linalg.det(np.array([placed.matrix[:3, :3] for placed in objects]).reshape(-1, 3, 3)) == 0
-    for placed, is_flat in zip(objects, flat, strict=True):
-        if is_flat and (users[placed.geometry] > 1 or isinstance(geometries[placed.geometry], Spheres)):
+    users: Counter[str] = Counter()
+    for placed in objects:
+        users[placed.geometry] += len(placed.matrices)
+    for placed in objects:
+        drawn = np.linalg.det(placed.matrices[:, :3, :3]) != 0
+        if not drawn.all() and (users[placed.geometry] > 1 or isinstance(geometries[placed.geometry], Spheres)):
             ledger.note(placed.name, "exported", "flattened by its scale, and Cycles does not draw it")
         else:
-            yield placed
+            drawn[:] = True
+        if drawn.any():
+            yield replace(placed, matrix=placed.matrices[drawn] if drawn.sum() > 1 else placed.matrices[drawn][0])
 
 
 def _free_name(name: str, taken: dict[str, Mesh | Spheres]) -> str:

@@ -170,8 +170,10 @@ class _SceneImport:
                 for i, index in enumerate(placed.material_indices)
             ]
             for first, block in data[placed.geometry]:
-                self._surface(placed, block, [slots[first]] if isinstance(block, bpy.types.PointCloud) else slots, paints)
-            self._ledger.placed(placed.name)
+                shown = [slots[first]] if isinstance(block, bpy.types.PointCloud) else slots
+                for matrix in placed.matrices:
+                    self._surface(dataclasses.replace(placed, matrix=matrix), block, shown, paints)
+            self._ledger.placed(placed.name, len(placed.matrices))
 
     def _data(self, name: str) -> list[tuple[int, bpy.types.Mesh | bpy.types.PointCloud]]:
         """(first material, data) of each datablock that a geometry becomes."""

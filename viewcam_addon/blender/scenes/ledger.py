@@ -23,9 +23,9 @@ class Ledger:
         self._placed: dict[str, int] = {}
         self.remedies: dict[tuple, Remedy] = {}
 
-    def placed(self, name: str) -> None:
-        """The object is in the scene once more."""
-        self._placed[name] = self._placed.get(name, 0) + 1
+    def placed(self, name: str, times: int = 1) -> None:
+        """The object is in the scene once more, or so many times."""
+        self._placed[name] = self._placed.get(name, 0) + times
 
     def note(self, name: str, status: str, reason: str) -> None:
         """A finding, one clause, about the object; the same one again changes nothing."""

@@ -156,7 +156,8 @@ def _seen(
     plain = materials.plain(overrides)
     copies: dict[tuple[int, int], _Copy] = {}
     placed = []
-    for source, matrix in placements(depsgraph, ledger, Shading() if lit else None):
+    shown = placements(depsgraph, ledger, Shading() if lit else None)
+    for source, matrix in ((source, matrix) for source, matrices in shown for matrix in matrices):
         if not np.isfinite(matrix).all():
             raise InputError(f"the matrix of object {source.name!r} holds a number that is not finite: check its transform")
         matrix[:3, 3] -= eye

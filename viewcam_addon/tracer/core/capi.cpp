@@ -4,7 +4,7 @@
 
 #include <cstring>
 
-#if defined(__x86_64__)
+#if defined(__x86_64__) && !defined(VIEWCAM_ONE_INSTANCE)
 #include <cpuid.h>
 
 namespace viewcam {

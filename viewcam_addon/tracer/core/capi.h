@@ -1,7 +1,7 @@
 /* The C interface: structures and one table of functions for each instruction set. tracer/native.py is the only one that calls it.
  *
- * Arrays belong to the caller, who has checked them; those of meshes and spheres must outlive their scene, and all others are
- * copied. Functions that return an int return 0, or another number and leave a message.
+ * Arrays belong to the caller; those of meshes and spheres must outlive their scene, and all others are copied. Functions that
+ * return an int return 0, or another number and leave a message: 1 without memory, 2 for what checks.h refuses.
  */
 #pragma once
 #include <stddef.h>
@@ -39,10 +39,10 @@ typedef struct {
     const int32_t* materials;
 } ViewcamSpheres;
 
-/* geometry: its number, as they were added. visible: to which kinds of rays. slots: for each material of the geometry, what the
- * Material Index pass shows and the number of a material. */
+/* So many objects that differ by their matrices alone. geometry: its number, as they were added. visible: to which kinds of rays.
+ * slots: for each material of the geometry, what the Material Index pass shows and the number of a material. */
 typedef struct {
-    uint32_t geometry, visible, slot_count;
+    uint32_t geometry, visible, slot_count, count;
     float index;
     const float* slot_indices;
     const uint32_t* slot_materials;
@@ -63,10 +63,10 @@ typedef struct {
     void (*scene_free)(ViewcamScene*);
     int (*add_mesh)(ViewcamScene*, const ViewcamMesh*);
     int (*add_spheres)(ViewcamScene*, const ViewcamSpheres*);
-    int (*add_object)(ViewcamScene*, const ViewcamObject*);
+    int (*add_objects)(ViewcamScene*, const ViewcamObject*);
     /* matrices: (objects, 3, 4), to world space. origin: of rendering space, in the world. */
     int (*commit)(ViewcamScene*, const double* matrices, const double* origin, int threads);
-    void (*set_camera)(ViewcamScene*, const ViewcamCamera*);
+    int (*set_camera)(ViewcamScene*, const ViewcamCamera*);
     size_t (*bytes)(const ViewcamScene*);
 
     /* planes: of each pass or null, its channels `stride` numbers apart. stop: or null; what it points to ends the work. */
@@ -80,8 +80,9 @@ typedef struct {
     int (*add_texture)(ViewcamScene*, int width, int height, int srgb, const float* pixels);
     int (*add_material)(ViewcamScene*, const ViewcamClosure*, int count);
     int (*add_lamp)(ViewcamScene*, const ViewcamLamp*);
-    void (*set_film)(ViewcamScene*, const ViewcamFilm*);
-    ViewcamLight* (*light_create)(const ViewcamScene*, const ViewcamLightSettings*);
+    int (*set_film)(ViewcamScene*, const ViewcamFilm*);
+    /* What is made must be freed before its scene, or what gives light there, changes. */
+    int (*light_create)(const ViewcamScene*, const ViewcamLightSettings*, ViewcamLight** made);
     void (*light_free)(ViewcamLight*);
     /* A tile of 32 × 32 pixels, by its lowest row and its first column. */
     int (*trace_light)(const ViewcamLight*, uint32_t row, uint32_t column, const ViewcamLightPasses*, const volatile int* stop);

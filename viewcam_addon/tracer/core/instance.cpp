@@ -4,6 +4,7 @@
 #include <string>
 
 #include "capi.h"
+#include "checks.h"
 #include "integrators/geometry.h"
 #include "light_functions.h"
 
@@ -52,6 +53,8 @@ const ViewcamCore core = {
     .add_mesh =
         [](ViewcamScene* scene, const ViewcamMesh* given) {
             return guarded([&] {
+                check::mesh(*given);
+                scene_of(scene).material_counts.push_back(check::materials(given->materials, given->count));
                 TriangleMesh mesh;
                 mesh.vertex_count = given->vertex_count, mesh.count = given->count;
                 mesh.vertices = given->vertices, mesh.triangles = given->triangles, mesh.materials = given->materials;
@@ -62,43 +65,53 @@ const ViewcamCore core = {
     .add_spheres =
         [](ViewcamScene* scene, const ViewcamSpheres* given) {
             return guarded([&] {
+                check::spheres(*given);
+                scene_of(scene).material_counts.push_back(check::materials(given->materials, given->count));
                 Spheres spheres;
                 spheres.count = given->count, spheres.centers = given->centers, spheres.radii = given->radii, spheres.materials = given->materials;
                 scene_of(scene).geometries.push_back(std::move(spheres));
             });
         },
-    .add_object =
+    .add_objects =
         [](ViewcamScene* scene, const ViewcamObject* given) {
             return guarded([&] {
                 Scene& to = scene_of(scene);
+                check::objects(to, *given);
                 Object object;
                 object.geometry = given->geometry, object.visible = given->visible, object.index = given->index;
                 object.first_slot = uint32_t(to.slots.size());
-                to.objects.push_back(object);
+                to.objects.insert(to.objects.end(), given->count, object);
                 for (uint32_t i = 0; i < given->slot_count; i++) to.slots.push_back({given->slot_indices[i], given->slot_materials[i]});
             });
         },
     .commit =
         [](ViewcamScene* scene, const double* matrices, const double* origin, int threads) {
             return guarded([&] {
+                check::placement(scene_of(scene), matrices, origin, threads);
                 scene_of(scene).origin = vector(origin);
                 scene_of(scene).commit(matrices, threads);
             });
         },
     .set_camera =
         [](ViewcamScene* scene, const ViewcamCamera* given) {
-            Camera& camera = scene_of(scene).camera;
-            camera.eye = vector(given->eye), camera.right = vector(given->right), camera.up = vector(given->up);
-            camera.forward = vector(given->forward);
-            camera.principal_point = {given->principal_point[0], given->principal_point[1]};
-            camera.distance = {given->distance[0], given->distance[1]};
-            camera.t_min = given->t_min, camera.t_max = given->t_max, camera.width = given->width, camera.height = given->height;
+            return guarded([&] {
+                check::camera(*given);
+                Camera& camera = scene_of(scene).camera;
+                camera.eye = vector(given->eye), camera.right = vector(given->right), camera.up = vector(given->up);
+                camera.forward = vector(given->forward);
+                camera.principal_point = {given->principal_point[0], given->principal_point[1]};
+                camera.distance = {given->distance[0], given->distance[1]};
+                camera.t_min = given->t_min, camera.t_max = given->t_max, camera.width = given->width, camera.height = given->height;
+            });
         },
     .bytes = [](const ViewcamScene* scene) { return scene_of(scene).bytes(); },
 
     .render_geometry =
         [](const ViewcamScene* scene, uint32_t first_row, uint32_t end_row, float* const* planes, size_t stride, const volatile int* stop) {
-            return guarded([&] { render_geometry(scene_of(scene), first_row, end_row, {planes, stride}, stop); });
+            return guarded([&] {
+                check::rows(scene_of(scene), first_row, end_row);
+                render_geometry(scene_of(scene), first_row, end_row, {planes, stride}, stop);
+            });
         },
     .surface_at =
         [](const ViewcamScene* scene, size_t count, const double* columns, const double* rows, float* const* planes) {
@@ -147,20 +160,44 @@ const ViewcamCore core = {
         },
 
     .clear_light = [](ViewcamScene* scene) { return guarded([&] { clear_light(scene_of(scene)); }); },
-    .add_texture = [](ViewcamScene* scene, int width, int height, int srgb,
-                      const float* pixels) { return guarded([&] { add_texture(scene_of(scene), width, height, srgb, pixels); }); },
+    .add_texture =
+        [](ViewcamScene* scene, int width, int height, int srgb, const float* pixels) {
+            return guarded([&] {
+                check::texture(width, height, pixels);
+                add_texture(scene_of(scene), width, height, srgb, pixels);
+            });
+        },
     .add_material = [](ViewcamScene* scene, const ViewcamClosure* closures,
                        int count) { return guarded([&] { add_material(scene_of(scene), closures, count); }); },
-    .add_lamp = [](ViewcamScene* scene, const ViewcamLamp* lamp) { return guarded([&] { add_lamp(scene_of(scene), *lamp); }); },
-    .set_film = [](ViewcamScene* scene, const ViewcamFilm* film) { set_film(scene_of(scene), *film); },
-    .light_create = [](const ViewcamScene* scene, const ViewcamLightSettings* settings) -> ViewcamLight* {
-        TileSampler* made = nullptr;
-        guarded([&] { made = create_light(scene_of(scene), *settings); });
-        return reinterpret_cast<ViewcamLight*>(made);
-    },
+    .add_lamp =
+        [](ViewcamScene* scene, const ViewcamLamp* lamp) {
+            return guarded([&] {
+                check::lamp(*lamp);
+                add_lamp(scene_of(scene), *lamp);
+            });
+        },
+    .set_film =
+        [](ViewcamScene* scene, const ViewcamFilm* film) {
+            return guarded([&] {
+                check::film(*film);
+                set_film(scene_of(scene), *film);
+            });
+        },
+    .light_create =
+        [](const ViewcamScene* scene, const ViewcamLightSettings* settings, ViewcamLight** made) {
+            return guarded([&] {
+                check::light(scene_of(scene), *settings);
+                *made = reinterpret_cast<ViewcamLight*>(create_light(scene_of(scene), *settings));
+            });
+        },
     .light_free = [](ViewcamLight* light) { delete &light_of(light); },
-    .trace_light = [](const ViewcamLight* light, uint32_t row, uint32_t column, const ViewcamLightPasses* passes,
-                      const volatile int* stop) { return guarded([&] { trace_light(light_of(light), row, column, *passes, stop); }); },
+    .trace_light =
+        [](const ViewcamLight* light, uint32_t row, uint32_t column, const ViewcamLightPasses* passes, const volatile int* stop) {
+            return guarded([&] {
+                check::tile(light_of(light).camera(), row, column, *passes);
+                trace_light(light_of(light), row, column, *passes, stop);
+            });
+        },
 
     .probe_sobol = [](uint32_t seed, uint32_t samples, int scatterings, size_t count, const uint32_t* pixels, const uint32_t* numbers, int first,
                       int dimensions, double* out) {

@@ -31,6 +31,7 @@ class Scene {
     };
 
     std::vector<Shape> geometries;
+    std::vector<uint32_t> material_counts;  // of each geometry, as many as its materials' numbers need
     std::vector<Object> objects;
     std::vector<Slot> slots;
     Camera camera;
@@ -113,7 +114,7 @@ class Scene {
     }
 
     // What lights need. triangle_count: 0 of spheres. material: of a triangle, an index into illumination.materials. corners: in
-    // rendering space. extent: half the diagonal of a box round all surfaces, 1 without any.
+    // rendering space. extent: half the diagonal of a box round the boxes of all surfaces, 1 without any.
     uint32_t triangle_count(uint32_t object) const {
         auto mesh = std::get_if<TriangleMesh>(&geometries[objects[object].geometry]);
         return mesh ? uint32_t(mesh->count) : 0;
@@ -127,15 +128,19 @@ class Scene {
         for (int c = 0; c < 3; c++) corners[c] = objects[object].to_world.point(mesh.corner(triangle, c));
     }
     double extent() const {
+        std::vector<Bounds> boxes(geometries.size());  // of meshes, in their own space
+        for (size_t i = 0; i < geometries.size(); i++)
+            if (auto mesh = std::get_if<TriangleMesh>(&geometries[i]))
+                for (size_t triangle = 0; triangle < mesh->count; triangle++)
+                    for (int c = 0; c < 3; c++) boxes[i].add(mesh->corner(triangle, c));
         Bounds box;
         for (const Object& object : objects) {
-            const Shape& shape = geometries[object.geometry];
-            if (auto mesh = std::get_if<TriangleMesh>(&shape)) {
-                for (uint32_t triangle = 0; triangle < mesh->count; triangle++)
-                    for (int c = 0; c < 3; c++) box.add(object.to_world.point(mesh->corner(triangle, c)));
-            } else {
+            const Bounds& own = boxes[object.geometry];
+            if (std::holds_alternative<Spheres>(geometries[object.geometry]))
                 box.add(world_bounds(object));
-            }
+            else if (!own.is_empty())
+                for (int i = 0; i < 8; i++)
+                    box.add(object.to_world.point({i & 1 ? own.high.x : own.low.x, i & 2 ? own.high.y : own.low.y, i & 4 ? own.high.z : own.low.z}));
         }
         double size = length(box.high - box.low) / 2;
         return size > 0 && size < INFINITE ? size : 1;

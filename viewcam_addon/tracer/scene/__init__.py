@@ -81,10 +81,11 @@ class Spheres:
 
 @dataclass(frozen=True, eq=False)
 class Object:
-    """One geometry, placed in the world.
+    """One geometry, placed in the world, once or as many instances.
 
     geometry : key in `Scene.geometries`.
-    matrix : (4, 4) float64, object space to world space, affine; negative and non-uniform scale are welcome.
+    matrix : (4, 4) float64, object space to world space, affine; negative and non-uniform scale are welcome. Or (n, 4, 4), for
+        n instances that differ by nothing else.
     object_index : what the Object Index pass shows.
     material_indices : what the Material Index pass shows, for each material of the geometry; at least one.
     materials : keys in `Scene.materials`, for each material of the geometry; "", and all that are missing, are `PLAIN`.
@@ -100,16 +101,21 @@ class Object:
     hidden_from: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
-        _check_shape(f"the matrix of object {shown(self.name)}", self.matrix, (4, 4))
+        _check_shape(f"the matrix of object {shown(self.name)}", self.matrix, (None, 4, 4)[-max(self.matrix.ndim, 2) :])
         if not np.isfinite(self.matrix).all():
             raise InputError(f"the matrix of object {shown(self.name)} holds a number that is not finite: check its transform")
-        if not np.array_equal(self.matrix[3], (0, 0, 0, 1)):
+        if not (self.matrices[:, 3] == (0, 0, 0, 1)).all():
             raise InputError(f"the matrix of object {shown(self.name)} is not affine: its last row must be 0, 0, 0, 1")
         if not self.material_indices:
             raise InputError(
                 f"object {shown(self.name)} has no material_indices: give at least one, 0 where it has no material"
             )
         object.__setattr__(self, "hidden_from", hidden_from(f"object {shown(self.name)}", self.hidden_from))
+
+    @property
+    def matrices(self) -> NDArray[np.float64]:
+        """(n, 4, 4): of each place where it stands."""
+        return self.matrix.reshape(-1, 4, 4)
 
 
 @dataclass(frozen=True)
@@ -207,11 +213,10 @@ def _reach(geometry: Mesh | Spheres) -> float:
 
 
 def _check_reach(placed: Object, reach: float) -> None:
-    largest = max(reach, float(np.abs(placed.matrix).max()))
+    linear, translation = np.abs(placed.matrices[:, :3, :3]), np.abs(placed.matrices[:, :3, 3])
+    largest = max(reach, linear.max(initial=0.0), translation.max(initial=0.0))
     if largest <= LARGEST:  # no product overflows
-        largest = max(
-            largest, 3 * reach * float(np.abs(placed.matrix[:3, :3]).max()) + float(np.abs(placed.matrix[:3, 3]).max())
-        )
+        largest = max(largest, (3 * reach * linear.max(axis=(1, 2)) + translation.max(axis=1)).max(initial=0.0))
     if largest > LARGEST:
         raise InputError(f"object {shown(placed.name)} reaches as far as {largest:.3g}: give it coordinates below {LARGEST:g}")
 

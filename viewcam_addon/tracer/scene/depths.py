@@ -24,7 +24,7 @@ def visible_depths(scene: Scene) -> tuple[float, float]:
     start, end = scene.clip
     eye = np.array(scene.camera.eye)
     if end == math.inf:
-        farthest = max((_distances(_box(scene, placed), eye)[1].max() for placed in scene.objects), default=0.0)
+        farthest = max((_distances(_boxes(scene, placed), eye)[1].max(initial=0.0) for placed in scene.objects), default=0.0)
         end = max(_END, 10.0 ** math.ceil(math.log10(2 * max(farthest, 1.0))))
     if start < _LEAST_START:
         slopes = scene.camera.view_plane([0.0, scene.camera.width], [0.0, scene.camera.height])
@@ -36,18 +36,20 @@ def visible_depths(scene: Scene) -> tuple[float, float]:
 
 def _nearest(scene: Scene, placed: Object, eye: Array, enough: float) -> float:
     """No more than the distance from the eye to an object; its parts are looked at if its box is not far `enough` away."""
-    nearest = float(_distances(_box(scene, placed), eye)[0].min())
-    if nearest > enough:
-        return nearest
-    return float(_distances(_placed(_parts(scene.geometries[placed.geometry]), placed), eye)[0].min(initial=math.inf))
+    nearest = _distances(_boxes(scene, placed), eye)[0]
+    parts = _parts(scene.geometries[placed.geometry])
+    within = (_distances(_placed(parts, matrix), eye)[0] for matrix in placed.matrices[nearest <= enough])
+    return min(
+        [float(nearest[nearest > enough].min(initial=math.inf)), *(float(each.min(initial=math.inf)) for each in within)]
+    )
 
 
-def _box(scene: Scene, placed: Object) -> Array:
-    """(1, 2, 3): the least and the largest coordinates of an object, world space, or of a box around it."""
+def _boxes(scene: Scene, placed: Object) -> Array:
+    """(n, 2, 3): the least and the largest coordinates of an object in each of its places, world space, or of boxes around."""
     parts = _parts(scene.geometries[placed.geometry])
     if not len(parts):
-        return np.repeat(placed.matrix[None, None, :3, 3], 2, axis=1)
-    return _placed(np.stack([parts[:, 0].min(axis=0), parts[:, 1].max(axis=0)])[None], placed)
+        return np.repeat(placed.matrices[:, None, :3, 3], 2, axis=1)
+    return _placed(np.stack([parts[:, 0].min(axis=0), parts[:, 1].max(axis=0)]), placed.matrices)
 
 
 def _parts(geometry: Mesh | Spheres) -> Array:
@@ -59,11 +61,12 @@ def _parts(geometry: Mesh | Spheres) -> Array:
     return np.stack([corners.min(axis=1), corners.max(axis=1)], axis=1)
 
 
-def _placed(boxes: Array, placed: Object) -> Array:
-    """(n, 2, 3): boxes around the boxes, world space."""
-    centre = boxes.mean(axis=1) @ placed.matrix[:3, :3].T + placed.matrix[:3, 3]
-    half = (boxes[:, 1] - boxes[:, 0]) / 2 @ np.abs(placed.matrix[:3, :3]).T
-    return np.stack([centre - half, centre + half], axis=1)
+def _placed(boxes: Array, matrices: Array) -> Array:
+    """(n, 2, 3): boxes around the boxes, world space: of n boxes and one matrix, or of one box and n matrices."""
+    linear = np.swapaxes(matrices[..., :3, :3], -1, -2)
+    centre = (boxes.mean(axis=-2)[..., None, :] @ linear)[..., 0, :] + matrices[..., :3, 3]
+    half = ((boxes[..., 1, :] - boxes[..., 0, :])[..., None, :] / 2 @ np.abs(linear))[..., 0, :]
+    return np.stack([centre - half, centre + half], axis=-2)
 
 
 def _distances(boxes: Array, eye: Array) -> tuple[Array, Array]:

@@ -19,8 +19,8 @@ from ...errors import InputError
 from ...files import is_replaced, read_bytes, written_whole
 from ...pinhole import Pinhole
 from . import LedgerEntry, Object, Scene, light_fields, placing
-from .fields import Field, arrays_beside
-from .geometry_fields import geometry, geometry_document
+from .fields import Arrays, Field, arrays_beside
+from .geometry_fields import array_document, geometry, geometry_document
 
 FORMAT = "virtual-pinhole-scene"
 VERSION = 1
@@ -75,7 +75,7 @@ def read(path: str | os.PathLike[str]) -> Scene:
     with arrays_beside(path, fields.get("arrays")) as arrays:
         geometries = {name: geometry(field, arrays) for name, field in fields["geometries"].named("geometry").items()}
         light = light_fields.light(fields, arrays)
-    objects = tuple(_object(field) for field in fields["objects"].items("object"))
+        objects = tuple(_object(field, arrays) for field in fields["objects"].items("object"))
     try:
         return Scene(
             camera=_camera(fields["camera"]),
@@ -105,17 +105,22 @@ def _document(scene: Scene, arrays: dict[str, NDArray]) -> dict:
     document["geometries"] = {
         name: geometry_document(each, str(index), arrays) for index, (name, each) in enumerate(scene.geometries.items())
     }
-    document["objects"] = [_object_document(placed) for placed in scene.objects]
+    document["objects"] = [_object_document(placed, str(index), arrays) for index, placed in enumerate(scene.objects)]
     document.update(light_fields.light_document(scene, arrays))
     document["ledger"] = [dataclasses.asdict(entry) for entry in scene.ledger]
     return document
 
 
-def _object_document(placed: Object) -> dict:
+def _object_document(placed: Object, prefix: str, arrays: dict[str, NDArray]) -> dict:
+    is_one = placed.matrix.ndim == 2
     document = {
         "name": placed.name,
         "geometry": placed.geometry,
-        "matrix": placed.matrix.tolist(),
+        **(
+            {"matrix": placed.matrix.tolist()}
+            if is_one
+            else {"matrices": array_document(placed.matrix, f"object {prefix}.matrices", arrays)}
+        ),
         "object_index": int(placed.object_index),
         "material_indices": [int(index) for index in placed.material_indices],
     }
@@ -179,10 +184,15 @@ def _clip(field: Field) -> tuple[float, float]:
     return start.number(), float("inf") if end.value is None else end.number()
 
 
-def _object(field: Field) -> Object:
-    optional = ("object_index", "material_indices", "materials", "hidden_from")
+def _object(field: Field, arrays: Arrays) -> Object:
+    optional = ("matrices", "object_index", "material_indices", "materials", "hidden_from")
     keys = field.fields(("name", "geometry"), (*placing.KEYS, *optional))
-    matrix = placing.matrix(field, keys)
+    if "matrices" not in keys:
+        matrix = placing.matrix(field, keys)
+    elif any(key in keys for key in placing.KEYS):
+        field.fail("has matrices beside a matrix, location, rotation or scale: give one or the other")
+    else:
+        matrix = keys["matrices"].array(arrays, np.float64, (None, 4, 4))
     indices = keys["material_indices"].items("material index") if "material_indices" in keys else None
     try:
         return Object(

@@ -36,6 +36,7 @@ class TileSampler {
         : integrator_(scene, bounces, seed, int(samples)), filter_(scene.illumination.filter_width), film_(scene.illumination.film),
           samples_(samples), error_(error), camera_(scene.camera) {}
 
+    const Camera& camera() const { return camera_; }
     // Traces the tile whose lowest row and first column are given. `*stop`, if there is one, ends it early.
     void trace(uint32_t row, uint32_t column, const LightPasses& passes, const volatile int* stop) const {
         Tile tile{row, column, std::min(TILE, camera_.height - row), std::min(TILE, camera_.width - column), {}};

@@ -39,9 +39,12 @@ class LightSampler {
         std::vector<Vec3> emissions;
         for (const Material& material : given.materials) emissions.push_back(material.emission.mean(given.textures));
         owners_.assign(scene.objects.size(), NONE);
+        const Object* black = nullptr;  // the last object none of whose triangles shines: most of a million instances are like it
         for (uint32_t object = 0; object < scene.objects.size(); object++) {
-            if (!(scene.objects[object].visible & DIFFUSE)) continue;
+            const Object& placed = scene.objects[object];
+            if (!(placed.visible & DIFFUSE) || (black && black->geometry == placed.geometry && black->first_slot == placed.first_slot)) continue;
             MeshLight mesh(scene, object, emissions);
+            if (mesh.is_black()) black = &placed;
             if (mesh.is_dark()) continue;
             owners_[object] = uint32_t(lights_.size());
             lights_.emplace_back(std::move(mesh), 0, true);

@@ -44,6 +44,7 @@ class MeshLight {
 
     bool is_sized() const { return true; }
     bool is_dark() const { return !(brightness_ > 0); }
+    bool is_black() const { return triangles_.empty(); }  // whatever its size
 
     // part: which triangle, in [0, 1).
     LightSample sample_li(const Interaction& from, double part, Vec2 u) const {

@@ -1,0 +1,96 @@
+// What the C interface refuses, a sentence each: whatever would be read or written outside of an array, or never come to an end.
+//
+// native.py gives none of it, so that who sees these sentences has found a fault in it. What a scene means is Python's to check.
+#pragma once
+#include <cmath>
+#include <stdexcept>
+
+#include "capi.h"
+#include "scene.h"
+
+namespace viewcam::VIEWCAM_ISA::check {
+
+constexpr double LARGEST = 1e18;  // of coordinates: squares of what matrices make of them are still numbers
+
+inline void that(bool holds, const char* otherwise) {
+    if (!holds) throw std::invalid_argument(otherwise);
+}
+// Also false of NaN.
+inline bool all_within(const double* values, size_t count, double least, double most) {
+    bool within = true;
+    for (size_t i = 0; i < count; i++) within &= values[i] >= least && values[i] <= most;
+    return within;
+}
+inline bool all_finite(const double* values, size_t count) {
+    return all_within(values, count, -std::numeric_limits<double>::max(), std::numeric_limits<double>::max());
+}
+// One more than the largest of some numbers of materials.
+inline uint32_t materials(const int32_t* values, size_t count) {
+    int32_t least = 0, most = 0;
+    for (size_t i = 0; i < count; i++) least = std::min(least, values[i]), most = std::max(most, values[i]);
+    that(least >= 0, "a geometry has a material below 0");
+    return uint32_t(most) + 1;
+}
+
+inline void mesh(const ViewcamMesh& given) {
+    that(given.count < LEAF && given.vertex_count < LEAF, "a mesh has too many triangles or vertices");
+    that(!given.count || (given.vertices && given.triangles && given.materials), "a mesh lacks an array");
+    that(all_within(given.vertices, 3 * given.vertex_count, -LARGEST, LARGEST), "a mesh has a vertex that is too far away or nowhere");
+    bool within = true;
+    for (size_t i = 0; i < 3 * given.count; i++) within &= uint32_t(given.triangles[i]) < given.vertex_count;
+    that(within, "a mesh has a triangle that names no vertex");
+}
+inline void spheres(const ViewcamSpheres& given) {
+    that(given.count < LEAF, "there are too many spheres");
+    that(!given.count || (given.centers && given.radii && given.materials), "spheres lack an array");
+    that(all_within(given.centers, 3 * given.count, -LARGEST, LARGEST), "a sphere is too far away or nowhere");
+    that(all_within(given.radii, given.count, 0, LARGEST), "a sphere has a radius below 0, or too large a one");
+}
+inline void objects(const Scene& scene, const ViewcamObject& given) {
+    that(given.geometry < scene.geometries.size(), "an object names no geometry");
+    that(given.slot_count >= scene.material_counts[given.geometry], "an object has fewer materials than its geometry");
+    that(given.slot_indices && given.slot_materials, "an object lacks an array");
+    that(given.count < LEAF - scene.objects.size(), "there are too many objects");
+}
+inline void placement(const Scene& scene, const double* matrices, const double* origin, int threads) {
+    that(!scene.objects.size() || matrices, "objects have no matrices");
+    that(all_within(matrices, 12 * scene.objects.size(), -LARGEST, LARGEST), "an object has a matrix with too large a number, or none");
+    that(all_within(origin, 3, -LARGEST, LARGEST), "the origin is too far away or nowhere");
+    that(threads >= 1 && threads <= 4096, "the number of threads is not between 1 and 4096");
+}
+inline void camera(const ViewcamCamera& given) {
+    for (const double* axis : {given.eye, given.right, given.up, given.forward})
+        that(all_within(axis, 3, -LARGEST, LARGEST), "the camera is too far away or nowhere");
+    that(all_finite(given.principal_point, 2) && all_finite(given.distance, 2), "the camera's view plane is nowhere");
+    that(given.distance[0] != 0 && given.distance[1] != 0, "the camera's view plane is at its eye");
+    that(given.t_min < given.t_max, "the camera's clip range is empty");
+    that(given.width < LEAF && given.height < LEAF, "the picture is too large");
+}
+inline void rows(const Scene& scene, uint32_t first, uint32_t end) {
+    that(first <= end && end <= scene.camera.height, "rows are asked for that the picture does not have");
+}
+inline void texture(int width, int height, const float* pixels) { that(width > 0 && height > 0 && pixels, "an image has no pixels"); }
+inline void lamp(const ViewcamLamp& given) {
+    that(given.kind >= VIEWCAM_SUN && given.kind <= VIEWCAM_ELLIPSE, "a lamp is of no kind");
+    that(all_within(given.matrix, 12, -LARGEST, LARGEST), "a lamp has a matrix with too large a number, or none");
+    that(all_finite(given.color, 3) && all_within(given.size, 2, 0, LARGEST), "a lamp has a colour or a size that is no number");
+    for (double value : {given.radius, given.angle, given.blend}) that(value >= 0 && value <= LARGEST, "a lamp has a size that is no number");
+}
+inline void film(const ViewcamFilm& given) {
+    that(all_finite(given.radiance, 3), "the world's light is no number");
+    that(given.filter_width >= 0 && given.filter_width <= LARGEST && std::isfinite(given.exposure), "the film's numbers are none");
+}
+inline void light(const Scene& scene, const ViewcamLightSettings& given) {
+    for (const Scene::Slot& slot : scene.slots)
+        that(slot.material < scene.illumination.materials.size(), "an object has a material that the scene does not have");
+    for (int bounces : given.bounces) that(bounces >= 0, "the number of bounces is below 0");
+    that(given.samples >= 1 && given.samples <= 1 << 24, "the number of samples is not between 1 and 2^24");
+    that(given.error >= 0 && std::isfinite(given.error), "the error is below 0, or no number");
+}
+inline void tile(const Camera& camera, uint32_t row, uint32_t column, const ViewcamLightPasses& to) {
+    that(row < camera.height && column < camera.width, "a tile is asked for that the picture does not have");
+    for (const float* pass : {to.combined, to.emission, to.environment, to.diffuse_direct, to.diffuse_indirect, to.diffuse_color, to.variance})
+        that(pass, "a pass of light has no place to go");
+}
+
+}  // namespace viewcam::VIEWCAM_ISA::check
