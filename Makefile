@@ -1,5 +1,6 @@
 # Each command sets up what it needs, and is quick the second time.
 #   make demo          the sample scene rendered by Cycles and by the tracer, compared; ends with the report
+#   make quick         lint and the tests that need neither Blender nor processes nor many samples; under a minute
 #   make test          lint and the tests, with the newest bpy wheel for the Python found
 #   make test-exhaustive  the tests that take minutes: 10⁸ rays, millions of hostile numbers
 #   make test-sanitizers  the core compiled with sanitizers, and what its tests find of addresses, undefined behaviour and threads
@@ -14,7 +15,7 @@
 #   make bench-guard   whether the tracer has become slower than it was, as a share of bare Embree's speed; a minute or two
 #   make clean         removes all that these made, but for ~/.cache/virtual-pinhole
 
-.PHONY: demo test test-exhaustive test-sanitizers lint test-matrix test-light test-blender extension artist-pictures scenes charts bench bench-guard clean
+.PHONY: demo quick test test-exhaustive test-sanitizers lint test-matrix test-light test-blender extension artist-pictures scenes charts bench bench-guard clean
 .DELETE_ON_ERROR:
 
 # bpy has wheels for these two only.
@@ -29,6 +30,16 @@ PARALLEL = $(PYTEST) --numprocesses=auto --maxprocesses=4 --dist=loadfile
 
 demo: .venv/demo
 	.venv/bin/viewcam demo
+
+# For the inner loop. What a version of NumPy or Python may change stands in these, so that the matrix has them, too.
+QUICK := $(shell grep -rLE --include='test_*.py' 'importorskip\("bpy"\)|fresh_blender|stand_in|subprocess' \
+	tests/cameras tests/commands tests/comparison tests/datasets tests/shots tests/tracer tests/test_*.py \
+	| grep -vE 'adaptive|audit|hostile|hypothesis|noise|project|roll|sabotage|sampler|test_text\.py' | sort)
+
+quick: .venv/test
+	.venv/bin/python -m ruff check .
+	.venv/bin/python -m ruff format --check .
+	$(call PARALLEL,.venv) --hypothesis-profile=quick $(QUICK)
 
 test: lint
 	$(call PARALLEL,.venv)
@@ -89,12 +100,14 @@ MATRIX := $(filter-out $(TESTED),$(WHEELS))
 test-matrix: $(MATRIX:%=test-wheel-%)
 	@$(if $(filter 5.2,$(WHEELS)),,echo "NOT TESTED: the wheel of Blender 5.2, since there is no Python 3.13 on the PATH or in pyenv")
 
-# The oldest and the newest have Pythons and NumPys of their own, on which tracer, batch and commands stand as well; between them a
-# version differs by its Blender alone, so only what touches Blender is tested with it.
-tests-4.5 = tests/blender tests/test_*.py
-tests-5.0 = tests/blender tests/test_*.py
-tests-4.2 = $(tests-5.2) tests/cameras
-tests-5.2 = tests/blender tests/batch tests/commands tests/documents tests/tracer tests/test_*.py
+# What a version can change: what touches Blender; with the oldest and the newest, which have NumPys of their own, the quick ones;
+# with the newest, which has a Python of its own, processes.
+TOUCHING_BLENDER = tests/blender tests/test_crashes.py \
+	$(shell grep -lE 'importorskip\("bpy"\)' tests/test_*.py tests/commands/test_*.py tests/comparison/test_*.py | grep -v test_project)
+tests-4.5 = $(TOUCHING_BLENDER)
+tests-5.0 = $(TOUCHING_BLENDER)
+tests-4.2 = $(TOUCHING_BLENDER) $(QUICK)
+tests-5.2 = $(TOUCHING_BLENDER) $(QUICK) tests/batch
 
 test-wheel-%: .venvs/%/ready
 	$(call PARALLEL,.venvs/$*) $(tests-$*)
@@ -113,7 +126,7 @@ test-light-%: .venvs/%/ready
 # The zip built by a real Blender, in that Blender and in those that are wheels; and the panel in a window.
 test-blender: .venv/test $(WHEELS:%=.venvs/%/ready)
 	BLENDER=$$(.ci/find-blender) || exit 1; export BLENDER; \
-	.venv/bin/python -m pytest tests/real_blender
+	.venv/bin/python -m pytest --numprocesses=2 --dist=loadfile tests/real_blender
 
 extension: .venv/extension
 	blender=$$(.ci/find-blender) || exit 1; \

@@ -3,6 +3,8 @@
 Each has a user folder of its own, so no test touches the extensions or the preferences of whoever runs it.
 """
 
+import contextlib
+import fcntl
 import os
 import platform
 import re
@@ -47,12 +49,22 @@ class Host:
         return outcome.stdout
 
 
+@contextlib.contextmanager
+def one_at_a_time():
+    """Of the processes that the tests are shared among, one makes what they all have."""
+    (ROOT / ".venvs").mkdir(exist_ok=True)
+    with open(ROOT / ".venvs" / "lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
 @pytest.fixture(scope="session")
 def extension_zip(tmp_path_factory) -> Path:
     """The extension for this machine, built by the real Blender."""
     folder = tmp_path_factory.mktemp("dist")
     target = PLATFORMS[platform.system(), platform.machine()]
-    subprocess.run([sys.executable, ROOT / ".ci" / "extension.py", os.environ["BLENDER"], folder, target], check=True)
+    with one_at_a_time():
+        subprocess.run([sys.executable, ROOT / ".ci" / "extension.py", os.environ["BLENDER"], folder, target], check=True)
     (built,) = folder.glob("*.zip")
     return built
 
@@ -81,11 +93,12 @@ def packages(real_blender) -> Path:
     script = "import sys; print('PYTHON', '.'.join(map(str, sys.version_info[:2])))"
     version = re.search(r"PYTHON (\S+)", real_blender.run("-b", "--factory-startup", "--python-expr", script).stdout)[1]
     folder = ROOT / ".venvs" / f"inside-blender-{version}-{'-'.join(PACKAGES)}"
-    if not (folder / "ready").exists():
-        pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--upgrade"]
-        target = [f"--target={folder}", f"--python-version={version}", "--only-binary=:all:"]
-        subprocess.run([*pip, *target, *PACKAGES], check=True)
-        # Without NumPy, which it asks for: Blender has its own.
-        subprocess.run([*pip, *target, "--no-deps", "OpenEXR"], check=True)
-        (folder / "ready").touch()
+    with one_at_a_time():
+        if not (folder / "ready").exists():
+            pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--upgrade"]
+            target = [f"--target={folder}", f"--python-version={version}", "--only-binary=:all:"]
+            subprocess.run([*pip, *target, *PACKAGES], check=True)
+            # Without NumPy, which it asks for: Blender has its own.
+            subprocess.run([*pip, *target, "--no-deps", "OpenEXR"], check=True)
+            (folder / "ready").touch()
     return folder
