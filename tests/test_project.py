@@ -51,8 +51,8 @@ ROOMS = {
     "shots": "errors checks files terminal pinhole moves tracer",
     "batch": "errors checks files events html_page children pinhole image cameras datasets comparison tracer shots",
     "blender": (
-        "errors checks files terminal html_page children pinhole roll rotation moves diagram image intrinsics camera_values "
-        "cameras datasets comparison tracer shots batch"
+        "errors checks files terminal html_page children pinhole roll rotation moves diagram photo_match image intrinsics "
+        "camera_values cameras datasets comparison tracer shots batch"
     ),
     "commands": "errors terminal events crashes children pinhole image cameras comparison tracer api shots batch",
     "camera_words": "words cameras",

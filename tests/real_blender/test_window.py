@@ -65,6 +65,16 @@ def test_handles_drag_eye_look_at_and_up_and_the_diagram_is_drawn_where_it_belon
     assert "Traceback" not in said, said  # what fails in a drawing or a handle is only printed
 
 
+def test_a_photo_of_a_known_camera_is_matched_by_dragging_along_its_edges(real_blender, tmp_path):
+    for _ in range(ATTEMPTS):
+        outcome = run_in_a_window(real_blender, Path(__file__).with_name("photo_in_a_window.py"), tmp_path)
+        if outcome.returncode == 0:
+            break
+    said = outcome.stdout + outcome.stderr
+    assert outcome.returncode == 0 and "done: escape" in said and "done: match the photo" in said, said
+    assert "Traceback" not in said, said
+
+
 def test_ten_rounds_of_enabling_and_disabling_leave_nothing_behind_in_a_window(real_blender):
     outcome = run_in_a_window(real_blender, ROOT / "tests" / "real_blender" / "leftovers_in_a_window.py", size=("1000", "700"))
     said = outcome.stdout + outcome.stderr

@@ -19,6 +19,7 @@ def _rooms() -> list[ModuleType]:
         operators,
         overlay,
         panel,
+        photo_matching,
         presets,
         proof,
         render_panels,
@@ -28,7 +29,7 @@ def _rooms() -> list[ModuleType]:
     from .rendering import engine
 
     buttons = [operators, moving, clipboard, baking, presets]
-    shown = [panel, scene_cameras, proof, overlay, gizmos]
+    shown = [panel, scene_cameras, photo_matching, proof, overlay, gizmos]
     followers = [animation, resolution]
     return [
         preferences,

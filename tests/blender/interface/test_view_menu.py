@@ -5,7 +5,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 import viewcam_addon
-from viewcam_addon.blender.interface import baking, clipboard, moving, operators, scene_cameras, view_menu
+from viewcam_addon.blender.interface import baking, clipboard, moving, operators, photo_matching, scene_cameras, view_menu
 
 
 def test_every_button_of_a_camera_stands_in_the_menu_which_the_search_reads(registered_addon):
@@ -14,6 +14,7 @@ def test_every_button_of_a_camera_stands_in_the_menu_which_the_search_reads(regi
     layout = SimpleNamespace(operator=entries.append, menu=menus.append, separator=lambda: None)
     view_menu.VIEWCAM_MT_cameras.draw(SimpleNamespace(layout=layout), bpy.context)
     classes = (*moving.CLASSES, *operators.CLASSES, *baking.CLASSES, *clipboard.OPERATORS, *scene_cameras.OPERATORS)
+    classes += photo_matching.OPERATORS
     assert set(entries) == {each.bl_idname for each in classes} and menus == ["VIEWCAM_MT_copy_camera_as"]
     assert all(getattr(bpy.ops.viewcam, entry.split(".")[1]).get_rna_type() for entry in entries)
 

@@ -20,17 +20,16 @@ import numpy as np
 
 from ... import diagram as diagrams
 from ...pinhole import Triple
-from .. import datablocks, storage, versions
+from .. import datablocks, versions
 from . import overlay
+from .kept import restore as _restore
+from .kept import state as _state
 
 _TWEAK = "GIZMOGROUP_OT_gizmo_tweak"
 _LOOKED_AT = 0.01  # seconds between two looks at whether a drag has ended
 _LABELS = {"eye": "Eye", "look_at": "Look-At", "up": "Up"}
 # Which handle the mouse takes where they cover each other: seen from above, up's tip is over the eye.
 _PRIORITY = {"eye": 2000, "look_at": 1000, "up": 0}
-# What moving a camera changes besides its values.
-_CHANNELS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
-_LENS = ("lens", "shift_x", "shift_y", "sensor_width", "sensor_height", "virtual_pinhole_sensor")
 
 
 @dataclass(frozen=True)
@@ -88,28 +87,6 @@ def drag(camera_object: bpy.types.Object, name: str, value: Triple) -> None:
         setattr(group, name, value)
     elif any(arrow := np.subtract(value, group.numbers()[0])):
         group.up = arrow * (_drag.length / math.hypot(*arrow))
-
-
-def _state(camera_object: bpy.types.Object) -> dict[str, object]:
-    """All that a drag changes, by its path from the camera."""
-    stored = camera_object.virtual_pinhole.bl_rna.properties
-    values = [each.identifier for each in stored if not each.is_readonly and each.type != "POINTER"]
-    paths = [*_CHANNELS, *(f"data.{name}" for name in _LENS)]
-    paths += [f"virtual_pinhole.{name}" for name in values if name != "roll"]  # which is told from the others
-    found = {path: camera_object.path_resolve(path) for path in paths}
-    return {
-        path: tuple(value) if hasattr(value, "__len__") and not isinstance(value, str) else value
-        for path, value in found.items()
-    }
-
-
-def _restore(camera_object: bpy.types.Object, state: dict[str, object]) -> None:
-    present = _state(camera_object)
-    with storage.without_callbacks():
-        for path, value in state.items():
-            if present[path] != value:
-                owner, _, name = path.rpartition(".")
-                setattr(camera_object.path_resolve(owner) if owner else camera_object, name, value)
 
 
 def _end_if_over() -> float | None:

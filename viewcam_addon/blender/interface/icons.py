@@ -7,7 +7,7 @@ import bpy.utils.previews
 import numpy as np
 
 _SIZE = 32
-_GREEN = (0.24, 0.78, 0.36)
+_GREEN = np.array([0.24, 0.78, 0.36])
 _CORNERS = ((5.0, 16.0), (12.5, 8.5), (27.0, 24.0))  # of the tick, pixels from the lower left
 _THICK = 2.6
 
@@ -42,5 +42,6 @@ def _drawn() -> np.ndarray:
         share = np.clip((pixels - start) @ along / (along @ along), 0.0, 1.0)
         distance = np.minimum(distance, np.linalg.norm(pixels - start - share[..., None] * along, axis=-1))
     drawn = np.empty((_SIZE, _SIZE, 4), np.float32)
-    drawn[..., :3], drawn[..., 3] = _GREEN, np.clip(_THICK + 0.5 - distance, 0.0, 1.0)
+    drawn[..., 3] = np.clip(_THICK + 0.5 - distance, 0.0, 1.0)
+    drawn[..., :3] = _GREEN * drawn[..., 3:]  # as Blender has it where a picture is see-through
     return drawn

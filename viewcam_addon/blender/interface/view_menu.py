@@ -5,7 +5,7 @@ Blender's search (F3) looks through menus; what stands in none is found by devel
 
 import bpy
 
-from . import baking, clipboard, moving, operators, scene_cameras
+from . import baking, clipboard, moving, operators, photo_matching, scene_cameras
 
 
 class VIEWCAM_MT_cameras(bpy.types.Menu):
@@ -13,7 +13,14 @@ class VIEWCAM_MT_cameras(bpy.types.Menu):
     bl_label = "Virtual Pinhole"
 
     def draw(self, _context: bpy.types.Context) -> None:
-        for group in (moving.CLASSES, operators.CLASSES, baking.CLASSES, clipboard.OPERATORS, scene_cameras.OPERATORS):
+        for group in (
+            moving.CLASSES,
+            operators.CLASSES,
+            baking.CLASSES,
+            clipboard.OPERATORS,
+            scene_cameras.OPERATORS,
+            photo_matching.OPERATORS,
+        ):
             for each in group:
                 self.layout.operator(each.bl_idname)
             self.layout.separator()
