@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from viewcam_addon import children, crashes
+from viewcam_addon import child_process, crashes
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="Windows tells of a crash itself")
 
@@ -22,11 +22,11 @@ def run(tmp_path):
 
     def start(does, *words):
         (tmp_path / "bpy.py").write_text(does)
-        variables = children.environment()
+        variables = child_process.environment()
         variables["PYTHONPATH"] = os.pathsep.join([str(tmp_path), variables["PYTHONPATH"]])
         variables.pop("VIEWCAM_BLENDER", None)
         how = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "cwd": tmp_path, "env": variables}
-        return subprocess.Popen(children.viewcam(*words), start_new_session=True, **how)
+        return subprocess.Popen(child_process.viewcam(*words), start_new_session=True, **how)
 
     return start
 

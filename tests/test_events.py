@@ -97,7 +97,9 @@ def test_a_check_s_child_processes_tell_as_if_they_were_none(tmp_path, capfd):
     told = lines_of(said.out)
     others = [event for event in told if event["event"] != "message"]
     assert (others[0]["event"], others[-1]["event"]) == ("started", "finished"), said.out
-    assert {event["event"] for event in others[1:-1]} == {"progress"} and others[-2]["share"] == 1, said.out
+    assert [event["name"] for event in others if event["event"] == "step"] == ["rendering", "tracing", "comparing"], said.out
+    assert [event["share"] for event in others if event["event"] == "progress"][-1] == 1, said.out
+    assert {event["event"] for event in others[1:-1]} == {"progress", "step"}
     messages = "\n".join(event["text"] for event in told if event["event"] == "message")
     assert "exported and rendered" in messages and "traced 64 × 36" in messages and "objects exported whole" in messages
     assert told[-1]["exit_status"] == status == json.loads((tmp_path / "result.json").read_text())["exit_status"]

@@ -31,7 +31,7 @@ ROOMS = {
     "events": "terminal",
     "words": "",
     "html_page": "errors",
-    "children": "",
+    "child_process": "errors events",
     "crashes": "",
     "exact": "",
     "pinhole": "errors checks exact",
@@ -47,14 +47,14 @@ ROOMS = {
     "datasets": "files pinhole cameras",
     "comparison": "errors files html_page pinhole image",
     "tracer": "errors checks memory files pinhole image",
-    "api": "errors children image comparison tracer",
+    "api": "errors child_process image comparison tracer",
     "shots": "errors checks files terminal pinhole moves tracer",
-    "batch": "errors checks files events html_page children pinhole image cameras datasets comparison tracer shots",
+    "batch": "errors checks files events html_page child_process pinhole image cameras datasets comparison tracer shots",
     "blender": (
-        "errors checks files terminal html_page children pinhole roll rotation moves diagram photo_match image intrinsics "
-        "camera_values cameras datasets comparison tracer shots batch"
+        "errors checks files terminal html_page child_process pinhole roll rotation moves diagram photo_match image "
+        "intrinsics camera_values cameras datasets comparison tracer shots batch"
     ),
-    "commands": "errors terminal events crashes children pinhole image cameras comparison tracer api shots batch",
+    "commands": "errors terminal events crashes child_process pinhole image cameras comparison tracer api shots batch",
     "camera_words": "words cameras",
     "batch_words": "words shots camera_words",
     "cli": "errors checks files events words tracer commands camera_words batch_words",

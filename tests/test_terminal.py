@@ -66,8 +66,7 @@ def test_everything_is_printed_by_the_one_that_makes_it_plain():
         "blender/animation.py": {"print", "stderr"},  # plain, as the test below sees
         "files.py": {"stdout", "stderr"},  # flushed
         "__main__.py": {"stdout", "stderr"},  # flushed
-        "commands/processes.py": {"stdout", "stderr"},  # flushed; those of children
-        "children.py": {"stdout", "stderr"},  # those of children
+        "child_process.py": {"stdout", "stderr"},  # flushed; those of child processes
     }
     found = {}
     for path in PACKAGE.rglob("*.py"):

@@ -7,14 +7,13 @@ no picture may be read from a file in it or written (image.py says why): those i
 
 import json
 import os
-import subprocess
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from . import children
+from . import child_process
 from . import image as images
 from .comparison import geometry, radiance
 from .comparison.light_verdict import RadianceComparison
@@ -141,11 +140,19 @@ def check(blend: File, *options: File) -> Check:
     """
     with tempfile.TemporaryDirectory(prefix="viewcam-") as folder:
         result = Path(folder) / "check.json"
-        words = [str(option) for option in (blend, *options, "--json", result)]
-        variables = children.environment(apart_from=children.blender_scripts())
-        command = children.viewcam("check", *words)
-        done = subprocess.run(command, env=variables, capture_output=True, text=True, check=False)
-        if done.returncode not in (0, 1):
-            raise InputError((done.stderr.strip().splitlines() or ["viewcam check ended without a word"])[-1])
+        words, errors = [str(option) for option in (blend, *options, "--json", result)], _Errors()
+        status = child_process.run_viewcam("check", *words, tell_on=errors, apart_from=child_process.blender_scripts())
+        if status not in (0, 1):
+            raise InputError(errors.last or f"viewcam check ended with status {status} and without a word")
         figures = json.loads(result.read_text(encoding="utf-8"))
-    return Check(done.returncode == 0, figures["sentence"], figures)
+    return Check(status == 0, figures["sentence"], figures)
+
+
+class _Errors:
+    """The last sentence of what goes wrong."""
+
+    last = ""
+
+    def tell(self, event: str, **fields: Any) -> None:
+        if event == "error":
+            self.last = fields["text"]

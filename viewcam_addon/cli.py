@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from . import batch_words, camera_words, checks, events, words
-from .commands import Result, audit, batch, camera, chart, serve, verification
+from .commands import Result, audit, batch, camera, chart, verification
 from .errors import InputError, bug
 from .files import check_writable, is_printed_to, written_whole
 from .tracer.scene.film import SAMPLES
@@ -229,7 +229,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
 
     hidden = subparsers.add_parser("serve")  # for our own processes: without a help, so the list of commands leaves it out
     hidden.add_argument("handle")
-    hidden.set_defaults(run=serve.run, json=None, log_json=False, writes=())
+    hidden.set_defaults(run=batch.serve, json=None, log_json=False, writes=())
     return parser
 
 

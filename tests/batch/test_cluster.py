@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from viewcam_addon import children, cli
+from viewcam_addon import child_process, cli
 from viewcam_addon.batch import cluster, one, render_client, run
 from viewcam_addon.batch.folder import Folder
 from viewcam_addon.batch.render_client import ServedRenderer
@@ -261,7 +261,9 @@ def farm(tmp_path, processes):
 
     def start(*words, **variables):
         said = scratch / f"{len(family)}.txt"
-        family.append(children.Family([sys.executable, "-m", "dask", *words], said, children.environment(**variables)))
+        family.append(
+            child_process.ProcessGroup([sys.executable, "-m", "dask", *words], said, child_process.environment(**variables))
+        )
         return family[-1], said
 
     _, said = start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
@@ -392,10 +394,10 @@ def test_a_farm_by_tls_as_the_page_says(stand_in, blend, tmp_path, processes):
     family = []
 
     def start(said, *words):
-        variables = children.environment(
+        variables = child_process.environment(
             DASK_CONFIG=str(tmp_path / "tls.yaml"), DASK_TEMPORARY_DIRECTORY=str(tmp_path / "dask")
         )
-        family.append(children.Family([sys.executable, "-m", "dask", *words], tmp_path / said, variables))
+        family.append(child_process.ProcessGroup([sys.executable, "-m", "dask", *words], tmp_path / said, variables))
         return tmp_path / said
 
     try:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from viewcam_addon import children
+from viewcam_addon import child_process
 
 pytest.importorskip("distributed")
 
@@ -49,7 +49,7 @@ def test_a_script_that_has_workers_is_not_run_again_by_them(stand_in, blend, tmp
     script = tmp_path / "script.py"  # as people write them: nothing asks for __main__
     script.write_text("print('run')" + COORDINATOR)
     command = [sys.executable, script, Path(__file__).parent, blend, tmp_path / "out", "a", "b"]
-    done = subprocess.run(command, env=children.environment(), capture_output=True, text=True)
+    done = subprocess.run(command, env=child_process.environment(), capture_output=True, text=True)
     assert done.returncode == 0 and done.stdout == "run\n", done.stdout + done.stderr
 
 
@@ -63,7 +63,11 @@ def test_nothing_is_left_running_and_nothing_is_said(stand_in, blend, tmp_path, 
     slow = [] if how == "finished" else ["slow_one", "c", "d"]
     before = set(os.listdir(os.getcwd()))
     batch = subprocess.Popen(
-        [*command, *slow], env=children.environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True
+        [*command, *slow],
+        env=child_process.environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,
     )
     try:
         family = set()

@@ -11,8 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from viewcam_addon import image
-from viewcam_addon.batch import child_process
+from viewcam_addon import child_process, image
 from viewcam_addon.batch.comparer import Comparer
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
@@ -201,8 +200,8 @@ def test_a_comparer_that_was_lost_is_started_again(scene_path, picture):
     taken = picture(CAMERA)
     with Comparer() as comparer:
         assert comparer.verdict(scene_path, taken, CAMERA, CLIP)["passed"]
-        comparer._partner._family.end()
-        with pytest.raises(child_process.Gone, match="the comparer has ended"):
+        comparer._server._process.end()
+        with pytest.raises(child_process.ProcessEnded, match="the comparer has ended"):
             comparer.verdict(scene_path, taken, CAMERA, CLIP)
         assert comparer.verdict(scene_path, taken, CAMERA, CLIP)["passed"]
 

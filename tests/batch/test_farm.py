@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from viewcam_addon import children
+from viewcam_addon import child_process
 
 pytest.importorskip("distributed")
 
@@ -30,7 +30,7 @@ def here(stand_in, tmp_path):
     programs = {
         "blender": str(stand_in.program),
         "dask": f"{sys.executable} -m dask",
-        "viewcam": shlex.join(children.viewcam()),
+        "viewcam": shlex.join(child_process.viewcam()),
     }
 
     def told(text):
@@ -57,7 +57,9 @@ def test_scheduler_worker_and_batch_as_the_page_starts_them(here, stand_in, tmp_
     def start(words):
         said = tmp_path / f"said-{len(family)}.txt"
         words = ["sh", "-c", f"exec env {here(words)}"]
-        family.append(children.Family(words, said, children.environment(DASK_TEMPORARY_DIRECTORY=str(tmp_path / "dask"))))
+        family.append(
+            child_process.ProcessGroup(words, said, child_process.environment(DASK_TEMPORARY_DIRECTORY=str(tmp_path / "dask")))
+        )
         return said
 
     try:
@@ -68,7 +70,7 @@ def test_scheduler_worker_and_batch_as_the_page_starts_them(here, stand_in, tmp_
         said = start(the_one("dask worker").replace("tcp://farm:8786", address) + " --no-dashboard")
         assert processes.until(lambda: "Registered to" in said.read_text()), said.read_text()
         words = ["sh", "-c", here(the_one("viewcam batch /shared/shot.blend").replace("tcp://farm:8786", address))]
-        batch = subprocess.run(words, env=children.environment(), capture_output=True, text=True)
+        batch = subprocess.run(words, env=child_process.environment(), capture_output=True, text=True)
     finally:
         for each in family:
             each.end()
@@ -98,7 +100,7 @@ def test_the_parts_of_a_manager_are_the_whole_and_a_repeated_part_renders_nothin
     assert placeholder in command
 
     def run(words):
-        done = subprocess.run(["sh", "-c", here(words)], env=children.environment(), capture_output=True, text=True)
+        done = subprocess.run(["sh", "-c", here(words)], env=child_process.environment(), capture_output=True, text=True)
         assert done.returncode == 0, f"{words}: {done.stdout}{done.stderr}"
 
     for part in (3, 7, 3):
@@ -110,8 +112,8 @@ def test_the_parts_of_a_manager_are_the_whole_and_a_repeated_part_renders_nothin
 def test_after_all_parts_the_command_without_them_renders_nothing_and_sums_up(here, stand_in, tmp_path):
     command = the_one("--shard 1/8")
     for part in ("1/2", "2/2"):
-        subprocess.run(["sh", "-c", here(command.replace("1/8", part))], env=children.environment(), check=True)
+        subprocess.run(["sh", "-c", here(command.replace("1/8", part))], env=child_process.environment(), check=True)
     assert not (tmp_path / "renders" / "summary.json").exists() and len(stand_in.diary("render")) == 16
-    subprocess.run(["sh", "-c", here(command.replace(" --shard 1/8", ""))], env=children.environment(), check=True)
+    subprocess.run(["sh", "-c", here(command.replace(" --shard 1/8", ""))], env=child_process.environment(), check=True)
     assert len(stand_in.diary("render")) == 16
     assert len(json.loads((tmp_path / "renders" / "summary.json").read_text())["shots"]) == 16

@@ -13,7 +13,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon import children
+from viewcam_addon import child_process
 from viewcam_addon.blender import opening, versions
 from viewcam_addon.blender.batch.renderer import BlenderRenderer
 from viewcam_addon.blender.rendering import job
@@ -277,7 +277,11 @@ def test_trusted_it_does_so_that_the_test_above_can_fail(fresh_blender, temporar
 @pytest.mark.parametrize("way", FLUIDS, ids=lambda way: way.__name__)
 @pytest.mark.parametrize("trust", [False, True])
 def test_no_fluid_is_simulated_into_a_folder_of_the_files_choice(tmp_path, way, trust):
-    how = {"env": children.environment(apart_from=bpy.utils.system_resource("SCRIPTS")), "capture_output": True, "text": True}
+    how = {
+        "env": child_process.environment(apart_from=bpy.utils.system_resource("SCRIPTS")),
+        "capture_output": True,
+        "text": True,
+    }
     program = [sys.executable, __file__]
     if bpy.app.binary_path:
         program = [bpy.app.binary_path, "-b", "--factory-startup", "--python-use-system-env", "--python", __file__, "--"]

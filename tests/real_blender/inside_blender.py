@@ -95,8 +95,8 @@ def export(file, *arguments):
 
 
 def viewcam(*arguments):
-    processes = importlib.import_module(f"{enable().__name__}.commands.processes")
-    sys.exit(processes.run_beside(*arguments))
+    child_process = importlib.import_module(f"{enable().__name__}.child_process")
+    sys.exit(child_process.run_viewcam(*arguments))
 
 
 def apply(file, output, pinhole):

@@ -78,7 +78,7 @@ def ended(comparison):
     while (proof.running() or proof._timer) and time.monotonic() < ends:
         yield
     assert proof.running() is None and proof._timer is None and not comparison.folder.exists()
-    assert comparison._family.status() is not None
+    assert comparison._process.status() is not None
 
 
 def open_the_panel():
@@ -216,7 +216,7 @@ def undo_while_it_runs():
     press("Z", *NOWHERE, ctrl=True)
     yield
     yield
-    assert proof.running() is comparison and comparison._family.status() is None
+    assert proof.running() is comparison and comparison._process.status() is None
     press("ESC", *NOWHERE)
     yield from ended(comparison)
 
@@ -236,7 +236,7 @@ def turn_the_add_on_off_while_it_runs():
     bpy.ops.preferences.addon_disable(module=ADDON)
     yield
     yield
-    assert not comparison.folder.exists() and comparison._family.status() is not None
+    assert not comparison.folder.exists() and comparison._process.status() is not None
     bpy.ops.preferences.addon_enable(module=ADDON)
     proof = importlib.import_module(PROOF)
     yield

@@ -7,7 +7,7 @@
     locks, interruption   shared work; the first signal and the second
     summary, sheet        what it came to, as JSON and as a page of thumbnails
     dataset               what it came to, as those read it who learn a scene from its pictures
-    child_process         a process that is kept open and asked; on it stand
+    on child processes (../child_process.py) stand
     comparer                  is what was rendered what the sidecar says?
     render_server, render_client    a renderer in a process of its own
     cluster, worker           shots on several workers, each of which keeps such a process

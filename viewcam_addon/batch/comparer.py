@@ -14,10 +14,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import checks, children
+from .. import checks, child_process
 from ..errors import InputError
 from ..pinhole import Pinhole
-from . import child_process
 
 if TYPE_CHECKING:
     from ..comparison.geometry import GeometryComparison
@@ -35,7 +34,7 @@ class Comparer:
 
     def __init__(self, threads: int | None = None) -> None:
         self._threads = threads
-        self._partner: child_process.Partner | None = None
+        self._server: child_process.ServerProcess | None = None
 
     def verdict(
         self, scene: Path, image: Path, camera: Pinhole, clip: tuple[float, float], stated: Pinhole | None = None
@@ -55,10 +54,12 @@ class Comparer:
         InputError
             if scene or picture can't be read or are not of the same size, there is no OpenEXR, or the process ended first.
         """
-        if self._partner is None:
+        if self._server is None:
             if sentence := lacking():
                 raise InputError(sentence)
-            self._partner = child_process.Partner("the comparer", children.module("batch.comparer"), children.environment())
+            self._server = child_process.ServerProcess(
+                "the comparer", child_process.module("batch.comparer"), child_process.environment()
+            )
         request = {
             "scene": str(scene),
             "image": str(image),
@@ -68,16 +69,16 @@ class Comparer:
             "threads": self._threads,
         }
         try:
-            return self._partner.ask(request)
-        except child_process.Gone:
+            return self._server.ask(request)
+        except child_process.ProcessEnded:
             self.close()
             raise
 
     def close(self) -> None:
         """End the process."""
-        if self._partner is not None:
-            self._partner.close()
-            self._partner = None
+        if self._server is not None:
+            self._server.close()
+            self._server = None
 
     def __enter__(self) -> "Comparer":
         return self
@@ -130,4 +131,4 @@ def _figures(comparison: "GeometryComparison") -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    child_process.answer(sys.argv[1], _Scenes().answer)
+    child_process.serve(sys.argv[1], _Scenes().answer)

@@ -14,11 +14,11 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from .. import children
+from .. import child_process
+from ..child_process import AnswerTimeout, ProcessEnded, ServerProcess
 from ..errors import InputError
 from ..pinhole import Pinhole
 from ..shots import Shot
-from .child_process import Gone, Partner, TooLong
 
 BLENDER = "VIEWCAM_BLENDER"
 """The variable that names the Blender."""
@@ -47,7 +47,7 @@ class ServedRenderer:
     ) -> None:
         self.blend, self.program = blend, None
         self._opening = {"open": {"blend": str(blend), "seed": seed, "threads": threads, "trust": trust}}
-        self._partner: Partner | None = None
+        self._server: ServerProcess | None = None
         self._limit, self._ends = time_limit, math.inf
         self._rendering: dict[str, Any] = {}
 
@@ -82,9 +82,9 @@ class ServedRenderer:
 
     def close(self) -> None:
         """End the Blender."""
-        if self._partner is not None:
-            self._partner.close()
-            self._partner = None
+        if self._server is not None:
+            self._server.close()
+            self._server = None
 
     def __enter__(self) -> "ServedRenderer":
         return self
@@ -97,16 +97,16 @@ class ServedRenderer:
         for attempt in range(1, ATTEMPTS + 1):
             try:
                 return self._answer(requests)
-            except Gone as gone:
+            except ProcessEnded as gone:
                 self.close()
                 if attempt == ATTEMPTS:
                     raise InputError(f"{ATTEMPTS} times in a row {gone}") from gone
         raise AssertionError("unreachable")
 
     def _answer(self, requests: tuple[dict[str, Any], ...]) -> Any:
-        if self._partner is not None and not self._partner.is_there():  # it was idle for long
+        if self._server is not None and not self._server.is_there():  # it was idle for long
             self.close()
-        if self._partner is None:
+        if self._server is None:
             self._start()
         else:
             requests = requests[-1:]
@@ -115,8 +115,8 @@ class ServedRenderer:
             if "render" in request:
                 self._ends = time.monotonic() + self._limit if self._limit else math.inf
             try:
-                answer = self._partner.ask(request, self._ends if request.keys() & {"render", "check"} else math.inf)
-            except TooLong as late:
+                answer = self._server.ask(request, self._ends if request.keys() & {"render", "check"} else math.inf)
+            except AnswerTimeout as late:
                 self.close()
                 limit = f"the shot took longer than the time limit of {self._limit:g} s, and its Blender was ended"
                 raise InputError(f"{limit}: give --time-limit more, or the shot fewer samples") from late
@@ -124,11 +124,11 @@ class ServedRenderer:
 
     def _start(self) -> None:
         name, command, variables = _blender()
-        self._partner = Partner(name, command, variables)
+        self._server = ServerProcess(name, command, variables)
         try:
-            self._partner.ask(self._opening)
-        except Gone as gone:
-            raise Gone(
+            self._server.ask(self._opening)
+        except ProcessEnded as gone:
+            raise ProcessEnded(
                 f"{gone.what} as it opened {self.blend}: see that the file is whole, that this is Blender 4.2 or newer with "
                 "the extension Virtual Pinhole, and that there is memory enough"
             ) from gone
@@ -144,4 +144,4 @@ def _blender() -> tuple[str, list[str], Mapping[str, str]]:
         return program, [program, "-b", "--disable-autoexec", "--command", "viewcam", "serve"], os.environ
     if importlib.util.find_spec("bpy") is None:
         raise InputError(f"there is no Blender on {platform.node()}: name one in {BLENDER}, or pip install bpy")
-    return "Blender", children.viewcam("serve"), children.environment(apart_from=children.blender_scripts())
+    return "Blender", child_process.viewcam("serve"), child_process.environment(apart_from=child_process.blender_scripts())

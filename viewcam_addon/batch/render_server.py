@@ -11,8 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from .. import child_process
 from ..shots import Shot
-from . import child_process
 
 IDLE = 120.0
 """Seconds after which a Blender that is asked for nothing ends: a farm's worker outlives the batches that it worked for."""
@@ -25,7 +25,7 @@ def serve(handle: str, opened: Callable[..., Any]) -> None:
     `seed`, `threads` and `trust`.
     """
     with contextlib.ExitStack() as stack:
-        child_process.answer(handle, _Served(stack, opened).answer, IDLE)
+        child_process.serve(handle, _Served(stack, opened).answer, IDLE)
 
 
 class _Served:

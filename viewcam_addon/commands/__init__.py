@@ -1,5 +1,25 @@
 """What each sub-command of `viewcam` does; cli.py knows its words. Each returns the exit status and what --json writes."""
 
+import importlib
+import importlib.util
+from types import ModuleType
 from typing import Any
 
+from ..errors import InputError
+
 Result = tuple[int, dict[str, Any]]
+
+
+def blender_room(name: str) -> ModuleType:
+    """The module of blender/ with this name.
+
+    Raises
+    ------
+    InputError
+        where there is no Blender.
+    """
+    if importlib.util.find_spec("bpy") is None:
+        raise InputError(
+            "this needs Blender: install it as a module (pip install bpy), or run blender -b FILE.blend --command viewcam"
+        )
+    return importlib.import_module(f"..blender.{name}", __package__)

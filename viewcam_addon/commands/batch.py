@@ -14,7 +14,7 @@ from typing import Any
 
 from .. import cameras, crashes
 from .. import shots as lists
-from ..batch import cluster, dataset, one, render_client
+from ..batch import cluster, dataset, one, render_client, render_server
 from ..batch import run as running
 from ..batch.folder import Folder
 from ..batch.interruption import Interruption
@@ -22,9 +22,8 @@ from ..batch.summary import Summary
 from ..errors import InputError
 from ..shots import Shot, ShotsError
 from ..terminal import say, silent_libraries
-from . import Result
+from . import Result, blender_room
 from .camera import options_of
-from .processes import blender_room
 
 _MOST_NAMED = 5
 _OPEN_TO_ALL = "whoever reaches {} can run any program on its workers: docs/farm.md says how TLS lets in only your own"
@@ -68,6 +67,12 @@ def run(options: argparse.Namespace) -> Result:
     if words:
         say(words)
     return summary.exit_status, summary.to_json()
+
+
+def serve(options: argparse.Namespace) -> Result:
+    """`viewcam serve`: a Blender that renders the shots of a batch for the process that started it. No command for people."""
+    render_server.serve(options.handle, blender_room("batch.renderer").BlenderRenderer)
+    return 0, {}
 
 
 def _refuse_contradictions(options: argparse.Namespace) -> None:

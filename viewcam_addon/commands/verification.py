@@ -12,14 +12,17 @@ import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from ..child_process import run_viewcam
 from ..errors import InputError
+from ..events import Events
 from ..terminal import say, silent_libraries
 from ..tracer.scene.film import seeds
-from . import Result
-from .processes import blender_room, run_beside
-from .progress import Progress
+from . import Result, blender_room
+
+if TYPE_CHECKING:
+    from ..tracer.tiles import Passes  # brings what the other commands need not wait for
 
 DEMO_SCENE = Path(__file__).parents[2] / "sample_scenes" / "studio.blend"
 
@@ -49,7 +52,7 @@ def render(options: argparse.Namespace) -> Result:
         scene = dataclasses.replace(scene, camera=scene.camera.resized(*options.size))
     told = _told_level(scene) if options.level == "auto" else {}
     level = told.get("level", options.level)
-    progress = Progress(options.events, scene.camera.height)
+    progress = _Progress(options.events, scene.camera.height)
     started = time.perf_counter()
     traced = api.render(scene, level, options.samples, options.seed, options.threads, options.error, progress)
     seconds = time.perf_counter() - started
@@ -99,7 +102,8 @@ def check(options: argparse.Namespace) -> Result:
         spent = ["--error", str(options.error)] if options.error else ["--samples", str(options.samples)]
         light = ["--level", level, *spent, "--seed", str(options.seed)]
         tell_on = options.events if options.log_json else None
-        status = run_beside("render", scene, reference, *light, *threads, tell_on=tell_on)
+        options.events.tell("step", name="tracing")
+        status = run_viewcam("render", scene, reference, *light, *threads, tell_on=tell_on)
         if status:
             return status, {"error": "the reference could not be traced"}
         outputs = [
@@ -111,8 +115,9 @@ def check(options: argparse.Namespace) -> Result:
         outputs += ["--test-samples", str(max(options.samples // count, 1)), "--repeat", options.repeat or options.words]
         if level == "geometry":
             tests = tests[:1]
+        options.events.tell("step", name="comparing")
         # The child has written the JSON: there is nothing to add.
-        return run_beside("compare", reference, *tests, "--scene", scene, *threads, *outputs, tell_on=tell_on), {}
+        return run_viewcam("compare", reference, *tests, "--scene", scene, *threads, *outputs, tell_on=tell_on), {}
 
 
 def demo(options: argparse.Namespace) -> Result:
@@ -130,8 +135,12 @@ def _export_and_render(options: argparse.Namespace, scene_path: Path, image_path
     from ..tracer.scene import scene_file
 
     started = time.perf_counter()
+
+    def rendering(number: int) -> None:
+        options.events.tell("step", name="rendering", number=number, of=len(image_paths))
+
     with silent_libraries():
-        scene = blender_room("rendering.job").export_and_render(_request(options), image_paths)
+        scene = blender_room("rendering.job").export_and_render(_request(options), image_paths, rendering)
     scene_file.write(scene, scene_path)
     say(f"exported and rendered with Cycles in {time.perf_counter() - started:.1f} s")
     return _told_level(scene)["level"] if options.level == "auto" else options.level
@@ -171,3 +180,24 @@ def _ledger_lines(ledger: Sequence[Any]) -> list[str]:
 
 def _ledger_json(ledger: Sequence[Any]) -> list[dict[str, str]]:
     return [{"object": entry.object, "status": entry.status, "reason": entry.reason} for entry in ledger]
+
+
+class _Progress:
+    """A tracer's watcher that tells `progress`, with the share of the rows that are done, at each whole percent.
+
+    rows : how many the picture has.
+    """
+
+    def __init__(self, events: Events, rows: int) -> None:
+        self._events, self._done, self._percent = events, bytearray(rows), 0
+        events.tell("progress", share=0.0)
+
+    def tile(self, passes: "Passes", rows: range) -> None:
+        self._done[rows.start : rows.stop] = b"\1" * len(rows)
+        percent = 100 * sum(self._done) // len(self._done)
+        if percent > self._percent:
+            self._percent = percent
+            self._events.tell("progress", share=percent / 100)
+
+    def stop(self) -> bool:
+        return False

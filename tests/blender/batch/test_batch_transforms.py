@@ -15,7 +15,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon import children, cli
+from viewcam_addon import child_process, cli
 
 RADIUS = 0.09
 BALLS = {
@@ -152,7 +152,7 @@ def look(path):
             "            numpy.save(sys.argv[2] + name[-1], channel.pixels)\n"
         )
         stem = str(path.with_suffix(""))
-        subprocess.run([sys.executable, "-c", program, str(path), stem], check=True, env=children.environment())
+        subprocess.run([sys.executable, "-c", program, str(path), stem], check=True, env=child_process.environment())
         return np.stack([np.load(f"{stem}{letter}.npy") for letter in "RGB"], axis=-1)
     picture = bpy.data.images.load(str(path))
     picture.colorspace_settings.name = "Non-Color"

@@ -17,7 +17,7 @@ bpy = pytest.importorskip("bpy")
 from viewcam_addon.blender.interface import comparing, proof, proof_image
 from viewcam_addon.errors import InputError
 
-# What `viewcam check` leaves behind, in place of it: a process that writes the files one by one, when it is told to.
+# What `viewcam check` tells and leaves behind, in place of it: a process that does so step by step, when it is told to.
 STAND_IN = """
 import json, pathlib, sys, time
 PICTURES = ["report/difference.png", "report/test.png", "report/reference.png"]
@@ -27,8 +27,15 @@ def step(name, text="x"):
         time.sleep(0.01)
     step.number += 1
     (folder / "report").mkdir(exist_ok=True)
+    if name in TOLD:
+        print("Blender's own words", json.dumps({"event": "step", **TOLD[name]}), sep=chr(10), flush=True)
     (folder / name).write_text(text)
 step.number = 1
+TOLD = {
+    "report/cycles.exr": {"name": "rendering", "number": 1, "of": 1},
+    "report/scene.json": {"name": "tracing"},
+    "report/reference.exr": {"name": "comparing"},
+}
 for name in ("report/cycles.exr", "report/scene.json", "report/reference.exr", "report/index.html", *PICTURES):
     step(name)
 result = {"passed": True, "sentence": "The same picture: as told.", "passes": [], "ledger": []}
@@ -198,7 +205,7 @@ def test_cancelled_while_it_renders_it_leaves_no_process_and_no_file(seen):
     comparison.cancel()  # twice does no harm
 
 
-def test_the_files_that_appear_tell_how_far_it_is(stand_in):
+def test_its_steps_tell_how_far_it_is(stand_in):
     comparison = stand_in()
     told = [comparison.progress()]
     for steps, name in ((1, "cycles.exr"), (2, "scene.json"), (3, "reference.exr")):
@@ -206,7 +213,7 @@ def test_the_files_that_appear_tell_how_far_it_is(stand_in):
         wait_for((comparison.folder / "report" / name).exists)
         told.append(comparison.progress())
     words = ["Rendering with Cycles", "Rendering with Cycles", "Tracing", "Comparing"]
-    assert told == list(zip((0, 0.25, 0.5, 0.75), words, strict=True))
+    assert told == list(zip((0, 0, 1 / 3, 2 / 3), words, strict=True))
     assert comparison.poll() is None
     comparison.let(8)
     outcome = wait_for(comparison.poll)
@@ -217,11 +224,13 @@ def test_the_files_that_appear_tell_how_far_it_is(stand_in):
 def test_light_is_rendered_in_pictures_that_are_counted(stand_in):
     comparison = stand_in(level="path", samples=64)
     assert comparison.progress() == (0, "Rendering with Cycles, 1 of 8")
-    report = comparison.folder / "report"
-    report.mkdir()
-    for i in range(3):
-        (report / f"cycles-{i + 1}.exr").write_text("")
-    assert comparison.progress() == (3 / 11, "Rendering with Cycles, 4 of 8")
+    with open(comparison.folder / "said.txt", "a", encoding="utf-8") as said:
+        said.write('{"event": "step", "name": "rendering", "number": 4, "of": 8}\n')
+        said.flush()
+        assert comparison.progress() == (3 / 10, "Rendering with Cycles, 4 of 8")
+        said.write('{"event": "step", "name": "tracing"}\n{"event": "progress", "share": 0.25}\n{"event": "pro')
+        said.flush()
+        assert comparison.progress() == (8.25 / 10, "Tracing"), "half a line is on its way"
     comparison.cancel()
 
 
@@ -278,7 +287,7 @@ def test_another_file_and_turning_the_add_on_off_end_it(stand_in, registered_add
 def test_cancel_ends_it_and_keeps_what_the_last_one_came_to(stand_in):
     comparison = stand_in()
     comparison.let(8)
-    wait_for(lambda: comparison._family.status() is not None)
+    wait_for(lambda: comparison._process.status() is not None)
     proof._running = comparison
     assert proof._look() is proof.latest() and proof.running() is None
     assert not bpy.ops.viewcam.cancel_comparison.poll()

@@ -233,7 +233,7 @@ def test_without_nodes_the_viewports_colours_count(pictures, floor, scene):
 
 
 def test_images_that_are_missing_are_told_and_stood_in_for(pictures, floor, tmp_path):
-    missing = bpy.data.images.new("Gone", 4, 4)
+    missing = bpy.data.images.new("ProcessEnded", 4, 4)
     missing.source, missing.filepath = "FILE", str(tmp_path / "gone.png")
     texture(floor, missing, "Linear")
     sides = pictures(scenes=1)

@@ -27,7 +27,7 @@ def test_render_settings_of_modifiers_count_and_not_those_of_the_viewport(monkey
 def test_what_is_hidden_in_the_viewport_only_is_rendered(add, both_sides, mesh_from):
     cube = mesh_from("cube")
     add(cube, "Here", location=(-1.5, 0, 0)).hide_viewport = True
-    add(cube, "Gone", location=(1.5, 0, 0)).hide_render = True
+    add(cube, "ProcessEnded", location=(1.5, 0, 0)).hide_render = True
     sides = both_sides()
     sides.check()
     assert [placed.name for placed in sides.exported.objects] == ["Here"]

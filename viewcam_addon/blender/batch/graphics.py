@@ -11,7 +11,7 @@ import sys
 
 import bpy
 
-from ... import children
+from ... import child_process
 
 _DRAW = """
 import bpy
@@ -33,7 +33,7 @@ def are_there() -> bool:
     else:
         command = [sys.executable, "-c", _DRAW]
     # There stands a bpy that only this process can import.
-    variables = children.environment(apart_from=bpy.utils.system_resource("SCRIPTS"))
+    variables = child_process.environment(apart_from=bpy.utils.system_resource("SCRIPTS"))
     try:
         # In a session of its own: a Ctrl-C that is meant for the batch would end it, and look like no GPU.
         how = {"env": variables, "start_new_session": True, "capture_output": True, "timeout": _LONGEST}

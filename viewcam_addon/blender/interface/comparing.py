@@ -3,7 +3,7 @@
 Nothing here needs a window. Whoever starts a comparison asks it now and then how far it is, or ends it. The copy, the child's
 own temporary files and what it makes stand in one folder in Blender's own temporary one, which ends with Blender.
 
-How far it is, the files tell that appear: each of them is written whole (files.py). Rejected: rendering in Blender's own
+How far it is the child tells in its log, a line of JSON for each step (events.py). Rejected: rendering in Blender's own
 process (it would stop the artist, and change the scene for as long), and `bpy.data.libraries.write` for the copy (it has no
 windows, and so another scene may be the current one).
 """
@@ -15,7 +15,7 @@ import shlex
 import shutil
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -23,7 +23,7 @@ from typing import Any
 
 import bpy
 
-from ... import children
+from ... import child_process
 from ...comparison.statistics import plain
 from ...errors import InputError
 from ...files import written_whole
@@ -123,7 +123,7 @@ class RunningComparison:
             raise InputError(f"no folder for the comparison can be made ({error.strerror}): free some space") from error
         try:
             save_copy(self.folder / _file_name())
-            self._family = self._child(scene, words)
+            self._process = self._child(scene, words)
         except OSError as error:
             _remove(self.folder)
             raise InputError(f"the comparison can't be started ({error.strerror}): free some space") from error
@@ -131,31 +131,28 @@ class RunningComparison:
             _remove(self.folder)
             raise
 
-    def _child(self, scene: bpy.types.Scene, words: Sequence[str]) -> children.Family:
+    def _child(self, scene: bpy.types.Scene, words: Sequence[str]) -> child_process.ProcessGroup:
         """`viewcam check` with these words, on its way; the report names them and the artist's file."""
         report = self.folder / _REPORT
         repeat = shlex.join(["check", _file_name(), *words])
         written = ["--json", str(self.folder / _RESULT), "--report", str(report), "--sides", str(report)]
         written += ["--difference", str(report / _PICTURES["difference"])]
-        command = _command(self.folder / _file_name(), scene, [*words, *written, "--repeat", repeat])
+        command = _command(self.folder / _file_name(), scene, [*words, *written, "--repeat", repeat, "--log-json"])
         # Blender's own scripts hold what the inside of a `bpy` looks like, which hides the module from a new process.
         scripts = bpy.utils.system_resource("SCRIPTS")
-        variables = children.environment(scripts, **{name: str(self.folder) for name in ("TMPDIR", "TMP", "TEMP")})
-        return children.Family(command, self.folder / _SAID, variables)
+        variables = child_process.environment(scripts, **{name: str(self.folder) for name in ("TMPDIR", "TMP", "TEMP")})
+        return child_process.ProcessGroup(command, self.folder / _SAID, variables)
 
     def progress(self) -> tuple[float, str]:
         """How far it is, from 0 to 1 in steps of unequal length, and what it is doing."""
-        report, pictures = self.folder / _REPORT, self._pictures
-        rendered = len(list(report.glob("cycles*.exr")))
-        exported, traced = (report / "scene.json").exists(), (report / "reference.exr").exists()
-        if traced:
-            words = "Comparing"
-        elif exported:
-            words = "Tracing"
-        else:
-            words = "Rendering with Cycles"
-            words += f", {min(rendered + 1, pictures)} of {pictures}" if pictures > 1 else ""
-        return (rendered + exported + traced) / (pictures + 3), words
+        done, words = _step({"name": "rendering", "number": 1}, self._pictures)
+        traced = 0.0
+        for event in child_process.events_in(self._said().splitlines()):
+            if event["event"] == "step":
+                done, words = _step(event, self._pictures)
+            elif event["event"] == "progress":
+                traced = event["share"]
+        return (done + (traced if words == "Tracing" else 0)) / (self._pictures + 2), words
 
     @property
     def seconds(self) -> float:
@@ -164,14 +161,14 @@ class RunningComparison:
 
     def wait(self) -> None:
         """Until there is something to poll."""
-        self._family.wait()
+        self._process.wait()
 
     def poll(self) -> Outcome | None:
         """What it has come to, None while it runs. What is left of it then is the outcome's folder."""
-        status = self._family.status()
+        status = self._process.status()
         if status is None:
             return None
-        self._family.end()
+        self._process.end()
         outcome = self._outcome(status)
         for path in self.folder.iterdir():  # the copy, and what else is no part of the report
             if path != outcome.folder:
@@ -182,7 +179,7 @@ class RunningComparison:
 
     def cancel(self) -> None:
         """End it at once, without a trace."""
-        self._family.end()
+        self._process.end()
         _remove(self.folder)
 
     def _outcome(self, status: int) -> Outcome:
@@ -203,6 +200,14 @@ class RunningComparison:
 
     def _said(self) -> str:
         return (self.folder / _SAID).read_text(encoding="utf-8", errors="replace")
+
+
+def _step(event: Mapping[str, Any], pictures: int) -> tuple[int, str]:
+    """How many steps are done before one of them, and what it is called. pictures : of Cycles."""
+    if event["name"] == "rendering":
+        number = event["number"]
+        return number - 1, "Rendering with Cycles" + (f", {number} of {pictures}" if pictures > 1 else "")
+    return (pictures, "Tracing") if event["name"] == "tracing" else (pictures + 1, "Comparing")
 
 
 def report_name(camera: str, frame: int) -> str:
@@ -284,7 +289,7 @@ def figures(result: dict[str, Any]) -> list[tuple[str, str]]:
 
 def failure(said: str, status: int) -> str:
     """One sentence for a child that came to nothing: its own, or its last words."""
-    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    lines = [line.strip() for line in said.splitlines() if line.strip() and not line.startswith('{"event"')]
     own = [match[1] for line in lines if (match := re.match(r"viewcam(?: \w+)?: (.*)", line))]
     if own:
         return own[-1][:1].upper() + own[-1][1:]
@@ -306,7 +311,7 @@ def _check_possible(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> 
 def _command(copy: Path, scene: bpy.types.Scene, words: Sequence[str]) -> list[str]:
     """`viewcam check` on the copy, in this same Blender."""
     if not bpy.app.binary_path:  # a module of Python
-        return children.viewcam("check", copy, *words)
+        return child_process.viewcam("check", copy, *words)
     # The file's own scene is that of its first window. The add-on may be enabled for this session only.
     other = ["--scene", scene.name] if any(window.scene != scene for window in bpy.context.window_manager.windows[:1]) else []
     enabled = ["--addons", preferences.PACKAGE] if preferences.PACKAGE in bpy.context.preferences.addons else []

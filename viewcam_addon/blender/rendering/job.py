@@ -6,7 +6,7 @@ What is in the file does not run (opening.py).
 
 import contextlib
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -111,14 +111,17 @@ def render(request: Request, path: str | os.PathLike[str]) -> tuple[LedgerEntry,
         return told
 
 
-def export_and_render(request: Request, paths: Sequence[str | os.PathLike[str]]) -> Scene:
+def export_and_render(
+    request: Request, paths: Sequence[str | os.PathLike[str]], rendering: Callable[[int], None] = lambda number: None
+) -> Scene:
     """Both sides of one state of the file, objects and materials numbered alike. Raises as `render` does.
 
-    paths : for several pictures of Cycles, which share the samples; their seeds count from that of the request.
+    paths : for several pictures of Cycles, which share the samples; their seeds count from that of the request. rendering : is
+    told of each, by its number from 1 on, before it is rendered.
     """
     with _stage(request) as stage, indices.numbered(), _seen_from(stage, request) as stage:
         scene = _export(stage, request)
-        _render(stage, request, paths, Lighting(scene.lamps, scene.world, scene.film, scene.bounces))
+        _render(stage, request, paths, Lighting(scene.lamps, scene.world, scene.film, scene.bounces), rendering)
         return scene
 
 
@@ -139,10 +142,17 @@ def _seen_from(stage: _Stage, request: Request) -> Iterator[_Stage]:
         yield _Stage(moved.scene, layer, moved.camera, stage.level, origin=moved.origin, names=moved.names, told=stage.ledger)
 
 
-def _render(stage: _Stage, request: Request, paths: Sequence[str | os.PathLike[str]], light: Lighting | None) -> None:
+def _render(
+    stage: _Stage,
+    request: Request,
+    paths: Sequence[str | os.PathLike[str]],
+    light: Lighting | None,
+    rendering: Callable[[int], None] = lambda number: None,
+) -> None:
     """Cycles' pictures. light : as exported, of a stage that is lit."""
     share = max(request.samples // len(paths), 1)
     for number, path in enumerate(paths):
+        rendering(number + 1)
         picture = None
         if stage.is_lit:
             bounces = NO_BOUNCES if stage.level == "direct" else light.bounces

@@ -1,4 +1,4 @@
-"""Processes of our own: a whole family ends, whoever in it was started by whom."""
+"""Processes of our own: a whole group ends, whoever in it was started by whom."""
 
 import os
 import sys
@@ -6,12 +6,12 @@ import time
 
 import pytest
 
-from viewcam_addon import children
+from viewcam_addon import child_process
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="whether a process runs is read off Linux's /proc")
 
 # A parent that starts a child which would sleep for a minute, and tells both numbers.
-FAMILY = """
+PARENT = """
 import os, subprocess, sys, time
 child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
 print(os.getpid(), child.pid, flush=True)
@@ -37,27 +37,27 @@ def wait_until(is_so, seconds=20):
 
 def test_grandchildren_end_with_the_child(tmp_path):
     said = tmp_path / "said.txt"
-    family = children.Family([sys.executable, "-c", FAMILY], said, os.environ)
-    assert wait_until(lambda: said.read_text().endswith("\n")), "the family has not started"
+    group = child_process.ProcessGroup([sys.executable, "-c", PARENT], said, os.environ)
+    assert wait_until(lambda: said.read_text().endswith("\n")), "the group has not started"
     members = [int(word) for word in said.read_text().split()]
-    assert all(map(is_there, members)) and family.status() is None
-    family.end()
+    assert all(map(is_there, members)) and group.status() is None
+    group.end()
     assert wait_until(lambda: not any(map(is_there, members))), "a member runs on"
-    assert family.status() == -9
-    family.end()  # twice does no harm
+    assert group.status() == -9
+    group.end()  # twice does no harm
 
 
 def test_what_a_child_says_stands_in_its_file(tmp_path):
     program = "import sys; print('out'); print('err', file=sys.stderr); sys.exit(3)"
-    family = children.Family([sys.executable, "-c", program], tmp_path / "said.txt", os.environ)
-    family.wait()
-    assert family.status() == 3
+    group = child_process.ProcessGroup([sys.executable, "-c", program], tmp_path / "said.txt", os.environ)
+    group.wait()
+    assert group.status() == 3
     assert sorted((tmp_path / "said.txt").read_text().split()) == ["err", "out"]
 
 
 def test_a_child_has_our_modules_in_reach_and_what_else_it_is_told(tmp_path):
-    variables = children.environment(TMPDIR=str(tmp_path))
+    variables = child_process.environment(TMPDIR=str(tmp_path))
     program = "import tempfile, viewcam_addon.cli, numpy; print(tempfile.gettempdir())"
-    family = children.Family([sys.executable, "-c", program], tmp_path / "said.txt", variables)
-    family.wait()
+    group = child_process.ProcessGroup([sys.executable, "-c", program], tmp_path / "said.txt", variables)
+    group.wait()
     assert (tmp_path / "said.txt").read_text().strip() == str(tmp_path)

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from viewcam_addon import children, errors
-from viewcam_addon.batch.child_process import Gone, Partner
+from viewcam_addon import child_process, errors
+from viewcam_addon.child_process import ProcessEnded, ServerProcess
 
 ECHO = """
 import os, signal, sys, time
 from viewcam_addon import errors
-from viewcam_addon.batch import child_process
+from viewcam_addon import child_process
 
 def answers(request):
     print("words that are nobody's business")
@@ -28,14 +28,14 @@ def answers(request):
         time.sleep(request["sleep"])
     return {"heard": request, "process": os.getpid()}
 
-child_process.answer(sys.argv[1], answers, idle=float(os.environ.get("IDLE", "600")))
+child_process.serve(sys.argv[1], answers, idle=float(os.environ.get("IDLE", "600")))
 """
 # Asks one thing, tells who answered, and waits to be killed.
 ASKER = """
 import sys, time
-from viewcam_addon import children
-from viewcam_addon.batch.child_process import Partner
-echo = Partner("the echo", [sys.executable, "-c", sys.argv[1]], children.environment())
+from viewcam_addon import child_process
+from viewcam_addon.child_process import ServerProcess
+echo = ServerProcess("the echo", [sys.executable, "-c", sys.argv[1]], child_process.environment())
 print(echo.ask({})["process"], flush=True)
 echo.ask({"sleep": float(sys.argv[2])})
 time.sleep(60)
@@ -46,8 +46,8 @@ ENDS_WITHIN = 20
 
 @pytest.fixture
 def echo():
-    with Partner("the echo", [sys.executable, "-c", ECHO], children.environment()) as partner:
-        yield partner
+    with ServerProcess("the echo", [sys.executable, "-c", ECHO], child_process.environment()) as server:
+        yield server
 
 
 def test_an_answer_is_what_was_asked_float_by_float(echo):
@@ -75,25 +75,30 @@ def test_a_bug_is_one_sentence_and_the_process_goes_on(echo):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows knows no such signal")
 def test_a_process_that_was_killed_is_gone_and_says_how(echo):
-    with pytest.raises(Gone, match=f"the echo has ended with signal {signal.SIGKILL:d}"):
+    with pytest.raises(ProcessEnded, match=f"the echo has ended with signal {signal.SIGKILL:d}"):
         echo.ask({"die": True})
-    with pytest.raises(Gone, match="the echo has ended"):
+    with pytest.raises(ProcessEnded, match="the echo has ended"):
         echo.ask({})
 
 
 def test_a_process_that_never_listens_is_gone():
     command = [sys.executable, "-c", "import sys; sys.exit(3)"]
-    with Partner("the deaf one", command, os.environ) as deaf, pytest.raises(Gone, match="has ended with status 3"):
+    with (
+        ServerProcess("the deaf one", command, os.environ) as deaf,
+        pytest.raises(ProcessEnded, match="has ended with status 3"),
+    ):
         deaf.ask({})
 
 
 def test_a_program_that_is_not_there_is_one_sentence(tmp_path):
     with pytest.raises(errors.InputError, match=r"the ghost can't be started \(.*\): check .*ghost"):
-        Partner("the ghost", [str(tmp_path / "ghost")], os.environ)
+        ServerProcess("the ghost", [str(tmp_path / "ghost")], os.environ)
 
 
 def test_what_it_prints_stands_in_its_log(tmp_path):
-    with Partner("the echo", [sys.executable, "-u", "-c", ECHO], children.environment(), tmp_path / "log.txt") as echo:
+    with ServerProcess(
+        "the echo", [sys.executable, "-u", "-c", ECHO], child_process.environment(), tmp_path / "log.txt"
+    ) as echo:
         echo.ask({})
     assert (tmp_path / "log.txt").read_text() == "words that are nobody's business\n"
 
@@ -102,7 +107,7 @@ def test_what_it_prints_stands_in_its_log(tmp_path):
 @pytest.mark.parametrize("answering", [0, 60])
 def test_a_process_ends_with_whoever_asked_even_in_the_midst_of_an_answer(tmp_path, answering):
     said = tmp_path / "said.txt"
-    asker = children.Family([sys.executable, "-c", ASKER, ECHO, str(answering)], said, children.environment())
+    asker = child_process.ProcessGroup([sys.executable, "-c", ASKER, ECHO, str(answering)], said, child_process.environment())
     assert _until(lambda: said.read_text().strip().isdecimal()), said.read_text()
     process = Path("/proc", said.read_text().strip())
     assert process.exists()
@@ -113,7 +118,7 @@ def test_a_process_ends_with_whoever_asked_even_in_the_midst_of_an_answer(tmp_pa
 
 
 def test_a_process_that_nobody_asks_for_long_ends_and_that_can_be_seen():
-    with Partner("the echo", [sys.executable, "-c", ECHO], children.environment(IDLE="0.5")) as echo:
+    with ServerProcess("the echo", [sys.executable, "-c", ECHO], child_process.environment(IDLE="0.5")) as echo:
         echo.ask({})
         assert _until(lambda: not echo.is_there()), "it waits on"
 
