@@ -12,6 +12,7 @@ panel would show a distance in pixels that are no longer those of the picture).
 """
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -123,6 +124,43 @@ class CameraValues:
     def counted_anew(self, frame: Frame, sensor_fit: str) -> "CameraValues":
         """The same camera with its distance in the pixels of the picture of `frame`."""
         return replace(self, distance=self.growth(frame, sensor_fit) * self.distance, counted_in=without_border(frame))
+
+    def seeing(self, distance: float, frame: Frame, sensor_fit: str) -> "CameraValues":
+        """The same view by another lens; the zoom stays. distance : the effective one in the picture of `frame` at 100 %."""
+        return replace(self, distance=distance / self.growth(frame, sensor_fit) / self.zoom)
+
+    def moved_to(
+        self, found: Pinhole, moved: Collection[str], bound: Collection[tuple[str, int]], up_axis: Triple, rounding: float
+    ) -> "CameraValues":
+        """The view of a camera that was moved, with the look-at point as far away as it was.
+
+        found : the camera as it stands. moved : which of "eye" and "view" have changed by more than a rounding; what has not
+        keeps its digits. bound : (name, index) of the numbers that something else decides; they stay. up_axis : the up to
+        choose where that of the values does not give the picture, up to `rounding`, but it does; else up becomes v.
+        """
+        said = self.with_unbound(replace(self, eye=found.eye), bound) if "eye" in moved else self
+        if "view" in moved:
+            _, v, w = found.basis()
+            look_at = said.eye - math.dist(self.eye, self.look_at) * w
+            up = self.up
+            if self.pole != HOLD:
+                choices = (up for up in (self.up, up_axis) if np.abs(replace(found, up=up).basis()[1] - v).max() <= rounding)
+                up = next(choices, tuple(v.tolist()))
+            said = replace(said, look_at=tuple(look_at.tolist()), up=up)
+        elif said.eye != self.eye:
+            said = replace(said, look_at=tuple((self.look_at + np.subtract(said.eye, self.eye)).tolist()))
+        return self.with_unbound(said, bound)
+
+    def with_unbound(self, other: "CameraValues", bound: Collection[tuple[str, int]]) -> "CameraValues":
+        """Other values, but their own numbers (name, index) that something else decides."""
+        kept = {}
+        for name in {name for name, _ in bound}:
+            mine, others = getattr(self, name), getattr(other, name)
+            if isinstance(mine, tuple):
+                kept[name] = tuple(a if (name, i) in bound else b for i, (a, b) in enumerate(zip(mine, others, strict=True)))
+            else:
+                kept[name] = mine
+        return replace(other, **kept)
 
     def roll_from(self, up: Triple, held: float) -> float:
         """The roll of the picture from what another up gives: radians, from u towards v. held : the roll that is held.

@@ -176,14 +176,6 @@ def test_it_follows_what_a_driver_reads_between_frames(posed_camera, scene):
         assert posed_camera.matrix_world.translation.z == pytest.approx(height)
 
 
-def test_a_camera_with_a_driven_value_comes_back_when_it_is_moved_as_a_driven_channel_does(posed_camera, scene):
-    posed_camera.virtual_pinhole.driver_add("eye", 2).driver.expression = "2.0 + 3.0"
-    scene.frame_set(1)
-    posed_camera.location = (1, 2, 3)
-    bpy.context.view_layer.update()
-    assert tuple(posed_camera.matrix_world.translation) == (7, -6, 5)
-
-
 def test_a_constraint_in_the_way_of_a_driven_camera_makes_no_endless_loop(posed_camera, scene):
     posed_camera.virtual_pinhole.driver_add("eye", 2).driver.expression = "2.0 + 3.0"
     constraint = posed_camera.constraints.new("LIMIT_LOCATION")

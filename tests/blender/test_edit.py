@@ -11,9 +11,12 @@ import viewcam_addon
 
 PACKAGE = Path(viewcam_addon.__file__).parent
 # As they stand on one another, from below. All that is outside blender/ lies below them, and is plain mathematics here.
-ROOMS = ["versions", "datablocks", "storage", "targets", "hold", "pose", "camera", "resolution", "animation", "properties"]
-BY_BLENDER = {"on_update", "on_frame_change"}  # what Blender calls as it evaluates
-MOST = 15
+ROOMS = [
+    *("versions", "datablocks", "preferences", "storage", "targets", "hold", "findings", "pose", "suspects"),
+    *("camera", "resolution", "animation", "properties"),
+]
+BY_BLENDER = {"on_update", "on_frame_change", "_edit_of"}  # what Blender calls as it evaluates, and as a property is stored
+MOST = 18
 
 
 def walk_of(action):
@@ -69,6 +72,7 @@ def test_no_edit_calls_upward_whatever_the_camera_is_set_to(posed_camera, empty)
     group.look_at_target = empty("Target", (1, 2, 3))
     group.pole, group.keeps = "HOLD", "FIELD_OF_VIEW"
     posed_camera.parent = empty("Parent", (0, 0, 1))
+    bpy.context.view_layer.update()
     for name in ("eye", "distance", "roll"):
         value = 0.5 if name == "roll" else EDITS[name]
         functions, upward = walk_of(lambda name=name, value=value: setattr(group, name, value))

@@ -135,13 +135,16 @@ def test_values_that_make_no_camera_leave_the_roll_and_the_next_ones_go_on_from_
     np.testing.assert_allclose(axes(held_camera), before, atol=TURN)
 
 
-def test_a_camera_that_was_moved_by_hand_carries_nothing_along(held_camera, over_the_top):
+def test_a_camera_that_was_turned_by_hand_is_carried_on_from_there(held_camera, over_the_top):
     group = held_camera.virtual_pinhole
     group.eye = over_the_top(-5)
     held_camera.rotation_euler = (0.3, 1.2, -2.0)
-    roll = group.held_roll
-    group.eye = over_the_top(5)
+    bpy.context.view_layer.update()
+    roll, before = group.held_roll, axes(held_camera)
+    assert roll != 0 and tuple(group.up) == UP
+    group.distance *= 2
     assert group.held_roll == roll
+    np.testing.assert_allclose(axes(held_camera), before, atol=TURN)
 
 
 @pytest.mark.parametrize("text", ["", "nonsense", "[1, 2]", "[null, 0, 0, 0, 0, 0, 0, 0, 0]", "[0, 0, 0, 0, 0, 0, 0, 0, 1]"])
@@ -174,7 +177,6 @@ def test_applying_again_keeps_up_and_roll(held_camera):
     group = held_camera.virtual_pinhole
     group.held_roll = 1.0
     before = axes(held_camera)
-    held_camera.rotation_euler = (1, 2, 3)
     assert bpy.ops.viewcam.apply_camera() == {"FINISHED"}
     assert (tuple(group.up), group.held_roll) == (UP, 1.0)
     np.testing.assert_array_equal(axes(held_camera), before)
@@ -186,7 +188,8 @@ def test_a_mirrored_and_parented_camera_is_held_as_well(held_camera, scene, over
     parent.location, parent.rotation_euler, parent.scale = (1, 2, 3), (0.3, 0.2, 0.1), (-2, -2, -2)
     held_camera.parent = parent
     bpy.context.view_layer.update()
-    held_camera.virtual_pinhole.eye = over_the_top(-9)
+    group = held_camera.virtual_pinhole
+    group.eye, group.look_at, group.up, group.held_roll = over_the_top(-9), (0, 0, 0), UP, 0.0  # the parent carried them along
     for degrees in range(-9, 10):
         before = axes(held_camera)
         held_camera.virtual_pinhole.eye = over_the_top(degrees)

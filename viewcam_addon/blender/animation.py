@@ -10,6 +10,7 @@ Only the cameras that Blender has just evaluated are looked at, of whichever sce
 whose values are not animated are left alone: their artist may have moved them.
 """
 
+import contextlib
 import sys
 
 import bpy
@@ -26,8 +27,10 @@ from .datablocks import is_animated
 def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
     depsgraph = depsgraph or bpy.context.evaluated_depsgraph_get()
     for block in [update.id.original for update in depsgraph.updates]:
-        if isinstance(block, bpy.types.Object) and block.type == "CAMERA" and is_animated(block):
+        if _is_camera(block) and is_animated(block):
             _follow(block, scene, depsgraph)
+        elif _is_camera(block) and depsgraph.mode != "RENDER":
+            _adopt_move(block, scene, depsgraph)
     resolution.on_frame_change(scene, depsgraph)
 
 
@@ -37,12 +40,14 @@ def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
     Blender evaluates what this sets without calling it again, so that a constraint in the way makes no endless loop.
     """
-    for block in [update.id.original for update in depsgraph.updates]:
-        is_camera = isinstance(block, bpy.types.Object) and block.type == "CAMERA"
-        if is_camera and block.animation_data and _is_driven(block):
-            _follow(block, scene, depsgraph)
     if depsgraph.id_type_updated("SCENE"):
         resolution.follow(scene)
+    for block in [update.id.original for update in depsgraph.updates]:
+        if _is_camera(block):
+            is_driven = bool(block.animation_data) and _is_driven(block)
+            is_moved = not cameras.is_untouched(block, by_values=is_driven) and _adopt_move(block, scene, depsgraph)
+            if is_driven and not is_moved:
+                _follow(block, scene, depsgraph)
 
 
 @persistent
@@ -54,6 +59,23 @@ def on_load(_path: str, _more: object = None) -> None:
         targets.connect(camera_object)
     for camera_object in watching:
         _follow(camera_object, scene, bpy.context.evaluated_depsgraph_get())
+
+
+@persistent
+def on_undo(_scene: bpy.types.Scene, _more: object = None) -> None:
+    cameras.forget()
+
+
+def _is_camera(block: bpy.types.ID) -> bool:
+    return isinstance(block, bpy.types.Object) and block.type == "CAMERA" and storage.is_enabled(block)
+
+
+def _adopt_move(camera_object: bpy.types.Object, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> bool:
+    if resolution.is_paused or cameras.is_being_set(camera_object):
+        return False
+    with contextlib.suppress(InputError):  # the panel finds the same error and shows it
+        return cameras.adopt_move(camera_object, scene, depsgraph)
+    return False
 
 
 def _is_driven(camera_object: bpy.types.Object) -> bool:
@@ -75,15 +97,21 @@ def _follow(camera_object: bpy.types.Object, scene: bpy.types.Scene, depsgraph: 
     else:
         targets.connect(camera_object)  # one that was removed from the file leaves its driver
         targets.mirror(camera_object, evaluated)
+        cameras.agree(camera_object)
 
 
 def register() -> None:
     bpy.app.handlers.frame_change_post.append(on_frame_change)
     bpy.app.handlers.depsgraph_update_post.append(on_update)
     bpy.app.handlers.load_post.append(on_load)
+    bpy.app.handlers.undo_post.append(on_undo)
+    bpy.app.handlers.redo_post.append(on_undo)
 
 
 def unregister() -> None:
+    bpy.app.handlers.redo_post.remove(on_undo)
+    bpy.app.handlers.undo_post.remove(on_undo)
     bpy.app.handlers.load_post.remove(on_load)
+    cameras.forget()
     bpy.app.handlers.depsgraph_update_post.remove(on_update)
     bpy.app.handlers.frame_change_post.remove(on_frame_change)

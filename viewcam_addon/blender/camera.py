@@ -4,6 +4,11 @@
 renders it; `stated` says which Pinhole the four values of `object.virtual_pinhole` ask for, and `follow` moves the camera
 there. findings.py compares `stated` with `read`.
 
+**Two ways.** An edited value moves the camera at once, in its callback. So where camera and values differ when Blender has
+evaluated the camera, it was Blender that moved it, and `adopt_move` brings the values there. What differs by no more than
+float32 storage is no move: the values keep every bit, however often this is asked. Rejected: to keep in the file what was set
+last, which undo, linking and scripts would make stale.
+
 **How the pose is set.** As location and rotation, in whatever rotation mode the artist has, computed in float64 relative to the
 parent, with delta transforms taken off: within 1.6e-7 of a matrix entry, and without trouble in gimbal lock. Rejected:
 `matrix_parent_inverse` (3e-8, but the location and rotation in the sidebar would say nothing, and the camera would not be where
@@ -17,7 +22,8 @@ negative scale mirrors the picture, as in Cycles; its sign changes only if the P
 
 import contextlib
 import math
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -40,6 +46,25 @@ _UNSEEN = 2.0**-24
 _in_place: set[tuple] = set()
 _MOST_IN_PLACE = 256
 
+# The values that a camera's move can change.
+ALL = frozenset({"eye", "look_at", "up", "distance", "held_roll"})
+
+
+@dataclass(frozen=True)
+class _Agreement:
+    """A camera's state (`_state_of`) and stored values as they were last seen to agree.
+
+    before_moves : both before Blender began to move it: a move that is cancelled gives the values back to the bit.
+    """
+
+    state: tuple
+    values: CameraValues
+    before_moves: tuple[tuple, CameraValues] | None
+
+
+_agreed: dict[int, _Agreement] = {}  # by the camera's session_uid
+_being_set: list[int] = []  # session_uid of cameras whose values were edited, until they stand there
+
 
 def apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene) -> list[str]:
     """State `pinhole` in the camera's four values, move the camera there, and read it back.
@@ -54,6 +79,13 @@ def apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Sc
         if the object is no perspective camera, if the pinhole has another size or pixel aspect than the scene renders, or if
         a number is too large for Blender. Nothing has changed then.
     """
+    with _setting(camera_object):
+        left = _apply(camera_object, pinhole, scene)
+    agree(camera_object)
+    return left + check(camera_object, pinhole, scene)
+
+
+def _apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene) -> list[str]:
     datablocks.check_perspective(camera_object)
     intrinsics.check_storable(camera_object.name, look_at=pinhole.look_at, up=pinhole.up, distance=pinhole.distance)
     place(camera_object, pinhole, scene)
@@ -64,8 +96,7 @@ def apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Sc
     if followed:  # being asked where these are, Blender has brought the camera back to them
         place(camera_object, pinhole, scene)
     kept = targets.names(camera_object)
-    left = [f"The {words} no longer follows {name!r}" for words, name in followed.items() if words not in kept]
-    return left + check(camera_object, pinhole, scene)
+    return [f"The {words} no longer follows {name!r}" for words, name in followed.items() if words not in kept]
 
 
 def state(
@@ -87,14 +118,25 @@ def state(
     storage.settle(camera_object, said, frame)
 
 
-def follow(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
+def follow(camera_object: bpy.types.Object, scene: bpy.types.Scene, edited: frozenset[str] = ALL) -> None:
     """Move an enabled camera to where its values, edited or not, say; a held roll is carried along (hold.py).
+
+    edited : names of the values that count, wherever Blender has moved the camera since its last update; the others follow it.
 
     Raises
     ------
     InputError
         as `stated` and `apply` do. Nothing has changed then.
     """
+    with _setting(camera_object):
+        _follow(camera_object, scene, edited)
+
+
+def _follow(camera_object: bpy.types.Object, scene: bpy.types.Scene, edited: frozenset[str]) -> None:
+    last = _agreed.get(camera_object.session_uid)
+    if edited != ALL and last and last.state != _state_of(camera_object):
+        with contextlib.suppress(InputError):
+            adopt_move(camera_object, scene, datablocks.depsgraph_of(scene), last.values, edited)
     values, wanted = _level(camera_object, scene)
     if values.pole == HOLD:
         angle = hold.roll(camera_object, values, scene)
@@ -105,6 +147,7 @@ def follow(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
         wanted = rolls.turned(wanted, angle)
     place(camera_object, wanted, scene)
     storage.settle(camera_object, values.as_set(), datablocks.frame_of(scene))
+    agree(camera_object)
 
 
 def place(
@@ -115,17 +158,11 @@ def place(
     depsgraph : where to look up what carries the camera; None: that of the scene. A camera whose pose tells what carries it
         is then placed once more from there, since it may have been far away.
     """
-
-    def state() -> tuple:
-        """All of the camera that is read or set here, what carries it aside."""
-        lens = (camera.lens, camera.shift_x, camera.shift_y, camera.sensor_width, camera.sensor_height, camera.sensor_fit)
-        return pose.channels_of(camera_object), lens, tuple(camera.virtual_pinhole_sensor)
-
     camera, frame = camera_object.data, datablocks.frame_of(scene)
     is_carried = bool(camera_object.parent or camera_object.constraints)
     within = depsgraph or datablocks.depsgraph_of(scene)
     parent = pose.parent_matrix(camera_object, within) if is_carried else rotation.IDENTITY
-    before = state()
+    before = _state_of(camera_object)
     channels, _, grown_from = before
     order = (pinhole, frame, parent.tobytes())
     if (*order, *before) not in _in_place:
@@ -142,9 +179,16 @@ def place(
         _store(camera, shift_x=data.shift_x, shift_y=data.shift_y, **intrinsics.lens_and_sensor(data, sensor))
         if len(_in_place) == _MOST_IN_PLACE:
             _in_place.clear()
-        _in_place.add((*order, *state()))
+        _in_place.add((*order, *_state_of(camera_object)))
     if is_carried and depsgraph is None and pose.is_told_by_its_pose(camera_object):
         place(camera_object, pinhole, scene, datablocks.depsgraph_of(scene))
+
+
+def _state_of(camera_object: bpy.types.Object) -> tuple:
+    """All of the camera that `place` reads or sets, what carries it aside."""
+    camera = camera_object.data
+    lens = (camera.lens, camera.shift_x, camera.shift_y, camera.sensor_width, camera.sensor_height, camera.sensor_fit)
+    return pose.channels_of(camera_object), lens, tuple(camera.virtual_pinhole_sensor)
 
 
 def refit(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
@@ -295,6 +339,117 @@ def adopt(camera_object: bpy.types.Object, scene: bpy.types.Scene, keep: frozens
     if "distance" in keep:
         distance = values.distance_at_full_size(frame, camera_object.data.sensor_fit)
     state(camera_object, eye, look_at, up, distance, frame)
+
+
+@contextlib.contextmanager
+def _setting(camera_object: bpy.types.Object) -> Iterator[None]:
+    """Values and camera may differ within the block: neither has been moved."""
+    _being_set.append(camera_object.session_uid)
+    try:
+        yield
+    finally:
+        _being_set.pop()
+
+
+def is_being_set(camera_object: bpy.types.Object) -> bool:
+    """Whether the camera is on its way to its values, as Blender evaluates it."""
+    return camera_object.session_uid in _being_set
+
+
+def is_untouched(camera_object: bpy.types.Object, by_values: bool) -> bool:
+    """Whether neither the camera nor, unless by_values, its values have changed since they were last seen to agree."""
+    last = _agreed.get(camera_object.session_uid)
+    if last is None or camera_object.parent or camera_object.constraints or last.state != _state_of(camera_object):
+        return False
+    return by_values or last.values == storage.load(camera_object)
+
+
+def adopt_move(
+    camera_object: bpy.types.Object,
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    since: CameraValues | None = None,
+    edited: frozenset[str] = frozenset(),
+) -> bool:
+    """State in an enabled camera's values where Blender has moved it since: by hand or by script, its parent or its lens.
+
+    The look-at point keeps its distance to the eye, and up stays where it gives the picture. What follows an object or has a
+    driver stays as that says, and the camera is brought back to it. Nothing is adopted of what a constraint, a driver or a
+    library sets in the camera itself: these win, and `check` names them.
+
+    depsgraph : in which the camera was evaluated just now. since : the values before some were edited, where the camera does
+        not stand there yet. edited : the names of these, which stay. Returns whether there was anything to adopt.
+
+    Raises
+    ------
+    InputError
+        as `read` and `stated` do. Nothing has changed then.
+    """
+    frame, state = datablocks.frame_of(scene), _state_of(camera_object)
+    evaluated = camera_object.evaluated_get(depsgraph)
+    values, level = _level(evaluated, scene)
+    base, bound = since or values, {(name, i) for name in edited for i in range(3)}
+    if since:
+        level = since.pinhole(level.plane, frame, camera_object.data.sensor_fit, level.mirrored)
+    wanted = rolls.turned(level, hold.roll(evaluated, base, scene))
+    is_carried = bool(camera_object.parent or camera_object.constraints)
+    found = read(evaluated, scene)
+    bound |= targets.bound(evaluated)
+    moved = _moved(camera_object, wanted, found, depsgraph)
+    last = _agreed.get(camera_object.session_uid)
+    if "eye" in {name for name, _ in bound} and not since and (last is None or last.state == state):
+        moved -= {findings.VIEW}  # it is what the eye follows that has moved
+    if values.set_for != without_border(frame):
+        moved -= {findings.DISTANCE}  # the lens is that of another picture
+    if not moved:
+        agree(camera_object)
+        return False
+    before = None if since or last is None else last.before_moves or (last.state, last.values)
+    if before and before[0] == state and not bound and not is_carried:  # the move was cancelled
+        said = before[1]
+    else:
+        said = base.moved_to(found, moved, bound, preferences.up_axis(), findings.LARGEST_TURN)
+        if findings.DISTANCE in moved:
+            at_full_size = found.distance[0] * (frame.resolution_x / frame.size[0])
+            said = base.with_unbound(said.seeing(at_full_size, frame, camera_object.data.sensor_fit), bound)
+        said = values.with_unbound(said, bound)
+    if values.pole == HOLD and findings.VIEW in moved:
+        more = rolls.angle_from(said.up, found) - hold.roll(evaluated, said, scene)
+        more = math.remainder(more, 2 * math.pi)
+        if abs(more) > findings.LARGEST_TURN:
+            said = replace(said, held_roll=float(np.float32(said.held_roll + more)))
+    stored = [name for name in ALL if getattr(said, name) != getattr(values, name)]
+    if not stored:
+        return False
+    intrinsics.check_storable(camera_object.name, eye=said.eye, look_at=said.look_at, distance=(said.distance,))
+    storage.store(camera_object, said, *stored)
+    storage.settle(camera_object, said.as_set(), frame)
+    if bound:
+        level = said.pinhole(found.plane, frame, camera_object.data.sensor_fit, found.mirrored)
+        place(camera_object, rolls.turned(level, hold.roll(evaluated, said, scene)), scene, depsgraph)
+    agree(camera_object, before)
+    return True
+
+
+def _moved(camera_object: bpy.types.Object, wanted: Pinhole, found: Pinhole, depsgraph: bpy.types.Depsgraph) -> set[str]:
+    """Which of EYE, VIEW and DISTANCE Blender has moved by more than a rounding, and nobody holds where they are."""
+    differing = findings.differences(wanted, found, pose.reach(camera_object, depsgraph)).keys()
+    moved = {findings.EYE, findings.VIEW, findings.DISTANCE} & differing
+    if findings.EYE in moved and np.array_equal(np.float32(wanted.eye), np.float32(found.eye)):
+        moved.remove(findings.EYE)
+    return moved - suspects.held(camera_object) if moved else moved
+
+
+def agree(camera_object: bpy.types.Object, before_moves: tuple[tuple, CameraValues] | None = None) -> None:
+    """Take note that the camera is where its values say. before_moves : state and values before Blender began to move it."""
+    if len(_agreed) >= _MOST_IN_PLACE:
+        _agreed.clear()
+    _agreed[camera_object.session_uid] = _Agreement(_state_of(camera_object), storage.load(camera_object), before_moves)
+
+
+def forget() -> None:
+    """Forget what agreed: undo has brought back other values, and other cameras."""
+    _agreed.clear()
 
 
 def _as_followed(camera_object: bpy.types.Object, eye: Triple, look_at: Triple) -> tuple[Triple, Triple]:

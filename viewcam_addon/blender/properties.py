@@ -14,6 +14,7 @@ no camera (eye = look-at) leave it where it was, and the panel says so.
 
 import contextlib
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import bpy
@@ -40,11 +41,21 @@ def _on_enabled(group: "VirtualPinhole", context: bpy.types.Context) -> None:
         _on_edited(group, context)
 
 
-def _on_edited(group: "VirtualPinhole", _context: bpy.types.Context) -> None:
-    if storage.is_storing or not group.enabled:
-        return
-    with contextlib.suppress(InputError):  # the panel finds the same error and shows it
-        cameras.follow(group.id_data, datablocks.scene_of(group.id_data))
+def _edit_of(*names: str) -> Callable[["VirtualPinhole", bpy.types.Context], None]:
+    """The callback of a property whose edit states these values, whatever Blender has done to the camera since."""
+    edited = frozenset(names)
+
+    def on_edited(group: "VirtualPinhole", _context: bpy.types.Context) -> None:
+        if storage.is_storing or not group.enabled:
+            return
+        with contextlib.suppress(InputError):  # the panel finds the same error and shows it
+            cameras.follow(group.id_data, datablocks.scene_of(group.id_data), edited)
+
+    return on_edited
+
+
+_on_edited = _edit_of(*cameras.ALL)
+_on_lens = _edit_of("distance")
 
 
 def _on_distance(group: "VirtualPinhole", context: bpy.types.Context) -> None:
@@ -53,13 +64,13 @@ def _on_distance(group: "VirtualPinhole", context: bpy.types.Context) -> None:
         values = storage.load(group.id_data)
         if not storage.is_counted_in_earlier(group.id_data, values):
             _count_in_present_picture(group)
-    _on_edited(group, context)
+    _on_lens(group, context)
 
 
 def _on_keeps(group: "VirtualPinhole", context: bpy.types.Context) -> None:
     if not storage.is_storing:
         _count_in_present_picture(group)
-    _on_edited(group, context)
+    _on_lens(group, context)
 
 
 def _count_in_present_picture(group: "VirtualPinhole") -> None:
@@ -72,7 +83,7 @@ def _on_pole(group: "VirtualPinhole", context: bpy.types.Context) -> None:
     if group.pole != HOLD:
         with storage.without_callbacks():
             group.held_roll = 0.0
-    _on_edited(group, context)
+    _edit_of("held_roll")(group, context)
 
 
 def _on_target(group: "VirtualPinhole", context: bpy.types.Context) -> None:
@@ -80,7 +91,7 @@ def _on_target(group: "VirtualPinhole", context: bpy.types.Context) -> None:
         return
     targets.connect(group.id_data)
     targets.mirror(group.id_data, group.id_data)
-    _on_edited(group, context)
+    _edit_of()(group, context)
 
 
 def _on_shown(_group: "VirtualPinhole", _context: bpy.types.Context) -> None:
@@ -97,7 +108,7 @@ def _roll(group: "VirtualPinhole") -> float:
 
 def _turn(group: "VirtualPinhole", angle: float) -> None:
     cameras.turn(group.id_data, angle)
-    _on_edited(group, bpy.context)
+    _edit_of("up", "held_roll")(group, bpy.context)
 
 
 class VirtualPinhole(bpy.types.PropertyGroup):
@@ -114,7 +125,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         description="Where the camera stands, in world space",
         subtype="TRANSLATION",
         precision=4,
-        update=_on_edited,
+        update=_edit_of("eye"),
         override={"LIBRARY_OVERRIDABLE"},
     )
     look_at: bpy.props.FloatVectorProperty(
@@ -122,7 +133,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         description="The point in the middle of the view, in world space",
         subtype="TRANSLATION",
         precision=4,
-        update=_on_edited,
+        update=_edit_of("look_at"),
         override={"LIBRARY_OVERRIDABLE"},
     )
     up: bpy.props.FloatVectorProperty(
@@ -131,7 +142,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         subtype="XYZ",
         default=(0.0, 0.0, 1.0),
         precision=4,
-        update=_on_edited,
+        update=_edit_of("up"),
         override={"LIBRARY_OVERRIDABLE"},
     )
     eye_target: bpy.props.PointerProperty(
@@ -176,7 +187,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         soft_max=10.0,
         step=1,
         precision=3,
-        update=_on_edited,
+        update=_edit_of("distance"),
         override={"LIBRARY_OVERRIDABLE"},
     )
     keeps: bpy.props.EnumProperty(
@@ -226,7 +237,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         default=math.radians(10),
         min=0.0,
         max=math.pi / 2,
-        update=_on_edited,
+        update=_edit_of(),
         options=set(),
         override={"LIBRARY_OVERRIDABLE"},
     )
@@ -235,7 +246,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         description="By how much the camera is turned about its view from what up says, in an animation at the first frame. "
         "Type 0 to level the picture",
         subtype="ANGLE",
-        update=_on_edited,
+        update=_edit_of("held_roll"),
         override={"LIBRARY_OVERRIDABLE"},
     )
     show_overlay: bpy.props.BoolProperty(

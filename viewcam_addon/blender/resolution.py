@@ -24,15 +24,15 @@ from . import datablocks, storage
 # The picture for which all cameras of a scene have been looked at, by the scene's name, with the scene's address: it is another
 # scene after undo and in another file. Without it every change of a scene's settings would look at every object.
 _seen: dict[str, tuple] = {}
-_is_paused = False
+is_paused = False
 
 
 @contextlib.contextmanager
 def lens_kept(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[None]:
     """For a picture of another size within the block: no camera follows it, and this one's values go with its lens."""
-    global _is_paused
-    values, was_paused = storage.load(camera_object), _is_paused
-    _is_paused = True
+    global is_paused
+    values, was_paused = storage.load(camera_object), is_paused
+    is_paused = True
     try:
         with storage.restored(camera_object, "keeps", "counted_in"):
             if values.keeps == PIXELS:
@@ -40,12 +40,12 @@ def lens_kept(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterat
                 storage.store(camera_object, replace(values, keeps=FIELD_OF_VIEW, counted_in=picture), "keeps", "counted_in")
             yield
     finally:
-        _is_paused = was_paused
+        is_paused = was_paused
 
 
 def follow(scene: bpy.types.Scene) -> None:
     """Set the lenses of the scene's cameras for its picture, if it is another one than last time."""
-    if _is_paused:
+    if is_paused:
         return
     with contextlib.suppress(InputError):  # no picture at all: the panel says so
         frame = datablocks.frame_of(scene)
@@ -60,7 +60,7 @@ def follow(scene: bpy.types.Scene) -> None:
 
 def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """In a render nothing but the lens is touched: the values are counted anew when the scene is next looked at."""
-    if depsgraph.mode != "RENDER" or _is_paused:
+    if depsgraph.mode != "RENDER" or is_paused:
         return
     with contextlib.suppress(InputError):
         for camera_object in _set_for_another(scene, datablocks.frame_of(scene)):

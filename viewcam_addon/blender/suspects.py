@@ -21,6 +21,20 @@ def suspects(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterato
     yield from _sharers(camera_object)
 
 
+def held(camera_object: bpy.types.Object) -> set[str]:
+    """What of EYE, VIEW, DISTANCE and CENTRE is decided by a constraint, a driver or a library, whatever the artist does.
+
+    And by keyframes, where the four values have some as well.
+    """
+    blocks = camera_object, camera_object.data
+    holding = [*_libraries(camera_object), *(each for block in blocks for each in _drivers(block))]
+    if not pose.is_carried_by_constraints(camera_object):
+        holding += _constraints(camera_object)
+    if datablocks.is_animated(camera_object):
+        holding += (each for block in blocks for each in _animation(block))
+    return set().union(*(suspect.acts_on for suspect in holding))
+
+
 # Constraints that leave the eye or the view alone; all others act on both.
 _MOVING = ("COPY_LOCATION", "LIMIT_LOCATION", "LIMIT_DISTANCE", "FLOOR")
 _TURNING = ("TRACK_TO", "DAMPED_TRACK", "LOCKED_TRACK", "COPY_ROTATION", "LIMIT_ROTATION", "COPY_SCALE", "LIMIT_SCALE")

@@ -94,6 +94,18 @@ def _depend(driver: bpy.types.Driver, target: bpy.types.Object) -> None:
             aim.id, aim.data_path = target, path
 
 
+def bound(camera_object: bpy.types.Object) -> set[tuple[str, int]]:
+    """(name, index) of the values' numbers that a target or a driver decides. An evaluated camera, or the original."""
+    found = {
+        (point, i) for point in POINTS for i in range(3) if target_of(camera_object, point) and place(camera_object, point)
+    }
+    for curve in versions.drivers(camera_object):
+        owner, _, name = curve.data_path.partition(".")
+        if owner == "virtual_pinhole" and curve.data_path != _HOOK and not versions.is_muted(curve):
+            found.add((name, curve.array_index))
+    return found
+
+
 def names(camera_object: bpy.types.Object) -> dict[str, str]:
     """The targets' names by the words for the point: {"look-at": "Empty"}."""
     found = ((words, target_of(camera_object, point)) for point, words in POINTS.items())

@@ -6,8 +6,7 @@ from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender.interface import readouts
 
 
-def test_apply_brings_a_moved_camera_back(posed_camera):
-    posed_camera.location = (1, 1, 1)
+def test_apply_leaves_a_camera_where_its_values_are(posed_camera):
     assert bpy.ops.viewcam.apply_camera() == {"FINISHED"}
     assert tuple(posed_camera.location) == (7, -6, 5)
 
@@ -37,10 +36,10 @@ def test_adopt_enables_a_camera(camera_object):
 
 
 def test_a_camera_can_be_named(posed_camera, add_camera):
-    add_camera("Other")
-    posed_camera.location = (1, 1, 1)
-    bpy.ops.viewcam.apply_camera(camera="Camera")
-    assert tuple(posed_camera.location) == (7, -6, 5)
+    other = add_camera("Other")
+    posed_camera.virtual_pinhole.enabled = False
+    bpy.ops.viewcam.adopt_camera(camera="Camera")
+    assert posed_camera.virtual_pinhole.enabled and not other.virtual_pinhole.enabled
 
 
 @pytest.mark.parametrize(
@@ -68,9 +67,9 @@ def test_without_a_camera_the_buttons_are_off(fresh_blender):
 def test_they_work_in_edit_mode_of_another_object(posed_camera, scene):
     bpy.ops.mesh.primitive_cube_add()
     bpy.ops.object.mode_set(mode="EDIT")
-    posed_camera.location = (1, 1, 1)
-    bpy.ops.viewcam.apply_camera()
-    assert tuple(posed_camera.location) == (7, -6, 5)
+    posed_camera.virtual_pinhole.enabled = False
+    bpy.ops.viewcam.adopt_camera(camera="Camera")
+    assert posed_camera.virtual_pinhole.enabled
 
 
 def test_applying_reports_what_did_not_stick(posed_camera, scene, capfd):
