@@ -8,7 +8,7 @@ _command = None
 
 def _rooms() -> list[ModuleType]:
     """Who has CLASSES for Blender or more to tell it, in order: a panel needs its operators, an operator its properties."""
-    from . import animation, preferences, properties, render_settings, resolution
+    from . import animation, own_picture, preferences, properties, render_settings, resolution
     from .interface import (
         baking,
         camera_files,
@@ -30,7 +30,7 @@ def _rooms() -> list[ModuleType]:
 
     buttons = [operators, moving, clipboard, baking, presets]
     shown = [panel, scene_cameras, photo_matching, proof, overlay, gizmos]
-    followers = [animation, resolution]
+    followers = [animation, resolution, own_picture]
     return [
         preferences,
         properties,

@@ -11,7 +11,7 @@ import bpy
 from ... import pinhole as text
 from ...errors import InputError
 from .. import camera as cameras
-from .. import datablocks, preferences
+from .. import datablocks, own_picture, preferences
 from . import file_menu, viewport
 
 _NAME = "Virtual Pinhole"
@@ -145,6 +145,7 @@ class VIEWCAM_OT_make_camera_active(_SceneOperator, bpy.types.Operator):
         if found is None or found.type != "CAMERA":
             raise InputError(f"scene {context.scene.name!r} has no camera {self.camera!r}: name another")
         context.scene.camera = found
+        own_picture.switch(context.scene)
 
 
 class VIEWCAM_UL_cameras(bpy.types.UIList):
@@ -204,6 +205,60 @@ def draw_none(layout: bpy.types.UILayout) -> None:
     column.operator("viewcam.add_camera", text="Add from View", icon="VIEW_CAMERA").from_view = True
 
 
+class _PicturePanel:
+    bl_label = "Own Picture"
+    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return datablocks.camera_in(context) is not None
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        self.layout.prop(datablocks.camera_in(context).virtual_pinhole_picture, "use", text="")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """While the camera is the scene's, what counts are the scene's numbers, here as in Output."""
+        camera_object, scene = datablocks.camera_in(context), context.scene
+        own, is_active = camera_object.virtual_pinhole_picture, own_picture.owner(scene) == camera_object
+        render, frames = (scene.render, scene) if is_active else (own, own)
+        layout = self.layout
+        layout.use_property_split, layout.use_property_decorate = True, False
+        layout.active = own.use
+        for names, group in (
+            (("resolution_x", "resolution_y", "resolution_percentage"), render),
+            (("pixel_aspect_x", "pixel_aspect_y"), render),
+            (("frame_start", "frame_end"), frames),
+        ):
+            column = layout.column(align=True)
+            for name in names:
+                column.prop(group, name, text=_LABELS[name])
+
+
+_LABELS = {
+    "resolution_x": "Resolution X",
+    "resolution_y": "Y",
+    "resolution_percentage": "%",
+    "pixel_aspect_x": "Aspect X",
+    "pixel_aspect_y": "Y",
+    "frame_start": "Frame Start",
+    "frame_end": "End",
+}
+
+
+class VIEWCAM_PT_data_picture(_PicturePanel, bpy.types.Panel):
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "data"
+    bl_parent_id = "VIEWCAM_PT_data"
+
+
+class VIEWCAM_PT_sidebar_picture(_PicturePanel, bpy.types.Panel):
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Pinhole"
+    bl_parent_id = "VIEWCAM_PT_sidebar"
+
+
 class VIEWCAM_PT_sidebar_cameras(bpy.types.Panel):
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
@@ -244,7 +299,13 @@ def _draw_add_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
 
 
 OPERATORS = (VIEWCAM_OT_add_camera, VIEWCAM_OT_step_camera, VIEWCAM_OT_make_camera_active)
-CLASSES = (*OPERATORS, VIEWCAM_UL_cameras, VIEWCAM_PT_sidebar_cameras)
+CLASSES = (
+    *OPERATORS,
+    VIEWCAM_UL_cameras,
+    VIEWCAM_PT_sidebar_cameras,
+    VIEWCAM_PT_data_picture,
+    VIEWCAM_PT_sidebar_picture,
+)
 
 
 def register() -> None:
