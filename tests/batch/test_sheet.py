@@ -96,6 +96,31 @@ def test_a_link_stays_in_the_folder(name):
         assert not parts.scheme and not parts.netloc and not parts.query and not parts.fragment and "/" not in parts.path
 
 
+def test_each_shot_says_what_it_is_of_by_which_lens_and_at_what_angle():
+    record = {
+        "shot": {"name": "a", "camera": "Hero <1>"},
+        "rendered": {"file": "film.blend", "width": 1000, "height": 500, "frame": 12},
+        "camera": {"distance": [500.0, 500.0], "width": 1000},
+        "blender": {"lens": 18.0},
+    }
+    assert sheet.facts(record) == ["film.blend", "Hero <1>", "frame 12", "1000 × 500", "18 mm", "90° across"]
+    page = Page(sheet.picture(Result("a", {**record, "warnings": []})))
+    assert "film.blend · Hero <1> · frame 12 · 1000 × 500 · 18 mm · 90° across" in page.text
+    for broken in (
+        {},
+        {"camera": 5},
+        {"camera": {"distance": []}, "rendered": {"frame": "1"}},
+        {"camera": {"distance": [0.0]}},
+    ):
+        assert sheet.facts(broken) == []
+
+
+def test_a_click_shows_a_picture_larger_and_the_page_says_when_it_was_made(tmp_path, painting):
+    painting.paint(tmp_path, 2)
+    text = (tmp_path / "contact-sheet.html").read_text(encoding="utf-8")
+    assert text.count('class="large"') == 2 and "showModal" in text and "document.lastModified" in text
+
+
 ATTACK = "4\"><script>alert(1)</script><img src=x onerror='alert(2)' alt=\""
 
 

@@ -1,14 +1,17 @@
 """The contact sheet: every shot of a batch in one HTML page, in the folder beside the pictures.
 
-Thumbnails are the previews themselves, loaded when they come into view, and lead to them; EXR and sidecar are linked. The page
-holds no times, so that the same batch gives the same page. Rejected: thumbnails inside the page, as reports have their
-pictures (ten thousand shots make a page that no browser opens), and smaller copies (a third file a shot).
+Thumbnails are the previews themselves, loaded when they come into view, and are shown larger by a click; EXR and sidecar are
+linked. The page holds no times, so that the same batch gives the same page; when it was made, the browser knows and says.
+Rejected: thumbnails inside the page, as reports have their pictures (ten thousand shots make a page that no browser opens), and
+smaller copies (a third file a shot).
 
 A sidecar may be anybody's: all that it says is text here and nothing else, and no link leads out of the folder.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 from .. import html_page
@@ -20,7 +23,34 @@ _WORDS = {"failed": "failed", "left": "left to render", "checks_failed": "not wh
 
 def picture(result: Result) -> str:
     """A shot's part of the page."""
-    return html_page.filled("batch/sheet_picture.html", shot=result, file=quote(result.name))
+    return html_page.filled("batch/sheet_picture.html", shot=result, file=quote(result.name), facts=facts(result.record or {}))
+
+
+def facts(record: Mapping[str, Any]) -> list[str]:
+    """What a shot's sidecar says of it, a few words each: file, camera, frame, size, lens and angle of view."""
+    rendered, camera, blender = (_part(record, name) for name in ("rendered", "camera", "blender"))
+    told = [str(rendered["file"])] if rendered.get("file") else []
+    name = _part(record, "shot").get("camera")
+    told += [str(name)] if name else []
+    frame, width, height = (rendered.get(key) for key in ("frame", "width", "height"))
+    told += [f"frame {frame}"] if isinstance(frame, int) else []
+    told += [f"{width} × {height}"] if isinstance(width, int) and isinstance(height, int) else []
+    lens, distance, across = blender.get("lens"), camera.get("distance"), camera.get("width")
+    told += [f"{lens:.4g} mm"] if isinstance(lens, float) else []
+    if (
+        isinstance(distance, list)
+        and distance
+        and isinstance(distance[0], float)
+        and distance[0] > 0
+        and isinstance(across, int)
+    ):
+        told.append(f"{math.degrees(2 * math.atan2(across / 2, distance[0])):.3g}° across")
+    return told
+
+
+def _part(record: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    found = record.get(name)
+    return found if isinstance(found, dict) else {}
 
 
 def write(path: Path, pictures: Sequence[str], counts: Mapping[str, int]) -> None:

@@ -153,7 +153,14 @@ def test_what_a_shot_says_is_rendered_and_said(stage, shoot):
     with BlenderRenderer(seed=7) as renderer:
         plain, said = shoot(renderer, LEFT)[0], shoot(renderer, replace(LEFT, width=48, height=40, samples=1, frame=9))[0]
         traced = shoot(renderer, replace(RIGHT, engine="VIEWCAM", level="auto", samples=3))[0]
-    settings = {"engine": "CYCLES", "level": None, "seed": 7, "scene": stage.name, "view_layers": [stage.view_layers[0].name]}
+    settings = {
+        "engine": "CYCLES",
+        "level": None,
+        "seed": 7,
+        "file": "",
+        "scene": stage.name,
+        "view_layers": [stage.view_layers[0].name],
+    }
     assert plain["rendered"] == settings | {"samples": 2, "width": 32, "height": 18, "frame": 4}
     assert said["rendered"] == settings | {"samples": 1, "width": 48, "height": 40, "frame": 9}
     assert traced["rendered"] | {"level": "path", "samples": 3, "engine": "VIEWCAM"} == traced["rendered"]

@@ -9,6 +9,7 @@ shots (persistent_data.py), and no camera of the file follows a picture of anoth
 
 import dataclasses
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 
 import bpy
 
@@ -146,6 +147,7 @@ class ShotSettings:
             "width": datablocks.frame_of(scene).window[2],
             "height": datablocks.frame_of(scene).window[3],
             "frame": scene.frame_current,
+            "file": Path(bpy.data.filepath).name,
             "scene": scene.name,
             "view_layers": [layer.name for layer in scene.view_layers if layer.use],
         }
