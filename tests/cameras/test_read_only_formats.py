@@ -243,6 +243,26 @@ def test_a_trajectory_is_an_animation_through_the_intrinsics_that_are_given(tmp_
         cameras.read(path)
 
 
+def test_eight_numbers_without_a_quaternion_are_no_trajectory_of_tum():
+    """Nuke's .chan has as many: frame, place, three angles in degrees, field of view."""
+    with pytest.raises(InputError, match="quaternion of pose 0 has the length 46"):
+        cameras.read("1 0.1 1.5 5 -10 2 0 45\n2 0.2 1.5 5 -10 4 0 45\n", options=Options(base=CAMERAS["plain"]))
+
+
+def test_euroc_cameras_that_are_fisheyes_are_refused_even_without_coefficients(tmp_path):
+    (tmp_path / "state").mkdir()
+    (tmp_path / "cam0").mkdir()
+    data = tmp_path / "state" / "data.csv"
+    data.write_text("#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w []\n0,1,2,3,1,0,0,0\n")
+    sensor = "T_BS:\n  data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\nresolution: [640, 480]\n"
+    sensor += "intrinsics: [500, 500, 320, 240]\ndistortion_model: {}\ndistortion_coefficients: [0, 0, 0, 0]\n"
+    (tmp_path / "cam0" / "sensor.yaml").write_text(sensor.format("radial-tangential"))
+    assert cameras.read(data)[0].pinhole.eye == (1, 2, 3)
+    (tmp_path / "cam0" / "sensor.yaml").write_text(sensor.format("equidistant"))
+    with pytest.raises(InputError, match="equidistant"):
+        cameras.read(data)
+
+
 @pytest.mark.parametrize("name", UNMIRRORED)
 def test_polycam_3d_scanner_app_and_record3d_are_arkits(name):
     known = Known(name)
@@ -313,9 +333,19 @@ K = {"K": [[500, 0, 320], [0, 500, 240], [0, 0, 1]], "image_size": [640, 480]}
         ({"K": [[500, 0, 0], [0, 500, 0], [320, 240, 1]]}, "transpose"),
         ({"K": [[500, 2, 320], [0, 500, 240], [0, 0, 1]]}, "skew"),
         ({"model": "fisheye"}, "fisheye"),
+        ({"camera_model": "pinhole", "distortion_model": "equidistant", "distortion_coeffs": [0, 0, 0, 0]}, "equidistant"),
+        ({"distortion_model": "fov"}, "fov"),
+        ({"cam_to_robot_transform": np.eye(4).tolist()}, "whose axes"),
+        ({"binning_x": 2}, "divide K"),
         ({"K": [[1.2, 0, 0.5], [0, 1.6, 0.5], [0, 0, 1]]}, "widths of the picture"),
     ],
 )
 def test_what_opencvs_names_leave_open_is_refused_and_not_guessed(more, told):
     with pytest.raises(InputError, match=told):
         cameras.read(json.dumps({**K, **more}))
+
+
+def test_a_distortion_that_no_picture_shows_is_taken_and_its_figure_said():
+    (camera,) = cameras.read(json.dumps({**K, "k1": 1e-6}))
+    # 500 k1 r³, r the corner's distance over the focal length
+    assert any("left out: it moves the picture's corner by 0.000257 pixels" in note for note in camera.notes)

@@ -515,6 +515,49 @@ CODE = {
 }
 
 
+VTK_WITHOUT_AN_ANGLE = "camera.SetPosition(7, -6, 4); camera.SetFocalPoint(0, 0, 1); camera.SetViewUp(0, 0, 1)"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "mlab.view(azimuth=45, elevation=60, distance=10, focalpoint=(0, 0, 0))",
+        "ctr.set_front([0.5, -0.2, 0.8]); ctr.set_lookat([0, 0, 0]); ctr.set_up([0, 0, 1])",
+        "camera.location = (7.4, -6.9, 5.0); camera.rotation_euler = (1.1, 0, 0.8)",
+    ],
+)
+def test_code_that_says_no_eye_or_target_is_not_completed_by_another_camera(text):
+    with pytest.raises(InputError, match=r"does not say the camera's (position|target)"):
+        cameras.read(text, options=Options(base=CAMERAS["plain"]))
+
+
+def test_what_of_code_is_another_cameras_is_said():
+    text = "gluLookAt(7, -6, 4, 0, 0, 1, 0, 0, 1);"
+    (camera,) = cameras.read(text, options=Options(base=CAMERAS["pixels_not_square"]))
+    assert camera.pinhole == CAMERAS["pixels_not_square"] and "how the camera sees" in camera.notes[0]
+    (camera,) = cameras.read("lookfrom = vec3(7, -6, 4); lookat = vec3(0, 0, 1);", options=Options(base=CAMERAS["rolled"]))
+    assert camera.pinhole.up == CAMERAS["rolled"].up and "which way is up" in camera.notes[0]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        VTK_WITHOUT_AN_ANGLE,
+        "plotter.camera_position = [(7, -6, 4), (0, 0, 1), (0, 0, 1)]",
+        "view.CameraPosition = [7, -6, 4]\nview.CameraFocalPoint = [0, 0, 1]\nview.CameraViewUp = [0, 0, 1]",
+    ],
+)
+def test_vtks_own_angle_counts_where_its_code_says_none_whatever_camera_was_there(text):
+    (camera,) = cameras.read(text, options=Options(size=(640, 360), base=CAMERAS["portrait"]))
+    assert camera.pinhole.distance[1] == pytest.approx(180 / math.tan(math.radians(15))) and "30°" in camera.notes[0]
+
+
+def test_three_js_turns_by_the_up_that_all_objects_have():
+    text = "camera = new THREE.PerspectiveCamera(40, 2); camera.position.set(1, 2, 3); camera.lookAt(0, 0, 0);"
+    (camera,) = cameras.read(f"THREE.Object3D.DEFAULT_UP.set(0, 0, 1); {text}", options=GL)
+    assert camera.pinhole.up == (0, 0, 1) and cameras.read(text, options=GL)[0].pinhole.up == (0, 1, 0)
+
+
 @pytest.mark.parametrize("name", CODE)
 def test_code_that_looks_at_a_point_is_read_as_the_matrices_of_glm(name):
     glm = pytest.importorskip("glm")
@@ -557,6 +600,19 @@ def test_vtks_window_centre_and_horizontal_angle_are_its_formulas():
         (CODE["vtk"] + "\ncamera.SetParallelProjection(1)", "parallel projection"),
         (CODE["vtk"] + "\ncamera.Zoom(1.5)", "zoom"),
         (CODE["vtk"] + "\ncamera.Azimuth(30)", "by other means"),
+        (CODE["vtk"] + "\nrenderer.ResetCamera()", "moves the camera until all is seen"),
+        (VTK_WITHOUT_AN_ANGLE + "\ncamera.ParallelProjectionOn()", "orthographic"),
+        (VTK_WITHOUT_AN_ANGLE + "\ncamera.Zoom(1.5)", "zoom"),
+        (CODE["three.js"] + "rig.add(camera);", "the camera is part of this"),
+        (CODE["three.js"] + "camera.up.set(0, 0, 1);", "changes after it was turned"),
+        (CODE["three.js"] + "camera.position.x = Math.sin(time);", "computed from what the text does not say"),
+        (CODE["three.js"] + "camera.position.x = 3; camera.position.x = 4;", "this is 3 elsewhere"),
+        (CODE["weekend_4"] + "cam.lookfrom = orbit(frame);", "eye in plain"),
+        (CODE["glm"] + "view = glm::rotate(view, 0.5f, glm::vec3(0, 1, 0));", "moves the view by other means"),
+        (
+            "glTranslatef(0, 0, -3); gluLookAt(1,2,3, 0,0,0, 0,1,0); gluPerspective(40, 1, 1, 9)",
+            "moves the view by other means",
+        ),
         (CODE["three.js"] + "camera.rotation.x = 1;", "by other means"),
         (CODE["three.js"] + "camera.position.applyAxisAngle(axis, 2);", "by other means"),
         (CODE["three.js"] + "camera.position.z += 2;", "moves the camera"),
@@ -585,6 +641,32 @@ def test_what_other_things_look_at_is_no_cameras():
         text.replace("view1", "this.instance").replace("mesh", "this.instance").replace("const ", ""), options=GL
     )
     assert (named.pinhole.eye, named.pinhole.look_at) == ((1, 2, 3), (0, 0, 9))
+
+
+def test_luxrenders_look_at_is_right_handed_as_pbrts_first_version_was():
+    """Its LookAt has right = dir × up for the camera's x, where pbrt has up × dir; the rest of the chain is the same."""
+    scene = 'LookAt 1 2 3  4 5 6  0 0 1\nCamera "perspective" "float fov" [40]\nFilm "{}" "integer xresolution" [640] '
+    scene += '"integer yresolution" [360]'
+    (lux,), (pbrt,) = (cameras.read(scene.format(film)) for film in ("fleximage", "image"))
+    assert not lux.pinhole.mirrored and pbrt.pinhole.mirrored
+    assert dataclasses.replace(lux.pinhole, mirrored=True) == pbrt.pinhole
+    for before, mirrored in (("Scale -1 1 1\n", True), ("Rotate 90 0 0 1\n", False), ("Scale -1 1 1 Rotate 90 0 0 1\n", True)):
+        (lux,), (pbrt,) = (cameras.read(before + scene.format(film)) for film in ("fleximage", "image"))
+        assert (lux.pinhole.mirrored, pbrt.pinhole.mirrored) == (mirrored, not mirrored)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '<Application><Camera Name="cam"/><Node Camera "x"/></Application>',
+        'print("Reading camera {}/{}".format(1, 2)); print(f"camera {number}")',
+        'from typing import NamedTuple\n\nCameraModel = namedtuple("CameraModel", ["a"])',
+        "to: everybody\nabout cameras",
+    ],
+)
+def test_what_only_has_the_words_of_a_format_is_not_taken_for_it(text):
+    with pytest.raises(InputError, match=r"no camera that is understood|give 3 finite numbers"):
+        cameras.read(text, options=GL)
 
 
 def test_a_film_of_pbrt_without_its_size_has_the_size_that_is_asked_for():

@@ -31,7 +31,7 @@ Rows = list[list[float]]
 Quaternion = tuple[float, float, float, float]
 
 # Of a rotation in a file, whose numbers have so many digits: what is worth a note, and what is none any more.
-_NOTED, _NO_ROTATION = 1e-5, 2e-3
+_NOTED, _NO_ROTATION, _NO_QUATERNION = 1e-5, 2e-3, 1e-2
 _SCALED = 1e-3
 
 
@@ -184,11 +184,17 @@ def from_world_to_camera(turn: ArrayLike, translation: Sequence[float], what: st
 
 
 def rotation_of(quaternion: Sequence[float], what: str) -> np.ndarray:
-    """(3, 3) of a quaternion (w, x, y, z), Hamilton's, of any length but 0."""
+    """(3, 3) of a quaternion (w, x, y, z), Hamilton's, of length 1 but for its few digits.
+
+    Raises
+    ------
+    InputError
+        if it has another length: then these four numbers are something else, as angles and a field of view.
+    """
     numbers = checks.vector(f"the quaternion of {what}", quaternion, 4)
     length = math.hypot(*numbers)
-    if not 1e-100 < length < 1e100:
-        raise InputError(f"the quaternion of {what} has the length {length:g}: give one of length 1")
+    if abs(length - 1) > _NO_QUATERNION:
+        raise InputError(f"the quaternion of {what} has the length {length:.6g}: give one of length 1")
     w, x, y, z = (number / length for number in numbers)
     return np.array(
         [

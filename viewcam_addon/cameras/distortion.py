@@ -11,6 +11,7 @@ from ..errors import InputError
 from ..pinhole import ViewPlane
 from .camera import Options
 
+_UNSEEN = 1e-3  # pixels: what this project calls the same camera
 Point = tuple[float, float]
 Lens = Callable[[float, float], Point]
 """x, y in the view plane at distance 1, y downwards, → where the lens puts them."""
@@ -64,7 +65,7 @@ def settle(coefficients: Mapping[str, float], lens: Lens, plane: ViewPlane, what
     Raises
     ------
     InputError
-        if there is one and `options.without_distortion` is not chosen.
+        if there is one that a picture can show and `options.without_distortion` is not chosen.
     """
     given = {name: value for name, value in coefficients.items() if value}
     if not given:
@@ -72,7 +73,7 @@ def settle(coefficients: Mapping[str, float], lens: Lens, plane: ViewPlane, what
     pixels = displacement(lens, plane)
     size = f"{pixels:.3g} pixels" if math.isfinite(pixels) else "beyond all numbers"
     terms = ", ".join(f"{name} = {value:.6g}" for name, value in given.items())
-    if options.without_distortion:
+    if options.without_distortion or pixels < _UNSEEN:
         return (f"The lens distortion of {what} ({terms}) was left out: it moves the picture's corner by {size}",)
     raise InputError(
         f"{what} has lens distortion ({terms}) that moves the picture's corner by {size}, which no pinhole has: "

@@ -49,7 +49,7 @@ _CAMERA = re.compile(r"cam|view|eye|lens|observer", re.IGNORECASE)
 _EYE = "eye eyepos eyeposition eyepoint eyelocation lookfrom lookfrompoint campos camerapos camposition "
 _EYE += "cameraposition cameralocation camerafrom cameraorigin cameraeye cameracenter"
 _TARGET = "lookat lookatpoint lookatpos lookto focalpoint camerafocalpoint cameratarget camtarget cameralookat cameraat"
-_UP = "up vup upvector viewup cameraviewup cameraup camup camerauup"
+_UP = "up vup upvector viewup cameraviewup cameraup camup camerauup defaultup"
 _SPECIFIC = {
     **dict.fromkeys(_EYE.split(), "eye"),
     **dict.fromkeys(_TARGET.split(), "target"),
@@ -107,7 +107,15 @@ _PERSPECTIVE |= {
 }
 _PERSPECTIVE |= {"perspectiveprojection", "createperspectiveprojectionmatrix"}
 _FRUSTUM = {"glfrustum", "frustum", "makefrustum"}
-_ORTHOGRAPHIC = {"glortho", "ortho", "orthographiccamera", "gluortho2d", "xmmatrixorthographiclh", "enableparallelprojection"}
+_ORTHOGRAPHIC = {
+    "glortho",
+    "ortho",
+    "orthographiccamera",
+    "gluortho2d",
+    "xmmatrixorthographiclh",
+    "enableparallelprojection",
+    "parallelprojectionon",
+}
 _MOVES = {
     "rotatex",
     "rotatey",
@@ -137,8 +145,16 @@ _MOVES |= {
 }
 _TURNED = {"rotation", "quaternion", "matrix", "matrixworld", "rotate"}
 _PLACES = {"position", "up", "direction"}
+# What turns or moves a view that a look-at made: glm::rotate(view, …), mat4.rotateY(view, view, …).
+_VIEW_MOVED = re.compile(
+    r"\b(?:rotate|translate|scale)\w{0,3}\s*+\(\s*+(?:\w+\s*+(?:\.|->)\s*+)?+(?:view|camera)\w*+\s*+,", re.IGNORECASE
+)
+_GL_MOVES = {"gltranslatef", "gltranslated", "glrotatef", "glrotated", "glscalef", "glscaled", "glmultmatrixf", "glmultmatrixd"}
 _CHANGED = re.compile(rf"(?<![\w$.])({_PATH})\s*+[-+*/]=")
 _VECTORS = {"eye", "target", "up", "direction"}
+_OF_VTK = re.compile(
+    r"SetViewUp|SetFocalPoint|CameraFocalPoint|\bcamera_position\s*+=|\bcpos\s*+=|\bfocal_point\s*+=", re.IGNORECASE
+)
 _OTHER_LENSES = re.compile(
     r"\b(ThinLens|FishEye|Fisheye|Spherical|Stereo(?:Camera)?|Orthographic)\s*+\*|new\s++(ThinLens|FishEye|Spherical|StereoCamera|Orthographic)\b"
 )
@@ -151,7 +167,7 @@ class _Said:
     values: dict[str, tuple[object, int]] = field(default_factory=dict)
     mirrored: bool = False
     aimed: list[tuple[int, tuple]] = field(default_factory=list)  # camera.lookAt(point): it counts where the camera is then
-    moved: list[int] = field(default_factory=list)  # the eye was set
+    moved: list[int] = field(default_factory=list)  # the eye, or up, was set
     frustum: tuple[float, ...] | None = None
     orthographic: int | None = None
     three: bool = False
@@ -293,9 +309,20 @@ class _Code:
             parts = _PART.sub(" ", changed[1]).split()
             if self._is_camera(parts[:1]) and self._role(parts, "=") not in (None, "width", "height", "size"):
                 texts.fail(self.text, changed.start(), "this moves the camera from where it was, write where it is then")
+        if moved := _VIEW_MOVED.search(self.text):
+            texts.fail(self.text, moved.start(), "this moves the view by other means, write eye, look-at and up")
         parts_of: dict[str, dict[str, float]] = {}
+        moved_before = None  # the matrix of OpenGL that gluLookAt multiplies
         for parts, sign, at, start in self.statements:
             role = self._role(parts, sign)
+            if sign == "(" and (name := texts.plain(parts[-1])) in ("glloadidentity", "glpushmatrix", *_GL_MOVES):
+                moved_before = start if name in _GL_MOVES else None
+            elif role == "look_at" and moved_before is not None and texts.plain(parts[-1]) == "glulookat":
+                texts.fail(self.text, moved_before, "this moves the view by other means, write eye, look-at and up")
+            elif sign == "(" and texts.plain(parts[-1]) == "resetcamera" and said.moved:
+                texts.fail(self.text, start, "this moves the camera until all is seen, write where it is then")
+            elif said.three and self._adds_camera(parts, sign, at):
+                texts.fail(self.text, start, "the camera is part of this, which may move it, write where it is in the scene")
             if role is None or (sign == ":" and role in ("width", "height", "size")):
                 continue
             if role == "moves" and sign != ":":
@@ -319,8 +346,12 @@ class _Code:
                 self._camera_position(said, at, start)
             elif role[:-1] in ("position_", "up_"):
                 value = self.reader.value(at)[0]
-                if isinstance(value, float):
-                    parts_of.setdefault(role[:-2], {})[role[-1]] = value
+                if not isinstance(value, float):
+                    texts.fail(self.text, at, "this is computed from what the text does not say, write the number")
+                said.moved.append(start)
+                before = parts_of.setdefault(role[:-2], {}).setdefault(role[-1], value)
+                if value != before:
+                    texts.fail(self.text, at, f"this is {before:g} elsewhere in the text, copy one camera")
             else:
                 self._plain(said, role, parts, sign, at, start)
         for name, given in parts_of.items():
@@ -330,12 +361,19 @@ class _Code:
             said.values[role] = (tuple(given.get(axis, old) for axis, old in zip("xyz", now, strict=True)), 0)
         return said
 
+    def _adds_camera(self, parts: list[str], sign: str, at: int) -> bool:
+        """Whether the statement makes a camera part of something else than the scene."""
+        if sign != "(" or len(parts) < 2 or parts[-1] != "add" or "scene" in parts[-2].lower():
+            return False
+        added = re.match(r"\s*+([\w$.]++)\s*+[,)]", self.text[at : at + 200])
+        return bool(added) and self._is_camera(added[1].split("."))
+
     def _set(self, said: _Said, role: str, value: object, at: int) -> None:
         before = said.values.get(role)
         if before and before[0] != value and not isinstance(value, Unknown) and not isinstance(before[0], Unknown):
             line = self.text.count("\n", 0, before[1]) + 1
             texts.fail(self.text, at, f"{role} is something else in line {line}, copy one camera")
-        if before is None or isinstance(before[0], Unknown):
+        if before is None or isinstance(value, Unknown):  # of what is known once and computed once nobody knows which counts
             said.values[role] = (value, at)
 
     def _plain(self, said: _Said, role: str, parts: list[str], sign: str, at: int, start: int) -> None:
@@ -355,7 +393,7 @@ class _Code:
                 value = next((part for part in parts_unknown if isinstance(part, Unknown)), Unknown(start))
             else:
                 value = found
-            if role == "eye":
+            if role == "eye" or (role == "up" and said.three):
                 said.moved.append(start)
         self._set(said, role, value, start)
 
@@ -398,6 +436,7 @@ class _Code:
         vectors = [numbers(part, 3) for part in value] if isinstance(value, tuple) and len(value) == 3 else [None]
         if None in vectors:
             texts.fail(self.text, start, "give position, focal point and up as three numbers each")
+        said.moved.append(start)
         for role, vector in zip(("eye", "target", "up"), vectors, strict=True):
             self._set(said, role, vector, start)
 
@@ -491,7 +530,9 @@ def _pose(said: _Said, text: str, options: Options) -> tuple:
         target = said.aimed[0][1]
         if said.moved and said.moved[-1] > said.aimed[-1][0]:
             texts.fail(
-                text, said.moved[-1], "the camera moves after it was turned to look at a point, set its position before lookAt"
+                text,
+                said.moved[-1],
+                "the camera changes after it was turned to look at a point, set position and up before lookAt",
             )
     if target is None and "target_of_controls" in values:
         target = numbers(_known(values, "target_of_controls", text, "write the target in plain numbers"), 3)
@@ -500,12 +541,8 @@ def _pose(said: _Said, text: str, options: Options) -> tuple:
             target, notes = (0.0, 0.0, 0.0), ("OrbitControls turn the camera to the origin",)
         else:
             direction = (0.0, 0.0, -1.0)
-    if eye is None:
-        eye = base.eye if base else None
     if target is None and direction is not None and eye is not None:
         target = tuple(a + b for a, b in zip(eye, direction, strict=True))
-    if target is None:
-        target = base.look_at if base else None
     for name, vector in (("eye", eye), ("target", target)):
         if vector is None:
             raise InputError(
@@ -515,7 +552,7 @@ def _pose(said: _Said, text: str, options: Options) -> tuple:
         if said.three or re.search(r"vtk|SetViewAngle|SetFocalPoint|pinhole|set_view_distance", text, re.IGNORECASE):
             up = (0.0, 1.0, 0.0)
         elif base:
-            up = base.up
+            up, notes = base.up, (*notes, "The text does not say which way is up: that of the camera before was taken")
         else:
             raise InputError("the text does not say which way is up for its camera: write it")
     return eye, target, up, notes
@@ -551,17 +588,18 @@ def _plane(said: _Said, text: str, options: Options) -> tuple:
             raise InputError(f"pixel size and zoom are {s:g} and {zoom:g}: give positive ones")
         return film.centred(d * zoom / s), film.is_stated, film.notes
     said_angles = [role for role in ("fov_y", "fov_x", "view_angle", "fov") if role in values]
+    if _plain_number(values, "zoom", 1.0, text) != 1 and not (said.three and said_angles):
+        texts.fail(text, values["zoom"][1], "what this zooms differs between programs, write the field of view that it makes")
     if not said_angles:
-        if "SetViewUp" in text or "SetFocalPoint" in text:
+        if _OF_VTK.search(text):
             film = texts.film(options, what, size)
             return (
                 film.plane(math.radians(30), "y"),
                 film.is_stated,
                 (*film.notes, "The text says no view angle: it is VTK's own, 30°"),
             )
-        return options.plane_or_refuse(what), False, ()
-    if not said.three and _plain_number(values, "zoom", 1.0, text) != 1:
-        texts.fail(text, values["zoom"][1], "what this zooms differs between programs, write the field of view that it makes")
+        kept = () if options.view_plane else ("The text does not say how the camera sees: as the camera before does",)
+        return options.plane_or_refuse(what), False, kept
     role = said_angles[0]
     if len(said_angles) > 1:
         known = {value for each in said_angles if not isinstance(value := values[each][0], Unknown)}

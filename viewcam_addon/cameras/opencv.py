@@ -38,11 +38,20 @@ _K = ("k", "cameramatrix", "intrinsicmatrix", "intrinsics", "intrinsic", "mtx", 
 _R = ("r", "rot", "rotation", "rmat", "rotationmatrix", "rw2c")
 _RVEC = ("rvec", "rodrigues", "rotationvector", "rvecs")
 _T = ("t", "tvec", "translation", "translationvector", "trans", "tw2c")
-_EXTRINSIC = ("extrinsic", "extrinsics", "rt", "worldtocamera", "w2c", "tcw", "extrinsicmatrix")
+_EXTRINSIC = (
+    "extrinsic", "extrinsics", "rt", "worldtocamera", "worldtocam", "world2camera", "world2cam", "w2c", "tcw",
+    "extrinsicmatrix",
+)  # fmt: skip
 _DISTORTION = (
     "distortioncoefficients", "distcoeffs", "dist", "distortion", "distcoef", "distcoeff", "d", "distortioncoeffs", "dist0",
 )  # fmt: skip
 _OTHER_DISTORTION = re.compile(r"dist(?!ance)|radial|tangential|^kc$|^[kp][1-6]$")
+_OTHER_LENS = re.compile(
+    r"fisheye|equidistant|omni|mei|u?cm$|kannala|kb\d|spherical|ortho|fov|division|double|^ds$|theta|equirect|panoram|cylind"
+)
+# Of what may be a pose in words that nobody knows; Kalibr's T_cam_imu is none.
+_MAY_BE_POSE = re.compile(r"pose|extrin|rotation|rot$|transf|transl|2cam|2world|toworld|tocam|w2|c2|rvec|tvec|position|quat")
+_NO_POSE = ("tcamimu", "timushift", "rectificationmatrix", "projectionmatrix", "p")
 _OTHER_POSE = ("pose", "c2w", "cam2world", "cameratoworld", "camtoworld", "twc", "camerapose", "quaternion", "q", "qvec")
 _WIDTH = ("imagewidth", "width", "w", "resx")
 _HEIGHT = ("imageheight", "height", "h", "resy")
@@ -373,15 +382,26 @@ def settled(numbers: dict[str, float], plane: ViewPlane, what: str, options: Opt
 
 def _camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
     what = f"camera {checks.shown(name)}"
-    model = str(_first(values, ("cameramodel", "distortionmodel", "model", "distortiontype")) or "")
-    if re.search(r"fisheye|equidistant|omni|mei|eucm|kannala|spherical|ortho", model.lower()):
-        not_a_pinhole(what, f"of the model {checks.shown(model)}")
+    refuse_other_lens(values, what)
+    for key in ("binningx", "binningy"):
+        if values.get(key) not in (None, 0, 1):
+            raise InputError(
+                f"{what} has {key} {checks.shown(values[key])}, and its K counts the pixels before that: divide K by it"
+            )
     size, stated = _size(values, what, options)
     plane = plane_of_k(_numbers("K", _first(values, _K)), size, half_pixel(options), what)
     notes = told_of_half_pixel(options, "OpenCV") + settled(_coefficients(values, what), plane, what, options)
     turn, translation, more = _pose(values, what)
     pinhole, more_of_pose = axes.pinhole(axes.from_world_to_camera(turn, translation, what), plane, what)
     return Camera(name, pinhole, stated, (*notes, *more, *more_of_pose))
+
+
+def refuse_other_lens(values: Mapping[str, Any], what: str) -> None:
+    """Raise InputError if a model that the values name is none of a pinhole, whatever its coefficients are."""
+    for key, value in values.items():
+        is_model = _plain(key) in ("cameramodel", "distortionmodel", "model", "distortiontype") and isinstance(value, str)
+        if is_model and _OTHER_LENS.search(value.lower()):
+            not_a_pinhole(what, f"of the model {checks.shown(value)}")
 
 
 def _coefficients(values: Mapping[str, Any], what: str) -> dict[str, float]:
@@ -433,6 +453,9 @@ def _pose(values: Mapping[str, Any], what: str) -> tuple[np.ndarray, tuple[float
         rows = np.array(numbers).reshape(-1, 4)[:3]
         return rows[:, :3], tuple(rows[:, 3].tolist()), (_WAY,)
     if turn is None and vector is None and translation is None:
+        for name, value in values.items():
+            if name not in _NO_POSE and isinstance(value, list | dict) and _MAY_BE_POSE.search(name):
+                raise InputError(f"{what} has {name}, and whose axes it means is not said: write R and t, from world to camera")
         return np.eye(3), (0.0, 0.0, 0.0), (f"{what} has no pose: it stands at the origin and looks along z, y down",)
     if (turn is None and vector is None) or translation is None:
         raise InputError(f"{what} has only a part of its pose: give R or rvec, and t")

@@ -57,6 +57,7 @@ _LENS = {"distance", "fov", "fov_x", "fov_y"}
 
 _GAP = re.compile(r"[\s,;|()\[\]{}<>'\"]*+")
 _SAYS = re.compile(r"\s*+['\"]?+\s*+[=:]?+\s*+(?:<?Vector\b)?+")
+_SAYS_VALUE = re.compile(r"\s*+['\"]?+\s*+(?:[=:]|[-−+.\d(\[{<]|<?Vector\b|\Z)")
 _WORD = re.compile(r"[A-Za-z_][\w-]*+")
 _TWO_WORDS = re.compile(
     r"(look\s++at|look\s++from|fov\s++axis|field\s++of\s++view|up\s++vector|view\s++up|focal\s++point|principal\s++point)\b",
@@ -80,7 +81,7 @@ def recognises(source: Source) -> bool:
     if isinstance(document := _document(source), dict):
         return any(isinstance(document.get(key), dict) for key in ("stated_camera", "camera")) or _is_camera(document)
     word = _word(source.text, _GAP.match(source.text).end())
-    return bool(word)
+    return bool(word) and bool(_SAYS_VALUE.match(source.text, word.end()))
 
 
 def _is_camera(document: dict) -> bool:

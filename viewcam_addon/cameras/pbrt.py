@@ -1,16 +1,17 @@
-"""pbrt's scenes, version 3 and 4: the transforms before the Camera, the Camera and the Film.
+"""pbrt's scenes, version 2 to 4, and LuxRender's: the transforms before the Camera, the Camera and the Film.
 
 **Pose.** The current transform at `Camera` takes world space to the camera's, x to the right of the picture, y upwards, z into
 the view; each statement multiplies from the right, and what stands after WorldBegin moves objects. Seen from a right-handed
 world that camera is left-handed: LookAt alone gives a mirrored picture, and `Scale -1 1 1` before it, which exporters write,
-one that is not.
+one that is not. LuxRender has it from version 1, whose LookAt was right-handed; its scenes are known by their film.
 
 **Picture.** `fov` is the angle of the *shorter* side. The image plane, [−1, 1] along that side, is `screenwindow` if that is
 given; `frameaspectratio` changes its longer side. The film is 1280 × 720 unless said; `cropwindow` keeps a part of it, in
 whole pixels, and moves nothing.
 
 Sources: pbrt-v4's src/pbrt/cameras.cpp (PerspectiveCamera::Create), film.cpp (FilmBaseParameters), util/transform.cpp (LookAt)
-and scene.cpp; pbrt-v3's src/core/api.cpp. Rejected: following Include, since a paste has no folder.
+and scene.cpp; pbrt-v3's src/core/api.cpp; LuxRender's core/geometry/transform.cpp. Rejected: following
+Include, since a paste has no folder.
 """
 
 import math
@@ -32,24 +33,27 @@ _COMMENT = r"#[^\n]*+"
 _WORDS = re.compile(
     r"\"((?:[^\"\\]|\\.){0,1000}+)\"|([A-Za-z]\w*+)|([-+]?+(?:\d++(?:\.\d*+)?+|\.\d++)(?:[eE][-+]?+\d++)?+(?![\w.]))|([][])|(\S)"
 )
+_KINDS = ("perspective", "orthographic", "environment", "spherical", "realistic")
+_STATEMENT = re.compile(
+    rf'\bLookAt\s++[-+.\d\[]|\bCamera\s*+"(?:{"|".join(_KINDS)})"|^[ \t]*+Camera[ \t]*+"\w++"', re.MULTILINE
+)
+_LUX = re.compile(r'\bFilm\s*+"(?:fleximage|multiimage)"')
 _MOVES = {"LookAt": 9, "Translate": 3, "Scale": 3, "Rotate": 4, "Transform": 16, "ConcatTransform": 16, "Identity": 0}
 _NOT_READ = {"Include", "Import"}
 _SIZE = (1280, 720)
 _HARMLESS = {"shutteropen", "shutterclose", "focaldistance", "lensradius", "medium", "hither", "yon"}
-_PINHOLES = {"perspective"}
 
 # A parameter: its name, its values (numbers or texts), and where it stands.
 _Parameters = dict[str, tuple[list, int]]
 
 
 def recognises(source: Source) -> bool:
-    return not source.is_binary and _has_statement(source.text)
+    return not source.is_binary and source.text.lstrip()[:1] not in ("<", "{", "[") and _has_statement(source.text)
 
 
 def _has_statement(text: str) -> bool:
     """Whether a LookAt is followed by a number, or a Camera by the name of one."""
-    text = texts.without(_COMMENT, text[: 2**20])
-    return bool(re.search(r"\bLookAt\s++[-+.\d\[]|\bCamera\s*+\"", text))
+    return bool(_STATEMENT.search(texts.without(_COMMENT, text[: 2**20])))
 
 
 def read(source: Source, options: Options) -> list[Camera]:
@@ -70,6 +74,7 @@ class _Scene:
         self.transform = np.eye(4)
         self.kept: list[np.ndarray] = []
         self.named: dict[str, np.ndarray] = {}
+        self.is_lux = bool(_LUX.search(text))
         self.look: Sequence[float] | None = None  # of a LookAt that alone, but for a mirror before it, is the transform
         self.mirrored = True
         self.at_camera: tuple | None = None
@@ -112,17 +117,19 @@ class _Scene:
             diagonal = self.transform.tolist()
             mirrors = diagonal == np.diag([-1.0, 1, 1, 1]).tolist()
             alone = mirrors or diagonal == np.eye(4).tolist()
-            self.look, self.mirrored = (given if alone else None), not mirrors
+            self.look, self.mirrored = (given if alone else None), mirrors == self.is_lux
         else:
             self.look = None
         step = _matrix(word, given, self.text, at)
+        if word == "LookAt" and self.is_lux:
+            step = np.diag([-1.0, 1, 1, 1]) @ step
         self.transform = step if word in ("Transform", "Identity") else self.transform @ step
         if not np.isfinite(self.transform).all() or abs(np.linalg.det(self.transform[:3, :3])) < 1e-30:
             texts.fail(self.text, at, "the transform up to here is flat or beyond all numbers, change it")
 
     def camera(self, options: Options) -> Camera:
         kind, _, parameters = self.lens or ("perspective", 0, {})
-        if kind not in _PINHOLES:
+        if kind != "perspective":
             not_a_pinhole(f"pbrt's Camera {kind[:40]!r}", f"{'of a real lens' if kind == 'realistic' else kind[:40]}")
         matrix, look, mirrored = self.at_camera or (self.transform, self.look, self.mirrored)
         notes = [f"pbrt's {name} was not taken" for name in parameters if name not in (*_HARMLESS, *_OF_LENS)]
@@ -153,7 +160,7 @@ class _Scene:
             x0, x1, y0, y1 = crop
             pinhole = pinhole.cropped(x0, film.height - y1, x1 - x0, y1 - y0)
         camera = Camera("Camera", pinhole, film.is_stated, (*film.notes, *notes))
-        return texts.mirroring(camera, "pbrt")
+        return texts.mirroring(camera, "LuxRender" if self.is_lux else "pbrt")
 
     def _film(self, options: Options) -> tuple[texts.Film, tuple[int, int, int, int] | None]:
         """The film, and the pixels of it that are kept: x0, x1, y0, y1 from the top left."""

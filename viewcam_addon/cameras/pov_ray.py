@@ -43,14 +43,19 @@ _KINDS = (
     *("stereo", "octa", "cube", "plate_carree", "mercator", "lambert_azimuthal", "lambert_cylindrical"),
 )
 _BLUR = ("blur_samples", "focal_point", "confidence", "variance", "bokeh", "aperture")
+_WORDS = "|".join((*_VECTORS, *_MOVES, *_KINDS, *_BLUR, "perspective", "angle"))
+_SAYS_CAMERA = re.compile(rf"\bcamera\s*+\{{\s*+(?:(?:{_WORDS})\b|(\w++)\s*+((?:{_WORDS})\b)?+)")
 _PIXELS = re.compile(r"\+([WwHh])(\d{1,6})\b")
 _UNITS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def recognises(source: Source) -> bool:
-    return (
-        not source.is_binary and bool(_CAMERA.search(source.text)) and _in_use(texts.without(_COMMENT, source.text)) is not None
-    )
+    if source.is_binary or not _CAMERA.search(source.text):
+        return False
+    text = texts.without(_COMMENT, source.text)
+    declared = {found[1] for found in _DECLARE.finditer(text)}
+    said = any(found[1] is None or found[1] in declared or found[2] for found in _SAYS_CAMERA.finditer(text))
+    return said and _in_use(text) is not None
 
 
 def read(source: Source, options: Options) -> list[Camera]:

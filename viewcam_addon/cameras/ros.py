@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import InputError
 from . import axes, naming, opencv
-from .camera import Camera, Options, not_a_pinhole
+from .camera import Camera, Options
 from .source import Record, Source
 
 TITLE = "ROS camera_info"
@@ -31,9 +31,7 @@ def read(source: Source, options: Options) -> list[Camera]:
     document = Record(opencv.yaml(source.text), source.name)
     name = str(document.values.get("camera_name") or "camera")
     what = f"camera {name}"
-    model = str(document.get("distortion_model"))
-    if model in ("equidistant", "fisheye"):
-        not_a_pinhole(what, f"of the distortion model {model}")
+    opencv.refuse_other_lens(document.values, what)
     k = document.record("camera_matrix").numbers("data", 9)
     if k[0] == 0:
         raise InputError(f"{what} is not calibrated, its K[0] is 0: calibrate it")

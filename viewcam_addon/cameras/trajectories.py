@@ -90,6 +90,7 @@ def _sensor(source: Source, options: Options) -> tuple[np.ndarray, ViewPlane | N
             f"{source.name} has poses of the body, not of a camera: put it where ../cam0/sensor.yaml of the data set is found"
         )
     values = Record(opencv.yaml(file.text), str(file.path))
+    opencv.refuse_other_lens(values.values, "cam0")
     mounted = np.array(values.record("T_BS").numbers("data", 16)).reshape(4, 4)
     if options.view_plane or "intrinsics" not in values:
         return mounted, None, ()
