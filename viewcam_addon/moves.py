@@ -54,6 +54,13 @@ def dollied(pinhole: Pinhole, reach: float) -> Pinhole:
     return _with_axes(pinhole, _along(pinhole.look_at, axes[2], reach), pinhole.look_at, axes)
 
 
+def trucked_to(pinhole: Pinhole, look_at: Triple) -> Pinhole:
+    """Eye and look-at moved alike, so that the camera looks at another point, world space, from the same side."""
+    return replace(
+        pinhole, eye=tuple((np.array(pinhole.eye) + np.subtract(look_at, pinhole.look_at)).tolist()), look_at=look_at
+    )
+
+
 def orbited(pinhole: Pinhole, around: float, upwards: float) -> Pinhole:
     """The eye carried about the look-at point, which stays in the middle of the view at the same distance.
 

@@ -45,8 +45,9 @@ def camera_object(add_camera):
 
 @pytest.fixture
 def posed_camera(camera_object, fresh_blender):
-    """A camera enabled and stated: eye (7, −6, 5), look-at (0, 0, 1), up z, distance 1500."""
+    """A camera enabled and stated: eye (7, −6, 5), look-at (0, 0, 1), up z, distance 1500, which a resize keeps."""
     group = camera_object.virtual_pinhole
+    group.keeps = "PIXELS"
     group.eye, group.look_at, group.up, group.distance = (7, -6, 5), (0, 0, 1), (0, 0, 1), 1500
     group.enabled = True
     fresh_blender.context.view_layer.update()

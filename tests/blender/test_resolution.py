@@ -232,3 +232,21 @@ def test_a_lens_that_did_not_follow_would_be_noticed(posed_camera, scene, monkey
     change(scene, {"resolution_x": 960})
     (warning,) = warnings(posed_camera, scene)
     assert "The picture was 1920 × 1080 px and is 960 × 1080 now" in warning
+
+
+@pytest.mark.parametrize("by", ["the tick-box", "Adopt", "values and the tick-box"])
+def test_a_new_camera_keeps_its_field_of_view_and_a_file_what_it_has(camera_object, scene, by):
+    group = camera_object.virtual_pinhole
+    if by == "Adopt":
+        bpy.ops.viewcam.adopt_camera()
+    else:
+        if by != "the tick-box":
+            group.eye, group.look_at, group.up, group.distance = (7, -6, 5), (0, 0, 1), (0, 0, 1), 2000
+        group.enabled = True
+    lens = camera_object.data.lens
+    change(scene, {"resolution_x": 3840})
+    assert group.keeps == "FIELD_OF_VIEW" and camera_object.data.lens == pytest.approx(lens, rel=2.0**-22)
+    group.property_unset("keeps")  # as a file of before has it
+    group.enabled = False
+    group.enabled = True
+    assert group.keeps == "PIXELS"

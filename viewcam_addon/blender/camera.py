@@ -326,6 +326,7 @@ def adopt(camera_object: bpy.types.Object, scene: bpy.types.Scene, keep: frozens
         as `read` does.
     """
     standing = as_it_stands(camera_object, scene, in_use=storage.is_enabled(camera_object) and not keep)
+    storage.begin(camera_object)
     values, frame = targets.values(camera_object), datablocks.frame_of(scene)
     eye, look_at, up = values.eye, values.look_at, values.up
     if "eye" not in keep:

@@ -29,6 +29,7 @@ def _on_enabled(group: "VirtualPinhole", context: bpy.types.Context) -> None:
     """What nobody has stated yet follows the camera, so that enabling for the first time moves nothing."""
     if storage.is_storing or not group.enabled:
         return
+    storage.begin(group.id_data)
     keep = frozenset(filter(group.is_property_set, storage.EXACT))
     if keep != storage.EXACT:
         with storage.without_callbacks():
@@ -174,6 +175,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         default=1000.0,
         soft_min=1.0,
         soft_max=100000.0,
+        step=100,
         precision=3,
         update=_on_distance,
         override={"LIBRARY_OVERRIDABLE"},
@@ -211,6 +213,8 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         description="By how much the picture is turned about the view, from how it is where up is the world's Z, or the axis "
         "in the preferences. Setting it turns up. Type 0 to level the picture",
         subtype="ANGLE",
+        step=100,
+        precision=3,
         get=_roll,
         set=_turn,
         options=set(),
@@ -246,6 +250,8 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         description="By how much the camera is turned about its view from what up says, in an animation at the first frame. "
         "Type 0 to level the picture",
         subtype="ANGLE",
+        step=100,
+        precision=3,
         update=_edit_of("held_roll"),
         override={"LIBRARY_OVERRIDABLE"},
     )

@@ -95,6 +95,13 @@ def store(camera_object: bpy.types.Object, values: CameraValues, *names: str) ->
         is_storing = before
 
 
+def begin(camera_object: bpy.types.Object) -> None:
+    """Make a new camera keep its field of view in a picture of another size, as Blender's do. One that was set before stays."""
+    group = camera_object.virtual_pinhole
+    if not group.is_property_set("keeps") and load(camera_object).set_for is None:
+        store(camera_object, replace(load(camera_object), keeps=FIELD_OF_VIEW), "keeps")
+
+
 def settle(camera_object: bpy.types.Object, values: CameraValues, frame: Frame) -> None:
     """Take note that the camera has been set by these values for the picture of `frame`; the distance now counts its pixels."""
     before = load(camera_object)

@@ -145,6 +145,24 @@ def test_framing_puts_the_selection_inside_the_margin_and_touches_it(selected_cu
         assert after.eye == before.eye and after.distance != before.distance
 
 
+@pytest.mark.parametrize("by", ["EYE", "DISTANCE"])
+def test_framing_centers_the_selection_unless_that_is_turned_off_or_the_view_follows_an_object(
+    selected_cube, posed_camera, stated, by, empty
+):
+    posed_camera.virtual_pinhole.look_at = (-1, 2, 0)
+    direction = stated().basis()[2]
+    bpy.ops.viewcam.frame_selection(by=by, center=False)
+    assert stated().basis()[2] == pytest.approx(direction, abs=1e-6)
+    bpy.ops.viewcam.frame_selection(by=by)
+    column, row, _ = stated().project(np.array(POINT, dtype=float))
+    assert (column, row) == pytest.approx((960, 540), abs=1e-6)
+    if by == "EYE":
+        assert stated().basis()[2] == pytest.approx(direction, abs=1e-6)
+    posed_camera.virtual_pinhole.look_at_target = target = empty("Target", POINT + np.array([0.1, 0, 0]))
+    bpy.ops.viewcam.frame_selection(by=by)
+    assert posed_camera.virtual_pinhole.look_at_target == target
+
+
 def test_swapping_looks_back(stated):
     bpy.ops.viewcam.swap_camera()
     assert (stated().eye, stated().look_at) == ((0, 0, 1), (7, -6, 5))

@@ -17,7 +17,7 @@ from ... import moves, rotation
 from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
-from .. import datablocks, preferences
+from .. import datablocks, preferences, targets
 from . import readouts, selection, viewport
 from .operators import CameraOperator
 
@@ -169,7 +169,7 @@ class VIEWCAM_OT_orbit_camera(_Move, bpy.types.Operator):
 class VIEWCAM_OT_frame_selection(_SelectionMove, bpy.types.Operator):
     bl_idname = "viewcam.frame_selection"
     bl_label = "Frame Selection"
-    bl_description = "Make all points of the selection fill the picture exactly, up to a margin. The view's direction stays"
+    bl_description = "Bring the selection into the middle of the picture and make all of its points fill it, up to a margin"
 
     by: bpy.props.EnumProperty(
         name="By",
@@ -178,6 +178,12 @@ class VIEWCAM_OT_frame_selection(_SelectionMove, bpy.types.Operator):
             ("EYE", "Eye", "The eye moves along the view, and the perspective changes"),
             ("DISTANCE", "Distance", "The view-plane distance d changes: the camera zooms, and the perspective stays"),
         ),
+    )
+    center: bpy.props.BoolProperty(
+        name="Center",
+        description="Bring the selection into the middle: by the eye, the camera moves sideways and keeps its direction; by "
+        "the distance, it turns where it stands. Where the look-at point follows an object the view stays with that",
+        default=True,
     )
     margin: bpy.props.FloatProperty(
         name="Margin",
@@ -189,8 +195,12 @@ class VIEWCAM_OT_frame_selection(_SelectionMove, bpy.types.Operator):
     )
 
     def moved(self, pinhole: Pinhole, camera_object: bpy.types.Object, _scene: bpy.types.Scene) -> Pinhole:
+        points = selection.points(bpy.context, camera_object)
+        if self.center and "look-at" not in targets.names(camera_object):
+            center = selection.bounds_centre(points)
+            pinhole = replace(pinhole, look_at=center) if self.by == "DISTANCE" else moves.trucked_to(pinhole, center)
         frame = moves.framed_by_distance if self.by == "DISTANCE" else moves.framed_by_eye
-        return frame(pinhole, selection.points(bpy.context, camera_object), self.margin / 100)
+        return frame(pinhole, points, self.margin / 100)
 
 
 class VIEWCAM_OT_swap_camera(_Move, bpy.types.Operator):
