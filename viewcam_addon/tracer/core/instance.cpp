@@ -119,7 +119,8 @@ const ViewcamCore core = {
                 const Scene& from = scene_of(scene);
                 for (size_t i = 0; i < count; i++) {
                     Ray ray = from.camera.ray(columns[i], rows[i]);
-                    write_geometry(from, ray, from.closest(ray, CAMERA), {planes, count}, i);
+                    Hit hit = from.closest(ray, CAMERA);
+                    write_geometry(from, &ray, &hit, 1, {planes, count}, &i);
                 }
             });
         },

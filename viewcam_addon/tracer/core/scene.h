@@ -23,7 +23,7 @@ namespace viewcam::VIEWCAM_ISA {
 
 class Scene {
    public:
-    // A new shape is one more here, with functions of these names: bounds, intersect, interaction, magnitude.
+    // A new shape is one more here, with functions of these names: bounds, intersect, interaction, magnitude; the latter two may take several hits at once.
     using Shape = std::variant<TriangleMesh, Spheres>;
     struct Slot {
         float index;        // what the Material Index pass shows
@@ -91,26 +91,46 @@ class Scene {
         for (int i = 0; i < count; i++) hidden[i] = nearest[i].t < rays[i].t_max || intersect_instances<true>(rays[i], SHADOW, nearest[i]);
     }
 
-    // The surface at a hit, with all that light needs to know there.
-    Interaction interaction(const Ray& ray, const Hit& hit) const {
-        const Object& object = objects[hit.object];
-        const Shape& shape = geometries[object.geometry];
-        Interaction found = std::holds_alternative<TriangleMesh>(shape)
-                                ? triangle_interaction(std::get<TriangleMesh>(shape), object, ray, hit.primitive)
-                                : sphere_interaction(std::get<Spheres>(shape), object, ray, hit.primitive);
-        found.slot = object.first_slot + found.material;
-        found.material = slots[found.slot].material;
-        found.object = hit.object;
-        found.primitive = hit.primitive;
-        return found;
+    // The surfaces at hits, with all that light needs to know there. magnitudes: receive what a renderer's relative rounding
+    // applies to there, world units, if wanted.
+    void interactions(const Ray* const* rays, const Hit* hits, int count, Interaction* found, double* magnitudes = nullptr) const {
+        TriangleHit triangles[4];
+        Interaction* to[4];
+        int some = 0;
+        auto finish_triangles = [&] {
+            TriangleSurfaces surfaces(triangles, some);
+            surfaces.interactions(to);
+            if (magnitudes) {
+                double4 magnitude = surfaces.magnitude(origin);
+                for (int i = 0; i < some; i++) magnitudes[to[i] - found] = magnitude[i];
+            }
+            some = 0;
+        };
+        for (int i = 0; i < count; i++) {
+            const Object& object = objects[hits[i].object];
+            const Shape& shape = geometries[object.geometry];
+            if (auto spheres = std::get_if<Spheres>(&shape)) {
+                found[i] = sphere_interaction(*spheres, object, *rays[i], hits[i].primitive);
+                if (magnitudes) magnitudes[i] = sphere_magnitude(*spheres, object, *rays[i], hits[i].primitive, origin);
+                continue;
+            }
+            triangles[some] = {&std::get<TriangleMesh>(shape), &object, rays[i], hits[i].primitive};
+            to[some++] = &found[i];
+            if (some == 4) finish_triangles();
+        }
+        if (some) finish_triangles();
+        for (int i = 0; i < count; i++) {
+            found[i].slot = objects[hits[i].object].first_slot + found[i].material;
+            found[i].material = slots[found[i].slot].material;
+            found[i].object = hits[i].object;
+            found[i].primitive = hits[i].primitive;
+        }
     }
-    // What a renderer's relative rounding applies to there, world units.
-    double magnitude(const Ray& ray, const Hit& hit) const {
-        const Object& object = objects[hit.object];
-        const Shape& shape = geometries[object.geometry];
-        return std::holds_alternative<TriangleMesh>(shape)
-                   ? triangle_magnitude(std::get<TriangleMesh>(shape), object, ray, hit.primitive, origin)
-                   : sphere_magnitude(std::get<Spheres>(shape), object, ray, hit.primitive, origin);
+    Interaction interaction(const Ray& ray, const Hit& hit) const {
+        const Ray* one = &ray;
+        Interaction found;
+        interactions(&one, &hit, 1, &found);
+        return found;
     }
 
     // What lights need. triangle_count: 0 of spheres. material: of a triangle, an index into illumination.materials. corners: in

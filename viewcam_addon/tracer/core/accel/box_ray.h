@@ -19,8 +19,20 @@ constexpr float FLOAT_ROUNDING = 0x1p-24f;
 // Rounds a distance of at least 0 up to a float.
 inline float round_up(double distance) { return float(distance * (1 + 2.5e-7) + 1e-37); }
 
-// Which of a direction's components is the largest, without its sign.
-inline int dominant_axis(double x, double y, double z) { return x > y ? (x > z ? 0 : 2) : (y > z ? 1 : 2); }
+// Which of a direction's components is the largest, given their sizes. No branch, which rays from surfaces would take at random.
+inline int dominant_axis(double x, double y, double z) {
+    int axis = !(x > y);
+    return larger(x, y) > z ? axis : 2;
+}
+
+// The same of four directions, given their sizes.
+struct DominantAxis {
+    long4 x, y;  // whether it is that one
+
+    explicit DominantAxis(const Vec3x4& size)
+        : x(long4(size.x > size.y) & long4(size.x > size.z)), y(~long4(size.x > size.y) & long4(size.y > size.z)) {}
+    double4 of(const Vec3x4& v) const { return select(x, v.x, select(y, v.y, v.z)); }
+};
 
 struct BoxRay {
     float near_origin[4], far_origin[4], near_reciprocal[4], far_reciprocal[4];
@@ -36,15 +48,15 @@ struct BoxRay {
 
 // The ray for the boxes of `bvh`; false where it misses them all. Ray's t_max is the farthest.
 inline bool enter(const Bvh& bvh, const Ray& ray, BoxRay& box) {
-    double4 direction = {ray.direction.x, ray.direction.y, ray.direction.z, 0}, origin = {ray.origin.x, ray.origin.y, ray.origin.z, 0};
+    // Of all these the fourth is what comes next in memory, and no matter.
+    double4 direction = load<double4>(&ray.direction.x), origin = load<double4>(&ray.origin.x);
     double4 size = abs(direction);
     int axis = dominant_axis(size[0], size[1], size[2]);
-    double longest = size[axis];
+    double longest = larger(larger(size[0], size[1]), size[2]);
     if (!(longest > 0) || !(longest < 1e300)) return false;
     double inverse = 1 / longest;
     double4 unit = direction * splat4(inverse), reciprocal = splat4(1.0) / copysign(max(abs(unit), splat4(1e-200)), unit);
-    double4 centre = {bvh.centre.x, bvh.centre.y, bvh.centre.z, 0}, scale = splat4(bvh.scale);
-    double4 half = double4{bvh.half.x, bvh.half.y, bvh.half.z, 0};
+    double4 centre = load<double4>(&bvh.centre.x), half = load<double4>(&bvh.half.x), scale = splat4(bvh.scale);
     double4 from = (origin - centre) * scale;
     double4 edge = half * splat4(1 + 1e-9) + splat4(4e-16) * abs(from) + splat4(ray.origin_error * bvh.scale + 1e-300);
     double4 one = (-edge - from) * reciprocal, other = (edge - from) * reciprocal, first = min(one, other), last = max(one, other);
@@ -69,7 +81,7 @@ inline bool enter(const Bvh& bvh, const Ray& ray, BoxRay& box) {
     for (int i = 0; i < 3; i++) box.backward[i] = std::signbit(unit[i]);
     box.start = start;
     box.axis = axis;
-    box.axis_factor = std::copysign(inverse, ray.direction[axis]);
+    box.axis_factor = std::copysign(inverse, (&ray.direction.x)[axis]);
     box.far = round_up(end - start);
     return true;
 }

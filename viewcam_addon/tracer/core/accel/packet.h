@@ -2,7 +2,7 @@
 //
 // Rays of one packet have the same signs of direction and the same dominant axis. A node's eight boxes are first tested for all
 // rays in one interval; each that is met is then tested for eight rays at a time, from the first eight on that met its parent.
-// Leaves are tested four rays at a time. Rejected: frusta (no better where rays come from surfaces), packets of 16 (a fifth slower
+// Leaves are tested four rays at a time, or ray by ray where no more meet them than there are triangles. Rejected: frusta (no better where rays come from surfaces), packets of 16 (a fifth slower
 // here), and sorting rays of bounces into packets (0.77 of single rays' speed before the sorting).
 #pragma once
 #include "traverse.h"
@@ -17,9 +17,12 @@ struct Shear {
     double by_x = 0, by_y = 0, by_z = 1;
 
     Shear() = default;
-    Shear(Vec3 direction, const BoxRay& box)
-        : x((box.axis + 1) % 3), y((box.axis + 2) % 3), z(box.axis), by_x(direction[x] * box.axis_factor),
-          by_y(direction[y] * box.axis_factor), by_z(box.axis_factor) {}
+    Shear(const Vec3& direction, const BoxRay& box)
+        : x(NEXT[box.axis]), y(NEXT[x]), z(box.axis), by_x((&direction.x)[x] * box.axis_factor),
+          by_y((&direction.x)[y] * box.axis_factor), by_z(box.axis_factor) {}
+
+   private:
+    static constexpr int NEXT[] = {1, 2, 0};
 };
 
 // Four triangles and a ray, or four rays and a triangle; corners relative to the rays' origins, in the order of a shear's axes.
@@ -96,32 +99,33 @@ struct alignas(64) Packet {
 
 // enter() of four rays at a time: `packet` of all of them, each with its key.
 inline void enter(const Bvh& bvh, const Ray* rays, const Nearest* nearest, int count, Packet& packet) {
-    alignas(32) double direction[3][PACKET];
+    static_assert(offsetof(Ray, t_min) == 6 * sizeof(double), "a ray's first four numbers and its next three are loaded at once");
     packet.count = count;
-    for (int i = 0; i < (count + 3) / 4 * 4; i++) {
-        const Ray& ray = rays[std::min(i, count - 1)];
-        for (int axis = 0; axis < 3; axis++) {
-            packet.origin[axis][i] = ray.origin[axis];
-            direction[axis][i] = ray.direction[axis];
-        }
-        packet.t_min[i] = ray.t_min;
-        packet.t[i] = nearest[std::min(i, count - 1)].t;
-        packet.name[i] = nearest[std::min(i, count - 1)].name;
-        packet.source[i] = i;
-    }
     double largest = max_component(bvh.half);
     for (int i = 0; i < count; i += 4) {
-        double4 d[3], size[3], unit[3], from[3], reciprocal[3];
+        double4 row[2][4];
+        for (int lane = 0; lane < 4; lane++) {
+            int ray = std::min(i + lane, count - 1);
+            const double* numbers = &rays[ray].origin.x;
+            row[0][lane] = load<double4>(numbers), row[1][lane] = load<double4>(numbers + 4);
+            packet.t[i + lane] = nearest[ray].t;
+            packet.name[i + lane] = nearest[ray].name;
+            packet.source[i + lane] = i + lane;
+        }
+        for (auto& rows : row) transpose(rows[0], rows[1], rows[2], rows[3]);
+        double4 origin[3] = {row[0][0], row[0][1], row[0][2]}, d[3] = {row[0][3], row[1][0], row[1][1]}, t_min = row[1][2];
+        double4 size[3], unit[3], from[3], reciprocal[3];
         for (int axis = 0; axis < 3; axis++) {
-            d[axis] = load<double4>(direction[axis] + i);
+            store(packet.origin[axis] + i, origin[axis]);
             size[axis] = abs(d[axis]);
         }
+        store(packet.t_min + i, t_min);
         double4 longest = max(size[0], max(size[1], size[2])), inverse = splat4(1.0) / longest, per = longest * splat4(bvh.scale);
-        double4 start = load<double4>(packet.t_min + i) * per, end = load<double4>(packet.t + i) * per, far = splat4(0.0);
+        double4 start = t_min * per, end = load<double4>(packet.t + i) * per, far = splat4(0.0);
         for (int axis = 0; axis < 3; axis++) {
             unit[axis] = d[axis] * inverse;
             reciprocal[axis] = splat4(1.0) / copysign(max(abs(unit[axis]), splat4(1e-200)), unit[axis]);
-            from[axis] = (load<double4>(packet.origin[axis] + i) - splat4(bvh.centre[axis])) * splat4(bvh.scale);
+            from[axis] = (origin[axis] - splat4(bvh.centre[axis])) * splat4(bvh.scale);
             double4 edge = splat4(bvh.half[axis] * (1 + 1e-9) + 1e-300) + splat4(4e-16) * abs(from[axis]);
             double4 one = (-edge - from[axis]) * reciprocal[axis], other = (edge - from[axis]) * reciprocal[axis];
             double4 first = min(one, other), last = max(one, other);
@@ -131,9 +135,8 @@ inline void enter(const Bvh& bvh, const Ray* rays, const Nearest* nearest, int c
         }
         long4 meets = long4(start <= end) & long4(longest > splat4(0.0)) & long4(longest < splat4(1e300));
         double4 error = splat4(largest * (2 * FLOAT_ROUNDING + 2e-12)) + splat4(8 * DOUBLE_ROUNDING) * (far + abs(start));
-        long4 x_largest = long4(size[0] > size[1]) & long4(size[0] > size[2]), y_largest = ~long4(size[0] > size[1]) & long4(size[1] > size[2]);
-        long4 axis_of = (~x_largest & ((y_largest & splat4(int64_t(1))) | (~y_largest & splat4(int64_t(2)))));
-        long4 key = axis_of << 3;
+        DominantAxis dominant({size[0], size[1], size[2]});
+        long4 key = ~dominant.x & ((dominant.y & splat4(int64_t(1) << 3)) | (~dominant.y & splat4(int64_t(2) << 3)));
         for (int axis = 0; axis < 3; axis++) {
             double4 entry = from[axis] + start * unit[axis], forward = copysign(error, unit[axis]);
             double4 bounded = copysign(min(abs(reciprocal[axis]), splat4(1e12)), reciprocal[axis]);
@@ -143,8 +146,8 @@ inline void enter(const Bvh& bvh, const Ray* rays, const Nearest* nearest, int c
             store(packet.far_reciprocal[axis] + i, __builtin_convertvector(bounded * splat4(1.0 + 6 * FLOAT_ROUNDING), float4));
             key |= ((long4)unit[axis] >> 63) & splat4(int64_t(1) << axis);
         }
-        double4 along = select(x_largest, d[0], select(y_largest, d[1], d[2])), next = select(x_largest, d[1], select(y_largest, d[2], d[0])),
-                after = select(x_largest, d[2], select(y_largest, d[0], d[1])), by_z = copysign(inverse, along);
+        double4 along = dominant.of({d[0], d[1], d[2]}), next = dominant.of({d[1], d[2], d[0]}), after = dominant.of({d[2], d[0], d[1]});
+        double4 by_z = copysign(inverse, along);
         store(packet.by_x + i, next * by_z);
         store(packet.by_y + i, after * by_z);
         store(packet.by_z + i, by_z);
@@ -155,7 +158,7 @@ inline void enter(const Bvh& bvh, const Ray* rays, const Nearest* nearest, int c
     }
 }
 
-// Calls visit(leaf, first of four rays, nearer) for the leaves that any ray may meet, with those of its rays that may.
+// Calls visit(leaf, first of four rays, which of them may meet it, nearer) for the leaves that any ray may meet.
 template <bool ANY, class Visit> inline void traverse_packet(const Bvh& bvh, Packet& packet, const Visit& visit) {
     const int groups = (packet.count + 7) / 8;
     int near[3], far[3];
@@ -224,8 +227,8 @@ template <bool ANY, class Visit> inline void traverse_packet(const Bvh& bvh, Pac
             bool nearer = false;
             for (int g = group; g < groups; g++) {
                 if (g > group) rays = parent ? rays_of(*parent, entry.slot, g) : 255;
-                if (rays & 15) visit(entry.child & ~LEAF, 8 * g, nearer);
-                if (rays >> 4) visit(entry.child & ~LEAF, 8 * g + 4, nearer);
+                if (rays & 15) visit(entry.child & ~LEAF, 8 * g, rays & 15, nearer);
+                if (rays >> 4) visit(entry.child & ~LEAF, 8 * g + 4, rays >> 4, nearer);
             }
             if (nearer) {
                 most = farthest();

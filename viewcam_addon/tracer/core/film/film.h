@@ -14,7 +14,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "../math/vec.h"
+#include "../math/simd.h"
 
 namespace viewcam::VIEWCAM_ISA {
 
@@ -26,6 +26,12 @@ enum Category : uint8_t { COLOR, EMISSION, ENVIRONMENT, DIRECT, INDIRECT, OTHER,
 struct PathLight {
     Vec3 of[CATEGORIES];
     bool covered = false;
+    uint8_t brought = 0;  // categories that anything was added to, as bits: the others are not summed
+
+    void add(Category category, Vec3 rgb) {
+        of[category] += rgb;
+        brought |= uint8_t(1 << category);
+    }
 };
 
 // How samples become pixels.
@@ -50,7 +56,8 @@ class Pixel {
     // Adds a sample. batch_size: a power of two.
     void add(const PathLight& light, const FilmSettings& film, uint32_t batch_size) {
         Vec3 shown;
-        for (int category = 0; category < CATEGORIES; category++) {
+        for (unsigned brought = light.brought; brought;) {
+            int category = take_bit(brought);
             totals_[category] += light.of[category];
             if (category != COLOR && !(film.transparent && category == ENVIRONMENT)) shown += light.of[category];
         }

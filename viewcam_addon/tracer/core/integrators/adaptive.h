@@ -92,6 +92,7 @@ class TileSampler {
     void sample_group(Tile& tile, const uint16_t* group, uint32_t size, uint32_t begin, uint32_t end, uint32_t batch,
                       const volatile int* stop) const {
         CameraSample samples[PathIntegrator::MOST];
+        Ray rays[PathIntegrator::MOST];
         PathLight light[PathIntegrator::MOST];
         const SobolSampler& sampler = integrator_.sampler();
         uint32_t at_a_time = PathIntegrator::MOST / size;
@@ -105,10 +106,11 @@ class TileSampler {
                     Vec2 u{sampler.number(scramble[0], i, 0), sampler.number(scramble[1], i, 1)};
                     Vec2 offset = samples_ > 1 ? filter_.offset(u) : Vec2{0.5, 0.5};
                     double column = tile.column + place % TILE + offset.x, row = tile.row + place / TILE + offset.y;
-                    samples[count++] = {number, i, camera_.ray(column, row)};
+                    samples[count] = {number, i};
+                    rays[count++] = camera_.ray(column, row);
                 }
             }
-            integrator_.trace(samples, count, light);
+            integrator_.trace(samples, rays, count, light);
             for (int i = 0; i < count; i++) tile.pixels[group[uint32_t(i) / (last - first)]].add(light[i], film_, batch);
         }
     }

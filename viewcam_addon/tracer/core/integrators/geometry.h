@@ -20,47 +20,60 @@ struct GeometryPasses {
     void write(ViewcamPass pass, size_t pixel, Vec3 v) const { write(pass, pixel, v.x, v.y, v.z); }
 };
 
-// What one ray met, written as Cycles writes it, also where that is nothing.
-inline void write_geometry(const Scene& scene, const Ray& ray, const Hit& hit, const GeometryPasses& passes, size_t pixel) {
+// What up to 64 rays met, written as Cycles writes it, also where that is nothing. pixels: where in the planes.
+inline void write_geometry(const Scene& scene, const Ray* rays, const Hit* hits, int count, const GeometryPasses& passes, const size_t* pixels) {
     constexpr double BACKGROUND_DEPTH = 1e10;
-    if (!hit) {
-        passes.write(VIEWCAM_DEPTH, pixel, BACKGROUND_DEPTH);
-        for (ViewcamPass pass : {VIEWCAM_POSITION, VIEWCAM_NORMAL, VIEWCAM_UV}) passes.write(pass, pixel, 0, 0, 0);
+    const Ray* met_by[PACKET];
+    Hit met[PACKET];
+    size_t to[PACKET];
+    Interaction found[PACKET];
+    double magnitudes[PACKET];
+    int some = 0;
+    for (int i = 0; i < count; i++) {
+        if (hits[i]) {
+            met_by[some] = &rays[i], met[some] = hits[i], to[some++] = pixels[i];
+            continue;
+        }
+        passes.write(VIEWCAM_DEPTH, pixels[i], BACKGROUND_DEPTH);
+        for (ViewcamPass pass : {VIEWCAM_POSITION, VIEWCAM_NORMAL, VIEWCAM_UV}) passes.write(pass, pixels[i], 0, 0, 0);
         for (ViewcamPass pass : {VIEWCAM_OBJECT_INDEX, VIEWCAM_MATERIAL_INDEX, VIEWCAM_MAGNITUDE, VIEWCAM_FACING})
-            passes.write(pass, pixel, 0);
-        return;
+            passes.write(pass, pixels[i], 0);
     }
-    Interaction at = scene.interaction(ray, hit);
-    passes.write(VIEWCAM_DEPTH, pixel, at.t);
-    passes.write(VIEWCAM_POSITION, pixel, ray.direction * at.t + (scene.origin + ray.origin));
-    passes.write(VIEWCAM_NORMAL, pixel, at.shading);
-    passes.write(VIEWCAM_UV, pixel, at.uv.x, at.uv.y, at.has_uv ? 1 : 0);
-    passes.write(VIEWCAM_OBJECT_INDEX, pixel, scene.objects[hit.object].index);
-    passes.write(VIEWCAM_MATERIAL_INDEX, pixel, scene.slots[at.slot].index);
-    passes.write(VIEWCAM_FACING, pixel, max(0.0, min(at.cosine, 1.0)));
-    if (passes.plane[VIEWCAM_MAGNITUDE]) {
-        double eye = max_component(abs(scene.origin + ray.origin));
-        passes.write(VIEWCAM_MAGNITUDE, pixel, max(eye, scene.magnitude(ray, hit)));
+    scene.interactions(met_by, met, some, found, passes.plane[VIEWCAM_MAGNITUDE] ? magnitudes : nullptr);
+    for (int i = 0; i < some; i++) {
+        const Interaction& at = found[i];
+        const Ray& ray = *met_by[i];
+        passes.write(VIEWCAM_DEPTH, to[i], at.t);
+        passes.write(VIEWCAM_POSITION, to[i], ray.direction * at.t + (scene.origin + ray.origin));
+        passes.write(VIEWCAM_NORMAL, to[i], at.shading);
+        passes.write(VIEWCAM_UV, to[i], at.uv.x, at.uv.y, at.has_uv ? 1 : 0);
+        passes.write(VIEWCAM_OBJECT_INDEX, to[i], scene.objects[at.object].index);
+        passes.write(VIEWCAM_MATERIAL_INDEX, to[i], scene.slots[at.slot].index);
+        passes.write(VIEWCAM_FACING, to[i], max(0.0, min(at.cosine, 1.0)));
+        if (passes.plane[VIEWCAM_MAGNITUDE])
+            passes.write(VIEWCAM_MAGNITUDE, to[i], max(max_component(abs(scene.origin + ray.origin)), magnitudes[i]));
     }
 }
 
-// The pixel centres of some rows, from the bottom, in blocks of 8 × 8; `*stop`, if there is one, ends it early.
+// The pixel centres of some rows, from the bottom, in blocks of 16 × 4, as many columns as fill the cache lines of the passes;
+// `*stop`, if there is one, ends it early.
 inline void render_geometry(const Scene& scene, uint32_t begin, uint32_t end, const GeometryPasses& passes, const volatile int* stop) {
-    constexpr uint32_t SIDE = 8;
+    constexpr uint32_t WIDTH = 16, HEIGHT = 4;
     const Camera& camera = scene.camera;
-    Ray rays[SIDE * SIDE];
-    Hit hits[SIDE * SIDE];
-    for (uint32_t row = begin; row < end; row += SIDE)
-        for (uint32_t column = 0; column < camera.width; column += SIDE) {
+    Ray rays[WIDTH * HEIGHT];
+    Hit hits[WIDTH * HEIGHT];
+    size_t pixels[WIDTH * HEIGHT];
+    for (uint32_t first_row = begin; first_row < end; first_row += HEIGHT)
+        for (uint32_t first_column = 0; first_column < camera.width; first_column += WIDTH) {
             if (stop && *stop) return;
-            uint32_t width = std::min(SIDE, camera.width - column), height = std::min(SIDE, end - row);
-            int count = int(width * height);
-            for (int i = 0; i < count; i++) rays[i] = camera.ray(column + uint32_t(i) % width + 0.5, row + uint32_t(i) / width + 0.5);
+            int count = 0;
+            for (uint32_t row = first_row; row < std::min(first_row + HEIGHT, end); row++)
+                for (uint32_t column = first_column; column < std::min(first_column + WIDTH, camera.width); column++) {
+                    pixels[count] = size_t(row) * camera.width + column;
+                    rays[count++] = camera.ray(column + 0.5, row + 0.5);
+                }
             scene.closest(rays, count, CAMERA, hits);
-            for (int i = 0; i < count; i++) {
-                size_t pixel = size_t(row + uint32_t(i) / width) * camera.width + column + uint32_t(i) % width;
-                write_geometry(scene, rays[i], hits[i], passes, pixel);
-            }
+            write_geometry(scene, rays, hits, count, passes, pixels);
         }
 }
 

@@ -32,10 +32,9 @@ inline Ray shadow_ray(const Interaction& point, const LightSample& sample) {
     return {origin, sample.direction, 0, larger(sample.distance - slack, 0.0)};
 }
 
-// A sample of a pixel, row · width + column, and its ray from the eye.
+// A sample of a pixel, row · width + column.
 struct CameraSample {
     uint32_t pixel, number;
-    Ray ray;
 };
 
 class PathIntegrator {
@@ -70,13 +69,13 @@ class PathIntegrator {
         return lit_ && ((kinds_ & GLOSSY && kinds_ & TRANSMISSION) || (kinds_ & DIFFUSE && (lights_.is_random() || onwards)));
     }
 
-    // The light of up to 64 paths.
-    void trace(const CameraSample* samples, int count, PathLight* light) const {
+    // The light of up to 64 paths, each with its ray from the eye.
+    void trace(const CameraSample* samples, const Ray* rays, int count, PathLight* light) const {
         static thread_local Block block;  // too large for a stack, and to be cleared for nothing
         block.light = light;
         block.live = 0;
         std::fill_n(light, count, PathLight{});
-        start(samples, count, block);
+        start(rays, count, block);
         for (int depth = 1; block.live > 0 && lit_; depth++) {
             scatter(samples, depth, block);
             gather(depth, block);
@@ -134,37 +133,39 @@ class PathIntegrator {
     ShadingPoint shading(const Interaction& point, Vec3 incoming) const { return {point, incoming, scene_.illumination.textures}; }
 
     // What the eye's rays come to, and the light that is of this alone.
-    void start(const CameraSample* samples, int count, Block& block) const {
-        Ray rays[MOST];
+    void start(const Ray* rays, int count, Block& block) const {
         Hit hits[MOST];
-        for (int i = 0; i < count; i++) rays[i] = samples[i].ray;
+        const Ray* met_by[MOST];
+        int from[MOST], met = 0;
         scene_.closest(rays, count, CAMERA, hits);
         for (int i = 0; i < count; i++) {
             PathLight& light = block.light[i];
-            double size = length(rays[i].direction);
-            Vec3 ahead = rays[i].direction / size;
             if (lights_.meets_lamps(CAMERA)) {
-                double farthest = smaller(rays[i].t_max, hits[i].t);
-                light.of[EMISSION] += lights_.le({rays[i].origin, ahead, rays[i].t_min * size, farthest * size, !hits[i]}, CAMERA);
+                double size = length(rays[i].direction), farthest = smaller(rays[i].t_max, hits[i].t);
+                light.add(EMISSION, lights_.le({rays[i].origin, rays[i].direction / size, rays[i].t_min * size, farthest * size, !hits[i]}, CAMERA));
             }
             if (!hits[i]) {
-                light.of[ENVIRONMENT] = lights_.environment().le(ahead, CAMERA);
+                light.add(ENVIRONMENT, lights_.environment().le(normalize(rays[i].direction), CAMERA));
                 continue;
             }
             light.covered = true;
-            Interaction& point = block.points[block.live];
-            point = scene_.interaction(rays[i], hits[i]);
+            from[met] = i, met_by[met] = &rays[i], hits[met++] = hits[i];
+        }
+        scene_.interactions(met_by, hits, met, block.points);
+        for (int k = 0; k < met; k++) {
+            PathLight& light = block.light[from[k]];
+            const Interaction& point = block.points[k];
             const Material& made_of = material(point);
-            if (!made_of.emission.is_black()) light.of[EMISSION] += made_of.emission.at(scene_.illumination.textures, point);
+            if (!made_of.emission.is_black()) light.add(EMISSION, made_of.emission.at(scene_.illumination.textures, point));
             if (made_of.closures.empty()) continue;
-            light.of[COLOR] = made_of.diffuse_color(shading(point, ahead));
-            Path& path = block.paths[block.live];  // the rest is known when it is scattered
-            path.sample = i, path.from = block.live;
+            Vec3 ahead = normalize(met_by[k]->direction);
+            light.add(COLOR, made_of.diffuse_color(shading(point, ahead)));
+            Path& path = block.paths[block.live++];  // the rest is known when it is scattered
+            path.sample = from[k], path.from = k;
             path.category = COLOR;
             path.scattered[0] = path.scattered[1] = path.scattered[2] = 0;
             path.weight = {1, 1, 1};
             path.ray.direction = ahead;
-            block.live++;
         }
     }
 
@@ -258,39 +259,45 @@ class PathIntegrator {
             else
                 for (int i = 0; i < count; i++) hidden[i] = shadowed[i].traced && scene_.occluded(rays[i]);
             for (int i = 0; i < count; i++)
-                if (!hidden[i]) block.light[shadowed[i].sample].of[shadowed[i].category] += shadowed[i].light;
+                if (!hidden[i]) block.light[shadowed[i].sample].add(shadowed[i].category, shadowed[i].light);
         }
     }
 
     // Where rays come to; adds what shines there.
     void arrive(Block& block) const {
-        int live = 0;
+        const Ray* met_by[MOST];
+        Hit hits[MOST];
+        int arrived[MOST], met = 0;
         for (int i = 0; i < block.live; i++) {
             const Path& path = block.onwards[i];
-            Vec3& light = block.light[path.sample].of[path.category];
+            PathLight& light = block.light[path.sample];
             if (path.last && only_sky_[path.kind]) {
-                if (!scene_.occluded(path.ray)) light += path.weight * lights_.environment().le(path.ray.direction, path.kind);
+                if (!scene_.occluded(path.ray)) light.add(path.category, path.weight * lights_.environment().le(path.ray.direction, path.kind));
                 continue;
             }
             Hit hit = scene_.closest(path.ray, path.kind);
             if (lights_.meets_lamps(path.kind))
-                light += path.weight * lights_.le({path.ray.origin, path.ray.direction, 0, hit.t, !hit}, path.kind);
-            if (!hit) {
-                light += path.weight * lights_.environment().le(path.ray.direction, path.kind);
-                continue;
-            }
-            Interaction& point = block.arrivals[live];
-            point = scene_.interaction(path.ray, hit);
+                light.add(path.category, path.weight * lights_.le({path.ray.origin, path.ray.direction, 0, hit.t, !hit}, path.kind));
+            if (hit)
+                arrived[met] = i, met_by[met] = &path.ray, hits[met++] = hit;
+            else
+                light.add(path.category, path.weight * lights_.environment().le(path.ray.direction, path.kind));
+        }
+        scene_.interactions(met_by, hits, met, block.arrivals);
+        int live = 0;
+        for (int k = 0; k < met; k++) {
+            const Path& path = block.onwards[arrived[k]];
+            const Interaction& point = block.arrivals[k];
             const Material& made_of = material(point);
             if (!made_of.emission.is_black()) {
                 double share = 1;
                 if (path.kind == DIFFUSE && lights_.has_meshes())
-                    share = power_heuristic(path.pdf, lights_.pdf_li(block.points[path.from], point, path.ray.direction, hit.t));
-                light += path.weight * made_of.emission.at(scene_.illumination.textures, point) * share;
+                    share = power_heuristic(path.pdf, lights_.pdf_li(block.points[path.from], point, path.ray.direction, hits[k].t));
+                block.light[path.sample].add(path.category, path.weight * made_of.emission.at(scene_.illumination.textures, point) * share);
             }
             if (path.last || made_of.closures.empty()) continue;
             block.paths[live] = path;
-            block.paths[live].from = live;
+            block.paths[live].from = k;
             live++;
         }
         block.live = live;

@@ -9,6 +9,8 @@
 #include <immintrin.h>
 #endif
 
+#include "vec.h"
+
 namespace viewcam::VIEWCAM_ISA {
 
 typedef float float4 __attribute__((vector_size(16)));
@@ -77,15 +79,52 @@ inline double4 copysign(double4 size, double4 sign) {
 }
 inline double4 select(long4 mask, double4 a, double4 b) { return (double4)((mask & (long4)a) | (~mask & (long4)b)); }
 
+inline double4 sqrt(double4 a) {
+#if defined(__AVX__)
+    return (double4)_mm256_sqrt_pd((__m256d)a);
+#else
+    return double4{std::sqrt(a[0]), std::sqrt(a[1]), std::sqrt(a[2]), std::sqrt(a[3])};
+#endif
+}
+
+// Four vectors: their coordinates in one register each.
+using Vec3x4 = Vec3Of<double4>;
+
+inline Vec3x4 splat4(Vec3 v) { return {splat4(v.x), splat4(v.y), splat4(v.z)}; }
+inline Vec3 lane(const Vec3x4& v, int i) { return {v.x[i], v.y[i], v.z[i]}; }
+inline Vec3x4 select(long4 mask, const Vec3x4& a, const Vec3x4& b) {
+    return {select(mask, a.x, b.x), select(mask, a.y, b.y), select(mask, a.z, b.z)};
+}
+inline double4 length(const Vec3x4& a) { return sqrt(dot(a, a)); }
+inline double4 max_component(const Vec3x4& a) { return max(a.x, max(a.y, a.z)); }
+inline Vec3x4 abs(const Vec3x4& a) { return {abs(a.x), abs(a.y), abs(a.z)}; }
+// of(i) → double of four lanes, or Vec3.
+template <class Of> inline auto gather4(const Of& of) {
+    if constexpr (std::is_same_v<decltype(of(0)), Vec3>) {
+        Vec3 a = of(0), b = of(1), c = of(2), d = of(3);
+        return Vec3x4{{a.x, b.x, c.x, d.x}, {a.y, b.y, c.y, d.y}, {a.z, b.z, c.z, d.z}};
+    } else {
+        return double4{of(0), of(1), of(2), of(3)};
+    }
+}
+
+// Rows become columns.
+inline void transpose(double4& a, double4& b, double4& c, double4& d) {
+    double4 ab0 = __builtin_shufflevector(a, b, 0, 4, 2, 6), ab1 = __builtin_shufflevector(a, b, 1, 5, 3, 7);
+    double4 cd0 = __builtin_shufflevector(c, d, 0, 4, 2, 6), cd1 = __builtin_shufflevector(c, d, 1, 5, 3, 7);
+    a = __builtin_shufflevector(ab0, cd0, 0, 1, 4, 5), c = __builtin_shufflevector(ab0, cd0, 2, 3, 6, 7);
+    b = __builtin_shufflevector(ab1, cd1, 0, 1, 4, 5), d = __builtin_shufflevector(ab1, cd1, 2, 3, 6, 7);
+}
+
 inline float reduce_min(float8 v) {
-    float least = v[0];
-    for (int i = 1; i < 8; i++) least = v[i] < least ? v[i] : least;
-    return least;
+    v = min(v, __builtin_shufflevector(v, v, 4, 5, 6, 7, 0, 1, 2, 3));
+    v = min(v, __builtin_shufflevector(v, v, 2, 3, 0, 1, 6, 7, 4, 5));
+    return v[0] < v[1] ? v[0] : v[1];
 }
 inline float reduce_max(float8 v) {
-    float most = v[0];
-    for (int i = 1; i < 8; i++) most = v[i] > most ? v[i] : most;
-    return most;
+    v = max(v, __builtin_shufflevector(v, v, 4, 5, 6, 7, 0, 1, 2, 3));
+    v = max(v, __builtin_shufflevector(v, v, 2, 3, 0, 1, 6, 7, 4, 5));
+    return v[0] > v[1] ? v[0] : v[1];
 }
 
 // The lowest bit that is set, which is taken out of `mask`.

@@ -19,11 +19,7 @@ struct Object {
     double inverse[3][3] = {};  // of its linear part
     Vec3 translation_low;       // what the translation's rounding took away
 
-    Vec3 to_object(Vec3 v) const {
-        return {inverse[0][0] * v.x + inverse[0][1] * v.y + inverse[0][2] * v.z,
-                inverse[1][0] * v.x + inverse[1][1] * v.y + inverse[1][2] * v.z,
-                inverse[2][0] * v.x + inverse[2][1] * v.y + inverse[2][2] * v.z};
-    }
+    Vec3 to_object(Vec3 v) const { return product(inverse, v); }
     // The same ray in object space; t stays what it is.
     Ray to_object(const Ray& ray) const {
         Vec3 apart = ray.origin - to_world.translation(), sizes = abs(apart);
@@ -45,9 +41,7 @@ struct Object {
     // transpose but for a factor.
     Vec3 turned_normal(Vec3 n) const {
         if (flat) return turned_by_cofactors(n);
-        Vec3 turned{inverse[0][0] * n.x + inverse[1][0] * n.y + inverse[2][0] * n.z,
-                    inverse[0][1] * n.x + inverse[1][1] * n.y + inverse[2][1] * n.z,
-                    inverse[0][2] * n.x + inverse[1][2] * n.y + inverse[2][2] * n.z};
+        Vec3 turned = transposed_product(inverse, n);
         return mirrored ? -turned : turned;
     }
 

@@ -8,6 +8,8 @@
 // Leaves hold their corners, 80 bytes a triangle: indices into shared vertices are a third of that, and take single rays a fifth
 // longer.
 #pragma once
+#include <bit>
+
 #include "../accel/packet.h"
 #include "object.h"
 
@@ -39,6 +41,15 @@ class TriangleBvh {
     struct alignas(64) Block {
         double corner[3][3][4];  // [corner][axis][triangle]; nan where there is none
         uint32_t object[4], primitive[4];
+
+        // The four against one ray, see intersect_triangle.
+        [[gnu::always_inline]] long4 intersect(const Shear& axes, double4 x, double4 y, double4 z, double4 by_x, double4 by_y, double4 by_z,
+                                               double4& t, double4& determinant) const {
+            auto at = [&](int c, int axis) { return load<double4>(corner[c][axis]); };
+            return intersect_triangle(at(0, axes.x) - x, at(0, axes.y) - y, at(0, axes.z) - z, at(1, axes.x) - x, at(1, axes.y) - y,
+                                      at(1, axes.z) - z, at(2, axes.x) - x, at(2, axes.y) - y, at(2, axes.z) - z, by_x, by_y, by_z, t,
+                                      determinant);
+        }
     };
     Bvh bvh;
     Array<Block> blocks;
@@ -78,15 +89,13 @@ class TriangleBvh {
         BoxRay box;
         if (bvh.root == NOTHING || !enter(bvh, Ray{ray.origin, ray.direction, ray.t_min, nearest.t}, box)) return false;
         Shear shear(ray.direction, box);
-        double4 x = splat4(ray.origin[shear.x]), y = splat4(ray.origin[shear.y]), z = splat4(ray.origin[shear.z]);
+        const double* origin = &ray.origin.x;
+        double4 x = splat4(origin[shear.x]), y = splat4(origin[shear.y]), z = splat4(origin[shear.z]);
         double4 by_x = splat4(shear.by_x), by_y = splat4(shear.by_y), by_z = splat4(shear.by_z);
         return traverse(bvh, box, [&](uint32_t leaf) {
             const Block& block = blocks[leaf];
-            auto at = [&](int corner, int axis) { return load<double4>(block.corner[corner][axis]); };
             double4 t, determinant;
-            unsigned met = bits(intersect_triangle(
-                at(0, shear.x) - x, at(0, shear.y) - y, at(0, shear.z) - z, at(1, shear.x) - x, at(1, shear.y) - y, at(1, shear.z) - z,
-                at(2, shear.x) - x, at(2, shear.y) - y, at(2, shear.z) - z, by_x, by_y, by_z, t, determinant));
+            unsigned met = bits(block.intersect(shear, x, y, z, by_x, by_y, by_z, t, determinant));
             if (!met) return false;
             t = t / determinant;
             met &= bits(long4(t > splat4(ray.t_min)));
@@ -102,12 +111,31 @@ class TriangleBvh {
         });
     }
 
-    // The same of a packet's rays, each with what `intersect` would find.
+    // The same of a packet's rays, each with what `intersect` would find. MANY: of four rays that meet a leaf, those that are tested
+    // together.
+    static constexpr int MANY = 4;
     template <bool ANY> void intersect(Packet& packet) const {
         if (bvh.root == NOTHING) return;
-        traverse_packet<ANY>(bvh, packet, [&](uint32_t leaf, int lane, bool& nearer) {
+        traverse_packet<ANY>(bvh, packet, [&](uint32_t leaf, int lane, unsigned rays, bool& nearer) {
             const Block& block = blocks[leaf];
             const Shear& shear = packet.shear;
+            if (std::popcount(rays) < MANY) {
+                while (rays) {
+                    int ray = lane + take_bit(rays);
+                    double4 t, determinant;
+                    unsigned met = bits(block.intersect(shear, splat4(packet.origin[shear.x][ray]), splat4(packet.origin[shear.y][ray]),
+                                                        splat4(packet.origin[shear.z][ray]), splat4(packet.by_x[ray]),
+                                                        splat4(packet.by_y[ray]), splat4(packet.by_z[ray]), t, determinant));
+                    if (!met) continue;
+                    t = t / determinant;
+                    met &= bits(long4(t > splat4(packet.t_min[ray])) & long4(t <= splat4(packet.t[ray])));
+                    while (met) {
+                        int i = take_bit(met);
+                        nearer |= packet.offer<ANY>(ray, t[i], block.object[i], block.primitive[i]);
+                    }
+                }
+                return;
+            }
             double4 x = load<double4>(packet.origin[shear.x] + lane), y = load<double4>(packet.origin[shear.y] + lane),
                     z = load<double4>(packet.origin[shear.z] + lane), by_x = load<double4>(packet.by_x + lane),
                     by_y = load<double4>(packet.by_y + lane), by_z = load<double4>(packet.by_z + lane);
@@ -129,127 +157,185 @@ class TriangleBvh {
     }
 };
 
-// Where a ray meets the triangle that it was found to hit, and all about the surface there.
-class TriangleSurface {
-   public:
-    Vec3 corner[3], first, second;  // rendering space; the sides from the first corner
-    Vec3 normal;                    // their cross product
-    double normal_squared, longest_squared;
-    double t, b1, b2;
+// A triangle that a ray was found to hit.
+struct TriangleHit {
+    const TriangleMesh* mesh;
+    const Object* object;
+    const Ray* ray;
+    uint32_t triangle;
+};
 
-    TriangleSurface(const TriangleMesh& mesh, const Object& object, size_t triangle, const Ray& ray) {
-        for (int i = 0; i < 3; i++) corner[i] = object.to_world.point(mesh.corner(triangle, i));
-        first = corner[1] - corner[0];
-        second = corner[2] - corner[0];
-        Vec3 third = corner[2] - corner[1];
-        normal = cross(first, second);
-        normal_squared = dot(normal, normal);
-        double one = dot(first, first), two = dot(second, second);
-        longest_squared = max(max(one, two), dot(third, third));
-        if (normal_squared * (SLENDER * SLENDER) < one * two) {
-            normal = exact_cross(first, second);
-            normal_squared = dot(normal, normal);
+// Where up to four rays meet the triangles that they were found to hit, and all about the surfaces there, four at once: what is
+// found of one is the same whatever goes along with it.
+class TriangleSurfaces {
+   public:
+    TriangleSurfaces(const TriangleHit* hits, int count) : count_(count) {
+        for (int i = 0; i < 4; i++) hits_[i] = hits[i < count ? i : 0], on_one_ &= hits_[i].object == hits_[0].object;
+        origin_ = gather4([&](int i) { return hits_[i].ray->origin; });
+        direction_ = gather4([&](int i) { return hits_[i].ray->direction; });
+        translation_ = {of_objects([](auto& object) { return object.to_world.m[0][3]; }),
+                        of_objects([](auto& object) { return object.to_world.m[1][3]; }),
+                        of_objects([](auto& object) { return object.to_world.m[2][3]; })};
+        double4 linear[3][3];
+        for (int row = 0; row < 3; row++)
+            for (int column = 0; column < 3; column++)
+                linear[row][column] = of_objects([=](auto& object) { return object.to_world.m[row][column]; });
+        for (int c = 0; c < 3; c++)
+            corner_[c] = product(linear, gather4([&](int i) { return hits_[i].mesh->corner(hits_[i].triangle, c); })) + translation_;
+        first_ = corner_[1] - corner_[0];
+        second_ = corner_[2] - corner_[0];
+        Vec3x4 third = corner_[2] - corner_[1];
+        normal_ = cross(first_, second_);
+        double4 one = dot(first_, first_), two = dot(second_, second_), squared = dot(normal_, normal_);
+        longest_squared_ = max(max(one, two), dot(third, third));
+        if (unsigned slender = bits(long4(squared * splat4(SLENDER * SLENDER) < one * two))) {
+            while (slender) {
+                int i = take_bit(slender);
+                Vec3 exact = exact_cross(lane(first_, i), lane(second_, i));
+                normal_.x[i] = exact.x, normal_.y[i] = exact.y, normal_.z[i] = exact.z;
+            }
+            squared = dot(normal_, normal_);
         }
-        Vec3 away = corner[0] - ray.origin;
-        t = dot(normal, away) / dot(normal, ray.direction);
+        size_ = sqrt(squared);
+        Vec3x4 away = corner_[0] - origin_;
+        t_ = dot(normal_, away) / dot(normal_, direction_);
         // A triangle seen so nearly edge-on that its plane tells nothing is met between its corners.
-        int axis = dominant_axis(std::fabs(ray.direction.x), std::fabs(ray.direction.y), std::fabs(ray.direction.z));
-        double per = 1 / ray.direction[axis], least = away[axis] * per, most = least;
-        for (int i = 1; i < 3; i++) {
-            double reached = (corner[i][axis] - ray.origin[axis]) * per;
+        DominantAxis axis(abs(direction_));
+        double4 per = splat4(1.0) / axis.of(direction_), least = axis.of(away) * per, most = least;
+        for (int c = 1; c < 3; c++) {
+            double4 reached = axis.of(corner_[c] - origin_) * per;
             least = min(least, reached);
             most = max(most, reached);
         }
-        t = min(max(t, least), most);
-        Vec3 inside = ray.direction * t - away;
-        b1 = dot(cross(inside, second), normal) / normal_squared;
-        b2 = dot(cross(first, inside), normal) / normal_squared;
-        b1 = max(min(b1, 1.0), 0.0);
-        b2 = max(min(b2, 1 - b1), 0.0);
+        t_ = min(max(t_, least), most);
+        Vec3x4 inside = direction_ * t_ - away;
+        b1_ = dot(cross(inside, second_), normal_) / squared;
+        b2_ = dot(cross(first_, inside), normal_) / squared;
+        b1_ = max(min(b1_, splat4(1.0)), splat4(0.0));
+        b2_ = max(min(b2_, splat4(1.0) - b1_), splat4(0.0));
     }
 
-    template <class Value> Value interpolate(Value a, Value b, Value c) const { return a * (1 - b1 - b2) + b * b1 + c * b2; }
+    // Writes the surfaces to *found[0], …; material: the slot of the object.
+    void interactions(Interaction* const* found) const {
+        double4 zero = splat4(0.0), one = splat4(1.0);
+        long4 behind = long4(dot(normal_, direction_) > zero), solid = long4(size_ > zero) & long4(size_ < splat4(INFINITE));
+        // What is no surface, but was found to be hit, looks at the ray.
+        double4 side = select(behind & solid, -one, one), distance = length(direction_);
+        Vec3x4 normal = select(solid, normal_ * (side / size_), -(direction_ / distance)), shading = normal;
+        if (any([](const TriangleHit& hit) { return hit.mesh->corner_normals; })) {
+            Vec3x4 smooth = smooth_normal();
+            double4 size = length(smooth);
+            shading = select(long4(size > zero), smooth * (side / size), normal);
+        }
+        Vec3x4 position = corner_[0] + b1_ * first_ + b2_ * second_;
+        double4 cosine = -dot(normal, direction_) / distance, offset = this->offset();
+        unsigned turned = bits(long4(side < zero));
+        for (int i = 0; i < count_; i++) {
+            const TriangleMesh& mesh = *hits_[i].mesh;
+            uint32_t triangle = hits_[i].triangle;
+            Interaction& to = *found[i];
+            to.position = lane(position, i), to.normal = lane(normal, i), to.shading = lane(shading, i);
+            to.offset = offset[i], to.t = t_[i], to.cosine = cosine[i];
+            to.backside = bool(turned >> i & 1) != hits_[i].object->mirrored;
+            to.material = uint32_t(mesh.materials[triangle]);
+            to.has_uv = mesh.corner_uvs;
+            to.uv = {};
+            if (mesh.corner_uvs) {
+                const float* uv = mesh.corner_uvs + 6 * triangle;
+                to.uv = {interpolate<double>(i, uv[0], uv[2], uv[4]), interpolate<double>(i, uv[1], uv[3], uv[5])};
+            }
+            to.vertex_color = {};
+            if (mesh.corner_colors)
+                to.vertex_color = interpolate(i, TriangleMesh::corner_value(mesh.corner_colors, triangle, 0),
+                                              TriangleMesh::corner_value(mesh.corner_colors, triangle, 1),
+                                              TriangleMesh::corner_value(mesh.corner_colors, triangle, 2));
+        }
+    }
+
+    // What a renderer's relative rounding applies to: the largest coordinate in world space, or of the object's place, plus the
+    // distance of the farthest corner from the ray's origin times the triangle's slenderness. Barycentric coordinates that are
+    // computed from the eye are off by a rounding of that distance over the height, and move the hit along the longest side.
+    // origin: of rendering space.
+    double4 magnitude(Vec3 origin) const {
+        double4 largest = max_component(abs(translation_ + splat4(origin))), farthest = splat4(0.0);
+        for (const Vec3x4& corner : corner_) {
+            largest = max(largest, max_component(abs(corner + splat4(origin))));
+            farthest = max(farthest, length(corner - origin_));
+        }
+        return largest + farthest * slenderness();
+    }
+
+   private:
+    // A triangle this many times as long as high costs a depth six bits of its 53, if its normal is not taken with care: rounded
+    // but once, in each component, so that its roundings turn it about its length.
+    static constexpr double SLENDER = 64, MOST_SLENDER = 0x1p24;
+    static constexpr uint32_t ALL_KINDS = CAMERA | DIFFUSE | GLOSSY | TRANSMISSION | SHADOW;
+
+    // of(object) of each, which is mostly the same one.
+    template <class Of> double4 of_objects(const Of& of) const {
+        return on_one_ ? splat4(of(*hits_[0].object)) : gather4([&](int i) { return of(*hits_[i].object); });
+    }
+    template <class Of> bool any(const Of& of) const { return of(hits_[0]) || of(hits_[1]) || of(hits_[2]) || of(hits_[3]); }
+    template <class Value> Value interpolate(int i, Value a, Value b, Value c) const {
+        return a * (1 - b1_[i] - b2_[i]) + b * b1_[i] + c * b2_[i];
+    }
 
     // The longest side over the height on it; slimmer triangles than float32 can tell from a line are no surface.
-    double slenderness(double most) const { return min(longest_squared / std::sqrt(normal_squared), most); }
+    double4 slenderness() const { return min(longest_squared_ / size_, splat4(MOST_SLENDER)); }
 
     // How far off the surface rays that leave it must start, with u = 2⁻⁵³, M the largest coordinate of corners and object in
     // rendering space and L the longest side. The point is rounded along the normal by √3 u (M + 6 L) where it is interpolated.
     // Seen from the start, corners are rounded by √3 u L; each of the three products u, v, w of the test is rounded by
     // 2 u L² and their sum is the normal's projection, so that the plane seems to lie off by 6 u L σ, σ = L²/|N|. An instance's
     // ray is rounded by as much again as its matrix's condition enlarges it.
-    double offset(const Object& object) const {
-        double reach = max(max_component(abs(corner[0])), max(max_component(abs(corner[1])), max_component(abs(corner[2]))));
-        reach = max(reach, max_component(abs(object.to_world.translation())));
-        double longest = std::sqrt(longest_squared), placing = object.shared || object.visible != ALL_KINDS ? 6 * object.condition : 0;
-        return DOUBLE_ROUNDING * ((4 + placing) * reach + (16 + 12 * slenderness(MOST_SLENDER)) * longest);
+    double4 offset() const {
+        double4 reach = max(max_component(abs(corner_[0])), max(max_component(abs(corner_[1])), max_component(abs(corner_[2]))));
+        reach = max(reach, max_component(abs(translation_)));
+        double4 placing = of_objects([](auto& object) {
+            return object.shared || object.visible != ALL_KINDS ? 6 * object.condition : 0;
+        });
+        return splat4(DOUBLE_ROUNDING) *
+               ((splat4(4.0) + placing) * reach + (splat4(16.0) + splat4(12.0) * slenderness()) * sqrt(longest_squared_));
     }
 
-    static constexpr uint32_t ALL_KINDS = CAMERA | DIFFUSE | GLOSSY | TRANSMISSION | SHADOW;
-
-   private:
-    // A triangle this many times as long as high costs a depth six bits of its 53, if its normal is not taken with care: rounded
-    // but once, in each component, so that its roundings turn it about its length.
-    static constexpr double SLENDER = 64, MOST_SLENDER = 0x1p24;
-};
-
-// The surface of a mesh where a ray hits it. material: the slot of the object.
-inline Interaction triangle_interaction(const TriangleMesh& mesh, const Object& object, const Ray& ray, size_t triangle) {
-    TriangleSurface at(mesh, object, triangle, ray);
-    Interaction found;
-    found.t = at.t;
-    found.position = at.corner[0] + at.b1 * at.first + at.b2 * at.second;
-    double side = dot(at.normal, ray.direction) > 0 ? -1 : 1, size = std::sqrt(at.normal_squared);
-    if (size > 0 && size < INFINITE) {
-        found.normal = at.normal * (side / size);
-    } else {  // no surface, but what was found there looks at the ray
-        side = 1;
-        found.normal = -normalize(ray.direction);
-    }
-    found.cosine = -dot(found.normal, ray.direction) / length(ray.direction);
-    found.backside = (side < 0) != object.mirrored;
-    found.shading = found.normal;
-    if (mesh.corner_normals) {
+    // The vertices' normals in the world, interpolated, of any length; 0 without any.
+    Vec3x4 smooth_normal() const {
         // Cycles turns those of a mesh that only one object uses into the world before it interpolates, and normalises them
         // there; those of a shared mesh it interpolates in object space.
-        Vec3 corner[3];
-        for (int i = 0; i < 3; i++) {
-            corner[i] = TriangleMesh::corner_value(mesh.corner_normals, triangle, i);
-            if (object.shared) continue;
-            corner[i] = object.turned_normal(corner[i]);
-            double size = length(corner[i]);
-            if (size > 0) corner[i] = corner[i] / size;
+        double4 inverse[3][3];
+        for (int row = 0; row < 3; row++)
+            for (int column = 0; column < 3; column++)
+                inverse[row][column] = of_objects([=](auto& object) { return object.inverse[row][column]; });
+        long4 mirrored = long4(of_objects([](auto& object) { return double(object.mirrored); }) > splat4(0.0));
+        auto turned = [&](const Vec3x4& normal) {
+            if (any([](const TriangleHit& hit) { return hit.object->flat; }))
+                return gather4([&](int i) { return hits_[i].object->turned_normal(lane(normal, i)); });
+            Vec3x4 turned = transposed_product(inverse, normal);
+            return select(mirrored, -turned, turned);
+        };
+        long4 shared = long4(of_objects([](auto& object) { return double(object.shared); }) > splat4(0.0));
+        Vec3x4 corner[3];
+        for (int c = 0; c < 3; c++) {
+            corner[c] = gather4([&](int i) {
+                const float* normals = hits_[i].mesh->corner_normals;
+                return normals ? TriangleMesh::corner_value(normals, hits_[i].triangle, c) : Vec3{};
+            });
+            Vec3x4 placed = turned(corner[c]);
+            double4 size = length(placed);
+            corner[c] = select(shared, corner[c], select(long4(size > splat4(0.0)), placed / size, placed));
         }
-        Vec3 smooth = at.interpolate(corner[0], corner[1], corner[2]);
-        if (object.shared) smooth = object.turned_normal(smooth);
-        double size = length(smooth);
-        if (size > 0) found.shading = smooth * (side / size);
+        Vec3x4 smooth = corner[0] * (splat4(1.0) - b1_ - b2_) + corner[1] * b1_ + corner[2] * b2_;
+        return bits(shared) ? select(shared, turned(smooth), smooth) : smooth;
     }
-    if (mesh.corner_uvs) {
-        const float* uv = mesh.corner_uvs + 6 * triangle;
-        found.uv = {at.interpolate<double>(uv[0], uv[2], uv[4]), at.interpolate<double>(uv[1], uv[3], uv[5])};
-        found.has_uv = true;
-    }
-    if (mesh.corner_colors)
-        found.vertex_color = at.interpolate(TriangleMesh::corner_value(mesh.corner_colors, triangle, 0),
-                                            TriangleMesh::corner_value(mesh.corner_colors, triangle, 1),
-                                            TriangleMesh::corner_value(mesh.corner_colors, triangle, 2));
-    found.offset = at.offset(object);
-    found.material = uint32_t(mesh.materials[triangle]);
-    return found;
-}
 
-// What a renderer's relative rounding applies to at a hit: the largest coordinate in world space, or of the object's place,
-// plus the distance of the farthest corner from the ray's origin times the triangle's slenderness. Barycentric coordinates that
-// are computed from the eye are off by a rounding of that distance over the height, and move the hit along the longest side.
-inline double triangle_magnitude(const TriangleMesh& mesh, const Object& object, const Ray& ray, size_t triangle, Vec3 origin) {
-    TriangleSurface at(mesh, object, triangle, ray);
-    double largest = max_component(abs(object.to_world.translation() + origin)), farthest = 0;
-    for (Vec3 corner : at.corner) {
-        largest = max(largest, max_component(abs(corner + origin)));
-        farthest = max(farthest, length(corner - ray.origin));
-    }
-    return largest + farthest * at.slenderness(0x1p24);
-}
+    TriangleHit hits_[4];
+    int count_;
+    bool on_one_ = true;  // on one object
+    Vec3x4 origin_, direction_, translation_;  // of the rays; of the objects' places
+    Vec3x4 corner_[3], first_, second_;        // rendering space; the sides from the first corner
+    Vec3x4 normal_;                            // their cross product
+    double4 size_, longest_squared_;           // of the normal; of the sides
+    double4 t_, b1_, b2_;
+};
 
 }  // namespace viewcam::VIEWCAM_ISA
