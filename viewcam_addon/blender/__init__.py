@@ -22,6 +22,7 @@ def _rooms() -> list[ModuleType]:
         photo_matching,
         presets,
         proof,
+        render_all,
         render_panels,
         scene_cameras,
         view_menu,
@@ -29,7 +30,7 @@ def _rooms() -> list[ModuleType]:
     from .rendering import engine
 
     buttons = [operators, moving, clipboard, baking, presets]
-    shown = [panel, scene_cameras, photo_matching, proof, overlay, gizmos]
+    shown = [panel, scene_cameras, photo_matching, proof, render_all, overlay, gizmos]
     followers = [animation, resolution, own_picture]
     return [
         preferences,

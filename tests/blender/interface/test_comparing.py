@@ -67,10 +67,10 @@ def stand_in(monkeypatch, seen):
         def let(self, steps):
             (self.folder / "go").write_text(str(steps))
 
-    def command(copy, _scene, _words):
+    def command(copy, _scene, _name, _words):
         return [sys.executable, "-c", STAND_IN, str(copy.parent)]
 
-    monkeypatch.setattr(comparing, "_command", command)
+    monkeypatch.setattr(comparing, "command", command)
     monkeypatch.setattr(proof, "RunningComparison", Slow)
     return lambda **options: Slow(seen.camera, seen, **options)
 
@@ -298,7 +298,7 @@ def test_cancel_ends_it_and_keeps_what_the_last_one_came_to(stand_in):
 
 def test_a_child_that_dies_is_told_with_its_last_words(monkeypatch, seen):
     program = "import os; print('Writing: something'); print('out of memory', flush=True); os.kill(os.getpid(), 11)"
-    monkeypatch.setattr(comparing, "_command", lambda *_: [sys.executable, "-c", program])
+    monkeypatch.setattr(comparing, "command", lambda *_: [sys.executable, "-c", program])
     with pytest.raises(RuntimeError, match="was ended by signal 11 after saying: out of memory"):
         bpy.ops.viewcam.compare_with_cycles()
     outcome = proof.latest()
@@ -364,7 +364,7 @@ def test_what_can_not_be_compared_is_refused_at_once_in_one_sentence(seen, monke
         with pytest.raises(RuntimeError, match="A copy of the file can't be saved"):
             bpy.ops.viewcam.compare_with_cycles()
     with monkeypatch.context() as patch:
-        patch.setattr(comparing, "_command", lambda *_: ["/no/such/program"])
+        patch.setattr(comparing, "command", lambda *_: ["/no/such/program"])
         with pytest.raises(RuntimeError, match="The comparison can't be started"):
             bpy.ops.viewcam.compare_with_cycles()
     seen.camera.data.type = "ORTHO"

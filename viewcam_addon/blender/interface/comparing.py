@@ -137,11 +137,12 @@ class RunningComparison:
         repeat = shlex.join(["check", _file_name(), *words])
         written = ["--json", str(self.folder / _RESULT), "--report", str(report), "--sides", str(report)]
         written += ["--difference", str(report / _PICTURES["difference"])]
-        command = _command(self.folder / _file_name(), scene, [*words, *written, "--repeat", repeat, "--log-json"])
+        words = [*words, *written, "--repeat", repeat, "--log-json"]
+        start = command(self.folder / _file_name(), scene, "check", words)
         # Blender's own scripts hold what the inside of a `bpy` looks like, which hides the module from a new process.
         scripts = bpy.utils.system_resource("SCRIPTS")
         variables = child_process.environment(scripts, **{name: str(self.folder) for name in ("TMPDIR", "TMP", "TEMP")})
-        return child_process.ProcessGroup(command, self.folder / _SAID, variables)
+        return child_process.ProcessGroup(start, self.folder / _SAID, variables)
 
     def progress(self) -> tuple[float, str]:
         """How far it is, from 0 to 1 in steps of unequal length, and what it is doing."""
@@ -308,10 +309,10 @@ def _check_possible(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> 
         raise InputError("OpenEXR is missing: install the extension from its zip, which brings it along")
 
 
-def _command(copy: Path, scene: bpy.types.Scene, words: Sequence[str]) -> list[str]:
-    """`viewcam check` on the copy, in this same Blender."""
+def command(copy: Path, scene: bpy.types.Scene, name: str, words: Sequence[str]) -> list[str]:
+    """`viewcam NAME` on the copy, in this same Blender."""
     if not bpy.app.binary_path:  # a module of Python
-        return child_process.viewcam("check", copy, *words)
+        return child_process.viewcam(name, copy, *words)
     # The file's own scene is that of its first window. The add-on may be enabled for this session only.
     other = ["--scene", scene.name] if any(window.scene != scene for window in bpy.context.window_manager.windows[:1]) else []
     enabled = ["--addons", preferences.PACKAGE] if preferences.PACKAGE in bpy.context.preferences.addons else []
@@ -324,7 +325,7 @@ def _command(copy: Path, scene: bpy.types.Scene, words: Sequence[str]) -> list[s
         *other,
         "--command",
         "viewcam",
-        "check",
+        name,
         *words,
     ]
 
