@@ -125,6 +125,7 @@ def test_what_is_killed_in_the_midst_of_a_shot_loses_nothing(stand_in, machines,
     assert processes.run(worker) == (victim == "blender")
 
 
+@pytest.mark.exhaustive
 def test_a_worker_that_is_stopped_holds_no_batch_up_with_a_time_limit_or_without(
     stand_in, blend, tmp_path, processes, monkeypatch
 ):
@@ -156,6 +157,7 @@ def test_a_shot_that_always_crashes_blender_fails_and_the_rest_go_on(stand_in, m
     assert {fields["shot"] for fields in ear.all("shot_done")} == {"a", "b", "c"}
 
 
+@pytest.mark.exhaustive
 def test_a_shot_that_ends_one_worker_after_another_fails_and_the_rest_go_on(stand_in, machines, blend, tmp_path):
     ear = Ear()
     summary = run_on(machines, blend, tmp_path / "out", shots("a", "poison", "b", "c"), ear)
@@ -195,12 +197,14 @@ def test_a_file_that_changed_between_two_batches_is_loaded_again(stand_in, machi
     assert summary.exit_status == 0 and loads() <= before + 2
 
 
+@pytest.mark.exhaustive
 def test_a_worker_without_a_blender_says_so_in_a_sentence(stand_in, blend, tmp_path, monkeypatch):
     monkeypatch.setenv("VIEWCAM_BLENDER", str(tmp_path / "ghost"))
     with cluster.opened(None, 1) as machines, pytest.raises(InputError, match=r"ghost can't be started"):
         run_on(machines, blend, tmp_path / "out", shots("a"))
 
 
+@pytest.mark.exhaustive
 def test_threads_are_the_cores_shared_among_the_workers(stand_in, blend, tmp_path, monkeypatch):
     monkeypatch.setattr(cluster, "_cores", lambda: 7)
     with cluster.opened(None, 2) as machines:
@@ -215,6 +219,7 @@ def test_blender_computes_in_as_many_threads_as_without_dask(stand_in, machines,
     assert stand_in.diary("one-thread")[0][1] == str(os.environ.get("OMP_NUM_THREADS"))
 
 
+@pytest.mark.exhaustive
 def test_nothing_of_dask_stays_in_this_process(stand_in, processes):
     """Modules to be found, variables, levels of logging, what Python's main program is; threads."""
 
@@ -278,6 +283,7 @@ def farm(tmp_path, processes):
         each.end()
 
 
+@pytest.mark.exhaustive
 def test_a_scheduler_without_workers_is_one_sentence(farm):
     address, _, _ = farm
     with (
@@ -287,6 +293,7 @@ def test_a_scheduler_without_workers_is_one_sentence(farm):
         pass
 
 
+@pytest.mark.exhaustive
 def test_blender_of_a_farm_computes_in_all_threads_too(farm, stand_in, blend, tmp_path):
     address, worker, _ = farm
     worker()
@@ -295,6 +302,7 @@ def test_blender_of_a_farm_computes_in_all_threads_too(farm, stand_in, blend, tm
     assert stand_in.diary("one-thread")[0][1] == "None"
 
 
+@pytest.mark.exhaustive
 def test_workers_of_a_farm_keep_their_blender_from_batch_to_batch(farm, stand_in, blend, tmp_path):
     address, worker, _ = farm
     worker()
@@ -304,6 +312,7 @@ def test_workers_of_a_farm_keep_their_blender_from_batch_to_batch(farm, stand_in
     assert [words[2] for words in stand_in.diary("open")] == ["None"], "one load, and the machine's own threads"
 
 
+@pytest.mark.exhaustive
 def test_the_shots_of_a_machine_that_is_not_fit_are_rendered_by_another(farm, stand_in, blend, tmp_path):
     address, worker, _ = farm
     worker(VIEWCAM_BLENDER=str(tmp_path / "ghost"))
@@ -314,6 +323,7 @@ def test_the_shots_of_a_machine_that_is_not_fit_are_rendered_by_another(farm, st
     assert summary.exit_status == 0 and summary.counts["done"] == 6
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("hears", ["in time", "too late"])
 def test_a_scheduler_that_dies_ends_the_batch_with_what_is_left(farm, stand_in, blend, tmp_path, processes, monkeypatch, hears):
     """Also where it dies before it could say that the first shot is done."""
@@ -352,6 +362,7 @@ def listening(process):
     return {(each.laddr.ip, each.laddr.port) for each in sockets}
 
 
+@pytest.mark.exhaustive
 def test_nobody_else_on_this_machine_can_have_the_workers_run_anything(stand_in, machines, tmp_path):
     """Neither without credentials nor with others, at any port that scheduler, workers and nannies have."""
     import distributed
@@ -379,6 +390,7 @@ def test_nobody_else_on_this_machine_can_have_the_workers_run_anything(stand_in,
             raise AssertionError(f"port {port} tells everybody about the workers")
 
 
+@pytest.mark.exhaustive
 def test_a_farm_by_tls_as_the_page_says(stand_in, blend, tmp_path, processes):
     """The configuration of docs/farm.md, with an authority of this test's own; whoever has none is not let in."""
     import dask
@@ -426,6 +438,7 @@ def test_a_plain_scheduler_is_warned_of(stand_in, blend, tmp_path, capfd, addres
     assert (sentence in capfd.readouterr().err) == warned
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("hangs", ["the loop", "the client"])
 def test_a_cluster_is_closed_within_seconds_whatever_hangs(stand_in, processes, monkeypatch, hangs):
     monkeypatch.setattr(cluster, "_CLOSED_WITHIN", 1.0)

@@ -29,6 +29,7 @@ def pictures(folder, name):
     return folder.image(name).read_bytes(), folder.preview(name).read_bytes()
 
 
+@pytest.mark.exhaustive
 def test_a_batch_that_dies_before_any_step_is_continued_to_the_same_bytes(tmp_path, painting, folders):
     """The shots are there already, of other settings: whatever is replaced could be taken for what it is not."""
     hashes = [painting.hashes(painting.shots(2), seed) for seed in (0, 1)]

@@ -3,6 +3,8 @@ import pytest
 
 from benchmarks.stability import spheres
 
+pytestmark = pytest.mark.exhaustive
+
 
 @pytest.fixture(scope="module")
 def measured():

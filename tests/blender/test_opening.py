@@ -274,6 +274,7 @@ def test_trusted_it_does_so_that_the_test_above_can_fail(fresh_blender, temporar
     assert bool(left["batch"]) == (way.__name__ not in NEVER), left
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("way", FLUIDS, ids=lambda way: way.__name__)
 @pytest.mark.parametrize("trust", [False, True])
 def test_no_fluid_is_simulated_into_a_folder_of_the_files_choice(tmp_path, way, trust):

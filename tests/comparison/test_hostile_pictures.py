@@ -25,7 +25,7 @@ def no_warnings_but_what_underflows(no_warnings):
 HOSTILE = (np.nan, np.inf, -np.inf, 1e30, 3.4e38, -3.4e38, 1e-45, np.array(0x7F800001, np.uint32).view(np.float32))
 GEOMETRY = ("Depth", "Position", "Normal", "UV", "Object Index", "Material Index")
 LIGHT = ("Combined", "Diffuse Direct", "Diffuse Color", "Emission")
-PINHOLE = Pinhole((5, -7, 4), (0.2, 0.1, 0.6), (0, 0, 1), 60.0, 64, 48)
+PINHOLE = Pinhole((5, -7, 4), (0.2, 0.1, 0.6), (0, 0, 1), 30.0, 32, 24)
 
 
 def harmed(image, name, value, rows=slice(10, 20), columns=slice(12, 24)):
@@ -36,9 +36,9 @@ def harmed(image, name, value, rows=slice(10, 20), columns=slice(12, 24)):
 
 def lit(seed, samples=64):
     rng = np.random.default_rng(seed)
-    light = {name: rng.gamma(samples, 1 / samples, (48, 64, 1)) * np.array([0.3, 0.5, 0.4]) for name in LIGHT}
-    light["Combined"] = np.concatenate([light["Combined"], np.ones((48, 64, 1))], axis=-1)
-    light |= {"Variance": np.full((48, 64, 3), 0.16 / samples), "Depth": np.full((48, 64, 1), 8.0)}
+    light = {name: rng.gamma(samples, 1 / samples, (24, 32, 1)) * np.array([0.3, 0.5, 0.4]) for name in LIGHT}
+    light["Combined"] = np.concatenate([light["Combined"], np.ones((24, 32, 1))], axis=-1)
+    light |= {"Variance": np.full((24, 32, 3), 0.16 / samples), "Depth": np.full((24, 32, 1), 8.0)}
     return Image({name: values.astype(np.float32) for name, values in light.items()}, PINHOLE, {"samples": str(samples)})
 
 

@@ -18,7 +18,7 @@ from viewcam_addon.comparison.sides import Sides
 LEVEL = 0.01
 HEIGHT, WIDTH = 32, 40
 # Trials that fail with a probability of 0.01 each have more failures than these once in a thousand (binomial distribution).
-TRIALS = [pytest.param(100, 5, id="100"), pytest.param(1000, 20, id="1000", marks=pytest.mark.exhaustive)]
+TRIALS = [pytest.param(50, 4, id="50"), pytest.param(500, 13, id="500", marks=pytest.mark.exhaustive)]
 
 rows, columns = np.mgrid[:HEIGHT, :WIDTH]
 TRUTH = np.stack([0.2 + 0.5 * columns / WIDTH, 0.3 + 0.3 * rows / HEIGHT, np.full((HEIGHT, WIDTH), 0.4)], axis=-1)

@@ -19,7 +19,7 @@ from viewcam_addon.image import Image
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import Tracer
 
-STATED = Pinhole((6.0, -7.5, 4.5), (0.2, 0.1, 0.8), (0.0, 0.0, 1.0), 300.0, 240, 150)
+STATED = Pinhole((6.0, -7.5, 4.5), (0.2, 0.1, 0.8), (0.0, 0.0, 1.0), 150.0, 120, 75)
 
 
 def smooth():
@@ -164,7 +164,7 @@ CHANGES = {
     "rows flipped": lambda passes: {name: values[::-1] for name, values in passes.items()},
     "columns flipped": lambda passes: {name: values[:, ::-1] for name, values in passes.items()},
     "axes swapped": lambda passes: passes | {"Position": passes["Position"][..., [0, 2, 1]]},
-    "NaN": lambda passes: passes | {"Depth": np.where(np.arange(STATED.width)[None, :, None] == 120, np.nan, passes["Depth"])},
+    "NaN": lambda passes: passes | {"Depth": np.where(np.arange(STATED.width)[None, :, None] == 60, np.nan, passes["Depth"])},
 }
 
 

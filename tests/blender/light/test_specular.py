@@ -101,7 +101,7 @@ def test_a_mirror_bends_its_smooth_normals_so_that_no_ray_goes_below(rays):
         check(way, reflected(ray, shading))
 
 
-@pytest.mark.parametrize("ior", [1.1, 1.5, 1 / 1.1])
+@pytest.mark.parametrize("ior", [1.5, *(pytest.param(ior, marks=pytest.mark.exhaustive) for ior in (1.1, 1 / 1.1))])
 def test_refraction_bends_them_likewise_and_is_black_where_no_light_goes_through(rays, ior):
     ray, true, shading, way, backside = rays("ShaderNodeBsdfRefraction", IOR=ior)
 

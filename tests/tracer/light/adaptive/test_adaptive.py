@@ -67,7 +67,7 @@ def test_pictures_that_lost_what_few_samples_met_would_be_told(mirrored, referen
     assert abs(whole) > 4 or np.abs(by_tile).max() > 5
 
 
-@pytest.mark.parametrize("error", [0.03, 0.01])
+@pytest.mark.parametrize("error", [0.03, pytest.param(0.01, marks=pytest.mark.exhaustive)])
 def test_the_error_that_is_wanted_is_met_in_the_mean(soft, error):
     scene = soft
     truth = render(scene, "direct", 2048, 99)["Combined"][..., :3].astype(float)
