@@ -29,7 +29,7 @@ ROOMS = {
     "files": "errors",
     "terminal": "",
     "events": "terminal",
-    "words": "",
+    "argument_types": "",
     "html_page": "errors",
     "child_process": "errors events",
     "crashes": "",
@@ -54,10 +54,10 @@ ROOMS = {
         "errors checks files terminal html_page child_process pinhole roll rotation moves diagram photo_match image "
         "intrinsics camera_values cameras datasets comparison tracer shots batch"
     ),
-    "commands": "errors terminal events crashes child_process pinhole image cameras comparison tracer api shots batch",
-    "camera_words": "words cameras",
-    "batch_words": "words shots camera_words",
-    "cli": "errors checks files events words tracer commands camera_words batch_words",
+    "commands": (
+        "errors terminal argument_types events crashes child_process pinhole image cameras comparison tracer api shots batch"
+    ),
+    "cli": "errors checks files events argument_types tracer commands",
 }
 BLENDER_ROOMS = {
     "versions": "",

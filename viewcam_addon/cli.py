@@ -3,7 +3,7 @@
 Exit status: 0 all well; 1 the comparison failed; 2 bad input or usage, with one line on stderr; 3 something could not be
 modelled under --strict. No traceback reaches a user.
 
-Here are the words; what they do is in commands/.
+Here are the commands and what options several of them have; what they do is in commands/.
 """
 
 import argparse
@@ -16,7 +16,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from . import batch_words, camera_words, checks, events, words
+from . import argument_types as types
+from . import checks, events
 from .commands import Result, audit, batch, camera, chart, verification
 from .errors import InputError, bug
 from .files import check_writable, is_printed_to, written_whole
@@ -97,7 +98,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     def command(run: Callable[[argparse.Namespace], Result], name: str, text: str) -> argparse.ArgumentParser:
         added = subparsers.add_parser(name, help=text, description=text)
         added.set_defaults(run=run, writes=())
-        added.add_argument("--threads", type=words.positive, metavar="N", help="threads to use (default: all)")
+        added.add_argument("--threads", type=types.positive, metavar="N", help="threads to use (default: all)")
         added.add_argument("--json", metavar="FILE", type=Path, help="write the result as JSON")
         added.add_argument("--log-json", action="store_true", help="tell on standard output a JSON object for each event")
         return added
@@ -114,7 +115,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     def scene_choices(added: argparse.ArgumentParser) -> None:
         added.add_argument("--camera", metavar="NAME", help="the camera object (default: the scene's)")
         added.add_argument("--frame", type=int, metavar="N", help="the frame (default: the file's current one)")
-        added.add_argument("--size", type=words.size, metavar="WxH", help="pixels of the picture (default: the scene's)")
+        added.add_argument("--size", type=types.size, metavar="WxH", help="pixels of the picture (default: the scene's)")
         added.add_argument("--strict", action="store_true", help="exit with 3 if anything can not be modelled")
         added.add_argument("--recenter", action="store_true", help="put the origin at the eye: for scenes far from it")
         added.add_argument("--clay", action="store_true", help="the same matte material on everything, on both sides")
@@ -129,21 +130,21 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         )
         (samples or added).add_argument(
             "--samples",
-            type=words.positive,
+            type=types.positive,
             metavar="N",
             default=SAMPLES,
             help="samples a pixel, for light (default: %(default)s)",
         )
         noise = "another noise for another number (default: 0)"
-        added.add_argument("--seed", type=words.seed, metavar="N", default=0, help=noise)
+        added.add_argument("--seed", type=types.seed, metavar="N", default=0, help=noise)
 
     def error(added: argparse._ActionsContainer, text: str) -> None:
         text = f"for light: {text} as many samples of each pixel as it takes for a standard error of E, in the picture's units"
-        added.add_argument("--error", type=words.above_zero, metavar="E", help=text)
+        added.add_argument("--error", type=types.above_zero, metavar="E", help=text)
 
     def report(added: argparse.ArgumentParser) -> None:
         added.add_argument("--report", metavar="DIR", type=Path, help="write an HTML report there")
-        added.add_argument("--difference", metavar="FILE.png", type=words.png, help="draw there what differs, pixel by pixel")
+        added.add_argument("--difference", metavar="FILE.png", type=types.png, help="draw there what differs, pixel by pixel")
         added.set_defaults(writes=("report", "difference"))
         added.add_argument("--sides", type=Path, help=argparse.SUPPRESS)  # a folder for both sides as pictures
         added.add_argument("--repeat", help=argparse.SUPPRESS)  # what the report shall name as its command
@@ -158,7 +159,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     added.add_argument("scene", metavar="SCENE.json", type=Path)
     added.add_argument("image", metavar="OUT.exr", type=Path)
     added.set_defaults(writes=("image",))
-    added.add_argument("--size", type=words.size, metavar="WxH", help="pixels of the picture (default: the scene's)")
+    added.add_argument("--size", type=types.size, metavar="WxH", help="pixels of the picture (default: the scene's)")
     added.add_argument("--stated", action="store_true", help="trace the four values as stated, not as Blender stored them")
     spent = added.add_mutually_exclusive_group()
     light(added, spent)
@@ -181,7 +182,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         "--scene", metavar="SCENE.json", type=Path, help="the reference's scene: explains silhouettes, brings the ledger"
     )
     # Cycles' file counts one that is left out.
-    added.add_argument("--test-samples", type=words.positive, help=argparse.SUPPRESS)
+    added.add_argument("--test-samples", type=types.positive, help=argparse.SUPPRESS)
     report(added)
 
     added = command(verification.check, "check", "Export, trace, render with Cycles and compare, all in one go.")
@@ -190,18 +191,18 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     error(added, "the tracer takes")
     report(added)
 
-    added = command(batch.run, "batch", batch_words.DESCRIPTION)
+    added = command(batch.run, "batch", batch.DESCRIPTION)
     blend(added)
-    batch_words.add(added, blend_is_open)
+    batch.add_options(added, blend_is_open)
 
     added = command(audit.run, "audit", "Tell what is wrong with a dataset's cameras, by its points or depth maps.")
     added.add_argument("dataset", metavar="DATASET", type=Path, help="transforms.json, a COLMAP model, or the folder of one")
     added.add_argument("--points", metavar="COLMAP", type=Path, help="a COLMAP model of the same pictures and world")
     added.add_argument("--against", metavar="CAMERAS", type=Path, help="true cameras of the same pictures, in any format")
-    added.add_argument("--size", type=words.size, metavar="WxH", help="pixels, where the file does not say")
+    added.add_argument("--size", type=types.size, metavar="WxH", help="pixels, where the file does not say")
 
     added = command(camera.run, "camera", "List the cameras of another program's file, or write them for a third one.")
-    camera_words.add(added)
+    camera.add_options(added)
 
     added = command(verification.demo, "demo", "Check the studio still that comes with the project, and write the report.")
     added.set_defaults(

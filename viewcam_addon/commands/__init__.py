@@ -1,4 +1,4 @@
-"""What each sub-command of `viewcam` does; cli.py knows its words. Each returns the exit status and what --json writes."""
+"""What each sub-command of `viewcam` does. Each returns the exit status and what --json writes."""
 
 import importlib
 import importlib.util

@@ -1,4 +1,4 @@
-"""What the words of the command line say: text → value, or one sentence that argparse puts behind the option's name."""
+"""Types of the command line's arguments: text → value, or one sentence that argparse puts behind the option's name."""
 
 import argparse
 import math
