@@ -1,6 +1,7 @@
 """Whatever the camera, the format and the options: written and read back with the same options it is the same camera."""
 
 import dataclasses
+import json
 import math
 
 import numpy as np
@@ -105,6 +106,39 @@ def test_it_comes_back_as_the_same_camera(tmp_path_factory, form, pinhole, axes,
     turned = 8 * FLOAT64 * (math.hypot(*pinhole.eye) + math.hypot(*pinhole.look_at)) / math.dist(pinhole.eye, pinhole.look_at)
     assert np.abs(np.array(have.axes()) - pinhole.axes()).max() < 1e-14 + turned / pinhole.sine_to_up
     assert math.dist(have.eye, pinhole.eye) <= 1e-14 * max(math.hypot(*pinhole.eye), 1e-3)
+
+
+@pytest.mark.parametrize("form", ["transforms", "colmap", "sidecar"])
+@SETTINGS
+@given(several=st.lists(pinholes(), min_size=1, max_size=3))
+def test_what_a_batch_leaves_comes_back_to_the_bit(tmp_path_factory, form, several):
+    several = [fitting(pinhole, form) for pinhole in several]
+    folder = tmp_path_factory.mktemp("a")
+    path = folder / "transforms.json" if form == "transforms" else folder
+    cameras.save([Camera(f"{number}", pinhole) for number, pinhole in enumerate(several)], path, form)
+    assert [camera.pinhole for camera in cameras.read(path)] == several
+
+
+@pytest.mark.parametrize(("form", "file"), [("transforms", "transforms.json"), ("colmap", "images.txt")])
+def test_where_somebody_changed_the_matrix_it_counts_and_not_the_values_of_which_it_was_made(tmp_path, form, file):
+    path = tmp_path / file if form == "transforms" else tmp_path
+    cameras.save([Camera("a", CAMERAS["plain"])], path, form)
+    text = (tmp_path / file).read_text()
+    assert "virtual_pinhole" in text and cameras.read(path)[0].pinhole == CAMERAS["plain"]
+    if form == "transforms":
+        said = json.loads(text)
+        said["frames"][0]["transform_matrix"][0][3] += 1
+        (tmp_path / file).write_text(json.dumps(said))
+    else:
+        *head, number, _, _ = text.split("\n")
+        words = number.split(" ")
+        words[5] = repr(float(words[5]) + 1)
+        (tmp_path / file).write_text("\n".join([*head, " ".join(words), "", ""]))
+    (changed,) = cameras.read(path)
+    assert math.dist(changed.pinhole.eye, CAMERAS["plain"].eye) == pytest.approx(1)
+    for damage in ("{", '"eye": [1, 2, 3]', '"eye": "x", "look_at"'):
+        (tmp_path / file).write_text(text.replace('"eye"', damage, 1) if form == "colmap" else text.replace('"eye"', '"ey"', 1))
+        assert np.abs(np.array(cameras.read(path)[0].pinhole.axes()) - CAMERAS["plain"].axes()).max() < 1e-15
 
 
 @pytest.mark.parametrize("form", OURS)

@@ -22,7 +22,7 @@ def test_pictures_of_one_kind_are_described_once_at_the_top():
     document = transforms.document([View("a.png", SHIFTED), View("b.png", ABOVE)])
     assert {key: document[key] for key in PICTURE} == PICTURE
     assert document.keys() == PICTURE.keys() | ANGLES | {"frames"}
-    assert [frame.keys() for frame in document["frames"]] == [{"file_path", "transform_matrix"}] * 2
+    assert [frame.keys() for frame in document["frames"]] == [{"file_path", "transform_matrix", "virtual_pinhole"}] * 2
     assert [frame["file_path"] for frame in document["frames"]] == ["a.png", "b.png"]
 
 
@@ -30,7 +30,7 @@ def test_pictures_of_several_kinds_are_described_in_every_frame_and_nowhere_else
     document = transforms.document([View("a.png", SHIFTED), View("b.png", SQUARE)])
     assert document.keys() == {"frames"}
     for frame in document["frames"]:
-        assert frame.keys() == PICTURE.keys() | ANGLES | {"file_path", "transform_matrix"}
+        assert frame.keys() == PICTURE.keys() | ANGLES | {"file_path", "transform_matrix", "virtual_pinhole"}
     projections = readers["transforms"](json.dumps(document))
     middle = {file: projection(np.zeros((1, 3))).tolist() for file, projection in projections.items()}
     assert middle == {"a.png": [[300, 210]], "b.png": [[320, 180]]}

@@ -6,7 +6,8 @@ PINHOLE (fx, fy, cx, cy). The upper left corner of the picture is (0, 0), its fi
 
 **Images.** In text two lines each, the second one empty where written here: it would list image points. The pose takes world
 space to the camera's x right, y down, z into the view, as a unit quaternion (w first, Hamilton's) and a translation. All
-numbers have as many digits as bring back the same float64. Of text and binary in one folder the binary one counts, as for
+numbers have as many digits as bring back the same float64, and comments before them the values of which they were made, so that
+a camera comes back to the bit. Of text and binary in one folder the binary one counts, as for
 COLMAP.
 
 rigs and frames, new in COLMAP 3.12, are neither written nor read: without them each image is a frame of its own, as older
@@ -16,7 +17,9 @@ Sources: COLMAP's doc/format.rst, doc/database.rst (pixel centres), src/colmap/s
 src/colmap/scene/reconstruction_io_text.cc and _binary.cc (what parts a line: a name ends at a space).
 """
 
+import contextlib
 import itertools
+import json
 import math
 import re
 import struct
@@ -27,7 +30,7 @@ from typing import NamedTuple
 from .. import checks
 from ..errors import InputError
 from ..pinhole import Pinhole, ViewPlane
-from . import axes, distortion, naming
+from . import axes, distortion, naming, own
 from .axes import intrinsics, quaternion, world_to_camera
 from .camera import Camera, Options, not_a_pinhole
 from .source import Source, flat, pixels
@@ -57,6 +60,7 @@ MODELS: dict[str, tuple[int, tuple[str, ...]]] = {
 }
 """Name → its number in binary files, and its parameters."""
 
+_EXACT = re.compile(r"^# virtual_pinhole (\d{1,18}) (\{[^\n]*+)$", re.MULTILINE)
 _STRAIGHT = ("f", "fx", "fy", "cx", "cy")
 _FILES = ("cameras", "images")
 _FOLDERS = ((), ("sparse", "0"), ("sparse",), ("colmap", "sparse", "0"))
@@ -72,6 +76,7 @@ class _Intrinsics(NamedTuple):
 
 
 class _Image(NamedTuple):
+    number: int
     name: str
     quaternion: tuple[float, ...]
     translation: tuple[float, ...]
@@ -89,6 +94,7 @@ def read(source: Source, options: Options) -> list[Camera]:
         intrinsic, images = _binary_cameras(files[0]), [*_binary_images(files[1])]
     else:
         intrinsic, images = _text_cameras(files[0]), [*_text_images(files[1])]
+    exact = {} if suffix == ".bin" else _exact(files[1])
     notes = (
         ("The folder has the model as text, too: the binary one counts",) if _has(folder, ".txt") and suffix == ".bin" else ()
     )
@@ -103,6 +109,8 @@ def read(source: Source, options: Options) -> list[Camera]:
         what = f"image {checks.shown(image.name)}"
         matrix = axes.from_world_to_camera(axes.rotation_of(image.quaternion, what), image.translation, what)
         pinhole, more = axes.pinhole(matrix, plane, what)
+        if same := own.restored(exact.get(image.number), lambda p: _is_written_as(p, image, intrinsic)):  # noqa: B023
+            pinhole, more = same, ()
         cameras.append(Camera(name, pinhole, True, (*notes, *of_lens, *more), image.name))
     return cameras
 
@@ -190,13 +198,35 @@ def _text_images(source: Source) -> Iterator[_Image]:
         if len(words) < 10 or not words[0].isdecimal():
             raise InputError(f"{place} is {checks.shown(line)}: it should be IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME")
         pose = flat(f"the pose in {place}", words[1:8])
-        yield _Image(re.split(r"\s+", line.strip(), maxsplit=9)[9], pose[:4], pose[4:], _id(words[8], place))
+        yield _Image(
+            _id(words[0], place), re.split(r"\s+", line.strip(), maxsplit=9)[9], pose[:4], pose[4:], _id(words[8], place)
+        )
         for number, points in itertools.islice(lines, 1):
             if len(points.split()) % 3 and not points.lstrip().startswith("#"):
                 raise InputError(
                     f"line {number} of {source.name} is no list of image points, X Y POINT3D_ID: each image has two lines, "
                     "the second of which may be empty"
                 )
+
+
+def _exact(source: Source) -> dict[int, object]:
+    """The values that comments have of the images, by their numbers."""
+    found = {}
+    for line in _EXACT.finditer(source.text):
+        with contextlib.suppress(InputError):
+            found[int(line[1])] = Source(line[2]).document
+    return found
+
+
+def _is_written_as(pinhole: Pinhole, image: _Image, intrinsic: dict[int, _Intrinsics]) -> bool:
+    if pinhole.mirrored:
+        return False
+    model, width, height, *parameters = _camera(pinhole).split()
+    plane = _Intrinsics(model, int(width), int(height), tuple(map(float, parameters)))
+    return plane == intrinsic[image.camera] and tuple(map(float, _pose(pinhole).split())) == (
+        *image.quaternion,
+        *image.translation,
+    )
 
 
 def _id(word: str, place: str) -> int:
@@ -252,10 +282,10 @@ def _binary_cameras(source: Source) -> dict[int, _Intrinsics]:
 def _binary_images(source: Source) -> Iterator[_Image]:
     reader = _Reader(source)
     for _ in range(reader.numbers("Q")[0]):
-        _, *pose, camera = reader.numbers("I7dI")
+        number, *pose, camera = reader.numbers("I7dI")
         name = reader.text()
         reader.skip(24 * reader.numbers("Q")[0])
-        yield _Image(name, tuple(pose[:4]), tuple(pose[4:]), camera)
+        yield _Image(number, name, tuple(pose[:4]), tuple(pose[4:]), camera)
 
 
 def write(cameras: Sequence[Camera], options: Options) -> dict[str, str]:
@@ -281,12 +311,14 @@ def texts(cameras: Iterable[Camera]) -> dict[str, str]:
     cameras = naming.checked(cameras, "a COLMAP model")
     check_names(map(naming.image_of, cameras))
     numbers: dict[str, int] = {}
-    images = []
+    images, exact = [], []
     for number, camera in enumerate(cameras, start=1):
+        exact.append(f"# virtual_pinhole {number} {json.dumps(own.document(camera.pinhole))}\n")
         intrinsic = numbers.setdefault(_camera(camera.pinhole), len(numbers) + 1)
         images.append(f"{number} {_pose(camera.pinhole)} {intrinsic} {naming.image_of(camera)}\n\n")
     return {
-        "images.txt": "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME\n# POINTS2D[] as X Y POINT3D_ID\n" + "".join(images),
+        "images.txt": "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME\n# POINTS2D[] as X Y POINT3D_ID\n"
+        + "".join([*exact, *images]),
         "cameras.txt": "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n"
         + "".join(f"{number} {camera}\n" for camera, number in numbers.items()),
         "points3D.txt": "# POINT3D_ID X Y Z R G B ERROR TRACK[] as IMAGE_ID POINT2D_IDX\n",

@@ -14,7 +14,7 @@ Rejected: skipping words that are not understood, since one of them may turn the
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from .. import checks
 from ..errors import InputError
@@ -95,11 +95,13 @@ def read(source: Source, options: Options) -> list[Camera]:
 
 
 def write(cameras: Sequence[Camera], options: Options) -> str:
-    return "\n".join(json.dumps(_document_of(camera.pinhole)) for camera in cameras)
+    return "\n".join(json.dumps(document(camera.pinhole)) for camera in cameras)
 
 
-def _document_of(pinhole: Pinhole) -> dict:
-    """Only what is not as usual is said, but the size always: distances count its pixels."""
+def document(pinhole: Pinhole) -> dict:
+    """A camera's values, each a float64 to the bit. Only what is not as usual is said, but the size always: distances count
+    its pixels.
+    """
     d_x, d_y = pinhole.distance
     document = {name: list(getattr(pinhole, name)) for name in VECTORS}
     document |= {"distance": d_x if d_x == d_y else [d_x, d_y], "width": pinhole.width, "height": pinhole.height}
@@ -108,6 +110,20 @@ def _document_of(pinhole: Pinhole) -> dict:
     if pinhole.mirrored:
         document["mirrored"] = True
     return document
+
+
+def restored(said: object, is_same: Callable[[Pinhole], bool]) -> Pinhole | None:
+    """The camera whose values stand as a `document` beside a matrix that was made of them, which holds fewer of their digits.
+
+    is_same : whether that camera is written as the matrix that stands there: if somebody changed it, the matrix counts.
+    """
+    if not isinstance(said, dict):
+        return None
+    try:
+        pinhole = Pinhole(**said)
+        return pinhole if is_same(pinhole) else None
+    except (InputError, TypeError):
+        return None
 
 
 def camera(values: Values, options: Options, what: str) -> Camera:

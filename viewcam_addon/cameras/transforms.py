@@ -10,6 +10,8 @@ fl_x), for readers that know nothing else, is the field of view if the principal
 granted: it isn't `Pinhole.field_of_view` where the camera is shifted. The original NeRF shoots its rays through the pixels'
 corners (bmild/nerf #24), which no file can mend; its files have no size either, which is then that of the picture beside it.
 
+`virtual_pinhole`, which others pass over, has the values of which the matrix was made: so the camera comes back to the bit.
+
 **Where they stand.** At the top if all pictures have the same, else in every frame, and always together: nerfstudio takes what
 is at the top before it looks into a frame, and instant-ngp reads cx and w from the same object. Where both say something and
 not the same, these two would take different cameras, so it is refused.
@@ -29,13 +31,14 @@ import numpy as np
 from .. import checks
 from ..errors import InputError
 from ..pinhole import Pinhole, ViewPlane
-from . import axes, distortion, naming
+from . import axes, distortion, naming, own
 from .camera import Camera, Options, not_a_pinhole
 from .source import Record, Source, image_size
 
 TITLE = "transforms.json (NeRF, instant-ngp, nerfstudio)"
 SUFFIX = ".json"
 FILE = "transforms.json"
+EXACT = "virtual_pinhole"
 AABB_SCALES = tuple(2**exponent for exponent in range(8))
 
 _POSES = ("transform_matrix", "transform_matrix_start")
@@ -88,6 +91,7 @@ def document(cameras: Iterable[Camera], aabb_scale: int | None = None) -> dict[s
                 "file_path": naming.image_of(camera),
                 **({} if shared else picture),
                 "transform_matrix": axes.camera_to_world(camera.pinhole),
+                EXACT: own.document(camera.pinhole),
             }
             for camera, picture in zip(cameras, pictures, strict=True)
         ],
@@ -131,19 +135,28 @@ def _cameras(source: Source, options: Options) -> list[Camera]:
     cameras = []
     for frame, path, name in zip(frames, paths, naming.distinct(paths), strict=True):
         both = _merged(top, frame)
-        known = tuple((key, str(value)) for key, value in both.values.items() if key not in ("frames", "file_path", *_POSES))
+        known = tuple(
+            (key, str(value)) for key, value in both.values.items() if key not in ("frames", "file_path", EXACT, *_POSES)
+        )
         key = known if "w" in both and "h" in both else (known, path)
         if key not in planes:
             planes[key] = _plane(both, source, path, options)
         plane, stated, notes = planes[key]
         matrix = _matrix(frame)
+        exact = None if undone else own.restored(frame.get(EXACT), lambda p: _is_written_as(p, matrix, both))  # noqa: B023
         pinhole, more = axes.pinhole(matrix if undone is None else undone(matrix), plane, frame.place)
+        pinhole, more = (exact, ()) if exact else (pinhole, more)
         image = path if naming.has_suffix(path) or "file_path" not in frame else f"{path}.png"
         time = frame.number("time") if "time" in frame else None
         cameras.append(
             Camera(name, pinhole, stated, (*told, *notes, *more), image if "file_path" in frame else None, time=time)
         )
     return cameras
+
+
+def _is_written_as(pinhole: Pinhole, matrix: np.ndarray, both: Record) -> bool:
+    picture = _picture(pinhole)
+    return axes.camera_to_world(pinhole) == matrix.tolist() and all(both.get(key) == picture[key] for key in picture)
 
 
 def _merged(top: Record, frame: Record) -> Record:
