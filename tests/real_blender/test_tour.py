@@ -4,17 +4,22 @@ import os
 import subprocess
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parent.parent.parent
 SCRIPT = Path(__file__).with_name("tour_in_a_window.py")
 # A virtual screen on a busy machine may lose a click: one loss is no finding, two at different times are.
 ATTEMPTS = 2
 
 
-def take_the_tour(real_blender, *folder):
+MOVING_SCRIPT = Path(__file__).with_name("moving_picture.py")
+
+
+def run_in_a_window(real_blender, script, *folder):
     return subprocess.run(
         [
             *(ROOT / ".ci" / "blender-window", "--factory-startup", "--addons", "bl_ext.user_default.virtual_pinhole"),
-            *("--enable-event-simulate", "-p", "0", "0", "1600", "1000", "--python", SCRIPT, "--", *folder),
+            *("--enable-event-simulate", "-p", "0", "0", "1600", "1000", "--python", script, "--", *folder),
         ],
         env={**os.environ, "BLENDER_USER_RESOURCES": str(real_blender.user_folder)},
         cwd=ROOT,
@@ -28,9 +33,20 @@ def test_the_tour_goes_through_and_each_of_its_steps_is_undone_and_redone(real_b
     """VIEWCAM_PICTURES : a folder for the pictures of docs/artists.md; without it none are taken."""
     folder = [each for each in [os.environ.get("VIEWCAM_PICTURES")] if each]
     for _ in range(ATTEMPTS):
-        outcome = take_the_tour(real_blender, *folder)
+        outcome = run_in_a_window(real_blender, SCRIPT, *folder)
         if outcome.returncode == 0:
             break
     said = outcome.stdout + outcome.stderr
     assert outcome.returncode == 0, said
     assert "done: the tour" in said and "Traceback" not in said, said  # what fails in a panel's draw() is only printed
+
+
+@pytest.mark.skipif(not os.environ.get("VIEWCAM_PICTURES"), reason="it checks nothing: it makes the README's moving picture")
+def test_the_moving_picture_is_made(real_blender, tmp_path):
+    from PIL import Image
+
+    outcome = run_in_a_window(real_blender, MOVING_SCRIPT, tmp_path)
+    assert outcome.returncode == 0, outcome.stdout + outcome.stderr
+    first, *rest = [Image.open(path).convert("RGB") for path in sorted(tmp_path.glob("frame-*.png"))]
+    target = ROOT / os.environ["VIEWCAM_PICTURES"] / "moving.webp"
+    first.save(target, save_all=True, append_images=rest, duration=110, loop=0, quality=60)

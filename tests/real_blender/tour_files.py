@@ -15,7 +15,7 @@ FILE = Path(tempfile.gettempdir(), f"shots_{os.getpid()}", "monkey.json")
 
 
 class CompareWithCycles(Step):
-    """Both renders in the background, the verdict in the panel, the difference in an image editor."""
+    """Both renders in the background, the verdict in the panel; Show brings both pictures into an image editor."""
 
     picture = "proof.png"
     shows = "window"
@@ -40,9 +40,13 @@ class CompareWithCycles(Step):
             yield
         for _ in range(6):
             yield
+        yield from push("viewcam.show_difference(")
+        for _ in range(6):
+            yield
 
     def by_script(self):
         bpy.ops.viewcam.compare_with_cycles(camera="Camera")
+        bpy.ops.viewcam.show_difference()
 
     def check(self):
         outcome = room("interface.proof").latest()
