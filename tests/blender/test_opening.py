@@ -5,6 +5,7 @@ does. `bpy.app.handlers` can't be saved in a file. Blender's fluids end the proc
 """
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -388,6 +389,46 @@ def test_a_camera_that_is_a_program_has_none_unless_it_is_trusted(fresh_blender,
         with opening.opened(blend, trust):
             data = bpy.context.scene.camera.data
             assert data.type == "CUSTOM" and bool(data.custom_filepath) == bool(data.custom_bytecode) == trust
+
+
+def pipe(scene, cube, marks):
+    """In place of an image that a material shows."""
+    tree = emitting(cube)
+    node = tree.nodes.new("ShaderNodeTexImage")
+    node.image = bpy.data.images.new("pipe", 1, 1)
+    node.image.source, node.image.filepath = "FILE", str(marks / "pipe.png")
+    tree.links.new(node.outputs[0], tree.nodes["Emission"].inputs[0])
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes in folders here")
+def test_a_pipe_in_place_of_an_image_is_refused_by_every_command_and_not_waited_for(fresh_blender, tmp_path):
+    blend, marks = hostile_file(pipe, tmp_path / "hostile")
+    os.mkfifo(marks / "pipe.png")
+    for trust in (False, True):
+        for name, command in COMMANDS.items():
+            with pytest.raises(InputError, match=r"pipe\.png, which is no file: give a file"):
+                command(blend, tmp_path, trust)
+                pytest.fail(f"{name} reads it")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes in folders here")
+def test_a_pipe_in_place_of_a_library_is_refused_and_not_waited_for(fresh_blender, tmp_path, monkeypatch):
+    """Blender opens it before anybody can look."""
+    monkeypatch.setattr(opening, "_WAITED", 0.2)
+    library = tmp_path / "library.blend"
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.ops.wm.save_as_mainfile(filepath=str(library))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(str(library), link=True) as (_, linked):
+        linked.objects = ["Cube"]
+    bpy.context.scene.collection.objects.link(linked.objects[0])
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "hostile.blend"))
+    library.unlink()
+    os.mkfifo(library)
+    handler = signal.getsignal(signal.SIGALRM)
+    with pytest.raises(InputError, match=r"library\.blend, which is no file: give a file"):
+        opening.open_blend(tmp_path / "hostile.blend")
+    assert signal.getsignal(signal.SIGALRM) is handler
 
 
 # What of a .blend names a file, and what becomes of it in a render.

@@ -10,6 +10,9 @@ to refuse such files (their cameras and geometry are wanted all the same).
 
 import contextlib
 import os
+import signal
+import stat
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -26,6 +29,9 @@ _MAGIC = (b"BLENDER", b"\x1f\x8b", b"\x28\xb5\x2f\xfd")
 # What a render would write beside its picture: each pass for the compositor (in the temporary folder), images as tx (5.2).
 _WRITING = ("use_render_cache", "use_auto_generate_texture_cache")
 
+_WAITED = 5.0
+"""Seconds for which Blender may wait for a pipe to be written to, in place of a library."""
+
 _Put = Callable[[bpy.types.bpy_struct, str, Any], None]
 
 
@@ -41,13 +47,17 @@ def opened(blend: str | os.PathLike[str] | None, trust: bool = False) -> Iterato
     Raises
     ------
     InputError
-        if there is no such file, if Blender can't read it, or if it is trusted and was opened without its scripts.
+        if there is no such file, if Blender can't read it, if a pipe or a device stands where it reads a file, or if it is trusted
+        and was opened without its scripts.
     """
     ensure_registered()
     with overridden() as overrides:
         if blend is not None:
             off = open_blend(blend, trust)
-        elif not trust:
+            yield overrides, off
+            return
+        _check_files()
+        if not trust:
             off = (*_disarmed(overrides.set), *_unrun())
         elif any(_unrun()):
             raise InputError(
@@ -72,7 +82,13 @@ def open_blend(path: str | os.PathLike[str], trust: bool = False) -> tuple[str, 
     if not start.startswith(_MAGIC):
         raise InputError(f"{path} is not a .blend file: give a file that Blender has saved")
     off: list[str] = []
-    with contextlib.nullcontext() if trust else _after_reading(lambda: off.extend(_disarmed(setattr))):
+
+    def read() -> None:
+        _check_files()
+        if not trust:
+            off.extend(_disarmed(setattr))
+
+    with _not_kept_waiting(), _after_reading(read):
         try:
             bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=trust)
         except RuntimeError as error:
@@ -100,6 +116,41 @@ def _after_reading(work: Callable[[], None]) -> Iterator[None]:
         bpy.app.handlers.load_post.remove(read)
     if failures:
         raise failures[0]
+
+
+@contextlib.contextmanager
+def _not_kept_waiting() -> Iterator[None]:
+    """Call Blender back from waiting for a pipe in place of a library; it then goes on without, and the path is told.
+
+    A signal does so, whose handler Python runs later; Windows, whose pipes are no files, and other threads have none.
+    """
+    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    handler = signal.signal(signal.SIGALRM, lambda *_: None)
+    timer = signal.setitimer(signal.ITIMER_REAL, _WAITED, _WAITED)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, *timer)
+        signal.signal(signal.SIGALRM, handler)
+
+
+def _check_files() -> None:
+    """Refuse a file that names what Blender would wait for: InputError with the path."""
+    for path in bpy.utils.blend_paths(absolute=True, packed=False, local=False):
+        size_of(Path(path))
+
+
+def size_of(path: Path) -> int:
+    """Bytes of a file that the open one reads, 0 where there is none. InputError for a pipe or a device: they may never end."""
+    try:
+        found = path.stat()
+    except (OSError, ValueError):  # it is told as missing
+        return 0
+    if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):
+        raise InputError(f"the .blend reads {path}, which is no file: give a file, or take out what names it")
+    return found.st_size
 
 
 def _disarmed(put: _Put) -> Iterator[str]:

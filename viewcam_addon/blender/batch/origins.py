@@ -17,7 +17,6 @@ import itertools
 import json
 import os
 import re
-import stat
 import tomllib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -26,6 +25,7 @@ from typing import Any
 import bpy
 
 from ...errors import InputError
+from .. import opening
 from .. import versions as blender_versions
 
 _MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
@@ -112,13 +112,7 @@ def _check_kinds(paths: Iterable[Path]) -> None:
     """Refuse what can't be hashed in some minutes: a pipe or a device, which may never end, and more than anybody reads."""
     total = 0
     for path in paths:
-        try:
-            found = path.stat()
-        except (OSError, ValueError):  # it is told as missing
-            continue
-        if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):
-            raise InputError(f"the .blend reads {path}, which is no file: give a file, or take out what names it")
-        total += found.st_size
+        total += opening.size_of(path)
         if total > _MOST_BYTES:
             raise InputError(
                 f"the .blend reads more than {_MOST_BYTES / 2**30:g} GiB of other files, as {path}: take out what is not needed"
