@@ -114,8 +114,12 @@ test-wheel-%: .venvs/%/ready
 
 test-light: $(WHEELS:%=test-light-%)
 
+# Between the oldest and the newest, two scenes tell whether a version of Cycles shades otherwise.
+light-4.5 = -k sample_scene
+light-5.0 = -k sample_scene
+
 test-light-%: .venvs/%/ready
-	$(call PYTEST,.venvs/$*) -m light
+	$(call PYTEST,.venvs/$*) tests/test_light_against_cycles.py -m light $(light-$*)
 
 .venvs/%/ready: $(PROJECT)
 	python=$$(.ci/python $(python-$*)) || { echo "Blender $*'s wheel needs Python $(python-$*), and there is none on the PATH or in pyenv"; exit 1; }; \
