@@ -9,6 +9,7 @@ from viewcam_addon.tracer import native
 from viewcam_addon.tracer.scene.film import Film
 from viewcam_addon.tracer.scene.lamps import Lamp
 from viewcam_addon.tracer.scene.materials import Picture
+from viewcam_addon.tracer.scene.shader_nodes import Closure
 
 FILM, SCATTERING = 2, 8
 """How many dimensions the film has, and each scattering."""
@@ -108,3 +109,20 @@ def looked_up(picture: Picture, uv, closest: bool):
     probe = native.core().probe_texture
     assert not probe(width, height, picture.srgb, _at(pixels), closest, len(places), _at(places), _at(out))
     return out.T
+
+
+class ScatteredBy:
+    """A shader node of one closure on a floor, z up: what it sends on of light from a direction, and what it samples.
+
+    incoming, direction : (3, n), unit; incoming goes downwards. u : (3, n) numbers. behind : whether the floor is met so.
+    """
+
+    def __init__(self, shader, incoming, direction, u, behind=False, version=502) -> None:
+        columns = np.asarray(u).shape[1]
+        parts = [np.broadcast_to(np.reshape(each, (3, -1)), (3, columns)) for each in (incoming, direction)]
+        given = np.ascontiguousarray(np.concatenate([*parts, np.full((1, columns), float(behind)), u]).T, np.float64)
+        out = np.empty((columns, 12))
+        described = native.described_closure(Closure(shader), {})
+        assert not native.core().probe_bsdf(described, version, columns, _at(given), _at(out))
+        self.light, self.pdf, self.sampled, self.weight = out[:, :3].T, out[:, 3], out[:, 4:7].T, out[:, 7:10].T
+        self.sampled_pdf, self.kind = out[:, 10], out[:, 11].astype(int)

@@ -7,6 +7,8 @@ import bpy
 
 from ..image import OLDER_NAMES
 
+# Whose materials a scene from here has: the tracer knows what Cycles changed (core/closures/shading_point.h).
+CYCLES = bpy.app.version[:2]
 # What Cycles draws without a material: a diffuse surface, and since 5.0 a Principled one, which bends grazing smooth normals.
 DEFAULT_SURFACE_BENDS_NORMALS = bpy.app.version >= (5, 0)
 # How Cycles reads a mesh in which flat faces stand beside smooth ones (export_geometry.py). Measured: 4.2, 4.5, 5.0 and 5.2.

@@ -26,6 +26,7 @@ from .scene.film import NO_BOUNCES
 from .scene.lamps import RAYS, Area, Lamp, Point, Spot, Sun
 from .scene.materials import PLAIN, Colour, Material
 from .scene.sameness import same_things
+from .scene.shader_nodes import KINDS, Closure
 from .tiles import Passes
 
 GEOMETRY = ("Depth", "Position", "Normal", "UV", "Object Index", "Material Index", "Magnitude", "Facing")
@@ -43,7 +44,6 @@ LIGHT = (
 TILE = 32
 """Pixels, the side of the tiles in which light is traced."""
 
-_CLOSURES = ("emission", "diffuse", "mirror", "glass", "refraction")
 _KINDS = {kind: 1 << number for number, kind in enumerate(RAYS)}
 # Rendering space's origin is the eye, snapped to a grid so much coarser than the scene that it stays where it is while a camera
 # moves about things: hierarchies then serve frame after frame, and coordinates are no larger than the grid.
@@ -82,8 +82,21 @@ class _Color(Structure):
     _fields_ = [("rgb", c_double * 3), *((name, c_int32) for name in ("image", "closest", "vertex"))]
 
 
+class _Input(Structure):
+    _fields_ = [("name", c_char_p), ("choice", c_char_p), ("color", _Color)]
+
+
+class _MixFactor(Structure):
+    _fields_ = [("value", _Color), ("rest", c_int32)]
+
+
 class _Closure(Structure):
-    _fields_ = [("kind", c_int32), ("color", _Color), ("ior", c_double)]
+    _fields_ = [
+        ("name", c_char_p),
+        ("inputs", POINTER(_Input)),
+        ("factors", POINTER(_MixFactor)),
+        *((name, c_int32) for name in ("input_count", "factor_count")),
+    ]
 
 
 class _Lamp(Structure):
@@ -101,7 +114,7 @@ class _Film(Structure):
     _fields_ = [
         ("radiance", c_double * 3),
         ("hidden_from", c_uint32),
-        ("transparent", c_int32),
+        *((name, c_int32) for name in ("transparent", "version")),
         ("filter_width", c_double),
         ("exposure", c_double),
     ]
@@ -157,6 +170,7 @@ class _Core(Structure):
             "probe_texture",
             _function(c_int, c_int, c_int, c_int, c_void_p, c_int, c_size_t, c_void_p, c_void_p),
         ),
+        ("probe_bsdf", _function(c_int, POINTER(_Closure), c_int, c_size_t, c_void_p, c_void_p)),
         ("probe_leaving", _function(c_int, c_void_p, c_size_t, c_void_p, c_void_p, c_void_p)),
     ]
 
@@ -305,20 +319,18 @@ class CoreScene:
         images: dict[str, int] = {}
         for name in ["", *scene.materials]:
             material = (scene.materials[name] if name else PLAIN) if name in used else Material()
-            for colour in material.colours.values():
+            for _, colour in material.inputs:
                 if colour.image is not None and colour.image not in images:
                     images[colour.image] = len(images)
                     self._add_texture(scene, colour.image)
-            closures = [
-                _Closure(_CLOSURES.index(component), _color(colour, images), material.ior)
-                for component, colour in sorted(material.colours.items(), key=lambda pair: _CLOSURES.index(pair[0]))
-            ]
+            closures = [described_closure(closure, images) for closure in material.closures]
             self.check(self.core.add_material(self.handle, (_Closure * len(closures))(*closures), len(closures)))
         for lamp in scene.lamps:
             if not lamp.is_dark:
                 self.check(self.core.add_lamp(self.handle, described_lamp(lamp)))
         film, world = scene.film, scene.world
         described = _Film(hidden_from=kinds(world.hidden_from), transparent=film.transparent, exposure=film.exposure)
+        described.version = 100 * scene.cycles[0] + scene.cycles[1]
         described.radiance[:] = world.radiance
         described.filter_width = 0.0 if film.filter == "BOX" else film.filter_width
         self.check(self.core.set_film(self.handle, described))
@@ -466,6 +478,19 @@ def _color(colour: Colour, images: Mapping[str, int]) -> _Color:
     described = _Color(image=image, closest=colour.closest, vertex=colour.vertex)
     described.rgb[:] = colour.rgb
     return described
+
+
+def described_closure(closure: Closure, images: Mapping[str, int]) -> _Closure:
+    """A closure as the core takes it. images : their numbers."""
+    inputs, factors = [], [_MixFactor(_color(factor, images), rest) for factor, rest in closure.factors]
+    for name in KINDS[closure.node.type].inputs:
+        value = closure.node[name]
+        if isinstance(value, Colour):
+            inputs.append(_Input(name.encode(), None, _color(value, images)))
+        else:
+            inputs.append(_Input(name.encode(), value.encode()))
+    arrays = (_Input * len(inputs))(*inputs), (_MixFactor * len(factors))(*factors)
+    return _Closure(closure.node.type.encode(), *arrays, len(inputs), len(factors))
 
 
 def _planes(passes: Passes, stride: int) -> Any:

@@ -5,6 +5,7 @@ import json
 import math
 import re
 from dataclasses import fields, is_dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from viewcam_addon.tracer.scene import scene_file
 from viewcam_addon.tracer.scene.film import FILTERS, Bounces, Film
 from viewcam_addon.tracer.scene.lamps import RAYS, Area, Point, Spot, Sun, World
 from viewcam_addon.tracer.scene.materials import Colour, Material, Picture
+from viewcam_addon.tracer.scene.shader_nodes import DISTRIBUTIONS, node
 
 DOCUMENTATION = Path(__file__).parents[3] / "docs" / "scene-file.md"
 
@@ -78,7 +80,19 @@ lamps = st.one_of(
 colours = st.builds(
     Colour, rgb=rgb, image=st.sampled_from([None, "small", "large"]), closest=st.booleans(), vertex=st.booleans()
 )
-materials = st.builds(
+shaders = st.recursive(
+    st.one_of(
+        st.builds(partial(node, "principled"), base_color=colours, roughness=amounts, coat_weight=colours),
+        st.builds(partial(node, "glossy"), color=rgb, roughness=colours, distribution=st.sampled_from(DISTRIBUTIONS)),
+        st.builds(partial(node, "emission"), color=colours, strength=amounts),
+    ),
+    lambda inner: st.one_of(
+        st.builds(partial(node, "mix"), factor=colours, first=inner, second=st.none() | inner),
+        st.builds(partial(node, "add"), first=inner, second=inner),
+    ),
+    max_leaves=4,
+)
+materials = st.builds(Material, surface=shaders) | st.builds(
     Material,
     **{name: st.none() | colours for name in ("diffuse", "emission", "mirror", "glass", "refraction")},
     ior=st.floats(1e-3, 1e3),
@@ -114,6 +128,7 @@ def test_light_that_is_written_is_read_back_to_the_last_bit(make_scene, make_mes
         world=data.draw(st.builds(World, radiance=rgb, hidden_from=rays)),
         film=data.draw(films),
         bounces=data.draw(bounces),
+        cycles=data.draw(st.tuples(st.integers(0, 99), st.integers(0, 99))),
     )
     path = tmp_path_factory.mktemp("scene") / "light.json"
     scene_file.write(scene, path)
@@ -177,6 +192,30 @@ def changed(document, path, value):
 @pytest.mark.parametrize(
     ("path", "value", "words"),
     [
+        (["cycles"], "five", ["'cycles' of the scene", "5.2"]),
+        (
+            ["materials", "wall"],
+            {"surface": {"type": "varnish"}},
+            ["'type' of 'surface' of material 'wall'", "'varnish'", "principled"],
+        ),
+        (
+            ["materials", "wall"],
+            {"surface": {"type": "glossy", "gloss": 1}},
+            ["'surface' of material 'wall'", "'gloss'", "roughness"],
+        ),
+        (
+            ["materials", "wall"],
+            {"surface": {"type": "mix", "first": 1}},
+            ["'first' of 'surface' of material 'wall'", "object"],
+        ),
+        (["materials", "wall", "surface"], {"type": "glossy"}, ["material 'wall'", "diffuse", "one or the other"]),
+        (
+            ["materials", "wall"],
+            {"surface": {"type": "glossy", "distribution": "phong"}},
+            ["distribution", "'phong'", "beckmann"],
+        ),
+        (["materials", "wall"], {"surface": {"type": "glossy", "roughness": -1}}, ["material 'wall'", "roughness", "0 to"]),
+        (["materials", "wall"], {"surface": {"type": "glossy", "color": {"image": "no"}}}, ["material 'wall'", "'no'"]),
         (["images", "checks", "pixels"], None, ["image 'checks'", "'pixels'"]),
         (["images", "checks", "pixels"], [[[1, 0]]], ["'pixels' of image 'checks'", "3"]),
         (["images", "checks", "pixels"], [[]], ["image 'checks'"]),

@@ -22,6 +22,7 @@ from ...tracer.scene import Mesh, Object, Scene, Spheres
 from ...tracer.scene.film import Bounces, Film
 from ...tracer.scene.lamps import RAYS, Lamp, World
 from .. import camera as cameras
+from .. import versions
 from ..temporary_settings import overridden, still_of_one_layer
 from . import export_geometry, features, film, lamps, world
 from .depsgraph import visit
@@ -60,6 +61,7 @@ class Lighting:
     world: World
     film: Film
     bounces: Bounces
+    cycles: tuple[int, int] = versions.CYCLES
 
 
 def export_scene(

@@ -71,7 +71,7 @@ class Paints:
 
 
 def _images_of(made: Material) -> list[str]:
-    return [colour.image for colour in made.colours.values() if colour.image is not None]
+    return [colour.image for _, colour in made.inputs if colour.image is not None]
 
 
 def paint(material: bpy.types.Material, made: Material, images: dict[str, bpy.types.Image]) -> None:
@@ -84,7 +84,7 @@ def paint(material: bpy.types.Material, made: Material, images: dict[str, bpy.ty
     output = adder.add("ShaderNodeOutputMaterial")
     materials.add_surface(adder, output, shaders.Reading(made, images, ""))
     _arrange(output, 0, {})
-    shown = next(iter(made.colours.values()), None)
+    shown = next((colour for _, colour in made.inputs), None)
     if shown:
         material.diffuse_color = (*np.clip(shown.rgb, 0.0, 1.0), 1.0)
 

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 import bpy
 
 from ...tracer.scene.materials import PLAIN, Colour
+from ...tracer.scene.shader_nodes import Node
 from .. import versions
 from ..temporary_settings import Overrides
 from . import nodes, shaders
@@ -70,6 +71,9 @@ def stand_in(overrides: Overrides, material: bpy.types.Material, reading: shader
 def add_surface(adder: nodes.Adder, output: bpy.types.Node, reading: shaders.Reading) -> None:
     """Add the nodes that shaders.read would read so, and link them to a material's output."""
     made = reading.material
+    if made.surface is not None:
+        adder.link(_shader(adder, made.surface, reading).outputs[0], output.inputs["Surface"])
+        return
     total = None
     for component, colour in made.colours.items():
         shader = adder.add(_SHADERS[component])
@@ -82,10 +86,26 @@ def add_surface(adder: nodes.Adder, output: bpy.types.Node, reading: shaders.Rea
     adder.link(total.outputs[0], output.inputs["Surface"])
 
 
+def _shader(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.types.Node:
+    """Add the nodes that a tree of shader nodes is."""
+    shader = shaders.SHADERS[node.type]
+    added = adder.add(shader.class_name)
+    for name, theirs in shader.words.items():
+        setattr(added, theirs, shaders.word_of(node[name]))
+    for name, theirs in shader.inputs.items():
+        value = node[name]
+        if isinstance(value, Node):
+            adder.link(_shader(adder, value, reading).outputs[0], added.inputs[theirs])
+        elif value is not None and (isinstance(theirs, int) or theirs in added.inputs):
+            _colour(adder, added.inputs[theirs], value, reading)
+    return added
+
+
 def _colour(adder: nodes.Adder, socket: bpy.types.NodeSocket, colour: Colour, reading: shaders.Reading) -> None:
     """The product that a colour is."""
     if colour.image is None and not colour.vertex:
-        socket.default_value = (*colour.rgb, 1.0)
+        values = {"VALUE": colour.rgb[0], "VECTOR": colour.rgb}
+        socket.default_value = values.get(socket.type, (*colour.rgb, 1.0))
         return
     factors = []
     if colour.image is not None:

@@ -1,13 +1,13 @@
-"""A Blender material as the tracer's: the components that its shader nodes add up to, or the nearest ones and why.
+"""A Blender material as the tracer's: the shaders that its nodes are, or the nearest ones and why.
 
-Exact are, with constants, textures, vertex colours and their products: Emission, a Diffuse BSDF without roughness, a
-Principled BSDF whose gloss has no strength, and Glossy, Glass and Refraction BSDFs without roughness, mixed and added.
-Measured in 4.2, 4.5, 5.0 and 5.2: with a specular IOR level of 0, or an IOR of 1, a Principled BSDF gives the Diffuse BSDF's
-pixels to the last bit, whatever its roughness, anisotropy and tint, unless a weight or the thin film below is not 0.
+What Emission, Lambert's Diffuse, a Principled BSDF whose gloss has no strength, and Glossy, Glass and Refraction BSDFs without
+roughness add up to is read as components, which a hand can change; whatever else is modelled, as a tree of shader nodes. Either
+with constants, textures, vertex colours and their products. Measured in 4.2, 4.5, 5.0 and 5.2: with a specular IOR level of 0,
+or an IOR of 1, a Principled BSDF gives the Diffuse BSDF's pixels to the last bit, whatever its roughness, anisotropy and tint,
+unless a weight or the thin film below is not 0.
 
-Whatever else is met becomes a Lambert surface of its base colour. Then Cycles is shown the same for the time of a comparison
-(materials.stand_in): an approximation is never a difference between the two sides. Rejected: matching roughness by a mixture of
-mirror and Lambert, which would be right nowhere.
+What is not modelled is left out, and where nothing is left becomes a Lambert surface of its base colour. Then Cycles is shown
+the same for the time of a comparison (materials.stand_in): an approximation is never a difference between the two sides.
 """
 
 import math
@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 import bpy
 
 from ...tracer.scene.materials import LARGEST_RADIANCE, PLAIN, Colour, Material
+from ...tracer.scene.shader_nodes import KINDS, Node
 from .. import versions
 from . import images, nodes
 from .nodes import Input, Output
@@ -34,6 +35,81 @@ _PRINCIPLED_ZERO = (
 )
 _WHITE = (1.0, 1.0, 1.0)
 _LUMINANCE = (0.2126, 0.7152, 0.0722)
+
+
+@dataclass(frozen=True)
+class Shader:
+    """A type of the tracer's shader nodes as Blender has it.
+
+    kind : the node's type; class_name : its class. inputs : ours → theirs. words : ours → the property that has the word.
+    neutral : of inputs that are not modelled, the value without which a shader is only approximated.
+    """
+
+    kind: str
+    class_name: str
+    inputs: dict[str, str | int]
+    words: dict[str, str] = field(default_factory=dict)
+    neutral: dict[str, float] = field(default_factory=dict)
+
+
+_DISTRIBUTION = {"distribution": "distribution"}
+_THICKNESS = {"Thin Film Thickness": 0.0}
+SHADERS = {
+    "diffuse": Shader("BSDF_DIFFUSE", "ShaderNodeBsdfDiffuse", {"color": "Color", "roughness": "Roughness"}),
+    "translucent": Shader("BSDF_TRANSLUCENT", "ShaderNodeBsdfTranslucent", {"color": "Color"}),
+    "glossy": Shader(
+        "BSDF_GLOSSY",
+        "ShaderNodeBsdfGlossy",
+        {"color": "Color", "roughness": "Roughness"},
+        _DISTRIBUTION,
+        {"Anisotropy": 0.0},
+    ),
+    "glass": Shader(
+        "BSDF_GLASS",
+        "ShaderNodeBsdfGlass",
+        {"color": "Color", "roughness": "Roughness", "ior": "IOR"},
+        _DISTRIBUTION,
+        _THICKNESS,
+    ),
+    "refraction": Shader(
+        "BSDF_REFRACTION",
+        "ShaderNodeBsdfRefraction",
+        {"color": "Color", "roughness": "Roughness", "ior": "IOR"},
+        _DISTRIBUTION,
+    ),
+    "emission": Shader("EMISSION", "ShaderNodeEmission", {"color": "Color", "strength": "Strength"}),
+    "principled": Shader(
+        "BSDF_PRINCIPLED",
+        "ShaderNodeBsdfPrincipled",
+        {
+            "base_color": "Base Color",
+            "metallic": "Metallic",
+            "roughness": "Roughness",
+            "ior": "IOR",
+            "diffuse_roughness": "Diffuse Roughness",
+            "specular_ior_level": "Specular IOR Level",
+            "specular_tint": "Specular Tint",
+            "transmission_weight": "Transmission Weight",
+            "coat_weight": "Coat Weight",
+            "coat_roughness": "Coat Roughness",
+            "coat_ior": "Coat IOR",
+            "coat_tint": "Coat Tint",
+            "emission_color": "Emission Color",
+            "emission_strength": "Emission Strength",
+        },
+        _DISTRIBUTION,
+        _THICKNESS | {"Anisotropic": 0.0, "Subsurface Weight": 0.0, "Sheen Weight": 0.0, "Thin Wall": 0.0},
+    ),
+    "mix": Shader("MIX_SHADER", "ShaderNodeMixShader", {"factor": 0, "first": 1, "second": 2}),
+    "add": Shader("ADD_SHADER", "ShaderNodeAddShader", {"first": 0, "second": 1}),
+}
+# Blender's words, where they are others than ours in capitals.
+_WORDS = {"multiscatter_ggx": "MULTI_GGX"}
+
+
+def word_of(ours: str) -> str:
+    """What Blender calls one of the words of our shader nodes."""
+    return _WORDS.get(ours, ours.upper())
 
 
 @dataclass
@@ -58,10 +134,16 @@ def read(material: bpy.types.Material) -> Reading:
     output = tree and tree.get_output_node("CYCLES")
     if not output:
         return in_the_viewport(material)
-    reader = _Reader(in_the_viewport(material).material.diffuse)
-    components = reader.surface(Input(output.inputs["Surface"]))
-    reader.reading.material = Material(**components, **({} if reader.ior is None else {"ior": reader.ior}))
-    return reader.reading
+    viewport = in_the_viewport(material).material.diffuse
+    plain = _Components(viewport)
+    components = plain.surface(Input(output.inputs["Surface"]))
+    plain.reading.material = Material(**components, **({} if plain.ior is None else {"ior": plain.ior}))
+    if not plain.reading.reasons:
+        return plain.reading
+    tree = _Tree(viewport)
+    tree.reading.material = Material(surface=tree.surface(Input(output.inputs["Surface"])))
+    is_plain = len(plain.reading.reasons) < len(tree.reading.reasons) or plain.reading.reasons == tree.reading.reasons
+    return plain.reading if is_plain else tree.reading
 
 
 def in_the_viewport(material: bpy.types.Material) -> Reading:
@@ -70,96 +152,11 @@ def in_the_viewport(material: bpy.types.Material) -> Reading:
 
 
 class _Reader:
-    """Follows the nodes from the output, and gathers what they ask for."""
+    """Follows the nodes to colours and numbers, and gathers what they ask for."""
 
     def __init__(self, viewport: Colour) -> None:
         self.reading = Reading()
         self.viewport = viewport
-        self.ior: float | None = None
-
-    def surface(self, of: Input | None) -> dict[str, Colour]:
-        """Component of Material → its colour."""
-        source = of and nodes.source(of)
-        if not isinstance(source, Output):
-            return {}
-        read = {
-            "EMISSION": self._emission,
-            "BSDF_DIFFUSE": self._diffuse,
-            "BSDF_PRINCIPLED": self._principled,
-            "BSDF_GLOSSY": self._glossy,
-            "BSDF_GLASS": self._clear,
-            "BSDF_REFRACTION": self._clear,
-            "MIX_SHADER": self._mix,
-            "ADD_SHADER": self._add,
-        }.get(source.node.type, self._unknown)
-        return read(source)
-
-    def _emission(self, output: Output) -> dict[str, Colour]:
-        strength = self._number(output, "Strength", 1.0)
-        return {"emission": self._scaled(self._colour(output, "Color"), strength)}
-
-    def _diffuse(self, output: Output) -> dict[str, Colour]:
-        self._want(output, "Roughness", 0.0)
-        return {"diffuse": self._colour(output, "Color")}
-
-    def _principled(self, output: Output) -> dict[str, Colour]:
-        for name in _PRINCIPLED_ZERO:
-            self._want(output, name, 0.0)
-        if constant_number(output, "IOR") != 1.0:
-            self._want(output, "Specular IOR Level", 0.0)
-        found = {"diffuse": self._colour(output, "Base Color")}
-        strength = self._number(output, "Emission Strength", 1.0)
-        if strength:
-            found["emission"] = self._scaled(self._colour(output, "Emission Color"), strength)
-        return found
-
-    def _glossy(self, output: Output) -> dict[str, Colour]:
-        component = "mirror" if self._want(output, "Roughness", 0.0) else "diffuse"
-        return {component: self._colour(output, "Color")}
-
-    def _clear(self, output: Output) -> dict[str, Colour]:
-        self._want(output, "Roughness", 0.0)
-        self._want(output, "Thin Film Thickness", 0.0)
-        ior = self._number(output, "IOR", Material.ior)
-        if not 1e-3 <= ior <= 1e3:
-            self._reason(output, f"has an IOR of {ior:g}")
-            ior = Material.ior
-        if self.ior not in (None, ior):
-            self._reason(output, "has another IOR than the first")
-        else:
-            self.ior = ior
-        return {"glass" if output.node.type == "BSDF_GLASS" else "refraction": self._colour(output, "Color")}
-
-    def _mix(self, output: Output) -> dict[str, Colour]:
-        factor = min(max(self._number(output, 0, 0.5), 0.0), 1.0)
-        # The side without weight is not there: what is odd about it does not matter.
-        first = self.surface(output.input(1)) if factor < 1.0 else {}
-        second = self.surface(output.input(2)) if factor > 0.0 else {}
-        return self._sum(output, first, 1.0 - factor, second, factor)
-
-    def _add(self, output: Output) -> dict[str, Colour]:
-        return self._sum(output, self.surface(output.input(0)), 1.0, self.surface(output.input(1)), 1.0)
-
-    def _unknown(self, output: Output) -> dict[str, Colour]:
-        self._reason(output, "is not modelled")
-        name = next((name for name in ("Base Color", "Color") if name in output.node.inputs), None)
-        return {"diffuse": self._colour(output, name) if name else self.viewport}
-
-    def _sum(
-        self, output: Output, first: dict[str, Colour], weight: float, second: dict[str, Colour], other_weight: float
-    ) -> dict[str, Colour]:
-        total = {name: self._scaled(colour, weight) for name, colour in first.items()}
-        for name, colour in second.items():
-            colour = self._scaled(colour, other_weight)
-            before = total.get(name)
-            if before is None or before.is_black:
-                total[name] = colour
-            elif not colour.is_black:
-                if _pattern(before) != _pattern(colour):
-                    self._reason(output, f"adds two {name} colours that vary")
-                rgb = tuple(a + b for a, b in zip(before.rgb, colour.rgb, strict=True))
-                total[name] = Colour(rgb, before.image, before.closest, before.vertex)
-        return total
 
     def _scaled(self, colour: Colour, factor: float) -> Colour:
         rgb = possible(tuple(value * factor for value in colour.rgb))
@@ -254,6 +251,152 @@ class _Reader:
         reason = f"has a node {output.node.name!r} that {clause}"
         if reason not in self.reading.reasons:
             self.reading.reasons.append(reason)
+
+
+class _Components(_Reader):
+    """Reads shaders as sums of components."""
+
+    def __init__(self, viewport: Colour) -> None:
+        super().__init__(viewport)
+        self.ior: float | None = None
+
+    def surface(self, of: Input | None) -> dict[str, Colour]:
+        """Component of Material → its colour."""
+        source = of and nodes.source(of)
+        if not isinstance(source, Output):
+            return {}
+        read = {
+            "EMISSION": self._emission,
+            "BSDF_DIFFUSE": self._diffuse,
+            "BSDF_PRINCIPLED": self._principled,
+            "BSDF_GLOSSY": self._glossy,
+            "BSDF_GLASS": self._clear,
+            "BSDF_REFRACTION": self._clear,
+            "MIX_SHADER": self._mix,
+            "ADD_SHADER": self._add,
+        }.get(source.node.type, self._unknown)
+        return read(source)
+
+    def _emission(self, output: Output) -> dict[str, Colour]:
+        strength = self._number(output, "Strength", 1.0)
+        return {"emission": self._scaled(self._colour(output, "Color"), strength)}
+
+    def _diffuse(self, output: Output) -> dict[str, Colour]:
+        self._want(output, "Roughness", 0.0)
+        return {"diffuse": self._colour(output, "Color")}
+
+    def _principled(self, output: Output) -> dict[str, Colour]:
+        for name in _PRINCIPLED_ZERO:
+            self._want(output, name, 0.0)
+        if constant_number(output, "IOR") != 1.0:
+            self._want(output, "Specular IOR Level", 0.0)
+        found = {"diffuse": self._colour(output, "Base Color")}
+        strength = self._number(output, "Emission Strength", 1.0)
+        if strength:
+            found["emission"] = self._scaled(self._colour(output, "Emission Color"), strength)
+        return found
+
+    def _glossy(self, output: Output) -> dict[str, Colour]:
+        component = "mirror" if self._want(output, "Roughness", 0.0) else "diffuse"
+        return {component: self._colour(output, "Color")}
+
+    def _clear(self, output: Output) -> dict[str, Colour]:
+        self._want(output, "Roughness", 0.0)
+        self._want(output, "Thin Film Thickness", 0.0)
+        ior = self._number(output, "IOR", Material.ior)
+        if not 1e-3 <= ior <= 1e3:
+            self._reason(output, f"has an IOR of {ior:g}")
+            ior = Material.ior
+        if self.ior not in (None, ior):
+            self._reason(output, "has another IOR than the first")
+        else:
+            self.ior = ior
+        return {"glass" if output.node.type == "BSDF_GLASS" else "refraction": self._colour(output, "Color")}
+
+    def _mix(self, output: Output) -> dict[str, Colour]:
+        factor = min(max(self._number(output, 0, 0.5), 0.0), 1.0)
+        # The side without weight is not there: what is odd about it does not matter.
+        first = self.surface(output.input(1)) if factor < 1.0 else {}
+        second = self.surface(output.input(2)) if factor > 0.0 else {}
+        return self._sum(output, first, 1.0 - factor, second, factor)
+
+    def _add(self, output: Output) -> dict[str, Colour]:
+        return self._sum(output, self.surface(output.input(0)), 1.0, self.surface(output.input(1)), 1.0)
+
+    def _unknown(self, output: Output) -> dict[str, Colour]:
+        self._reason(output, "is not modelled")
+        name = next((name for name in ("Base Color", "Color") if name in output.node.inputs), None)
+        return {"diffuse": self._colour(output, name) if name else self.viewport}
+
+    def _sum(
+        self, output: Output, first: dict[str, Colour], weight: float, second: dict[str, Colour], other_weight: float
+    ) -> dict[str, Colour]:
+        total = {name: self._scaled(colour, weight) for name, colour in first.items()}
+        for name, colour in second.items():
+            colour = self._scaled(colour, other_weight)
+            before = total.get(name)
+            if before is None or before.is_black:
+                total[name] = colour
+            elif not colour.is_black:
+                if _pattern(before) != _pattern(colour):
+                    self._reason(output, f"adds two {name} colours that vary")
+                rgb = tuple(a + b for a, b in zip(before.rgb, colour.rgb, strict=True))
+                total[name] = Colour(rgb, before.image, before.closest, before.vertex)
+        return total
+
+
+class _Tree(_Reader):
+    """Reads shaders as a tree of shader nodes."""
+
+    def surface(self, of: Input | None) -> Node | None:
+        """The tracer's node, or None where there is no surface."""
+        source = of and nodes.source(of)
+        if not isinstance(source, Output):
+            return None
+        found = next(((ours, shader) for ours, shader in SHADERS.items() if shader.kind == source.node.type), None)
+        if found is None:
+            self._reason(source, "is not modelled")
+            name = next((name for name in ("Base Color", "Color") if name in source.node.inputs), None)
+            return Node("diffuse", (("color", self._colour(source, name) if name else self.viewport),))
+        ours, shader = found
+        for name, neutral in shader.neutral.items():
+            self._want(source, name, neutral)
+        known = KINDS[ours].inputs
+        given: dict[str, object] = {}
+        for name, theirs in shader.inputs.items():
+            if known[name] is not None and source.input(theirs) is not None:
+                given[name] = self._input(source, theirs, known[name] if isinstance(known[name], float) else None)
+        for name in (name for name, default in known.items() if default is None):
+            if (
+                ours == "add"
+                or given["factor"].varies
+                or given["factor"].rgb[0] not in {"first": (1.0,), "second": (0.0,)}[name]
+            ):
+                given[name] = self.surface(source.input(shader.inputs[name]))
+        return Node(ours, tuple((given | self._words(source, ours)).items()))
+
+    def _words(self, output: Output, ours: str) -> dict[str, str]:
+        found = {}
+        for name, theirs in SHADERS[ours].words.items():
+            word = getattr(output.node, theirs)
+            known = [each for each in KINDS[ours].inputs[name] if word_of(each) == word]
+            if not known:
+                self._reason(output, f"has the {name} {word}")
+            found |= dict.fromkeys([name] if known else [], *known)
+        return found
+
+    def _input(self, output: Output, name: str | int, otherwise: float | None) -> Colour:
+        """What an input is given. otherwise : what a number is where that is not modelled, or None of a colour."""
+        value = None if otherwise is None else constant_number(output, name)
+        if value is None:
+            known = len(self.reading.reasons)
+            colour = self._colour(output, name)
+            return colour if otherwise is None or len(self.reading.reasons) == known else Colour((otherwise,) * 3)
+        most = 1.0 if isinstance(name, int) else LARGEST_RADIANCE
+        if not math.isfinite(value) or value > LARGEST_RADIANCE or (value < 0 and name == "Strength"):
+            self._reason(output, f"has a {output.node.inputs[name].name} of {value:g}")
+            value = 0.0
+        return Colour((min(max(value, 0.0), most),) * 3)
 
 
 def _pattern(colour: Colour) -> tuple:

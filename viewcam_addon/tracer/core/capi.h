@@ -95,6 +95,7 @@ typedef struct {
     int (*probe_sample_light)(const ViewcamLamp*, size_t, const double*, double*);
     int (*probe_light_le)(const ViewcamLamp*, size_t, const double*, double*);
     int (*probe_texture)(int width, int height, int srgb, const float*, int closest, size_t, const double*, double*);
+    int (*probe_bsdf)(const ViewcamClosure*, int version, size_t, const double*, double*);
     int (*probe_leaving)(const ViewcamScene*, size_t, const double*, const double*, double*);
 } ViewcamCore;
 

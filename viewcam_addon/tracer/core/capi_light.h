@@ -8,11 +8,23 @@ typedef struct {
     int32_t image, closest, vertex;
 } ViewcamColor;
 
-enum ViewcamClosureKind { VIEWCAM_EMISSION, VIEWCAM_DIFFUSE, VIEWCAM_MIRROR, VIEWCAM_GLASS, VIEWCAM_REFRACTION };
+/* An input of a closure by its name in scene files. choice: of what is a word, or null. */
 typedef struct {
-    int32_t kind;
+    const char *name, *choice;
     ViewcamColor color;
-    double ior;
+} ViewcamInput;
+
+/* A factor of a closure's weight. rest: whether it is 1 less the colour's luminance. */
+typedef struct {
+    ViewcamColor value;
+    int32_t rest;
+} ViewcamMixFactor;
+
+typedef struct {
+    const char* name;
+    const ViewcamInput* inputs;
+    const ViewcamMixFactor* factors;
+    int32_t input_count, factor_count;
 } ViewcamClosure;
 
 enum ViewcamLampKind { VIEWCAM_SUN, VIEWCAM_POINT, VIEWCAM_SPOT, VIEWCAM_RECTANGLE, VIEWCAM_ELLIPSE };
@@ -23,11 +35,11 @@ typedef struct {
     double matrix[12], color[3], radius, angle, blend, size[2];
 } ViewcamLamp;
 
-/* filter_width: 0 is a box. */
+/* filter_width: 0 is a box. version: of Blender, 100 times the first number and the second, whose materials are meant. */
 typedef struct {
     double radiance[3];
     uint32_t hidden_from;
-    int32_t transparent;
+    int32_t transparent, version;
     double filter_width, exposure;
 } ViewcamFilm;
 

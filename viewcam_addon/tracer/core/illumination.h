@@ -33,6 +33,9 @@ struct Illumination {
     FilmSettings film;
     double filter_width = 0;  // of BLACKMAN_HARRIS, 0 is BOX
     Bounces bounces;
+    int version = CYCLES_5_2;  // whose Cycles computes materials so
+
+    ShadingPoint shading(const Interaction& point, Vec3 incoming) const { return {point, incoming, textures, version}; }
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

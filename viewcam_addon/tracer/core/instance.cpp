@@ -215,6 +215,8 @@ const ViewcamCore core = {
                          double* out) { return guarded([&] { probe::light_le(*lamp, count, given, out); }); },
     .probe_texture = [](int width, int height, int srgb, const float* pixels, int closest, size_t count, const double* uv,
                         double* out) { return guarded([&] { probe::texture(width, height, srgb, pixels, closest, count, uv, out); }); },
+    .probe_bsdf = [](const ViewcamClosure* closure, int version, size_t count, const double* given,
+                     double* out) { return guarded([&] { probe::bsdf(*closure, version, count, given, out); }); },
     .probe_leaving = [](const ViewcamScene* scene, size_t count, const double* rays, const double* lights,
                         double* out) { return guarded([&] { probe::leaving(scene_of(scene), count, rays, lights, out); }); },
 };

@@ -9,20 +9,22 @@ inline void add_texture(Scene& scene, int width, int height, bool srgb, const fl
     scene.illumination.textures.push_back({width, height, srgb, std::vector<float>(pixels, pixels + 3 * size_t(width) * height)});
 }
 
+inline Color color_of(const ViewcamColor& given) {
+    uint32_t image = given.image < 0 ? NONE : uint32_t(given.image);
+    return {{given.rgb[0], given.rgb[1], given.rgb[2]}, image, bool(given.closest), bool(given.vertex)};
+}
+inline WeightedClosure closure_of(const ViewcamClosure& given) {
+    std::vector<Input> inputs;
+    for (int i = 0; i < given.input_count; i++)
+        inputs.push_back({given.inputs[i].name, given.inputs[i].choice ? given.inputs[i].choice : "", color_of(given.inputs[i].color)});
+    WeightedClosure made{closure_of(given.name, Inputs(std::move(inputs))), {}};
+    for (int i = 0; i < given.factor_count; i++) made.factors.push_back({color_of(given.factors[i].value), bool(given.factors[i].rest)});
+    return made;
+}
 inline void add_material(Scene& scene, const ViewcamClosure* closures, int count) {
     Material material;
-    for (int i = 0; i < count; i++) {
-        const ViewcamColor& c = closures[i].color;
-        Color color{{c.rgb[0], c.rgb[1], c.rgb[2]}, c.image < 0 ? NONE : uint32_t(c.image), bool(c.closest), bool(c.vertex)};
-        double ior = closures[i].ior;
-        switch (closures[i].kind) {
-            case VIEWCAM_EMISSION: material.emission = color; break;
-            case VIEWCAM_DIFFUSE: material.closures.push_back(DiffuseClosure{color}); break;
-            case VIEWCAM_MIRROR: material.closures.push_back(MirrorClosure{color}); break;
-            case VIEWCAM_GLASS: material.closures.push_back(GlassClosure{color, ior}); break;
-            case VIEWCAM_REFRACTION: material.closures.push_back(RefractionClosure{color, ior}); break;
-        }
-    }
+    for (int i = 0; i < count; i++) material.closures.push_back(closure_of(closures[i]));
+    material.prepare(scene.illumination.textures);
     scene.illumination.materials.push_back(std::move(material));
 }
 
@@ -40,7 +42,7 @@ inline void set_film(Scene& scene, const ViewcamFilm& given) {
     Illumination& light = scene.illumination;
     light.environment = {{given.radiance[0], given.radiance[1], given.radiance[2]}, given.hidden_from};
     light.film = {bool(given.transparent), given.exposure};
-    light.filter_width = given.filter_width;
+    light.filter_width = given.filter_width, light.version = given.version;
 }
 inline void clear_light(Scene& scene) { scene.illumination = {}; }
 
@@ -133,6 +135,31 @@ inline void leaving(const Scene& scene, size_t count, const double* rays, const 
         for (int axis = 0; axis < 3; axis++)
             out[axis] = point.position[axis], out[3 + axis] = point.normal[axis], out[7 + axis] = onwards.origin[axis];
         out[6] = point.t, out[10] = onwards.t_max;
+    }
+}
+// A closure on a floor, z up. given: (count, 10), the unit way that a path came along, a unit direction to a light, whether the
+// floor is met from behind, and three numbers. out: (count, 12), eval and pdf of the direction; of what is sampled the direction,
+// weight, pdf and the kind of ray.
+inline void bsdf(const ViewcamClosure& closure, int version, size_t count, const double* given, double* out) {
+    Material material;
+    material.closures.push_back(closure_of(closure));
+    std::vector<Texture> none;
+    for (size_t i = 0; i < count; i++, given += 10, out += 12) {
+        Interaction point;
+        point.normal = point.shading = {0, 0, 1}, point.backside = given[6] != 0;
+        Vec3 direction{given[3], given[4], given[5]};
+        BSDF bsdf = material.bsdf({point, {given[0], given[1], given[2]}, none, version});
+        double pdf = 0;
+        ScatteredLight light = bsdf.eval(direction, direction.z > 0 ? DIFFUSE | GLOSSY : TRANSMISSION, [&](RayKind, auto&& of_lobe) {
+            pdf += of_lobe();
+            return 1;
+        });
+        Vec3 sum = light.diffuse + light.other;
+        BSDFSample sample;
+        if (!bsdf.is_black()) sample = bsdf.sample(given[7], [&] { return Vec2{given[8], given[9]}; });
+        double row[12] = {sum.x, sum.y, sum.z, pdf, sample.direction.x, sample.direction.y, sample.direction.z, sample.weight.x, sample.weight.y,
+                          sample.weight.z, sample.pdf, double(sample.kind)};
+        std::copy(row, row + 12, out);
     }
 }
 // uv: (count, 2). out: (count, 3).

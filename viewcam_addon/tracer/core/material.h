@@ -1,87 +1,114 @@
-// What surfaces are made of: what they give off, and closures that become the lobes of a BSDF where a path meets them.
+// What surfaces are made of: closures, each with a weight, that become the lobes of a BSDF where a path meets them.
 #pragma once
+#include <algorithm>
 #include <variant>
 #include <vector>
 
-#include "bsdf/bsdf.h"
-#include "textures.h"
+#include "closures/diffuse.h"
+#include "closures/emission.h"
+#include "closures/glass.h"
+#include "closures/glossy.h"
+#include "closures/principled.h"
 
 namespace viewcam::VIEWCAM_ISA {
 
-// What a closure's `add_to` is told: the point that a path has come to, along `incoming`, and the scene's images.
-struct ShadingPoint {
-    const Interaction& point;
-    Vec3 incoming;
-    const std::vector<Texture>& textures;
+// One line a closure. Each has a NAME, by which a scene asks for it, KINDS, the kinds of rays that its lobes scatter, and `add_to`;
+// `kinds` where its inputs leave some of them out, `is_rough` where it may spread light otherwise than diffuse surfaces do,
+// `mean_emission` and `shines_evenly` where it shines.
+using Closure = std::variant<DiffuseClosure, GlossyClosure, GlassClosure, RefractionClosure, EmissionClosure, TranslucentClosure, PrincipledClosure>;
 
-    Vec3 color(const Color& color) const { return color.at(textures, point); }
-    // The index of refraction beyond the surface over that before it. ior: inside over outside.
-    double ratio(double ior) const { return point.backside ? 1 / ior : ior; }
+// A factor of a closure's weight, from 0 to 1: a mixture's, or what it leaves to the other side.
+struct MixFactor {
+    Color value;
+    bool rest;
+};
+struct WeightedClosure {
+    Closure closure;
+    std::vector<MixFactor> factors;
 };
 
-struct DiffuseClosure {
-    Color color;
-    static constexpr uint32_t KINDS = DIFFUSE;  // the kinds of rays that its lobes scatter
-    void add_to(BSDF& bsdf, const ShadingPoint& at) const { bsdf.add(Lambert{at.color(color), at.point.shading}); }
-};
-
-struct MirrorClosure {
-    Color color;
-    static constexpr uint32_t KINDS = GLOSSY;
-    void add_to(BSDF& bsdf, const ShadingPoint& at) const {
-        bsdf.add(SpecularReflection{at.color(color), specular_normal(at.incoming, at.point), at.incoming});
+// The closure of this name; std::invalid_argument if there is none.
+template <size_t I = 0> Closure closure_of(std::string_view name, const Inputs& inputs) {
+    if constexpr (I == std::variant_size_v<Closure>) {
+        throw std::invalid_argument("no closure is called " + std::string(name));
+    } else {
+        using Kind = std::variant_alternative_t<I, Closure>;
+        return name == Kind::NAME ? Closure(Kind(inputs)) : closure_of<I + 1>(name, inputs);
     }
-};
-
-struct GlassClosure {
-    Color color;
-    double ior;
-    static constexpr uint32_t KINDS = GLOSSY | TRANSMISSION;
-    void add_to(BSDF& bsdf, const ShadingPoint& at) const {
-        Vec3 normal = specular_normal(at.incoming, at.point), rgb = at.color(color);
-        double ratio = at.ratio(ior), reflectance = fresnel(-dot(normal, at.incoming), ratio);
-        bsdf.add(SpecularReflection{rgb * reflectance, normal, at.incoming});
-        bsdf.add(SpecularTransmission{rgb * (1 - reflectance), normal, at.incoming, ratio});
-    }
-};
-
-// Glass that reflects nothing but where all is reflected, and there it is black.
-struct RefractionClosure {
-    Color color;
-    double ior;
-    static constexpr uint32_t KINDS = TRANSMISSION;
-    void add_to(BSDF& bsdf, const ShadingPoint& at) const {
-        Vec3 normal = specular_normal(at.incoming, at.point);
-        double ratio = at.ratio(ior);
-        if (fresnel(-dot(normal, at.incoming), ratio) < 1)
-            bsdf.add(SpecularTransmission{at.color(color), normal, at.incoming, ratio});
-    }
-};
-
-// One line a closure.
-using Closure = std::variant<DiffuseClosure, MirrorClosure, GlassClosure, RefractionClosure>;
+}
 
 struct Material {
-    Color emission;  // radiance, of both sides
-    std::vector<Closure> closures;
+    std::vector<WeightedClosure> closures;
 
-    uint32_t kinds() const {
-        uint32_t kinds = 0;
-        for (const Closure& closure : closures) kinds |= std::visit([](const auto& closure) { return closure.KINDS; }, closure);
-        return kinds;
+    // The kinds of rays that its lobes scatter.
+    uint32_t kinds() const { return kinds_; }
+    // Those among them that are scattered all over, but not as diffuse light is.
+    uint32_t rough_kinds() const { return rough_kinds_; }
+    bool scatters() const { return kinds_; }
+    bool emits() const { return !is_black(mean_emission_); }
+    // About what it gives off, black only where it gives off nothing; and whether that is what it gives off everywhere.
+    Vec3 mean_emission() const { return mean_emission_; }
+    bool shines_evenly() const { return shines_evenly_; }
+
+    // To be called when all closures are there.
+    void prepare(const std::vector<Texture>& textures) {
+        for (const WeightedClosure& one : closures)
+            std::visit(
+                [&](const auto& closure) {
+                    uint32_t kinds = closure.KINDS;
+                    if constexpr (requires { closure.kinds(); }) kinds = closure.kinds();
+                    kinds_ |= kinds;
+                    if constexpr (requires { closure.is_rough(); })
+                        if (closure.is_rough()) rough_kinds_ |= kinds & ~DIFFUSE;
+                    if constexpr (requires { closure.mean_emission(textures); }) {
+                        mean_emission_ += closure.mean_emission(textures) * mean_weight(one, textures);
+                        shines_evenly_ &= closure.shines_evenly() && std::none_of(one.factors.begin(), one.factors.end(), [](const MixFactor& factor) { return factor.value.varies(); });
+                    }
+                },
+                one.closure);
     }
+
     BSDF bsdf(const ShadingPoint& at) const {
         BSDF bsdf;
-        for (const Closure& closure : closures) std::visit([&](const auto& closure) { closure.add_to(bsdf, at); }, closure);
+        for (const WeightedClosure& one : closures) add(one, at, bsdf);
         return bsdf;
     }
-    // The albedo of what is diffuse here, which a pass of its own shows.
-    Vec3 diffuse_color(const ShadingPoint& at) const {
-        Vec3 sum;
-        for (const Closure& closure : closures)
-            if (auto* diffuse = std::get_if<DiffuseClosure>(&closure)) sum += at.color(diffuse->color);
-        return sum;
+    Vec3 emission(const ShadingPoint& at) const {
+        BSDF bsdf;
+        for (const WeightedClosure& one : closures)
+            std::visit(
+                [&](const auto& closure) {
+                    if constexpr (requires { closure.mean_emission(at.textures); }) add(one, at, bsdf);
+                },
+                one.closure);
+        return bsdf.emission();
     }
+    // The albedo of what is diffuse here.
+    Vec3 diffuse_color(const ShadingPoint& at) const { return kinds_ & (DIFFUSE | TRANSMISSION) ? bsdf(at).diffuse_color() : Vec3{}; }
+
+   private:
+    static void add(const WeightedClosure& one, const ShadingPoint& at, BSDF& bsdf) {
+        Vec3 weight{1, 1, 1};
+        for (const MixFactor& factor : one.factors) {
+            double value = unit_range(at.number(factor.value));
+            weight *= factor.rest ? 1 - value : value;
+        }
+        if (weight.x > 0) std::visit([&](const auto& closure) { closure.add_to(bsdf, at, weight); }, one.closure);
+    }
+    // The mean over images, and above 0 where these may be.
+    static double mean_weight(const WeightedClosure& one, const std::vector<Texture>& textures) {
+        constexpr double LEAST = 0.01;
+        double weight = 1;
+        for (const MixFactor& factor : one.factors) {
+            double mean = unit_range(factor.value.mean(textures).x), value = factor.rest ? 1 - mean : mean;
+            weight *= factor.value.varies() ? larger(value, LEAST) : value;
+        }
+        return weight;
+    }
+
+    uint32_t kinds_ = 0, rough_kinds_ = 0;
+    Vec3 mean_emission_;
+    bool shines_evenly_ = true;
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ... import checks
 from ...checks import shown
 from ...errors import InputError
 from ...pinhole import Pinhole
@@ -142,6 +143,7 @@ class Scene:
     origin : the point of the world from which all coordinates of the scene are counted: (0, 0, 0), or that of a recentred
         export.
     images : what `Colour.image` names.
+    cycles : the version of Blender whose Cycles' materials are meant.
     """
 
     camera: Pinhole
@@ -157,10 +159,13 @@ class Scene:
     world: World = field(default_factory=World)
     film: Film = field(default_factory=Film)
     bounces: Bounces = field(default_factory=Bounces)
+    cycles: tuple[int, int] = (5, 2)
 
     def __post_init__(self) -> None:
         if len(self.origin) != 3 or not np.isfinite(self.origin).all():
             raise InputError(f"origin is {self.origin}: give three finite numbers")
+        if len(self.cycles) != 2 or not all(type(number) is int and 0 <= number < 100 for number in self.cycles):
+            raise InputError(f"cycles is {checks.shown(self.cycles)}: give a version of Blender, as 5.2")
         start, end = (float(depth) for depth in self.clip)
         if not 0 <= start < end:
             raise InputError(f"clip is {start:g} … {end:g}: give a nearest depth of at least 0 and a greater farthest depth")
@@ -186,7 +191,7 @@ class Scene:
                         f"object {shown(placed.name)} names the material {shown(name)}, which the scene does not have"
                     )
         for name, material in self.materials.items():
-            for component, colour in material.colours.items():
+            for component, colour in material.inputs:
                 if colour.image is not None and colour.image not in self.images:
                     raise InputError(
                         f"{component} of material {shown(name)} names the image {shown(colour.image)}, "

@@ -4,13 +4,10 @@ from . import Object, Scene
 from .film import LEVELS
 from .lamps import World
 from .materials import PLAIN, Material
+from .shader_nodes import KINDS
 
-_COUNTED_AS = {
-    "diffuse": ("diffuse",),
-    "mirror": ("glossy",),
-    "glass": ("glossy", "transmission"),
-    "refraction": ("transmission",),
-}
+_REFLECTS, _MIRRORS = "reflects light onto others", "mirrors"
+_WHAT = {"diffuse": _REFLECTS, "principled": _REFLECTS, "glossy": _MIRRORS}
 
 
 def least_level(scene: Scene) -> tuple[str, str]:
@@ -24,14 +21,16 @@ def least_level(scene: Scene) -> tuple[str, str]:
         return direct, f"Light comes from {light}, and the scene allows no bounces."
     shown = [(placed, material) for placed in scene.objects for material in _materials(scene, placed)]
     scattering = [
-        (placed, component) for placed, material in shown for component in material.colours if component in _COUNTED_AS
+        (placed, closure.node.type)
+        for placed, material in shown
+        for closure in material.closures
+        if KINDS[closure.node.type].scatters
     ]
     if not scattering:
         return direct, f"Light comes from {light}, and nothing reflects it."
-    for placed, component in scattering:
-        if any(getattr(bounces, kind) > 0 for kind in _COUNTED_AS[component]):
-            what = {"diffuse": "reflects light onto others", "mirror": "mirrors"}.get(component, "is clear")
-            return path, f"Light comes from {light}, and {placed.name!r} {what}."
+    for placed, kind in scattering:
+        if any(getattr(bounces, bounce) > 0 for bounce in KINDS[kind].scatters):
+            return path, f"Light comes from {light}, and {placed.name!r} {_WHAT.get(kind, 'is clear')}."
     return direct, f"Light comes from {light}, and the scene allows no bounces of the kinds that it has."
 
 
@@ -41,7 +40,7 @@ def _light(scene: Scene) -> str | None:
         if any(getattr(lamp, "irradiance", ()) or getattr(lamp, "power", ())):
             return f"the lamp {lamp.name!r}"
     for placed in scene.objects:
-        if any("emission" in material.colours for material in _materials(scene, placed)):
+        if any(closure.node.is_shining for material in _materials(scene, placed) for closure in material.closures):
             return f"the surface of {placed.name!r}"
     return "the world" if scene.world.radiance != World().radiance else None
 

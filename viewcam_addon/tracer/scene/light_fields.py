@@ -5,6 +5,7 @@ radians: a file must give back the last bit of them, which degrees can't.
 """
 
 import dataclasses
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -19,8 +20,9 @@ from .film import Bounces, Film
 from .geometry_fields import array_document
 from .lamps import Area, Lamp, Point, Spot, Sun, World
 from .materials import Colour, Material, Picture
+from .shader_nodes import KINDS, Node
 
-KEYS = ("images", "materials", "lamps", "world", "film", "bounces")
+KEYS = ("images", "materials", "lamps", "world", "film", "bounces", "cycles")
 
 _LAMPS: dict[str, type[Lamp]] = {kind.kind: kind for kind in (Sun, Point, Spot, Area)}
 _WHITE = (1.0, 1.0, 1.0)
@@ -52,6 +54,7 @@ def light_document(scene: Scene, arrays: dict[str, NDArray]) -> dict:
         "world": _changed(scene.world),
         "film": _changed(scene.film),
         "bounces": _changed(scene.bounces),
+        "cycles": "" if scene.cycles == Scene.cycles else ".".join(map(str, scene.cycles)),
     }
     return {key: value for key, value in document.items() if value}
 
@@ -68,7 +71,16 @@ def light(fields: dict[str, Field], arrays: Arrays) -> dict[str, Any]:
     for key, kind in (("world", World), ("film", Film), ("bounces", Bounces)):
         if key in fields:
             found[key] = _simple(kind, fields[key])
+    if "cycles" in fields:
+        found["cycles"] = _version(fields["cycles"])
     return found
+
+
+def _version(field: Field) -> tuple[int, int]:
+    if not re.fullmatch(r"[0-9]{1,2}\.[0-9]{1,2}", field.text()):
+        field.fail(f'is {shown(field.value)}: give a version of Blender, as "5.2"')
+    first, second = map(int, field.value.split("."))
+    return first, second
 
 
 def hidden_from(field: Field) -> frozenset[str]:
@@ -94,7 +106,19 @@ def _material_document(material: Material) -> dict[str, Any]:
         colour = getattr(material, each.name)
         if isinstance(colour, Colour):
             document[each.name] = _colour_document(colour)
-    return document
+    return document if material.surface is None else document | {"surface": _node_document(material.surface)}
+
+
+def _node_document(node: Node) -> dict[str, Any]:
+    def value_of(name: str, value: object) -> object:
+        if isinstance(value, Node):
+            return _node_document(value)
+        if isinstance(value, Colour):
+            is_number = isinstance(KINDS[node.type].inputs[name], float) and value == Colour((value.rgb[0],) * 3)
+            return value.rgb[0] if is_number else _colour_document(value)
+        return value
+
+    return {"type": node.type} | {name: value_of(name, value) for name, value in node.inputs}
 
 
 def _colour_document(colour: Colour) -> list[float] | dict[str, Any]:
@@ -114,13 +138,39 @@ def _picture(field: Field, arrays: Arrays) -> Picture:
 
 
 def _material(field: Field) -> Material:
-    components = [each.name for each in dataclasses.fields(Material) if each.name != "ior"]
-    keys = field.fields((), (*components, "ior"))
-    colours = {name: _colour(keys[name]) for name in components if name in keys}
+    components = [each.name for each in dataclasses.fields(Material) if each.name not in ("ior", "surface")]
+    keys = field.fields((), (*components, "ior", "surface"))
+    given: dict[str, Any] = {name: _colour(keys[name]) for name in components if name in keys}
+    if "ior" in keys:
+        given["ior"] = keys["ior"].number()
+    if "surface" in keys:
+        given["surface"] = _node(keys["surface"])
     try:
-        return Material(**colours, **({"ior": keys["ior"].number()} if "ior" in keys else {}))
+        return Material(**given)
     except InputError as error:
         field.hand_on(error)
+
+
+def _node(field: Field) -> Node:
+    kind = field.fields(("type",), others=True)["type"]
+    if kind.text() not in KINDS:
+        kind.fail(f"is {shown(kind.value)}: give one of {', '.join(KINDS)}")
+    known = KINDS[kind.value].inputs
+    keys = field.fields(("type",), tuple(known))
+    try:
+        return Node(
+            kind.value, tuple((name, _node_input(keys[name], default)) for name, default in known.items() if name in keys)
+        )
+    except InputError as error:
+        field.hand_on(error)
+
+
+def _node_input(field: Field, default: object) -> Any:
+    if default is None:
+        return _node(field)
+    if isinstance(default, tuple) and isinstance(default[0], str):
+        return field.text()
+    return _colour(field) if isinstance(field.value, list | dict) else field.number()
 
 
 def _colour(field: Field) -> Colour:

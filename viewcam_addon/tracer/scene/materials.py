@@ -1,86 +1,27 @@
-"""What surfaces are made of, as data: the few materials whose light has an answer in closed form.
+"""What surfaces are made of, as data.
 
-A material is a sum of components, each with a colour: Lambert's diffuse reflection, emission, a perfect mirror, clear glass and
-clear refraction. That is what Blender's shaders reduce to where they are smooth or rough all the way; what lies between is not
-modelled (blender/shaders.py finds the stand-in). Rejected: a graph of nodes, which would be a second Cycles, and roughness,
-which would need its microfacets to the last constant.
-
-Colours are linear, in the scene's own primaries; nobody here knows which.
+A material is either a tree of shader nodes (shader_nodes.py) or, for what a hand writes most, a sum of components without any
+roughness, each with a colour: Lambert's diffuse reflection, emission, a perfect mirror, clear glass and clear refraction.
 """
 
 from dataclasses import dataclass, fields
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ... import checks
 from ...errors import InputError
+from .colours import LARGEST_RADIANCE, Colour, Picture, radiance
+from .shader_nodes import Closure, Node, closures, node
 
-# Float32 passes and float64 sums hold products of these.
-LARGEST_RADIANCE = 1e18
-
-
-def radiance(name: str, values: object) -> tuple[float, float, float]:
-    """Three numbers that light can have: finite, not negative, not beyond `LARGEST_RADIANCE`; InputError with `name`."""
-    rgb = checks.vector(name, values, 3)
-    if not all(0.0 <= value <= LARGEST_RADIANCE for value in rgb):
-        raise InputError(f"{name} is {checks.shown(rgb)}: give three numbers from 0 to {LARGEST_RADIANCE:g}")
-    return rgb
-
-
-@dataclass(frozen=True, eq=False)
-class Picture:
-    """An image that colours surfaces, laid out over UV (0, 0) to (1, 1) and repeated beyond.
-
-    pixels : (height, width, 3) float32, rows from the bottom; encoded as sRGB where `srgb` is true, else linear. Between
-        pixels the encoded values are interpolated, as Cycles does.
-    """
-
-    pixels: NDArray[np.float32]
-    srgb: bool = False
-
-    def __post_init__(self) -> None:
-        if self.pixels.ndim != 3 or self.pixels.shape[2] != 3 or not self.pixels.size:
-            raise InputError(f"an image has the shape {self.pixels.shape} and must have height × width × 3: check it")
-        if not np.isfinite(self.pixels).all():
-            raise InputError("an image holds a number that is not finite: check it")
-        # What is encoded as sRGB is raised to the power of 2.4.
-        most = LARGEST_RADIANCE ** (1 / 2.4) if self.srgb else LARGEST_RADIANCE
-        largest = float(np.abs(self.pixels).max())
-        if largest > most:
-            raise InputError(
-                f"an image holds {largest:.3g}: give numbers up to {most:.3g}, so that its light can be computed with"
-            )
-
-
-@dataclass(frozen=True)
-class Colour:
-    """A colour, the same everywhere or times what an image or the mesh's own colours say.
-
-    rgb : factors, not negative. image : key in `Scene.images`, looked up at the mesh's UV, or None. closest : the nearest pixel
-    of the image instead of a linear interpolation between four. vertex : times the mesh's `corner_colours`.
-    """
-
-    rgb: tuple[float, float, float]
-    image: str | None = None
-    closest: bool = False
-    vertex: bool = False
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "rgb", radiance("a colour", self.rgb))
-
-    @property
-    def is_black(self) -> bool:
-        return not any(self.rgb)
+__all__ = ["LARGEST_RADIANCE", "PLAIN", "Colour", "Material", "Picture", "radiance"]
 
 
 @dataclass(frozen=True)
 class Material:
-    """The components that a surface's light is the sum of; None is no such component.
+    """The components that a surface's light is the sum of; None is no such component. Or `surface`, and no component.
 
     diffuse : albedo of a Lambert surface, both of its sides. emission : radiance, of both sides. mirror : reflectance of a
     perfect mirror. glass : colour of what is reflected and refracted by a clear dielectric, shared out by Fresnel's equations.
     refraction : colour of what is refracted, nothing being reflected. ior : of glass and refraction, inside over outside.
+    surface : the shader that is in their place.
     """
 
     diffuse: Colour | None = None
@@ -89,20 +30,44 @@ class Material:
     glass: Colour | None = None
     refraction: Colour | None = None
     ior: float = 1.45
+    surface: Node | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "ior", checks.number("ior of a material", self.ior, 1e-3, 1e3))
+        if self.surface is not None and self.colours:
+            raise InputError(f"a material has a surface beside {', '.join(self.colours)}: give one or the other")
 
     @property
     def colours(self) -> dict[str, Colour]:
         """Component → its colour, without those that are None or black."""
-        found = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "ior"}
+        found = {field.name: getattr(self, field.name) for field in fields(self) if field.type in (Colour, Colour | None)}
         return {name: colour for name, colour in found.items() if colour is not None and not colour.is_black}
 
     @property
-    def scatters(self) -> bool:
-        """Whether any light that falls on it leaves it again."""
-        return bool(self.colours.keys() - {"emission"})
+    def closures(self) -> tuple[Closure, ...]:
+        """What the core adds up, of either form of a material."""
+        if self.surface is not None:
+            return tuple(closures(self.surface))
+        made = {
+            "emission": lambda colour: node("emission", color=colour),
+            "diffuse": lambda colour: node("diffuse", color=colour),
+            "mirror": lambda colour: node("glossy", color=colour, roughness=0.0, distribution="ggx"),
+            "glass": lambda colour: node("glass", color=colour, ior=self.ior, distribution="ggx"),
+            "refraction": lambda colour: node("refraction", color=colour, ior=self.ior, distribution="ggx"),
+        }
+        return tuple(Closure(make(self.colours[name])) for name, make in made.items() if name in self.colours)
+
+    @property
+    def inputs(self) -> tuple[tuple[str, Colour], ...]:
+        """What all colours and numbers are given, each with what a sentence calls it."""
+        if self.surface is None:
+            return tuple(self.colours.items())
+        found = []
+        for closure in self.closures:
+            kind = closure.node.type
+            found += [(f"{name} of {kind}", value) for name, value in closure.node.inputs if isinstance(value, Colour)]
+            found += [(f"a factor of {kind}", factor) for factor, _ in closure.factors]
+        return tuple(found)
 
 
 PLAIN = Material(diffuse=Colour((0.8, 0.8, 0.8)))

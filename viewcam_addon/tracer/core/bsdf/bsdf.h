@@ -1,4 +1,4 @@
-// The BSDF at a point of a surface: a sum of lobes.
+// What closures become at a point of a surface: the BSDF, a sum of lobes, and what it gives off.
 //
 // A path takes one lobe only, chosen in proportion to the lobes' colours, and its weight is divided by that share: where there
 // is one lobe, it is taken and nothing is random. Glass is two lobes, shared out by Fresnel's equations.
@@ -9,43 +9,63 @@
 
 #include "dielectric.h"
 #include "lambert.h"
+#include "microfacet.h"
+#include "oren_nayar.h"
 #include "specular.h"
+#include "translucent.h"
 
 namespace viewcam::VIEWCAM_ISA {
 
 // One line a kind of lobe. Each has a colour (the most that it sends on), KIND (by which objects and lights hide and by which
-// bounces are counted), DELTA (whether its direction is no matter of chance), eval, pdf and sample.
-using Lobe = std::variant<Lambert, SpecularReflection, SpecularTransmission>;
+// bounces are counted), DELTA (whether its direction is no matter of chance), IS_DIFFUSE (whether passes count it so), eval, pdf
+// and sample; `importance` where what it scatters is not its colour.
+using Lobe = std::variant<Lambert, SpecularReflection, SpecularTransmission, OrenNayar, Translucent, MicrofacetReflection, MicrofacetTransmission>;
+
+// Light that lobes send on, by the passes that count it.
+struct ScatteredLight {
+    Vec3 diffuse, other;
+};
 
 class BSDF {
    public:
-    static constexpr int MOST_LOBES = 8;
+    static constexpr int MOST_LOBES = 64;
 
     // Black lobes are left out.
     template <class Kind> void add(const Kind& lobe) {
-        double share = lobe.color.x + lobe.color.y + lobe.color.z;
+        double share = importance(lobe);
         if (!(share > 0) || count_ == MOST_LOBES) return;
         new (&storage_[count_]) Lobe(lobe);
         shares_[count_++] = share, total_ += share;
-        kinds_ |= Kind::KIND, spread_ |= !Kind::DELTA;
+        kinds_ |= Kind::KIND;
+        if (!Kind::DELTA) spread_ |= Kind::KIND;
     }
+    void emit(Vec3 radiance) { emission_ += radiance; }
 
     bool is_black() const { return count_ == 0; }
-    // Whether light from any one direction is scattered into all: what lights can be sampled for.
-    bool is_spread() const { return spread_; }
-
-    // What of light from a unit direction is sent on to where the path came from, cosine included, by lobes of a kind.
-    Vec3 eval(Vec3 to_light, RayKind kind) const {
+    Vec3 emission() const { return emission_; }
+    // The kinds of rays that light from any one direction is scattered into all over: what lights can be sampled for.
+    uint32_t spread_kinds() const { return spread_; }
+    // The albedo of what is diffuse, which a pass of its own shows.
+    Vec3 diffuse_color() const {
         Vec3 sum;
         for (int i = 0; i < count_; i++)
-            std::visit([&](const auto& lobe) { if (lobe.KIND == kind && !lobe.DELTA) sum += lobe.eval(to_light); }, lobe(i));
+            std::visit([&](const auto& lobe) { if (lobe.IS_DIFFUSE) sum += lobe.color; }, lobe(i));
         return sum;
     }
-    // The density by solid angle with which `sample` chooses a direction.
-    double pdf(Vec3 to_light) const {
-        double sum = 0;
+
+    // What of light from a unit direction is sent on to where the path came from, cosine included, by lobes of some kinds.
+    // weight(kind, pdf): what of it counts, by the density with which `sample` chooses that lobe and this direction.
+    template <class Weight> ScatteredLight eval(Vec3 to_light, uint32_t kinds, Weight&& weight) const {
+        ScatteredLight sum;
         for (int i = 0; i < count_; i++)
-            std::visit([&](const auto& lobe) { if (!lobe.DELTA) sum += share(i) * lobe.pdf(to_light); }, lobe(i));
+            std::visit(
+                [&](const auto& lobe) {
+                    if (lobe.DELTA || !(lobe.KIND & kinds)) return;
+                    Vec3 light = lobe.eval(to_light);
+                    if (viewcam::VIEWCAM_ISA::is_black(light)) return;
+                    (lobe.IS_DIFFUSE ? sum.diffuse : sum.other) += light * weight(lobe.KIND, [&] { return share(i) * lobe.pdf(to_light); });
+                },
+                lobe(i));
         return sum;
     }
     // u_lobe: which lobe, in [0, 1). direction: two numbers in [0, 1) that are made where they are asked for.
@@ -61,7 +81,7 @@ class BSDF {
         std::visit(
             [&](const auto& lobe) {
                 static_cast<LobeSample&>(sample) = lobe.sample(lobe.DELTA ? Vec2{} : direction());
-                sample.kind = lobe.KIND;
+                sample.kind = lobe.KIND, sample.is_diffuse = lobe.IS_DIFFUSE;
             },
             lobe(chosen));
         sample.weight = sample.weight / share(chosen);
@@ -73,6 +93,12 @@ class BSDF {
     uint32_t kinds() const { return kinds_; }
 
    private:
+    template <class Kind> static double importance(const Kind& lobe) {
+        if constexpr (requires { lobe.importance(); })
+            return lobe.importance();
+        else
+            return lobe.color.x + lobe.color.y + lobe.color.z;
+    }
     double share(int lobe) const { return count_ == 1 ? 1 : shares_[lobe] / total_; }
 
     static_assert(std::is_trivially_destructible_v<Lobe>);
@@ -84,8 +110,8 @@ class BSDF {
     Storage storage_[MOST_LOBES];
     double shares_[MOST_LOBES], total_ = 0;
     int count_ = 0;
-    uint32_t kinds_ = 0;
-    bool spread_ = false;
+    uint32_t kinds_ = 0, spread_ = 0;
+    Vec3 emission_;
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

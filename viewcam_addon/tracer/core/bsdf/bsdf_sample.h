@@ -11,6 +11,7 @@ struct LobeSample {
 };
 struct BSDFSample : LobeSample {
     RayKind kind = DIFFUSE;
+    bool is_diffuse = true;
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

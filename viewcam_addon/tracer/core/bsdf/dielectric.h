@@ -30,7 +30,7 @@ inline double fresnel(double cosine, double ratio) {
 
 struct SpecularTransmission {
     static constexpr RayKind KIND = TRANSMISSION;
-    static constexpr bool DELTA = true;
+    static constexpr bool DELTA = true, IS_DIFFUSE = false;
     Vec3 color, normal, incoming;
     double ratio;
 

@@ -8,7 +8,7 @@ namespace viewcam::VIEWCAM_ISA {
 
 struct Lambert {
     static constexpr RayKind KIND = DIFFUSE;
-    static constexpr bool DELTA = false;
+    static constexpr bool DELTA = false, IS_DIFFUSE = true;
     Vec3 color, normal;
 
     // What of light from a unit direction is sent on, cosine included.

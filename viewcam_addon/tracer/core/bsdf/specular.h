@@ -29,7 +29,7 @@ inline Vec3 specular_normal(Vec3 incoming, const Interaction& point) {
 
 struct SpecularReflection {
     static constexpr RayKind KIND = GLOSSY;
-    static constexpr bool DELTA = true;
+    static constexpr bool DELTA = true, IS_DIFFUSE = false;
     Vec3 color, normal, incoming;
 
     Vec3 eval(Vec3) const { return {}; }

@@ -50,8 +50,9 @@ class PathIntegrator {
         most_of_[TRANSMISSION] = bounces.transmission + 1;
         bool shines = false;
         for (const Material& material : scene.illumination.materials) {
-            shines |= !material.emission.is_black();
+            shines |= material.emits();
             kinds_ |= material.kinds();
+            spread_ |= (material.kinds() & DIFFUSE) | material.rough_kinds();
         }
         for (RayKind kind : {DIFFUSE, GLOSSY, TRANSMISSION}) {
             meets_[kind] = shines || lights_.environment().lights(kind) || lights_.meets_lamps(kind);
@@ -65,8 +66,10 @@ class PathIntegrator {
 
     // Whether paths through the same point of the film may bring different light.
     bool is_random() const {
-        bool onwards = std::min(most_, most_of_[DIFFUSE]) > 1 || meets_[DIFFUSE];
-        return lit_ && ((kinds_ & GLOSSY && kinds_ & TRANSMISSION) || (kinds_ & DIFFUSE && (lights_.is_random() || onwards)));
+        bool random = kinds_ & GLOSSY && kinds_ & TRANSMISSION;
+        for (RayKind kind : {DIFFUSE, GLOSSY, TRANSMISSION})
+            random |= spread_ & kind && (lights_.is_random() || std::min(most_, most_of_[kind]) > 1 || meets_[kind]);
+        return lit_ && random;
     }
 
     // The light of up to 64 paths, each with its ray from the eye.
@@ -79,7 +82,7 @@ class PathIntegrator {
         for (int depth = 1; block.live > 0 && lit_; depth++) {
             scatter(samples, depth, block);
             gather(depth, block);
-            arrive(block);
+            arrive(depth, block);
         }
     }
 
@@ -94,7 +97,7 @@ class PathIntegrator {
         int sample, from;
         Category category = COLOR;
         RayKind kind = CAMERA;
-        bool last = false;
+        bool last = false, through = false;  // through: whether light from behind counts where it leaves
         uint16_t scattered[3] = {};  // diffuse, glossy, transmission
         Vec3 weight{1, 1, 1};
         Ray ray;
@@ -105,7 +108,7 @@ class PathIntegrator {
         int sample;
         Category category;
         bool traced;
-        Vec3 light;
+        Vec3 light, other;  // other: of what is not diffuse where the eye sees it
     };
     struct Block {
         PathLight* light;
@@ -119,18 +122,13 @@ class PathIntegrator {
     static int row(RayKind kind) { return kind == DIFFUSE ? 0 : kind == GLOSSY ? 1 : 2; }
 
     // Where that belongs which a path brings that is scattered for the depth-th time.
-    static Category after(Category category, RayKind kind, int depth) {
-        if (depth == 1) return kind == DIFFUSE ? DIRECT : OTHER;
+    static Category after(Category category, bool is_diffuse, int depth) {
+        if (depth == 1) return is_diffuse ? DIRECT : OTHER;
         return depth == 2 && category == DIRECT ? INDIRECT : category;
-    }
-    // The part that counts of a sample whose direction was picked with a density, where another way of picking has the other.
-    static double power_heuristic(double pdf, double other) {
-        double ratio = other / pdf;
-        return ratio > 0 ? 1 / (1 + ratio * ratio) : 1;
     }
 
     const Material& material(const Interaction& point) const { return scene_.illumination.materials[point.material]; }
-    ShadingPoint shading(const Interaction& point, Vec3 incoming) const { return {point, incoming, scene_.illumination.textures}; }
+    ShadingPoint shading(const Interaction& point, Vec3 incoming) const { return scene_.illumination.shading(point, incoming); }
 
     // What the eye's rays come to, and the light that is of this alone.
     void start(const Ray* rays, int count, Block& block) const {
@@ -156,9 +154,9 @@ class PathIntegrator {
             PathLight& light = block.light[from[k]];
             const Interaction& point = block.points[k];
             const Material& made_of = material(point);
-            if (!made_of.emission.is_black()) light.add(EMISSION, made_of.emission.at(scene_.illumination.textures, point));
-            if (made_of.closures.empty()) continue;
             Vec3 ahead = normalize(met_by[k]->direction);
+            if (made_of.emits()) light.add(EMISSION, made_of.emission(shading(point, ahead)));
+            if (!made_of.scatters()) continue;
             light.add(COLOR, made_of.diffuse_color(shading(point, ahead)));
             Path& path = block.paths[block.live++];  // the rest is known when it is scattered
             path.sample = from[k], path.from = k;
@@ -187,10 +185,11 @@ class PathIntegrator {
                 return sampler_.pair(key, sample.number, SobolSampler::dimension(depth, purpose));
             };
             double brightest = 0;
-            if (bsdf.is_spread() && lights_.count() > 0) {
+            bool through = bsdf.spread_kinds() & TRANSMISSION;
+            if (bsdf.spread_kinds() && lights_.count() > 0) {
                 LightSampler::Choice choices[LightSampler::ASKED];
                 double u = lights_.is_random() ? number(SobolSampler::LIGHT) : 0;
-                int chosen = lights_.choose(point, u, depth == 1, choices, brightest);
+                int chosen = lights_.choose(point, u, depth == 1, through, choices, brightest);
                 Vec2 u_light = chosen && lights_.is_random() ? pair(SobolSampler::LIGHT_POINT) : Vec2{};
                 for (int k = 0; k < chosen; k++) ask(choices[k], point, u_light, path, depth, bsdf, block);
             }
@@ -214,7 +213,8 @@ class PathIntegrator {
             next.kind = sampled.kind;
             next.last = last & sampled.kind;
             next.scattered[row(sampled.kind)]++;
-            next.category = after(path.category, sampled.kind, depth);
+            next.through = through;
+            next.category = after(path.category, sampled.is_diffuse, depth);
             next.weight = min(path.weight * sampled.weight, MOST_WEIGHT);
             double survival = 1;
             if (sampled.kind == DIFFUSE && brightest > 0 && next.last)
@@ -236,14 +236,20 @@ class PathIntegrator {
     void ask(const LightSampler::Choice& choice, const Interaction& point, Vec2 u, const Path& path, int depth, const BSDF& bsdf,
              Block& block) const {
         LightSample sample = choice.light->sample_li(point, choice.rest, u);
-        if (!(dot(point.normal, sample.direction) > 0)) return;
-        Vec3 light = bsdf.eval(sample.direction, DIFFUSE) * sample.weight;
-        if (is_black(light)) return;
-        light = light * path.weight / choice.chance;
-        if (choice.light->mesh()) light *= power_heuristic(sample.pdf * choice.chance, bsdf.pdf(sample.direction));
+        uint32_t kinds = dot(point.normal, sample.direction) > 0 ? DIFFUSE | GLOSSY : TRANSMISSION;
+        // Surfaces that shine are found by scattered rays, too, and lamps by those that are not diffuse.
+        auto weight = [&](RayKind kind, auto&& pdf) {
+            bool is_found = choice.light->mesh() || (kind != DIFFUSE && choice.light->is_sized());
+            return is_found ? power_heuristic(sample.pdf * choice.chance, pdf()) : 1;
+        };
+        ScatteredLight light = bsdf.eval(sample.direction, kinds & ~choice.light->hidden_from, weight);
+        if (depth > 1) light.diffuse += light.other, light.other = {};
+        light.diffuse = light.diffuse * sample.weight, light.other = light.other * sample.weight;
+        if (is_black(light.diffuse) && is_black(light.other)) return;
         int place = block.lit[choice.slot]++;
         bool traced = choice.light->casts_shadow;
-        block.shadowed[choice.slot][place] = {path.sample, after(path.category, DIFFUSE, depth), traced, light};
+        block.shadowed[choice.slot][place] = {path.sample, after(path.category, true, depth), traced, light.diffuse * path.weight / choice.chance,
+                                              light.other * path.weight / choice.chance};
         if (traced) block.shadow_rays[choice.slot][place] = shadow_ray(point, sample);
     }
 
@@ -259,12 +265,16 @@ class PathIntegrator {
             else
                 for (int i = 0; i < count; i++) hidden[i] = shadowed[i].traced && scene_.occluded(rays[i]);
             for (int i = 0; i < count; i++)
-                if (!hidden[i]) block.light[shadowed[i].sample].add(shadowed[i].category, shadowed[i].light);
+                if (!hidden[i]) {
+                    PathLight& light = block.light[shadowed[i].sample];
+                    light.add(shadowed[i].category, shadowed[i].light);
+                    light.add(OTHER, shadowed[i].other);
+                }
         }
     }
 
     // Where rays come to; adds what shines there.
-    void arrive(Block& block) const {
+    void arrive(int depth, Block& block) const {
         const Ray* met_by[MOST];
         Hit hits[MOST];
         int arrived[MOST], met = 0;
@@ -276,8 +286,12 @@ class PathIntegrator {
                 continue;
             }
             Hit hit = scene_.closest(path.ray, path.kind);
-            if (lights_.meets_lamps(path.kind))
-                light.add(path.category, path.weight * lights_.le({path.ray.origin, path.ray.direction, 0, hit.t, !hit}, path.kind));
+            if (lights_.meets_lamps(path.kind)) {
+                LightRay ray{path.ray.origin, path.ray.direction, 0, hit.t, !hit};
+                light.add(path.category, path.weight * (path.pdf == INFINITE ? lights_.le(ray, path.kind)
+                                                                             : lights_.le(ray, path.kind, block.points[path.from], path.pdf,
+                                                                                          depth == 1, path.through)));
+            }
             if (hit)
                 arrived[met] = i, met_by[met] = &path.ray, hits[met++] = hit;
             else
@@ -289,13 +303,13 @@ class PathIntegrator {
             const Path& path = block.onwards[arrived[k]];
             const Interaction& point = block.arrivals[k];
             const Material& made_of = material(point);
-            if (!made_of.emission.is_black()) {
+            if (made_of.emits()) {
                 double share = 1;
-                if (path.kind == DIFFUSE && lights_.has_meshes())
-                    share = power_heuristic(path.pdf, lights_.pdf_li(block.points[path.from], point, path.ray.direction, hits[k].t));
-                block.light[path.sample].add(path.category, path.weight * made_of.emission.at(scene_.illumination.textures, point) * share);
+                if (path.pdf < INFINITE && lights_.has_meshes())
+                    share = power_heuristic(path.pdf, lights_.pdf_li(block.points[path.from], point, path.ray.direction, hits[k].t, path.through));
+                block.light[path.sample].add(path.category, path.weight * made_of.emission(shading(point, path.ray.direction)) * share);
             }
-            if (path.last || made_of.closures.empty()) continue;
+            if (path.last || !made_of.scatters()) continue;
             block.paths[live] = path;
             block.paths[live].from = k;
             live++;
@@ -312,7 +326,7 @@ class PathIntegrator {
     int most_, most_of_[TRANSMISSION + 1] = {};
     bool meets_[TRANSMISSION + 1] = {}, only_sky_[TRANSMISSION + 1] = {};
     bool lit_;
-    uint32_t kinds_ = 0;  // of rays that any material scatters
+    uint32_t kinds_ = 0, spread_ = 0;  // of rays that any material scatters, and all over
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

@@ -37,6 +37,11 @@ struct LightRay {
 constexpr double MOST_WEIGHT_OF_LIGHT = 1e100;  // more light than any picture holds, less than makes products overflow
 
 inline double mean(Vec3 rgb) { return (rgb.x + rgb.y + rgb.z) / 3; }
+// The part that counts of a sample whose direction was picked with a density, where another way of picking has the other.
+inline double power_heuristic(double pdf, double other) {
+    double ratio = other / pdf;
+    return ratio > 0 ? 1 / (1 + ratio * ratio) : 1;
+}
 // Sizes as they are, but 0 where their squares are nothing that float64 can divide by.
 inline double not_tiny(double size) { return size > 1e-100 ? size : 0; }
 

@@ -30,24 +30,27 @@ class LightSampler {
 
     explicit LightSampler(const Scene& scene) : environment_(scene.illumination.environment) {
         const Illumination& given = scene.illumination;
+        uint32_t lit = DIFFUSE;  // the kinds of rays that surfaces scatter light into from any one direction
+        for (const Material& material : given.materials) lit |= material.rough_kinds();
         std::vector<Light> unlit;
         for (const Lamp& lamp : given.lamps) {
             Light light = light_of(lamp, scene.origin);
-            (lamp.hidden_from & DIFFUSE ? unlit : lights_).push_back(light);
+            (lit & ~lamp.hidden_from ? lights_ : unlit).push_back(light);
         }
         lamps_ = lights_.size();
         std::vector<Vec3> emissions;
-        for (const Material& material : given.materials) emissions.push_back(material.emission.mean(given.textures));
+        for (const Material& material : given.materials) emissions.push_back(material.mean_emission());
         owners_.assign(scene.objects.size(), NONE);
         const Object* black = nullptr;  // the last object none of whose triangles shines: most of a million instances are like it
         for (uint32_t object = 0; object < scene.objects.size(); object++) {
             const Object& placed = scene.objects[object];
-            if (!(placed.visible & DIFFUSE) || (black && black->geometry == placed.geometry && black->first_slot == placed.first_slot)) continue;
+            uint32_t visible = placed.visible;
+            if (!(visible & lit) || (black && black->geometry == placed.geometry && black->first_slot == placed.first_slot)) continue;
             MeshLight mesh(scene, object, emissions);
             if (mesh.is_black()) black = &placed;
             if (mesh.is_dark()) continue;
             owners_[object] = uint32_t(lights_.size());
-            lights_.emplace_back(std::move(mesh), 0, true);
+            lights_.emplace_back(std::move(mesh), ~visible, true);
         }
         size_t meshes = lights_.size();
         lights_.insert(lights_.end(), unlit.begin(), unlit.end());
@@ -70,7 +73,20 @@ class LightSampler {
     }
 
     const Environment& environment() const { return environment_; }
-    // How many lights diffuse surfaces can be lit by, and whether what they get depends on chance.
+    // The same of a ray that a surface has scattered with a density, where that light may have been found from there, too. seen,
+    // through: as in `choose`.
+    Vec3 le(const LightRay& ray, RayKind kind, const Interaction& from, double pdf, bool seen, bool through) const {
+        Vec3 sum;
+        for (uint32_t light : met_[kind]) {
+            Vec3 radiance = lights_[light].le(ray);
+            if (is_black(radiance)) continue;
+            double other = int(light) < count_ ? lights_[light].pdf_li(from, ray.direction) * chance(from, light, seen, through) : 0;
+            sum += radiance * power_heuristic(pdf, other);
+        }
+        return sum;
+    }
+
+    // How many lights surfaces can be lit by, and whether what they get depends on chance.
     int count() const { return count_; }
     bool has_meshes() const { return size_t(count_) > lamps_; }
     bool is_random() const { return random_; }
@@ -85,14 +101,14 @@ class LightSampler {
         return sum;
     }
 
-    // The lights that a point asks, at most ASKED. seen: whether the eye sees it, so that several are worth it. u: in [0, 1).
-    // brightest: receives about what the brightest lamp brings where lamps are asked one by one, else 0.
-    int choose(const Interaction& point, double u, bool seen, Choice (&choices)[ASKED], double& brightest) const {
+    // The lights that a point asks, at most ASKED. seen: whether the eye sees it, so that several are worth it. through: whether
+    // light from behind the surface counts. u: in [0, 1). brightest: receives about what the brightest lamp brings where lamps are asked one by one, else 0.
+    int choose(const Interaction& point, double u, bool seen, bool through, Choice (&choices)[ASKED], double& brightest) const {
         brightest = 0;
         if (count_ == 0) return 0;
         if (asks_each() && seen) {
             double estimates[ASKED];
-            for (int i = 0; i < count_; i++) brightest = larger(brightest, estimates[i] = lights_[i].estimate(point.position, point.normal));
+            for (int i = 0; i < count_; i++) brightest = larger(brightest, estimates[i] = estimate(i, point, through));
             int chosen = 0;
             for (int i = 0; i < count_; i++) {
                 // One without a size has no noise of its own.
@@ -112,7 +128,7 @@ class LightSampler {
             return 1;
         }
         double estimates[FEW], total = 0, reached = 0;
-        for (int i = 0; i < count_; i++) total += estimates[i] = lights_[i].estimate(point.position, point.normal);
+        for (int i = 0; i < count_; i++) total += estimates[i] = estimate(i, point, through);
         double wanted = u * total;
         for (int i = 0, last = -1; i <= count_; i++) {  // the last that has a chance is taken even where sums are rounded
             if (i < count_ && estimates[i] > 0) last = i;
@@ -135,11 +151,11 @@ class LightSampler {
     }
 
     // The density by solid angle with which a point would have sent a ray to a surface that its scattered ray has met.
-    double pdf_li(const Interaction& from, const Interaction& met, Vec3 direction, double distance) const {
+    double pdf_li(const Interaction& from, const Interaction& met, Vec3 direction, double distance, bool through) const {
         uint32_t owner = owners_[met.object];
         if (owner == NONE) return 0;
         double pdf = lights_[owner].mesh()->pdf_li(met.material, distance, std::fabs(dot(met.normal, direction)));
-        return pdf * chance(from, owner);
+        return pdf * chance(from, owner, false, through);
     }
 
    private:
@@ -150,14 +166,25 @@ class LightSampler {
     // Whether lamps and the sky are asked one by one where the eye sees points.
     bool asks_each() const { return count_ <= ASKED && !has_meshes() && (count_ > 1 || !is_black(environment_.radiance)); }
 
-    double chance(const Interaction& point, uint32_t light) const {
+    // What a light may bring to a point.
+    double estimate(uint32_t light, const Interaction& point, bool through) const {
+        double before = lights_[light].estimate(point.position, point.normal);
+        return through ? before + lights_[light].estimate(point.position, -point.normal) : before;
+    }
+
+    double chance(const Interaction& point, uint32_t light, bool seen, bool through) const {
+        if (asks_each() && seen) {
+            double brightest = 0;
+            for (int i = 0; i < count_; i++) brightest = larger(brightest, estimate(i, point, through));
+            return smaller(estimate(light, point, through) / (brightest * WORTH), 1.0);
+        }
         if (count_ == 1) return 1;
         if (!chances_.empty()) return chances_[light];
         double total = 0, own = 0;
         for (int i = 0; i < count_; i++) {
-            double estimate = lights_[i].estimate(point.position, point.normal);
-            total += estimate;
-            if (uint32_t(i) == light) own = estimate;
+            double brought = estimate(i, point, through);
+            total += brought;
+            if (uint32_t(i) == light) own = brought;
         }
         return total > 0 ? own / total : 0;
     }

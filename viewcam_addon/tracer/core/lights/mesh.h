@@ -61,7 +61,7 @@ class MeshLight {
         uint32_t material = scene_->material(object_, triangle);
         double cosine = std::fabs(dot(normal, ahead)) / length(normal), pdf = densities_[material] * squared / cosine;
         if (!(pdf > LEAST_DENSITY && pdf < INFINITE)) return {ahead, distance, {}, INFINITE, 1};
-        return {ahead, distance, radiance(material, triangle, from, to) / pdf, pdf, cosine};
+        return {ahead, distance, radiance(material, triangle, from, to, ahead) / pdf, pdf, cosine};
     }
     // Of a ray that meets a triangle, at a distance, under |cos| to its normal.
     double pdf_li(uint32_t material, double distance, double cosine) const {
@@ -78,11 +78,11 @@ class MeshLight {
    private:
     static constexpr double LEAST_DENSITY = 1e-100;  // less has what a point sees of itself only
 
-    Vec3 radiance(uint32_t material, uint32_t triangle, const Interaction& from, Vec3 to) const {
-        const Color& emission = scene_->illumination.materials[material].emission;
-        if (!emission.varies()) return emission.rgb;
+    Vec3 radiance(uint32_t material, uint32_t triangle, const Interaction& from, Vec3 to, Vec3 ahead) const {
+        const Material& made_of = scene_->illumination.materials[material];
+        if (made_of.shines_evenly()) return made_of.mean_emission();
         Hit hit{1, object_, triangle};
-        return emission.at(scene_->illumination.textures, scene_->interaction(Ray{from.position, to}, hit));
+        return made_of.emission(scene_->illumination.shading(scene_->interaction(Ray{from.position, to}, hit), ahead));
     }
 
     const Scene* scene_;

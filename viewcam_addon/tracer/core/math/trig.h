@@ -116,4 +116,7 @@ inline double pow(double x, double power) {
     return rest * std::bit_cast<double>(uint64_t(int64_t(whole) + 1023) << 52);
 }
 
+// e^x, 0 where that is less than float64's own numbers go down to; x < 690.
+inline double exp(double x) { return x < -690 ? 0 : pow(2.718281828459045, x); }
+
 }  // namespace viewcam::VIEWCAM_ISA

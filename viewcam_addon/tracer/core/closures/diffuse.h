@@ -1,0 +1,39 @@
+// Diffuse reflection, rough or Lambert's, and what is let through as evenly.
+#pragma once
+#include "../bsdf/oren_nayar.h"
+#include "shading_point.h"
+
+namespace viewcam::VIEWCAM_ISA {
+
+// albedo: as of OrenNayar.
+inline void add_diffuse(BSDF& bsdf, const ShadingPoint& at, Vec3 color, double roughness, Vec3 albedo) {
+    constexpr double SMOOTH = 1e-5;
+    if (roughness < SMOOTH)
+        bsdf.add(Lambert{color, at.point.shading});
+    else
+        bsdf.add(OrenNayar(color, at.point.shading, -at.incoming, unit_range(roughness), albedo, at.version >= CYCLES_4_3));
+}
+
+struct DiffuseClosure {
+    static constexpr const char* NAME = "diffuse";
+    static constexpr uint32_t KINDS = DIFFUSE;  // the kinds of rays that its lobes scatter
+    Color color, roughness;
+
+    explicit DiffuseClosure(const Inputs& in) : color(in["color"]), roughness(in["roughness"]) {}
+    void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
+        Vec3 rgb = at.color(color);
+        add_diffuse(bsdf, at, rgb * weight, at.number(roughness), rgb);
+    }
+};
+
+struct TranslucentClosure {
+    static constexpr const char* NAME = "translucent";
+    static constexpr uint32_t KINDS = TRANSMISSION;
+    Color color;
+
+    explicit TranslucentClosure(const Inputs& in) : color(in["color"]) {}
+    bool is_rough() const { return true; }
+    void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const { bsdf.add(Translucent{at.color(color) * weight, at.normal()}); }
+};
+
+}  // namespace viewcam::VIEWCAM_ISA
