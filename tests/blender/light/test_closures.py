@@ -14,6 +14,7 @@ from viewcam_addon.tracer import render
 
 COLOUR = (0.8, 0.5, 0.2, 1.0)
 GLOSSY, GLASS, PRINCIPLED = "ShaderNodeBsdfGlossy", "ShaderNodeBsdfGlass", "ShaderNodeBsdfPrincipled"
+METALLIC = [] if bpy.app.version < (4, 3) else ["ShaderNodeBsdfMetallic"]
 ROUGHNESSES = (0.2, 0.5, 0.8, 1.0)
 
 # p50 and p99, calibrated: what float32 leaves of the formulas; the tables' own differences; an exponential in float32 far off a
@@ -26,6 +27,10 @@ def of_formulas():
         yield "ShaderNodeBsdfDiffuse", {"Color": COLOUR, "Roughness": r}, {}
         yield GLOSSY, {"Color": COLOUR, "Roughness": r}, {"distribution": "GGX"}
         yield GLASS, {"Color": COLOUR, "Roughness": r, "IOR": 1.45}, {"distribution": "GGX"}
+        for kind in METALLIC:
+            yield kind, {"Base Color": COLOUR, "Roughness": r}, {"distribution": "GGX"}
+            physical = {"distribution": "GGX", "fresnel_type": "PHYSICAL_CONDUCTOR"}
+            yield kind, {"IOR": (0.2, 0.9, 1.5), "Extinction": (3.9, 2.4, 1.9), "Roughness": r}, physical
     yield PRINCIPLED, {"Base Color": COLOUR, "Metallic": 1.0, "Roughness": 0.4}, {"distribution": "GGX"}
 
 
@@ -37,6 +42,8 @@ def of_tables():
         yield PRINCIPLED, {"Base Color": COLOUR, "Roughness": r, "Metallic": 0.6, "Specular Tint": (0.9, 0.5, 0.7, 1)}, {}
         yield PRINCIPLED, {"Base Color": COLOUR, "Coat Weight": 0.7, "Coat Roughness": r, "Coat Tint": (0.9, 0.6, 0.4, 1)}, {}
         yield PRINCIPLED, {"Base Color": COLOUR, "Transmission Weight": 0.7, "Roughness": r, "IOR": 1.33}, {}
+        for kind in METALLIC:
+            yield kind, {"Base Color": COLOUR, "Roughness": r}, {"distribution": "MULTI_GGX"}
     yield PRINCIPLED, {"Base Color": COLOUR, "Specular IOR Level": 0.9, "Roughness": 0.3}, {"distribution": "GGX"}
     yield PRINCIPLED, {"Base Color": COLOUR, "Specular IOR Level": 0.2, "IOR": 2.0, "Coat Weight": 1.0, "Coat IOR": 1.9}, {}
     yield PRINCIPLED, {"Base Color": COLOUR, "Diffuse Roughness": 0.6}, {}

@@ -16,6 +16,8 @@ ROUGH = {
     "ggx": node("glossy", color=WHITE, roughness=0.5, distribution="ggx"),
     "beckmann": node("glossy", color=WHITE, roughness=0.5, distribution="beckmann"),
     "multiscatter": node("glossy", color=WHITE, roughness=0.8),
+    "metal": node("metallic", color=(0.9, 0.6, 0.3), roughness=0.5),
+    "conductor": node("metallic", fresnel="physical_conductor", roughness=0.5),
     "glass": node("glass", **GLASSY),
     "refraction": node("refraction", **GLASSY),
     "principled": node("principled", base_color=WHITE),
@@ -108,15 +110,19 @@ def test_a_white_furnace_stays_white(name, roughness, degrees):
     assert -lost - 5 * error < weights.mean() - 1 < 2e-3 + 5 * error, weights.mean()
 
 
-@pytest.mark.parametrize("name", ["ggx", "beckmann", "lambert", "oren-nayar"])
+@pytest.mark.parametrize("name", ["ggx", "beckmann", "metal", "conductor", "lambert", "oren-nayar"])
 def test_light_goes_both_ways_alike(name):
+    """Of what is scattered more than once it does not, as in Cycles."""
+    shader = ROUGH[name]
+    if shader.type == "metallic":
+        shader = node("metallic", **dict(shader.inputs) | {"distribution": "ggx"})
     rng = np.random.default_rng(3)
     one, other = (rng.normal(size=(3, COUNT)) for _ in range(2))
     for each in (one, other):
         each[2] = np.abs(each[2]) + 0.05
         each /= np.linalg.norm(each, axis=0)
     forth, back = (
-        np.stack([ScatteredBy(ROUGH[name], -seen[:, i], lit[:, i], np.zeros((3, 1))).light[:, 0] for i in range(COUNT)], axis=1)
+        np.stack([ScatteredBy(shader, -seen[:, i], lit[:, i], np.zeros((3, 1))).light[:, 0] for i in range(COUNT)], axis=1)
         / lit[2]
         for seen, lit in ((one, other), (other, one))
     )

@@ -64,6 +64,13 @@ SHADERS = {
         _DISTRIBUTION,
         {"Anisotropy": 0.0},
     ),
+    "metallic": Shader(
+        "BSDF_METALLIC",
+        "ShaderNodeBsdfMetallic",
+        {"color": "Base Color", "edge_tint": "Edge Tint", "ior": "IOR", "extinction": "Extinction", "roughness": "Roughness"},
+        _DISTRIBUTION | {"fresnel": "fresnel_type"},
+        _THICKNESS | {"Anisotropy": 0.0},
+    ),
     "glass": Shader(
         "BSDF_GLASS",
         "ShaderNodeBsdfGlass",

@@ -8,6 +8,7 @@
 #include "closures/emission.h"
 #include "closures/glass.h"
 #include "closures/glossy.h"
+#include "closures/metallic.h"
 #include "closures/principled.h"
 
 namespace viewcam::VIEWCAM_ISA {
@@ -15,7 +16,8 @@ namespace viewcam::VIEWCAM_ISA {
 // One line a closure. Each has a NAME, by which a scene asks for it, KINDS, the kinds of rays that its lobes scatter, and `add_to`;
 // `kinds` where its inputs leave some of them out, `is_rough` where it may spread light otherwise than diffuse surfaces do,
 // `mean_emission` and `shines_evenly` where it shines.
-using Closure = std::variant<DiffuseClosure, GlossyClosure, GlassClosure, RefractionClosure, EmissionClosure, TranslucentClosure, PrincipledClosure>;
+using Closure = std::variant<DiffuseClosure, GlossyClosure, GlassClosure, RefractionClosure, EmissionClosure, TranslucentClosure, MetallicClosure,
+                             PrincipledClosure>;
 
 // A factor of a closure's weight, from 0 to 1: a mixture's, or what it leaves to the other side.
 struct MixFactor {

@@ -7,7 +7,7 @@ from .materials import PLAIN, Material
 from .shader_nodes import KINDS
 
 _REFLECTS, _MIRRORS = "reflects light onto others", "mirrors"
-_WHAT = {"diffuse": _REFLECTS, "principled": _REFLECTS, "glossy": _MIRRORS}
+_WHAT = {"diffuse": _REFLECTS, "principled": _REFLECTS, "glossy": _MIRRORS, "metallic": _MIRRORS}
 
 
 def least_level(scene: Scene) -> tuple[str, str]:

@@ -35,6 +35,18 @@ KINDS: dict[str, Kind] = {
     "diffuse": Kind({"color": GREY, "roughness": 0.0}, ("diffuse",)),
     "translucent": Kind({"color": GREY}, ("transmission",)),
     "glossy": Kind({"color": GREY, "roughness": 0.5, "distribution": DISTRIBUTIONS}, ("glossy",)),
+    "metallic": Kind(
+        {
+            "color": (0.617, 0.577, 0.54),
+            "edge_tint": (0.695, 0.726, 0.77),
+            "ior": (2.757, 2.513, 2.231),
+            "extinction": (3.867, 3.404, 3.009),
+            "roughness": 0.5,
+            "fresnel": ("f82", "physical_conductor"),
+            "distribution": DISTRIBUTIONS,
+        },
+        ("glossy",),
+    ),
     "glass": Kind(
         {"color": WHITE, "roughness": 0.0, "ior": 1.5, "distribution": DISTRIBUTIONS},
         ("glossy", "transmission"),
