@@ -73,6 +73,20 @@ def test_mirrors_and_glass(take, make_material, kind, is_smooth):
     check(take())
 
 
+@pytest.mark.parametrize(
+    ("kind", "inputs"),
+    [
+        ("Principled", {"Base Color": (0.9, 0.6, 0.3, 1), "Roughness": 0.3}),
+        ("Glossy", {"Color": (0.9, 0.8, 0.7, 1), "Roughness": 0.4}),
+        ("Glass", {"Color": (0.9, 0.8, 0.7, 1), "Roughness": 0.2}),
+        ("Translucent", {"Color": (0.9, 0.8, 0.7, 1)}),
+    ],
+)
+def test_rough_surfaces(take, make_material, kind, inputs):
+    replace_monkey(make_material, f"ShaderNodeBsdf{kind}", **inputs)
+    check(take())
+
+
 def test_surfaces_that_shine_light_others(take, make_material):
     replace_monkey(make_material, "ShaderNodeEmission", Color=(0.9, 0.8, 0.7, 1), Strength=3.0)
     check(take())

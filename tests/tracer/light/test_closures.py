@@ -19,7 +19,7 @@ ROUGH = {
     "metal": node("metallic", color=(0.9, 0.6, 0.3), roughness=0.5),
     "conductor": node("metallic", fresnel="physical_conductor", roughness=0.5),
     "glass": node("glass", **GLASSY),
-    "refraction": node("refraction", **GLASSY),
+    "refraction": node("refraction", **GLASSY, distribution="ggx"),  # of what is 0, as Beckmann's tails, no density is told
     "principled": node("principled", base_color=WHITE),
     "coated": node("principled", base_color=WHITE, coat_weight=0.7, coat_roughness=0.4, metallic=0.3),
     "clear": node("principled", base_color=WHITE, transmission_weight=0.6, roughness=0.6),
