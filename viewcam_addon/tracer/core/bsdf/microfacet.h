@@ -81,7 +81,7 @@ struct MicrofacetTransmission : MicrofacetLobe {
    private:
     Vec3 eval_local(Vec3 wo) const {
         if (!(wi.z > 0 && wo.z < 0)) return {};
-        Vec3 bent = -(wo * ratio + wi);
+        Vec3 bent = wo * ratio + wi;
         double squared = dot(bent, bent);
         Vec3 h = bent / std::sqrt(squared);
         double in = dot(wi, h), out = dot(wo, h), spread = ratio * ratio / squared * std::fabs(in * out);
@@ -90,9 +90,9 @@ struct MicrofacetTransmission : MicrofacetLobe {
     }
     double pdf_local(Vec3 wo) const {
         if (!(wi.z > 0 && wo.z < 0)) return 0;
-        Vec3 bent = -(wo * ratio + wi);
+        Vec3 bent = wo * ratio + wi;
         double squared = dot(bent, bent);
-        Vec3 h = bent / std::sqrt(squared);
+        Vec3 h = bent / std::copysign(std::sqrt(squared), bent.z);
         double out = dot(wo, h);
         return out < 0 ? facets.pdf_visible(wi, h) * ratio * ratio * -out / squared : 0;
     }
