@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .scene import Mesh, Object, Scene, Spheres
+from .scene import Mesh, Object, Scene, Spheres, placing
 from .scene.film import NO_BOUNCES
 from .scene.lamps import RAYS, Area, Lamp, Point, Spot, Sun
 from .scene.materials import PLAIN, Colour, Material
@@ -114,7 +114,8 @@ class _Film(Structure):
     _fields_ = [
         ("radiance", c_double * 3),
         ("hidden_from", c_uint32),
-        *((name, c_int32) for name in ("transparent", "version")),
+        *((name, c_int32) for name in ("transparent", "version", "image", "closest")),
+        ("to_image", c_double * 12),
         ("filter_width", c_double),
         ("exposure", c_double),
     ]
@@ -333,6 +334,11 @@ class CoreScene:
         described.version = 100 * scene.cycles[0] + scene.cycles[1]
         described.radiance[:] = world.radiance
         described.filter_width = 0.0 if film.filter == "BOX" else film.filter_width
+        if world.image is not None and world.image not in images:
+            images[world.image] = len(images)
+            self._add_texture(scene, world.image)
+        described.image, described.closest = images.get(world.image, -1), world.closest
+        described.to_image[:] = tuple(np.column_stack([placing.rotated(world.rotation), np.zeros(3)]).ravel())
         self.check(self.core.set_film(self.handle, described))
         self._light = scene
 

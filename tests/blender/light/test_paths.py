@@ -114,6 +114,29 @@ def test_a_mixture_of_everything(take, make_material):
     check(take())
 
 
+@pytest.mark.parametrize("kind", ["Diffuse", "Glossy"])
+def test_an_image_around_the_world(take, make_material, set_world, kind):
+    """With a window in it, that scattered rays seldom find."""
+    replace_monkey(make_material, f"ShaderNodeBsdf{kind}", Color=(0.9, 0.6, 0.4, 1), Roughness=0.4 * (kind == "Glossy"))
+    image = bpy.data.images.new("Room", 32, 16, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"
+    pixels = np.random.default_rng(1).uniform(0, 0.3, (16, 32, 4)).astype(np.float32)
+    pixels[11:13, 4:6, :3] = 80.0, 60.0, 30.0
+    image.pixels.foreach_set(pixels.ravel())
+
+    def wrap(_):
+        world = set_world((0, 0, 0), 1.0)
+        texture, mapping = (world.node_tree.nodes.new(f"ShaderNode{name}") for name in ("TexEnvironment", "Mapping"))
+        coordinates = world.node_tree.nodes.new("ShaderNodeTexCoord")
+        texture.image, mapping.inputs["Rotation"].default_value = image, (0.3, 0.1, 2.0)
+        background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
+        world.node_tree.links.new(coordinates.outputs["Generated"], mapping.inputs["Vector"])
+        world.node_tree.links.new(mapping.outputs[0], texture.inputs["Vector"])
+        world.node_tree.links.new(texture.outputs[0], background.inputs["Color"])
+
+    check(take(arrange=wrap))
+
+
 @pytest.mark.parametrize("ray", ["diffuse", "glossy", "transmission", "shadow"])
 def test_what_is_hidden_from_one_kind_of_rays(take, make_material, ray, mesh_from, add):
     """A glowing ball before a mirror and glass: seen in neither, or in all but one."""

@@ -57,7 +57,9 @@ def test_a_world_without_nodes_has_its_plain_colour(set_world, export):
     assert exported.world.radiance == (0.25, 0.5, 1.0) and not told
 
 
-def test_an_image_of_the_world_is_its_mean_over_the_sphere(set_world, export):
+@pytest.fixture
+def sky(set_world):
+    """A world of a small image, the Environment Texture that shows it, and a function that puts a node before that."""
     world = set_world(strength=2.0)
     image = bpy.data.images.new("Sky", 4, 2, float_buffer=True)
     image.colorspace_settings.name = "Non-Color"
@@ -67,8 +69,42 @@ def test_an_image_of_the_world_is_its_mean_over_the_sphere(set_world, export):
     texture = world.node_tree.nodes.new("ShaderNodeTexEnvironment")
     texture.image = image
     world.node_tree.links.new(texture.outputs[0], background_of(world).inputs["Color"])
+
+    def feed(kind, output=0):
+        node = world.node_tree.nodes.new(kind)
+        world.node_tree.links.new(node.outputs[output], texture.inputs["Vector"])
+        return node
+
+    return world, texture, feed
+
+
+def test_an_image_is_wrapped_around_the_world(sky, export):
     exported, told = export()
-    assert exported.world.radiance == pytest.approx((1.0, 0.5, 0.0))
+    assert exported.world == World((2.0, 2.0, 2.0), image="Sky") and not told
+    assert exported.images["Sky"].pixels[:, 0].tolist() == [[1.0, 0.0, 0.0], [0.0, 0.5, 0.0]]
+
+
+def test_a_mapping_turns_the_image(sky, export):
+    _, texture, feed = sky
+    texture.interpolation = "Closest"
+    feed("ShaderNodeMapping").inputs["Rotation"].default_value = (0.25, 0.5, 1.0)
+    exported, told = export()
+    assert exported.world == World((2.0, 2.0, 2.0), image="Sky", closest=True, rotation=(0.25, 0.5, 1.0)) and not told
+
+
+@pytest.mark.parametrize("change", ["mirror ball", "cubic", "scale", "another coordinate"])
+def test_an_image_that_is_used_otherwise_is_its_mean_over_the_sphere(sky, export, change):
+    _, texture, feed = sky
+    if change == "mirror ball":
+        texture.projection = "MIRROR_BALL"
+    elif change == "cubic":
+        texture.interpolation = "Cubic"
+    elif change == "scale":
+        feed("ShaderNodeMapping").inputs["Scale"].default_value = (1, 2, 1)
+    else:
+        feed("ShaderNodeTexCoord", "Window")
+    exported, told = export()
+    assert exported.world.radiance == pytest.approx((1.0, 0.5, 0.0)) and exported.world.image is None
     assert "'Environment Texture' that varies" in told["World"] and "constant" in told["World"]
 
 

@@ -125,7 +125,9 @@ def test_light_that_is_written_is_read_back_to_the_last_bit(make_scene, make_mes
         },
         materials=chosen,
         lamps=tuple(data.draw(st.lists(lamps, max_size=3))),
-        world=data.draw(st.builds(World, radiance=rgb, hidden_from=rays)),
+        world=data.draw(
+            st.builds(World, rgb, rays, st.sampled_from([None, "small"]), st.booleans(), st.tuples(*[st.floats(-9, 9)] * 3))
+        ),
         film=data.draw(films),
         bounces=data.draw(bounces),
         cycles=data.draw(st.tuples(st.integers(0, 99), st.integers(0, 99))),

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ...tracer.scene import Mesh, Object, Scene, Spheres
 from ...tracer.scene.film import Bounces, Film
 from ...tracer.scene.lamps import RAYS, Lamp, World
+from ...tracer.scene.materials import Picture
 from .. import camera as cameras
 from .. import versions
 from ..temporary_settings import overridden, still_of_one_layer
@@ -106,13 +107,13 @@ def survey(
         return visit(scene, look)
 
 
-def light_in(depsgraph: bpy.types.Depsgraph, ledger: Ledger) -> Lighting:
-    """What gives light in a depsgraph, and how it becomes a picture."""
+def light_in(depsgraph: bpy.types.Depsgraph, ledger: Ledger, images: dict[str, Picture] | None = None) -> Lighting:
+    """What gives light in a depsgraph, and how it becomes a picture. images : receives the world's."""
     scene = depsgraph.scene
     bounces = film.bounces_of(scene, ledger)
     return Lighting(
         lamps=tuple(lamps.lamps_in(depsgraph, bounces, ledger)),
-        world=world.world_of(world.shown_world(scene, depsgraph.view_layer_eval), ledger),
+        world=world.world_of(world.shown_world(scene, depsgraph.view_layer_eval), ledger, images),
         film=film.film_of(scene, ledger),
         bounces=bounces,
     )
@@ -136,7 +137,11 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
         **_view_in(depsgraph, camera_object),
         geometries=geometries,
         objects=tuple(_drawn(objects, geometries, ledger)),
-        **(vars(light_in(depsgraph, ledger)) | {"materials": shading.materials, "images": shading.images} if shading else {}),
+        **(
+            vars(light_in(depsgraph, ledger, shading.images)) | {"materials": shading.materials, "images": shading.images}
+            if shading
+            else {}
+        ),
         ledger=ledger.entries(),
     )
 

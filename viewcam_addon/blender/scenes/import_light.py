@@ -147,6 +147,24 @@ def _facing(towards: tuple[float, ...]) -> np.ndarray:
     return matrix
 
 
+def add_environment(adder: nodes.Adder, background: bpy.types.Node, made: World, image: bpy.types.Image) -> None:
+    """Let a Background node show an image that is wrapped around the world."""
+    coordinates, mapping = adder.add("ShaderNodeTexCoord"), adder.add("ShaderNodeMapping", Rotation=made.rotation)
+    texture = adder.add("ShaderNodeTexEnvironment")
+    texture.image, texture.interpolation = image, "Closest" if made.closest else "Linear"
+    adder.link(coordinates.outputs["Generated"], mapping.inputs["Vector"])
+    adder.link(mapping.outputs[0], texture.inputs["Vector"])
+    color = texture.outputs["Color"]
+    if len(set(made.radiance)) == 1:
+        background.inputs["Strength"].default_value = made.radiance[0]
+    else:
+        multiply = adder.add("ShaderNodeVectorMath", color)
+        multiply.operation = "MULTIPLY"
+        multiply.inputs[1].default_value = made.radiance
+        color = multiply.outputs[0]
+    adder.link(color, background.inputs["Color"])
+
+
 def hide(block: bpy.types.Object, hidden_from: frozenset[str]) -> None:
     """Let these kinds of rays pass by an object, and all others see it."""
     for ray in RAYS:
@@ -163,6 +181,11 @@ def set_surroundings(scene: bpy.types.Scene, made: Scene, name: str, overrides: 
     adder = nodes.Adder(world.node_tree)
     output = adder.add("ShaderNodeOutputWorld")
     background = adder.add("ShaderNodeBackground", Color=(*made.world.radiance, 1.0), Strength=1.0)
+    if made.world.image is not None:
+        background.inputs["Color"].default_value, background.inputs["Strength"].default_value = (1.0, 1.0, 1.0, 1.0), 1.0
+        add_environment(
+            adder, background, made.world, image_from(made.images[made.world.image], made.world.image, overrides, ledger)
+        )
     adder.link(background.outputs[0], output.inputs["Surface"])
     _arrange(output, 0, {})
     overrides.set(scene, "world", world)

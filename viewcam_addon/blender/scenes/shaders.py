@@ -215,7 +215,7 @@ class _Reader:
             self._reason(output, f"does not repeat ({node.extension.lower()})")
         if node.interpolation not in ("Linear", "Closest"):
             self._reason(output, f"interpolates {node.interpolation.lower()}")
-        if not _maps_plainly(node):
+        if not maps_plainly(node):
             self._reason(output, "has a mapping of its own")
         vector = nodes.source(output.input("Vector"))
         if isinstance(vector, Output):
@@ -410,7 +410,8 @@ def _pattern(colour: Colour) -> tuple:
     return colour.image, colour.closest, colour.vertex
 
 
-def _maps_plainly(node: bpy.types.Node) -> bool:
+def maps_plainly(node: bpy.types.Node) -> bool:
+    """Whether a texture node has no mapping of its own."""
     mapping, colours = node.texture_mapping, node.color_mapping
     return (
         tuple(mapping.translation) == tuple(mapping.rotation) == (0.0, 0.0, 0.0)

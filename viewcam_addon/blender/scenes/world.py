@@ -1,8 +1,11 @@
-"""Blender's world as the tracer's: the same light from everywhere, or its mean and why."""
+"""Blender's world as the tracer's: one colour, an equirectangular image, or the mean of what is not modelled and why."""
+
+from typing import NamedTuple
 
 import bpy
 
 from ...tracer.scene.lamps import World
+from ...tracer.scene.materials import Picture
 from .. import versions
 from ..temporary_settings import Overrides
 from . import images, nodes, shaders
@@ -18,11 +21,11 @@ def shown_world(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> bpy.
     return view_layer.world_override or scene.world
 
 
-def world_of(world: bpy.types.World | None, ledger: Ledger) -> World:
-    """The tracer's world. What it approximates, Cycles is shown likewise."""
+def world_of(world: bpy.types.World | None, ledger: Ledger, pictures: dict[str, Picture] | None = None) -> World:
+    """The tracer's world. What it approximates, Cycles is shown likewise. pictures : receives its image."""
     if world is None:
         return World()
-    radiance, reasons = _read(world)
+    radiance, wrapped, reasons = _read(world)
     for reason in reasons:
         ledger.note(world.name, "approximated", f"the world {reason}, and a constant one stands in")
     if reasons:
@@ -35,7 +38,20 @@ def world_of(world: bpy.types.World | None, ledger: Ledger) -> World:
     ):
         if hasattr(owner, name):  # versions know fewer of them
             ledger.set_for_cycles(owner, name, value)
-    return World(radiance, frozenset(ray for ray in _RAYS if not getattr(world.cycles_visibility, ray)))
+    hidden_from = frozenset(ray for ray in _RAYS if not getattr(world.cycles_visibility, ray))
+    if wrapped is None:
+        return World(radiance, hidden_from)
+    if pictures is not None and wrapped.image.name_full not in pictures:
+        pictures[wrapped.image.name_full] = images.picture_of(wrapped.image)
+    return World(radiance, hidden_from, wrapped.image.name_full, wrapped.closest, wrapped.rotation)
+
+
+class _Wrapped(NamedTuple):
+    """An image that is wrapped around the world, as World has it."""
+
+    image: bpy.types.Image
+    closest: bool
+    rotation: tuple[float, float, float]
 
 
 def _make_constant(overrides: Overrides, world: bpy.types.World, radiance: RGB) -> None:
@@ -44,32 +60,83 @@ def _make_constant(overrides: Overrides, world: bpy.types.World, radiance: RGB) 
     adder.link(background.outputs[0], output.inputs["Surface"])
 
 
-def _read(world: bpy.types.World) -> tuple[RGB, list[str]]:
-    """The radiance, and why it is only a mean."""
+def _read(world: bpy.types.World) -> tuple[RGB, _Wrapped | None, list[str]]:
+    """The radiance, the image that it is multiplied by, and why it is only a mean."""
     tree = versions.node_tree(world)
     if tree is None:
-        return tuple(world.color), []
+        return tuple(world.color), None, []
     output = tree.get_output_node("CYCLES")
     if output is None:
-        return (0.0, 0.0, 0.0), []
+        return (0.0, 0.0, 0.0), None, []
     reasons = ["has a volume"] if output.inputs["Volume"].is_linked else []
     surface = nodes.source(Input(output.inputs["Surface"]))
     if not isinstance(surface, Output):
-        return (0.0, 0.0, 0.0), reasons
+        return (0.0, 0.0, 0.0), None, reasons
     if surface.node.type not in ("BACKGROUND", "EMISSION"):
-        return tuple(world.color), [*reasons, f"has a node {surface.node.name!r} that is not modelled"]
+        return tuple(world.color), None, [*reasons, f"has a node {surface.node.name!r} that is not modelled"]
     rgb = shaders.constant_colour(surface, "Color")
     strength = shaders.constant_number(surface, "Strength")
+    wrapped = None
     if rgb is None:
-        rgb, reason = _mean(surface, world)
-        reasons.append(reason)
+        source, factor = _factored(nodes.source(surface.input("Color")))
+        wrapped = _wrapped(source)
+        rgb, reason = (factor, None) if wrapped else _mean(surface, world)
+        reasons += [reason] if reason else []
     if strength is None:
         strength = 1.0
         reasons.append("has a strength that varies")
     radiance = shaders.possible(tuple(value * strength for value in rgb))
     if radiance is None:
-        return (0.0, 0.0, 0.0), [*reasons, f"has the colour {tuple(rgb)} and the strength {strength:g}"]
-    return radiance, reasons
+        return (0.0, 0.0, 0.0), None, [*reasons, f"has the colour {tuple(rgb)} and the strength {strength:g}"]
+    if wrapped and reasons:  # a constant world stands in
+        mean = images.mean(wrapped.image)
+        return tuple(a * b for a, b in zip(radiance, mean, strict=True)), None, reasons
+    return radiance, wrapped, reasons
+
+
+def _factored(source: Output) -> tuple[Output | Input, RGB]:
+    """What a Vector Math node multiplies by a constant, and that."""
+    if source.node.type == "VECT_MATH" and source.node.operation == "MULTIPLY":
+        factor = shaders.constant_colour(source, 1)
+        if factor is not None:
+            return nodes.source(source.input(0)), factor
+    return source, (1.0, 1.0, 1.0)
+
+
+def _wrapped(source: Output | Input) -> _Wrapped | None:
+    """The image of an Environment Texture that is wrapped around the world as it is, or turned by a Mapping node."""
+    if not isinstance(source, Output):
+        return None
+    node = source.node
+    if node.type != "TEX_ENVIRONMENT" or images.obstacle(node.image and node.image.original) is not None:
+        return None
+    if (
+        node.projection != "EQUIRECTANGULAR"
+        or node.interpolation not in ("Linear", "Closest")
+        or not shaders.maps_plainly(node)
+    ):
+        return None
+    rotation = _rotation(nodes.source(source.input("Vector")))
+    return rotation and _Wrapped(node.image.original, node.interpolation == "Closest", rotation)
+
+
+def _rotation(vector: Output | Input) -> tuple[float, float, float] | None:
+    """By what angles directions are turned, or None where more is done to them."""
+    if not isinstance(vector, Output):
+        return 0.0, 0.0, 0.0
+    if vector.node.type == "TEX_COORD":
+        is_direction = vector.socket.name == "Generated" or (vector.socket.name == "Object" and vector.node.object is None)
+        return (0.0, 0.0, 0.0) if is_direction else None
+    if vector.node.type != "MAPPING" or vector.node.vector_type not in ("POINT", "VECTOR"):
+        return None
+    given = [
+        shaders.constant_colour(vector, name)
+        for name in ("Location", "Rotation", "Scale")[vector.node.vector_type == "VECTOR" :]
+    ]
+    inner = _rotation(nodes.source(vector.input("Vector")))
+    if None in given or inner is None or any(inner) or given[-1] != (1.0, 1.0, 1.0) or (len(given) == 3 and any(given[0])):
+        return None
+    return given[-2]
 
 
 def _mean(surface: Output, world: bpy.types.World) -> tuple[RGB, str]:

@@ -35,11 +35,12 @@ typedef struct {
     double matrix[12], color[3], radius, angle, blend, size[2];
 } ViewcamLamp;
 
-/* filter_width: 0 is a box. version: of Blender, 100 times the first number and the second, whose materials are meant. */
+/* image: of the world, a number of viewcam_add_texture, or −1; to_image: (3, 4), directions of the world to its. filter_width: 0 is a box. version: of Blender, 100 times the first number and the second, whose materials are meant. */
 typedef struct {
     double radiance[3];
     uint32_t hidden_from;
-    int32_t transparent, version;
+    int32_t transparent, version, image, closest;
+    double to_image[12];
     double filter_width, exposure;
 } ViewcamFilm;
 

@@ -79,6 +79,7 @@ inline void lamp(const ViewcamLamp& given) {
 inline void film(const ViewcamFilm& given) {
     that(all_finite(given.radiance, 3), "the world's light is no number");
     that(given.filter_width >= 0 && given.filter_width <= LARGEST && std::isfinite(given.exposure), "the film's numbers are none");
+    that(all_finite(given.to_image, 12), "the world is turned by what is no number");
 }
 inline void light(const Scene& scene, const ViewcamLightSettings& given) {
     for (const Scene::Slot& slot : scene.slots)

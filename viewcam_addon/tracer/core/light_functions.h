@@ -40,7 +40,13 @@ inline void add_lamp(Scene& scene, const ViewcamLamp& given) { scene.illuminatio
 
 inline void set_film(Scene& scene, const ViewcamFilm& given) {
     Illumination& light = scene.illumination;
-    light.environment = {{given.radiance[0], given.radiance[1], given.radiance[2]}, given.hidden_from};
+    Environment& world = light.environment;
+    world = {};
+    world.radiance = {given.radiance[0], given.radiance[1], given.radiance[2]}, world.hidden_from = given.hidden_from;
+    world.image = given.image < 0 ? NONE : uint32_t(given.image), world.closest = given.closest;
+    for (int i = 0; i < 12; i++) world.to_image.m[i / 4][i % 4] = given.to_image[i];
+    if (world.image != NONE && world.image >= light.textures.size()) throw std::invalid_argument("the world has an image that the scene does not have");
+    world.prepare(light.textures);
     light.film = {bool(given.transparent), given.exposure};
     light.filter_width = given.filter_width, light.version = given.version;
 }

@@ -35,15 +35,16 @@ struct Texture {
         return decoded(lower * (1 - up) + upper * up);
     }
 
-    // Over all pixels.
-    Vec3 mean() const {
+    Vec3 mean() const { return mean(0, width, 0, height); }
+    // Over the pixels of some columns and rows.
+    Vec3 mean(int left, int right, int first, int last) const {
         Vec3 sum;
-        for (int row = 0; row < height; row++) {
+        for (int row = first; row < last; row++) {
             Vec3 of_row;
-            for (int column = 0; column < width; column++) of_row += decoded(pixel(column, row));
+            for (int column = left; column < right; column++) of_row += decoded(pixel(column, row));
             sum += of_row;
         }
-        return sum / (double(width) * height);
+        return sum / (double(right - left) * (last - first));
     }
 
    private:

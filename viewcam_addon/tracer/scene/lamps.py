@@ -190,14 +190,24 @@ class Area(Lamp):
 
 @dataclass(frozen=True)
 class World:
-    """Light from everywhere beyond the scene. radiance : (3,). hidden_from : as for lamps."""
+    """Light from everywhere beyond the scene. radiance : (3,). hidden_from : as for lamps.
+
+    image : key in `Scene.images` of what the radiance is multiplied by, equirectangular: its rows go from straight down to
+    straight up, its middle shows what lies along x, and its left half what lies along y; or None. closest : the nearest pixel
+    instead of a linear interpolation between four. rotation : of directions before they are looked up there, radians about x,
+    then y, then z, as in Blender's Mapping node.
+    """
 
     radiance: tuple[float, float, float] = (0.0, 0.0, 0.0)
     hidden_from: frozenset[str] = frozenset()
+    image: str | None = None
+    closest: bool = False
+    rotation: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "radiance", radiance("radiance of the world", self.radiance))
         object.__setattr__(self, "hidden_from", hidden_from("the world", self.hidden_from))
+        object.__setattr__(self, "rotation", checks.vector("rotation of the world", self.rotation, 3))
 
 
 def hidden_from(name: str, rays: Collection[str]) -> frozenset[str]:

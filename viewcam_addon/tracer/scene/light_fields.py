@@ -28,11 +28,11 @@ _LAMPS: dict[str, type[Lamp]] = {kind.kind: kind for kind in (Sun, Point, Spot, 
 _WHITE = (1.0, 1.0, 1.0)
 
 _READERS: dict[str, Callable[[Field], Any]] = {
-    **dict.fromkeys(("towards", "irradiance", "position", "power", "radiance"), lambda field: field.vector(3)),
+    **dict.fromkeys(("towards", "irradiance", "position", "power", "radiance", "rotation"), lambda field: field.vector(3)),
     **dict.fromkeys(("angle", "radius", "blend", "filter_width", "exposure"), Field.number),
-    **dict.fromkeys(("casts_shadow", "soft_falloff", "ellipse", "transparent"), Field.truth),
+    **dict.fromkeys(("casts_shadow", "soft_falloff", "ellipse", "transparent", "closest"), Field.truth),
     **dict.fromkeys(("total", "diffuse", "glossy", "transmission"), lambda field: field.whole(0)),
-    "filter": Field.text,
+    **dict.fromkeys(("filter", "image"), Field.text),
     "size": lambda field: field.vector(2),
     "hidden_from": lambda field: hidden_from(field),
 }

@@ -237,10 +237,8 @@ class PathIntegrator {
              Block& block) const {
         LightSample sample = choice.light->sample_li(point, choice.rest, u);
         uint32_t kinds = dot(point.normal, sample.direction) > 0 ? DIFFUSE | GLOSSY : TRANSMISSION;
-        // Surfaces that shine are found by scattered rays, too, and lamps by those that are not diffuse.
         auto weight = [&](RayKind kind, auto&& pdf) {
-            bool is_found = choice.light->mesh() || (kind != DIFFUSE && choice.light->is_sized());
-            return is_found ? power_heuristic(sample.pdf * choice.chance, pdf()) : 1;
+            return choice.light->is_found_by(kind) ? power_heuristic(sample.pdf * choice.chance, pdf()) : 1;
         };
         ScatteredLight light = bsdf.eval(sample.direction, kinds & ~choice.light->hidden_from, weight);
         if (depth > 1) light.diffuse += light.other, light.other = {};
@@ -273,6 +271,10 @@ class PathIntegrator {
         }
     }
 
+    Vec3 environment_le(const Path& path, int depth, const Block& block) const {
+        return lights_.environment_le(path.ray.direction, path.kind, block.points[path.from], path.pdf, depth == 1, path.through);
+    }
+
     // Where rays come to; adds what shines there.
     void arrive(int depth, Block& block) const {
         const Ray* met_by[MOST];
@@ -282,7 +284,7 @@ class PathIntegrator {
             const Path& path = block.onwards[i];
             PathLight& light = block.light[path.sample];
             if (path.last && only_sky_[path.kind]) {
-                if (!scene_.occluded(path.ray)) light.add(path.category, path.weight * lights_.environment().le(path.ray.direction, path.kind));
+                if (!scene_.occluded(path.ray)) light.add(path.category, path.weight * environment_le(path, depth, block));
                 continue;
             }
             Hit hit = scene_.closest(path.ray, path.kind);
@@ -295,7 +297,7 @@ class PathIntegrator {
             if (hit)
                 arrived[met] = i, met_by[met] = &path.ray, hits[met++] = hit;
             else
-                light.add(path.category, path.weight * lights_.environment().le(path.ray.direction, path.kind));
+                light.add(path.category, path.weight * environment_le(path, depth, block));
         }
         scene_.interactions(met_by, hits, met, block.arrivals);
         int live = 0;

@@ -3,6 +3,7 @@
 #include <variant>
 
 #include "area.h"
+#include "environment.h"
 #include "mesh.h"
 #include "point.h"
 #include "spot.h"
@@ -12,7 +13,7 @@ namespace viewcam::VIEWCAM_ISA {
 
 class Light {
    public:
-    using Kind = std::variant<Sun, Point, Spot, Area, MeshLight>;
+    using Kind = std::variant<Sun, Point, Spot, Area, MeshLight, EnvironmentLight>;
 
     // hidden_from: the kinds of rays that don't see it; what a light hides from, it does not light.
     Light(Kind kind, uint32_t hidden_from, bool casts_shadow) : hidden_from(hidden_from), casts_shadow(casts_shadow), kind_(std::move(kind)) {}
@@ -61,8 +62,10 @@ class Light {
     bool is_sized() const {
         return std::visit([](const auto& light) { return light.is_sized(); }, kind_);
     }
-    // Whether rays that are scattered into all directions look for it, too.
     const MeshLight* mesh() const { return std::get_if<MeshLight>(&kind_); }
+    bool is_environment() const { return std::holds_alternative<EnvironmentLight>(kind_); }
+    // Whether rays of a kind that are scattered all over find it, too: diffuse ones see no lamps.
+    bool is_found_by(RayKind kind) const { return mesh() || is_environment() || (kind != DIFFUSE && is_sized()); }
 
    private:
     Kind kind_;

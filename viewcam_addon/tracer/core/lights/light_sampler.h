@@ -28,7 +28,7 @@ class LightSampler {
         int slot = 0;
     };
 
-    explicit LightSampler(const Scene& scene) : environment_(scene.illumination.environment) {
+    explicit LightSampler(const Scene& scene) : environment_(&scene.illumination.environment) {
         const Illumination& given = scene.illumination;
         uint32_t lit = DIFFUSE;  // the kinds of rays that surfaces scatter light into from any one direction
         for (const Material& material : given.materials) lit |= material.rough_kinds();
@@ -36,6 +36,10 @@ class LightSampler {
         for (const Lamp& lamp : given.lamps) {
             Light light = light_of(lamp, scene.origin);
             (lit & ~lamp.hidden_from ? lights_ : unlit).push_back(light);
+        }
+        if (environment_->has_image() && lit & ~environment_->hidden_from) {
+            sky_ = uint32_t(lights_.size());
+            lights_.emplace_back(EnvironmentLight(*environment_), environment_->hidden_from, true);
         }
         lamps_ = lights_.size();
         std::vector<Vec3> emissions;
@@ -55,7 +59,7 @@ class LightSampler {
         size_t meshes = lights_.size();
         lights_.insert(lights_.end(), unlit.begin(), unlit.end());
         for (size_t i = 0; i < lights_.size(); i++)
-            if ((i < lamps_ || i >= meshes) && lights_[i].is_sized())
+            if ((i < lamps_ || i >= meshes) && i != sky_ && lights_[i].is_sized())
                 for (RayKind kind : {CAMERA, GLOSSY, TRANSMISSION})
                     if (!(lights_[i].hidden_from & kind)) met_[kind].push_back(uint32_t(i));
         count_ = int(meshes);
@@ -72,7 +76,13 @@ class LightSampler {
         }
     }
 
-    const Environment& environment() const { return environment_; }
+    const Environment& environment() const { return *environment_; }
+    // What a ray sees of the world that a surface has scattered with a density. seen, through: as in `choose`.
+    Vec3 environment_le(Vec3 direction, RayKind kind, const Interaction& from, double pdf, bool seen, bool through) const {
+        Vec3 radiance = environment_->le(direction, kind);
+        if (sky_ == NONE || pdf == INFINITE || is_black(radiance)) return radiance;
+        return radiance * power_heuristic(pdf, environment_->pdf_li(direction) * chance(from, sky_, seen, through));
+    }
     // The same of a ray that a surface has scattered with a density, where that light may have been found from there, too. seen,
     // through: as in `choose`.
     Vec3 le(const LightRay& ray, RayKind kind, const Interaction& from, double pdf, bool seen, bool through) const {
@@ -147,7 +157,7 @@ class LightSampler {
     // How often the sky is worth a ray where lamps bring as much as `brightest` tells.
     double sky_chance(double brightest, RayKind kind) const {
         if (!(brightest > 0)) return 1;
-        return smaller(PI / WORTH * mean(environment_.le({}, kind)) / brightest, 1.0);
+        return environment_->lights(kind) ? smaller(PI / WORTH * mean(environment_->mean_radiance()) / brightest, 1.0) : 0;
     }
 
     // The density by solid angle with which a point would have sent a ray to a surface that its scattered ray has met.
@@ -164,7 +174,7 @@ class LightSampler {
     static constexpr double WORTH = 0.25, SMALLEST_CHANCE = 1e-80, BELOW_1 = 1 - 0x1p-53;
 
     // Whether lamps and the sky are asked one by one where the eye sees points.
-    bool asks_each() const { return count_ <= ASKED && !has_meshes() && (count_ > 1 || !is_black(environment_.radiance)); }
+    bool asks_each() const { return count_ <= ASKED && !has_meshes() && (count_ > 1 || !is_black(environment_->radiance)); }
 
     // What a light may bring to a point.
     double estimate(uint32_t light, const Interaction& point, bool through) const {
@@ -196,7 +206,8 @@ class LightSampler {
     std::vector<uint32_t> owners_;                // of each object, which light it is
     std::vector<uint32_t> met_[TRANSMISSION + 1];  // by kind of ray, lamps that have a size
     std::vector<double> chances_, reached_;       // of many lights
-    Environment environment_;
+    const Environment* environment_;
+    uint32_t sky_ = NONE;  // which light the world's image is
 };
 
 }  // namespace viewcam::VIEWCAM_ISA
