@@ -19,7 +19,7 @@ ROUGHNESSES = (0.2, 0.5, 0.8, 1.0)
 
 # p50 and p99, calibrated: what float32 leaves of the formulas; the tables' own differences; an exponential in float32 far off a
 # lobe; refraction, close to where all is reflected.
-FORMULAS, TABLES, BECKMANN, REFRACTED = (1e-6, 2e-5), (5e-5, 5e-4), (2e-4, 1e-3), (5e-6, 2e-3)
+FORMULAS, TABLES, BECKMANN, REFRACTED = (1e-6, 3e-5), (5e-5, 5e-4), (2e-4, 1e-3), (5e-6, 2e-3)
 
 
 def of_formulas():
