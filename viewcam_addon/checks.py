@@ -42,7 +42,7 @@ def number(name: str, value: object, least: float = -math.inf, most: float = mat
 def vector(name: str, values: object, count: int) -> tuple[float, ...]:
     """`count` values, of whatever can be iterated over, as finite floats."""
     try:
-        if isinstance(values, _WITHOUT_ORDER):
+        if type(values) not in (tuple, list) and isinstance(values, _WITHOUT_ORDER):  # abstract classes are slow to ask
             raise TypeError
         numbers = tuple([x if type(x) is float else _real(x) for x in itertools.islice(values, count + 1)])
     except TypeError:

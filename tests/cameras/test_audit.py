@@ -316,6 +316,24 @@ def test_a_field_of_view_of_the_other_side_is_named_against_true_cameras(tmp_pat
     assert "field of view" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        # nerfstudio-project/nerfstudio #2255: c of OpenCV's calibration, where half a pixel is missing
+        (lambda said: {"cx": said["cx"] - 0.5, "cy": said["cy"] - 0.5}, "half a pixel too small"),
+        # ashawkey/stable-dreamfusion #377: cx stood for the height's and cy for the width's
+        (lambda said: {"cx": said["cy"], "cy": said["cx"]}, "swapped"),
+    ],
+)
+def test_a_principal_point_that_was_written_wrongly_in_transforms_json_is_named(tmp_path, capsys, change, told):
+    true = [replace(c, pinhole=replace(c.pinhole, principal_point=(70.0, 60.0))) for c in a_filmed_scene()]
+    cameras.save(true, tmp_path / "true.json", "transforms")
+    document = json.loads((tmp_path / "true.json").read_text())
+    (tmp_path / "wrong.json").write_text(json.dumps(document | change(document)))
+    assert run("audit", tmp_path / "wrong.json", "--against", tmp_path / "true.json") == 1
+    assert told in capsys.readouterr().out
+
+
 def test_world_to_camera_with_opencvs_axes_in_transforms_json_is_named(tmp_path, capsys):
     """Matrices of OpenCV, written as they are."""
     found = a_filmed_scene()
