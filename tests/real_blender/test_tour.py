@@ -48,5 +48,5 @@ def test_the_moving_picture_is_made(real_blender, tmp_path):
     outcome = run_in_a_window(real_blender, MOVING_SCRIPT, tmp_path)
     assert outcome.returncode == 0, outcome.stdout + outcome.stderr
     first, *rest = [Image.open(path).convert("RGB") for path in sorted(tmp_path.glob("frame-*.png"))]
-    target = ROOT / os.environ["VIEWCAM_PICTURES"] / "moving.webp"
+    target = ROOT / os.environ["VIEWCAM_PICTURES"] / ".." / "moving.webp"
     first.save(target, save_all=True, append_images=rest, duration=110, loop=0, quality=60)
