@@ -52,7 +52,7 @@ ROOMS = {
     "batch": "errors checks files events html_page child_process pinhole image cameras datasets comparison tracer shots",
     "blender": (
         "errors checks files terminal html_page child_process pinhole roll rotation moves diagram photo_match image "
-        "intrinsics camera_values cameras datasets comparison tracer shots batch"
+        "intrinsics camera_values cameras comparison tracer shots batch"
     ),
     "commands": (
         "errors terminal argument_types events crashes child_process pinhole image cameras comparison tracer api shots batch"
@@ -64,7 +64,6 @@ BLENDER_ROOMS = {
     "temporary_settings": "",
     "opening": "temporary_settings",
     "picture": "temporary_settings",
-    "keyframes": "versions",
     "findings": "",
     "render_settings": "",
     "preferences": "render_settings",
@@ -79,10 +78,10 @@ BLENDER_ROOMS = {
     "resolution": "datablocks storage camera",
     "own_picture": "",
     "animation": "versions datablocks storage targets camera resolution",
-    "scenes": "versions temporary_settings picture keyframes findings datablocks pose camera",
+    "scenes": "versions temporary_settings picture findings datablocks pose camera",
     "rendering": "versions temporary_settings opening datablocks resolution scenes",
     "interface": (
-        "versions temporary_settings picture keyframes findings render_settings preferences datablocks storage targets hold "
+        "versions temporary_settings picture findings render_settings preferences datablocks storage targets hold "
         "pose camera own_picture scenes rendering"
     ),
     "batch": "versions temporary_settings opening datablocks camera resolution scenes rendering",

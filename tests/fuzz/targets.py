@@ -273,7 +273,7 @@ def sidecar() -> Feed:
     from viewcam_addon import shots as lists
     from viewcam_addon.batch import dataset, one, run
     from viewcam_addon.batch.folder import Folder
-    from viewcam_addon.datasets.record import record
+    from viewcam_addon.cameras.sidecar import record
     from viewcam_addon.errors import InputError, told
     from viewcam_addon.pinhole import Pinhole
 

@@ -1,8 +1,7 @@
 """A batch: many shots of one file, each as a picture, a preview and a sidecar, and nothing lost on the way.
 
-    renderer              what renders a shot: the contract that Blender's side keeps
     folder                what stands where, and whether a shot is there already
-    one                   one shot, rendered and written
+    one                   one shot, rendered and written; what a renderer is
     run                   all of them: claimed, rendered, counted, through failures, full disks, signals and other batches
     locks, interruption   shared work; the first signal and the second
     summary, sheet        what it came to, as JSON and as a page of thumbnails

@@ -4,12 +4,12 @@ import dataclasses
 import time
 from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
-from typing import Any
+from pathlib import Path
+from typing import Any, Protocol
 
 from ..files import written_whole
 from ..shots import Shot
 from .folder import Folder, write_json
-from .renderer import Renderer
 
 Outcome = dict[str, Any] | Exception
 """The sidecar of a shot, or why there is none."""
@@ -22,6 +22,28 @@ and ask again.
 """
 
 _MOMENT = 0.2  # seconds
+
+
+class Renderer(Protocol):
+    """Holds one scene open, and renders its shots one after another.
+
+    Both methods raise InputError if this shot can't be had, and FullDiskError if nothing more can be written; the next shot
+    may then still be asked for.
+    """
+
+    def render(self, shot: Shot, image: Path, preview: Path) -> dict[str, Any]:
+        """Write the picture (EXR) and its preview (PNG) to these two paths.
+
+        Both paths are temporary, in the batch's folder: the caller renames them, and removes them after an error.
+
+        Returns what the sidecar says of it: the keys of datasets.record, and `stated`, `rendered`, `warnings`, `versions`.
+        The same shot gives the same bytes and the same values each time.
+        """
+        ...
+
+    def check(self, shot: Shot) -> dict[str, Any]:
+        """Compare the shot that was just rendered with the tracer: `passed` (bool), `verdict` (a sentence), and figures."""
+        ...
 
 
 def in_turn(folder: Folder, renderer: Renderer, settings: Mapping[str, str], check: bool) -> Work:

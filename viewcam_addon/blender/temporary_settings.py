@@ -15,6 +15,9 @@ import bpy
 
 Made = TypeVar("Made")
 
+LARGEST_INDEX = 32767
+"""Of pass_index."""
+
 
 class Overrides:
     """Sets what is Blender's for a while, and remembers how to restore it."""
@@ -92,3 +95,23 @@ def cameras_unbound(overrides: Overrides, scene: bpy.types.Scene) -> None:
     overrides.afterwards(setattr, scene, "camera", scene.camera)
     for marker in scene.timeline_markers:
         overrides.set(marker, "camera", None)
+
+
+@contextlib.contextmanager
+def numbered_indices() -> Iterator[None]:
+    """Number the file's objects from 1, and its materials, where all of them have the index 0, for the index passes.
+
+    As soon as one of them carries a number its artist has a use for them, and they stay. Rejected: `foreach_set`, which passes
+    over what is linked from a library.
+    """
+    blank = [blocks for blocks in (bpy.data.objects, bpy.data.materials) if not any(block.pass_index for block in blocks)]
+    try:
+        for blocks in blank:
+            for number, block in enumerate(blocks):
+                # Beyond the largest they start again: two of them may share a number then.
+                block.pass_index = number % LARGEST_INDEX + 1
+        yield
+    finally:
+        for blocks in blank:
+            for block in blocks:
+                block.pass_index = 0

@@ -1,14 +1,18 @@
 """Every difference between Blender 4.2 and 5.2 that this project meets, each in one place."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
+from numpy.typing import NDArray
 
 from ..image import OLDER_NAMES
 
 # Whose materials a scene from here has: the tracer knows what Cycles changed (core/closures/shading_point.h).
 CYCLES = bpy.app.version[:2]
+_LINEAR = 1  # an enum's number, as foreach_set takes it
 # What Cycles draws without a material: a diffuse surface, and since 5.0 a Principled one, which bends grazing smooth normals.
 DEFAULT_SURFACE_BENDS_NORMALS = bpy.app.version >= (5, 0)
 # How Cycles reads a mesh in which flat faces stand beside smooth ones (export_geometry.py). Measured: 4.2, 4.5, 5.0 and 5.2.
@@ -184,3 +188,18 @@ def pass_name(name: str) -> str:
     """What Blender calls a pass in a render's result. Since 5.0 as we do."""
     older = {new: old for old, new in OLDER_NAMES.items()} if bpy.app.version < (5, 0) else {}
     return older.get(name, name)
+
+
+def linear_keyframes(block: bpy.types.ID, path: str, at: Sequence[float], values: NDArray[np.float64]) -> None:
+    """Put keyframes in the place of a property's curves; a single one for a number that stands still.
+
+    at : frames, of the curves. values : (frames, numbers of the property).
+    """
+    remove_curves(block, path)
+    for index, column in enumerate(values.T):
+        count = 1 if (column == column[0]).all() else len(column)
+        curve = new_curve(block, path, index)
+        curve.keyframe_points.add(count)
+        curve.keyframe_points.foreach_set("co", np.column_stack([at, column])[:count].ravel())
+        curve.keyframe_points.foreach_set("interpolation", [_LINEAR] * count)
+        curve.update()

@@ -2,7 +2,7 @@
 
     transforms.py   transforms.json, as NeRF, instant-ngp and nerfstudio read it
     colmap.py       cameras.txt, images.txt and points3D.txt of COLMAP
-    record.py       what a picture's sidecar says of its camera
+    record          what a picture's sidecar says of its camera (cameras/sidecar.py)
 
 The formats themselves are those of cameras/; here are their names in scripts. World space stays as it is: no format here
 scales, centres or turns it.
@@ -10,6 +10,7 @@ scales, centres or turns it.
 
 from dataclasses import dataclass
 
+from ..cameras import sidecar as record  # noqa: F401 - a name of this package
 from ..cameras.camera import Camera
 from ..cameras.naming import check_image
 from ..pinhole import Pinhole

@@ -6,9 +6,10 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from viewcam_addon.blender import temporary_settings
 from viewcam_addon.blender.rendering import cycles, job
-from viewcam_addon.blender.scenes import depsgraph, indices
-from viewcam_addon.blender.temporary_settings import overridden
+from viewcam_addon.blender.scenes import depsgraph
+from viewcam_addon.blender.temporary_settings import numbered_indices, overridden
 from viewcam_addon.errors import InputError
 
 # What describes the settings, what follows from them, and brushes (reading some of them crashes 4.2).
@@ -272,7 +273,7 @@ def test_threads_are_limited_for_the_time_of_the_render(scene, camera_object, tm
 def test_objects_and_materials_are_numbered_from_one_where_all_have_none(scene, camera_object):
     bpy.ops.mesh.primitive_cube_add()
     first, second = bpy.data.materials.new("First"), bpy.data.materials.new("Second")
-    with indices.numbered():
+    with numbered_indices():
         assert sorted(block.pass_index for block in bpy.data.objects) == [1, 2]
         assert (first.pass_index, second.pass_index) == (1, 2)
     assert not any(block.pass_index for block in (*bpy.data.objects, *bpy.data.materials))
@@ -282,7 +283,7 @@ def test_an_artists_own_numbers_stay(scene, camera_object):
     bpy.ops.mesh.primitive_cube_add()
     bpy.context.object.pass_index = 40
     bpy.data.materials.new("First")
-    with pytest.raises(KeyError), indices.numbered():
+    with pytest.raises(KeyError), numbered_indices():
         assert sorted(block.pass_index for block in bpy.data.objects) == [0, 40]
         assert bpy.data.materials["First"].pass_index == 1
         raise KeyError
@@ -291,10 +292,10 @@ def test_an_artists_own_numbers_stay(scene, camera_object):
 
 
 def test_more_objects_than_indices_start_again(scene, camera_object, monkeypatch):
-    monkeypatch.setattr(indices, "LARGEST", 2)
+    monkeypatch.setattr(temporary_settings, "LARGEST_INDEX", 2)
     for name in "abc":
         bpy.data.objects.new(name, None)
-    with indices.numbered():
+    with numbered_indices():
         assert [block.pass_index for block in bpy.data.objects] == [1, 2, 1, 2]
 
 

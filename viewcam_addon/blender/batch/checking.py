@@ -27,10 +27,9 @@ from ...tracer.scene import LedgerEntry, Scene, scene_file
 from ...tracer.scene.sameness import same_things
 from .. import datablocks
 from ..rendering import cycles, job
-from ..scenes import indices
 from ..scenes.export import export_scene
 from ..scenes.ledger import Ledger, Remedy
-from ..temporary_settings import overridden
+from ..temporary_settings import numbered_indices, overridden
 from . import persistent_data
 
 _MOST_TOLD = 5
@@ -76,7 +75,7 @@ class Checker:
             if the scene can't be exported or rendered by Cycles, or if the comparer can't compare.
         """
         layer, image = job.rendered_layer(scene), self._folder / "cycles.exr"
-        with indices.numbered(), overridden() as overrides:
+        with numbered_indices(), overridden() as overrides:
             if not scene.render.use_crop_to_border:  # the picture is of the whole frame then
                 overrides.set(scene.render, "use_border", False)
             export = self._exported(scene, layer, camera_object)

@@ -20,7 +20,7 @@ from typing import Any
 
 import bpy
 
-from ...datasets.record import record
+from ...cameras.sidecar import record
 from ...pinhole import Pinhole
 from ...shots import Shot
 from .. import camera as cameras

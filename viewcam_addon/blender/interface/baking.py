@@ -25,7 +25,7 @@ from ...comparison.cameras import conversion_error
 from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
-from .. import datablocks, keyframes, pose, versions
+from .. import datablocks, pose, versions
 from .operators import CameraOperator
 
 Array = NDArray[np.float64]
@@ -167,7 +167,7 @@ def _write(flight: _Flight) -> None:
             versions.remove_curves(block, path)
             setattr(block, path, values[0, 0])
             continue
-        keyframes.linear(block, path, flight.at, values)
+        versions.linear_keyframes(block, path, flight.at, values)
 
 
 def _agreement(flight: _Flight, baked: Sequence[Pinhole], times: list[float]) -> BakedAgreement:

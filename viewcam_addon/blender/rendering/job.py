@@ -18,10 +18,10 @@ from ...tracer.scene.film import LEVELS, NO_BOUNCES, SAMPLES
 from ...tracer.scene.levels import least_level
 from .. import datablocks, resolution
 from ..opening import opened
-from ..scenes import indices, materials, recentering
+from ..scenes import materials, recentering
 from ..scenes.export import Lighting, export_scene, survey
 from ..scenes.ledger import Ledger
-from ..temporary_settings import Overrides
+from ..temporary_settings import Overrides, numbered_indices
 from . import cycles
 
 AUTO = "auto"
@@ -119,7 +119,7 @@ def export_and_render(
     paths : for several pictures of Cycles, which share the samples; their seeds count from that of the request. rendering : is
     told of each, by its number from 1 on, before it is rendered.
     """
-    with _stage(request) as stage, indices.numbered(), _seen_from(stage, request) as stage:
+    with _stage(request) as stage, numbered_indices(), _seen_from(stage, request) as stage:
         scene = _export(stage, request)
         _render(stage, request, paths, Lighting(scene.lamps, scene.world, scene.film, scene.bounces), rendering)
         return scene

@@ -25,7 +25,7 @@ from ...cameras import Camera
 from ...cameras.naming import image_of
 from ...errors import InputError
 from .. import camera as cameras
-from .. import datablocks, keyframes, picture, pose
+from .. import datablocks, picture, pose, versions
 from ..temporary_settings import Overrides
 
 _PLACES = (".", "images", "..", "../images", "../..", "../../images")
@@ -152,7 +152,7 @@ class _CameraImport:
             if path in _OF_DATA and (values == values[0]).all():
                 setattr(owner, path, values[0, 0])
             else:
-                keyframes.linear(owner, path, at, values)
+                versions.linear_keyframes(owner, path, at, values)
         for owner in (block, block.data):
             if owner.animation_data and owner.animation_data.action:
                 self._overrides.afterwards(bpy.data.batch_remove, [owner.animation_data.action])

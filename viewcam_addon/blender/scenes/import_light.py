@@ -12,9 +12,8 @@ from ...tracer.scene import Scene
 from ...tracer.scene.film import Bounces, Film
 from ...tracer.scene.lamps import RAYS, Area, Lamp, Spot, Sun, World
 from ...tracer.scene.materials import PLAIN, Material, Picture
-from ..temporary_settings import Overrides
+from ..temporary_settings import LARGEST_INDEX, Overrides
 from . import film, materials, nodes, shaders
-from .indices import LARGEST
 from .ledger import Ledger
 
 _COLUMN = 260.0  # between nodes, in the node editor's units
@@ -57,9 +56,9 @@ class Paints:
     def _new(self, name: str, index: int) -> bpy.types.Material:
         material = bpy.data.materials.new(name or f"Index {index}")
         self._overrides.afterwards(bpy.data.batch_remove, [material])
-        material.pass_index = min(index, LARGEST)
-        if index > LARGEST:
-            self._ledger.note(material.name, "approximated", f"its index is {index}, and Blender's end at {LARGEST}")
+        material.pass_index = min(index, LARGEST_INDEX)
+        if index > LARGEST_INDEX:
+            self._ledger.note(material.name, "approximated", f"its index is {index}, and Blender's end at {LARGEST_INDEX}")
         made = self._scene.materials[name] if name else PLAIN
         paint(material, made, {key: self._image(key) for key in _images_of(made)})
         return material

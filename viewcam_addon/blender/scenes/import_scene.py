@@ -27,9 +27,8 @@ from ...tracer.scene import LedgerEntry, Mesh, Object, Scene
 from ...tracer.scene.depths import visible_depths
 from .. import camera as cameras
 from .. import datablocks, findings, picture
-from ..temporary_settings import Overrides
+from ..temporary_settings import LARGEST_INDEX, Overrides
 from . import import_geometry, import_light
-from .indices import LARGEST
 from .ledger import Ledger
 
 Array = NDArray[np.float64]
@@ -199,9 +198,9 @@ class _SceneImport:
         for slot, material in zip(block.material_slots, slots, strict=False):
             if slot.material != material:  # another object of this geometry has others; an empty slot would show its
                 slot.link, slot.material = "OBJECT", material or paints.plain()
-        block.pass_index = min(placed.object_index, LARGEST)
-        if placed.object_index > LARGEST:
-            reason = f"its index is {placed.object_index}, and Blender's end at {LARGEST}"
+        block.pass_index = min(placed.object_index, LARGEST_INDEX)
+        if placed.object_index > LARGEST_INDEX:
+            reason = f"its index is {placed.object_index}, and Blender's end at {LARGEST_INDEX}"
             self._ledger.note(placed.name, "approximated", reason)
         import_light.hide(block, placed.hidden_from)
 

@@ -150,7 +150,7 @@ def test_particles_follow(look, add, mesh_from, scene, check):
 def test_a_file_in_edit_mode_and_materials_of_the_object_or_the_layer(look, add, mesh_from, scene, check):
     look(UTM)
     blue, layers, red = (bpy.data.materials.new(name) for name in ("Blue", "Layer", "Red"))
-    blue_index, layers_index, red_index = 1, 2, 3  # as `indices.numbered` counts them, in the order of their names
+    blue_index, layers_index, red_index = 1, 2, 3  # as `datablocks.numbered_indices` counts them, in the order of their names
     mesh = mesh_from("cube", size=3)
     mesh.materials.append(red)
     mesh.materials.append(None)
