@@ -349,3 +349,21 @@ def test_a_distortion_that_no_picture_shows_is_taken_and_its_figure_said():
     (camera,) = cameras.read(json.dumps({**K, "k1": 1e-6}))
     # 500 k1 r³, r the corner's distance over the focal length
     assert any("left out: it moves the picture's corner by 0.000257 pixels" in note for note in camera.notes)
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        ({"camera_intrinsics": [700, 700, 400, 300]}, "has camera_intrinsics, which programs read differently"),
+        ({"K": [[700, 0, 400], [0, 700, 300], [0, 0, 1]]}, "has K, which"),
+        ({"camera_type": "equirectangular"}, "equirectangular"),
+        ({"w": 800}, "w 800 and the size is given as 640 × 480"),
+    ],
+)
+def test_what_a_transforms_json_says_in_other_words_is_not_passed_over(more, told):
+    frame = {"file_path": "a.png", "transform_matrix": np.eye(4).tolist()}
+    given = Options(size=(640, 480))
+    assert cameras.read(json.dumps({"camera_angle_x": 0.7, "frames": [frame]}), options=given)
+    for document in ({**more, "frames": [frame]}, {"frames": [{**frame, **more}]}):
+        with pytest.raises(InputError, match=told):
+            cameras.read(json.dumps({"camera_angle_x": 0.7, **document}), options=given)

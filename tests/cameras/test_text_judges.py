@@ -650,6 +650,8 @@ def test_luxrenders_look_at_is_right_handed_as_pbrts_first_version_was():
     (lux,), (pbrt,) = (cameras.read(scene.format(film)) for film in ("fleximage", "image"))
     assert not lux.pinhole.mirrored and pbrt.pinhole.mirrored
     assert dataclasses.replace(lux.pinhole, mirrored=True) == pbrt.pinhole
+    (first,) = cameras.read('SearchPath "/usr/share"\n' + scene.format("image"))
+    assert first.pinhole == lux.pinhole
     for before, mirrored in (("Scale -1 1 1\n", True), ("Rotate 90 0 0 1\n", False), ("Scale -1 1 1 Rotate 90 0 0 1\n", True)):
         (lux,), (pbrt,) = (cameras.read(before + scene.format(film)) for film in ("fleximage", "image"))
         assert (lux.pinhole.mirrored, pbrt.pinhole.mirrored) == (mirrored, not mirrored)

@@ -3,7 +3,8 @@
 **Pose.** The current transform at `Camera` takes world space to the camera's, x to the right of the picture, y upwards, z into
 the view; each statement multiplies from the right, and what stands after WorldBegin moves objects. Seen from a right-handed
 world that camera is left-handed: LookAt alone gives a mirrored picture, and `Scale -1 1 1` before it, which exporters write,
-one that is not. LuxRender has it from version 1, whose LookAt was right-handed; its scenes are known by their film.
+one that is not. LuxRender has LookAt from version 1, where it was right-handed: scenes of these two are known by their film and
+their SearchPath.
 
 **Picture.** `fov` is the angle of the *shorter* side. The image plane, [−1, 1] along that side, is `screenwindow` if that is
 given; `frameaspectratio` changes its longer side. The film is 1280 × 720 unless said; `cropwindow` keeps a part of it, in
@@ -37,7 +38,7 @@ _KINDS = ("perspective", "orthographic", "environment", "spherical", "realistic"
 _STATEMENT = re.compile(
     rf'\bLookAt\s++[-+.\d\[]|\bCamera\s*+"(?:{"|".join(_KINDS)})"|^[ \t]*+Camera[ \t]*+"\w++"', re.MULTILINE
 )
-_LUX = re.compile(r'\bFilm\s*+"(?:fleximage|multiimage)"')
+_LUX = re.compile(r'\bFilm\s*+"(?:fleximage|multiimage)"|^[ \t]*+SearchPath[ \t]*+"', re.MULTILINE)
 _MOVES = {"LookAt": 9, "Translate": 3, "Scale": 3, "Rotate": 4, "Transform": 16, "ConcatTransform": 16, "Identity": 0}
 _NOT_READ = {"Include", "Import"}
 _SIZE = (1280, 720)

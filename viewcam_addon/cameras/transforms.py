@@ -44,6 +44,7 @@ AABB_SCALES = tuple(2**exponent for exponent in range(8))
 _POSES = ("transform_matrix", "transform_matrix_start")
 _PINHOLES = ("PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "PERSPECTIVE")
 _OTHER_CAMERAS = ("is_fisheye", "ftheta_p0", "latlong", "equirectangular", "orthographic")
+_NOT_READ = ("k", "intrinsic", "intrinsics", "intrinsic_matrix", "camera_intrinsics", "camera_matrix", "cam_k")
 _LENS = ("k1", "k2", "k3", "k4", "p1", "p2")  # the order of distortion_params, too
 _SAME_FOCAL = 1e-3  # relative: what camera_angle_x and fl_x may differ by for the few digits of one
 
@@ -180,6 +181,12 @@ def _plane(both: Record, source: Source, path: str, options: Options) -> tuple[V
     model = both.values.get("camera_model")
     if model is not None and str(model).upper() not in _PINHOLES:
         not_a_pinhole(both.place, f"of the camera model {checks.shown(model)}")
+    if (kind := both.get("camera_type")) is not None and str(kind).upper() not in _PINHOLES:
+        not_a_pinhole(both.place, f"of the camera type {checks.shown(kind)}")
+    if unread := next((key for key in both.values if key.lower() in _NOT_READ), None):
+        raise InputError(
+            f"{both.place} has {unread}, which programs read differently: write fl_x, fl_y, cx and cy in its place"
+        )
     for key in _OTHER_CAMERAS:
         if both.values.get(key) or (both.values.get(key) == 0.0 and key == "ftheta_p0"):
             not_a_pinhole(both.place, f"a camera with {key}")
@@ -205,7 +212,13 @@ def _size(both: Record, source: Source, path: str, options: Options) -> tuple[tu
         for name in (path, f"{path}.png", f"{path}.jpg"):
             if size := image_size(source.path.parent / name):
                 return size, True
-    return options.size_or_refuse(both.place), False
+    size = options.size_or_refuse(both.place)
+    for key, side in zip("wh", size, strict=True):
+        if key in both and both.size(key) != side:
+            raise InputError(
+                f"{both.place} has {key} {both.get(key)} and the size is given as {size[0]} × {size[1]}: give its own"
+            )
+    return size, False
 
 
 def _focal(both: Record, along: str, side: int) -> float | None:
