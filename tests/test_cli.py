@@ -48,6 +48,16 @@ def without(mapping, key):
     return {name: value for name, value in mapping.items() if name != key}
 
 
+def test_a_command_imports_what_other_commands_need_for_no_one(tmp_path):
+    words = ["render", str(write_scene(tmp_path)), str(tmp_path / "out.exr")]
+    code = f"import sys; from viewcam_addon.cli import main; assert main({words}) == 0; print(*sys.modules, sep='\\n')"
+    imported = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
+    needless = [
+        name for name in imported if name.startswith(("viewcam_addon.cameras", "viewcam_addon.batch", "viewcam_addon.shots"))
+    ]
+    assert not needless, f"viewcam render has imported {', '.join(needless)}, which takes time at every start"
+
+
 def test_a_scene_written_by_hand_is_traced_and_compared_with_itself(tmp_path, capfd):
     scene, picture = write_scene(tmp_path), tmp_path / "out.exr"
     assert main(["render", str(scene), str(picture), "--json", str(tmp_path / "render.json")]) == 0

@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from . import argument_types as types
-from . import checks, events
-from .commands import Result, audit, batch, camera, chart, verification
+from . import events
+from .commands import Result, chart, verification
 from .errors import InputError, bug
 from .files import check_writable, is_printed_to, written_whole
 from .tracer.scene.film import SAMPLES
@@ -83,11 +83,14 @@ class _CommandParser(_OneLineParser):
     """Takes files and options in any order: Python 3.11 alone would take no file after an option where one may be left out."""
 
     _is_intermixing = False
+    add_words: Callable[[argparse.ArgumentParser], None]
+    """Adds the command's words, once it is this command that was given: what they need is imported for no other."""
 
     def parse_known_args(self, *arguments: Any) -> Any:  # which intermixed parsing uses itself
         if self._is_intermixing:
             return super().parse_known_args(*arguments)
         self._is_intermixing = True
+        self.add_words(self)
         return self.parse_known_intermixed_args(*arguments)
 
 
@@ -95,13 +98,22 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     parser = _OneLineParser(prog="viewcam", description="A camera from eye, look-at, up and distance, proven against Cycles.")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_CommandParser)
 
-    def command(run: Callable[[argparse.Namespace], Result], name: str, text: str) -> argparse.ArgumentParser:
-        added = subparsers.add_parser(name, help=text, description=text)
-        added.set_defaults(run=run, writes=())
-        added.add_argument("--threads", type=types.positive, metavar="N", help="threads to use (default: all)")
-        added.add_argument("--json", metavar="FILE", type=Path, help="write the result as JSON")
-        added.add_argument("--log-json", action="store_true", help="tell on standard output a JSON object for each event")
-        return added
+    def command(name: str, text: str) -> Callable[[Callable[[argparse.ArgumentParser], None]], None]:
+        """Of a function that adds the command's own words, and what runs it."""
+
+        def add(own_words: Callable[[argparse.ArgumentParser], None]) -> None:
+            def add_words(added: argparse.ArgumentParser) -> None:
+                added.set_defaults(writes=())
+                added.add_argument("--threads", type=types.positive, metavar="N", help="threads to use (default: all)")
+                added.add_argument("--json", metavar="FILE", type=Path, help="write the result as JSON")
+                added.add_argument(
+                    "--log-json", action="store_true", help="tell on standard output a JSON object for each event"
+                )
+                own_words(added)
+
+            subparsers.add_parser(name, help=text, description=text).add_words = add_words
+
+        return add
 
     def blend(added: argparse.ArgumentParser) -> None:
         if not blend_is_open:
@@ -149,88 +161,122 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         added.add_argument("--sides", type=Path, help=argparse.SUPPRESS)  # a folder for both sides as pictures
         added.add_argument("--repeat", help=argparse.SUPPRESS)  # what the report shall name as its command
 
-    added = command(verification.export, "export", "Write the scene of a .blend as the tracer reads it.")
-    blend(added)
-    added.add_argument("scene", metavar="SCENE.json", type=Path)
-    added.set_defaults(writes=("scene",))
-    scene_choices(added)
+    @command("export", "Write the scene of a .blend as the tracer reads it.")
+    def add_export(added: argparse.ArgumentParser) -> None:
+        added.set_defaults(run=verification.export)
+        blend(added)
+        added.add_argument("scene", metavar="SCENE.json", type=Path)
+        added.set_defaults(writes=("scene",))
+        scene_choices(added)
 
-    added = command(verification.render, "render", "Trace a scene file into an EXR.")
-    added.add_argument("scene", metavar="SCENE.json", type=Path)
-    added.add_argument("image", metavar="OUT.exr", type=Path)
-    added.set_defaults(writes=("image",))
-    added.add_argument("--size", type=types.size, metavar="WxH", help="pixels of the picture (default: the scene's)")
-    added.add_argument("--stated", action="store_true", help="trace the four values as stated, not as Blender stored them")
-    spent = added.add_mutually_exclusive_group()
-    light(added, spent)
-    error(spent, "in place of --samples")
+    @command("render", "Trace a scene file into an EXR.")
+    def add_render(added: argparse.ArgumentParser) -> None:
+        added.set_defaults(run=verification.render)
+        added.add_argument("scene", metavar="SCENE.json", type=Path)
+        added.add_argument("image", metavar="OUT.exr", type=Path)
+        added.set_defaults(writes=("image",))
+        added.add_argument("--size", type=types.size, metavar="WxH", help="pixels of the picture (default: the scene's)")
+        added.add_argument("--stated", action="store_true", help="trace the four values as stated, not as Blender stored them")
+        spent = added.add_mutually_exclusive_group()
+        light(added, spent)
+        error(spent, "in place of --samples")
 
-    added = command(
-        verification.cycles, "cycles", "Render a .blend with Cycles so that it can be compared, and give every setting back."
-    )
-    blend(added)
-    added.add_argument("image", metavar="OUT.exr", type=Path)
-    added.set_defaults(writes=("image",))
-    scene_choices(added)
+    @command("cycles", "Render a .blend with Cycles so that it can be compared, and give every setting back.")
+    def add_cycles(added: argparse.ArgumentParser) -> None:
+        added.set_defaults(run=verification.cycles)
+        blend(added)
+        added.add_argument("image", metavar="OUT.exr", type=Path)
+        added.set_defaults(writes=("image",))
+        scene_choices(added)
 
-    added = command(verification.compare, "compare", "Compare EXRs of one camera against derived tolerances and noise.")
-    added.add_argument("reference", metavar="REFERENCE.exr", type=Path)
-    added.add_argument(
-        "tests", metavar="TEST.exr", type=Path, nargs="+", help="several are one picture, rendered with several seeds"
-    )
-    added.add_argument(
-        "--scene", metavar="SCENE.json", type=Path, help="the reference's scene: explains silhouettes, brings the ledger"
-    )
-    # Cycles' file counts one that is left out.
-    added.add_argument("--test-samples", type=types.positive, help=argparse.SUPPRESS)
-    report(added)
+    @command("compare", "Compare EXRs of one camera against derived tolerances and noise.")
+    def add_compare(added: argparse.ArgumentParser) -> None:
+        added.set_defaults(run=verification.compare)
+        added.add_argument("reference", metavar="REFERENCE.exr", type=Path)
+        added.add_argument(
+            "tests", metavar="TEST.exr", type=Path, nargs="+", help="several are one picture, rendered with several seeds"
+        )
+        added.add_argument(
+            "--scene", metavar="SCENE.json", type=Path, help="the reference's scene: explains silhouettes, brings the ledger"
+        )
+        # Cycles' file counts one that is left out.
+        added.add_argument("--test-samples", type=types.positive, help=argparse.SUPPRESS)
+        report(added)
 
-    added = command(verification.check, "check", "Export, trace, render with Cycles and compare, all in one go.")
-    blend(added)
-    scene_choices(added)
-    error(added, "the tracer takes")
-    report(added)
+    @command("check", "Export, trace, render with Cycles and compare, all in one go.")
+    def add_check(added: argparse.ArgumentParser) -> None:
+        added.set_defaults(run=verification.check)
+        blend(added)
+        scene_choices(added)
+        error(added, "the tracer takes")
+        report(added)
 
-    added = command(batch.run, "batch", batch.DESCRIPTION)
-    blend(added)
-    batch.add_options(added, blend_is_open)
+    @command("batch", "Render many shots of one file: opened once, each written whole, and continued after whatever ended it.")
+    def add_batch(added: argparse.ArgumentParser) -> None:
+        from .commands import batch
 
-    added = command(audit.run, "audit", "Tell what is wrong with a dataset's cameras, by its points or depth maps.")
-    added.add_argument("dataset", metavar="DATASET", type=Path, help="transforms.json, a COLMAP model, or the folder of one")
-    added.add_argument("--points", metavar="COLMAP", type=Path, help="a COLMAP model of the same pictures and world")
-    added.add_argument("--against", metavar="CAMERAS", type=Path, help="true cameras of the same pictures, in any format")
-    added.add_argument("--size", type=types.size, metavar="WxH", help="pixels, where the file does not say")
+        added.set_defaults(run=batch.run)
+        blend(added)
+        batch.add_options(added, blend_is_open)
 
-    added = command(camera.run, "camera", "List the cameras of another program's file, or write them for a third one.")
-    camera.add_options(added)
+    @command("audit", "Tell what is wrong with a dataset's cameras, by its points or depth maps.")
+    def add_audit(added: argparse.ArgumentParser) -> None:
+        from .commands import audit
 
-    added = command(verification.demo, "demo", "Check the studio still that comes with the project, and write the report.")
-    added.set_defaults(
-        blend=verification.DEMO_SCENE, camera=None, frame=None, size=None, strict=False, recenter=False, clay=False
-    )
-    added.set_defaults(difference=None, sides=None, repeat=None, trust=False, writes=("report",))
-    light(added)
-    error(added, "the tracer takes")
-    added.add_argument(
-        "--report", metavar="DIR", type=Path, default=Path("demo"), help="where the report goes (default: %(default)s)"
-    )
+        added.set_defaults(run=audit.run)
+        added.add_argument(
+            "dataset", metavar="DATASET", type=Path, help="transforms.json, a COLMAP model, or the folder of one"
+        )
+        added.add_argument("--points", metavar="COLMAP", type=Path, help="a COLMAP model of the same pictures and world")
+        added.add_argument("--against", metavar="CAMERAS", type=Path, help="true cameras of the same pictures, in any format")
+        added.add_argument("--size", type=types.size, metavar="WxH", help="pixels, where the file does not say")
 
-    added = command(chart.run, "chart", "Measure the methods and draw how they compare, in a clone of the project.")
-    added.add_argument(
-        "subject",
-        choices=["stability", "light", "speed", "scaling", "poses"],
-        help="stability: every method up to where it fails; light: error against samples; speed: error against time; "
-        "scaling: time and memory against size; poses: time against error of the camera's axes",
-    )
-    added.add_argument(
-        "--output", metavar="DIR", type=Path, default=Path("docs", "charts"), help="where the SVGs go (default: %(default)s)"
-    )
-    added.add_argument("--only", metavar="NAME", nargs="+", default=[], help="these sweeps and no others")
-    added.add_argument("--quick", action="store_true", help="few trials: seconds instead of minutes")
+    @command("camera", "List the cameras of another program's file, or write them for a third one.")
+    def add_camera(added: argparse.ArgumentParser) -> None:
+        from .commands import camera
 
-    hidden = subparsers.add_parser("serve")  # for our own processes: without a help, so the list of commands leaves it out
-    hidden.add_argument("handle")
-    hidden.set_defaults(run=batch.serve, json=None, log_json=False, writes=())
+        added.set_defaults(run=camera.run)
+        camera.add_options(added)
+
+    @command("demo", "Check the studio still that comes with the project, and write the report.")
+    def add_demo(added: argparse.ArgumentParser) -> None:
+        added.set_defaults(run=verification.demo)
+        added.set_defaults(
+            blend=verification.DEMO_SCENE, camera=None, frame=None, size=None, strict=False, recenter=False, clay=False
+        )
+        added.set_defaults(difference=None, sides=None, repeat=None, trust=False, writes=("report",))
+        light(added)
+        error(added, "the tracer takes")
+        added.add_argument(
+            "--report", metavar="DIR", type=Path, default=Path("demo"), help="where the report goes (default: %(default)s)"
+        )
+
+    @command("chart", "Measure the methods and draw how they compare, in a clone of the project.")
+    def add_chart(added: argparse.ArgumentParser) -> None:
+        added.set_defaults(run=chart.run)
+        added.add_argument(
+            "subject",
+            choices=["stability", "light", "speed", "scaling", "poses"],
+            help="stability: every method up to where it fails; light: error against samples; speed: error against time; "
+            "scaling: time and memory against size; poses: time against error of the camera's axes",
+        )
+        added.add_argument(
+            "--output",
+            metavar="DIR",
+            type=Path,
+            default=Path("docs", "charts"),
+            help="where the SVGs go (default: %(default)s)",
+        )
+        added.add_argument("--only", metavar="NAME", nargs="+", default=[], help="these sweeps and no others")
+        added.add_argument("--quick", action="store_true", help="few trials: seconds instead of minutes")
+
+    def add_serve(hidden: argparse.ArgumentParser) -> None:
+        from .commands import batch
+
+        hidden.add_argument("handle")
+        hidden.set_defaults(run=batch.serve, json=None, log_json=False, writes=())
+
+    subparsers.add_parser("serve").add_words = add_serve  # for our own processes: without a help, the list leaves it out
     return parser
 
 
@@ -275,6 +321,8 @@ def _told(options: argparse.Namespace, status: int, sentence: str, problems: Seq
 
 def _write_json(options: argparse.Namespace, result: dict[str, Any]) -> int:
     """Write the result; the exit status if that fails, else 0."""
+    from . import checks
+
     try:
         with written_whole(options.json) as temporary:
             temporary.write_text(json.dumps(checks.for_json(result), indent=2, allow_nan=False) + "\n", encoding="utf-8")

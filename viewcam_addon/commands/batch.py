@@ -27,8 +27,6 @@ from ..terminal import say, silent_libraries
 from . import Result, blender_room
 from .camera import add_reading_options, options_of
 
-DESCRIPTION = "Render many shots of one file: opened once, each written whole, and continued after whatever ended it."
-
 _EXAMPLES = """\
 examples:
   {command}{file} shots.csv --out renders
