@@ -41,7 +41,7 @@ class VIEWCAM_preferences(bpy.types.AddonPreferences):
 
     default_up: bpy.props.EnumProperty(
         name="Default Up",
-        description="Up of new cameras where it gives the same picture, and of levelled ones. Roll is counted from it",
+        description="Up of new cameras where it gives the same picture, and of leveled ones. Roll is counted from it",
         items=[(name, name.replace("-", "−"), f"The world's {name.replace('-', '−')} axis") for name in _AXES],
         default=_DEFAULTS.default_up,
     )
@@ -52,8 +52,8 @@ class VIEWCAM_preferences(bpy.types.AddonPreferences):
         default=_DEFAULTS.default_level,
     )
     plane_color: bpy.props.FloatVectorProperty(
-        name="View Plane Colour",
-        description="Colour of the view plane in the 3D viewport",
+        name="View Plane Color",
+        description="Color of the view plane in the 3D viewport",
         subtype="COLOR_GAMMA",
         size=4,
         min=0.0,
@@ -61,9 +61,9 @@ class VIEWCAM_preferences(bpy.types.AddonPreferences):
         default=_DEFAULTS.plane_color,
     )
     line_color: bpy.props.FloatVectorProperty(
-        name="Line Colour",
-        description="Colour of the view plane's pixels, the pyramid and the line to the look-at point. "
-        "The axes have the theme's colours",
+        name="Line Color",
+        description="Color of the view plane's pixels, the pyramid and the line to the look-at point. "
+        "The axes have the theme's colors",
         subtype="COLOR_GAMMA",
         size=4,
         min=0.0,

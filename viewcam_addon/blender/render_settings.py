@@ -28,7 +28,7 @@ class ReferenceSettings(bpy.types.PropertyGroup):
     )
     samples: bpy.props.IntProperty(
         name="Samples",
-        description="Paths of light through each pixel. With 1 it is the path through the pixel's centre",
+        description="Paths of light through each pixel. With 1 it is the path through the pixel's center",
         default=SAMPLES,
         min=1,
         soft_max=4096,
@@ -36,7 +36,7 @@ class ReferenceSettings(bpy.types.PropertyGroup):
     seed: bpy.props.IntProperty(
         name="Seed", description="The same seed gives the same picture, another one another noise", min=0
     )
-    clay: bpy.props.BoolProperty(name="Clay", description="All surfaces are of one grey, perfectly matt material")
+    clay: bpy.props.BoolProperty(name="Clay", description="All surfaces are of one gray, perfectly matt material")
     use_pass_variance: bpy.props.BoolProperty(
         name="Variance",
         description="The estimated variance of each pixel of Combined, which is a mean over its samples",

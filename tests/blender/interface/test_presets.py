@@ -9,7 +9,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender.interface import presets
+from viewcam_addon.blender.interface import panel, presets
 from viewcam_addon.pinhole import Pinhole
 
 NAMES = {Path(path).stem: str(path) for path in (presets.SHIPPED / "presets" / presets.FOLDER).glob("*.py")}
@@ -72,6 +72,12 @@ def test_a_lens_has_its_angle_in_any_picture_and_leaves_the_view(posed_camera, s
     assert values(posed_camera)[3] == pytest.approx(max(size) * lens / 36, rel=8 * 2.0**-53)
     data = posed_camera.data
     assert (data.lens, data.sensor_width) == (pytest.approx(lens, rel=2.0**-23), 36)
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if "looking" in name])
+def test_no_preset_warns_of_itself(posed_camera, scene, name):
+    execute(name)
+    assert panel.notices(posed_camera, scene) == []
 
 
 def test_a_preset_enables_a_camera_that_was_set_otherwise(camera_object, scene):

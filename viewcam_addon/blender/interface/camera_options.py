@@ -29,7 +29,7 @@ def scale(**look: Any) -> Any:
     """The property "scale" of an operator."""
     return bpy.props.FloatProperty(
         name="Scale",
-        description="World units here of one unit there, as 0.001 for millimetres",
+        description="World units here of one unit there, as 0.001 for millimeters",
         default=1.0,
         min=1e-12,
         max=1e12,
@@ -76,7 +76,7 @@ class ReadingOptions(WorldOptions):
         description="Where (0, 0) lies in the picture",
         items=[
             (_UNSTATED, "Habit of the Format", ""),
-            *((key, {"corner": "Corner", "center": "Centre of the First"}[key], text) for key, text in formats.PIXELS.items()),
+            *((key, {"corner": "Corner", "center": "Center of the First"}[key], text) for key, text in formats.PIXELS.items()),
         ],
         options={"SKIP_SAVE"},
     )

@@ -283,5 +283,5 @@ def draw(layout: bpy.types.UILayout, camera_object: bpy.types.Object) -> None:
     with_size.camera, with_size.set_size = camera_object.name, True
 
 
-OPERATORS = (VIEWCAM_OT_copy_camera, VIEWCAM_OT_paste_camera, VIEWCAM_OT_copy_readout)
-CLASSES = (VIEWCAM_MT_copy_camera_as, *OPERATORS)
+IN_MENUS = (VIEWCAM_OT_copy_camera, VIEWCAM_OT_paste_camera)  # a read-out is copied by its own button
+CLASSES = (VIEWCAM_MT_copy_camera_as, *IN_MENUS, VIEWCAM_OT_copy_readout)

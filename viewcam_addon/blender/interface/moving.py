@@ -70,10 +70,10 @@ class VIEWCAM_OT_adopt_view(_Move, bpy.types.Operator):
 class VIEWCAM_OT_look_at_selection(_SelectionMove, bpy.types.Operator):
     bl_idname = "viewcam.look_at_selection"
     bl_label = "Look at Selection"
-    bl_description = "Bring the selection's centre into the middle of the view. The camera turns and stays where it is"
+    bl_description = "Bring the selection's center into the middle of the view. The camera turns and stays where it is"
 
     centre: bpy.props.EnumProperty(
-        name="Centre",
+        name="Center",
         description="Which point of the selection the camera looks at",
         items=(
             ("BOUNDS", "Bounding Box", "The middle of the box about the selection, along the world's axes"),

@@ -17,7 +17,7 @@ class VIEWCAM_MT_cameras(bpy.types.Menu):
             moving.CLASSES,
             operators.CLASSES,
             baking.CLASSES,
-            clipboard.OPERATORS,
+            clipboard.IN_MENUS,
             scene_cameras.OPERATORS,
             photo_matching.OPERATORS,
         ):
