@@ -23,6 +23,8 @@ from .pinhole import ViewPlane
 # Blender clamps a shorter lens, silently (rna_camera.cc).
 SHORTEST_LENS = 1.0
 FITS = ("AUTO", "HORIZONTAL", "VERTICAL")
+LENS_UNITS = ("MILLIMETERS", "HORIZONTAL", "VERTICAL", "DIAGONAL", "PIXELS")
+_LENGTHS = ("MILLIMETERS", "PIXELS")
 # Every number of a Blender camera is a float32, and within its range nothing below leaves float64's. A smaller relative
 # difference can't be stored.
 _SMALLEST, _LARGEST = 2.0**-149, (2.0 - 2.0**-23) * 2.0**127
@@ -197,6 +199,45 @@ def growth(sensor_fit: str, before: Frame, after: Frame) -> float:
     """The factor by which d, in pixel widths at 100 %, grows from one picture to another where lens and sensor stay."""
     was, now = (_fitted_pixels(sensor_fit, replace(frame, percentage=100))[0] for frame in (before, after))
     return now / was
+
+
+def lens_in(unit: str, distance: float, frame: Frame, sensor: tuple[float, float], sensor_fit: str) -> float:
+    """What a distance is as a lens, in one of LENS_UNITS: millimeters, or an angle in radians of the whole picture, unshifted.
+
+    distance : pixels of the picture of `frame` at 100 %. sensor : width and height in mm.
+    """
+    return (
+        distance * _scale(unit, frame, sensor, sensor_fit)
+        if unit in _LENGTHS
+        else 2 * math.atan(0.5 / (distance * _scale(unit, frame, sensor, sensor_fit)))
+    )
+
+
+def distance_by_lens(unit: str, value: float, frame: Frame, sensor: tuple[float, float], sensor_fit: str) -> float:
+    """The distance that a lens is: the way back from `lens_in`.
+
+    Raises
+    ------
+    InputError
+        if there is none: an angle that is not between 0 and 180°.
+    """
+    if unit not in _LENGTHS:
+        if not 0 < value < math.pi:
+            raise InputError(f"field of view is {math.degrees(value):g}°: give an angle between 0 and 180°")
+        value = 0.5 / math.tan(value / 2)
+    return value / _scale(unit, frame, sensor, sensor_fit)
+
+
+def _scale(unit: str, frame: Frame, sensor: tuple[float, float], sensor_fit: str) -> float:
+    """What a distance of one pixel is: in the unit of a length, or for an angle as a part of the picture's side."""
+    whole = replace(frame, percentage=100)
+    if unit == "PIXELS":
+        return 1.0
+    if unit == "MILLIMETERS":
+        return sensor[1 if sensor_fit == "VERTICAL" else 0] / _fitted_pixels(sensor_fit, whole)[0]
+    width = float(whole.resolution_x)
+    height = whole.resolution_y * (whole.pixel_aspect_y / whole.pixel_aspect_x)
+    return 1 / {"HORIZONTAL": width, "VERTICAL": height, "DIAGONAL": math.hypot(width, height)}[unit]
 
 
 def own_sensor(current: tuple[float, float], before: tuple[float, float]) -> tuple[float, float]:

@@ -330,3 +330,26 @@ def test_the_properties_work_in_edit_mode_of_another_object(posed_camera, scene)
     bpy.ops.object.mode_set(mode="EDIT")
     posed_camera.virtual_pinhole.eye = (0, -9, 0)
     assert tuple(posed_camera.location) == (0, -9, 0)
+
+
+@pytest.mark.parametrize("fit", ["AUTO", "HORIZONTAL", "VERTICAL"])
+@pytest.mark.parametrize("size", [(1920, 1080), (600, 999)])
+def test_the_lens_is_said_in_any_unit_and_is_one_distance(posed_camera, scene, size, fit):
+    scene.render.resolution_x, scene.render.resolution_y = size
+    posed_camera.data.sensor_fit = fit
+    bpy.context.view_layer.update()
+    group, data = posed_camera.virtual_pinhole, posed_camera.data
+    group.zoom = 2.0
+    group.lens_unit = "MILLIMETERS"
+    group.focal_length = 35
+    assert data.lens == pytest.approx(35, rel=1e-6) and group.zoom == 2
+    for unit, side in (("HORIZONTAL", size[0]), ("VERTICAL", size[1]), ("DIAGONAL", math.hypot(*size))):
+        group.lens_unit = unit
+        assert group.field_of_view == pytest.approx(2 * math.atan(side / 2 / (2 * group.distance)), rel=1e-6)
+        group.field_of_view = math.radians(60)
+        assert 2 * group.distance == pytest.approx(side / 2 / math.tan(math.radians(30)), rel=1e-6)
+        found = cameras.read(posed_camera, scene).distance[0]
+        assert found == pytest.approx(2 * group.distance, rel=1e-6)
+    before = group.distance
+    group.field_of_view = math.radians(200)
+    assert group.distance == before, "no lens has this angle"

@@ -39,6 +39,7 @@ class TypeTheFourValues(Step):
         for name in ("eye", "look_at"):
             for i, number in enumerate(getattr(self, name)):
                 yield from type_into(f"virtual_pinhole.{name}[{i}]", str(number))
+        values().lens_unit = "PIXELS"
         yield from type_into("virtual_pinhole.distance", str(self.distance))
 
     def by_script(self):
@@ -139,6 +140,9 @@ class Roll(Step):
 
 class KeepTheFieldOfView(Step):
     """What the camera keeps when the picture gets another resolution, by the mouse wheel over the choice."""
+
+    def prepare(self):
+        values().keeps = "PIXELS"  # a new camera has the other
 
     def by_hand(self):
         while values().keeps != "FIELD_OF_VIEW":

@@ -501,6 +501,25 @@ def _focus_distance(camera_object: bpy.types.Object, pinhole: Pinhole, depsgraph
     return focus.focus_distance if focus.focus_distance > 0 else 10.0  # which nan is not
 
 
+def lens(camera_object: bpy.types.Object, unit: str) -> float:
+    """The lens in one of intrinsics.LENS_UNITS, zoom included; 0 where there is none."""
+    frame, fit = datablocks.frame_of(datablocks.scene_of(camera_object)), camera_object.data.sensor_fit
+    with contextlib.suppress(InputError, ZeroDivisionError):
+        distance = storage.load(camera_object).distance_at_full_size(frame, fit)
+        return intrinsics.lens_in(unit, distance, frame, datablocks.own_sensor(camera_object.data), fit)
+    return 0.0
+
+
+def set_lens(camera_object: bpy.types.Object, unit: str, value: float) -> None:
+    """Say the distance that is this lens, and move nothing. The zoom stays, and what is no lens changes nothing."""
+    frame, fit = datablocks.frame_of(datablocks.scene_of(camera_object)), camera_object.data.sensor_fit
+    with contextlib.suppress(InputError, ZeroDivisionError):
+        distance = intrinsics.distance_by_lens(unit, value, frame, datablocks.own_sensor(camera_object.data), fit)
+        said = storage.load(camera_object).seeing(distance, frame, fit)
+        intrinsics.check_storable(camera_object.name, distance=(said.distance,))
+        storage.store(camera_object, said, "distance")
+
+
 def roll(camera_object: bpy.types.Object) -> float:
     """The property `roll`, radians: 0 where the values make no camera, and below what can be seen."""
     with contextlib.suppress(InputError):

@@ -112,6 +112,29 @@ def _turn(group: "VirtualPinhole", angle: float) -> None:
     _edit_of("up", "held_roll")(group, bpy.context)
 
 
+def _focal_length(group: "VirtualPinhole") -> float:
+    return cameras.lens(group.id_data, "MILLIMETERS")
+
+
+def _set_focal_length(group: "VirtualPinhole", value: float) -> None:
+    cameras.set_lens(group.id_data, "MILLIMETERS", value)
+    _on_lens(group, bpy.context)
+
+
+def _side(group: "VirtualPinhole") -> str:
+    """Whose angle `field_of_view` is."""
+    return group.lens_unit if group.lens_unit in ("VERTICAL", "DIAGONAL") else "HORIZONTAL"
+
+
+def _field_of_view(group: "VirtualPinhole") -> float:
+    return cameras.lens(group.id_data, _side(group))
+
+
+def _set_field_of_view(group: "VirtualPinhole", value: float) -> None:
+    cameras.set_lens(group.id_data, _side(group), value)
+    _on_lens(group, bpy.context)
+
+
 class VirtualPinhole(bpy.types.PropertyGroup):
     """The four values of a camera object, world space. Distance counts pixels of the picture at 100 %."""
 
@@ -122,16 +145,16 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         override={"LIBRARY_OVERRIDABLE"},
     )
     eye: bpy.props.FloatVectorProperty(
-        name="Eye",
-        description="Where the camera stands, in world space",
+        name="Camera",
+        description="Where the camera stands, in world space: the eye point e",
         subtype="TRANSLATION",
         precision=4,
         update=_edit_of("eye"),
         override={"LIBRARY_OVERRIDABLE"},
     )
     look_at: bpy.props.FloatVectorProperty(
-        name="Look-At",
-        description="The point in the middle of the view, in world space",
+        name="Look At",
+        description="The point in the middle of the view, in world space: the look-at point l",
         subtype="TRANSLATION",
         precision=4,
         update=_edit_of("look_at"),
@@ -169,8 +192,9 @@ class VirtualPinhole(bpy.types.PropertyGroup):
     )
     # No minimum: Blender would clamp without a word, and so the panel says what is wrong with d ≤ 0.
     distance: bpy.props.FloatProperty(
-        name="Distance",
-        description="From the eye to the view plane, in pixels of the picture at 100 %: twice the distance zooms in by two",
+        name="Lens",
+        description="The view-plane distance d: from the eye to the view plane, in pixels of the picture at 100 %. Twice the "
+        "distance zooms in by two",
         subtype="PIXEL",
         default=1000.0,
         soft_min=1.0,
@@ -179,6 +203,46 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         precision=3,
         update=_on_distance,
         override={"LIBRARY_OVERRIDABLE"},
+    )
+    lens_unit: bpy.props.EnumProperty(
+        name="Lens Unit",
+        description="In which unit the lens is shown and typed",
+        items=(
+            ("MILLIMETERS", "mm", "The focal length on the camera's sensor"),
+            ("HORIZONTAL", "Horizontal", "The horizontal field of view"),
+            ("VERTICAL", "Vertical", "The vertical field of view"),
+            ("DIAGONAL", "Diagonal", "The diagonal field of view"),
+            ("PIXELS", "px", "The view-plane distance d, in pixels of the picture at 100 %"),
+        ),
+        update=_on_shown,
+        options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    # Two looks at one distance: a property has one kind of unit. Neither is stored, nor overridable.
+    focal_length: bpy.props.FloatProperty(
+        name="Lens",
+        description="The focal length, zoom included. It is kept as the view-plane distance d: key that by the dot beside it",
+        subtype="DISTANCE_CAMERA",
+        unit="CAMERA",
+        soft_min=1.0,
+        soft_max=5000.0,
+        step=100,
+        precision=2,
+        get=_focal_length,
+        set=_set_focal_length,
+        options=set(),
+    )
+    field_of_view: bpy.props.FloatProperty(
+        name="Lens",
+        description="The field of view, zoom included. It is kept as the view-plane distance d: key that by the dot beside it",
+        subtype="ANGLE",
+        soft_min=math.radians(0.4),
+        soft_max=math.radians(173),
+        step=100,
+        precision=3,
+        get=_field_of_view,
+        set=_set_field_of_view,
+        options=set(),
     )
     # No minimum either.
     zoom: bpy.props.FloatProperty(

@@ -129,6 +129,9 @@ class Layout:
     def separator(self):
         pass
 
+    def decorator(self, owner, name):
+        assert name in owner.bl_rna.properties, f"{owner} has no {name}"
+
     def _draw(self, kind, name, look):
         unknown = set(look) - set(bpy.types.UILayout.bl_rna.functions[kind].parameters.keys())
         assert not unknown, f"this Blender's {kind}() does not take {unknown}"
@@ -193,8 +196,12 @@ def test_the_sub_panel_has_every_move_for_the_camera_that_is_shown(posed_camera)
 
 
 def test_every_value_has_its_row_and_the_roll_is_the_one_that_counts(posed_camera):
-    always = ["name", "eye", "eye_target", "look_at", "look_at_target", "up", "distance", "zoom", "keeps"]
+    always = ["name", "eye", "eye_target", "look_at", "look_at_target", "up", "focal_length", "lens_unit", "zoom", "keeps"]
     assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "roll", "pole"]
+    for unit, name in (("DIAGONAL", "field_of_view"), ("PIXELS", "distance")):
+        posed_camera.virtual_pinhole.lens_unit = unit
+        always[always.index("lens_unit") - 1] = name
+        assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "roll", "pole"]
     posed_camera.virtual_pinhole.pole = "HOLD"
     assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "held_roll", "hold_within", "pole"]
 

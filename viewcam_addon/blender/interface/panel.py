@@ -81,13 +81,23 @@ def _draw_values(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> 
         column.prop(group, f"{point}_target", text="Object")
     column.prop(group, "up")
     column.separator()
-    for name in ("distance", "zoom", "keeps"):
+    _draw_lens(column.row(align=True), group)
+    for name in ("zoom", "keeps"):
         column.prop(group, name)
     column.separator()
     column.prop(group, "held_roll" if group.pole == "HOLD" else "roll")
     if group.pole == "HOLD":
         column.prop(group, "hold_within")
     column.prop(group, "pole")
+
+
+def _draw_lens(row: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
+    """One field and its unit. Whatever the unit, the dot beside it keys d."""
+    row.use_property_decorate = False
+    row.prop(group, {"MILLIMETERS": "focal_length", "PIXELS": "distance"}.get(group.lens_unit, "field_of_view"))
+    row.prop(group, "lens_unit", text="")
+    row.use_property_decorate = True
+    row.decorator(group, "distance")
 
 
 def _draw_setting(row: bpy.types.UILayout, camera_object: bpy.types.Object, alert: bool) -> None:
