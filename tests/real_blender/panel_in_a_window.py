@@ -151,6 +151,7 @@ def undo_and_redo(before, after):
 
 
 def zoom():
+    values().lens_unit = "PIXELS"
     yield from type_into("distance", -1, "750")
     assert values().distance == 750, f"typed 750, and the distance is {values().distance}"
     is_at_its_values()

@@ -18,7 +18,7 @@ from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import datablocks, preferences, targets
-from . import readouts, selection, viewport
+from . import dragging, readouts, selection, viewport
 from .operators import CameraOperator
 
 
@@ -166,6 +166,74 @@ class VIEWCAM_OT_orbit_camera(_Move, bpy.types.Operator):
         return moves.orbited(pinhole, -self.around if pinhole.mirrored else self.around, self.upwards)
 
 
+class VIEWCAM_OT_drag_camera(_Move, bpy.types.Operator):
+    bl_idname = "viewcam.drag_camera"
+    bl_label = "Drag Camera"
+    bl_description = "Orbit, dolly or truck with the mouse, or by a typed number. Click or Enter is done, Escape takes it back, Shift is precise"
+
+    kind: bpy.props.EnumProperty(
+        name="Move",
+        description="How the camera goes with the mouse",
+        items=(
+            (dragging.ORBIT, "Orbit", "The eye goes around the look-at point"),
+            (dragging.DOLLY, "Dolly", "The eye goes towards the look-at point or away from it"),
+            (dragging.DOLLY_ZOOM, "Dolly Zoom", "The same, and the lens keeps the size of what is at the look-at point"),
+            (dragging.TRUCK, "Truck", "The camera goes sideways and up, and keeps its direction"),
+        ),
+        options={"SKIP_SAVE"},
+    )
+    amount: bpy.props.FloatVectorProperty(
+        name="Amount",
+        description="Radians around and upwards, or world units to the right and upwards, or away from the look-at point",
+        size=2,
+        options={"SKIP_SAVE"},
+    )
+
+    def moved(self, pinhole: Pinhole, _camera_object: bpy.types.Object, _scene: bpy.types.Scene) -> Pinhole:
+        return dragging.moved(pinhole, self.kind, tuple(self.amount))
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        found = bpy.data.objects.get(self.camera) if self.camera else datablocks.camera_in(context)
+        try:
+            if found is None:
+                raise InputError("there is no camera: select one")
+            self._drag = dragging.Drag(found, datablocks.scene_of(found), self.kind)
+        except InputError as error:
+            self.report({"ERROR"}, datablocks.sentence(error))
+            return {"CANCELLED"}
+        self._at = event.mouse_x, event.mouse_y
+        context.window_manager.modal_handler_add(self)
+        self._tell(context)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        drag, is_pressed = self._drag, event.value == "PRESS"
+        if event.type == "MOUSEMOVE":
+            drag.move(event.mouse_x - self._at[0], event.mouse_y - self._at[1], event.shift)
+            self._at = event.mouse_x, event.mouse_y
+        elif event.type in {"ESC", "RIGHTMOUSE"} and is_pressed:
+            drag.cancel()
+            context.workspace.status_text_set(None)
+            return {"CANCELLED"}
+        elif event.type in {"LEFTMOUSE", "RET", "NUMPAD_ENTER"} and is_pressed:
+            self.amount = drag.amount
+            for finding in drag.findings:
+                self.report({"WARNING"}, finding)
+            context.workspace.status_text_set(None)
+            return {"FINISHED"}
+        elif event.type == "BACK_SPACE" and is_pressed:
+            drag.type(drag.text[:-1])
+        elif is_pressed and event.unicode and event.unicode in "0123456789.-":
+            drag.type(drag.text + event.unicode)
+        self._tell(context)
+        return {"RUNNING_MODAL"}
+
+    def _tell(self, context: bpy.types.Context) -> None:
+        typed = f" [{self._drag.text}]" if self._drag.text else ""
+        keys = "Mouse or number: move    Shift: precise    LMB, Enter: confirm    RMB, Esc: cancel"
+        context.workspace.status_text_set(f"{self.bl_rna.properties['kind'].enum_items[self.kind].name}{typed}    {keys}")
+
+
 class VIEWCAM_OT_frame_selection(_SelectionMove, bpy.types.Operator):
     bl_idname = "viewcam.frame_selection"
     bl_label = "Frame Selection"
@@ -233,6 +301,7 @@ CLASSES = (
     VIEWCAM_OT_look_at_active,
     VIEWCAM_OT_dolly_camera,
     VIEWCAM_OT_orbit_camera,
+    VIEWCAM_OT_drag_camera,
     VIEWCAM_OT_frame_selection,
     VIEWCAM_OT_swap_camera,
     VIEWCAM_OT_level_camera,

@@ -19,7 +19,7 @@ from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import datablocks, findings, hold, targets
-from . import baking, clipboard, presets, readouts, scene_cameras
+from . import baking, clipboard, dragging, presets, readouts, scene_cameras
 
 
 @dataclass(frozen=True)
@@ -155,6 +155,11 @@ _MOVES = {
         ("viewcam.orbit_camera", {"text": "", "icon": "TRIA_UP"}, {"around": 0.0, "upwards": _STEP}),
         ("viewcam.orbit_camera", {"text": "", "icon": "TRIA_DOWN"}, {"around": 0.0, "upwards": -_STEP}),
     ),
+    "Drag": tuple(
+        ("viewcam.drag_camera", {"text": name}, {"kind": kind})
+        for kind, name in ((dragging.ORBIT, "Orbit"), (dragging.DOLLY, "Dolly"), (dragging.TRUCK, "Truck"))
+    ),
+    "Zoom": (("viewcam.drag_camera", {"text": "Dolly Zoom"}, {"kind": dragging.DOLLY_ZOOM}),),
     "Eye": (
         ("viewcam.dolly_camera", {"text": "Dolly"}, {}),
         ("viewcam.swap_camera", {"text": "Swap"}, {}),

@@ -1,0 +1,103 @@
+"""Moves of the camera that follow the mouse: orbit, dolly, dolly zoom, truck, or a typed number in the mouse's place.
+
+`Drag` is what goes on, and knows no event; the operator in moving.py feeds it. Every change starts from the camera as it was,
+so that nothing adds up, and cancelling gives it back to the bit (kept.py).
+"""
+
+import contextlib
+import math
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from ... import moves
+from ...errors import InputError
+from ...pinhole import Pinhole
+from .. import camera as cameras
+from .. import targets
+from . import kept
+
+ORBIT, DOLLY, DOLLY_ZOOM, TRUCK = "ORBIT", "DOLLY", "DOLLY_ZOOM", "TRUCK"
+_TURN = math.radians(0.5)  # for a pixel of the mouse, as a viewport's turntable
+_CLOSER = 0.005  # of the distance to the look-at point, for a pixel
+_PRECISE = 0.1
+
+
+def moved(pinhole: Pinhole, kind: str, amount: tuple[float, float]) -> Pinhole:
+    """A camera moved by a drag. Pure.
+
+    amount : radians around and upwards for an orbit, world units to the right and upwards for a truck, else world units away
+        from the look-at point, of which the first counts. A dolly zoom keeps the picture's size at the look-at point.
+
+    Raises
+    ------
+    InputError
+        if the eye would reach the look-at point, or a number is not finite.
+    """
+    if kind == ORBIT:
+        return moves.orbited(pinhole, -amount[0] if pinhole.mirrored else amount[0], amount[1])
+    if kind == TRUCK:
+        u, v, _ = pinhole.basis()
+        step = amount[0] * np.array(u) * (-1 if pinhole.mirrored else 1) + amount[1] * np.array(v)
+        return moves.trucked_to(pinhole, tuple((pinhole.look_at + step).tolist()))
+    reach = math.dist(pinhole.eye, pinhole.look_at)
+    dollied = moves.dollied(pinhole, reach + amount[0]) if amount[0] else pinhole
+    if kind == DOLLY_ZOOM:
+        dollied = replace(dollied, distance=tuple(each * (reach + amount[0]) / reach for each in pinhole.distance))
+    return dollied
+
+
+class Drag:
+    """A drag that goes on.
+
+    amount : as `moved` takes it. text : what was typed, which counts instead of the mouse where it is a number; degrees for
+    an orbit. findings : what `camera.apply` said last.
+
+    Raises
+    ------
+    InputError
+        if the camera is none, or what it follows would have to be given up.
+    """
+
+    def __init__(self, camera_object: bpy.types.Object, scene: bpy.types.Scene, kind: str) -> None:
+        followed = targets.names(camera_object)
+        for words, name in followed.items():
+            if words == "eye" or kind == TRUCK:
+                raise InputError(f"the {words} follows {name!r}, and can't be dragged: clear that object first")
+        stated = cameras.stated(camera_object, scene)
+        self.start = stated or cameras.as_it_stands(camera_object, scene, in_use=False)
+        self._before = kept.state(camera_object)
+        self._camera, self._scene, self._kind = camera_object, scene, kind
+        self._mouse, self.amount, self.text, self.findings = (0.0, 0.0), (0.0, 0.0), "", []
+
+    def move(self, right: float, upwards: float, precise: bool = False) -> None:
+        """The mouse has gone so many pixels."""
+        factor = _PRECISE if precise else 1.0
+        self._mouse = self._mouse[0] + factor * right, self._mouse[1] + factor * upwards
+        self._follow()
+
+    def type(self, text: str) -> None:
+        """What is typed so far."""
+        self.text = text
+        self._follow()
+
+    def cancel(self) -> None:
+        kept.restore(self._camera, self._before)
+
+    def _follow(self) -> None:
+        self.amount = self._by_mouse()
+        with contextlib.suppress(ValueError):
+            number = float(self.text)
+            self.amount = (math.radians(number) if self._kind == ORBIT else number), 0.0
+        with contextlib.suppress(InputError):  # beyond what there is: the camera waits for the mouse to come back
+            self.findings = cameras.apply(self._camera, moved(self.start, self._kind, self.amount), self._scene)
+
+    def _by_mouse(self) -> tuple[float, float]:
+        x, y = self._mouse
+        if self._kind == ORBIT:  # what is under the mouse goes with it
+            return -_TURN * x, -_TURN * y
+        reach = math.dist(self.start.eye, self.start.look_at)
+        if self._kind == TRUCK:
+            return -x * reach / self.start.distance[0], -y * reach / self.start.distance[1]
+        return reach * (math.exp(-_CLOSER * (x + y)) - 1), 0.0
