@@ -129,7 +129,7 @@ class Layout:
     def separator(self):
         pass
 
-    def decorator(self, owner, name):
+    def prop_decorator(self, owner, name):
         assert name in owner.bl_rna.properties, f"{owner} has no {name}"
 
     def _draw(self, kind, name, look):

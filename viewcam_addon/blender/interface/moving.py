@@ -169,7 +169,10 @@ class VIEWCAM_OT_orbit_camera(_Move, bpy.types.Operator):
 class VIEWCAM_OT_drag_camera(_Move, bpy.types.Operator):
     bl_idname = "viewcam.drag_camera"
     bl_label = "Drag Camera"
-    bl_description = "Orbit, dolly or truck with the mouse, or by a typed number. Click or Enter is done, Escape takes it back, Shift is precise"
+    bl_description = (
+        "Orbit, dolly or truck with the mouse, or by a typed number. Click or Enter is done, Escape takes it back, "
+        "Shift is precise"
+    )
 
     kind: bpy.props.EnumProperty(
         name="Move",

@@ -97,7 +97,7 @@ def _draw_lens(row: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
     row.prop(group, {"MILLIMETERS": "focal_length", "PIXELS": "distance"}.get(group.lens_unit, "field_of_view"))
     row.prop(group, "lens_unit", text="")
     row.use_property_decorate = True
-    row.decorator(group, "distance")
+    row.prop_decorator(group, "distance")
 
 
 def _draw_setting(row: bpy.types.UILayout, camera_object: bpy.types.Object, alert: bool) -> None:
