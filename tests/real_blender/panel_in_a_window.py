@@ -79,7 +79,7 @@ def find(name, index, area_type="VIEW_3D", region_type="UI", across=0.6):
 
 def type_into(name, index, text):
     """Steps that click on a field, replace its text and confirm."""
-    x, y = yield from find(name, index)
+    x, y = yield from find(name, index, across=0.5 if name == "distance" else 0.6)  # its unit stands beside it
     yield from click(x, y)
     press("A", x, y, ctrl=True)
     for character in text:

@@ -18,7 +18,7 @@ _HEADER = 60  # pixels from the panel's top within which its checkbox stands
 _PATIENCE = 4  # looks
 _ROW = 14  # pixels between two looks, less than a button's height
 # Where in a row its buttons are looked for, as shares of the panel's width; of operators there are many in a row.
-_MIDDLE, _CHECKBOX, _OPERATORS = 0.6, 0.13, (0.31, 0.38, 0.46, 0.53, 0.72, 0.85)
+_MIDDLE, _CHECKBOX, _OPERATORS = 0.5, 0.13, (0.31, 0.38, 0.46, 0.53, 0.6, 0.72, 0.85)
 _KEYS = {"-": "MINUS", ".": "PERIOD", " ": "SPACE", "/": "SLASH", "=": "EQUAL", ",": "COMMA"}
 _DIGITS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE")
 
