@@ -445,6 +445,16 @@ def test_how_to_add_something_is_told_in_fewer_than_ten_lines():
     told = [each for each in page.split("\n\n") if each.strip().startswith("**")]
     assert len(told) >= 7 and max(each.count("\n") + 1 for each in told) < 10
     assert {"format", "lamp", "pass", "command", "tolerance", "version"} <= set(re.findall(r"[a-z]+", page))
+    touched = {each.split(".**")[0].strip("* "): len(paths_named_in(each)) for each in told}
+    most = {
+        "A camera format": 2,
+        "A command": 2,
+        "A pass": 3,
+        "A tolerance": 3,
+        "A value of the camera": 3,
+        "A Blender version": 2,
+    }
+    assert {name: touched.get(name) for name in most if not 0 < touched.get(name, 0) <= most[name]} == {}
 
 
 def test_what_is_public_is_what_the_page_names_and_can_be_imported_without_blender():
