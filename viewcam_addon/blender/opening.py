@@ -122,17 +122,19 @@ def _after_reading(work: Callable[[], None]) -> Iterator[None]:
 def _not_kept_waiting() -> Iterator[None]:
     """Call Blender back from waiting for a pipe in place of a library; it then goes on without, and the path is told.
 
-    A signal does so, whose handler Python runs later; Windows, whose pipes are no files, and other threads have none.
+    A signal does so, whose handler Python runs later; Windows, whose pipes are no files, and other threads have none. Whoever
+    has set an alarm already has a time limit of their own.
     """
-    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
+    has_alarms = hasattr(signal, "setitimer") and threading.current_thread() is threading.main_thread()
+    if not has_alarms or signal.getitimer(signal.ITIMER_REAL)[0]:
         yield
         return
     handler = signal.signal(signal.SIGALRM, lambda *_: None)
-    timer = signal.setitimer(signal.ITIMER_REAL, _WAITED, _WAITED)
+    signal.setitimer(signal.ITIMER_REAL, _WAITED, _WAITED)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, *timer)
+        signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, handler)
 
 
