@@ -351,14 +351,24 @@ def blend() -> Feed:
     return feed
 
 
+SMALL = ("--size", "16x9", "--samples", "1")
+COMMANDS = (
+    ("export", "mutant.blend", "scene.json"),
+    ("cycles", "mutant.blend", "out.exr", *SMALL),
+    ("check", "mutant.blend", *SMALL),
+    ("batch", "mutant.blend", "--orbit", "1", "--out", "out", *SMALL),
+)
+
+
 def command(folder: Path) -> None:
-    """Export a mutant as a user does, and raise Said unless all is well or told in a sentence."""
-    words = [sys.executable, "-m", "viewcam_addon", "export", "mutant.blend", "scene.json"]
-    environment = os.environ | {"PYTHONPATH": str(TESTS.parent)}
-    ran = subprocess.run(words, cwd=folder, capture_output=True, text=True, errors="replace", env=environment, timeout=120)
-    if ran.returncode < 0 or (ran.returncode > 1) != bool(ran.stderr.strip()):
-        raise Said(f"the command ended with status {ran.returncode}: {ran.stderr[-LONGEST:]!r}")
-    judge(ran.stderr.strip())
+    """Give a mutant to every command as a user does, and raise Said unless all is well or told in a sentence."""
+    how = {"cwd": folder, "env": os.environ | {"PYTHONPATH": str(TESTS.parent)}, "timeout": 120}
+    for words in COMMANDS:
+        program = [sys.executable, "-m", "viewcam_addon", *words]
+        ran = subprocess.run(program, capture_output=True, text=True, errors="replace", check=False, **how)
+        if ran.returncode < 0 or (ran.returncode > 1) != bool(ran.stderr.strip()) or "Traceback" in ran.stdout:
+            raise Said(f"viewcam {words[0]} ended with status {ran.returncode}: {ran.stderr[-LONGEST:]!r}")
+        judge(ran.stderr.strip())
 
 
 KINDS = {"scene": scene, "exr": exr, "shots": shots, "sidecar": sidecar, "blend": blend}
