@@ -98,8 +98,7 @@ def test_a_thousand_rows_with_forty_kinds_of_bad_ones_are_named_by_line_and_colu
         ([CORNELL, "--orbit", "4", "--scheduler", "localhost", "--out", "OUT"], "tcp://host:8786"),
         ([CORNELL, "none.csv", "--out", "OUT"], "none.csv"),
         ([CORNELL, ROOT / "LICENSE", "--out", "OUT"], "LICENSE is no camera"),
-        # It has one, in an example.
-        ([CORNELL, ROOT / "README.md", "--out", "OUT"], "README.md: the text says where the camera is but not how it sees"),
+        ([CORNELL, "FILE", "--out", "OUT"], "FILE: the text says where the camera is but not how it sees"),
         (["none.blend", "--orbit", "4", "--out", "OUT"], "none.blend"),
         ([ROOT / "README.md", "--orbit", "4", "--out", "OUT"], "not a .blend"),
         ([CORNELL, "--orbit", "4", "--out", "FILE"], "can't be a folder"),
@@ -108,7 +107,7 @@ def test_a_thousand_rows_with_forty_kinds_of_bad_ones_are_named_by_line_and_colu
 )
 def test_each_wrong_word_is_one_sentence_and_nothing_is_written(tmp_path, capfd, monkeypatch, words, told):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "FILE").write_text("a file")
+    (tmp_path / "FILE").write_text("camera.lookAt(eye=(7, -6, 4), look_at=(0, 0, 1), up=(0, 0, 1))")
     assert told in fails(capfd, *words)
     assert files(tmp_path) == ["FILE"]
 
