@@ -30,8 +30,11 @@ _LONG = 4 * 3600  # seconds
 """The time limit of what takes minutes by its nature."""
 
 
+@pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
 def pytest_collection_modifyitems(items):
     for item in items:
+        if "benchmarks" in item.path.parts and not item.get_closest_marker("speed"):
+            item.add_marker(pytest.mark.exhaustive)  # what measures is not what is shipped
         if "real_blender" in item.path.parts or any(map(item.get_closest_marker, ("exhaustive", "light", "speed"))):
             item.add_marker(pytest.mark.timeout(_LONG))
 

@@ -16,6 +16,7 @@ import disturbed
 from batch_folders import assert_same
 
 
+@pytest.mark.exhaustive
 class TestWheel(disturbed.Disturbances):
     @pytest.fixture(scope="class")
     @classmethod

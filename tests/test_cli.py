@@ -219,6 +219,7 @@ def viewcam(*words, **options):
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False, **options)
 
 
+@pytest.mark.exhaustive
 def test_a_chart_is_measured_and_drawn_where_it_is_wanted(tmp_path):
     pytest.importorskip("bpy")
     words = ["chart", "stability", "--only", "field_of_view", "--quick", "--output", tmp_path, "--json", tmp_path / "all.json"]

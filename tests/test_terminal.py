@@ -150,6 +150,7 @@ def test_a_list_of_problems_is_as_many_lines_as_problems(tmp_path, capfd):
     assert len(said.splitlines()) == 1 + len(json.loads((tmp_path / "out.json").read_text())["problems"])
 
 
+@pytest.mark.exhaustive
 def test_names_in_a_blend_are_printed_plain(fresh_blender, tmp_path):
     """Blender keeps any character in a name: what is exported, what a batch lists, and what a comparison leaves out."""
     bpy = fresh_blender

@@ -8,8 +8,6 @@ from benchmarks import light
 from benchmarks.light import pictures
 from benchmarks.light.convergence import slope
 
-pytestmark = pytest.mark.exhaustive
-
 
 @pytest.fixture(scope="module")
 def charts():

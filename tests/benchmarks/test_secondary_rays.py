@@ -2,8 +2,6 @@ import pytest
 
 from benchmarks.stability import secondary_rays
 
-pytestmark = pytest.mark.exhaustive
-
 
 @pytest.fixture(scope="module")
 def measured():

@@ -250,7 +250,6 @@ def test_what_goes_wrong_in_a_contestant_s_process_is_raised_here():
 # All of it.
 
 
-@pytest.mark.exhaustive
 def test_a_scene_is_raced_from_the_blend_to_the_charts(tmp_path, monkeypatch):
     """Both figures of the studio still, 96 × 54 pixels, to an error of 0.05."""
     pytest.importorskip("bpy")

@@ -3,8 +3,6 @@ import pytest
 
 from benchmarks.stability import spheres
 
-pytestmark = pytest.mark.exhaustive
-
 
 @pytest.fixture(scope="module")
 def measured():

@@ -86,6 +86,7 @@ def depths_by_testing_each(scene, spheres, directions):
     return best
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("radius", [0.003, 0.03, 0.15])
 def test_a_hundred_thousand_spheres_are_told_apart_as_by_testing_each(make_scene, make_spheres, radius):
     rng = np.random.default_rng(1)

@@ -221,6 +221,7 @@ def test_what_a_watcher_raises_ends_the_render(lively):
         render(lively(), "direct", 2, watcher=audience)
 
 
+@pytest.mark.exhaustive
 def test_memory_beside_the_passes_does_not_grow_with_picture_and_samples(lively):
     def beside(width, height, samples):
         tracer = Tracer(lively(SEED, width, height), threads=1)

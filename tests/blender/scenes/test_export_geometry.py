@@ -137,6 +137,7 @@ def test_stretched_point_clouds_are_ellipsoids(beads, both_sides):
     both_sides().check()
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("name", ["spot", "stanford-bunny", "teapot"])
 def test_real_models(scene, camera, both_sides, models_folder, name):
     bpy.ops.wm.obj_import(filepath=str(models_folder / f"{name}.obj"))

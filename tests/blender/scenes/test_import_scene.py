@@ -138,12 +138,10 @@ def check_same(made, found):
 # --- The sample scenes
 
 
-SLOW = {"studio", "telephoto", "flight", "wide"}
-
-
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(path.stem, marks=[pytest.mark.exhaustive] * (path.stem in SLOW)) for path in sorted(SAMPLES.glob("*.blend"))],
+    [path.stem for path in sorted(SAMPLES.glob("*.blend"))],
 )
 def test_a_sample_scene_comes_back_as_the_same_picture(name, fresh_blender, tmp_path):
     scene_file.write(

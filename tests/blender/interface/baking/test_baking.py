@@ -23,7 +23,7 @@ def without_the_addon():
         viewcam_addon.register()
 
 
-@pytest.mark.parametrize("pole", ["CANONICAL", "HOLD"])
+@pytest.mark.parametrize("pole", [pytest.param("CANONICAL", marks=pytest.mark.exhaustive), "HOLD"])
 def test_a_baked_flight_over_the_pole_renders_the_live_picture_without_the_addon(
     over_the_target, scene, render_positions, picture_error, without_the_addon, pole
 ):

@@ -47,6 +47,7 @@ def assert_nothing_slips(scene, seeds=3):
     return passes
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("thickness", [0.03, 0.01, 0.003])
 def test_a_wire_far_thinner_than_a_pixel(with_things, make_mesh, thickness):
     """A pixel is 0.08 wide there: the thinnest wire covers a 27th of it, and no ray through a centre need meet it."""
@@ -89,6 +90,7 @@ def assert_no_light_is_lost(scene, seeds=48):
     assert abs(off) <= 4 * error, f"{off / error:+.1f} standard errors of {error:.3g}"
 
 
+@pytest.mark.exhaustive
 def test_a_small_bright_window_that_few_samples_see(with_things, make_mesh):
     """It covers a hundredth of one pixel, and is forty times as bright as white."""
     window = make_mesh([(0.5, 0, 0.8), (0.508, 0, 0.8), (0.508, 0, 0.808), (0.5, 0, 0.808)], [(0, 1, 2), (0, 2, 3)])
