@@ -278,15 +278,31 @@ def blenders_camera_and_the_view_plane(source):
         assert np.isfinite(stored).all() and np.float32(back.lens) >= 1 and (np.abs(stored) <= np.finfo(np.float32).max).all()
 
 
+def any_frame(source):
+    sizes = [source.choice((1, 3, 1920, 65536, 2**31 - 1)) for _ in range(2)]
+    return Frame(*sizes, source.choice((1, 33, 100, 32767)), float32(source), float32(source))
+
+
 @attacks("intrinsics.growth")
 def another_picture(source):
-    def frame():
-        sizes = [source.choice((1, 3, 1920, 65536, 2**31 - 1)) for _ in range(2)]
-        return Frame(*sizes, source.choice((1, 33, 100, 32767)), float32(source), float32(source))
-
-    fit, before, after = source.choice(intrinsics.FITS), frame(), frame()
+    fit, before, after = source.choice(intrinsics.FITS), any_frame(source), any_frame(source)
     there, back = answer(intrinsics.growth, fit, before, after), answer(intrinsics.growth, fit, after, before)
     assert 0 < there < math.inf and abs(there * back - 1) <= 2 * 2.0**-52, (fit, before, after)  # two quotients, a product
+
+
+@attacks("intrinsics.lens_in", "intrinsics.distance_by_lens")
+def a_lens_in_any_unit(source):
+    """There and back a distance loses what rounding the lens does to it, near 180° by 1/sin more."""
+    frame, sensor = any_frame(source), (float32(source), float32(source))
+    unit, fit, distance = source.choice(intrinsics.LENS_UNITS), source.choice(intrinsics.FITS), float32(source)
+    lens = intrinsics.lens_in(unit, distance, frame, sensor, fit)
+    is_length = unit in ("PIXELS", "MILLIMETERS")
+    assert 0 < lens < math.inf and (is_length or lens <= math.pi), (unit, distance, frame)
+    back = answer(intrinsics.distance_by_lens, unit, lens, frame, sensor, fit)
+    amplified = 1.0 if is_length else lens / max(math.sin(lens), 1e-300)
+    assert back is REFUSED or abs(back / distance - 1) <= (8 + 4 * amplified) * 2.0**-53, (unit, distance, lens, back)
+    found = answer(intrinsics.distance_by_lens, unit, source.choice((source.finite(), math.nan, math.inf)), frame, sensor, fit)
+    assert found is REFUSED or 0 < found < math.inf, (unit, found)
 
 
 @attacks("intrinsics.own_sensor", "intrinsics.lens_and_sensor", "intrinsics.check_storable")

@@ -219,13 +219,17 @@ def distance_by_lens(unit: str, value: float, frame: Frame, sensor: tuple[float,
     Raises
     ------
     InputError
-        if there is none: an angle that is not between 0 and 180°.
+        if there is none: an angle that is not between 0 and 180°, or a length that gives no distance that a camera can have.
     """
     if unit not in _LENGTHS:
-        if not 0 < value < math.pi:
+        tangent = math.tan(value / 2) if 0 < value < math.pi else 0.0
+        if not tangent > 0:
             raise InputError(f"field of view is {math.degrees(value):g}°: give an angle between 0 and 180°")
-        value = 0.5 / math.tan(value / 2)
-    return value / _scale(unit, frame, sensor, sensor_fit)
+        value = 0.5 / tangent
+    distance = value / _scale(unit, frame, sensor, sensor_fit)
+    if not 0 < distance < math.inf:
+        raise InputError(f"lens gives a distance of {distance:g} pixels: give one that is above 0 and finite")
+    return distance
 
 
 def _scale(unit: str, frame: Frame, sensor: tuple[float, float], sensor_fit: str) -> float:

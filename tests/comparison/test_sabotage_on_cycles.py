@@ -190,8 +190,9 @@ def test_a_fault_in_the_file_is_found(change, compared):
 
 
 def test_a_conversion_that_went_wrong_is_told_from_a_wrong_renderer(compared, still):
-    """The camera is moved after it was stated: Cycles renders what stands there, and only the conversion is at fault."""
-    still.camera.location.x += 1e-3
+    """A constraint holds the camera off its values: Cycles renders what stands there, and only the conversion is at fault."""
+    limit = still.camera.constraints.new("LIMIT_LOCATION")
+    limit.use_min_x, limit.min_x = True, still.camera.location.x + 1e-3
     comparison = compared()
     assert not comparison.passed
     assert all(row.ok for row in comparison.rows), "\n".join(comparison.lines())

@@ -154,7 +154,8 @@ def test_the_same_picture_is_the_verdict_and_the_file_stays_as_it_is(seen):
 
 def test_a_camera_that_is_not_where_it_was_put_differs_and_then_is_mended(seen):
     """Twice by the operator: one image, of the second comparison in the end."""
-    seen.camera.location.x += 0.01
+    limit = seen.camera.constraints.new("LIMIT_LOCATION")
+    limit.use_min_x, limit.min_x = True, seen.camera.location.x + 0.01
     bpy.context.view_layer.update()
     assert bpy.ops.viewcam.compare_with_cycles() == {"FINISHED"}
     first = proof.latest()
@@ -162,7 +163,7 @@ def test_a_camera_that_is_not_where_it_was_put_differs_and_then_is_mended(seen):
     image = bpy.data.images["Virtual Pinhole Proof"]
     bytes_before = image.packed_file.data
     assert tuple(image.size) == (3 * 64 + 2 * proof_image._GAP, 48)
-    seen.camera.virtual_pinhole.distance = 50
+    seen.camera.constraints.remove(limit)
     assert bpy.ops.viewcam.compare_with_cycles(camera="Camera") == {"FINISHED"}
     second = proof.latest()
     assert second.passed and not first.temporary.exists() and second.report.is_file()

@@ -198,7 +198,9 @@ def test_the_camera_of_a_file_that_states_none_is_taken_as_it_stands(look, camer
 def test_a_camera_that_is_not_where_it_was_stated_is_still_told(look, camera_object, both_sides, add_map):
     look(UTM)
     add_map(UTM)
-    camera_object.rotation_euler.z += 0.05
+    limit = camera_object.constraints.new("LIMIT_ROTATION")
+    limit.use_limit_z, limit.min_z = True, camera_object.rotation_euler.z + 0.05
+    limit.max_z = limit.min_z
     comparison = both_sides(recenter=True).comparison
     assert comparison.rows[0].ok and not comparison.conversion.ok
     # 0.05 rad at a distance of 150 px.
