@@ -127,7 +127,7 @@ def export_and_render(
 
 def _export(stage: _Stage, request: Request) -> Scene:
     scene = export_scene(stage.scene, stage.view_layer, stage.camera, stage.ledger, stage.is_lit)
-    objects = tuple(replace(placed, name=stage.names.get(placed.name, placed.name)) for placed in scene.objects)
+    objects = recentering.as_in_file(scene.objects, stage.names) if stage.names else scene.objects
     return replace(scene, objects=objects, origin=stage.origin, ledger=stage.entries(request.strict))
 
 

@@ -21,8 +21,8 @@ and instances, which the file has rounded to half a metre, come out elsewhere th
 """
 
 import contextlib
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import bpy
@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...pinhole import Pinhole
+from ...tracer.scene import Object
 from .. import camera as cameras
 from .. import datablocks, findings, pose
 from ..temporary_settings import Overrides, overridden, still_of_one_layer
@@ -137,6 +138,21 @@ def recentred(
         shown = _place(overrides, temporary, placed)
         _visit(temporary, temporary.view_layers[0], camera, lambda depsgraph: _verify(depsgraph, shown, copies))
         yield Recentred(temporary, camera, view.shown.eye, {each.name: source.name for each, source in shown.items()})
+
+
+def as_in_file(objects: Iterable[Object], names: Mapping[str, str]) -> tuple[Object, ...]:
+    """The objects of an exported `Recentred` as the file's own export has them: by their names there, instances as one object.
+
+    Here each place has an object of its own, and so a name of its own, that the exporter keeps apart. names : of `Recentred`.
+    """
+    found: dict[tuple, list[Object]] = {}
+    for placed in (replace(each, name=names[each.name]) for each in objects):
+        all_but_place = tuple(getattr(placed, each.name) for each in fields(placed) if each.name != "matrix")
+        found.setdefault(all_but_place, []).append(placed)
+    return tuple(
+        replace(same[0], matrix=np.concatenate([each.matrices for each in same])) if len(same) > 1 else same[0]
+        for same in found.values()
+    )
 
 
 def _visit(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_object: bpy.types.Object, work: Callable) -> Any:

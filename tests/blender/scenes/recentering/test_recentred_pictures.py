@@ -1,6 +1,7 @@
 """Far from home: with the origin at the eye both sides show the file's scene to a thousandth of a pixel."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -144,7 +145,31 @@ def test_particles_follow(look, add, mesh_from, scene, check):
     settings.particle_size, settings.physics_type = 1.0, "NO"
     scene.frame_set(3)
     sides = check()
-    assert sum(each.name == "Ball" for each in sides.exported.objects) > 20
+    (balls,) = (each for each in sides.exported.objects if each.name == "Ball")
+    assert len(balls.matrices) == 41, "one for each particle, and the ball itself"
+
+
+@pytest.mark.parametrize(
+    "change, told",
+    [
+        (lambda matrices: matrices[:, :, [1, 0, 2, 3]], "instance 1 of Map is"),
+        (lambda matrices: matrices[::-1], "instance 1 of Map is"),
+        (lambda matrices: matrices[:2], "the same number of instances"),
+    ],
+    ids=["turned", "in another order", "one fewer"],
+)
+def test_instances_that_are_not_where_the_file_has_them_are_caught(change, told, look, add, map_mesh, check_moved):
+    look(UTM)
+    many = bpy.data.collections.new("Many")
+    add(map_mesh("Map", (0, 0, 0)), "Map", collection=many)
+    for number in range(3):
+        instance = add(None, f"Instance {number}", np.add(UTM, (40.0 * number, 0, 0)))
+        instance.instance_type, instance.instance_collection = "COLLECTION", many
+    plain, moved = (job.export(job.Request(recenter=recenter)) for recenter in (False, True))
+    check_moved(plain, moved)
+    (maps,) = moved.objects
+    with pytest.raises(AssertionError, match=told):
+        check_moved(plain, replace(moved, objects=(replace(maps, matrix=change(maps.matrices)),)))
 
 
 def test_a_file_in_edit_mode_and_materials_of_the_object_or_the_layer(look, add, mesh_from, scene, check):
