@@ -93,7 +93,8 @@ def test_a_view_through_another_camera_shows_this_one(shown, posed_camera, add_c
 
 
 def test_what_is_drawn_is_what_the_values_ask_for(shown, posed_camera):
-    posed_camera.location = (0, 0, 0)  # the camera was moved away from its values
+    limit = posed_camera.constraints.new("LIMIT_LOCATION")  # holds the camera off its values
+    limit.use_max_x, limit.max_x = True, 0
     ((pinhole, up, share),) = overlay._figures(shown)
     assert pinhole.eye == (7, -6, 5) and up == (0, 0, 1) and share == posed_camera.virtual_pinhole.plane_at
     assert (pinhole.width, pinhole.height) == (1920, 1080)
