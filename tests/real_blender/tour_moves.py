@@ -146,7 +146,7 @@ class FrameByDistance(_SeenThroughTheCamera):
 
 class OrbitToTheRight(_Move):
     operator, properties = "orbit_camera", {"around": math.radians(15)}
-    button = 'viewcam.orbit_camera(camera="Camera", around=0'
+    button = 'viewcam.orbit_camera(camera="Camera", around=0.'
 
     def prepare(self):
         self.eye = np.array(values().eye)
