@@ -221,7 +221,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
     # Two looks at one distance: a property has one kind of unit. Neither is stored, nor overridable.
     focal_length: bpy.props.FloatProperty(
         name="Lens",
-        description="The focal length, zoom included. It is kept as the view-plane distance d: key that by the dot beside it",
+        description="The focal length, zoom included. It is kept as the view-plane distance d: choose px to key it",
         subtype="DISTANCE_CAMERA",
         unit="CAMERA",
         soft_min=1.0,
@@ -234,7 +234,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
     )
     field_of_view: bpy.props.FloatProperty(
         name="Lens",
-        description="The field of view, zoom included. It is kept as the view-plane distance d: key that by the dot beside it",
+        description="The field of view, zoom included. It is kept as the view-plane distance d: choose px to key it",
         subtype="ANGLE",
         soft_min=math.radians(0.4),
         soft_max=math.radians(173),

@@ -241,7 +241,7 @@ def test_apply_again_is_not_marked_where_it_mends_nothing(posed_camera, scene):
 def test_a_notice_is_drawn_in_lines_that_fit_and_with_its_remedy_below(posed_camera):
     posed_camera.virtual_pinhole.eye = (0, 0, 5)
     found = drawn(panel.VIEWCAM_PT_sidebar, 200)
-    lines = [(name, look["icon"]) for kind, name, look, *_ in found if kind == "label"]
+    lines = [(name, look["icon"]) for kind, name, look, *_ in found if kind == "label" and name]
     assert " ".join(line for line, _ in lines).startswith("The view is parallel to up")
     assert [icon for _, icon in lines] == ["ERROR"] + ["BLANK1"] * (len(lines) - 1) and len(lines) > 2
     assert found[-1][:2] == ("operator", "viewcam.choose_up") and found[-1][4].camera == "Camera"

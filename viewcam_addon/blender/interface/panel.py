@@ -92,12 +92,17 @@ def _draw_values(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> 
 
 
 def _draw_lens(row: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
-    """One field and its unit. Whatever the unit, the dot beside it keys d."""
+    """One field and its unit, no wider than its words. The dot keys d, and Blender wants d's own field beside it."""
     row.use_property_decorate = False
     row.prop(group, {"MILLIMETERS": "focal_length", "PIXELS": "distance"}.get(group.lens_unit, "field_of_view"))
-    row.prop(group, "lens_unit", text="")
-    row.use_property_decorate = True
-    row.prop_decorator(group, "distance")
+    unit = row.row(align=True)
+    unit.use_property_split = False
+    unit.ui_units_x = 2.4 if group.lens_unit in ("MILLIMETERS", "PIXELS") else 9.0
+    unit.prop(group, "lens_unit", text="")
+    if group.lens_unit == "PIXELS":
+        row.prop_decorator(group, "distance")
+    else:
+        row.label(text="", icon="BLANK1")
 
 
 def _draw_setting(row: bpy.types.UILayout, camera_object: bpy.types.Object, alert: bool) -> None:
