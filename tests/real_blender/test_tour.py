@@ -19,7 +19,7 @@ def run_in_a_window(real_blender, script, *folder):
     return subprocess.run(
         [
             *(ROOT / ".ci" / "blender-window", "--factory-startup", "--addons", "bl_ext.user_default.virtual_pinhole"),
-            *("--enable-event-simulate", "-p", "0", "0", "1600", "1000", "--python", script, "--", *folder),
+            *("--enable-event-simulate", "-p", "0", "0", "1600", "2000", "--python", script, "--", *folder),
         ],
         env={**os.environ, "BLENDER_USER_RESOURCES": str(real_blender.user_folder)},
         cwd=ROOT,

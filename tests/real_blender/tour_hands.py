@@ -13,7 +13,7 @@ from mathutils import Vector
 from panel_in_a_window import NOWHERE, click, move, press, region, window
 
 SIDEBAR, PROPERTIES, VIEWPORT = ("VIEW_3D", "UI"), ("PROPERTIES", "WINDOW"), ("VIEW_3D", "WINDOW")
-SCREEN_HEIGHT = 1000
+SCREEN_HEIGHT = 2000
 _HEADER = 60  # pixels from the panel's top within which its checkbox stands
 _PATIENCE = 4  # looks
 _ROW = 14  # pixels between two looks, less than a button's height
@@ -104,22 +104,29 @@ def push(button, where=SIDEBAR):
 
 
 def unfold(button, where=SIDEBAR):
-    """Open the sub-panels, from the first on, until the button is there: headers are rows in which nothing answers."""
+    """Open sub-panels, from the first on, until one has the button; the others are folded again.
+
+    Headers are rows in which nothing answers, and so are labels in a panel that is open.
+    """
     if _remembered(button, where) and (yield from seek(button, where)):
         return
     _, part = region(*where)
-    y = min((y for _, y in _map(where).values()), default=part.y + part.height) - _ROW
-    while y > part.y and not _remembered(button, where):
+    known = dict(_map(where))
+    y = min((y for _, y in known.values()), default=part.y + part.height) - _ROW
+    while y > part.y:
         x = part.x + part.width * 0.35
         if (yield from look(x, y, where)):  # still the last button
             y -= _ROW / 2
             continue
         yield from click(x, y)
-        if (yield from survey(y - _ROW / 2, max(y - 6 * _ROW, part.y), where)):
-            yield from survey(y - 5 * _ROW, part.y, where)
-            y = min(y for _, y in _map(where).values())
+        if (yield from survey(y - _ROW / 2, part.y, where)):
+            if _remembered(button, where):
+                return
+            yield from click(x, y)
+            _found[where] = dict(known)
+            y -= _ROW / 2
         y -= _ROW / 2
-    assert _remembered(button, where), f"no sub-panel opens on {button}, only on {sorted(_map(where))}"
+    raise AssertionError(f"no sub-panel has {button}, beside {sorted(_map(where))}")
 
 
 def type_into(button, text, where=SIDEBAR):

@@ -1,6 +1,6 @@
 """Runs inside a real Blender with a window: takes the tour (tour.py) by mouse and keys, and undoes and redoes each step.
 
-blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python tour_in_a_window.py -- [FOLDER]
+blender --enable-event-simulate -p 0 0 1600 2000 --addons … --python tour_in_a_window.py -- [FOLDER]
 
 FOLDER : where the pictures of docs/artists.md go; without it none are taken. Leaves with status 0, or 5 and a traceback.
 """
