@@ -264,19 +264,21 @@ def farm(tmp_path, processes):
     family, scratch = [], tmp_path / "scratch"
     scratch.mkdir()
 
-    def start(*words, **variables):
+    def start(*words, until, **variables):
+        """A process that has said that it is ready, and the address that it said."""
         said = scratch / f"{len(family)}.txt"
         family.append(
             child_process.ProcessGroup([sys.executable, "-m", "dask", *words], said, child_process.environment(**variables))
         )
-        return family[-1], said
+        ready = re.compile(rf"{until}:\s+(tcp://\S+)")
+        assert processes.until(lambda: ready.search(said.read_text())), said.read_text()
+        return family[-1], ready.search(said.read_text())[1]
 
-    _, said = start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
-    assert processes.until(lambda: re.search(r"Scheduler at:\s+(tcp://\S+)", said.read_text())), said.read_text()
-    address = re.search(r"Scheduler at:\s+(tcp://\S+)", said.read_text())[1]
+    _, address = start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", until="Scheduler at")
 
     def worker(**variables):
-        return start("worker", address, "--nthreads", "1", "--no-dashboard", "--local-directory", str(scratch), **variables)[0]
+        place = "--nthreads", "1", "--no-dashboard", "--local-directory", str(scratch)
+        return start("worker", address, *place, until="Registered to", **variables)[0]
 
     yield address, worker, lambda: family[0].end()
     for each in family:
@@ -318,7 +320,6 @@ def test_the_shots_of_a_machine_that_is_not_fit_are_rendered_by_another(farm, st
     worker(VIEWCAM_BLENDER=str(tmp_path / "ghost"))
     worker()
     with cluster.opened(address, None) as machines:
-        machines._client.wait_for_workers(2, timeout=30)
         summary = run_on(machines, blend, tmp_path / "out", shots(*"abcdef"))
     assert summary.exit_status == 0 and summary.counts["done"] == 6
 

@@ -201,7 +201,8 @@ def test_cancelled_while_it_renders_it_leaves_no_process_and_no_file(seen):
     wait_for(lambda: list(comparison.folder.glob("blender_*")))
     assert processes_of(comparison.folder)
     comparison.cancel()
-    assert processes_of(comparison.folder) == []
+    # Blender is killed at once, but not waited for: it is no child of ours.
+    wait_for(lambda: processes_of(comparison.folder) == [], seconds=2)
     assert set(Path(bpy.app.tempdir).iterdir()) == there and changed(before, state(seen)) == {}
     comparison.cancel()  # twice does no harm
 

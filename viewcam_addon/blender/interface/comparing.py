@@ -346,8 +346,11 @@ def _read(path: Path) -> dict[str, Any]:
 
 
 def _remove(path: Path) -> None:
+    """Also what a process that is being killed creates meanwhile: it may take a few milliseconds to die."""
     if path.is_dir():
-        shutil.rmtree(path, ignore_errors=True)
+        ends = time.monotonic() + 1
+        while path.is_dir() and time.monotonic() < ends:
+            shutil.rmtree(path, ignore_errors=True)
     else:
         path.unlink(missing_ok=True)
 
