@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from viewcam_addon import child_process, crashes
+from viewcam_addon import cameras, child_process, crashes
+from viewcam_addon.pinhole import Pinhole
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="Windows tells of a crash itself")
 
@@ -19,6 +20,8 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="Windows tells o
 def run(tmp_path):
     """A function: what Blender does as it is loaded, words of viewcam → the process."""
     (tmp_path / "file.blend").write_bytes(b"BLENDER-v402")
+    dataset = cameras.write([cameras.Camera("1", Pinhole((0, -5, 0), (0, 0, 0), (0, 0, 1), 64, 64, 36))], "transforms")
+    (tmp_path / "transforms.json").write_text(dataset)
 
     def start(does, *words):
         (tmp_path / "bpy.py").write_text(does)
@@ -38,6 +41,7 @@ WORDS = {
     "check": ["file.blend"],
     "demo": [],
     "batch": ["file.blend", "--orbit", "2", "--out", "out"],
+    "audit": ["transforms.json", "--blend", "file.blend"],
     "batch --workers": ["file.blend", "--orbit", "2", "--out", "out", "--workers", "1"],
 }
 

@@ -76,6 +76,7 @@ BLENDER_ROOMS = {
     "camera": "findings preferences datablocks storage targets hold pose suspects",
     "properties": "datablocks storage targets camera",
     "resolution": "datablocks storage camera",
+    "dataset_cameras": "opening datablocks camera",
     "own_picture": "",
     "animation": "versions datablocks storage targets camera resolution",
     "scenes": "versions temporary_settings picture findings datablocks pose camera",

@@ -55,7 +55,8 @@ def main(arguments: Sequence[str] | None = None, blend_is_open: bool = False, en
 
 def _crash(options: argparse.Namespace, number: int) -> str:
     name = signal.Signals(number).name if number in set(signal.Signals) else number
-    sentence = f"Blender has ended with {name} at {options.blend}: see that the file is whole, and that there is memory enough"
+    blend = options.blend or "no file"
+    sentence = f"Blender has ended with {name} at {blend}: see that the file is whole, and that there is memory enough"
     if options.command != "batch":
         return sentence
     return f"{sentence}; what is finished is kept, and with --resume --workers 1 a shot that crashes it does not end the batch"
@@ -120,6 +121,9 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
             added.add_argument("blend", metavar="FILE.blend", type=Path, help="any file that Blender opens")
         else:
             added.set_defaults(blend=None)
+        trust(added)
+
+    def trust(added: argparse.ArgumentParser) -> None:
         added.add_argument(
             "--trust", action="store_true", help="let what is in the file run and write: Python, shaders, caches"
         )
@@ -227,8 +231,12 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         added.add_argument(
             "dataset", metavar="DATASET", type=Path, help="transforms.json, a COLMAP model, or the folder of one"
         )
-        added.add_argument("--points", metavar="COLMAP", type=Path, help="a COLMAP model of the same pictures and world")
-        added.add_argument("--against", metavar="CAMERAS", type=Path, help="true cameras of the same pictures, in any format")
+        by = added.add_mutually_exclusive_group()
+        by.add_argument("--points", metavar="COLMAP", type=Path, help="a COLMAP model of the same pictures and world")
+        by.add_argument("--against", metavar="CAMERAS", type=Path, help="true cameras of the same pictures, in any format")
+        text = "the file that was rendered, whose cameras are called as the pictures, or whose frames end their names"
+        by.add_argument("--blend", metavar="FILE.blend", type=Path, help=text)
+        trust(added)
         added.add_argument("--size", type=types.size, metavar="WxH", help="pixels, where the file does not say")
 
     @command("camera", "List the cameras of another program's file, or write them for a third one.")

@@ -11,7 +11,7 @@ import os
 import signal
 import sys
 
-COMMANDS = ("export", "cycles", "check", "demo", "batch")
+COMMANDS = ("export", "cycles", "check", "demo", "batch", "audit")
 """Those that open a .blend in their own process. Of a batch, another one may do so, whose crashes render_client.py tells."""
 
 passed_on: dict[int, int] = {}

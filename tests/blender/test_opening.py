@@ -15,7 +15,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon import child_process
-from viewcam_addon.blender import opening, versions
+from viewcam_addon.blender import dataset_cameras, opening, versions
 from viewcam_addon.blender.batch.renderer import BlenderRenderer
 from viewcam_addon.blender.rendering import job
 from viewcam_addon.errors import InputError, NotModelledError
@@ -46,6 +46,7 @@ COMMANDS = {
     "check": lambda blend, out, trust: told(
         job.export_and_render(job.Request(blend, frame=2, trust=trust, level="direct", samples=1), [out / "b.exr"]).ledger
     ),
+    "audit": lambda blend, out, trust: list(dataset_cameras.of_pictures(["2"], blend, trust)[0].notes),
 }
 
 

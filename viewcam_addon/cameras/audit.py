@@ -411,8 +411,9 @@ class Verdict:
     """What the evidence says.
 
     kind : a Mistake's, "none" if the cameras are right, "unknown" if they are wrong in no known way, "unsure" if the evidence
-    is too little. sentence : for people. others : kinds that explain it as well. error, error_as_is : the usual error with the
-    mistake undone and with the cameras as they are. certainty : log likelihood over the cameras as they are.
+    is too little. sentence : for people. others : kinds that explain it as well; of right cameras, those that the evidence is
+    too little to exclude. error, error_as_is : the usual error with the mistake undone and with the cameras as they are.
+    certainty : log likelihood over the cameras as they are; of right ones, theirs over that of the likeliest mistake.
     """
 
     kind: str
@@ -450,9 +451,16 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
     shown = {"error": error, "error_as_is": error_as_is, "certainty": certainty, "observations": len(as_is)}
     if certainty < _SURE:
         if error_as_is <= evidence.plausible:
-            return Verdict(
-                "none", f"nothing is wrong with the cameras: the evidence fits to {error_as_is:.2g} {evidence.unit}", **shown
-            )
+            sentence = f"nothing is wrong with the cameras: the evidence fits to {error_as_is:.2g} {evidence.unit}"
+            over = [
+                (max(float(cost - costs[0]), 0.0), mistake.kind)
+                for mistake, cost, each in zip(tried, costs[1:], errors, strict=True)
+                if _differ(each, as_is, evidence)
+            ]
+            possible = tuple(dict.fromkeys(kind for sure, kind in over if sure < _SURE))
+            if possible:
+                sentence += f"; it is too little to exclude: {', '.join(possible)}"
+            return Verdict("none", sentence, possible, **shown | {"certainty": min(over)[0] if over else 0.0})
         return Verdict(
             "unknown",
             f"something is wrong, in no way that is known: the evidence is off by {error_as_is:.3g} {evidence.unit}",
@@ -477,6 +485,12 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
 def _usual(errors: Array, evidence: "Tracks | Depths") -> float:
     """The largest of the part of the errors that counts; behind the camera they are infinite."""
     return float(np.sort(errors)[int(evidence.part * (len(errors) - 1))])
+
+
+def _differ(errors: Array, others: Array, evidence: "Tracks | Depths") -> bool:
+    """Whether there was something to undo: swapped, a principal point in the middle of a square is as it was."""
+    with np.errstate(invalid="ignore"):
+        return bool((np.abs(errors - others) > evidence.floor).any())
 
 
 def _left_out(views: Views, evidence: Tracks) -> list[Mistake]:

@@ -1,4 +1,5 @@
-"""`viewcam audit`: what is wrong with a dataset's cameras, by points, depth maps or true cameras (cameras/audit.py)."""
+"""`viewcam audit`: what is wrong with a dataset's cameras, by points, depth maps, true cameras or the .blend that was
+rendered (cameras/audit.py)."""
 
 import argparse
 import dataclasses
@@ -12,7 +13,7 @@ from ..cameras.audit import Depths, Tracks, audit, tracks_through
 from ..cameras.evidence import depths, tracks
 from ..errors import InputError
 from ..terminal import say, silent_libraries
-from . import Result
+from . import Result, blender_room
 
 
 def run(options: argparse.Namespace) -> Result:
@@ -22,7 +23,7 @@ def run(options: argparse.Namespace) -> Result:
         found, evidence, by = _evidence(options, found, taken)
     verdict = audit(found, evidence)
     say(f"{options.dataset}: {verdict.sentence}")
-    if verdict.kind not in ("none", "unsure"):
+    if verdict.kind != "unsure":
         say(f"Sure to e^{verdict.certainty:.0f} : 1 by {verdict.observations} observations of {by}")
     result: dict[str, Any] = {"dataset": str(options.dataset), "evidence": by, **dataclasses.asdict(verdict)}
     return (0 if verdict.kind in ("none", "unsure") else 1), result
@@ -32,19 +33,26 @@ def _evidence(
     options: argparse.Namespace, found: Sequence[Camera], taken: Options
 ) -> tuple[Sequence[Camera], Tracks | Depths, str]:
     """The cameras that there is evidence on, the evidence, and what it is."""
-    if options.against:
-        true = {_called(camera): camera for camera in cameras.read(options.against, options=taken)}
+    if given := options.against or options.blend:
+        if options.blend:
+            names = [_called(camera) for camera in found]
+            read = blender_room("dataset_cameras").of_pictures(names, options.blend, options.trust)
+            for note in read[0].notes:
+                options.events.tell("note", command=options.command, text=note)
+        else:
+            read = cameras.read(options.against, options=taken)
+        true = {_called(camera): camera for camera in read}
         both = [camera for camera in found if _called(camera) in true]
         if not both:
-            raise InputError(f"{options.against} names none of the pictures of {options.dataset}: give the same names")
-        return both, tracks_through([true[_called(camera)] for camera in both]), str(options.against)
+            raise InputError(f"{given} names none of the pictures of {options.dataset}: give the same names")
+        return both, tracks_through([true[_called(camera)] for camera in both]), str(given)
     if points := tracks(options.points or options.dataset, found):
         return found, points, "points"
     if options.points is None and (maps := depths(options.dataset, found)):
         return found, maps, "depth maps"
     raise InputError(
         f"{options.points or options.dataset} has no points with tracks and no depth maps: "
-        "give a COLMAP model with --points, or true cameras with --against"
+        "give a COLMAP model with --points, true cameras with --against, or the .blend that was rendered with --blend"
     )
 
 

@@ -1,0 +1,81 @@
+"""An audit by the .blend that rendered a dataset: its cameras by name, or by the frames that end the pictures' names."""
+
+import dataclasses
+import json
+
+import bpy
+import numpy as np
+import pytest
+
+from viewcam_addon import cameras as formats
+from viewcam_addon import cli
+from viewcam_addon.blender import camera as cameras
+from viewcam_addon.blender import dataset_cameras
+from viewcam_addon.cameras import Camera
+from viewcam_addon.errors import InputError
+
+COUNT = 6
+
+
+@pytest.fixture
+def flight(scene, camera_object, tmp_path):
+    """A .blend whose camera flies, shifted, for six frames, and its cameras as its pictures are called."""
+    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 640, 360, 50
+    camera_object.data.shift_x, camera_object.data.shift_y = 0.05, -0.02
+    for frame in range(1, COUNT + 1):
+        camera_object.location = (frame, -6 + 0.4 * frame, 3 + 0.1 * frame)
+        camera_object.rotation_euler = (1.1, 0.02 * frame, 0.15 * frame)
+        camera_object.keyframe_insert("location", frame=frame)
+        camera_object.keyframe_insert("rotation_euler", frame=frame)
+    found = []
+    for frame in range(1, COUNT + 1):
+        scene.frame_set(frame)
+        found.append(Camera(f"{frame}", cameras.read(camera_object, scene), image=f"images/{frame:04d}.png"))
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "flight.blend"))
+    return tmp_path / "flight.blend", found
+
+
+def audited(folder, blend, capsys):
+    status = cli.main(["audit", str(folder / "transforms.json"), "--blend", str(blend)])
+    return status, capsys.readouterr()
+
+
+def test_cameras_of_the_frames_that_their_pictures_are_called_by_are_right(flight, tmp_path, capsys):
+    blend, found = flight
+    formats.save(found, tmp_path / "transforms.json", "transforms")
+    status, told = audited(tmp_path, blend, capsys)
+    assert status == 0 and "nothing is wrong" in told.out and f"by {60 * COUNT} observations of {blend}" in told.out
+
+
+def test_a_mistake_is_named_by_the_blend_alone(flight, tmp_path, capsys):
+    blend, found = flight
+    whole = [
+        dataclasses.replace(camera, pinhole=camera.pinhole.resized(640, 360)) for camera in found
+    ]  # the resolution percentage was ignored
+    formats.save(whole, tmp_path / "transforms.json", "transforms")
+    status, told = audited(tmp_path, blend, capsys)
+    assert status == 1 and "resolution percentage: times 1/2 is right" in told.out
+    document = json.loads(formats.write(found, "transforms"))
+    for frame in document["frames"]:
+        frame["transform_matrix"] = np.linalg.inv(frame["transform_matrix"]).tolist()
+    (tmp_path / "transforms.json").write_text(json.dumps(document))
+    status, told = audited(tmp_path, blend, capsys)
+    assert status == 1 and "world to camera" in told.out
+
+
+def test_pictures_that_are_called_as_cameras_are_theirs(scene, add_camera, tmp_path):
+    for number, name in enumerate(("left", "right", "other")):
+        add_camera(name).location = (number, -5, 2)
+    bpy.context.view_layer.update()
+    wanted = {each.name: cameras.read(each, scene) for each in scene.objects}
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    found = dataset_cameras.of_pictures(["right", "none", "left"], tmp_path / "a.blend")
+    assert {camera.name: camera.pinhole for camera in found} == {name: wanted[name] for name in ("right", "left")}
+
+
+def test_a_blend_that_does_not_tell_which_camera_took_a_picture_is_refused(camera_object, tmp_path):
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    with pytest.raises(InputError, match="stands still; give the true cameras with --against"):
+        dataset_cameras.of_pictures(["r_1", "r_2"], tmp_path / "a.blend")
+    with pytest.raises(InputError, match="called otherwise"):
+        dataset_cameras.of_pictures(["left"], tmp_path / "a.blend")
