@@ -1,8 +1,11 @@
 """A batch's renderer: the shot's camera and settings, the same bytes each time, and a scene that is as before."""
 
+import itertools
 import json
 import math
 import struct
+import threading
+import time
 from dataclasses import replace
 
 import pytest
@@ -386,3 +389,24 @@ def test_eevee_draws_the_same_whatever_it_drew_before_or_is_refused(stage, shoot
         first, other, again = (shoot(renderer, shot) for shot in (there, away, there))
     assert first == again and first[1] != other[1]
     assert first[0]["rendered"] | {"engine": "EEVEE", "samples": 2, "seed": None} == first[0]["rendered"]
+
+
+def test_blender_lets_other_threads_run_while_it_opens_a_file(fresh_blender, scene, tmp_path):
+    """So that a heartbeat is heard in a load of any length: no gap between a thread's turns is half as long as the load."""
+    for number in range(1000):
+        scene.collection.objects.link(bpy.data.objects.new(str(number), bpy.data.meshes.new(str(number))))
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "many.blend"))
+    turns, opened = [time.monotonic()], threading.Event()
+
+    def take_turns():
+        while not opened.wait(0.01):
+            turns.append(time.monotonic())
+
+    thread = threading.Thread(target=take_turns)
+    thread.start()
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "many.blend"))
+    opened.set()
+    thread.join()
+    turns.append(time.monotonic())
+    longest, whole = max(b - a for a, b in itertools.pairwise(turns)), turns[-1] - turns[0]
+    assert longest < whole / 2, f"of {whole:.2f} s of a load no other thread had a turn for {longest:.2f} s"
