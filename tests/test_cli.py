@@ -321,6 +321,7 @@ def test_where_nothing_can_be_written_one_line_says_so_and_nothing_is_left(tmp_p
         (["demo", "--report", "OUT"], "report"),
         (["batch", "a.blend", "--orbit", "3", "--out", "folder", "--json", "OUT"], "json"),
         (["check", "a.blend", "--json", "OUT"], "json"),
+        (["check", "a.blend", "--junit", "OUT"], "junit"),
     ],
 )
 def test_what_can_not_be_written_is_said_before_anything_is_traced_or_rendered(tmp_path, capfd, monkeypatch, words, output):

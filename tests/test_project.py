@@ -31,6 +31,7 @@ ROOMS = {
     "events": "terminal",
     "argument_types": "",
     "html_page": "errors",
+    "junit": "checks files",
     "child_process": "errors events",
     "crashes": "",
     "exact": "",
@@ -48,6 +49,7 @@ ROOMS = {
     "comparison": "errors files html_page pinhole image",
     "tracer": "errors checks memory files pinhole image",
     "api": "errors child_process image comparison tracer",
+    "pytest_plugin": "errors junit api",
     "shots": "errors checks files terminal pinhole moves tracer",
     "batch": "errors checks files events html_page child_process pinhole image cameras datasets comparison tracer shots",
     "blender": (
@@ -57,7 +59,7 @@ ROOMS = {
     "commands": (
         "errors terminal argument_types events crashes child_process pinhole image cameras comparison tracer api shots batch"
     ),
-    "cli": "errors checks files events argument_types tracer commands",
+    "cli": "errors checks files junit events argument_types tracer commands",
 }
 BLENDER_ROOMS = {
     "versions": "",

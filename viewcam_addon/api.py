@@ -118,9 +118,10 @@ def compare(
 
 @dataclass(frozen=True)
 class Check:
-    """What `check` has found.
+    """What `check` has found, or a comparison of files.
 
-    passed : whether Cycles renders the camera. sentence : by how much. figures : all that --json writes.
+    passed : whether Cycles renders the camera, or the pictures are the same. sentence : by how much. figures : all that --json
+    writes.
     """
 
     passed: bool
@@ -138,12 +139,17 @@ def check(blend: File, *options: File) -> Check:
     InputError
         as the command does: no Blender, no such file or camera, no such option.
     """
+    return run("check", blend, *options)
+
+
+def run(command: str, *words: File) -> Check:
+    """What `viewcam check` or `viewcam compare` finds, in a process of its own; raises as `check` does."""
     with tempfile.TemporaryDirectory(prefix="viewcam-") as folder:
-        result = Path(folder) / "check.json"
-        words, errors = [str(option) for option in (blend, *options, "--json", result)], _Errors()
-        status = child_process.run_viewcam("check", *words, tell_on=errors, apart_from=child_process.blender_scripts())
+        result, errors = Path(folder) / "result.json", _Errors()
+        given = [str(word) for word in (*words, "--json", result)]
+        status = child_process.run_viewcam(command, *given, tell_on=errors, apart_from=child_process.blender_scripts())
         if status not in (0, 1):
-            raise InputError(errors.last or f"viewcam check ended with status {status} and without a word")
+            raise InputError(errors.last or f"viewcam {command} ended with status {status} and without a word")
         figures = json.loads(result.read_text(encoding="utf-8"))
     return Check(status == 0, figures["sentence"], figures)
 

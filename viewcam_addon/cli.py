@@ -46,9 +46,9 @@ def main(arguments: Sequence[str] | None = None, blend_is_open: bool = False, en
             status, result = _outcome(options)
         else:
             status, result = _told(options, InputError.exit_status, _crash(options, ended_by))
-        if options.json and result:
-            status = _write_json(options, {"exit_status": status, **result}) or status
         seconds = round(time.monotonic() - started, 3)
+        if result:
+            status = _write_result(options, status, {"exit_status": status, **result}, seconds) or status
         options.events.tell("finished", command=options.command, exit_status=status, seconds=seconds)
     return status
 
@@ -161,6 +161,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     def report(added: argparse.ArgumentParser) -> None:
         added.add_argument("--report", metavar="DIR", type=Path, help="write an HTML report there")
         added.add_argument("--difference", metavar="FILE.png", type=types.png, help="draw there what differs, pixel by pixel")
+        added.add_argument("--junit", metavar="FILE.xml", type=Path, help="write the result as a test's, for CI systems")
         added.set_defaults(writes=("report", "difference"))
         added.add_argument("--sides", type=Path, help=argparse.SUPPRESS)  # a folder for both sides as pictures
         added.add_argument("--repeat", help=argparse.SUPPRESS)  # what the report shall name as its command
@@ -213,6 +214,8 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         blend(added)
         scene_choices(added)
         error(added, "the tracer takes")
+        against = "the scene that Cycles must show, as viewcam export wrote it (default: what the file holds now)"
+        added.add_argument("--scene", metavar="SCENE.json", type=Path, help=against)
         report(added)
 
     @command("batch", "Render many shots of one file: opened once, each written whole, and continued after whatever ended it.")
@@ -252,7 +255,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         added.set_defaults(
             blend=verification.DEMO_SCENE, camera=None, frame=None, size=None, strict=False, recenter=False, clay=False
         )
-        added.set_defaults(difference=None, sides=None, repeat=None, trust=False, writes=("report",))
+        added.set_defaults(difference=None, sides=None, repeat=None, scene=None, trust=False, writes=("report",))
         light(added)
         error(added, "the tracer takes")
         added.add_argument(
@@ -303,12 +306,13 @@ def _outcome(options: argparse.Namespace) -> Result:
 
 def _check_outputs(options: argparse.Namespace) -> None:
     """Raise InputError for what can't be written, before anything is traced or rendered."""
-    if options.json:
-        try:
-            _check_output(options.json, is_text=not options.log_json)
-        except InputError:
-            options.json = None  # where this error would be told as well
-            raise
+    for name in ("json", "junit"):
+        if path := getattr(options, name, None):
+            try:
+                _check_output(path, is_text=not options.log_json)
+            except InputError:
+                setattr(options, name, None)  # where this error would be told as well
+                raise
     for name in options.writes:
         if path := getattr(options, name):
             _check_output(path / "index.html" if name == "report" else path, is_text=False)
@@ -327,13 +331,16 @@ def _told(options: argparse.Namespace, status: int, sentence: str, problems: Seq
     return status, {"error": sentence, **several}
 
 
-def _write_json(options: argparse.Namespace, result: dict[str, Any]) -> int:
-    """Write the result; the exit status if that fails, else 0."""
-    from . import checks
+def _write_result(options: argparse.Namespace, status: int, result: dict[str, Any], seconds: float) -> int:
+    """Write the result where that was asked for; the exit status if that fails, else 0."""
+    from . import checks, junit
 
     try:
-        with written_whole(options.json) as temporary:
-            temporary.write_text(json.dumps(checks.for_json(result), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        if options.json:
+            with written_whole(options.json) as temporary:
+                temporary.write_text(json.dumps(checks.for_json(result), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        if path := getattr(options, "junit", None):
+            junit.write(path, options.words, status, result, seconds)
     except InputError as error:
         return _told(options, error.exit_status, str(error))[0]
     return 0

@@ -8,7 +8,7 @@ Rejected: a copy of the scene to change freely (rigid bodies, caches and drivers
 """
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from typing import Any, TypeVar
 
 import bpy
@@ -98,13 +98,16 @@ def cameras_unbound(overrides: Overrides, scene: bpy.types.Scene) -> None:
 
 
 @contextlib.contextmanager
-def numbered_indices() -> Iterator[None]:
+def numbered_indices(kinds: Collection[str] = ("objects", "materials")) -> Iterator[None]:
     """Number the file's objects from 1, and its materials, where all of them have the index 0, for the index passes.
+
+    kinds : which of the two.
 
     As soon as one of them carries a number its artist has a use for them, and they stay. Rejected: `foreach_set`, which passes
     over what is linked from a library.
     """
-    blank = [blocks for blocks in (bpy.data.objects, bpy.data.materials) if not any(block.pass_index for block in blocks)]
+    named = [getattr(bpy.data, kind) for kind in kinds]
+    blank = [blocks for blocks in named if not any(block.pass_index for block in blocks)]
     try:
         for blocks in blank:
             for number, block in enumerate(blocks):

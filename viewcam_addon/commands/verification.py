@@ -8,6 +8,7 @@ to test.
 
 import argparse
 import dataclasses
+import json
 import tempfile
 import time
 from collections.abc import Sequence
@@ -97,18 +98,22 @@ def check(options: argparse.Namespace) -> Result:
         scene, reference = folder / "scene.json", folder / "reference.exr"
         count = seeds(options.level, options.samples)
         tests = [folder / f"cycles-{i + 1}.exr" for i in range(count)] if count > 1 else [folder / "cycles.exr"]
-        level = _export_and_render(options, scene, tests)
+        numbered = {} if options.scene is None else {"numbered": _numbered(options.scene)}
+        level = _export_and_render(options, scene, tests, **numbered)
+        size = []
+        if options.scene:
+            scene, size = options.scene, ["--size", "x".join(map(str, options.size))] if options.size else []
         threads = ["--threads", str(options.threads)] if options.threads else []
         spent = ["--error", str(options.error)] if options.error else ["--samples", str(options.samples)]
         light = ["--level", level, *spent, "--seed", str(options.seed)]
         tell_on = options.events if options.log_json else None
         options.events.tell("step", name="tracing")
-        status = run_viewcam("render", scene, reference, *light, *threads, tell_on=tell_on)
+        status = run_viewcam("render", scene, reference, *light, *size, *threads, tell_on=tell_on)
         if status:
             return status, {"error": "the reference could not be traced"}
         outputs = [
             word
-            for flag in ("json", "report", "difference", "sides")
+            for flag in ("report", "difference", "sides")
             if (to := getattr(options, flag))
             for word in (f"--{flag}", str(to))
         ]
@@ -116,8 +121,10 @@ def check(options: argparse.Namespace) -> Result:
         if level == "geometry":
             tests = tests[:1]
         options.events.tell("step", name="comparing")
-        # The child has written the JSON: there is nothing to add.
-        return run_viewcam("compare", reference, *tests, "--scene", scene, *threads, *outputs, tell_on=tell_on), {}
+        result = Path(temporary) / "result.json"
+        outputs += ["--json", str(result)]
+        status = run_viewcam("compare", reference, *tests, "--scene", scene, *threads, *outputs, tell_on=tell_on)
+        return status, json.loads(result.read_bytes()) if result.exists() else {"error": "the pictures could not be compared"}
 
 
 def demo(options: argparse.Namespace) -> Result:
@@ -127,10 +134,22 @@ def demo(options: argparse.Namespace) -> Result:
     return check(options)
 
 
-def _export_and_render(options: argparse.Namespace, scene_path: Path, image_paths: Sequence[Path]) -> str:
+def _numbered(scene_path: Path) -> tuple[str, ...]:
+    """What of a .blend must be numbered for its picture to be this scene's: what has numbers there."""
+    from ..tracer.scene import scene_file
+
+    objects = scene_file.read(scene_path).objects
+    has_numbers = {
+        "objects": any(placed.object_index for placed in objects),
+        "materials": any(any(placed.material_indices) for placed in objects),
+    }
+    return tuple(kind for kind, has in has_numbers.items() if has)
+
+
+def _export_and_render(options: argparse.Namespace, scene_path: Path, image_paths: Sequence[Path], **more: Any) -> str:
     """What of a check needs Blender: both sides from one evaluated state, under one numbering of the indices.
 
-    Returns the level, the least one where that is asked for.
+    more : of the request. Returns the level, the least one where that is asked for.
     """
     from ..tracer.scene import scene_file
 
@@ -140,7 +159,7 @@ def _export_and_render(options: argparse.Namespace, scene_path: Path, image_path
         options.events.tell("step", name="rendering", number=number, of=len(image_paths))
 
     with silent_libraries():
-        scene = blender_room("rendering.job").export_and_render(_request(options), image_paths, rendering)
+        scene = blender_room("rendering.job").export_and_render(_request(options, **more), image_paths, rendering)
     scene_file.write(scene, scene_path)
     say(f"exported and rendered with Cycles in {time.perf_counter() - started:.1f} s")
     return _told_level(scene)["level"] if options.level == "auto" else options.level
@@ -155,7 +174,7 @@ def _told_level(scene: Any) -> dict[str, str]:
     return {"level": level, "reason": reason}
 
 
-def _request(options: argparse.Namespace) -> Any:
+def _request(options: argparse.Namespace, **more: Any) -> Any:
     return blender_room("rendering.job").Request(
         blend=options.blend,
         camera=options.camera,
@@ -169,6 +188,7 @@ def _request(options: argparse.Namespace) -> Any:
         seed=options.seed,
         clay=options.clay,
         trust=options.trust,
+        **more,
     )
 
 

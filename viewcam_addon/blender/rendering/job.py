@@ -35,8 +35,8 @@ class Request:
 
     recenter : whether both sides see the scene with its origin at the eye. level : one of film.LEVELS, or "auto" for the least
     that models all light of the scene (levels.py). samples : a pixel, of all of Cycles' pictures together, from level `direct`
-    on. clay : whether one and the same material covers all surfaces. trust : whether
-    what is in the file may run and write (opening.py).
+    on. clay : whether one and the same material covers all surfaces. trust : whether what is in the file may run and write
+    (opening.py). numbered : what `export_and_render` numbers for the index passes where the file does not: objects, materials.
     """
 
     blend: str | os.PathLike[str] | None = None
@@ -51,6 +51,7 @@ class Request:
     seed: int = 0
     clay: bool = False
     trust: bool = False
+    numbered: tuple[str, ...] = ("objects", "materials")
 
 
 @dataclass(frozen=True)
@@ -119,7 +120,7 @@ def export_and_render(
     paths : for several pictures of Cycles, which share the samples; their seeds count from that of the request. rendering : is
     told of each, by its number from 1 on, before it is rendered.
     """
-    with _stage(request) as stage, numbered_indices(), _seen_from(stage, request) as stage:
+    with _stage(request) as stage, numbered_indices(request.numbered), _seen_from(stage, request) as stage:
         scene = _export(stage, request)
         _render(stage, request, paths, Lighting(scene.lamps, scene.world, scene.film, scene.bounces), rendering)
         return scene
