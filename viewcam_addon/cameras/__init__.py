@@ -154,7 +154,8 @@ def read(given: str | Path, *, format: str | None = None, options: Options | Non
     if not cameras:
         raise InputError(f"{source.name} holds no camera: give another file")
     told = _told_of_world(source, options)
-    return [_doubted(_unmirrored(moved(camera, options), options)).noted(*told) for camera in cameras]
+    found = [_doubted(_unmirrored(moved(camera, options), options)) for camera in cameras]
+    return [camera.noted(*told) for camera in found] if told else found
 
 
 def recognised(source: str | Path | Source) -> str:

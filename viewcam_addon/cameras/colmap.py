@@ -27,6 +27,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from .. import checks
 from ..errors import InputError
 from ..pinhole import Pinhole, ViewPlane
@@ -99,20 +101,29 @@ def read(source: Source, options: Options) -> list[Camera]:
         ("The folder has the model as text, too: the binary one counts",) if _has(folder, ".txt") and suffix == ".bin" else ()
     )
     planes = {}
-    cameras = []
-    for image, name in zip(images, naming.distinct([image.name for image in images]), strict=True):
+    for image in images:
         if image.camera not in intrinsic:
             raise InputError(f"{folder}: image {checks.shown(image.name)} is of camera {image.camera}, which is not there")
         if image.camera not in planes:
             planes[image.camera] = _plane(intrinsic[image.camera], f"camera {image.camera}", options)
-        plane, of_lens = planes[image.camera]
-        what = f"image {checks.shown(image.name)}"
-        matrix = axes.from_world_to_camera(axes.rotation_of(image.quaternion, what), image.translation, what)
-        pinhole, more = axes.pinhole(matrix, plane, what)
-        if same := own.restored(exact.get(image.number), lambda p: _is_written_as(p, image, intrinsic)):  # noqa: B023
+    found = zip(images, naming.distinct([image.name for image in images]), _poses(images, planes), strict=True)
+    cameras = []
+    for image, name, (pinhole, more) in found:
+        if (same := own.stated(exact.get(image.number))) and _is_written_as(same, image, intrinsic[image.camera]):
             pinhole, more = same, ()
-        cameras.append(Camera(name, pinhole, True, (*notes, *of_lens, *more), image.name))
+        cameras.append(Camera(name, pinhole, True, (*notes, *planes[image.camera][1], *more), image.name))
     return cameras
+
+
+def _poses(images: Sequence[_Image], planes: dict) -> list[tuple[Pinhole, tuple[str, ...]]]:
+    whats = [f"image {checks.shown(image.name)}" for image in images]
+    numbers = [
+        checks.vector(f"the pose of {what}", (*image.quaternion, *image.translation), 7)
+        for image, what in zip(images, whats, strict=True)
+    ]
+    poses = np.array(numbers).reshape(-1, 7)
+    matrices = axes.from_worlds_to_cameras(axes.rotations_of(poses[:, :4], whats), poses[:, 4:])
+    return axes.pinholes(matrices, [planes[image.camera][0] for image in images], whats)
 
 
 def _model(source: Source) -> tuple[Path, str] | None:
@@ -218,15 +229,10 @@ def _exact(source: Source) -> dict[int, object]:
     return found
 
 
-def _is_written_as(pinhole: Pinhole, image: _Image, intrinsic: dict[int, _Intrinsics]) -> bool:
-    if pinhole.mirrored:
+def _is_written_as(pinhole: Pinhole, image: _Image, intrinsic: _Intrinsics) -> bool:
+    if pinhole.mirrored or intrinsics_of(pinhole) != intrinsic:
         return False
-    model, width, height, *parameters = _camera(pinhole).split()
-    plane = _Intrinsics(model, int(width), int(height), tuple(map(float, parameters)))
-    return plane == intrinsic[image.camera] and tuple(map(float, _pose(pinhole).split())) == (
-        *image.quaternion,
-        *image.translation,
-    )
+    return pose_of(pinhole) == (*image.quaternion, *image.translation)
 
 
 def _id(word: str, place: str) -> int:
@@ -315,7 +321,7 @@ def texts(cameras: Iterable[Camera]) -> dict[str, str]:
     for number, camera in enumerate(cameras, start=1):
         exact.append(f"# virtual_pinhole {number} {json.dumps(own.document(camera.pinhole))}\n")
         intrinsic = numbers.setdefault(_camera(camera.pinhole), len(numbers) + 1)
-        images.append(f"{number} {_pose(camera.pinhole)} {intrinsic} {naming.image_of(camera)}\n\n")
+        images.append(f"{number} {_spaced(*pose_of(camera.pinhole))} {intrinsic} {naming.image_of(camera)}\n\n")
     return {
         "images.txt": "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME\n# POINTS2D[] as X Y POINT3D_ID\n"
         + "".join([*exact, *images]),
@@ -325,15 +331,22 @@ def texts(cameras: Iterable[Camera]) -> dict[str, str]:
     }
 
 
-def _camera(pinhole: Pinhole) -> str:
+def intrinsics_of(pinhole: Pinhole) -> _Intrinsics:
+    """What cameras.txt says of a camera."""
     (f_x, _, c_x), (_, f_y, c_y), _ = intrinsics(pinhole)
-    model, focal = ("SIMPLE_PINHOLE", [f_x]) if f_x == f_y else ("PINHOLE", [f_x, f_y])
-    return f"{model} {pinhole.width} {pinhole.height} {_spaced(*focal, c_x, c_y)}"
+    model, focal = ("SIMPLE_PINHOLE", (f_x,)) if f_x == f_y else ("PINHOLE", (f_x, f_y))
+    return _Intrinsics(model, pinhole.width, pinhole.height, (*focal, c_x, c_y))
 
 
-def _pose(pinhole: Pinhole) -> str:
+def _camera(pinhole: Pinhole) -> str:
+    model, width, height, parameters = intrinsics_of(pinhole)
+    return f"{model} {width} {height} {_spaced(*parameters)}"
+
+
+def pose_of(pinhole: Pinhole) -> tuple[float, ...]:
+    """What images.txt says of it: the quaternion, w first, and the translation."""
     *rows, _ = world_to_camera(pinhole)
-    return _spaced(*quaternion(rows), *(row[3] for row in rows))
+    return (*quaternion(rows), *(row[3] for row in rows))
 
 
 def _spaced(*numbers: float) -> str:

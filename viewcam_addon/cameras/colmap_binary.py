@@ -4,9 +4,8 @@ import struct
 from collections.abc import Sequence
 
 from . import naming
-from .axes import intrinsics, quaternion, world_to_camera
 from .camera import Camera, Options
-from .colmap import MODELS, check_names
+from .colmap import MODELS, check_names, intrinsics_of, pose_of
 
 TITLE = "COLMAP model, binary"
 SUFFIX = ""
@@ -19,8 +18,7 @@ def write(cameras: Sequence[Camera], _options: Options) -> dict[str, bytes]:
     images = [struct.pack("<Q", len(cameras))]
     for number, camera in enumerate(cameras, start=1):
         intrinsic = numbers.setdefault(_intrinsics(camera), len(numbers) + 1)
-        *rows, _ = world_to_camera(camera.pinhole)
-        images.append(struct.pack("<I7dI", number, *quaternion(rows), *(row[3] for row in rows), intrinsic))
+        images.append(struct.pack("<I7dI", number, *pose_of(camera.pinhole), intrinsic))
         images.append(naming.image_of(camera).encode("utf-8") + b"\0" + struct.pack("<Q", 0))
     return {
         "images.bin": b"".join(images),
@@ -30,8 +28,5 @@ def write(cameras: Sequence[Camera], _options: Options) -> dict[str, bytes]:
 
 
 def _intrinsics(camera: Camera) -> bytes:
-    (f_x, _, c_x), (_, f_y, c_y), _ = intrinsics(camera.pinhole)
-    model, focal = ("SIMPLE_PINHOLE", (f_x,)) if f_x == f_y else ("PINHOLE", (f_x, f_y))
-    parameters = (*focal, c_x, c_y)
-    size = (camera.pinhole.width, camera.pinhole.height)
-    return struct.pack(f"<iQQ{len(parameters)}d", MODELS[model][0], *size, *parameters)
+    model, width, height, parameters = intrinsics_of(camera.pinhole)
+    return struct.pack(f"<iQQ{len(parameters)}d", MODELS[model][0], width, height, *parameters)

@@ -14,7 +14,7 @@ Rejected: skipping words that are not understood, since one of them may turn the
 import json
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from .. import checks
 from ..errors import InputError
@@ -112,16 +112,14 @@ def document(pinhole: Pinhole) -> dict:
     return document
 
 
-def restored(said: object, is_same: Callable[[Pinhole], bool]) -> Pinhole | None:
-    """The camera whose values stand as a `document` beside a matrix that was made of them, which holds fewer of their digits.
-
-    is_same : whether that camera is written as the matrix that stands there: if somebody changed it, the matrix counts.
+def stated(said: object) -> Pinhole | None:
+    """The camera whose values stand as a `document` beside a matrix that was made of them, which holds fewer of their digits;
+    None if they make none. It counts only while it is written as that matrix: if somebody changed that, the matrix counts.
     """
     if not isinstance(said, dict):
         return None
     try:
-        pinhole = Pinhole(**said)
-        return pinhole if is_same(pinhole) else None
+        return Pinhole(**said)
     except (InputError, TypeError):
         return None
 

@@ -38,21 +38,22 @@ def read(source: Source, options: Options) -> list[Camera]:
     if kind == "EuRoC":
         mounted, plane, notes = _sensor(source, options)
     plane = options.view_plane or plane or options.plane_or_refuse(source.name)
-    digits = max(4, len(str(len(rows) - 1)))
     stated = kind == "EuRoC" and options.view_plane is None
-    cameras = []
-    for index, row in enumerate(rows):
-        what = f"pose {index}"
-        matrix, time = np.eye(4), index * _KITTI_STEP
-        if kind == "KITTI":
-            matrix[:3] = np.array(row).reshape(3, 4)
-        else:
-            x, y, z, w = row[4:8] if kind == "TUM" else (*row[5:8], row[4])
-            matrix[:3, :3], matrix[:3, 3] = axes.rotation_of((w, x, y, z), what), row[1:4]
-            time = row[0] if kind == "TUM" else row[0] * 1e-9
-        pinhole, more = axes.pinhole(axes.of_opencv(matrix @ mounted), plane, what)
-        cameras.append(Camera(f"pose_{index:0{digits}d}", pinhole, stated, (*notes, *more), time=time))
-    return cameras
+    whats = [f"pose {index}" for index in range(len(rows))]
+    matrices = np.tile(np.eye(4), (len(rows), 1, 1))
+    if kind == "KITTI":
+        times = np.arange(len(rows)) * _KITTI_STEP
+        matrices[:, :3] = rows[:, :12].reshape(-1, 3, 4)
+    else:
+        times = rows[:, 0] * (1 if kind == "TUM" else 1e-9)
+        quaternions = rows[:, [7, 4, 5, 6] if kind == "TUM" else [4, 5, 6, 7]]  # w x y z
+        matrices[:, :3, :3], matrices[:, :3, 3] = axes.rotations_of(quaternions, whats), rows[:, 1:4]
+    found = axes.pinholes(axes.of_opencv(matrices @ mounted)[:, :3], [plane] * len(rows), whats)
+    digits = max(4, len(str(len(rows) - 1)))
+    return [
+        Camera(f"pose_{index:0{digits}d}", pinhole, stated, (*notes, *more), time=time)
+        for index, ((pinhole, more), time) in enumerate(zip(found, times.tolist(), strict=True))
+    ]
 
 
 def _kind(source: Source) -> str | None:
@@ -71,14 +72,23 @@ def _kind(source: Source) -> str | None:
     return {(8, False): "TUM", (12, False): "KITTI"}.get(*counts) if len(counts) == 1 else None
 
 
-def _rows(source: Source) -> list[tuple[float, ...]]:
-    rows = []
-    for number, line in enumerate(source.text.split("\n"), start=1):
-        if line.strip() and not line.lstrip().startswith("#"):
-            row = flat(f"line {number} of {source.name}", line.strip().rstrip(","))
-            if (rows and len(row) != len(rows[0])) or len(row) < 8:
-                raise InputError(f"line {number} of {source.name} has {len(row)} numbers: a pose has as many as the others")
-            rows.append(row)
+def _rows(source: Source) -> np.ndarray:
+    """(n, 8 or more): the numbers of each line."""
+    lines = [line.strip().rstrip(",") for line in source.text.split("\n")]
+    numbered = [(number, line) for number, line in enumerate(lines, start=1) if line and not line.startswith("#")]
+    try:  # at once, which is twenty times as fast
+        rows = np.loadtxt([line.replace(",", " ") for _, line in numbered], comments=None, ndmin=2)
+    except ValueError:
+        rows = np.zeros((0, 0))
+    if rows.shape[1] < 8 or not np.isfinite(rows).all():
+        read: list[tuple[float, ...]] = []
+        for number, line in numbered:
+            read.append(flat(f"line {number} of {source.name}", line))
+            if len(read[-1]) != len(read[0]) or len(read[-1]) < 8:
+                raise InputError(
+                    f"line {number} of {source.name} has {len(read[-1])} numbers: a pose has as many as the others, at least 8"
+                )
+        rows = np.array(read)
     return rows
 
 

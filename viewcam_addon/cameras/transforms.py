@@ -144,9 +144,11 @@ def _cameras(source: Source, options: Options) -> list[Camera]:
             planes[key] = _plane(both, source, path, options)
         plane, stated, notes = planes[key]
         matrix = _matrix(frame)
-        exact = None if undone else own.restored(frame.get(EXACT), lambda p: _is_written_as(p, matrix, both))  # noqa: B023
-        pinhole, more = axes.pinhole(matrix if undone is None else undone(matrix), plane, frame.place)
-        pinhole, more = (exact, ()) if exact else (pinhole, more)
+        same = None if undone else own.stated(frame.get(EXACT))
+        if same and _is_written_as(same, matrix, both):
+            pinhole, more = same, ()
+        else:
+            pinhole, more = axes.pinhole(matrix if undone is None else undone(matrix), plane, frame.place)
         image = path if naming.has_suffix(path) or "file_path" not in frame else f"{path}.png"
         time = frame.number("time") if "time" in frame else None
         cameras.append(
