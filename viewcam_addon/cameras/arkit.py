@@ -89,12 +89,12 @@ def _record3d(source: Source, options: Options) -> list[Camera]:
     if not isinstance(poses, list) or not poses:
         raise InputError(f"{source.name} has no poses: record it again")
     rate = values.number("fps", 60.0, 1e-3)
-    cameras = []
-    for index, pose in enumerate(poses):
-        what = f"pose {index}"
-        x, y, z, w, *eye = Record({"pose": pose}, what).numbers("pose", 7)
-        matrix = np.eye(4)
-        matrix[:3, :3], matrix[:3, 3] = axes.rotation_of((w, x, y, z), what), eye
-        pinhole, notes = axes.pinhole(matrix, plane, what)
-        cameras.append(Camera(f"pose_{index:04d}", pinhole, True, notes, time=index / rate))
-    return cameras
+    whats = [f"pose {index}" for index in range(len(poses))]
+    numbers = [Record({"pose": pose}, what).numbers("pose", 7) for pose, what in zip(poses, whats, strict=True)]
+    x, y, z, w, *eyes = np.array(numbers).T
+    turns = axes.rotations_of(np.stack([w, x, y, z], axis=-1), whats)
+    matrices = np.concatenate([turns, np.stack(eyes, axis=-1)[:, :, None]], axis=2)
+    return [
+        Camera(f"pose_{index:04d}", pinhole, True, notes, time=index / rate)
+        for index, (pinhole, notes) in enumerate(axes.pinholes(matrices, [plane] * len(poses), whats))
+    ]

@@ -127,9 +127,9 @@ def pinholes(matrices: np.ndarray, planes: Sequence[ViewPlane], whats: Sequence[
         x, y, z = (turn[:, :, i] / lengths[:, i, None] for i in range(3))
         askew = np.max([np.abs((a * b).sum(axis=-1)) for a, b in ((x, y), (x, z), (y, z))], axis=0)
         fine = (np.abs(lengths - 1).max(axis=-1, initial=0.0) < _SCALED) & (askew <= _NOTED)
-    fine &= (np.cross(x, y) * z).sum(axis=-1) > 0
-    at = np.flatnonzero(fine)
-    reach = 2.0 ** np.ceil(np.log2(np.maximum(1.0, _lengths(eye[at]))))
+        fine &= (np.cross(x, y) * z).sum(axis=-1) > 0
+        at = np.flatnonzero(fine & (_lengths(eye) < 1e150))
+        reach = 2.0 ** np.ceil(np.log2(np.maximum(1.0, _lengths(eye[at]))))
     made = Pinhole.of_poses(eye[at], eye[at] - reach[:, None] * z[at], y[at], [planes[i] for i in at.tolist()])
     found = dict(zip(at.tolist(), ((each, ()) for each in made), strict=True))
     return [found.get(i) or pinhole(matrices[i], planes[i], whats[i]) for i in range(len(matrices))]
@@ -209,9 +209,14 @@ def from_world_to_camera(turn: ArrayLike, translation: Sequence[float], what: st
     return of_opencv(matrix)
 
 
-def from_worlds_to_cameras(turns: np.ndarray, translations: np.ndarray) -> np.ndarray:
-    """(n, 3, 4): `from_world_to_camera` of many: of (n, 3, 3) that are known to be rotations, and translations (n, 3)."""
-    eyes = -np.linalg.solve(turns, translations[:, :, None])
+def from_worlds_to_cameras(turns: np.ndarray, translations: np.ndarray, whats: Sequence[str]) -> np.ndarray:
+    """(n, 3, 4): `from_world_to_camera` of many, (n, 3, 3) and (n, 3). Whether they are rotations, `pinholes` asks."""
+    try:
+        eyes = -np.linalg.solve(turns, translations[:, :, None])
+    except np.linalg.LinAlgError:
+        for turn, what in zip(turns, whats, strict=True):
+            rotation(turn.tolist(), what)
+        raise
     return of_opencv(np.concatenate([turns.swapaxes(1, 2), eyes], axis=2))
 
 

@@ -6,16 +6,16 @@ length of 0 marks a picture that was not placed.
 Source: Bundler's README.md.
 """
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from ..errors import InputError
 from . import axes, distortion, naming
 from .camera import Camera, Options
-from .source import Source, flat, image_size
+from .source import Source, flat, image_size, numbered_lines, table
 
 TITLE = "Bundler"
+
+_OPENCV = np.array([1.0, -1.0, -1.0])
 
 
 def recognises(source: Source) -> bool:
@@ -23,44 +23,38 @@ def recognises(source: Source) -> bool:
 
 
 def read(source: Source, options: Options) -> list[Camera]:
-    lines = _numbers(source)
-    header = next(lines, ())
+    lines = numbered_lines(source)
+    header = flat(f"the beginning of {source.name}", lines[0][1]) if lines else ()
     if len(header) != 2 or not header[0].is_integer() or header[0] < 0:
         raise InputError(f"{source.name} does not begin with the number of its cameras and points: export it again")
-    blocks = []
-    for index in range(int(header[0])):
-        block = [next(lines, ()) for _ in range(5)]
-        if [len(line) for line in block] != [3] * 5:
-            raise InputError(f"camera {index} of {source.name} is not f k1 k2, three rows of R and t: export it again")
-        blocks.append(block)
+    count = int(header[0])
+    rows = table(source.name, lines[1 : 1 + 5 * count])
+    if rows.shape != (5 * count, 3) and count:
+        raise InputError(f"{source.name} has not {count} cameras of f k1 k2, three rows of R and t each: export it again")
+    blocks = rows.reshape(-1, 5, 3)
     listed = source.file("list.txt")
     paths = [line.split()[0] for line in listed.text.split("\n") if line.split()] if listed else []
     paths = paths if len(paths) == len(blocks) else [f"camera {index}" for index in range(len(blocks))]
-    cameras, lost = [], 0
-    for block, path, name in zip(blocks, paths, naming.distinct(paths), strict=True):
-        (f, k1, k2), *turn, translation = block
-        if f == 0:
-            lost += 1
-            continue
+    names = naming.distinct(paths)
+    placed = [index for index, (f, _, _) in enumerate(blocks[:, 0].tolist()) if f]
+    turns, translations = blocks[placed, 1:4] * _OPENCV[:, None], blocks[placed, 4] * _OPENCV
+    matrices = axes.from_worlds_to_cameras(turns, translations, [names[index] for index in placed])
+    planes, told = [], []
+    for index in placed:
+        f, k1, k2 = blocks[index, 0].tolist()
         if f < 0:
-            raise InputError(f"{name} of {source.name} has the focal length {f:g}: give one above 0")
-        size = image_size(source.path.parent / path) if source.path else None
-        width, height = size or options.size_or_refuse(name)
-        plane = axes.view_plane(f, f, width / 2, height / 2, (width, height))
+            raise InputError(f"{names[index]} of {source.name} has the focal length {f:g}: give one above 0")
+        size = image_size(source.path.parent / paths[index]) if source.path else None
+        width, height = size or options.size_or_refuse(names[index])
+        planes.append(axes.view_plane(f, f, width / 2, height / 2, (width, height)))
         lens = {"k1": k1, "k2": k2}
-        notes = distortion.settle(lens, distortion.opencv(lens), plane, name, options)
-        turn = np.array(turn)
-        turn[1:] *= -1  # from its axes to OpenCV's
-        matrix = axes.from_world_to_camera(turn, (translation[0], -translation[1], -translation[2]), name)
-        pinhole, more = axes.pinhole(matrix, plane, name)
-        image = path if naming.has_suffix(path) else None
-        cameras.append(Camera(name, pinhole, size is not None, (*notes, *more), image))
+        told.append((size is not None, distortion.settle(lens, distortion.opencv(lens), planes[-1], names[index], options)))
+    found = zip(placed, told, axes.pinholes(matrices, planes, [names[index] for index in placed]), strict=True)
+    cameras = [
+        Camera(names[index], pinhole, stated, (*notes, *more), paths[index] if naming.has_suffix(paths[index]) else None)
+        for index, (stated, notes), (pinhole, more) in found
+    ]
+    lost = len(blocks) - len(cameras)
     if lost and not cameras:
         raise InputError(f"none of the {lost} cameras of {source.name} was placed: let Bundler place them first")
-    return [camera.noted(*((f"{lost} cameras that were not placed were left out",) if lost else ())) for camera in cameras]
-
-
-def _numbers(source: Source) -> Iterator[tuple[float, ...]]:
-    for number, line in enumerate(source.text.split("\n"), start=1):
-        if line.strip() and not line.lstrip().startswith("#"):
-            yield flat(f"line {number} of {source.name}", line)
+    return [camera.noted(f"{lost} cameras that were not placed were left out") for camera in cameras] if lost else cameras

@@ -122,7 +122,7 @@ def _poses(images: Sequence[_Image], planes: dict) -> list[tuple[Pinhole, tuple[
         for image, what in zip(images, whats, strict=True)
     ]
     poses = np.array(numbers).reshape(-1, 7)
-    matrices = axes.from_worlds_to_cameras(axes.rotations_of(poses[:, :4], whats), poses[:, 4:])
+    matrices = axes.from_worlds_to_cameras(axes.rotations_of(poses[:, :4], whats), poses[:, 4:], whats)
     return axes.pinholes(matrices, [planes[image.camera][0] for image in images], whats)
 
 

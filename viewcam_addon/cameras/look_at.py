@@ -43,6 +43,7 @@ _PATH = r"[A-Za-z_$][\w$]*+(?:(?:\s*+\(\s*+\))?+\s*+(?:\.|->|::)\s*+[A-Za-z_$][\
 _STATEMENT = re.compile(rf"(?<![\w$.])(?<!->)(?<!::)({_PATH})\s*+(?:(=)(?!=)|(\()|(:)(?!:)|(\{{))")
 _PART = re.compile(r"\(\s*\)|\.|->|::|\s")
 _MADE = re.compile(r"(?<![\w$])([\w$]++)\s*+[=:]\s*+new\s++(?:THREE\s*+\.\s*+)?+PerspectiveCamera\b")
+_MOST_STATEMENTS = 10_000
 _IS_CODE = re.compile(r"\w\s*+\(\s*+[-\w.]|;\s*+$|\w\.\w++\s*+[=(]", re.MULTILINE)
 _CAMERA = re.compile(r"cam|view|eye|lens|observer", re.IGNORECASE)
 
@@ -312,6 +313,7 @@ class _Code:
         if moved := _VIEW_MOVED.search(self.text):
             texts.fail(self.text, moved.start(), "this moves the view by other means, write eye, look-at and up")
         parts_of: dict[str, dict[str, float]] = {}
+        counted = 0
         moved_before = None  # the matrix of OpenGL that gluLookAt multiplies
         for parts, sign, at, start in self.statements:
             role = self._role(parts, sign)
@@ -325,6 +327,9 @@ class _Code:
                 texts.fail(self.text, start, "the camera is part of this, which may move it, write where it is in the scene")
             if role is None or (sign == ":" and role in ("width", "height", "size")):
                 continue
+            counted += 1
+            if counted > _MOST_STATEMENTS:
+                raise InputError(f"the text says more than {_MOST_STATEMENTS} things of cameras: copy one camera")
             if role == "moves" and sign != ":":
                 texts.fail(self.text, start, "this moves or bends the camera by other means, write eye, look-at and up")
             elif role == "moves":

@@ -24,11 +24,11 @@ _KEYS = {"image_width", "image_height", "camera_matrix", "distortion_model"}
 
 
 def recognises(source: Source) -> bool:
-    return "camera_matrix" in source.text and opencv.yaml(source.text).keys() >= _KEYS
+    return "camera_matrix" in source.text and source.yaml.keys() >= _KEYS
 
 
 def read(source: Source, options: Options) -> list[Camera]:
-    document = Record(opencv.yaml(source.text), source.name)
+    document = Record(source.yaml, source.name)
     name = str(document.values.get("camera_name") or "camera")
     what = f"camera {name}"
     opencv.refuse_other_lens(document.values, what)

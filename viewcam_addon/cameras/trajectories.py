@@ -17,7 +17,7 @@ from ..errors import InputError
 from ..pinhole import ViewPlane
 from . import axes, opencv
 from .camera import Camera, Options
-from .source import Record, Source, flat
+from .source import Record, Source, numbered_lines, table
 
 TITLE = "trajectories of TUM, KITTI and EuRoC"
 
@@ -31,7 +31,9 @@ def recognises(source: Source) -> bool:
 
 def read(source: Source, options: Options) -> list[Camera]:
     kind = _kind(source)
-    rows = _rows(source)
+    rows = table(source.name, numbered_lines(source))
+    if rows.shape[1] < 8:
+        raise InputError(f"{source.name} has {rows.shape[1]} numbers in a line: a pose has at least 8")
     if len(rows) > _MOST:
         raise InputError(f"{source.name} has {len(rows)} poses: give at most {_MOST}")
     mounted, plane, notes = np.eye(4), None, ()
@@ -72,26 +74,6 @@ def _kind(source: Source) -> str | None:
     return {(8, False): "TUM", (12, False): "KITTI"}.get(*counts) if len(counts) == 1 else None
 
 
-def _rows(source: Source) -> np.ndarray:
-    """(n, 8 or more): the numbers of each line."""
-    lines = [line.strip().rstrip(",") for line in source.text.split("\n")]
-    numbered = [(number, line) for number, line in enumerate(lines, start=1) if line and not line.startswith("#")]
-    try:  # at once, which is twenty times as fast
-        rows = np.loadtxt([line.replace(",", " ") for _, line in numbered], comments=None, ndmin=2)
-    except ValueError:
-        rows = np.zeros((0, 0))
-    if rows.shape[1] < 8 or not np.isfinite(rows).all():
-        read: list[tuple[float, ...]] = []
-        for number, line in numbered:
-            read.append(flat(f"line {number} of {source.name}", line))
-            if len(read[-1]) != len(read[0]) or len(read[-1]) < 8:
-                raise InputError(
-                    f"line {number} of {source.name} has {len(read[-1])} numbers: a pose has as many as the others, at least 8"
-                )
-        rows = np.array(read)
-    return rows
-
-
 def _sensor(source: Source, options: Options) -> tuple[np.ndarray, ViewPlane | None, tuple[str, ...]]:
     """Where EuRoC's cam0 stands on the body, and how it sees."""
     file = next((found for up in ("..", "../..") if (found := source.file(*up.split("/"), "cam0", "sensor.yaml"))), None)
@@ -99,7 +81,7 @@ def _sensor(source: Source, options: Options) -> tuple[np.ndarray, ViewPlane | N
         raise InputError(
             f"{source.name} has poses of the body, not of a camera: put it where ../cam0/sensor.yaml of the data set is found"
         )
-    values = Record(opencv.yaml(file.text), str(file.path))
+    values = Record(file.yaml, str(file.path))
     opencv.refuse_other_lens(values.values, "cam0")
     mounted = np.array(values.record("T_BS").numbers("data", 16)).reshape(4, 4)
     if options.view_plane or "intrinsics" not in values:

@@ -1,0 +1,93 @@
+"""The part of YAML in which OpenCV, ROS and Kalibr write cameras: keys, numbers, texts, lists; blocks by indentation.
+
+What is not of it is left out, so that whoever looks for a key does not find it. Rejected: PyYAML, which refuses OpenCV's first
+line and tags, and which Blender's Python has not.
+"""
+
+import re
+from typing import Any
+
+from ..errors import InputError
+
+_LINE = re.compile(r"(\s*+)(?:- )?([\"']?)([^:\"'#\[\]{}]++)\2\s*+:(?:\s++(.*))?$")
+_BRACKET = re.compile(r"[\[\]{}]")
+_ITEM = re.compile(r"(\s*+)-\s++(.*)$")
+_DEEPEST = 8
+
+
+def read(text: str) -> dict[str, Any]:
+    """The keys of a text and what stands there; none of what is not of this part of YAML."""
+    root: dict[str, Any] = {}
+    stack: list[tuple[int, dict[str, Any]]] = [(-1, root)]
+    block: tuple[int, list] | None = None
+    for line in _joined(text):
+        if (item := _ITEM.match(line)) and block is not None and len(item[1]) >= block[0]:
+            block[1].append(_value(item[2].strip()))
+            continue
+        found = _LINE.match(line)
+        if not found:
+            continue
+        indent, key, value = len(found[1]), found[3].strip(), _without_tag((found[4] or "").strip())
+        while indent <= stack[-1][0]:
+            stack.pop()
+        holder, block = stack[-1][1], None
+        if value:
+            holder[key] = _value(value)
+        elif len(stack) <= _DEEPEST:
+            inner = _Block()
+            holder[key] = inner
+            stack.append((indent, inner))
+            block = (indent, inner.items_of_list)
+    return _settled_blocks(root)
+
+
+def _settled_blocks(values: dict[str, Any]) -> dict[str, Any]:
+    """The blocks as what they turned out to be: objects, or lists."""
+    return {
+        key: (value.items_of_list or _settled_blocks(value)) if isinstance(value, _Block) else value
+        for key, value in values.items()
+    }
+
+
+class _Block(dict):
+    """What stands below a key: keys of its own, or the items of a list."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.items_of_list: list = []
+
+
+def _joined(text: str) -> list[str]:
+    """The lines, those of one pair of brackets in one; comments and the document's marks left out."""
+    lines, parts, open_brackets = [], [], 0
+    for line in text.split("\n"):
+        if not line or line.startswith(("%", "---", "...")) or line.lstrip().startswith("#"):
+            continue
+        line = re.sub(r"\s#.*$", "", line) if "#" in line else line
+        parts.append(line if not parts else line.strip())
+        if _BRACKET.search(line):
+            open_brackets += line.count("[") + line.count("{") - line.count("]") - line.count("}")
+        if open_brackets <= 0:
+            lines.append(" ".join(parts))
+            parts, open_brackets = [], 0
+    return lines
+
+
+def _without_tag(value: str) -> str:
+    return re.sub(r"^![^\s]*\s*", "", value) if value.startswith("!") else value
+
+
+def _value(text: str) -> Any:
+    if text.startswith("["):
+        try:
+            return _list(text)
+        except InputError:
+            return text
+    try:
+        return float(text) if "_" not in text else text.strip("\"'")
+    except ValueError:
+        return text.strip("\"'")
+
+
+def _list(text: str) -> list:
+    return [_value(part.strip()) for part in re.sub(r"[\[\]]", " ", text).split(",") if part.strip()]
