@@ -2,7 +2,7 @@
 #   make demo          the sample scene rendered by Cycles and by the tracer, compared; ends with the report
 #   make quick         lint and the tests that need neither Blender nor processes nor many samples; under a minute
 #   make test          lint and the tests, with the newest bpy wheel for the Python found
-#   make test-exhaustive  the tests that take minutes: 10⁸ rays, millions of hostile numbers
+#   make test-exhaustive  the tests that take minutes: 10⁸ rays, a million hostile numbers
 #   make test-sanitizers  the core compiled with sanitizers, and what its tests find of addresses, undefined behaviour and threads
 #   make test-matrix   the tests with Blender 4.2 (and 5.2 where there is a Python 3.13) as wheels; those of Blender with 4.5 and 5.0
 #   make test-light    whole pictures of light, 1024 samples a pixel, against Cycles of each of these
