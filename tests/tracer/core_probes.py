@@ -5,11 +5,14 @@ No formula is here: each function lays numbers out for the core and takes them b
 
 import numpy as np
 
+from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer import native
+from viewcam_addon.tracer.scene import Mesh, Object, Scene
+from viewcam_addon.tracer.scene.colours import WHITE, Colour
 from viewcam_addon.tracer.scene.film import Film
 from viewcam_addon.tracer.scene.lamps import Lamp
-from viewcam_addon.tracer.scene.materials import Picture
-from viewcam_addon.tracer.scene.shader_nodes import Closure
+from viewcam_addon.tracer.scene.materials import Material, Picture
+from viewcam_addon.tracer.scene.shader_nodes import Closure, Node, node
 
 FILM, SCATTERING = 2, 8
 """How many dimensions the film has, and each scattering."""
@@ -101,14 +104,29 @@ def radiance_seen(lamp: Lamp, starts, directions, nearest=0.0, farthest=np.inf):
     return out.T
 
 
+def evaluated(shown: Node, images=None, uv=(0.0, 0.0), incoming=(0.0, 0.0, -1.0), behind=False):
+    """What a node makes on a floor, z up, at (2, n) UV, met along (3, n): (3, n), and as a number (n,)."""
+    uv, incoming = np.asarray(uv, np.float64).reshape(2, -1), np.asarray(incoming, np.float64).reshape(3, -1)
+    count = max(uv.shape[1], incoming.shape[1])
+    flat = Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]]), np.zeros(1, np.int32))
+    scene = Scene(
+        Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 10, 8, 8),
+        {"floor": flat},
+        (Object("floor", "floor", np.eye(4), materials=("shown",)),),
+        materials={"shown": Material(surface=node("emission", color=shown))},
+        images=images or {},
+    )
+    core = native.CoreScene(scene, 1)
+    core.illuminate(scene)
+    rows = [np.broadcast_to(each, (len(each), count)) for each in (incoming, uv, np.array([[float(behind)]]))]
+    values, numbers = core.values(np.concatenate(rows).T)
+    return values.T, numbers
+
+
 def looked_up(picture: Picture, uv, closest: bool):
     """(3, n): the linear colours of an image at (2, n) UV."""
-    height, width, _ = picture.pixels.shape
-    pixels, places = np.ascontiguousarray(picture.pixels, np.float32), np.ascontiguousarray(np.asarray(uv, np.float64).T)
-    out = np.empty((len(places), 3))
-    probe = native.core().probe_texture
-    assert not probe(width, height, picture.srgb, _at(pixels), closest, len(places), _at(places), _at(out))
-    return out.T
+    shown = node("image", image=Colour(WHITE, "shown"), interpolation="closest" if closest else "linear")
+    return evaluated(shown, {"shown": picture}, uv)[0]
 
 
 class ScatteredBy:
@@ -122,7 +140,7 @@ class ScatteredBy:
         parts = [np.broadcast_to(np.reshape(each, (3, -1)), (3, columns)) for each in (incoming, direction)]
         given = np.ascontiguousarray(np.concatenate([*parts, np.full((1, columns), float(behind)), u]).T, np.float64)
         out = np.empty((columns, 12))
-        described = native.described_closure(Closure(shader), {})
+        described = native.described_closure(Closure(shader), {}, {})
         assert not native.core().probe_bsdf(described, version, columns, _at(given), _at(out))
         self.light, self.pdf, self.sampled, self.weight = out[:, :3].T, out[:, 3], out[:, 4:7].T, out[:, 7:10].T
         self.sampled_pdf, self.kind = out[:, 10], out[:, 11].astype(int)

@@ -123,8 +123,8 @@ def light_up(draw, calls):
     film.radiance[:] = [draw(NUMBER) for _ in range(3)]
     calls("set_film", calls.scene, film)
     width, height = draw(st.integers(-1, 3)), draw(st.integers(-1, 3))
-    pixels = calls.at(np.ones(3 * max(width * height, 1)), np.float32)
-    calls("add_texture", calls.scene, width, height, draw(st.booleans()), pixels)
+    pixels = calls.at(np.ones(4 * max(width * height, 1)), np.float32)
+    calls("add_texture", calls.scene, width, height, draw(st.integers(2, 4)), draw(st.booleans()), pixels)
 
 
 def trace(draw, calls):

@@ -22,11 +22,12 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .scene import Mesh, Object, Scene, Spheres, placing
+from .scene.colours import WHITE
 from .scene.film import NO_BOUNCES
 from .scene.lamps import RAYS, Area, Lamp, Point, Spot, Sun
 from .scene.materials import PLAIN, Colour, Material
 from .scene.sameness import same_things
-from .scene.shader_nodes import KINDS, Closure
+from .scene.shader_nodes import KINDS, Closure, Node
 from .tiles import Passes
 
 GEOMETRY = ("Depth", "Position", "Normal", "UV", "Object Index", "Material Index", "Magnitude", "Facing")
@@ -79,7 +80,7 @@ class _Camera(Structure):
 
 
 class _Color(Structure):
-    _fields_ = [("rgb", c_double * 3), *((name, c_int32) for name in ("image", "closest", "vertex"))]
+    _fields_ = [("rgb", c_double * 3), *((name, c_int32) for name in ("image", "closest", "vertex", "node"))]
 
 
 class _Input(Structure):
@@ -90,13 +91,12 @@ class _MixFactor(Structure):
     _fields_ = [("value", _Color), ("rest", c_int32)]
 
 
+class _Node(Structure):
+    _fields_ = [("name", c_char_p), ("inputs", POINTER(_Input)), ("input_count", c_int32)]
+
+
 class _Closure(Structure):
-    _fields_ = [
-        ("name", c_char_p),
-        ("inputs", POINTER(_Input)),
-        ("factors", POINTER(_MixFactor)),
-        *((name, c_int32) for name in ("input_count", "factor_count")),
-    ]
+    _fields_ = [("node", _Node), ("factors", POINTER(_MixFactor)), ("factor_count", c_int32)]
 
 
 class _Lamp(Structure):
@@ -151,7 +151,8 @@ class _Core(Structure):
         ("closest", _function(c_int, c_void_p, c_size_t, c_void_p, c_uint32, c_int, c_void_p, c_void_p, c_void_p)),
         ("occluded", _function(c_int, c_void_p, c_size_t, c_void_p, c_int, c_void_p)),
         ("clear_light", _function(c_int, c_void_p)),
-        ("add_texture", _function(c_int, c_void_p, c_int, c_int, c_int, c_void_p)),
+        ("add_texture", _function(c_int, c_void_p, c_int, c_int, c_int, c_int, c_void_p)),
+        ("add_node", _function(c_int, c_void_p, POINTER(_Node))),
         ("add_material", _function(c_int, c_void_p, c_void_p, c_int)),
         ("add_lamp", _function(c_int, c_void_p, POINTER(_Lamp))),
         ("set_film", _function(c_int, c_void_p, POINTER(_Film))),
@@ -167,10 +168,7 @@ class _Core(Structure):
         ("probe_specular", _function(c_int, c_double, c_size_t, c_void_p, c_void_p)),
         ("probe_sample_light", _function(c_int, POINTER(_Lamp), c_size_t, c_void_p, c_void_p)),
         ("probe_light_le", _function(c_int, POINTER(_Lamp), c_size_t, c_void_p, c_void_p)),
-        (
-            "probe_texture",
-            _function(c_int, c_int, c_int, c_int, c_void_p, c_int, c_size_t, c_void_p, c_void_p),
-        ),
+        ("probe_nodes", _function(c_int, c_void_p, c_size_t, c_void_p, c_void_p)),
         ("probe_bsdf", _function(c_int, POINTER(_Closure), c_int, c_size_t, c_void_p, c_void_p)),
         ("probe_leaving", _function(c_int, c_void_p, c_size_t, c_void_p, c_void_p, c_void_p)),
     ]
@@ -318,13 +316,18 @@ class CoreScene:
         self.check(self.core.clear_light(self.handle))
         used = _used(scene)
         images: dict[str, int] = {}
+        nodes: dict[Node, int] = {}
         for name in ["", *scene.materials]:
             material = (scene.materials[name] if name else PLAIN) if name in used else Material()
             for _, colour in material.inputs:
                 if colour.image is not None and colour.image not in images:
                     images[colour.image] = len(images)
                     self._add_texture(scene, colour.image)
-            closures = [described_closure(closure, images) for closure in material.closures]
+            for closure in material.closures:
+                for value in (*dict(closure.node.inputs).values(), *(factor for factor, _ in closure.factors)):
+                    if isinstance(value, Node):
+                        self._add_nodes(value, images, nodes)
+            closures = [described_closure(closure, images, nodes) for closure in material.closures]
             self.check(self.core.add_material(self.handle, (_Closure * len(closures))(*closures), len(closures)))
         for lamp in scene.lamps:
             if not lamp.is_dark:
@@ -344,9 +347,19 @@ class CoreScene:
 
     def _add_texture(self, scene: Scene, name: str) -> None:
         picture = scene.images[name]
-        height, width, _ = picture.pixels.shape
-        pixels = array(picture.pixels, np.float32, (height, width, 3))
-        self.check(self.core.add_texture(self.handle, width, height, picture.srgb, _address(pixels)))
+        height, width, channels = picture.pixels.shape
+        pixels = array(picture.pixels, np.float32, (height, width, channels))
+        self.check(self.core.add_texture(self.handle, width, height, channels, picture.srgb, _address(pixels)))
+
+    def _add_nodes(self, node: Node, images: Mapping[str, int], nodes: dict[Node, int]) -> None:
+        """Add a node that makes values after those that feed it. nodes : the numbers of those that are there."""
+        if node in nodes:
+            return
+        for name in KINDS[node.type].inputs:
+            if isinstance(value := node[name], Node):
+                self._add_nodes(value, images, nodes)
+        self.check(self.core.add_node(self.handle, _described_node(node, images, nodes)))
+        nodes[node] = len(nodes)
 
     def render_geometry(self, passes: Passes, rows: range, stop: Any = None) -> None:
         """Write the surfaces at the centres of some rows' pixels into those of `GEOMETRY` that are asked for.
@@ -403,6 +416,16 @@ class CoreScene:
         lights[:, :3], lights[:, 3] = directions, distances
         self.check(self.core.probe_leaving(self.handle, len(rays), _address(rays), _address(lights), _address(found)))
         return found[:, :3], found[:, 3:6], found[:, 6], found[:, 7:10], found[:, 10]
+
+    def values(self, rows: NDArray) -> tuple[NDArray, NDArray]:
+        """What the last node makes on a floor, z up: n colours or vectors (n, 3), and the numbers (n,) that they are.
+
+        rows : (n, 6), the unit way that a path came along, u, v, and whether the floor is met from behind.
+        """
+        rows = array(rows, np.float64, (None, 6))
+        found = np.empty((len(rows), 4))
+        self.check(self.core.probe_nodes(self.handle, len(rows), _address(rows), _address(found)))
+        return found[:, :3], found[:, 3]
 
     @property
     def bytes(self) -> int:
@@ -479,24 +502,35 @@ def described_lamp(lamp: Lamp) -> _Lamp:
     return described
 
 
-def _color(colour: Colour, images: Mapping[str, int]) -> _Color:
-    image = -1 if colour.image is None else images[colour.image]
-    described = _Color(image=image, closest=colour.closest, vertex=colour.vertex)
-    described.rgb[:] = colour.rgb
+def _color(value: Colour | Node | tuple[float, ...], images: Mapping[str, int], nodes: Mapping[Node, int]) -> _Color:
+    if isinstance(value, Node):
+        described = _Color(image=-1, node=nodes[value])
+        value = Colour(WHITE)
+    elif isinstance(value, Colour):
+        image = -1 if value.image is None else images[value.image]
+        described = _Color(image=image, closest=value.closest, vertex=value.vertex, node=-1)
+    else:
+        described = _Color(image=-1, node=-1)
+    described.rgb[:] = value.rgb if isinstance(value, Colour) else value
     return described
 
 
-def described_closure(closure: Closure, images: Mapping[str, int]) -> _Closure:
-    """A closure as the core takes it. images : their numbers."""
-    inputs, factors = [], [_MixFactor(_color(factor, images), rest) for factor, rest in closure.factors]
-    for name in KINDS[closure.node.type].inputs:
-        value = closure.node[name]
-        if isinstance(value, Colour):
-            inputs.append(_Input(name.encode(), None, _color(value, images)))
-        else:
-            inputs.append(_Input(name.encode(), value.encode()))
-    arrays = (_Input * len(inputs))(*inputs), (_MixFactor * len(factors))(*factors)
-    return _Closure(closure.node.type.encode(), *arrays, len(inputs), len(factors))
+def _described_node(node: Node, images: Mapping[str, int], nodes: Mapping[Node, int]) -> _Node:
+    inputs = []
+    for name in KINDS[node.type].inputs:
+        value = node[name]
+        if isinstance(value, str | bool):
+            inputs.append(_Input(name.encode(), str(value).lower().encode(), _color(WHITE, images, nodes)))
+        elif value is not None:
+            inputs.append(_Input(name.encode(), None, _color(value, images, nodes)))
+    return _Node(node.type.encode(), (_Input * len(inputs))(*inputs), len(inputs))
+
+
+def described_closure(closure: Closure, images: Mapping[str, int], nodes: Mapping[Node, int]) -> _Closure:
+    """A closure as the core takes it. images, nodes : their numbers."""
+    factors = [_MixFactor(_color(factor, images, nodes), rest) for factor, rest in closure.factors]
+    described = _described_node(closure.node, images, nodes)
+    return _Closure(described, (_MixFactor * len(factors))(*factors), len(factors))
 
 
 def _planes(passes: Passes, stride: int) -> Any:

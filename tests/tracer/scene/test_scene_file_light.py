@@ -80,14 +80,33 @@ lamps = st.one_of(
 colours = st.builds(
     Colour, rgb=rgb, image=st.sampled_from([None, "small", "large"]), closest=st.booleans(), vertex=st.booleans()
 )
+values = st.recursive(
+    st.one_of(
+        vectors,
+        colours,
+        st.builds(partial(node, "layer_weight"), blend=st.floats(-9, 9), output=st.sampled_from(("fresnel", "facing"))),
+        st.builds(
+            partial(node, "image"),
+            image=st.builds(partial(Colour, (1.0, 1.0, 1.0)), st.sampled_from(["small", "large"])),
+            interpolation=st.sampled_from(("linear", "closest", "cubic")),
+            straight=st.booleans(),
+        ),
+    ),
+    lambda inner: st.one_of(
+        st.builds(partial(node, "math"), a=inner, operation=st.sampled_from(("multiply", "sine")), clamp=st.booleans()),
+        st.builds(partial(node, "mix_color"), factor=inner, a=inner, b=inner, clamp_factor=st.booleans()),
+    ),
+    max_leaves=4,
+)
+nodes = st.builds(partial(node, "separate"), color=values)
 shaders = st.recursive(
     st.one_of(
-        st.builds(partial(node, "principled"), base_color=colours, roughness=amounts, coat_weight=colours),
+        st.builds(partial(node, "principled"), base_color=colours | nodes, roughness=amounts, coat_weight=colours),
         st.builds(partial(node, "glossy"), color=rgb, roughness=colours, distribution=st.sampled_from(DISTRIBUTIONS)),
         st.builds(partial(node, "emission"), color=colours, strength=amounts),
     ),
     lambda inner: st.one_of(
-        st.builds(partial(node, "mix"), factor=colours, first=inner, second=st.none() | inner),
+        st.builds(partial(node, "mix"), factor=colours | nodes, first=inner, second=st.none() | inner),
         st.builds(partial(node, "add"), first=inner, second=inner),
     ),
     max_leaves=4,
@@ -216,6 +235,32 @@ def changed(document, path, value):
             {"surface": {"type": "glossy", "distribution": "phong"}},
             ["distribution", "'phong'", "beckmann"],
         ),
+        (
+            ["materials", "wall"],
+            {"surface": {"type": "glossy", "roughness": {"type": "math", "operation": "guess"}}},
+            ["'roughness' of 'surface' of material 'wall'", "operation", "'guess'", "multiply"],
+        ),
+        (
+            ["materials", "wall"],
+            {"surface": {"type": "glossy", "roughness": {"type": "math", "a": 1e30}}},
+            ["'roughness' of 'surface' of material 'wall'", "1e+30"],
+        ),
+        (
+            ["materials", "wall"],
+            {"surface": {"type": "glossy", "color": {"type": "image", "straight": 1}}},
+            ["'straight' of 'color'", "true or false"],
+        ),
+        (
+            ["materials", "wall"],
+            {"surface": {"type": "glossy", "color": {"type": "image", "image": "no"}}},
+            ["material 'wall'", "'no'"],
+        ),
+        (
+            ["materials", "wall"],
+            {"surface": {"type": "glossy", "color": {"type": "glossy"}}},
+            ["material 'wall'", "'glossy'", "makes values"],
+        ),
+        (["materials", "wall"], {"surface": {"type": "math"}}, ["material 'wall'", "'math'", "shader"]),
         (["materials", "wall"], {"surface": {"type": "glossy", "roughness": -1}}, ["material 'wall'", "roughness", "0 to"]),
         (["materials", "wall"], {"surface": {"type": "glossy", "color": {"image": "no"}}}, ["material 'wall'", "'no'"]),
         (["images", "checks", "pixels"], None, ["image 'checks'", "'pixels'"]),

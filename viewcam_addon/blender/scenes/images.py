@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 
 from ...tracer.scene.materials import Picture
+from ..temporary_settings import Overrides
 
 _LINEAR = ("Non-Color", "Linear Rec.709", "Raw", "Linear")
 
@@ -24,8 +25,21 @@ def obstacle(image: bpy.types.Image | None) -> str | None:
     return None
 
 
-def picture_of(image: bpy.types.Image) -> Picture:
-    """An image without an obstacle."""
+def alpha_obstacle(image: bpy.types.Image) -> str | None:
+    """Why the alpha of an image without another obstacle can't be a picture's, one clause, or None where it can."""
+    if image.channels != 4 or image.alpha_mode == "NONE" or image.colorspace_settings.is_data or is_multiplied(image):
+        return None
+    return f"shows the alpha of {image.name!r}, which is kept as {image.alpha_mode.lower().replace('_', ' ')}"
+
+
+def is_multiplied(image: bpy.types.Image) -> bool:
+    """Whether Cycles multiplies an image's colours by its alpha, in bytes."""
+    plain = image.is_float or image.colorspace_settings.is_data
+    return image.channels == 4 and image.alpha_mode == "STRAIGHT" and not plain
+
+
+def picture_of(image: bpy.types.Image, alpha: bool = False) -> Picture:
+    """An image without an obstacle. alpha : whether it is to have its alpha, without an obstacle either."""
     width, height = image.size
     pixels = np.empty(width * height * image.channels, np.float32)
     image.pixels.foreach_get(pixels)
@@ -36,10 +50,28 @@ def picture_of(image: bpy.types.Image) -> Picture:
         # Blender has decoded them. Cycles reads a file for itself; what Blender hands it stays as it is.
         srgb = image.source == "FILE" and not image.packed_file and not image.is_dirty
         rgb = _encoded(rgb) if srgb else rgb
-    if image.channels == 4 and image.alpha_mode == "STRAIGHT" and not image.is_float:
+    if alpha and image.channels == 4 and image.alpha_mode != "NONE":
+        rgb = pixels
+    elif is_multiplied(image):
         # As Cycles does it, in whole bytes.
         rgb = np.rint(rgb * 255) * np.rint(pixels[..., 3:] * 255) // 255 / 255
     return Picture(np.ascontiguousarray(np.nan_to_num(rgb, posinf=0.0, neginf=0.0), np.float32), srgb)
+
+
+def image_of(picture: Picture, name: str, overrides: Overrides) -> bpy.types.Image:
+    """A packed image with these pixels until the overrides end: bytes where they are encoded, floats where they are linear."""
+    height, width, channels = picture.pixels.shape
+    image = bpy.data.images.new(
+        name, width, height, alpha=channels == 4, float_buffer=not picture.srgb, is_data=not picture.srgb
+    )
+    overrides.afterwards(bpy.data.batch_remove, [image])
+    if channels == 4:
+        image.alpha_mode = "STRAIGHT" if picture.srgb else "CHANNEL_PACKED"
+    pixels = np.concatenate([picture.pixels, np.ones((height, width, 4 - channels), np.float32)], axis=2)
+    image.pixels.foreach_set(pixels.ravel())
+    image.update()
+    image.pack()
+    return image
 
 
 def mean(image: bpy.types.Image) -> tuple[float, float, float]:

@@ -13,7 +13,7 @@ from ...tracer.scene.film import Bounces, Film
 from ...tracer.scene.lamps import RAYS, Area, Lamp, Spot, Sun, World
 from ...tracer.scene.materials import PLAIN, Material, Picture
 from ..temporary_settings import LARGEST_INDEX, Overrides
-from . import film, materials, nodes, shaders
+from . import film, images, materials, nodes, shaders
 from .ledger import Ledger
 
 _COLUMN = 260.0  # between nodes, in the node editor's units
@@ -73,19 +73,19 @@ def _images_of(made: Material) -> list[str]:
     return [colour.image for _, colour in made.inputs if colour.image is not None]
 
 
-def paint(material: bpy.types.Material, made: Material, images: dict[str, bpy.types.Image]) -> None:
-    """Give a new material the nodes of the tracer's. images : `Colour.image` → the image."""
+def paint(material: bpy.types.Material, made: Material, shown: dict[str, bpy.types.Image]) -> None:
+    """Give a new material the nodes of the tracer's. shown : `Colour.image` → the image."""
     if not material.node_tree:  # from 5.0 on new materials have one
         material.use_nodes = True
     tree = material.node_tree
     tree.nodes.clear()
     adder = nodes.Adder(tree)
     output = adder.add("ShaderNodeOutputMaterial")
-    materials.add_surface(adder, output, shaders.Reading(made, images, ""))
+    materials.add_surface(adder, output, shaders.Reading(made, shown, ""))
     _arrange(output, 0, {})
-    shown = next((colour for _, colour in made.inputs), None)
-    if shown:
-        material.diffuse_color = (*np.clip(shown.rgb, 0.0, 1.0), 1.0)
+    colour = next((colour for _, colour in made.inputs), None)
+    if colour:
+        material.diffuse_color = (*np.clip(colour.rgb, 0.0, 1.0), 1.0)
 
 
 def _arrange(node: bpy.types.Node, column: int, taken: dict[int, int]) -> None:
@@ -98,17 +98,10 @@ def _arrange(node: bpy.types.Node, column: int, taken: dict[int, int]) -> None:
 
 
 def image_from(picture: Picture, name: str, overrides: Overrides, ledger: Ledger) -> bpy.types.Image:
-    """A packed image with these pixels: bytes where they are encoded, floats where they are linear."""
-    height, width, _ = picture.pixels.shape
-    image = bpy.data.images.new(name, width, height, float_buffer=not picture.srgb, is_data=not picture.srgb)
-    overrides.afterwards(bpy.data.batch_remove, [image])
-    pixels = np.concatenate([picture.pixels, np.ones((height, width, 1), np.float32)], axis=2)
-    if picture.srgb and np.abs(pixels - np.rint(pixels * 255) / 255).max() > 2.0**-20:
+    """A packed image with these pixels."""
+    if picture.srgb and np.abs(picture.pixels - np.rint(picture.pixels * 255) / 255).max() > 2.0**-20:
         ledger.note(name, "approximated", "its sRGB pixels are rounded to the 256 levels that Blender keeps")
-    image.pixels.foreach_set(pixels.ravel())
-    image.update()
-    image.pack()
-    return image
+    return images.image_of(picture, name, overrides)
 
 
 def light_from(lamp: Lamp, overrides: Overrides, ledger: Ledger) -> tuple[bpy.types.Light, np.ndarray]:

@@ -8,14 +8,16 @@ shaders.py has found.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import bpy
 
+from ...errors import InputError
 from ...tracer.scene.materials import PLAIN, Colour
-from ...tracer.scene.shader_nodes import Node
+from ...tracer.scene.shader_nodes import KINDS, Node
 from .. import versions
 from ..temporary_settings import Overrides
-from . import nodes, shaders
+from . import images, nodes, shaders, value_nodes
 
 # Node types that let something else than the surface's own geometry into the passes.
 _TRANSPARENT = {"BSDF_TRANSPARENT", "HOLDOUT"}
@@ -63,7 +65,9 @@ def make_plain(overrides: Overrides, material: bpy.types.Material) -> None:
 
 
 def stand_in(overrides: Overrides, material: bpy.types.Material, reading: shaders.Reading) -> None:
-    """Let Cycles see the components of a tracer's material until the overrides end."""
+    """Let Cycles see a tracer's material until the overrides end."""
+    tables = {key: images.image_of(picture, key, overrides) for key, picture in reading.tables.items()}
+    reading = replace(reading, images=reading.images | tables)
     output, adder = nodes.override_output(overrides, material.node_tree, "ShaderNodeOutputMaterial")
     add_surface(adder, output, reading)
 
@@ -94,15 +98,53 @@ def _shader(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.typ
         setattr(added, theirs, shaders.word_of(node[name]))
     for name, theirs in shader.inputs.items():
         value = node[name]
-        if isinstance(value, Node):
+        if isinstance(value, Node) and not value.is_value:
             adder.link(_shader(adder, value, reading).outputs[0], added.inputs[theirs])
         elif value is not None and (isinstance(theirs, int) or theirs in added.inputs):
             _colour(adder, added.inputs[theirs], value, reading)
     return added
 
 
-def _colour(adder: nodes.Adder, socket: bpy.types.NodeSocket, colour: Colour, reading: shaders.Reading) -> None:
-    """The product that a colour is."""
+def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.types.NodeSocket:
+    """The output of nodes that make a value; those are one that differ by their output alone."""
+    value = next(value for ours, value in value_nodes.VALUES if ours == node.type)
+    key = node.type, tuple(each for each in node.inputs if each[0] != "output")
+    added = adder.values.get(key)
+    if added is None:
+        added = adder.values[key] = adder.add(value.class_name)
+        for name, wanted in value.fixed.items():
+            setattr(added, name, wanted)
+        for name, theirs in value.words.items():
+            _choose(added, theirs, value_nodes.word_of(node.type, node[name]))
+        for name, theirs in value.flags.items():
+            setattr(added, theirs, node[name])
+        if node.type == "image" and node["image"] is not None:
+            added.image = reading.images[node["image"].image]
+        for name, theirs in value.inputs.items():
+            if node[name] != Node("texture_coordinate") or node.type != "image":
+                _colour(adder, value_nodes.input_of(added, theirs), node[name], reading)
+    word = dict(node.inputs).get("output", node["output"] if "output" in KINDS[node.type].inputs else None)
+    found = [socket for socket in added.outputs if value.outputs.get(socket.identifier, "") == word]
+    return next((socket for socket in found if socket.enabled), found[0])
+
+
+def _choose(node: bpy.types.Node, name: str, word: str) -> None:
+    try:
+        setattr(node, name, word)
+    except TypeError as error:  # vectors' powers came with 4.3
+        raise InputError(f"this Blender has no {node.bl_label} that is {word}: open the scene in a newer one") from error
+
+
+def _colour(
+    adder: nodes.Adder, socket: bpy.types.NodeSocket, colour: Colour | Node | tuple[float, ...], reading: shaders.Reading
+) -> None:
+    """What an input is given: a value, or the product that a colour is."""
+    if isinstance(colour, Node):
+        adder.link(_value(adder, colour, reading), socket)
+        return
+    if isinstance(colour, tuple):
+        socket.default_value = {"VALUE": colour[0], "VECTOR": colour}.get(socket.type, (*colour, 1.0))
+        return
     if colour.image is None and not colour.vertex:
         values = {"VALUE": colour.rgb[0], "VECTOR": colour.rgb}
         socket.default_value = values.get(socket.type, (*colour.rgb, 1.0))

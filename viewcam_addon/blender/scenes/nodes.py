@@ -96,6 +96,9 @@ class Adder:
 
     def __init__(self, tree: bpy.types.NodeTree) -> None:
         self._tree, self._added = tree, []
+        self.values: dict[
+            object, bpy.types.Node
+        ] = {}  # the nodes that make values, by what they are, of which one of each will do
 
     def add(self, kind: str, *linked: bpy.types.NodeSocket, **values: object) -> bpy.types.Node:
         """A node of this class. linked : outputs for its first inputs. values : of its inputs, by name."""

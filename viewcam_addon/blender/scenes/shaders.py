@@ -11,14 +11,16 @@ the same for the time of a comparison (materials.stand_in): an approximation is 
 """
 
 import math
+import zlib
 from dataclasses import dataclass, field
 
 import bpy
+import numpy as np
 
-from ...tracer.scene.materials import LARGEST_RADIANCE, PLAIN, Colour, Material
+from ...tracer.scene.materials import LARGEST_RADIANCE, PLAIN, Colour, Material, Picture
 from ...tracer.scene.shader_nodes import KINDS, Node
 from .. import versions
-from . import images, nodes
+from . import images, nodes, value_nodes
 from .nodes import Input, Output
 
 RGB = tuple[float, float, float]
@@ -34,7 +36,9 @@ _PRINCIPLED_ZERO = (
     "Thin Film Thickness",
 )
 _WHITE = (1.0, 1.0, 1.0)
-_LUMINANCE = (0.2126, 0.7152, 0.0722)
+_RAMP = 256  # Cycles looks ramps up in a table of one more
+_BESIDE = 1e-6  # of a pixel: where a step lies is the pixel's that it leads to
+_LUMINANCE = (0.2126390, 0.7151687, 0.0721923)
 
 
 @dataclass(frozen=True)
@@ -132,6 +136,8 @@ class Reading:
     images: dict[str, bpy.types.Image] = field(default_factory=dict)
     vertex: str | None = None
     uv: str | None = None
+    alphas: set[str] = field(default_factory=set)
+    tables: dict[str, Picture] = field(default_factory=dict)
     reasons: list[str] = field(default_factory=list)
 
 
@@ -203,28 +209,40 @@ class _Reader:
         return Colour(rgb, textured.image, textured.closest, first.vertex or second.vertex)
 
     def _image(self, output: Output) -> Colour:
+        """An image that is a colour alone: laid out by UV, repeated."""
+        node = output.node
+        if node.extension != "REPEAT":
+            self._reason(output, f"does not repeat ({node.extension.lower()})")
+        if node.interpolation not in ("Linear", "Closest"):
+            self._reason(output, f"interpolates {node.interpolation.lower()}")
+        if not self._shows(output):
+            return self.viewport
+        vector = nodes.source(output.input("Vector"))
+        if isinstance(vector, Output) and not self._is_uv(vector):
+            self._reason(vector, "is not modelled")
+        return Colour(_WHITE, node.image.original.name_full, node.interpolation == "Closest")
+
+    def _shows(self, output: Output) -> bool:
+        """Whether an Image Texture's image is one that we can have, which is noted then."""
         node = output.node
         image = node.image and node.image.original
         why = images.obstacle(image)
         if why:
             self._reason(output, why)
-            return self.viewport
+            return False
         if node.projection != "FLAT":
             self._reason(output, "is not projected flat")
-        if node.extension != "REPEAT":
-            self._reason(output, f"does not repeat ({node.extension.lower()})")
-        if node.interpolation not in ("Linear", "Closest"):
-            self._reason(output, f"interpolates {node.interpolation.lower()}")
         if not maps_plainly(node):
             self._reason(output, "has a mapping of its own")
-        vector = nodes.source(output.input("Vector"))
-        if isinstance(vector, Output):
-            if vector.node.type == "UVMAP" and not vector.node.from_instancer:
-                self.reading.uv = vector.node.uv_map or self.reading.uv
-            elif not (vector.node.type == "TEX_COORD" and vector.socket.name == "UV" and not vector.node.from_instancer):
-                self._reason(vector, "is not modelled")
         self.reading.images[image.name_full] = image
-        return Colour(_WHITE, image.name_full, node.interpolation == "Closest")
+        return True
+
+    def _is_uv(self, vector: Output) -> bool:
+        """Whether an output is the UV of a mesh; of another map than the active one, it is noted."""
+        if vector.node.type == "UVMAP" and not vector.node.from_instancer:
+            self.reading.uv = vector.node.uv_map or self.reading.uv
+            return True
+        return vector.node.type == "TEX_COORD" and vector.socket.name == "UV" and not vector.node.from_instancer
 
     def _vertex(self, output: Output) -> Colour:
         node = output.node
@@ -392,18 +410,120 @@ class _Tree(_Reader):
             found |= dict.fromkeys([name] if known else [], *known)
         return found
 
-    def _input(self, output: Output, name: str | int, otherwise: float | None) -> Colour:
+    def _input(self, output: Output, name: str | int, otherwise: float | None) -> Colour | Node:
         """What an input is given. otherwise : what a number is where that is not modelled, or None of a colour."""
         value = None if otherwise is None else constant_number(output, name)
         if value is None:
-            known = len(self.reading.reasons)
-            colour = self._colour(output, name)
-            return colour if otherwise is None or len(self.reading.reasons) == known else Colour((otherwise,) * 3)
+            known, source = len(self.reading.reasons), nodes.source(output.input(name))
+            made: Colour | Node | None = self._colour(output, name)
+            if len(self.reading.reasons) > known and isinstance(source, Output):
+                del self.reading.reasons[known:]
+                made = self._value(source)
+            if made is not None and len(self.reading.reasons) == known:
+                return made
+            return self.viewport if otherwise is None else Colour((otherwise,) * 3)
         most = 1.0 if isinstance(name, int) else LARGEST_RADIANCE
         if not math.isfinite(value) or value > LARGEST_RADIANCE or (value < 0 and name == "Strength"):
             self._reason(output, f"has a {output.node.inputs[name].name} of {value:g}")
             value = 0.0
         return Colour((min(max(value, 0.0), most),) * 3)
+
+    def _value(self, output: Output) -> Colour | Node | None:
+        """The nodes that make a value; None where a reason says that it is not modelled."""
+        node = output.node
+        if node.type in ("VERTEX_COLOR", "ATTRIBUTE") and output.socket.name == "Color":
+            return self._vertex(output)
+        if node.type == "UVMAP" and self._is_uv(output):
+            return Node("texture_coordinate")
+        if node.type == "VALTORGB":
+            return self._ramp(output)
+        found = value_nodes.value_of(output)
+        if found is None:
+            self._reason(output, "is not modelled")
+            return None
+        ours, value = found
+        words = value_nodes.given_words(output, ours, value)
+        why = words if isinstance(words, str) else self._departure(output, ours)
+        if why:
+            self._reason(output, why)
+            return None
+        given = dict(words)
+        if ours == "image":
+            if not self._shows(output):
+                return None
+            image = node.image.original
+            given["image"] = Colour(_WHITE, image.name_full)
+            if node.outputs["Alpha"].is_linked:
+                if why := images.alpha_obstacle(image):
+                    self._reason(output, why)
+                    return None
+                given["straight"] = images.is_multiplied(image)
+                self.reading.alphas.add(image.name_full)
+        for name, theirs in value.inputs.items():
+            read = self._value_input(Input(value_nodes.input_of(node, theirs), output.groups), KINDS[ours].inputs[name])
+            if read is None:
+                return None
+            if (ours, name, read) != ("image", "vector", (0.0, 0.0, 0.0)):
+                given[name] = read
+        made = Node(ours, tuple(given.items()))
+        plain = Node("image", tuple((name, made[name]) for name in ("image", "interpolation"))) if ours == "image" else None
+        if made == plain and made["interpolation"] != "cubic":
+            return Colour(_WHITE, made["image"].image, made["interpolation"] == "closest")
+        return made
+
+    def _value_input(self, of: Input, known: object) -> Colour | Node | tuple[float, ...] | None:
+        """What an input of a node that makes values is given. known : its default, a number where it is one."""
+        constant = constant_number_of(of) if isinstance(known, float) else _constant(of)
+        if constant is not None:
+            three = _rgb(constant)
+            if all(math.isfinite(value) and abs(value) <= LARGEST_RADIANCE for value in three):
+                return three
+            self.reading.reasons.append(f"has a node {of.socket.node.name!r} that is given {max(three, key=abs):g}")
+            return None
+        return self._value(nodes.source(of))
+
+    def _departure(self, output: Output, ours: str) -> str | None:
+        """Why a node that we know is another here, one clause."""
+        node = output.node
+        if ours in ("fresnel", "layer_weight") and isinstance(nodes.source(output.input("Normal")), Output):
+            return "has a Normal that is not modelled"
+        if ours == "texture_coordinate" and (node.from_instancer or node.object is not None):
+            return "has another object's coordinates"
+        return None
+
+    def _ramp(self, output: Output) -> Node | None:
+        """A Color Ramp, as the picture of 257 pixels that Cycles makes of it."""
+        factor = self._value_input(Input(output.node.inputs[0], output.groups), 0.5)
+        if factor is None:
+            return None
+        ramp = output.node.color_ramp
+        pixels = np.array([[ramp.evaluate(i / _RAMP) for i in range(_RAMP + 1)]], np.float32)
+        key = f"Color Ramp {zlib.crc32(pixels.tobytes()):08x}"
+        self.reading.tables[key] = Picture(pixels)
+        closest = ramp.interpolation == "CONSTANT" and ramp.color_mode == "RGB"
+        first = _BESIDE if closest else 0.5
+        return Node(
+            "image",
+            (
+                ("image", Colour(_WHITE, key)),
+                (
+                    "vector",
+                    Node(
+                        "math",
+                        (
+                            ("operation", "multiply_add"),
+                            ("a", factor),
+                            ("b", _RAMP / (_RAMP + 1)),
+                            ("c", first / (_RAMP + 1)),
+                            ("clamp", False),
+                        ),
+                    ),
+                ),
+                ("interpolation", "closest" if closest else "linear"),
+                ("extension", "extend"),
+                ("output", "alpha" if output.socket.name == "Alpha" else "color"),
+            ),
+        )
 
 
 def _pattern(colour: Colour) -> tuple:
@@ -430,7 +550,12 @@ def _rgb(value: object) -> RGB:
 def constant_number(output: Output, name: str | int) -> float | None:
     """The constant that a node's input is given, or None where it varies."""
     of = output.input(name)
-    value = of and _constant(of)
+    return of and constant_number_of(of)
+
+
+def constant_number_of(of: Input) -> float | None:
+    """The same of an input."""
+    value = _constant(of)
     if value is None or isinstance(value, int | float):
         return value
     return sum(factor * each for factor, each in zip(_LUMINANCE, _rgb(value), strict=True))

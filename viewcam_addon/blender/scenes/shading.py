@@ -20,9 +20,10 @@ class Shading:
         if name not in self._readings:
             reading = self._readings[name] = shaders.read(material)
             self.materials[name] = reading.material
+            self.images |= reading.tables
             for key, image in reading.images.items():
-                if key not in self.images:
-                    self.images[key] = images.picture_of(image)
+                if key not in self.images or key in reading.alphas:
+                    self.images[key] = images.picture_of(image, key in reading.alphas)
         return self._readings[name]
 
     def names(self, slots: tuple[bpy.types.Material | None, ...]) -> tuple[str, ...]:

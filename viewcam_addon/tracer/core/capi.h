@@ -77,7 +77,10 @@ typedef struct {
     int (*occluded)(const ViewcamScene*, size_t count, const double* rays, int packets, uint8_t* hidden);
 
     int (*clear_light)(ViewcamScene*);
-    int (*add_texture)(ViewcamScene*, int width, int height, int srgb, const float* pixels);
+    /* channels: 3, or 4 with an alpha. */
+    int (*add_texture)(ViewcamScene*, int width, int height, int channels, int srgb, const float* pixels);
+    /* Of materials' inputs; it names nodes that were added before. */
+    int (*add_node)(ViewcamScene*, const ViewcamNode*);
     int (*add_material)(ViewcamScene*, const ViewcamClosure*, int count);
     int (*add_lamp)(ViewcamScene*, const ViewcamLamp*);
     int (*set_film)(ViewcamScene*, const ViewcamFilm*);
@@ -94,7 +97,7 @@ typedef struct {
     int (*probe_specular)(double ratio, size_t, const double*, double*);
     int (*probe_sample_light)(const ViewcamLamp*, size_t, const double*, double*);
     int (*probe_light_le)(const ViewcamLamp*, size_t, const double*, double*);
-    int (*probe_texture)(int width, int height, int srgb, const float*, int closest, size_t, const double*, double*);
+    int (*probe_nodes)(const ViewcamScene*, size_t, const double*, double*);
     int (*probe_bsdf)(const ViewcamClosure*, int version, size_t, const double*, double*);
     int (*probe_leaving)(const ViewcamScene*, size_t, const double*, const double*, double*);
 } ViewcamCore;

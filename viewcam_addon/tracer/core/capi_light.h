@@ -2,13 +2,13 @@
 #pragma once
 #include <stdint.h>
 
-/* image: a number of viewcam_add_texture, or −1. */
+/* image: a number of viewcam_add_texture, or −1. node: likewise, of viewcam_add_node. */
 typedef struct {
     double rgb[3];
-    int32_t image, closest, vertex;
+    int32_t image, closest, vertex, node;
 } ViewcamColor;
 
-/* An input of a closure by its name in scene files. choice: of what is a word, or null. */
+/* An input of a closure or a node by its name in scene files. choice: of what is a word, or null. */
 typedef struct {
     const char *name, *choice;
     ViewcamColor color;
@@ -23,8 +23,13 @@ typedef struct {
 typedef struct {
     const char* name;
     const ViewcamInput* inputs;
+    int32_t input_count;
+} ViewcamNode;
+
+typedef struct {
+    ViewcamNode node;
     const ViewcamMixFactor* factors;
-    int32_t input_count, factor_count;
+    int32_t factor_count;
 } ViewcamClosure;
 
 enum ViewcamLampKind { VIEWCAM_SUN, VIEWCAM_POINT, VIEWCAM_SPOT, VIEWCAM_RECTANGLE, VIEWCAM_ELLIPSE };

@@ -69,7 +69,13 @@ inline void camera(const ViewcamCamera& given) {
 inline void rows(const Scene& scene, uint32_t first, uint32_t end) {
     that(first <= end && end <= scene.camera.height, "rows are asked for that the picture does not have");
 }
-inline void texture(int width, int height, const float* pixels) { that(width > 0 && height > 0 && pixels, "an image has no pixels"); }
+inline void texture(int width, int height, int channels, const float* pixels) {
+    that(width > 0 && height > 0 && pixels && (channels == 3 || channels == 4), "an image has no pixels");
+}
+inline void node(const Scene& scene, const ViewcamNode& given) {
+    for (int i = 0; i < given.input_count; i++)
+        that(given.inputs[i].color.image < int64_t(scene.illumination.textures.size()), "a node has an image that the scene does not have");
+}
 inline void lamp(const ViewcamLamp& given) {
     that(given.kind >= VIEWCAM_SUN && given.kind <= VIEWCAM_ELLIPSE, "a lamp is of no kind");
     that(all_within(given.matrix, 12, -LARGEST, LARGEST), "a lamp has a matrix with too large a number, or none");

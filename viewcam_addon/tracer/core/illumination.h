@@ -6,6 +6,7 @@
 #include "film/filter.h"
 #include "lights/environment.h"
 #include "material.h"
+#include "nodes/value_node.h"
 
 namespace viewcam::VIEWCAM_ISA {
 
@@ -27,6 +28,7 @@ struct Bounces {
 
 struct Illumination {
     std::vector<Texture> textures;
+    ValueNodes nodes;
     std::vector<Material> materials;
     std::vector<Lamp> lamps;
     Environment environment;
@@ -34,8 +36,6 @@ struct Illumination {
     double filter_width = 0;  // of BLACKMAN_HARRIS, 0 is BOX
     Bounces bounces;
     int version = CYCLES_5_2;  // whose Cycles computes materials so
-
-    ShadingPoint shading(const Interaction& point, Vec3 incoming) const { return {point, incoming, textures, version}; }
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

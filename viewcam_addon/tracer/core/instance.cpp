@@ -162,10 +162,17 @@ const ViewcamCore core = {
 
     .clear_light = [](ViewcamScene* scene) { return guarded([&] { clear_light(scene_of(scene)); }); },
     .add_texture =
-        [](ViewcamScene* scene, int width, int height, int srgb, const float* pixels) {
+        [](ViewcamScene* scene, int width, int height, int channels, int srgb, const float* pixels) {
             return guarded([&] {
-                check::texture(width, height, pixels);
-                add_texture(scene_of(scene), width, height, srgb, pixels);
+                check::texture(width, height, channels, pixels);
+                add_texture(scene_of(scene), width, height, channels, srgb, pixels);
+            });
+        },
+    .add_node =
+        [](ViewcamScene* scene, const ViewcamNode* node) {
+            return guarded([&] {
+                check::node(scene_of(scene), *node);
+                add_node(scene_of(scene), *node);
             });
         },
     .add_material = [](ViewcamScene* scene, const ViewcamClosure* closures,
@@ -213,8 +220,8 @@ const ViewcamCore core = {
                              double* out) { return guarded([&] { probe::sample_light(*lamp, count, given, out); }); },
     .probe_light_le = [](const ViewcamLamp* lamp, size_t count, const double* given,
                          double* out) { return guarded([&] { probe::light_le(*lamp, count, given, out); }); },
-    .probe_texture = [](int width, int height, int srgb, const float* pixels, int closest, size_t count, const double* uv,
-                        double* out) { return guarded([&] { probe::texture(width, height, srgb, pixels, closest, count, uv, out); }); },
+    .probe_nodes = [](const ViewcamScene* scene, size_t count, const double* given,
+                      double* out) { return guarded([&] { probe::nodes(scene_of(scene), count, given, out); }); },
     .probe_bsdf = [](const ViewcamClosure* closure, int version, size_t count, const double* given,
                      double* out) { return guarded([&] { probe::bsdf(*closure, version, count, given, out); }); },
     .probe_leaving = [](const ViewcamScene* scene, size_t count, const double* rays, const double* lights,

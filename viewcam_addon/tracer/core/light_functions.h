@@ -5,25 +5,38 @@
 
 namespace viewcam::VIEWCAM_ISA {
 
-inline void add_texture(Scene& scene, int width, int height, bool srgb, const float* pixels) {
-    scene.illumination.textures.push_back({width, height, srgb, std::vector<float>(pixels, pixels + 3 * size_t(width) * height)});
+inline Texture texture_of(int width, int height, int channels, bool srgb, const float* pixels) {
+    Texture texture{width, height, srgb, std::vector<float>(pixels, pixels + size_t(channels) * size_t(width) * height), channels};
+    texture.premultiply();
+    return texture;
+}
+inline void add_texture(Scene& scene, int width, int height, int channels, bool srgb, const float* pixels) {
+    scene.illumination.textures.push_back(texture_of(width, height, channels, srgb, pixels));
 }
 
-inline Color color_of(const ViewcamColor& given) {
-    uint32_t image = given.image < 0 ? NONE : uint32_t(given.image);
-    return {{given.rgb[0], given.rgb[1], given.rgb[2]}, image, bool(given.closest), bool(given.vertex)};
+inline Color color_of(const ViewcamColor& given, const ValueNodes& nodes) {
+    Vec3 rgb{given.rgb[0], given.rgb[1], given.rgb[2]};
+    auto number = [](int32_t n) { return n < 0 ? NONE : uint32_t(n); };
+    return nodes.resolved({rgb, number(given.image), number(given.node), bool(given.closest), bool(given.vertex)});
 }
-inline WeightedClosure closure_of(const ViewcamClosure& given) {
+inline Inputs inputs_of(const ViewcamNode& given, const ValueNodes& nodes) {
     std::vector<Input> inputs;
     for (int i = 0; i < given.input_count; i++)
-        inputs.push_back({given.inputs[i].name, given.inputs[i].choice ? given.inputs[i].choice : "", color_of(given.inputs[i].color)});
-    WeightedClosure made{closure_of(given.name, Inputs(std::move(inputs))), {}};
-    for (int i = 0; i < given.factor_count; i++) made.factors.push_back({color_of(given.factors[i].value), bool(given.factors[i].rest)});
+        inputs.push_back({given.inputs[i].name, given.inputs[i].choice ? given.inputs[i].choice : "", color_of(given.inputs[i].color, nodes)});
+    return Inputs(std::move(inputs));
+}
+inline void add_node(Scene& scene, const ViewcamNode& given) {
+    Illumination& light = scene.illumination;
+    light.nodes.add(given.name, inputs_of(given, light.nodes), light.textures);
+}
+inline WeightedClosure closure_of(const ViewcamClosure& given, const ValueNodes& nodes) {
+    WeightedClosure made{closure_of(given.node.name, inputs_of(given.node, nodes)), {}};
+    for (int i = 0; i < given.factor_count; i++) made.factors.push_back({color_of(given.factors[i].value, nodes), bool(given.factors[i].rest)});
     return made;
 }
 inline void add_material(Scene& scene, const ViewcamClosure* closures, int count) {
     Material material;
-    for (int i = 0; i < count; i++) material.closures.push_back(closure_of(closures[i]));
+    for (int i = 0; i < count; i++) material.closures.push_back(closure_of(closures[i], scene.illumination.nodes));
     material.prepare(scene.illumination.textures);
     scene.illumination.materials.push_back(std::move(material));
 }
@@ -148,7 +161,7 @@ inline void leaving(const Scene& scene, size_t count, const double* rays, const 
 // weight, pdf and the kind of ray.
 inline void bsdf(const ViewcamClosure& closure, int version, size_t count, const double* given, double* out) {
     Material material;
-    material.closures.push_back(closure_of(closure));
+    material.closures.push_back(closure_of(closure, {}));
     std::vector<Texture> none;
     for (size_t i = 0; i < count; i++, given += 10, out += 12) {
         Interaction point;
@@ -168,12 +181,19 @@ inline void bsdf(const ViewcamClosure& closure, int version, size_t count, const
         std::copy(row, row + 12, out);
     }
 }
-// uv: (count, 2). out: (count, 3).
-inline void texture(int width, int height, bool srgb, const float* pixels, bool closest, size_t count, const double* uv, double* out) {
-    Texture texture{width, height, srgb, std::vector<float>(pixels, pixels + 3 * size_t(width) * height)};
-    for (size_t i = 0; i < count; i++) {
-        Vec3 color = texture.at({uv[2 * i], uv[2 * i + 1]}, closest);
-        out[3 * i] = color.x, out[3 * i + 1] = color.y, out[3 * i + 2] = color.z;
+// What the last of some nodes makes on a floor, z up, whose UV is (u, v): given: (count, 6), the unit way that a path came along, u,
+// v, and whether the floor is met from behind. out: (count, 4), a colour or vector, and the number that it is.
+inline void nodes(const Scene& scene, size_t count, const double* given, double* out) {
+    const Illumination& light = scene.illumination;
+    if (light.nodes.all.empty()) throw std::invalid_argument("there is no node");
+    auto last = uint32_t(light.nodes.all.size() - 1);
+    for (size_t i = 0; i < count; i++, given += 6, out += 4) {
+        Interaction point;
+        point.normal = point.shading = {0, 0, 1}, point.uv = {given[3], given[4]}, point.backside = given[5] != 0;
+        ShadingPoint at{point, {given[0], given[1], given[2]}, light.textures, light.version, &light.nodes};
+        Vec3 value = light.nodes.value(last, at);
+        double row[4] = {value.x, value.y, value.z, light.nodes.number(last, at)};
+        std::copy(row, row + 4, out);
     }
 }
 

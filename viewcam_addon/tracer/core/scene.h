@@ -133,6 +133,11 @@ class Scene {
         return found;
     }
 
+    // What a material is told of a point that a path reaches.
+    ShadingPoint shading(const Interaction& point, Vec3 incoming) const {
+        return {point, incoming, illumination.textures, illumination.version, &illumination.nodes, &objects[point.object], origin};
+    }
+
     // What lights need. triangle_count: 0 of spheres. material: of a triangle, an index into illumination.materials. corners: in
     // rendering space. extent: half the diagonal of a box round the boxes of all surfaces, 1 without any.
     uint32_t triangle_count(uint32_t object) const {

@@ -1,7 +1,7 @@
 // What colours surfaces have: constants, images and the mesh's own colours.
 //
-// As in Cycles (measured with 4.2, 5.0 and 5.2): of n pixels, that of number i has its centre at (i + ½)/n of UV; images repeat,
-// and at their border pixels are blended with those on the other side; sRGB is decoded after blending, which makes blends of
+// As in Cycles (measured with 4.2, 5.0 and 5.2): of n pixels, that of number i has its centre at (i + ½)/n of UV; where images repeat,
+// pixels at their border are blended with those on the other side; sRGB is decoded after blending, which makes blends of
 // light and dark darker than half-way. Cycles has UV in float32: at 64 pixels, its colours are off by up to 2e-5 of the contrast.
 //
 // Rejected: decoding images when they are loaded (not what Cycles does), and mip maps, which it has not.
@@ -14,25 +14,39 @@
 
 namespace viewcam::VIEWCAM_ISA {
 
-// An image laid out over UV (0, 0) to (1, 1) and repeated beyond. pixels: rows from the bottom, RGB, as they are encoded.
+// How an image is looked up. straight: whether colours are divided by the alpha that they were multiplied by.
+struct Lookup {
+    enum Interpolation { LINEAR, CLOSEST, CUBIC } interpolation = LINEAR;
+    enum Extension { REPEAT, EXTEND, CLIP, MIRROR } extension = REPEAT;
+    bool straight = false;
+};
+
+// An image laid out over UV (0, 0) to (1, 1). pixels: rows from the bottom, RGB or, with that many channels, RGBA, as they are
+// encoded. Colours that are encoded are multiplied by their alpha in whole bytes, before they are blended.
 struct Texture {
     int width, height;
     bool srgb;
     std::vector<float> pixels;
+    int channels = 3;
+
+    // To be called when all pixels are there.
+    void premultiply() {
+        if (channels != 4 || !srgb) return;
+        for (size_t i = 0; i < pixels.size(); i += 4)
+            for (size_t c = 0; c < 3; c++) pixels[i + c] = float(std::floor(std::rint(pixels[i + c] * 255) * std::rint(pixels[i + 3] * 255) / 255) / 255);
+    }
 
     // The linear colour at UV; that at 0 where UV is not finite. closest: of the nearest pixel instead of between four.
-    Vec3 at(Vec2 uv, bool closest) const {
-        double u = uv.x - std::floor(uv.x), v = uv.y - std::floor(uv.y);
-        if (!(u >= 0 && u <= 1)) u = 0;
-        if (!(v >= 0 && v <= 1)) v = 0;
-        if (closest) return decoded(pixel(std::min(int(u * width), width - 1), std::min(int(v * height), height - 1)));
-        double column = u * width - 0.5, row = v * height - 0.5, left = std::floor(column), below = std::floor(row);
-        double across = column - left, up = row - below;
-        int x0 = left < 0 ? width - 1 : int(left), x1 = int(left) + 1 >= width ? 0 : int(left) + 1;
-        int y0 = below < 0 ? height - 1 : int(below), y1 = int(below) + 1 >= height ? 0 : int(below) + 1;
-        Vec3 lower = pixel(x0, y0) * (1 - across) + pixel(x1, y0) * across;
-        Vec3 upper = pixel(x0, y1) * (1 - across) + pixel(x1, y1) * across;
-        return decoded(lower * (1 - up) + upper * up);
+    Vec3 at(Vec2 uv, bool closest) const { return at(uv, Lookup{closest ? Lookup::CLOSEST : Lookup::LINEAR}); }
+    Vec3 at(Vec2 uv, Lookup lookup) const {
+        Vec3 rgb = blend<Vec3>(uv, lookup, [&](int column, int row) { return pixel(column, row); });
+        if (lookup.straight && channels == 4)
+            if (double a = alpha(uv, lookup); a != 0 && a != 1) rgb = rgb / a;
+        return decoded(rgb);
+    }
+    double alpha(Vec2 uv, Lookup lookup) const {
+        auto opaque = [&](int column, int row) { return channels == 4 ? double(pixels[4 * (size_t(row) * width + column) + 3]) : 1; };
+        return blend<double>(uv, lookup, opaque);
     }
 
     Vec3 mean() const { return mean(0, width, 0, height); }
@@ -49,22 +63,74 @@ struct Texture {
 
    private:
     Vec3 pixel(int column, int row) const {
-        const float* rgb = &pixels[3 * (size_t(row) * width + column)];
+        const float* rgb = &pixels[size_t(channels) * (size_t(row) * width + column)];
         return {rgb[0], rgb[1], rgb[2]};
     }
+    // The pixel that stands for one beyond the border, −1 for nothing.
+    static int within(int64_t i, int64_t count, Lookup::Extension extension) {
+        if (i >= 0 && i < count) return int(i);
+        if (extension == Lookup::EXTEND) return i < 0 ? 0 : int(count - 1);
+        if (extension == Lookup::CLIP) return -1;
+        if (extension == Lookup::REPEAT) return int((i % count + count) % count);
+        int64_t there = (i % (2 * count) + 2 * count) % (2 * count);
+        return int(there < count ? there : 2 * count - 1 - there);
+    }
+    // Pixels' values at UV, blended.
+    template <class Value, class Pixel> Value blend(Vec2 uv, Lookup lookup, Pixel&& pixel) const {
+        double u = uv.x, v = uv.y;
+        if (lookup.extension == Lookup::REPEAT) {
+            u -= std::floor(u), v -= std::floor(v);
+            u = u >= 0 ? smaller(u, LARGEST) : 0;
+            v = v >= 0 ? smaller(v, LARGEST) : 0;
+        } else {  // far outside an image all is as it is just outside, or mirrored
+            if (!(std::fabs(u) < FARTHEST)) u = 0;
+            if (!(std::fabs(v) < FARTHEST)) v = 0;
+        }
+        auto at = [&](int64_t column, int64_t row) -> Value {
+            int x = within(column, width, lookup.extension), y = within(row, height, lookup.extension);
+            return x < 0 || y < 0 ? Value{} : pixel(x, y);
+        };
+        if (lookup.interpolation == Lookup::CLOSEST) return at(int64_t(std::floor(u * width)), int64_t(std::floor(v * height)));
+        double column = u * width - 0.5, row = v * height - 0.5, left = std::floor(column), below = std::floor(row);
+        double across = column - left, up = row - below;
+        auto x = int64_t(left), y = int64_t(below);
+        if (lookup.interpolation == Lookup::LINEAR) {
+            Value lower = at(x, y) * (1 - across) + at(x + 1, y) * across;
+            Value upper = at(x, y + 1) * (1 - across) + at(x + 1, y + 1) * across;
+            return lower * (1 - up) + upper * up;
+        }
+        double columns[4], rows[4];
+        spline(across, columns), spline(up, rows);
+        Value sum{};
+        for (int j = 0; j < 4; j++) {
+            Value of_row{};
+            for (int i = 0; i < 4; i++) of_row = of_row + at(x - 1 + i, y - 1 + j) * columns[i];
+            sum = sum + of_row * rows[j];
+        }
+        return sum;
+    }
+    // The weights of a cubic B-spline's four pixels.
+    static void spline(double t, double (&weights)[4]) {
+        double s = 1 - t;
+        weights[0] = s * s * s / 6, weights[3] = t * t * t / 6;
+        weights[1] = (3 * t * t * t - 6 * t * t + 4) / 6, weights[2] = (3 * s * s * s - 6 * s * s + 4) / 6;
+    }
+    static constexpr double FARTHEST = 1e4, LARGEST = 1 - 0x1p-53;
+
     Vec3 decoded(Vec3 rgb) const { return srgb ? Vec3{linear(rgb.x), linear(rgb.y), linear(rgb.z)} : rgb; }
     // sRGB (IEC 61966-2-1).
     static double linear(double encoded) { return encoded <= 0.04045 ? encoded / 12.92 : pow((encoded + 0.055) / 1.055, 2.4); }
 };
 
-// A colour, the same everywhere or times what an image or the mesh's own colours say. image: in the scene's textures, or NONE.
+// A colour, the same everywhere or times what an image or the mesh's own colours say; or what a node makes (nodes/value_node.h),
+// the rest then being white. image: in the scene's textures, or NONE. node: likewise, in its nodes.
 struct Color {
     Vec3 rgb;
-    uint32_t image = NONE;
+    uint32_t image = NONE, node = NONE;
     bool closest = false, vertex = false;
 
     bool is_black() const { return viewcam::VIEWCAM_ISA::is_black(rgb); }
-    bool varies() const { return image != NONE || vertex; }
+    bool varies() const { return image != NONE || vertex || node != NONE; }
 
     Vec3 at(const std::vector<Texture>& textures, const Interaction& point) const {
         Vec3 color = rgb;
@@ -72,7 +138,7 @@ struct Color {
         if (vertex) color *= point.vertex_color;
         return color;
     }
-    // Over its image, as if vertex colours were white.
+    // Over its image, as if vertex colours and what a node makes were white.
     Vec3 mean(const std::vector<Texture>& textures) const { return image == NONE ? rgb : rgb * textures[image].mean(); }
 };
 

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from ... import checks
 from ...errors import InputError
 
+WHITE = (1.0, 1.0, 1.0)
+
 # Float32 passes and float64 sums hold products of these.
 LARGEST_RADIANCE = 1e18
 
@@ -27,16 +29,17 @@ def radiance(name: str, values: object) -> tuple[float, float, float]:
 class Picture:
     """An image that colours surfaces, laid out over UV (0, 0) to (1, 1) and repeated beyond.
 
-    pixels : (height, width, 3) float32, rows from the bottom; encoded as sRGB where `srgb` is true, else linear. Between
-        pixels the encoded values are interpolated, as Cycles does.
+    pixels : (height, width, 3) float32, or 4 with an alpha, rows from the bottom; encoded as sRGB where `srgb` is true, else
+        linear. Between pixels the encoded values are interpolated, as Cycles does; with an alpha, after they are multiplied by
+        it. Linear ones are not multiplied.
     """
 
     pixels: NDArray[np.float32]
     srgb: bool = False
 
     def __post_init__(self) -> None:
-        if self.pixels.ndim != 3 or self.pixels.shape[2] != 3 or not self.pixels.size:
-            raise InputError(f"an image has the shape {self.pixels.shape} and must have height × width × 3: check it")
+        if self.pixels.ndim != 3 or self.pixels.shape[2] not in (3, 4) or not self.pixels.size:
+            raise InputError(f"an image has the shape {self.pixels.shape} and must have height × width × 3 or 4: check it")
         if not np.isfinite(self.pixels).all():
             raise InputError("an image holds a number that is not finite: check it")
         # What is encoded as sRGB is raised to the power of 2.4.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...checks import shown
 from ...errors import InputError
-from . import Scene, placing
+from . import Scene, placing, value_nodes
 from .fields import Arrays, Field
 from .film import Bounces, Film
 from .geometry_fields import array_document
@@ -111,12 +111,15 @@ def _material_document(material: Material) -> dict[str, Any]:
 
 def _node_document(node: Node) -> dict[str, Any]:
     def value_of(name: str, value: object) -> object:
+        known = KINDS[node.type].inputs[name]
         if isinstance(value, Node):
             return _node_document(value)
-        if isinstance(value, Colour):
-            is_number = isinstance(KINDS[node.type].inputs[name], float) and value == Colour((value.rgb[0],) * 3)
-            return value.rgb[0] if is_number else _colour_document(value)
-        return value
+        three = value.rgb if isinstance(value, Colour) and value == Colour(value.rgb) else value
+        if isinstance(known, float) and isinstance(three, tuple) and three == (three[0],) * 3:
+            return three[0]
+        if known is value_nodes.IMAGE:
+            return value.image
+        return _colour_document(value) if isinstance(value, Colour) else value
 
     return {"type": node.type} | {name: value_of(name, value) for name, value in node.inputs}
 
@@ -130,7 +133,9 @@ def _colour_document(colour: Colour) -> list[float] | dict[str, Any]:
 
 def _picture(field: Field, arrays: Arrays) -> Picture:
     keys = field.fields(("pixels",), ("srgb",))
-    pixels = keys["pixels"].array(arrays, np.float32, (None, None, 3))
+    pixels = keys["pixels"].array(arrays, np.float32, (None, None, None))
+    if pixels.shape[2] not in (3, 4):
+        keys["pixels"].fail(f"has {pixels.shape[2]} numbers a pixel and must have 3 or 4: correct it")
     try:
         return Picture(pixels, keys["srgb"].truth() if "srgb" in keys else False)
     except InputError as error:
@@ -155,21 +160,29 @@ def _node(field: Field) -> Node:
     kind = field.fields(("type",), others=True)["type"]
     if kind.text() not in KINDS:
         kind.fail(f"is {shown(kind.value)}: give one of {', '.join(KINDS)}")
-    known = KINDS[kind.value].inputs
-    keys = field.fields(("type",), tuple(known))
+    known = KINDS[kind.value]
+    keys = field.fields(("type",), tuple(known.inputs))
     try:
-        return Node(
-            kind.value, tuple((name, _node_input(keys[name], default)) for name, default in known.items() if name in keys)
+        given = (
+            (name, _node_input(keys[name], default, known.is_value)) for name, default in known.inputs.items() if name in keys
         )
+        return Node(kind.value, tuple(given))
     except InputError as error:
         field.hand_on(error)
 
 
-def _node_input(field: Field, default: object) -> Any:
-    if default is None:
+def _node_input(field: Field, default: object, of_value: bool) -> Any:
+    is_node = isinstance(field.value, dict) and "type" in field.value
+    if default is None or is_node:
         return _node(field)
+    if isinstance(default, bool):
+        return field.truth()
+    if default is value_nodes.IMAGE:
+        return Colour(_WHITE, field.text())
     if isinstance(default, tuple) and isinstance(default[0], str):
         return field.text()
+    if isinstance(field.value, list) and of_value:
+        return field.vector(3)
     return _colour(field) if isinstance(field.value, list | dict) else field.number()
 
 

@@ -34,6 +34,8 @@ class Material:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "ior", checks.number("ior of a material", self.ior, 1e-3, 1e3))
+        if self.surface is not None and self.surface.is_value:
+            raise InputError(f"the surface of a material is a node {self.surface.type!r}: give a shader")
         if self.surface is not None and self.colours:
             raise InputError(f"a material has a surface beside {', '.join(self.colours)}: give one or the other")
 
@@ -59,14 +61,15 @@ class Material:
 
     @property
     def inputs(self) -> tuple[tuple[str, Colour], ...]:
-        """What all colours and numbers are given, each with what a sentence calls it."""
+        """What all colours and numbers are given or made from, each with what a sentence calls it."""
         if self.surface is None:
             return tuple(self.colours.items())
         found = []
         for closure in self.closures:
             kind = closure.node.type
-            found += [(f"{name} of {kind}", value) for name, value in closure.node.inputs if isinstance(value, Colour)]
-            found += [(f"a factor of {kind}", factor) for factor, _ in closure.factors]
+            for name, value in (*closure.node.inputs, *(("a factor", factor) for factor, _ in closure.factors)):
+                colours = value.colours if isinstance(value, Node) else [value] if isinstance(value, Colour) else []
+                found += [(f"{name} of {kind}", colour) for colour in colours]
         return tuple(found)
 
 

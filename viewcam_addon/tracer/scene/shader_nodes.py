@@ -1,4 +1,4 @@
-"""Shader nodes, as data: a tree of closures, mixed and added, whose inputs are numbers, colours or images.
+"""Shader nodes, as data: a tree of closures, mixed and added, whose inputs are numbers, colours, images or value nodes.
 
 The names and defaults are those of Blender's nodes, in small letters; what they compute is Cycles', in the version that the
 scene names (`Scene.cycles`), and stands in core/closures. A tree, since a shader that feeds two others is simply there twice.
@@ -6,16 +6,17 @@ Rejected: names and links as in Blender's own files, which a hand must keep in s
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from ... import checks
 from ...errors import InputError
-from .colours import Colour
+from . import value_nodes
+from .colours import LARGEST_RADIANCE, WHITE, Colour
 
 RGB = tuple[float, float, float]
 
-WHITE, GREY = (1.0, 1.0, 1.0), (0.8, 0.8, 0.8)
+GREY = (0.8, 0.8, 0.8)
 DISTRIBUTIONS = ("multiscatter_ggx", "ggx", "beckmann")
 
 
@@ -23,12 +24,15 @@ DISTRIBUTIONS = ("multiscatter_ggx", "ggx", "beckmann")
 class Kind:
     """What a type of node is given.
 
-    inputs : name → its default; a number, a colour, words to choose from (the first is the default), or None for a shader.
+    inputs : name → its default; a number, a colour, words to choose from (the first is the default), or None for a shader; of a
+    node that makes values also what value_nodes.py says.
+    is_value : whether it makes a value, and is no shader.
     scatters : the kinds of bounces (film.Bounces) that its light is counted as.
     """
 
-    inputs: Mapping[str, float | RGB | tuple[str, ...] | None]
+    inputs: Mapping[str, value_nodes.Default | None]
     scatters: tuple[str, ...] = ()
+    is_value: bool = False
 
 
 KINDS: dict[str, Kind] = {
@@ -78,35 +82,81 @@ KINDS: dict[str, Kind] = {
     ),
     "mix": Kind({"factor": 0.5, "first": None, "second": None}),
     "add": Kind({"first": None, "second": None}),
+    **{name: Kind(inputs, is_value=True) for name, inputs in value_nodes.KINDS.items()},
 }
+
+MOST_NODES = 500
+"""Of a value: a tree that is larger is none that a hand has made, or one node in it feeds others again and again."""
 
 
 @dataclass(frozen=True)
 class Node:
     """A node, and through its inputs all that feed it.
 
-    type : one of `KINDS`. inputs : (name, value) of those that are not what they are by default: a number, a `Colour`, three
-    numbers, a word, or a `Node` where a shader belongs.
+    type : one of `KINDS`. inputs : (name, value) of those that are not what they are by default. Of a shader a `Colour`, a
+    word, or a `Node`: a shader where one belongs, else one that makes values. Of that also whether something holds, and in
+    place of constant colours three numbers, which may be negative.
     """
 
     type: str
     inputs: tuple[tuple[str, Any], ...] = ()
+    size: int = field(default=1, init=False, compare=False, repr=False)  # nodes that make the value, this one among them
 
     def __post_init__(self) -> None:
+        what = "node" if self.is_value else "shader"
         if self.type not in KINDS:
-            raise InputError(f"a shader is of the type {checks.shown(self.type)}: give one of {', '.join(KINDS)}")
+            raise InputError(f"a {what} is of the type {checks.shown(self.type)}: give one of {', '.join(KINDS)}")
         known = KINDS[self.type].inputs
         values = {}
         for name, value in dict(self.inputs).items():
             if name not in known:
-                raise InputError(f"a shader {self.type!r} has no input {checks.shown(name)}: give one of {', '.join(known)}")
-            values[name] = _checked(f"{name} of a shader {self.type!r}", value, known[name])
-        ordered = ((name, values[name]) for name in known if name in values and values[name] != _default(known[name]))
+                raise InputError(
+                    f"a {what} {self.type!r} has no input {checks.shown(name)}: give one of {', '.join(known) or 'none'}"
+                )
+            values[name] = _checked(f"{name} of a {what} {self.type!r}", value, known[name], self.is_value)
+        ordered = ((name, values[name]) for name in known if name in values and values[name] != self._default(name))
         object.__setattr__(self, "inputs", tuple(ordered))
+        size = 1 + sum(value.size for _, value in self.inputs if isinstance(value, Node) and value.is_value)
+        object.__setattr__(self, "size", size)
+        if size > MOST_NODES:
+            raise InputError(f"an input is computed by more than {MOST_NODES} nodes: give it fewer")
 
     def __getitem__(self, name: str) -> Any:
-        """The value of an input: a `Colour`, a word, or a `Node` or None."""
-        return dict(self.inputs).get(name, _default(KINDS[self.type].inputs[name]))
+        """The value of an input: a `Colour`, a word, or a `Node` or None; of a node that makes values three numbers, too."""
+        return dict(self.inputs).get(name, self._default(name))
+
+    def _default(self, name: str) -> Any:
+        default = KINDS[self.type].inputs[name]
+        if default is value_nodes.UV:
+            return Node("texture_coordinate")
+        if default is None or default is value_nodes.IMAGE:
+            return None
+        if isinstance(default, tuple) and isinstance(default[0], str):
+            return default[0]
+        return _number_or_colour(default, self.is_value)
+
+    @property
+    def is_value(self) -> bool:
+        """Whether it makes a value, and is no shader."""
+        return self.type in KINDS and KINDS[self.type].is_value
+
+    @property
+    def varies(self) -> bool:
+        """Whether it is not the same everywhere: nobody asks a node that makes values, whose core knows."""
+        return True
+
+    @property
+    def is_black(self) -> bool:
+        return False
+
+    @property
+    def colours(self) -> Iterator[Colour]:
+        """All images and colours of the mesh that a value is made from."""
+        for _, value in self.inputs:
+            if isinstance(value, Colour):
+                yield value
+            elif isinstance(value, Node):
+                yield from value.colours
 
     @property
     def is_shining(self) -> bool:
@@ -146,19 +196,21 @@ def closures(shader: Node | None, factors: tuple[tuple[Colour, bool], ...] = ())
         yield Closure(shader, factors)
 
 
-def _default(of: Any) -> Any:
-    if of is None:
-        return None
-    return of[0] if isinstance(of, tuple) and isinstance(of[0], str) else _colour(of)
-
-
-def _colour(value: Any) -> Colour:
-    if isinstance(value, Colour):
+def _number_or_colour(value: Any, may_be_negative: bool) -> Any:
+    if isinstance(value, bool | Colour):
         return value
-    return Colour((float(value),) * 3) if isinstance(value, int | float) else Colour(value)
+    three = (float(value),) * 3 if isinstance(value, int | float) else value
+    if not may_be_negative:
+        return Colour(three)
+    three = checks.vector("a value", three, 3)
+    if any(abs(number) > LARGEST_RADIANCE for number in three):
+        raise InputError(f"a value is {checks.shown(three)}: give numbers up to {LARGEST_RADIANCE:g}")
+    return three
 
 
-def _checked(name: str, value: Any, known: Any) -> Any:
+def _checked(name: str, value: Any, known: Any, of_value: bool) -> Any:
+    if isinstance(value, Node) and value.is_value == (known is None):
+        raise InputError(f"{name} is a node {value.type!r}: give {'a shader' if known is None else 'one that makes values'}")
     if known is None:
         if value is not None and not isinstance(value, Node):
             raise InputError(f"{name} is no shader: give one")
@@ -167,7 +219,17 @@ def _checked(name: str, value: Any, known: Any) -> Any:
         if value not in known:
             raise InputError(f"{name} is {checks.shown(value)}: give one of {', '.join(known)}")
         return value
+    if isinstance(known, bool):
+        if not isinstance(value, bool):
+            raise InputError(f"{name} is {checks.shown(value)}: give true or false")
+        return value
+    if known is value_nodes.IMAGE:
+        if not isinstance(value, Colour) or value != Colour(WHITE, value.image):
+            raise InputError(f"{name} is no image: give its name")
+        return value
+    if isinstance(value, Node):
+        return value
     try:
-        return _colour(value)
+        return _number_or_colour(value, of_value)
     except (InputError, TypeError, ValueError) as error:
         raise InputError(f"{name}: {error}") from error

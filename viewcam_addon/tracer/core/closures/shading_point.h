@@ -1,5 +1,6 @@
 // What closures are told: the point that a path has come to, and how they read the inputs that a scene file gives them.
 #pragma once
+#include <algorithm>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -13,19 +14,36 @@ namespace viewcam::VIEWCAM_ISA {
 // The versions of Blender whose Cycles computes materials in ways of its own: what is meant is the newest that is not newer.
 enum CyclesVersion { CYCLES_4_2 = 402, CYCLES_4_3 = 403, CYCLES_5_0 = 500, CYCLES_5_2 = 502 };
 
-// A point of a surface that a path reaches along `incoming`, and the scene's images.
+// What values are: as a number, a colour counts by its luminance and a vector by its mean.
+enum class Gives { NUMBER, COLOR, VECTOR };
+
+// Of Rec. 709's primaries.
+inline double luminance(Vec3 rgb) { return 0.2126390 * rgb.x + 0.7151687 * rgb.y + 0.0721923 * rgb.z; }
+
+struct Object;
+struct ValueNodes;
+
+// A point of a surface that a path reaches along `incoming`, and the scene's images and nodes. object: that has the surface.
+// origin: of rendering space, in the world.
 struct ShadingPoint {
     const Interaction& point;
     Vec3 incoming;
     const std::vector<Texture>& textures;
     int version = CYCLES_5_2;
+    const ValueNodes* nodes = nullptr;
+    const Object* object = nullptr;
+    Vec3 origin;
 
-    Vec3 color(const Color& color) const { return color.at(textures, point); }
-    // A number is a colour's luminance, Rec. 709's.
+    // What an input is given here; as light, and of a colour the luminance.
+    Vec3 value(const Color& color) const { return color.node == NONE ? color.at(textures, point) : value_of_node(color.node); }
+    Vec3 color(const Color& color) const {
+        if (color.node == NONE) return color.at(textures, point);
+        Vec3 rgb = value_of_node(color.node);
+        return {larger(rgb.x, 0), larger(rgb.y, 0), larger(rgb.z, 0)};
+    }
     double number(const Color& color) const {
         if (!color.varies()) return color.rgb.x;
-        Vec3 rgb = color.at(textures, point);
-        return 0.2126390 * rgb.x + 0.7151687 * rgb.y + 0.0721923 * rgb.z;
+        return color.node == NONE ? luminance(color.at(textures, point)) : number_of_node(color.node);
     }
     // The index of refraction beyond the surface over that before it. ior: inside over outside.
     double ratio(double ior) const { return point.backside ? 1 / ior : ior; }
@@ -35,9 +53,14 @@ struct ShadingPoint {
     bool is_smooth(const Microfacets& facets) const {
         return facets.alpha_x * facets.alpha_y <= (version < CYCLES_4_3 ? 5e-7 : 2e-10);
     }
+
+   private:
+    Vec3 value_of_node(uint32_t node) const;
+    double number_of_node(uint32_t node) const;
 };
 
-// A closure's inputs by the names that scene files have for them. choice: of what is no number.
+// The inputs of a closure or a node by the names that scene files have for them. choice: of what is no number; of what holds or
+// does not, "true" or "false".
 struct Input {
     std::string name, choice;
     Color color;
@@ -47,6 +70,10 @@ class Inputs {
     explicit Inputs(std::vector<Input> inputs) : inputs_(std::move(inputs)) {}
     const Color& operator[](std::string_view name) const { return find(name).color; }
     const std::string& choice(std::string_view name) const { return find(name).choice; }
+    bool flag(std::string_view name) const { return choice(name) == "true"; }
+    bool all_constant() const {
+        return std::none_of(inputs_.begin(), inputs_.end(), [](const Input& input) { return input.color.varies(); });
+    }
 
    private:
     const Input& find(std::string_view name) const {

@@ -128,7 +128,7 @@ class PathIntegrator {
     }
 
     const Material& material(const Interaction& point) const { return scene_.illumination.materials[point.material]; }
-    ShadingPoint shading(const Interaction& point, Vec3 incoming) const { return scene_.illumination.shading(point, incoming); }
+    ShadingPoint shading(const Interaction& point, Vec3 incoming) const { return scene_.shading(point, incoming); }
 
     // What the eye's rays come to, and the light that is of this alone.
     void start(const Ray* rays, int count, Block& block) const {

@@ -89,11 +89,22 @@ inline double atan2(double y, double x) {
     return std::copysign(angle, y);
 }
 
-// x^power of 1e-300 < x < 1e300 with a result in that range.
-inline double pow(double x, double power) {
+// The binary logarithm of 1e-300 < x < 1e300.
+inline double log2(double x) {
     static constexpr double LOG2[] = {2.8853900817779268,  0.9617966939259754,  0.5770780163557014,
                                       0.4121985830711221,  0.32059890487808423, 0.2623075212731535,
                                       0.22199096082951125, 0.19111353353277502, 0.19156360034169936};
+    auto bits = std::bit_cast<uint64_t>(x);
+    auto exponent = int(bits >> 52) - 1023;
+    double mantissa = std::bit_cast<double>((bits & 0xfffffffffffffull) | 0x3ff0000000000000ull);
+    if (mantissa > 1.4142135623730951) mantissa /= 2, exponent++;
+    double s = (mantissa - 1) / (mantissa + 1);
+    return exponent + s * polynomial(s * s, LOG2);
+}
+inline double log(double x) { return log2(x) * 0.6931471805599453; }
+
+// x^power of 1e-300 < x < 1e300 with a result in that range.
+inline double pow(double x, double power) {
     static constexpr double EXP2[] = {1.0,
                                       0.6931471805599453,
                                       0.24022650695910072,
@@ -107,12 +118,7 @@ inline double pow(double x, double power) {
                                       7.054894386348348e-09,
                                       4.456675341049206e-10,
                                       2.5733568308756892e-11};
-    auto bits = std::bit_cast<uint64_t>(x);
-    auto exponent = int(bits >> 52) - 1023;
-    double mantissa = std::bit_cast<double>((bits & 0xfffffffffffffull) | 0x3ff0000000000000ull);
-    if (mantissa > 1.4142135623730951) mantissa /= 2, exponent++;
-    double s = (mantissa - 1) / (mantissa + 1), wanted = power * (exponent + s * polynomial(s * s, LOG2));
-    double whole = std::floor(wanted + 0.5), rest = polynomial(wanted - whole, EXP2);
+    double wanted = power * log2(x), whole = std::floor(wanted + 0.5), rest = polynomial(wanted - whole, EXP2);
     return rest * std::bit_cast<double>(uint64_t(int64_t(whole) + 1023) << 52);
 }
 

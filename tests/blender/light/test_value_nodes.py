@@ -1,0 +1,238 @@
+"""Nodes that make values, without noise: a floor of patches that shine with what a node makes, one node each.
+
+What is shown is a tenth of the value, kept between −3 and 3, and a half more, so that none is negative, in one sample a pixel.
+The bound is absolute; where a value jumps (closest pixels, floors, divisions) Cycles' float32 may stand elsewhere, in a few.
+"""
+
+import zlib
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from viewcam_addon.blender.rendering import job
+from viewcam_addon.tracer import render
+from viewcam_addon.tracer.scene.shader_nodes import KINDS
+
+MOST, TYPICAL = 2e-5, 2e-6  # calibrated: float32 of UV up to 2, at images of 4 pixels, and 4.2 has another luminance by 1e-5
+JUMPS = 0.04  # of the pixels
+
+
+class N:
+    """A node by its class, inputs by their identifiers, properties; the output is the first enabled one or that of a name."""
+
+    def __init__(self, kind, inputs=None, output=None, **properties):
+        self.kind, self.inputs, self.output, self.properties = kind, inputs or {}, output, properties
+
+    def add(self, tree):
+        node = tree.nodes.new("ShaderNode" + self.kind)
+        for name, value in self.properties.items():
+            if name == "stops":
+                for position, colour in value:
+                    node.color_ramp.elements.new(position).color = colour
+            elif name == "ramp":
+                node.color_ramp.interpolation = value
+            else:
+                setattr(node, name, value)
+        for name, value in self.inputs.items():
+            socket = next(each for each in node.inputs if each.identifier == name)
+            if isinstance(value, N):
+                tree.links.new(value.add(tree), socket)
+            else:
+                socket.default_value = value
+        if self.output:
+            return node.outputs[self.output]
+        return next(socket for socket in node.outputs if socket.enabled)
+
+
+UV = N("TexCoord", output="UV")
+U, V = N("SeparateXYZ", {"Vector": UV}, "X"), N("SeparateXYZ", {"Vector": UV}, "Y")
+OBJECT = N("TexCoord", output="Object")
+
+
+def two_colours():
+    """Colours that vary over the mesh, one of them beyond 1."""
+    less = N("Math", {"Value": V, "Value_001": 0.7}, operation="MULTIPLY")
+    return tuple(N("CombineColor", {"Red": r, "Green": g, "Blue": b}) for r, g, b in ((U, V, 0.3), (0.4, U, less)))
+
+
+def graphs(image, straight):
+    """name → what a patch shows."""
+    found = {}
+    a, b = two_colours()
+    for word in KINDS["math"].inputs["operation"]:
+        found[f"math {word}"] = N("Math", {"Value": U, "Value_001": V, "Value_002": 0.4}, operation=word.upper())
+    found["math clamp"] = N("Math", {"Value": U, "Value_001": V}, operation="ADD", use_clamp=True)
+    for word in KINDS["vector_math"].inputs["operation"]:
+        theirs = {"fract": "FRACTION"}.get(word, word.upper())
+        if word in ("power", "sign") and bpy.app.version < (4, 3):
+            continue  # they came with 4.3
+        inputs = {"Vector": OBJECT, "Vector_001": a, "Vector_002": (0.3, 0.2, 0.1), "Scale": 0.7}
+        found[f"vector math {word}"] = N("VectorMath", inputs, operation=theirs)
+    for word in KINDS["mix_color"].inputs["blend"]:
+        inputs = {"Factor_Float": 0.6, "A_Color": a, "B_Color": b}
+        found[f"mix {word}"] = N("Mix", inputs, data_type="RGBA", blend_type=word.upper())
+    found["mix clamped"] = N(
+        "Mix", {"Factor_Float": U, "A_Color": a, "B_Color": b}, data_type="RGBA", blend_type="ADD", clamp_result=True
+    )
+    found["mix number"] = N("Mix", {"Factor_Float": V, "A_Float": U, "B_Float": a}, data_type="FLOAT", clamp_factor=False)
+    for word in KINDS["map_range"].inputs["interpolation"]:
+        inputs = {"Value": U, "From Min": 0.2, "From Max": 1.1, "To Min": 0.9, "To Max": 0.1, "Steps": 3.0}
+        found[f"map range {word}"] = N("MapRange", inputs, interpolation_type=word.upper(), clamp=False)
+        found[f"map range {word} clamped"] = N("MapRange", inputs, interpolation_type=word.upper(), clamp=True)
+    for interpolation in ("Linear", "Closest", "Cubic", "Smart"):
+        for extension in ("REPEAT", "EXTEND", "CLIP", "MIRROR"):
+            if interpolation in ("Linear", "Cubic") or extension == "CLIP":
+                image_node = {"image": image, "interpolation": interpolation, "extension": extension}
+                found[f"image {interpolation} {extension}"] = N("TexImage", {"Vector": UV}, **image_node)
+    found["alpha"] = N("TexImage", {"Vector": UV}, "Alpha", image=straight, extension="CLIP")
+    found["premultiplied"] = N("TexImage", {}, "Color", image=straight)
+    for word in ("POINT", "TEXTURE", "VECTOR", "NORMAL"):
+        inputs = {"Vector": OBJECT, "Rotation": (0.3, -0.4, 1.1), "Scale": (1.5, 0.7, 2.0)}
+        inputs |= {"Location": (0.2, -0.3, 0.1)} if word in ("POINT", "TEXTURE") else {}
+        found[f"mapping {word}"] = N("Mapping", inputs, vector_type=word)
+    for word in ("UV", "Object", "Normal", "Reflection"):
+        found[f"coordinate {word}"] = N("TexCoord", output=word)
+    for word in ("Position", "Normal", "True Normal", "Incoming", "Backfacing"):
+        found[f"geometry {word}"] = N("NewGeometry", output=word)
+    for word in ("Location", "Object Index"):
+        found[f"object {word}"] = N("ObjectInfo", output=word)
+    found["fresnel"] = N("Fresnel", {"IOR": 1.45})
+    for word in ("Fresnel", "Facing"):
+        for blend in (0.2, 0.5, 0.8):
+            found[f"layer weight {word} {blend}"] = N("LayerWeight", {"Blend": blend}, word)
+    stops = [(0.3, (0.9, 0.1, 0.2, 0.5)), (0.6, (0.1, 0.3, 0.8, 1.0))]
+    for word in ("LINEAR", "CONSTANT", "EASE", "B_SPLINE"):
+        found[f"ramp {word}"] = N("ValToRGB", {"Fac": U}, "Color", stops=stops, ramp=word)
+    found["ramp alpha"] = N("ValToRGB", {"Fac": a}, "Alpha", stops=stops)
+    found["gamma"] = N("Gamma", {"Color": a, "Gamma": 1.7})
+    found["bright"] = N("BrightContrast", {"Color": a, "Bright": 0.1, "Contrast": 0.4})
+    found["hue"] = N("HueSaturation", {"Color": a, "Hue": 0.63, "Saturation": 1.2, "Value": 0.8, "Fac": 0.9})
+    found["invert"] = N("Invert", {"Color": a, "Fac": 0.7})
+    found["luminance"] = N("RGBToBW", {"Color": a})
+    found["separate"] = N("SeparateColor", {"Color": b}, "Green")
+    found["clamp"] = N("Clamp", {"Value": U, "Min": 0.2, "Max": 0.8})
+    found["number of a vector"] = N("Math", {"Value": OBJECT, "Value_001": a}, operation="ADD")
+    return found
+
+
+@pytest.fixture
+def floor(scene, camera, add, make_material, set_world, read_passes, tmp_path):
+    """floor(graphs) → name → (what the tracer shows of it, what Cycles shows), each (pixels, 3)."""
+
+    def show(graphs):
+        scene.render.resolution_x = scene.render.resolution_y = 144
+        set_world((0, 0, 0), 0.0)
+        camera.location, camera.rotation_euler, camera.data.lens = (0.013, 0.029, 1.0), (0, 0, 0), 12.0
+        cells = 30
+        side = 3.0 / cells
+        rng = np.random.default_rng(1)
+        for number, (name, graph) in enumerate(graphs.items()):
+            material = make_material(name, "ShaderNodeEmission")
+            tree = material.node_tree
+            shown = graph
+            for operation, *by in (("MINIMUM", 3), ("MAXIMUM", -3), ("MULTIPLY_ADD", 0.1, 0.5)):
+                inputs = {"Vector": shown} | {f"Vector_00{i}": (value,) * 3 for i, value in enumerate(by, start=1)}
+                shown = N("VectorMath", inputs, operation=operation)
+            tree.links.new(shown.add(tree), tree.nodes["Shader"].inputs["Color"])
+            places = [place for place in range(cells * cells) if place % len(graphs) == number]
+            corners = [((p % cells - cells / 2) * side, ((7 * p // cells) % cells - cells / 2) * side) for p in places]
+            vertices = [(x + dx, y + dy, 0.0) for x, y in corners for dx, dy in ((0, 0), (side, 0), (side, side), (0, side))]
+            mesh = bpy.data.meshes.new(name)
+            faces = [range(4 * i, 4 * i + 4)[:: 1 if i % 2 else -1] for i in range(len(corners))]
+            mesh.from_pydata(vertices, [], faces)
+            mesh.uv_layers.new().data.foreach_set("uv", rng.uniform(-0.7, 1.6, 8 * len(corners)))
+            mesh.materials.append(material)
+            add(mesh, name, pass_index=number + 1)
+        path = tmp_path / "floor.exr"
+        exported = job.export_and_render(job.Request(threads=2, level="direct", samples=1), [path])
+        assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
+        (theirs,) = read_passes([path])
+        ours = render.render(exported, "direct", 1, threads=2)
+        indices = ours["Object Index"][..., 0]
+        return {
+            name: tuple(each["Combined"][indices == number][:, :3].astype(np.float64) for each in (ours, theirs))
+            for number, name in enumerate(graphs, start=1)
+        }
+
+    return show
+
+
+def check(found):
+    told = []
+    for name, (ours, theirs) in found.items():
+        assert len(ours) > 20, (name, len(ours))
+        apart = np.abs(ours - theirs).max(axis=1) / np.maximum(np.abs(theirs).max(axis=1), 1)
+        if np.median(apart) > TYPICAL or (apart > MOST).mean() > JUMPS:
+            told.append(f"{name}: p50 {np.median(apart):.1e}, {(apart > MOST).mean():.1%} above {MOST}, most {apart.max():.1e}")
+    assert not told, "\n".join(told)
+
+
+@pytest.fixture
+def images(fresh_blender):
+    """An image of many colours, and one with an alpha that colours are multiplied by."""
+    rng = np.random.default_rng(zlib.crc32(b"images"))
+    made = []
+    for name in ("many", "straight"):
+        image = bpy.data.images.new(name, 4, 3, alpha=True)
+        pixels = rng.random((12, 4)).astype(np.float32)
+        if name == "many":
+            pixels[:, 3] = 1
+        image.pixels.foreach_set(pixels.ravel())
+        image.update()
+        image.pack()
+        made.append(image)
+    return made
+
+
+def test_every_node_makes_what_cycles_makes(floor, images):
+    check(floor(graphs(*images)))
+
+
+def test_a_colour_whose_alpha_is_used_is_divided_by_it(floor, images):
+    material = N("TexImage", {}, "Color", image=images[1])
+    node = material.add
+
+    def both(tree):
+        color = node(tree)
+        mix = tree.nodes.new("ShaderNodeMix")
+        mix.data_type = "RGBA"
+        tree.links.new(color.node.outputs["Alpha"], mix.inputs[0])
+        tree.links.new(color, next(each for each in mix.inputs if each.identifier == "B_Color"))
+        return next(socket for socket in mix.outputs if socket.enabled)
+
+    material.add = both
+    check(floor({"cut out": material}))
+
+
+@pytest.mark.parametrize("wrong", ["math", "mix_color", "mapping", "image", "texture_coordinate"])
+def test_a_node_that_is_a_little_wrong_is_found(floor, images, monkeypatch, wrong):
+    """The test above must be able to fail."""
+    from viewcam_addon.tracer import native
+
+    right = native._described_node
+    changes = {
+        "math": ("a", lambda value: tuple(0.999 * each for each in value)),
+        "mix_color": ("factor", lambda value: tuple(each + 0.001 for each in value)),
+        "mapping": ("rotation", lambda value: (value[0], value[1], value[2] + 1e-3)),
+        "image": ("interpolation", lambda value: "cubic"),
+        "texture_coordinate": ("output", lambda value: "normal"),
+    }
+    name, change = changes[wrong]
+
+    def described(node, *numbers):
+        if node.type == wrong:
+            node = native.Node(node.type, (*node.inputs, (name, change(node[name]))))
+        return right(node, *numbers)
+
+    shown = {
+        "math": N("Math", {"Value": 0.7, "Value_001": U}, operation="ADD"),
+        "mix_color": N("Mix", {"Factor_Float": 0.5, "A_Color": UV, "B_Color": (0.2, 0.9, 0.4, 1)}, data_type="RGBA"),
+        "mapping": N("Mapping", {"Vector": UV, "Rotation": (0, 0, 0.2)}),
+        "image": N("TexImage", {"Vector": UV}, image=images[0], extension="EXTEND"),
+        "texture_coordinate": OBJECT,
+    }
+    monkeypatch.setattr(native, "_described_node", described)
+    with pytest.raises(AssertionError, match="p50"):
+        check(floor({wrong: shown[wrong]}))

@@ -1,0 +1,239 @@
+"""The tracer's nodes that make values (tracer/scene/value_nodes.py) as Blender has them, to be read and to be made again."""
+
+from dataclasses import dataclass, field
+
+import bpy
+
+from ...tracer.scene.shader_nodes import KINDS
+from .nodes import Output
+
+
+@dataclass(frozen=True)
+class Value:
+    """A type of node as Blender has it.
+
+    kind : its type; class_name : its class. inputs : ours → the identifier of theirs. words, flags : ours → the property.
+    outputs : the identifier of theirs → our word for it, None where we have one output. fixed : property → what it must be.
+    """
+
+    kind: str
+    class_name: str
+    inputs: dict[str, str]
+    outputs: dict[str, str | None]
+    words: dict[str, str] = field(default_factory=dict)
+    flags: dict[str, str] = field(default_factory=dict)
+    fixed: dict[str, str] = field(default_factory=dict)
+
+
+def _same(*names: str) -> dict[str, str]:
+    return {name.lower().replace(" ", "_"): name for name in names}
+
+
+def _words(*names: str) -> dict[str, str | None]:
+    return {name: name.lower().replace(" ", "_") for name in names}
+
+
+_COLOR = {"Color": None}
+VALUES: tuple[tuple[str, Value], ...] = (
+    (
+        "image",
+        Value(
+            "TEX_IMAGE",
+            "ShaderNodeTexImage",
+            {"vector": "Vector"},
+            _words("Color", "Alpha"),
+            {"interpolation": "interpolation", "extension": "extension"},
+        ),
+    ),
+    (
+        "texture_coordinate",
+        Value("TEX_COORD", "ShaderNodeTexCoord", {}, _words("UV", "Object", "Normal", "Reflection")),
+    ),
+    (
+        "mapping",
+        Value(
+            "MAPPING",
+            "ShaderNodeMapping",
+            _same("Vector", "Location", "Rotation", "Scale"),
+            {"Vector": None},
+            {"kind": "vector_type"},
+        ),
+    ),
+    (
+        "geometry",
+        Value(
+            "NEW_GEOMETRY",
+            "ShaderNodeNewGeometry",
+            {},
+            _words("Position", "Normal", "True Normal", "Incoming", "Backfacing"),
+        ),
+    ),
+    ("object_info", Value("OBJECT_INFO", "ShaderNodeObjectInfo", {}, _words("Location", "Object Index"))),
+    ("fresnel", Value("FRESNEL", "ShaderNodeFresnel", {"ior": "IOR"}, {"Fac": None})),
+    ("layer_weight", Value("LAYER_WEIGHT", "ShaderNodeLayerWeight", {"blend": "Blend"}, _words("Fresnel", "Facing"))),
+    (
+        "math",
+        Value(
+            "MATH",
+            "ShaderNodeMath",
+            {"a": "Value", "b": "Value_001", "c": "Value_002"},
+            {"Value": None},
+            {"operation": "operation"},
+            {"clamp": "use_clamp"},
+        ),
+    ),
+    (
+        "vector_math",
+        Value(
+            "VECT_MATH",
+            "ShaderNodeVectorMath",
+            {"a": "Vector", "b": "Vector_001", "c": "Vector_002", "scale": "Scale"},
+            {"Vector": None, "Value": None},
+            {"operation": "operation"},
+        ),
+    ),
+    (
+        "map_range",
+        Value(
+            "MAP_RANGE",
+            "ShaderNodeMapRange",
+            _same("Value", "From Min", "From Max", "To Min", "To Max", "Steps"),
+            {"Result": None},
+            {"interpolation": "interpolation_type"},
+            {"clamp": "clamp"},
+            {"data_type": "FLOAT"},
+        ),
+    ),
+    (
+        "clamp",
+        Value(
+            "CLAMP",
+            "ShaderNodeClamp",
+            _same("Value", "Min", "Max"),
+            {"Result": None},
+            fixed={"clamp_type": "MINMAX"},
+        ),
+    ),
+    (
+        "separate",
+        Value("SEPXYZ", "ShaderNodeSeparateXYZ", {"color": "Vector"}, {"X": "x", "Y": "y", "Z": "z"}),
+    ),
+    (
+        "separate",
+        Value(
+            "SEPARATE_COLOR",
+            "ShaderNodeSeparateColor",
+            {"color": "Color"},
+            {"Red": "x", "Green": "y", "Blue": "z"},
+            fixed={"mode": "RGB"},
+        ),
+    ),
+    (
+        "combine_xyz",
+        Value("COMBXYZ", "ShaderNodeCombineXYZ", {"x": "X", "y": "Y", "z": "Z"}, {"Vector": None}),
+    ),
+    (
+        "combine_color",
+        Value(
+            "COMBINE_COLOR",
+            "ShaderNodeCombineColor",
+            {"x": "Red", "y": "Green", "z": "Blue"},
+            _COLOR,
+            fixed={"mode": "RGB"},
+        ),
+    ),
+    (
+        "mix_color",
+        Value(
+            "MIX",
+            "ShaderNodeMix",
+            {"factor": "Factor_Float", "a": "A_Color", "b": "B_Color"},
+            {"Result_Color": None},
+            {"blend": "blend_type"},
+            {"clamp_factor": "clamp_factor", "clamp_result": "clamp_result"},
+            {"data_type": "RGBA"},
+        ),
+    ),
+    (
+        "mix_color",
+        Value(
+            "MIX_RGB",
+            "ShaderNodeMixRGB",
+            {"factor": "Fac", "a": "Color1", "b": "Color2"},
+            _COLOR,
+            {"blend": "blend_type"},
+            {"clamp_result": "use_clamp"},
+        ),
+    ),
+    (
+        "mix_number",
+        Value(
+            "MIX",
+            "ShaderNodeMix",
+            {"factor": "Factor_Float", "a": "A_Float", "b": "B_Float"},
+            {"Result_Float": None},
+            {},
+            {"clamp_factor": "clamp_factor"},
+            {"data_type": "FLOAT"},
+        ),
+    ),
+    ("gamma", Value("GAMMA", "ShaderNodeGamma", _same("Color", "Gamma"), _COLOR)),
+    (
+        "bright_contrast",
+        Value("BRIGHTCONTRAST", "ShaderNodeBrightContrast", _same("Color", "Bright", "Contrast"), _COLOR),
+    ),
+    (
+        "hue_saturation",
+        Value(
+            "HUE_SAT",
+            "ShaderNodeHueSaturation",
+            _same("Color", "Hue", "Saturation", "Value") | {"factor": "Fac"},
+            _COLOR,
+        ),
+    ),
+    ("invert", Value("INVERT", "ShaderNodeInvert", {"color": "Color", "factor": "Fac"}, _COLOR)),
+    ("rgb_to_bw", Value("RGBTOBW", "ShaderNodeRGBToBW", {"color": "Color"}, {"Val": None})),
+)
+"""What we call each, and what it is; of what is one thing to us the first is made."""
+
+# Blender's words, where they are others than ours in capitals.
+_WORDS = {
+    ("image", "linear"): "Linear",
+    ("image", "closest"): "Closest",
+    ("image", "cubic"): "Cubic",
+    ("vector_math", "fract"): "FRACTION",
+}
+
+
+def word_of(ours: str, word: str) -> str:
+    """What Blender calls one of the words of a node."""
+    return _WORDS.get((ours, word), word.upper())
+
+
+def value_of(output: Output) -> tuple[str, Value] | None:
+    """What makes the value of an output, or None where that is not modelled."""
+    for ours, value in VALUES:
+        is_it = value.kind == output.node.type and output.socket.identifier in value.outputs
+        if is_it and all(getattr(output.node, name) == wanted for name, wanted in value.fixed.items()):
+            return ours, value
+    return None
+
+
+def given_words(output: Output, ours: str, value: Value) -> dict[str, str | bool] | str:
+    """The words and flags of a node; or, where one is not modelled, that clause."""
+    found: dict[str, str | bool] = {name: bool(getattr(output.node, theirs)) for name, theirs in value.flags.items()}
+    for name, theirs in value.words.items():
+        word = getattr(output.node, theirs)
+        if (ours, word) == ("image", "Smart"):
+            word = "Cubic"
+        choices = KINDS[ours].inputs[name]
+        known = next((each for each in choices if word_of(ours, each) == word), None)
+        if known is None:
+            return f"has the {name} {word.lower()}"
+        found[name] = known
+    word = value.outputs[output.socket.identifier]
+    return found if word is None else found | {"output": word}
+
+
+def input_of(node: bpy.types.Node, identifier: str) -> bpy.types.NodeSocket:
+    return next(socket for socket in node.inputs if socket.identifier == identifier)

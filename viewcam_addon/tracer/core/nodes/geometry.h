@@ -1,0 +1,145 @@
+// What is known of the point of a surface, and coordinates that images are looked up by.
+#pragma once
+#include "../shapes/object.h"
+#include "math.h"
+
+namespace viewcam::VIEWCAM_ISA {
+
+// A place or a direction. In rendering space, whose axes are the world's, places are the world's less the scene's origin.
+struct TextureCoordinateNode {
+    static constexpr const char* NAME = "texture_coordinate";
+    static constexpr Gives GIVES = Gives::VECTOR;
+    static constexpr bool VARIES = true;
+    enum { UV, OBJECT, NORMAL, REFLECTION } output;
+
+    explicit TextureCoordinateNode(const Inputs& in) : output(output_of(in.choice("output"))) {}
+    Vec3 eval(const ShadingPoint& at) const {
+        const Interaction& point = at.point;
+        switch (output) {
+            case UV: return {point.uv.x, point.uv.y, 0};
+            case OBJECT: return at.object ? at.object->to_object(point.position - at.object->to_world.translation()) : point.position;
+            case NORMAL: return at.object ? safe::normalized(at.object->to_world.transposed(point.shading)) : point.shading;
+            default: return reflected(at.incoming, point.shading);
+        }
+    }
+
+   private:
+    static decltype(output) output_of(const std::string& name) {
+        return name == "uv" ? UV : name == "object" ? OBJECT : name == "normal" ? NORMAL : REFLECTION;
+    }
+};
+
+// A vector that is scaled, turned about x, then y, then z, and moved; as a texture, point, vector or normal is.
+struct MappingNode {
+    static constexpr const char* NAME = "mapping";
+    static constexpr Gives GIVES = Gives::VECTOR;
+    Color vector, location, rotation, scale;
+    enum { POINT, TEXTURE, DIRECTION, NORMAL } kind;
+
+    explicit MappingNode(const Inputs& in)
+        : vector(in["vector"]), location(in["location"]), rotation(in["rotation"]), scale(in["scale"]), kind(kind_of(in.choice("kind"))) {}
+    Vec3 eval(const ShadingPoint& at) const {
+        Vec3 v = at.value(vector), by = at.value(scale), angles = at.value(rotation);
+        auto over = [](Vec3 a, Vec3 b) { return safe::each([](double a, double b, double) { return safe::divide(a, b); }, a, b); };
+        switch (kind) {
+            case POINT: return turned(v * by, angles) + at.value(location);
+            case TEXTURE: return over(turned_back(v - at.value(location), angles), by);
+            case DIRECTION: return turned(v * by, angles);
+            default: return safe::normalized(turned(over(v, by), angles));
+        }
+    }
+
+   private:
+    static decltype(kind) kind_of(const std::string& name) {
+        return name == "point" ? POINT : name == "texture" ? TEXTURE : name == "vector" ? DIRECTION : NORMAL;
+    }
+    // In the plane of two axes.
+    static void turn(double& x, double& y, double angle) {
+        double s = safe::sine(angle), c = safe::cosine(angle), along = c * x - s * y;
+        y = s * x + c * y, x = along;
+    }
+    static Vec3 turned(Vec3 v, Vec3 angles) {
+        turn(v.y, v.z, angles.x), turn(v.z, v.x, angles.y), turn(v.x, v.y, angles.z);
+        return v;
+    }
+    static Vec3 turned_back(Vec3 v, Vec3 angles) {
+        turn(v.x, v.y, -angles.z), turn(v.z, v.x, -angles.y), turn(v.y, v.z, -angles.x);
+        return v;
+    }
+};
+
+struct GeometryNode {
+    static constexpr const char* NAME = "geometry";
+    static constexpr Gives GIVES = Gives::VECTOR;
+    static constexpr bool VARIES = true;
+    enum { POSITION, NORMAL, TRUE_NORMAL, INCOMING, BACKFACING } output;
+
+    explicit GeometryNode(const Inputs& in) : output(output_of(in.choice("output"))) {}
+    Vec3 eval(const ShadingPoint& at) const {
+        switch (output) {
+            case POSITION: return at.point.position + at.origin;
+            case NORMAL: return at.point.shading;
+            case TRUE_NORMAL: return at.point.normal;
+            case INCOMING: return -at.incoming;
+            default: return grey(at.point.backside);
+        }
+    }
+
+   private:
+    static decltype(output) output_of(const std::string& name) {
+        return name == "position"      ? POSITION
+               : name == "normal"      ? NORMAL
+               : name == "true_normal" ? TRUE_NORMAL
+               : name == "incoming"    ? INCOMING
+                                       : BACKFACING;
+    }
+};
+
+struct ObjectInfoNode {
+    static constexpr const char* NAME = "object_info";
+    static constexpr Gives GIVES = Gives::VECTOR;
+    static constexpr bool VARIES = true;
+    bool location;  // or the index that passes have
+
+    explicit ObjectInfoNode(const Inputs& in) : location(in.choice("output") == "location") {}
+    Vec3 eval(const ShadingPoint& at) const {
+        if (!at.object) return {};
+        return location ? at.object->to_world.translation() + at.origin : grey(at.object->index);
+    }
+};
+
+struct FresnelNode {
+    static constexpr const char* NAME = "fresnel";
+    static constexpr Gives GIVES = Gives::NUMBER;
+    static constexpr bool VARIES = true;
+    Color ior;
+
+    explicit FresnelNode(const Inputs& in) : ior(in["ior"]) {}
+    Vec3 eval(const ShadingPoint& at) const {
+        return grey(fresnel(std::fabs(dot(at.incoming, at.point.shading)), at.ratio(larger(at.number(ior), 1e-5))));
+    }
+};
+
+struct LayerWeightNode {
+    static constexpr const char* NAME = "layer_weight";
+    static constexpr Gives GIVES = Gives::NUMBER;
+    static constexpr bool VARIES = true;
+    Color blend;
+    bool facing;
+
+    explicit LayerWeightNode(const Inputs& in) : blend(in["blend"]), facing(in.choice("output") == "facing") {}
+    Vec3 eval(const ShadingPoint& at) const {
+        double cosine = std::fabs(dot(at.incoming, at.point.shading)), blended = at.number(blend);
+        if (!facing) {
+            double left = larger(1 - blended, 1e-5);
+            return grey(fresnel(cosine, at.point.backside ? left : 1 / left));
+        }
+        if (blended != 0.5) {
+            blended = smaller(larger(blended, 0.0), 1 - 1e-5);
+            cosine = safe::power(cosine, blended < 0.5 ? 2 * blended : 0.5 / (1 - blended));
+        }
+        return grey(1 - cosine);
+    }
+};
+
+}  // namespace viewcam::VIEWCAM_ISA

@@ -1,0 +1,81 @@
+// What closures' inputs are computed from where they are neither constants nor a plain image: nodes, each of which makes a number,
+// a colour or a vector of what other nodes make. A scene has one list of them; a node names only nodes before it.
+//
+// Evaluated at each hit, from the input back: what no input needs is never computed. A node whose inputs are all constant becomes
+// its value when it is made, so that constants cost nothing. Rejected: a stack machine (Cycles' SVM), whose order must be compiled.
+#pragma once
+#include <variant>
+
+#include "color.h"
+#include "geometry.h"
+#include "image.h"
+
+namespace viewcam::VIEWCAM_ISA {
+
+struct ConstantNode {
+    static constexpr const char* NAME = "constant";
+    static constexpr Gives GIVES = Gives::COLOR;
+    Vec3 is;
+    Vec3 eval(const ShadingPoint&) const { return is; }
+};
+
+// One line a node. Each has a NAME, by which a scene asks for it, what it GIVES, by which it becomes a number, and `eval`; VARIES
+// where it depends on more than its inputs.
+using ValueNode = std::variant<ConstantNode, ImageNode, TextureCoordinateNode, MappingNode, GeometryNode, ObjectInfoNode, FresnelNode, LayerWeightNode,
+                               MathNode, VectorMathNode, MapRangeNode, ClampNode, SeparateNode, CombineXYZNode, CombineColorNode, MixColorNode, MixNumberNode, GammaNode,
+                               BrightContrastNode, HueSaturationNode, InvertNode, LuminanceNode>;
+
+// A number of a value that is of some sort: a colour's luminance, a vector's mean.
+inline double number_of(Vec3 value, Gives sort) {
+    return sort == Gives::NUMBER ? value.x : sort == Gives::VECTOR ? (value.x + value.y + value.z) / 3 : luminance(value);
+}
+
+struct ValueNodes {
+    std::vector<ValueNode> all;
+
+    Vec3 value(uint32_t node, const ShadingPoint& at) const {
+        return std::visit([&](const auto& kind) { return finite(kind.eval(at)); }, all[node]);
+    }
+    double number(uint32_t node, const ShadingPoint& at) const {
+        return std::visit([&](const auto& kind) { return number_of(finite(kind.eval(at)), kind.GIVES); }, all[node]);
+    }
+
+    // Adds the node of this name; std::invalid_argument if there is none.
+    void add(std::string_view name, const Inputs& inputs, const std::vector<Texture>& textures) { all.push_back(made(name, inputs, textures)); }
+    // The same, or the constant that a node has turned out to be.
+    Color resolved(Color color) const {
+        if (color.node == NONE) return color;
+        if (color.node >= all.size()) throw std::invalid_argument("an input names no node");
+        if (auto constant = std::get_if<ConstantNode>(&all[color.node])) return {constant->is};
+        return color;
+    }
+
+   private:
+    static constexpr double LARGEST = 1e18;
+
+    static double finite(double x) { return x < LARGEST ? larger(x, -LARGEST) : x > 0 ? LARGEST : 0; }
+    static Vec3 finite(Vec3 v) { return {finite(v.x), finite(v.y), finite(v.z)}; }
+
+    template <size_t I = 1> ValueNode made(std::string_view name, const Inputs& inputs, const std::vector<Texture>& textures) const {
+        if constexpr (I == std::variant_size_v<ValueNode>) {
+            throw std::invalid_argument("no node is called " + std::string(name));
+        } else {
+            using Kind = std::variant_alternative_t<I, ValueNode>;
+            if (name != Kind::NAME) return made<I + 1>(name, inputs, textures);
+            Kind node(inputs);
+            if constexpr (!requires { Kind::VARIES; })
+                if (inputs.all_constant()) {
+                    Interaction nowhere;
+                    Vec3 value = finite(node.eval({nowhere, {0, 0, -1}, textures}));
+                    // As a number a vector is its mean, and a constant its luminance.
+                    if (Kind::GIVES != Gives::VECTOR || (value.x == value.y && value.y == value.z)) return ConstantNode{value};
+                }
+            return node;
+        }
+    }
+};
+
+inline Vec3 ShadingPoint::value_of_node(uint32_t node) const { return nodes->value(node, *this); }
+inline double ShadingPoint::number_of_node(uint32_t node) const { return nodes->number(node, *this); }
+
+}  // namespace viewcam::VIEWCAM_ISA

@@ -1,0 +1,86 @@
+"""Nodes that make the numbers, colours and vectors that shaders' inputs are given, as data.
+
+The names and defaults are those of Blender's nodes, in small letters; what they compute stands in core/nodes. An input that
+takes a number takes a colour's luminance, and a vector's mean.
+"""
+
+from collections.abc import Mapping
+
+Vector = tuple[float, float, float]
+
+IMAGE = "an image"
+"""The default of an input that names an image."""
+UV = "uv"
+"""The default of a vector that is the mesh's UV where nothing else is given."""
+
+Default = float | Vector | tuple[str, ...] | bool | str
+
+BLACK, GREY, WHITE = (0.0, 0.0, 0.0), (0.5, 0.5, 0.5), (1.0, 1.0, 1.0)
+
+MATH = (
+    "add subtract multiply divide multiply_add power logarithm sqrt inverse_sqrt absolute exponent minimum maximum less_than "
+    "greater_than sign compare smooth_min smooth_max round floor ceil trunc fract modulo floored_modulo wrap snap pingpong "
+    "sine cosine tangent arcsine arccosine arctangent arctan2 radians degrees"
+)
+VECTOR_MATH = (
+    "add subtract multiply divide multiply_add cross_product project reflect dot_product distance length scale normalize "
+    "absolute power sign minimum maximum floor ceil fract modulo wrap snap sine cosine tangent"
+)
+BLENDS = (
+    "mix darken multiply burn lighten screen dodge add overlay soft_light linear_light difference exclusion subtract divide "
+    "hue saturation color value"
+)
+
+# Input → its default: a number, three, words to choose from (the first is the default), whether something holds, IMAGE or UV.
+KINDS: dict[str, Mapping[str, Default]] = {
+    "image": {
+        "image": IMAGE,
+        "vector": UV,
+        "interpolation": ("linear", "closest", "cubic"),
+        "extension": ("repeat", "extend", "clip", "mirror"),
+        "straight": False,
+        "output": ("color", "alpha"),
+    },
+    "texture_coordinate": {"output": ("uv", "object", "normal", "reflection")},
+    "mapping": {
+        "vector": BLACK,
+        "location": BLACK,
+        "rotation": BLACK,
+        "scale": WHITE,
+        "kind": ("point", "texture", "vector", "normal"),
+    },
+    "geometry": {"output": ("position", "normal", "true_normal", "incoming", "backfacing")},
+    "object_info": {"output": ("location", "object_index")},
+    "fresnel": {"ior": 1.5},
+    "layer_weight": {"blend": 0.5, "output": ("fresnel", "facing")},
+    "math": {"operation": tuple(MATH.split()), "a": 0.5, "b": 0.5, "c": 0.5, "clamp": False},
+    "vector_math": {"operation": tuple(VECTOR_MATH.split()), "a": BLACK, "b": BLACK, "c": BLACK, "scale": 1.0},
+    "map_range": {
+        "value": 1.0,
+        "from_min": 0.0,
+        "from_max": 1.0,
+        "to_min": 0.0,
+        "to_max": 1.0,
+        "steps": 4.0,
+        "interpolation": ("linear", "stepped", "smoothstep", "smootherstep"),
+        "clamp": True,
+    },
+    "clamp": {"value": 1.0, "min": 0.0, "max": 1.0},
+    "separate": {"color": BLACK, "output": ("x", "y", "z")},
+    "combine_xyz": {"x": 0.0, "y": 0.0, "z": 0.0},
+    "combine_color": {"x": 0.0, "y": 0.0, "z": 0.0},
+    "mix_color": {
+        "factor": 0.5,
+        "a": GREY,
+        "b": GREY,
+        "blend": tuple(BLENDS.split()),
+        "clamp_factor": True,
+        "clamp_result": False,
+    },
+    "mix_number": {"factor": 0.5, "a": 0.0, "b": 0.0, "clamp_factor": True},
+    "gamma": {"color": WHITE, "gamma": 1.0},
+    "bright_contrast": {"color": WHITE, "bright": 0.0, "contrast": 0.0},
+    "hue_saturation": {"hue": 0.5, "saturation": 1.0, "value": 1.0, "factor": 1.0, "color": (0.8, 0.8, 0.8)},
+    "invert": {"factor": 1.0, "color": BLACK},
+    "rgb_to_bw": {"color": GREY},
+}
