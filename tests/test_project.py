@@ -32,6 +32,7 @@ ROOMS = {
     "argument_types": "",
     "html_page": "errors",
     "junit": "checks files",
+    "png": "",
     "child_process": "errors events",
     "crashes": "",
     "exact": "",
@@ -46,9 +47,10 @@ ROOMS = {
     "camera_values": "errors checks pinhole roll intrinsics",
     "cameras": "errors checks files pinhole intrinsics",
     "datasets": "files pinhole cameras",
-    "comparison": "errors files html_page pinhole image",
+    "comparison": "errors files html_page pinhole image png",
     "tracer": "errors checks memory files pinhole image",
-    "api": "errors child_process image comparison tracer",
+    "labels": "errors files png pinhole image tracer",
+    "api": "errors child_process image comparison tracer labels",
     "pytest_plugin": "errors junit api",
     "shots": "errors checks files terminal pinhole moves tracer",
     "batch": "errors checks files events html_page child_process pinhole image cameras datasets comparison tracer shots",
@@ -57,7 +59,8 @@ ROOMS = {
         "intrinsics camera_values cameras comparison tracer shots batch"
     ),
     "commands": (
-        "errors terminal argument_types events crashes child_process pinhole image cameras comparison tracer api shots batch"
+        "errors terminal argument_types events crashes child_process pinhole image cameras comparison tracer labels api shots "
+        "batch"
     ),
     "cli": "errors checks files junit events argument_types tracer commands",
 }
@@ -468,7 +471,8 @@ import sys
 sys.modules.update(dict.fromkeys({sorted(BLENDER_MODULES)}))
 import viewcam_addon as vp
 assert "numpy" not in sys.modules, "Blender's start would wait for it"
-assert {{name: getattr(vp, name).__doc__ for name in vp.__all__}} and set(vp.__all__) == {named | {"Scene", "Image", "Check"}}
+assert {{name: getattr(vp, name).__doc__ for name in vp.__all__}}
+assert set(vp.__all__) == {named | {"Scene", "Image", "Check", "Labels"}}
 assert callable(vp.compare) and callable(vp.check), "a room has the name of a function"
 try:
     vp.nothing

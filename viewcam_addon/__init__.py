@@ -12,10 +12,12 @@ if TYPE_CHECKING:
     from .api import Check as Check
     from .api import check as check
     from .api import compare as compare
+    from .api import label as label
     from .api import read_scene as read_scene
     from .api import render as render
     from .errors import InputError as InputError
     from .image import Image as Image
+    from .labels.scene_labels import Labels as Labels
     from .pinhole import Pinhole as Pinhole
     from .tracer.scene import Scene as Scene
 
@@ -28,10 +30,25 @@ _HOMES = {
     "cameras": "cameras",
     "read_scene": "api",
     "render": "api",
+    "label": "api",
+    "Labels": "labels.scene_labels",
     "compare": "api",
     "check": "api",
 }
-__all__ = ["Check", "Image", "InputError", "Pinhole", "Scene", "cameras", "check", "compare", "read_scene", "render"]
+__all__ = [
+    "Check",
+    "Image",
+    "InputError",
+    "Labels",
+    "Pinhole",
+    "Scene",
+    "cameras",
+    "check",
+    "compare",
+    "label",
+    "read_scene",
+    "render",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -8,7 +8,7 @@ no picture may be read from a file in it or written (image.py says why): those i
 import json
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,8 @@ from .comparison.light_verdict import RadianceComparison
 from .comparison.verdict import GeometryComparison
 from .errors import InputError
 from .image import Image
+from .labels import scene_labels
+from .labels.scene_labels import Labels
 from .tracer import render as tracing
 from .tracer.scene import Scene, scene_file
 from .tracer.scene.film import MOST_SAMPLES, SAMPLES
@@ -73,6 +75,31 @@ def render(
             attributes["error"] = str(error)
         attributes |= {"samples": str(samples), "seed": str(seed)}
     return Image(passes, scene.camera, attributes)
+
+
+def label(
+    scene: Scene | File,
+    labels: Collection[str] = scene_labels.KINDS[:-1],
+    previous: Scene | File | None = None,
+    next: Scene | File | None = None,
+    threads: int | None = None,
+) -> Labels:
+    """What is true of a scene's picture, exact at the centre of each pixel.
+
+    scene : or the path of a scene file, as the others. labels : some of "depth", "normals", "position", "masks", "amodal" and
+    "flow"; docs/labels.md says what each brings. previous, next : the frames before and after, for "flow".
+    threads : all cores where None.
+
+    Returns the passes as an Image, and what is told of each instance as plain JSON values.
+
+    Raises
+    ------
+    InputError
+        if there is no such label, flow has no other frame, or frames differ in size.
+    """
+    frame = scene if isinstance(scene, Scene) else read_scene(scene)
+    before, after = (each if each is None or isinstance(each, Scene) else read_scene(each) for each in (previous, next))
+    return scene_labels.label(frame, labels, before, after, threads)
 
 
 def compare(

@@ -34,6 +34,10 @@ def size(text: str) -> tuple[int, int]:
     return positive(width), positive(height)
 
 
+def names(text: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in text.split(",") if name.strip())
+
+
 def png(text: str) -> Path:
     path = Path(text)
     if path.suffix.lower() != ".png":

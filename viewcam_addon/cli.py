@@ -185,6 +185,17 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         spent = added.add_mutually_exclusive_group()
         light(added, spent)
         error(spent, "in place of --samples")
+        added.add_argument(
+            "--labels",
+            type=types.names,
+            metavar="LABELS",
+            help="write ground truth beside the picture: some of depth,normals,position,masks,amodal,flow",
+        )
+        for other in ("previous", "next"):
+            words = f"the {other} frame, for --labels flow"
+            added.add_argument(f"--{other}", metavar="SCENE.json", type=Path, help=words)
+        words = "steps of the labels' 16-bit depth in a scene unit (default: 1000, millimetres of metres)"
+        added.add_argument("--depth-steps", type=types.above_zero, metavar="N", default=1000.0, help=words)
 
     @command("cycles", "Render a .blend with Cycles so that it can be compared, and give every setting back.")
     def add_cycles(added: argparse.ArgumentParser) -> None:

@@ -62,7 +62,19 @@ _LIGHT = {
 }
 # Of a picture whose pixels have as many samples as a wanted error takes, how many.
 _OPTIONAL = {"Sample Count": "X"}
-CHANNELS = _LIGHT | _OPTIONAL | _GEOMETRY
+# Labels, beside some of these: docs/labels.md says what they hold. X and Y of a flow are pixels to the right and down.
+_LABELS = {
+    "Distance": "X",
+    "Camera Normal": "XYZ",
+    "Object Position": "XYZ",
+    "Instance": "X",
+    **{
+        f"{to} {name}": channels
+        for to in ("Forward", "Backward")
+        for name, channels in (("Flow", "XY"), ("Motion", "XYZ"), ("Hidden", "X"))
+    },
+}
+CHANNELS = _LIGHT | _OPTIONAL | _GEOMETRY | _LABELS
 # What Blender 4 calls some of them in a file.
 OLDER_NAMES = {
     "IndexOB": "Object Index",

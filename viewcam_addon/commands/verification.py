@@ -49,8 +49,15 @@ def render(options: argparse.Namespace) -> Result:
                 f"{options.scene} has no stated_camera: leave --stated out, or enable the Virtual Pinhole in Blender"
             )
         scene = dataclasses.replace(scene, camera=scene.stated_camera)
+    others = {name: api.read_scene(path) for name in ("previous", "next") if (path := getattr(options, name))}
+    if others and "flow" not in (options.labels or ()):
+        raise InputError(f"--{next(iter(others))} is for flow: add --labels flow")
     if options.size:
-        scene = dataclasses.replace(scene, camera=scene.camera.resized(*options.size))
+        scene, *resized = (
+            dataclasses.replace(each, camera=each.camera.resized(*options.size)) for each in (scene, *others.values())
+        )
+        others = dict(zip(others, resized, strict=True))
+    labels = api.label(scene, options.labels, **others, threads=options.threads) if options.labels else None
     told = _told_level(scene) if options.level == "auto" else {}
     level = told.get("level", options.level)
     progress = _Progress(options.events, scene.camera.height)
@@ -59,6 +66,11 @@ def render(options: argparse.Namespace) -> Result:
     seconds = time.perf_counter() - started
     image.write(options.image, traced)
     say(f"traced {scene.camera.width} × {scene.camera.height} pixels in {seconds:.2f} s")
+    if labels:
+        from ..labels import files
+
+        told["labels"] = [str(path) for path in files.write(options.image, labels, options.depth_steps)]
+        say(f"labels: {told['labels'][-1]}")
     return 0, {"image": str(options.image), "seconds": seconds} | told
 
 

@@ -3,19 +3,17 @@
 Pictures here are (height, width, 3 or 4) uint8 with rows from the top, as PNG and screens have them, or (height, width)
 levels of the colour scale.
 
-The PNG writer is a dozen lines over zlib. Rejected: Pillow and matplotlib for it, which an add-on inside Blender does not
-have. The colour scale is computed in Oklab rather than copied as a table: lightness rises in even steps, so that equal steps
+The colour scale is computed in Oklab rather than copied as a table: lightness rises in even steps, so that equal steps
 of the error look equal, in print and to the colour-blind too.
 """
 
 import base64
-import struct
-import zlib
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..image import BACKGROUND_DEPTH, Image
+from ..png import encoded
 from .mismatches import Mismatches
 
 Picture = NDArray[np.uint8]
@@ -46,24 +44,9 @@ def png_uri(picture: Picture, scale: NDArray[np.uint8] | None = None) -> str:
 
 def png(picture: Picture, scale: NDArray[np.uint8] | None = None) -> bytes:
     """The picture as a PNG file; a (height, width) one holds levels of a scale (colour_scale by default), 0 for none."""
-    height, width = picture.shape[:2]
-    lines = picture.reshape(height, -1)
-    if picture.ndim == 2:
-        kind, filtered, palette = (
-            3,
-            0,
-            ((b"PLTE", b"\0\0\0" + (colour_scale() if scale is None else scale).tobytes()), (b"tRNS", b"\0")),
-        )
-    else:
-        # Each row is stored as its difference to the one above (filter 2), which compresses well.
-        kind, filtered, palette = {3: 2, 4: 6}[picture.shape[2]], 2, ()
-        lines = lines - np.vstack([np.zeros_like(lines[:1]), lines[:-1]])
-    rows = np.column_stack([np.full(height, filtered, np.uint8), lines])
-    header = struct.pack(">IIBBBBB", width, height, 8, kind, 0, 0, 0)
-    chunks = ((b"IHDR", header), *palette, (b"IDAT", zlib.compress(rows.tobytes(), 6)), (b"IEND", b""))
-    return b"\x89PNG\r\n\x1a\n" + b"".join(
-        struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data)) for name, data in chunks
-    )
+    if picture.ndim == 3:
+        return encoded(picture)
+    return encoded(picture, b"\0\0\0" + (colour_scale() if scale is None else scale).tobytes())
 
 
 def shaded(image: Image) -> Picture:

@@ -7,11 +7,11 @@ number of threads.
 
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from ..image import CHANNELS, GEOMETRY_PASSES, LIGHT_PASSES
@@ -61,9 +61,9 @@ class Tracer:
         vars(self).clear()
         return former
 
-    def render(self, watcher: Watcher | None = None) -> Passes:
+    def render(self, watcher: Watcher | None = None, names: Collection[str] = tuple(PASSES)) -> Passes:
         """Pass name → (height, width, channels) float32, rows from the bottom: the surfaces at the pixel centres."""
-        passes = self._blank(unwritten)
+        passes = self._blank(lambda shape: unwritten(shape, names))
         bands = (range(first, min(first + BAND, self._camera.height)) for first in range(0, self._camera.height, BAND))
 
         def trace(rows: range, stop: int) -> None:
@@ -105,6 +105,39 @@ class Tracer:
             if not left[row] and watcher is not None:
                 watcher.tile(passes, range(row, min(row + native.TILE, height)))
         return passes
+
+    def hits(self) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+        """What the pixels' centres show, each (height, width), rows from the bottom: the planar depth, inf where nothing is;
+        which instance, counting through the objects and the places of each; and which of its geometry's primitives, −1 where
+        none is.
+        """
+        camera = self._camera
+        u, v, w = camera.basis()
+        x, _ = camera.view_plane(np.arange(camera.width) + 0.5, 0.5)
+        _, y = camera.view_plane(0.5, np.arange(camera.height) + 0.5)
+        across, up = x[:, None] * (-u if camera.mirrored else u) - w, y[:, None] * v
+        shape = camera.height, camera.width
+        found = np.empty(shape), np.empty(shape, np.int64), np.empty(shape, np.int64)
+
+        def trace(rows: range, _: int) -> None:
+            some = slice(rows.start, rows.stop)
+            directions = (up[some, None] + across).reshape(-1, 3)  # of length 1 along −w: distances are depths
+            for whole, part in zip(found, self.closest(np.array([camera.eye]), directions), strict=True):
+                whole[some] = part.reshape(len(rows), -1)
+
+        bands = (range(first, min(first + BAND, camera.height)) for first in range(0, camera.height, BAND))
+        for _ in self._in_threads(trace, bands, None):
+            pass
+        return found
+
+    def closest(self, origins: ArrayLike, directions: ArrayLike) -> tuple[NDArray, NDArray, NDArray]:
+        """What rays meet first within the clip range, in lengths of their directions; the rest as in `hits`, each (n,).
+
+        origins, directions : (n, 3) or what broadcasts to it, world space.
+        """
+        nearest, farthest = self._scene.clip
+        rays = self._core.rays(origins, directions, math.nextafter(nearest, 0.0), math.nextafter(farthest, math.inf))
+        return self._core.closest(rays)
 
     def surface_at(self, columns: ArrayLike, rows: ArrayLike, px: ArrayLike = 0.5, py: ArrayLike = 0.5) -> Passes:
         """The surfaces at sample points of pixels.

@@ -1,0 +1,105 @@
+"""Labels as files beside a picture: one EXR of all passes, PNGs and .flo for who wants those, a JSON that says what is what.
+
+Each appears whole, and the JSON last: where it stands, so do the others.
+"""
+
+import json
+import struct
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import image
+from ..errors import InputError
+from ..files import is_replaced, written_whole
+from ..image import BACKGROUND_DEPTH
+from ..png import encoded
+from .scene_labels import Labels
+
+DEPTH_STEPS = 1000.0
+"""Of a 16-bit depth, in a scene unit: millimetres, where the unit is a metre."""
+
+_UNKNOWN_FLOW = 1e10
+"""What Middlebury's format has where no flow is known; everything above 1e9 counts as that."""
+
+
+def of_picture(path: Path, ending: str) -> Path:
+    """The label file that belongs to a picture: shot.exr → shot.labels.json."""
+    return path.with_name(f"{path.stem}.{ending}")
+
+
+def write(path: Path, labels: Labels, depth_steps: float = DEPTH_STEPS) -> list[Path]:
+    """Write the labels of a picture beside it.
+
+    path : the picture's. depth_steps : of the 16-bit PNG, in a scene unit; what is nearer than half a step or farther than
+    65535 of them is 0, as is a pixel that shows nothing.
+
+    Returns the files, the JSON last.
+
+    Raises
+    ------
+    InputError
+        if they can't be written.
+    """
+    if not is_replaced(path):
+        raise InputError(f"{path} is no file beside which labels could stand: give the name of one")
+    passes = labels.image.passes
+    written = [of_picture(path, "labels.exr")] if passes else []
+    if passes:
+        image.write(written[0], labels.image)
+    others = {}
+    if "Depth" in passes:
+        others["depth.png"] = encoded(depth_levels(passes["Depth"][::-1, :, 0], depth_steps))
+    if "Instance" in passes:
+        others["instances.png"] = encoded(id_colours(passes["Instance"][::-1, :, 0]))
+    for name in ("Forward", "Backward"):
+        if f"{name} Flow" in passes:
+            others[f"{name.lower()}.flo"] = middlebury(passes[f"{name} Flow"][::-1])
+            others[f"{name.lower()}_hidden.png"] = encoded(
+                np.uint8(255) * (passes[f"{name} Hidden"][::-1, :, 0] != 0).astype(np.uint8)
+            )
+    for ending, content in others.items():
+        written.append(of_picture(path, ending))
+        with written_whole(written[-1]) as temporary:
+            temporary.write_bytes(content)
+    written.append(of_picture(path, "labels.json"))
+    with written_whole(written[-1]) as temporary:
+        told = _told(path, labels, [each.name for each in written[:-1]], depth_steps)
+        temporary.write_text(json.dumps(told, allow_nan=False) + "\n", encoding="utf-8")
+    return written
+
+
+def _told(path: Path, labels: Labels, names: list[str], depth_steps: float) -> dict[str, Any]:
+    return {
+        "format": "virtual-pinhole-labels",
+        "version": 1,
+        "picture": path.name,
+        "camera": asdict(labels.image.camera),
+        "files": names,
+        "passes": list(labels.image.passes),
+        "depth_png_steps": depth_steps,
+        "lost": labels.lost,
+        "instances": labels.instances,
+    }
+
+
+def depth_levels(depth: NDArray[np.float32], steps: float) -> NDArray[np.uint16]:
+    """Depths in steps, to the nearest; 0 where nothing is, or what 16 bits can't hold: nothing wraps and nothing is clipped."""
+    levels = np.rint(depth.astype(np.float64) * steps)
+    return np.where((depth < BACKGROUND_DEPTH) & (levels <= 65535), levels, 0).astype(np.uint16)
+
+
+def id_colours(ids: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Ids as COCO's panoptic PNG has them: R + 256 G + 65536 B; 0 where nothing is."""
+    whole = ids.astype(np.uint32)
+    return np.stack([whole & 255, whole >> 8 & 255, whole >> 16], axis=-1).astype(np.uint8)
+
+
+def middlebury(flow: NDArray[np.float32]) -> bytes:
+    """A .flo file. flow : (height, width, 2), rows from the top, pixels right and down, nan where unknown."""
+    height, width, _ = flow.shape
+    values = np.where(np.isfinite(flow).all(axis=-1, keepdims=True), flow, _UNKNOWN_FLOW).astype("<f4")
+    return b"PIEH" + struct.pack("<ii", width, height) + values.tobytes()

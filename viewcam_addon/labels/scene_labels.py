@@ -1,0 +1,122 @@
+"""All labels of one frame: passes of a picture, and what is told of each instance."""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..image import BACKGROUND_DEPTH, Image
+from ..tracer.scene import Scene
+from . import masks
+from .motion import Motion, motion
+from .surfaces import Silhouettes, Surfaces, box
+
+KINDS = ("depth", "normals", "position", "masks", "amodal", "flow")
+
+_TO_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
+"""From u, v, w to x right, y down, z forward."""
+
+
+@dataclass(frozen=True, eq=False)
+class Labels:
+    """What is true of a picture.
+
+    image : the passes that were asked for, rows from the bottom, with the camera; docs/labels.md says what each holds.
+    instances : plain JSON values of each instance of which a pixel is shown or, with amodal masks, would be if it stood alone.
+    lost : of the other frames, "forward" and "backward": names of visible objects that have no counterpart there.
+    """
+
+    image: Image
+    instances: list[dict[str, Any]]
+    lost: dict[str, list[str]]
+
+
+def label(
+    scene: Scene,
+    kinds: Collection[str] = KINDS[:-1],
+    previous: Scene | None = None,
+    next: Scene | None = None,
+    threads: int | None = None,
+) -> Labels:
+    """The labels of a scene's picture. Parameters and errors are those of api.label."""
+    if unknown := [kind for kind in kinds if kind not in KINDS]:
+        raise InputError(f"there is no label {unknown[0]!r}: give some of {', '.join(KINDS)}")
+    others = {"Forward": next, "Backward": previous}
+    if "flow" in kinds and not any(others.values()):
+        raise InputError("flow goes to another frame: give the scene of the next or of the previous one")
+    surfaces = Surfaces(scene, threads)
+    passes: dict[str, NDArray] = {}
+    if "depth" in kinds:
+        passes |= _depths(surfaces)
+    if "normals" in kinds:
+        normals = surfaces.normals()
+        u, v, w = scene.camera.basis()
+        axes = np.stack([-u if scene.camera.mirrored else u, -v, -w], axis=1)
+        passes |= {"Normal": normals, "Camera Normal": normals @ axes}
+    if "position" in kinds:
+        local = np.zeros_like(surfaces.points)
+        for instance, pixels in surfaces.shown:
+            local.reshape(-1, 3)[pixels] = surfaces.local_points(instance, pixels)
+        passes |= {"Position": surfaces.points, "Object Position": local}
+    if "masks" in kinds:
+        ids = np.array([*(instance.id for instance in surfaces.instances), 0])  # the last is that of −1
+        passes |= {"Instance": ids[surfaces.instance], "Material Index": surfaces.material_indices()}
+    lost = {}
+    if "flow" in kinds:
+        for name, other in others.items():
+            if other is not None:
+                found = motion(surfaces, Surfaces(other, threads))
+                passes |= _motions(name, found)
+                lost[name.lower()] = list(found.lost)
+    planes = {name: np.asarray(values, np.float32).reshape(*surfaces.depth.shape, -1) for name, values in passes.items()}
+    told = _instances(surfaces, with_masks="masks" in kinds, with_amodal="amodal" in kinds)
+    return Labels(Image(planes, scene.camera, {"software": "Virtual Pinhole"}), told, lost)
+
+
+def _depths(surfaces: Surfaces) -> dict[str, NDArray]:
+    hit = np.isfinite(surfaces.depth)
+    away = surfaces.points - np.array(surfaces.camera.eye)
+    distance = np.sqrt((away * away).sum(-1))
+    return {
+        "Depth": np.where(hit, surfaces.depth, BACKGROUND_DEPTH),
+        "Distance": np.where(hit, distance, BACKGROUND_DEPTH),
+    }
+
+
+def _motions(name: str, found: Motion) -> dict[str, NDArray]:
+    return {f"{name} Flow": found.flow, f"{name} Motion": found.displacement, f"{name} Hidden": found.hidden}
+
+
+def _instances(surfaces: Surfaces, with_masks: bool, with_amodal: bool) -> list[dict[str, Any]]:
+    shown = {id(instance): pixels for instance, pixels in surfaces.shown}
+    silhouettes, camera = Silhouettes(surfaces), surfaces.camera
+    u, v, w = camera.basis()
+    to_camera = np.eye(4)
+    to_camera[:3, :3] = [-u if camera.mirrored else u, v, w]
+    to_camera[:3, 3] = -to_camera[:3, :3] @ np.array(camera.eye)
+    told, none = [], np.empty(0, np.intp)
+    for instance in surfaces.instances:
+        visible = shown.get(id(instance), none)
+        whole = silhouettes.pixels(instance, visible) if with_amodal else visible
+        if not len(whole):
+            continue
+        least, greatest = box(surfaces.scene.geometries[instance.placed.geometry])
+        figures: dict[str, Any] = {
+            "id": instance.id,
+            "name": instance.key[0],
+            "number": instance.key[1],
+            "object_index": instance.placed.object_index,
+            "object_to_world": instance.matrix.tolist(),
+            "object_to_camera": (_TO_OPENCV @ to_camera @ instance.matrix).tolist(),
+            "box": {"min": least.tolist(), "max": greatest.tolist()},
+        }
+        if with_masks:
+            figures["visible"] = masks.described(visible, surfaces.instance.shape)
+        if with_amodal:
+            figures["amodal"] = masks.described(whole, surfaces.instance.shape)
+            figures["visible_fraction"] = len(visible) / len(whole)
+        told.append(figures)
+    return told
