@@ -1,9 +1,14 @@
 """The panel, the handles and Compare with Cycles in a window, used by mouse and keyboard on a virtual screen."""
 
 import contextlib
+import json
+import math
 import os
 import subprocess
 from pathlib import Path
+
+from viewcam_addon import cameras
+from viewcam_addon.pinhole import Pinhole
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SCRIPT = Path(__file__).with_name("panel_in_a_window.py")
@@ -72,6 +77,27 @@ def test_a_photo_of_a_known_camera_is_matched_by_dragging_along_its_edges(real_b
             break
     said = outcome.stdout + outcome.stderr
     assert outcome.returncode == 0 and "done: escape" in said and "done: match the photo" in said, said
+    assert "Traceback" not in said, said
+
+
+def test_cameras_of_colmap_fspy_and_pbrt_come_in_by_the_file_browser_a_drop_and_a_paste(real_blender, tmp_path):
+    """VIEWCAM_PICTURES : a folder for pictures of the window; without it none are taken."""
+    angles = [2 * math.pi * number / 100 for number in range(100)]
+    eyes = {f"shot_{i:03d}": (6 * math.cos(a), 6 * math.sin(a), 2 + math.sin(3 * a)) for i, a in enumerate(angles)}
+    around = [
+        cameras.Camera(name, Pinhole(eye, (0, 0, 0), (0, 0, 1), 1400, 960, 540), image=f"{name}.png")
+        for name, eye in eyes.items()
+    ]
+    cameras.save(around, tmp_path / "sparse", "colmap")
+    (tmp_path / "cameras_of_colmap.json").write_text(json.dumps(eyes))
+    folder = [each for each in [os.environ.get("VIEWCAM_PICTURES")] if each]
+    script = Path(__file__).with_name("cameras_in_a_window.py")
+    for _ in range(ATTEMPTS):
+        outcome = run_in_a_window(real_blender, script, tmp_path, *folder)
+        if outcome.returncode == 0:
+            break
+    said = outcome.stdout + outcome.stderr
+    assert outcome.returncode == 0 and "done: paste_pbrt" in said, said
     assert "Traceback" not in said, said
 
 

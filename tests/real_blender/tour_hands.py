@@ -164,6 +164,11 @@ def key_over(button, key, where=SIDEBAR, **modifiers):
     yield
 
 
+def push_undo(message):
+    with bpy.context.temp_override(window=window()):
+        bpy.ops.ed.undo_push(message=message)
+
+
 def undo():
     press("Z", *NOWHERE, ctrl=True)
     yield

@@ -17,7 +17,7 @@ sys.path.append(str(Path(__file__).parent))
 import tour
 import tour_step
 from panel_in_a_window import move, open_the_panels, region, start, window
-from tour_hands import lowest_button, photograph, redo, undo
+from tour_hands import lowest_button, photograph, push_undo, redo, undo
 
 FOLDER = next(map(Path, sys.argv[sys.argv.index("--") + 1 :]), None)
 MOUSE_AWAY = (200, 700)
@@ -33,11 +33,6 @@ def draw_finely():
     for _ in range(12):
         yield
     system.viewport_aa = "OFF"
-
-
-def push_undo(message):
-    with bpy.context.temp_override(window=window()):
-        bpy.ops.ed.undo_push(message=message)
 
 
 def take(step):
