@@ -59,8 +59,8 @@ ROOMS = {
         "intrinsics camera_values cameras comparison tracer shots batch"
     ),
     "commands": (
-        "errors terminal argument_types events crashes child_process pinhole image cameras comparison tracer labels api shots "
-        "batch"
+        "errors files terminal argument_types events crashes child_process pinhole image cameras comparison tracer labels "
+        "api shots batch"
     ),
     "cli": "errors checks files junit events argument_types tracer commands",
 }

@@ -253,6 +253,18 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         trust(added)
         added.add_argument("--size", type=types.size, metavar="WxH", help="pixels, where the file does not say")
 
+    @command("labels", "Gather the labels of a folder's pictures into one file of a dataset.")
+    def add_labels(added: argparse.ArgumentParser) -> None:
+        from .commands import labels
+
+        added.set_defaults(run=labels.run, writes=("output",))
+        added.add_argument("folder", metavar="FOLDER", type=Path, help="where viewcam render --labels masks has written")
+        added.add_argument("output", metavar="OUT.json", type=Path)
+        added.add_argument(
+            "--to", choices=["coco", "panoptic"], default="coco", help="COCO's instances, or its panoptic format"
+        )
+        added.add_argument("--amodal", action="store_true", help="whole objects, in place of what is visible of them")
+
     @command("camera", "List the cameras of another program's file, or write them for a third one.")
     def add_camera(added: argparse.ArgumentParser) -> None:
         from .commands import camera

@@ -236,7 +236,7 @@ exec "{sys.executable}" -m viewcam_addon "$@" ;;
 esac
 command=$1; shift
 case $command in
-render|compare|camera) exec blender -q -b --command viewcam $command "$@" ;;
+render|compare|camera|labels) exec blender -q -b --command viewcam $command "$@" ;;
 *) file=$1; shift; exec blender -q -b "$file" --command viewcam $command "$@" ;;
 esac"""
     python = ["sh", "-c", 'program=$1; shift; exec blender -b --python-exit-code 9 --python "$program" -- "$@"', "sh"]

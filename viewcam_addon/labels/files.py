@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 
 from .. import image
 from ..errors import InputError
-from ..files import is_replaced, written_whole
+from ..files import is_replaced, read_bytes, written_whole
 from ..image import BACKGROUND_DEPTH
 from ..png import encoded
 from .scene_labels import Labels
+
+_FORMAT, _VERSION = "virtual-pinhole-labels", 1
 
 DEPTH_STEPS = 1000.0
 """Of a 16-bit depth, in a scene unit: millimetres, where the unit is a metre."""
@@ -72,10 +74,33 @@ def write(path: Path, labels: Labels, depth_steps: float = DEPTH_STEPS) -> list[
     return written
 
 
+def read(path: Path) -> dict[str, Any]:
+    """What a label file tells, with the keys that docs/labels.md names.
+
+    Raises
+    ------
+    InputError
+        if it can't be read, or is no such file.
+    """
+    try:
+        told = json.loads(read_bytes(path))
+        is_one = (told["format"], told["version"]) == (_FORMAT, _VERSION)
+        whole = [told["camera"]["width"], told["camera"]["height"], *(each["id"] for each in told["instances"])]
+        texts = [told["picture"], *(each["name"] for each in told["instances"])]
+        is_whole = all(type(each) is int for each in whole) and all(isinstance(each, str) for each in texts)
+    except OSError as error:
+        raise InputError(f"{path} can't be read ({error.strerror or error}): give the folder of label files") from error
+    except (ValueError, LookupError, TypeError, RecursionError) as error:
+        raise InputError(f"{path} is no label file that can be read: write it again with viewcam render --labels") from error
+    if not (is_one and is_whole):
+        raise InputError(f"{path} is of another version or format: write it again with viewcam render --labels")
+    return told
+
+
 def _told(path: Path, labels: Labels, names: list[str], depth_steps: float) -> dict[str, Any]:
     return {
-        "format": "virtual-pinhole-labels",
-        "version": 1,
+        "format": _FORMAT,
+        "version": _VERSION,
         "picture": path.name,
         "camera": asdict(labels.image.camera),
         "files": names,

@@ -1,0 +1,21 @@
+"""`viewcam labels`: the labels of many pictures as one file of a dataset."""
+
+import argparse
+import json
+
+from ..errors import InputError
+from ..files import written_whole
+from ..labels import coco
+from ..terminal import say
+from . import Result
+
+
+def run(options: argparse.Namespace) -> Result:
+    if options.amodal and options.to != "coco":
+        raise InputError("--amodal is for COCO's instances: a pixel of a panoptic picture is of one segment")
+    document = coco.panoptic(options.folder) if options.to == "panoptic" else coco.instances(options.folder, options.amodal)
+    with written_whole(options.output) as temporary:
+        temporary.write_text(json.dumps(document) + "\n", encoding="utf-8")
+    counts = {name: len(document[name]) for name in ("images", "annotations", "categories")}
+    say(f"{options.output}: " + ", ".join(f"{count:,} {name}" for name, count in counts.items()))
+    return 0, {"output": str(options.output), **counts}

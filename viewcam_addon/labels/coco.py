@@ -1,0 +1,104 @@
+"""The labels of many pictures as one file of COCO's: instances (boxes and masks) or panoptic (segments of colour pictures).
+
+Both are plain JSON of what `labels.json` files tell, so that nothing is traced again and a dataset may grow. A category is an
+object's name without Blender's number behind it (Chair of Chair.001).
+"""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from . import files
+
+Document = dict[str, Any]
+
+
+def instances(folder: Path, amodal: bool = False) -> Document:
+    """As instances_train2017.json is made. amodal : masks and boxes of whole objects in place of what is visible of them.
+
+    folder : of label files; `file_name` is the picture's that they belong to. Raises InputError as `found` does.
+    """
+    pictures, categories = found(folder)
+    kind = "amodal" if amodal else "visible"
+    annotations: list[Document] = []
+    for number, (path, told) in enumerate(pictures, start=1):
+        for each in _with(kind, path, told):
+            annotations.append(
+                {
+                    "id": len(annotations) + 1,
+                    "image_id": number,
+                    "category_id": categories[category(each["name"])],
+                    **each[kind],
+                    "iscrowd": 0,
+                    "instance_id": each["id"],
+                }
+            )
+    return {"images": _images(pictures), "annotations": annotations, "categories": _categories(categories)}
+
+
+def panoptic(folder: Path) -> Document:
+    """As panoptic_train2017.json is made, of the instances.png beside each label file. Raises InputError as `found` does."""
+    pictures, categories = found(folder)
+    annotations = []
+    for number, (path, told) in enumerate(pictures, start=1):
+        segments = [
+            {
+                "id": each["id"],
+                "category_id": categories[category(each["name"])],
+                "area": each["visible"]["area"],
+                "bbox": each["visible"]["bbox"],
+                "iscrowd": 0,
+            }
+            for each in _with("visible", path, told)
+        ]
+        file_name = files.of_picture(Path(told["picture"]), "instances.png").name
+        annotations.append({"image_id": number, "file_name": file_name, "segments_info": segments})
+    things = [{**each, "isthing": 1, "color": _colour(each["id"])} for each in _categories(categories)]
+    return {"images": _images(pictures), "annotations": annotations, "categories": things}
+
+
+def category(name: str) -> str:
+    """Chair of Chair.001: Blender's names of copies."""
+    return re.sub(r"\.\d{3,}$", "", name)
+
+
+def found(folder: Path) -> tuple[list[tuple[Path, Document]], dict[str, int]]:
+    """The label files of a folder in the order of their names, and the categories, numbered from 1 in the order of theirs.
+
+    Raises
+    ------
+    InputError
+        if there is none, or one can't be read.
+    """
+    paths = sorted(folder.glob("*.labels.json"))
+    if not paths:
+        raise InputError(f"{folder} has no label files, *.labels.json: write some with viewcam render --labels masks")
+    pictures = [(path, files.read(path)) for path in paths]
+    names = sorted({category(each["name"]) for _, told in pictures for each in told["instances"]})
+    return pictures, {name: number for number, name in enumerate(names, start=1)}
+
+
+def _with(kind: str, path: Path, told: Document) -> Sequence[Document]:
+    """The instances that have such a mask."""
+    label = "masks" if kind == "visible" else kind
+    if any(kind not in each for each in told["instances"]):
+        raise InputError(f"{path} has no {kind} masks: render it with --labels {label}")
+    return [each for each in told["instances"] if each[kind] is not None]
+
+
+def _images(pictures: list[tuple[Path, Document]]) -> list[Document]:
+    return [
+        {"id": number, "width": told["camera"]["width"], "height": told["camera"]["height"], "file_name": told["picture"]}
+        for number, (_, told) in enumerate(pictures, start=1)
+    ]
+
+
+def _categories(categories: dict[str, int]) -> list[Document]:
+    return [{"id": number, "name": name, "supercategory": "object"} for name, number in categories.items()]
+
+
+def _colour(number: int) -> list[int]:
+    """Of a category: neighbours far apart, by steps around each channel that share no divisor with 256."""
+    return [number * step % 256 for step in (67, 149, 211)]
