@@ -57,12 +57,14 @@ from . import (
     realitycapture,
     ros,
     sidecar,
+    textbook,
     three_js,
     trajectories,
     transforms,
     unity,
     unreal,
     usd,
+    vtk,
 )
 from .axes import moved, moved_back
 from .camera import ANGLES, AXES, PIXELS, Camera, Options, choose
@@ -107,6 +109,8 @@ FORMATS: dict[str, ModuleType] = {
     "three_js": three_js,
     "unreal": unreal,
     "unity": unity,
+    "vtk": vtk,
+    "textbook": textbook,
     "mitsuba": mitsuba,
     "pov_ray": pov_ray,
     "pbrt": pbrt,
