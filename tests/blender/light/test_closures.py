@@ -17,9 +17,11 @@ GLOSSY, GLASS, PRINCIPLED = "ShaderNodeBsdfGlossy", "ShaderNodeBsdfGlass", "Shad
 METALLIC = [] if bpy.app.version < (4, 3) else ["ShaderNodeBsdfMetallic"]
 ROUGHNESSES = (0.2, 0.5, 0.8, 1.0)
 
-# p50 and p99, calibrated: what float32 leaves of the formulas; the tables' own differences; an exponential in float32 far off a
-# lobe; refraction, close to where all is reflected.
-FORMULAS, TABLES, BECKMANN, REFRACTED = (1e-6, 3e-5), (5e-5, 5e-4), (2e-4, 1e-3), (5e-6, 2e-3)
+# p50 and p99, calibrated on 4.2, 4.5, 5.0 and 5.2: what float32 leaves of the formulas (3.4e-7 and, at roughness 0.2, 1.7e-5,
+# in 4.2 2.2e-5); the tables' own differences (2.7e-5, 7.8e-5), and those of facets as rough as can be (1.3e-4); an
+# exponential in float32 far off a lobe (8.6e-7, 1.2e-4); refraction (7e-7, 3.3e-5).
+FORMULAS = (5e-7, 2e-5 if bpy.app.version >= (4, 3) else 2.5e-5)
+TABLES, ROUGHEST, BECKMANN, REFRACTED = (3e-5, 1e-4), (3e-5, 1.5e-4), (1.2e-6, 1.5e-4), (1e-6, 4e-5)
 
 
 def of_formulas():
@@ -34,16 +36,21 @@ def of_formulas():
     yield PRINCIPLED, {"Base Color": COLOUR, "Metallic": 1.0, "Roughness": 0.4}, {"distribution": "GGX"}
 
 
+def of_bare_facets(roughnesses):
+    for r in roughnesses:
+        yield GLOSSY, {"Color": COLOUR, "Roughness": r}, {"distribution": "MULTI_GGX"}
+        for kind in METALLIC:
+            yield kind, {"Base Color": COLOUR, "Roughness": r}, {"distribution": "MULTI_GGX"}
+
+
 def of_tables():
     for r in ROUGHNESSES:
-        yield GLOSSY, {"Color": COLOUR, "Roughness": r}, {"distribution": "MULTI_GGX"}
         yield GLASS, {"Color": COLOUR, "Roughness": r, "IOR": 1.6}, {"distribution": "MULTI_GGX"}
         yield PRINCIPLED, {"Base Color": COLOUR, "Roughness": r}, {}
         yield PRINCIPLED, {"Base Color": COLOUR, "Roughness": r, "Metallic": 0.6, "Specular Tint": (0.9, 0.5, 0.7, 1)}, {}
         yield PRINCIPLED, {"Base Color": COLOUR, "Coat Weight": 0.7, "Coat Roughness": r, "Coat Tint": (0.9, 0.6, 0.4, 1)}, {}
         yield PRINCIPLED, {"Base Color": COLOUR, "Transmission Weight": 0.7, "Roughness": r, "IOR": 1.33}, {}
-        for kind in METALLIC:
-            yield kind, {"Base Color": COLOUR, "Roughness": r}, {"distribution": "MULTI_GGX"}
+    yield from of_bare_facets(ROUGHNESSES[:-1])
     yield PRINCIPLED, {"Base Color": COLOUR, "Specular IOR Level": 0.9, "Roughness": 0.3}, {"distribution": "GGX"}
     yield PRINCIPLED, {"Base Color": COLOUR, "Specular IOR Level": 0.2, "IOR": 2.0, "Coat Weight": 1.0, "Coat IOR": 1.9}, {}
     yield PRINCIPLED, {"Base Color": COLOUR, "Diffuse Roughness": 0.6}, {}
@@ -126,6 +133,11 @@ def test_lobes_are_cycles_to_float32(patches):
 
 def test_tabulated_lobes_and_layers_are_cycles_to_the_tables(patches):
     check(patches(of_tables()), of_tables(), TABLES)
+
+
+def test_facets_as_rough_as_can_be_are_cycles_to_their_table(patches):
+    roughest = list(of_bare_facets([1.0]))
+    check(patches(roughest), roughest, ROUGHEST)
 
 
 def test_beckmanns_lobes_are_cycles_to_its_exponential(patches):
