@@ -31,6 +31,12 @@ PARTS = (
 )
 
 
+# A grey pixel.
+PNG = bytes.fromhex(
+    "89504e470d0a1a0a0000000d49484452000000010000000108000000003a7e9b55"
+    "0000000a49444154789c636800000082008177cd72b60000000049454e44ae426082"
+)
+
 # A virtual screen on a busy machine may lose a click: one loss is no finding, two at different times are.
 ATTEMPTS = 2
 
@@ -89,6 +95,8 @@ def test_cameras_of_colmap_fspy_and_pbrt_come_in_by_the_file_browser_a_drop_and_
         for name, eye in eyes.items()
     ]
     cameras.save(around, tmp_path / "sparse", "colmap")
+    for camera in around:  # what is not found would be told in a popup, which takes the keys
+        (tmp_path / "sparse" / camera.image).write_bytes(PNG)
     (tmp_path / "cameras_of_colmap.json").write_text(json.dumps(eyes))
     folder = [each for each in [os.environ.get("VIEWCAM_PICTURES")] if each]
     script = Path(__file__).with_name("cameras_in_a_window.py")
