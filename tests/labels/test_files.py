@@ -9,6 +9,7 @@ import pytest
 import viewcam_addon as vp
 from viewcam_addon import image
 from viewcam_addon.cli import main
+from viewcam_addon.errors import InputError
 from viewcam_addon.labels import files
 from viewcam_addon.tracer.scene import scene_file
 
@@ -42,6 +43,19 @@ def test_the_exr_has_every_pass_to_the_last_bit(written):
     assert set(found.passes) == set(labels.image.passes) and found.camera == labels.image.camera
     for name, values in labels.image.passes.items():
         np.testing.assert_array_equal(found[name], values)
+
+
+def test_no_json_of_an_older_frame_stands_beside_files_of_a_newer(written, tmp_path, monkeypatch):
+    labels, _ = written
+    files.write(tmp_path / "shot.exr", labels)
+
+    def fail(*_):
+        raise InputError("the disk is full")
+
+    monkeypatch.setattr(image, "write", fail)
+    with pytest.raises(InputError, match="the disk is full"):
+        files.write(tmp_path / "shot.exr", labels)
+    assert not (tmp_path / "shot.labels.json").exists() and (tmp_path / "shot.labels.exr").exists()
 
 
 def test_opencv_reads_the_flow_and_what_is_unknown_is_that_there(written):

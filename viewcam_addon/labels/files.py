@@ -1,6 +1,6 @@
 """Labels as files beside a picture: one EXR of all passes, PNGs and .flo for who wants those, a JSON that says what is what.
 
-Each appears whole, and the JSON last: where it stands, so do the others.
+Each appears whole, and the JSON last: where it stands, so do the others. An older one goes first.
 """
 
 import json
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .. import image
 from ..errors import InputError
-from ..files import is_replaced, read_bytes, written_whole
+from ..files import check_writable, is_replaced, read_bytes, written_whole
 from ..image import BACKGROUND_DEPTH
 from ..png import encoded
 from .scene_labels import Labels
@@ -48,7 +48,10 @@ def write(path: Path, labels: Labels, depth_steps: float = DEPTH_STEPS) -> list[
     """
     if not is_replaced(path):
         raise InputError(f"{path} is no file beside which labels could stand: give the name of one")
-    passes = labels.image.passes
+    passes, told_in = labels.image.passes, of_picture(path, "labels.json")
+    check_writable(told_in)
+    if is_replaced(told_in):
+        told_in.unlink(missing_ok=True)
     written = [of_picture(path, "labels.exr")] if passes else []
     if passes:
         image.write(written[0], labels.image)
@@ -67,8 +70,8 @@ def write(path: Path, labels: Labels, depth_steps: float = DEPTH_STEPS) -> list[
         written.append(of_picture(path, ending))
         with written_whole(written[-1]) as temporary:
             temporary.write_bytes(content)
-    written.append(of_picture(path, "labels.json"))
-    with written_whole(written[-1]) as temporary:
+    written.append(told_in)
+    with written_whole(told_in) as temporary:
         told = _told(path, labels, [each.name for each in written[:-1]], depth_steps)
         temporary.write_text(json.dumps(told, allow_nan=False) + "\n", encoding="utf-8")
     return written
