@@ -87,7 +87,7 @@ BLENDER_ROOMS = {
     "scenes": "versions temporary_settings picture findings datablocks pose camera",
     "rendering": "versions temporary_settings opening datablocks resolution scenes",
     "interface": (
-        "versions temporary_settings picture findings render_settings preferences datablocks storage targets hold "
+        "versions temporary_settings picture findings render_settings preferences datablocks storage targets hold suspects "
         "pose camera own_picture scenes rendering"
     ),
     "batch": "versions temporary_settings opening datablocks camera resolution scenes rendering",

@@ -47,19 +47,19 @@ def test_a_constraint_that_does_nothing_is_not_accused(posed_camera, scene, how)
 def test_a_driver_on_the_location_is_named(posed_camera, scene):
     posed_camera.driver_add("location", 0).driver.expression = "1.0 + 1.0"
     (finding,) = findings_after_setting(posed_camera, scene)
-    assert finding.startswith("A driver sets 'location' of 'Camera', the eye is 5 m away")
+    assert finding.startswith("A driver sets the location of 'Camera', the eye is 5 m away")
 
 
 def test_a_driver_on_the_lens_is_named(posed_camera, scene):
     posed_camera.data.driver_add("lens").driver.expression = "20.0 + 1.0"
     (finding,) = findings_after_setting(posed_camera, scene)
-    assert finding.startswith("A driver sets 'lens' of 'Camera', the view plane is 1120 px away and not 1500")
+    assert finding.startswith("A driver sets the focal length of 'Camera', the view plane is 1120 px away and not 1500")
 
 
 def test_a_keyframe_on_the_location_is_named_before_it_acts(posed_camera, scene):
     posed_camera.keyframe_insert("location", frame=1)
     (finding,) = findings_after_setting(posed_camera, scene)
-    assert finding.startswith("'location' of 'Camera' is animated, and in a render its keyframes win over the four values")
+    assert finding.startswith("Keyframes set the location of 'Camera', and in a render they win over the four values")
 
 
 def test_a_keyframe_on_the_lens_is_named_when_it_has_acted(posed_camera, scene):
@@ -67,7 +67,7 @@ def test_a_keyframe_on_the_lens_is_named_when_it_has_acted(posed_camera, scene):
     posed_camera.virtual_pinhole.distance = 3000.0
     scene.frame_set(2)
     (finding,) = findings_later(posed_camera, scene)
-    assert "'lens' of 'Camera' is animated" in finding
+    assert "Keyframes set the focal length of 'Camera'" in finding
     assert posed_camera.virtual_pinhole.distance == 1500, "the values follow the keyframes"
 
 
@@ -77,7 +77,7 @@ def test_a_keyframe_in_the_nla_is_named(posed_camera, scene):
     data.nla_tracks.new().strips.new("Strip", 1, data.action)
     data.action = None
     (finding,) = findings_after_setting(posed_camera, scene)
-    assert finding.startswith("'rotation_euler' of 'Camera' is animated")
+    assert finding.startswith("Keyframes set the rotation of 'Camera'")
 
 
 def test_keyframes_on_the_four_values_are_no_culprits(posed_camera, scene):

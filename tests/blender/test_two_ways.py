@@ -8,7 +8,8 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import findings, pose
+from viewcam_addon.blender import findings, pose, versions
+from viewcam_addon.blender.interface import dragging, panel
 
 
 def update():
@@ -219,9 +220,9 @@ def test_values_and_camera_agree_whoever_is_edited(posed_camera, scene, empty, s
         "shift": lambda: setattr(camera_().data, "shift_x", random.uniform(-0.5, 0.5)),
         "frame": lambda: bpy.context.scene.frame_set(int(random.integers(1, 100))),
         "step of undo": lambda: bpy.ops.ed.undo_push(message="step"),
+        "undo": lambda: bpy.ops.ed.undo(),
+        "redo": lambda: bpy.ops.ed.redo(),
     }
-    if bpy.app.background and bpy.ops.ed.undo.poll():
-        edits |= {"undo": bpy.ops.ed.undo, "redo": bpy.ops.ed.redo}
     done = []
     for _ in range(steps):
         names = random.choice(sorted(edits), size=random.integers(1, 3))
@@ -233,3 +234,67 @@ def test_values_and_camera_agree_whoever_is_edited(posed_camera, scene, empty, s
                 done[-1] += " (none)"
         differing = law(camera_(), bpy.context.scene)
         assert differing == {}, f"after {done[-6:]}: {differing}"
+    assert {"undo", "redo"} <= set(done)
+
+
+def test_auto_keying_keys_the_camera_that_is_moved_and_its_values_follow_those_keyframes(posed_camera, scene):
+    """Blender keys what it moves, the camera's own location; without keyframes of their own the values are never in the way."""
+    scene.tool_settings.use_keyframe_insert_auto = True
+    for frame, x in ((1, 1.0), (11, 5.0)):
+        scene.frame_set(frame)
+        posed_camera.location = (x, -6, 5)
+        update()
+        posed_camera.keyframe_insert("location")  # as G does when it is confirmed
+        update()
+    scene.frame_set(1)
+    assert posed_camera.virtual_pinhole.eye[0] == 1 and law(posed_camera, scene) == {}
+    assert not any(curve.data_path.startswith("virtual_pinhole") for curve in versions.action_curves(posed_camera))
+
+
+def test_where_the_values_have_keyframes_those_win_over_what_auto_keying_keys_of_the_camera(posed_camera, scene):
+    """And the panel names them, with a button."""
+    posed_camera.virtual_pinhole.keyframe_insert("eye", frame=1)
+    scene.frame_set(5)
+    posed_camera.location = (1, 2, 3)
+    update()
+    posed_camera.keyframe_insert("location")
+    scene.frame_set(6)
+    assert tuple(posed_camera.virtual_pinhole.eye) == (7, -6, 5) == tuple(posed_camera.matrix_world.translation)
+    (notice,) = panel.notices(posed_camera, scene)
+    assert notice.sentence.startswith("Keyframes set the location of 'Camera', and in a render they win")
+    assert notice.remedy == ("viewcam.delete_keyframes", "Delete These Keyframes")
+    assert bpy.ops.viewcam.delete_keyframes() == {"FINISHED"}
+    update()
+    assert panel.notices(posed_camera, scene) == [] and law(posed_camera, scene) == {}
+    assert [curve.data_path for curve in versions.action_curves(posed_camera)] == ["virtual_pinhole.eye"] * 3
+
+
+@pytest.mark.parametrize("is_on", [True, False])
+def test_auto_keying_keys_what_a_button_moves_where_it_has_keyframes(posed_camera, scene, is_on):
+    group = posed_camera.virtual_pinhole
+    group.keyframe_insert("eye", frame=1)
+    scene.frame_set(5)
+    scene.tool_settings.use_keyframe_insert_auto = is_on
+    bpy.ops.viewcam.orbit_camera(around=0.5)
+    there = tuple(group.eye)
+    bpy.ops.viewcam.look_at_cursor()
+    scene.frame_set(6)
+    scene.frame_set(5)
+    assert tuple(group.eye) == (there if is_on else (7, -6, 5))
+    assert {curve.data_path for curve in versions.action_curves(posed_camera)} == {"virtual_pinhole.eye"}
+
+
+def test_auto_keying_keys_the_cameras_own_channels_too_where_a_button_moves_them(posed_camera, scene):
+    """They would win at the next frame."""
+    posed_camera.keyframe_insert("location", frame=1)
+    posed_camera.data.keyframe_insert("lens", frame=1)
+    scene.frame_set(5)
+    scene.tool_settings.use_keyframe_insert_auto = True
+    drag = dragging.Drag(posed_camera, scene, dragging.DOLLY_ZOOM)
+    drag.move(50, 0)
+    drag.confirm()
+    there = tuple(posed_camera.location), posed_camera.data.lens
+    scene.frame_set(6)
+    scene.frame_set(5)
+    assert (tuple(posed_camera.location), posed_camera.data.lens) == there
+    assert there[0] != (7, -6, 5) and law(posed_camera, scene) == {}

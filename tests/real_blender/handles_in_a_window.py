@@ -7,6 +7,7 @@ Leaves with status 0, or 5 and a traceback.
 """
 
 import importlib
+import math
 import sys
 import time
 from pathlib import Path
@@ -184,6 +185,73 @@ def cancel_each_handle():
     yield from undo()
     assert everything() != moved and everything() != before, "a cancelled drag has pushed a step of undo"
     yield from undo(shift=True)
+
+
+def strike(key, character="", at=NOWHERE):
+    for value in ("PRESS", "RELEASE"):
+        letter = {"unicode": character} if character and value == "PRESS" else {}
+        window().event_simulate(type=key, value=value, x=at[0], y=at[1], **letter)
+
+
+def begin(kind):
+    """Steps: a button of Drag is clicked, with the mouse where it is."""
+    area, _ = region("VIEW_3D", "WINDOW")
+    with bpy.context.temp_override(window=window(), area=area, region=views()[-1]):
+        assert bpy.ops.viewcam.drag_camera("INVOKE_DEFAULT", True, camera="Camera", kind=kind) == {"RUNNING_MODAL"}
+    yield
+    assert [each.bl_idname for each in window().modal_operators] == ["VIEWCAM_OT_drag_camera"]
+
+
+def drag_the_camera():
+    """Orbit, dolly, dolly zoom and truck: with the mouse, by a number, confirmed, cancelled; each is one step of undo."""
+    there = (NOWHERE[0] + 40, NOWHERE[1] + 30)
+    for kind in ("ORBIT", "DOLLY", "DOLLY_ZOOM", "TRUCK"):
+        state_the_values()
+        move(*NOWHERE)
+        yield
+        yield
+        before, (eye, look_at, _, distance) = everything(), values().numbers()
+        for key in ("ESC", "RIGHTMOUSE"):
+            yield from begin(kind)
+            yield from pull(NOWHERE, there)
+            assert everything() != before, f"the mouse does not move the camera in {kind}"
+            is_at_its_values()
+            strike(key, at=there)
+            yield
+            yield
+            assert everything() == before, f"{key} did not bring back what was before {kind}"
+            assert not window().modal_operators
+            move(*NOWHERE)
+            yield
+            yield
+        for confirm, typed in (("LEFTMOUSE", ""), ("RET", ""), ("RET", "2.5")):
+            yield from begin(kind)
+            yield from pull(NOWHERE, there)
+            for character, key in zip(typed, ("TWO", "PERIOD", "FIVE"), strict=bool(typed)):
+                strike(key, character, there)
+                yield
+            strike(confirm, at=there)
+            yield
+            yield
+            is_at_its_values()
+            after, numbers = everything(), values().numbers()
+            reach, former = math.dist(numbers[0], numbers[1]), math.dist(eye, look_at)
+            if typed:
+                moved = {"ORBIT": 0.0, "TRUCK": 0.0}.get(kind, 2.5)
+                assert abs(reach - former - moved) < CLOSE, f"{kind} by 2.5 went from {former} to {reach}"
+                assert kind != "TRUCK" or abs(math.dist(eye, numbers[0]) - 2.5) < CLOSE
+                turned = 2 * former * math.sin(math.radians(2.5) / 2) * math.hypot(6, 6.5) / former
+                assert kind != "ORBIT" or abs(math.dist(eye, numbers[0]) - turned) < CLOSE
+            if kind == "DOLLY_ZOOM":
+                assert abs(numbers[3] / reach / (distance / former) - 1) < CLOSE
+            yield from undo()
+            assert everything() == before, f"one step of undo did not take back {kind} confirmed by {confirm}"
+            yield from undo(shift=True)
+            assert everything() == after, f"redo did not bring back {kind}"
+            yield from undo()
+            move(*NOWHERE)
+            yield
+            yield
 
 
 def snap_to_a_corner():
@@ -369,6 +437,7 @@ PARTS = (
     open_the_view,
     drag_each_handle,
     cancel_each_handle,
+    drag_the_camera,
     snap_to_a_corner,
     drag_in_a_quad_view,
     hide_the_diagram,

@@ -63,7 +63,11 @@ def on_load(_path: str, _more: object = None) -> None:
 
 @persistent
 def on_undo(_scene: bpy.types.Scene, _more: object = None) -> None:
-    cameras.forget()
+    """Undo may bring back a camera's channels and not evaluate them, so that its values would follow where it was before."""
+    for block in bpy.data.objects:
+        if _is_camera(block) and not cameras.is_untouched(block, by_values=False):
+            cameras.forget(block)
+            block.update_tag(refresh={"OBJECT", "DATA"})
 
 
 def _is_camera(block: bpy.types.ID) -> bool:

@@ -448,9 +448,12 @@ def agree(camera_object: bpy.types.Object, before_moves: tuple[tuple, CameraValu
     _agreed[camera_object.session_uid] = _Agreement(_state_of(camera_object), storage.load(camera_object), before_moves)
 
 
-def forget() -> None:
-    """Forget what agreed: undo has brought back other values, and other cameras."""
-    _agreed.clear()
+def forget(camera_object: bpy.types.Object | None = None) -> None:
+    """Forget that a camera, or all, agreed: undo has brought back other values."""
+    if camera_object is None:
+        _agreed.clear()
+    else:
+        _agreed.pop(camera_object.session_uid, None)
 
 
 def _as_followed(camera_object: bpy.types.Object, eye: Triple, look_at: Triple) -> tuple[Triple, Triple]:

@@ -29,6 +29,7 @@ _SHIFT_ROUNDINGS = 2
 EYE, VIEW, DISTANCE, CENTRE = "eye", "view", "distance", "centre"
 POSE, LENS = frozenset({EYE, VIEW}), frozenset({DISTANCE, CENTRE})
 APPLY_AGAIN = "apply the values again"
+DELETE_KEYFRAMES = "delete them, and key the four values instead"
 REMEDY = f"{APPLY_AGAIN}, or adopt the camera as it stands"
 
 

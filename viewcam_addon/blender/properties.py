@@ -209,9 +209,9 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         description="In which unit the lens is shown and typed",
         items=(
             ("MILLIMETERS", "mm", "The focal length on the camera's sensor"),
-            ("HORIZONTAL", "Horizontal", "The horizontal field of view"),
-            ("VERTICAL", "Vertical", "The vertical field of view"),
-            ("DIAGONAL", "Diagonal", "The diagonal field of view"),
+            ("HORIZONTAL", "H FOV", "The horizontal field of view"),
+            ("VERTICAL", "V FOV", "The vertical field of view"),
+            ("DIAGONAL", "D FOV", "The diagonal field of view"),
             ("PIXELS", "px", "The view-plane distance d, in pixels of the picture at 100 %"),
         ),
         update=_on_shown,

@@ -1,18 +1,17 @@
 """Who in a .blend may keep a camera from being what its four values say. Reads Blender, changes nothing."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import bpy
 
 from . import datablocks, pose, storage, versions
-from .findings import APPLY_AGAIN, CENTRE, DISTANCE, EYE, LENS, POSE, REMEDY, VIEW, Suspect
+from .findings import APPLY_AGAIN, CENTRE, DELETE_KEYFRAMES, DISTANCE, EYE, LENS, POSE, REMEDY, VIEW, Suspect
 
 
 def suspects(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[Suspect]:
     yield from _constraints(camera_object)
-    for block in (camera_object, camera_object.data):
-        yield from _drivers(block)
-        yield from _animation(block)
+    yield from _drivers(camera_object)
+    yield from _animation(camera_object)
     yield from _ancestors(camera_object)
     yield from _libraries(camera_object)
     yield from _locks(camera_object)
@@ -26,12 +25,11 @@ def held(camera_object: bpy.types.Object) -> set[str]:
 
     And by keyframes, where the four values have some as well.
     """
-    blocks = camera_object, camera_object.data
-    holding = [*_libraries(camera_object), *(each for block in blocks for each in _drivers(block))]
+    holding = [*_libraries(camera_object), *_drivers(camera_object)]
     if not pose.is_carried_by_constraints(camera_object):
         holding += _constraints(camera_object)
     if datablocks.is_animated(camera_object):
-        holding += (each for block in blocks for each in _animation(block))
+        holding += _animation(camera_object)
     return set().union(*(suspect.acts_on for suspect in holding))
 
 
@@ -52,22 +50,22 @@ def _constraints(camera_object: bpy.types.Object) -> Iterator[Suspect]:
             yield Suspect(f"The constraint {name} moves {camera}", acts_on, "disable it, or the Virtual Pinhole")
 
 
-# What a channel acts on, by the start of its data path.
+# A channel by the start of its data path: what it acts on, and its name as a sentence says it.
 _CHANNELS = {
-    "location": EYE,
-    "delta_location": EYE,
-    "rotation_": VIEW,
-    "delta_rotation_": VIEW,
-    "scale": VIEW,
-    "delta_scale": VIEW,
-    "lens": DISTANCE,
-    "sensor_": DISTANCE,
-    "shift_": CENTRE,
+    "location": (EYE, "location"),
+    "delta_location": (EYE, "delta location"),
+    "rotation_": (VIEW, "rotation"),
+    "delta_rotation_": (VIEW, "delta rotation"),
+    "scale": (VIEW, "scale"),
+    "delta_scale": (VIEW, "delta scale"),
+    "lens": (DISTANCE, "focal length"),
+    "sensor_": (DISTANCE, "sensor"),
+    "shift_": (CENTRE, "shift"),
 }
 
 
-def _acts_on(data_path: str) -> str | None:
-    return next((quantity for start, quantity in _CHANNELS.items() if data_path.startswith(start)), None)
+def _channel(data_path: str) -> tuple[str | None, str]:
+    return next((channel for start, channel in _CHANNELS.items() if data_path.startswith(start)), (None, ""))
 
 
 def _paths(curves: list[bpy.types.FCurve]) -> list[str]:
@@ -75,19 +73,30 @@ def _paths(curves: list[bpy.types.FCurve]) -> list[str]:
     return sorted({curve.data_path for curve in curves if not versions.is_muted(curve)})
 
 
-def _drivers(block: bpy.types.ID) -> Iterator[Suspect]:
-    for path in _paths(versions.drivers(block)):
-        if quantity := _acts_on(path):
-            culprit = f"A driver sets {path!r} of {block.name!r}"
-            yield Suspect(culprit, frozenset({quantity}), "remove it, or disable the Virtual Pinhole")
+def _drivers(camera_object: bpy.types.Object) -> Iterator[Suspect]:
+    for block in (camera_object, camera_object.data):
+        for path in _paths(versions.drivers(block)):
+            quantity, words = _channel(path)
+            if quantity:
+                culprit = f"A driver sets the {words} of {block.name!r}"
+                yield Suspect(culprit, frozenset({quantity}), "remove it, or disable the Virtual Pinhole")
 
 
-def _animation(block: bpy.types.ID) -> Iterator[Suspect]:
-    for path in _paths(versions.animation_curves(block)):
-        quantity = _acts_on(path)
-        if quantity and quantity != CENTRE:
-            culprit = f"{path!r} of {block.name!r} is animated, and in a render its keyframes win over the four values"
-            yield Suspect(culprit, frozenset({quantity}), "delete them, and animate the four values instead", always=True)
+def keyed(
+    camera_object: bpy.types.Object, curves: Callable[[bpy.types.ID], list[bpy.types.FCurve]]
+) -> list[tuple[bpy.types.ID, str]]:
+    """Which of the camera's own channels keyframes set: (object or data, data path). curves : of a datablock."""
+    blocks = camera_object, camera_object.data
+    return [(block, path) for block in blocks for path in _paths(curves(block)) if _channel(path)[0] not in (None, CENTRE)]
+
+
+def _animation(camera_object: bpy.types.Object) -> Iterator[Suspect]:
+    if found := keyed(camera_object, versions.animation_curves):
+        channels = [_channel(path) for _, path in found]
+        words = list(dict.fromkeys(words for _, words in channels))
+        which = f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0]
+        culprit = f"Keyframes set the {which} of {camera_object.name!r}, and in a render they win over the four values"
+        yield Suspect(culprit, frozenset(quantity for quantity, _ in channels), DELETE_KEYFRAMES, always=True)
 
 
 def _ancestors(camera_object: bpy.types.Object) -> Iterator[Suspect]:
@@ -108,7 +117,7 @@ def _is_moved_by_animation(block: bpy.types.Object) -> bool:
     """Its own channels, the bones of an armature, or the time on a path."""
     blocks = filter(None, (block, block.data))
     paths = [path for each in blocks for path in _paths([*versions.animation_curves(each), *versions.drivers(each)])]
-    return any(_acts_on(path) in POSE or path.startswith("pose.bones") or path == "eval_time" for path in paths)
+    return any(_channel(path)[0] in POSE or path.startswith("pose.bones") or path == "eval_time" for path in paths)
 
 
 def _libraries(camera_object: bpy.types.Object) -> Iterator[Suspect]:

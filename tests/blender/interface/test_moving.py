@@ -1,6 +1,7 @@
 """The buttons that move a camera: what each does, what it says where it can't, and that undo takes it all back."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -247,7 +248,7 @@ def test_a_camera_can_be_named(posed_camera, add_camera, scene):
 def test_what_does_not_stick_is_reported(posed_camera, scene, capfd):
     posed_camera.driver_add("location", 0).driver.expression = "1.0 + 1.0"
     bpy.ops.viewcam.swap_camera()
-    assert "A driver sets 'location'" in capfd.readouterr().out
+    assert "A driver sets the location" in capfd.readouterr().out
 
 
 def test_keyed_values_can_be_moved_and_keyed_again(posed_camera, scene):
@@ -405,3 +406,14 @@ def test_undo_restores_values_and_camera_bit_for_bit(posed_camera, selected_cube
     assert snapshot("Camera") == before
     bpy.ops.ed.redo()
     assert snapshot("Camera") == after
+
+
+def test_dolly_in_a_menu_asks_for_the_distance_and_does_nothing_before(posed_camera, stated, monkeypatch):
+    """Where it stood in the panel, a click was followed by nothing that could be seen."""
+    before, asked = stated(), []
+    operator = moving.VIEWCAM_OT_dolly_camera
+    properties = SimpleNamespace(is_property_set=lambda name: False)
+    window_manager = SimpleNamespace(invoke_props_dialog=lambda each: asked.append(each.reach) or {"RUNNING_MODAL"})
+    clicked = SimpleNamespace(found=lambda context: posed_camera, properties=properties, reach=0.0)
+    assert operator.invoke(clicked, SimpleNamespace(window_manager=window_manager), None) == {"RUNNING_MODAL"}
+    assert asked == [math.dist(before.eye, before.look_at)] and stated() == before

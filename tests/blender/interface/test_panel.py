@@ -186,7 +186,8 @@ def test_both_panels_have_closed_sub_panels(posed_camera):
 
 def test_the_sub_panel_has_every_move_for_the_camera_that_is_shown(posed_camera):
     buttons = [each for each in drawn(panel.VIEWCAM_PT_sidebar_move) if each[0] == "operator"]
-    assert {name for _, name, *_ in buttons} == {each.bl_idname for each in moving.CLASSES}
+    # Dolly is a drag here; to a distance the menu has it, and asks for that.
+    assert {name for _, name, *_ in buttons} == {each.bl_idname for each in moving.CLASSES} - {"viewcam.dolly_camera"}
     icons = bpy.types.UILayout.bl_rna.functions["operator"].parameters["icon"].enum_items
     for _, name, look, _, properties in buttons:
         assert properties.camera == "Camera"

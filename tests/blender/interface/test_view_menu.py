@@ -9,13 +9,19 @@ from viewcam_addon.blender.interface import baking, clipboard, moving, operators
 
 
 def test_every_button_of_a_camera_stands_in_the_menu_which_the_search_reads(registered_addon):
-    entries = []
-    menus = []
-    layout = SimpleNamespace(operator=entries.append, menu=menus.append, separator=lambda: None)
+    entries, drags, menus = [], [], []
+
+    def operator(name, text=""):
+        entries.append(name)
+        drags.extend([text] if text else [])
+        return SimpleNamespace()
+
+    layout = SimpleNamespace(operator=operator, menu=menus.append, separator=lambda: None)
     view_menu.VIEWCAM_MT_cameras.draw(SimpleNamespace(layout=layout), bpy.context)
     classes = (*moving.CLASSES, *operators.CLASSES, *baking.CLASSES, *clipboard.IN_MENUS, *scene_cameras.OPERATORS)
     classes += photo_matching.OPERATORS
     assert set(entries) == {each.bl_idname for each in classes} and menus == ["VIEWCAM_MT_copy_camera_as"]
+    assert drags == ["Drag: Orbit", "Drag: Dolly", "Drag: Dolly Zoom", "Drag: Truck"]
     assert all(getattr(bpy.ops.viewcam, entry.split(".")[1]).get_rna_type() for entry in entries)
 
 

@@ -25,7 +25,7 @@ from ...comparison.cameras import conversion_error
 from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
-from .. import datablocks, pose, versions
+from .. import datablocks, pose, suspects, versions
 from .operators import CameraOperator
 
 Array = NDArray[np.float64]
@@ -201,6 +201,7 @@ def _check(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
         )
     for block in (camera_object, camera):
         _check_animation(block)
+        _check_own_action(block)
 
 
 def _check_editable(block: bpy.types.ID) -> None:
@@ -218,17 +219,20 @@ def _check_animation(block: bpy.types.ID) -> None:
         curve.data_path == "virtual_pinhole.enabled" for curve in (*versions.animation_curves(block), *versions.drivers(block))
     ):
         raise InputError(f"'enabled' of {block.name!r} is animated, and would turn it on again: delete its keyframes")
+    if _is_mixed(block.animation_data):
+        raise InputError(
+            f"the NLA would mix the keyframes of {block.name!r} with its tracks: leave tweak mode and solo, and let the action "
+            "replace what lies below it, at full influence"
+        )
+
+
+def _check_own_action(block: bpy.types.ID) -> None:
     kind = bpy.data.objects if isinstance(block, bpy.types.Object) else bpy.data.cameras
     sharers = [other.name for other in kind if other != block and versions.shares_animation(block, other)]
     if sharers:
         raise InputError(
             f"the action {block.animation_data.action.name!r} of {block.name!r} moves {_names(sharers)} too: "
             "make the action single-user"
-        )
-    if _is_mixed(block.animation_data):
-        raise InputError(
-            f"the NLA would mix the keyframes of {block.name!r} with its tracks: leave tweak mode and solo, and let the action "
-            "replace what lies below it, at full influence"
         )
 
 
@@ -291,6 +295,29 @@ class VIEWCAM_OT_bake_camera(CameraOperator, bpy.types.Operator):
             self.report({"INFO"} if found.ok else {"WARNING"}, found.sentence())
 
 
+class VIEWCAM_OT_delete_keyframes(CameraOperator, bpy.types.Operator):
+    bl_idname = "viewcam.delete_keyframes"
+    bl_label = "Delete the Camera's Own Keyframes"
+    bl_description = (
+        "Delete the keyframes of location, rotation, scale, focal length and sensor, as Bake and auto keying write them, so "
+        "that the four values alone say where the camera is. Keyframes of the values stay"
+    )
+
+    def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
+        found = suspects.keyed(camera_object, versions.action_curves)
+        if not found:
+            raise InputError(
+                f"no action of camera {camera_object.name!r} has keyframes of its own channels: look into its NLA tracks"
+            )
+        for block, _ in found:
+            _check_editable(block)
+            _check_own_action(block)
+        for block, path in found:
+            versions.remove_curves(block, path)
+        if camera_object.virtual_pinhole.enabled:
+            cameras.follow(camera_object, scene)
+
+
 def draw(layout: bpy.types.UILayout, camera_object: bpy.types.Object) -> None:
     """The button, in the panel."""
     row = layout.row()
@@ -298,4 +325,4 @@ def draw(layout: bpy.types.UILayout, camera_object: bpy.types.Object) -> None:
     row.operator("viewcam.bake_camera", icon="ACTION").camera = camera_object.name
 
 
-CLASSES = (VIEWCAM_OT_bake_camera,)
+CLASSES = (VIEWCAM_OT_bake_camera, VIEWCAM_OT_delete_keyframes)

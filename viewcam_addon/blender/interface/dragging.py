@@ -19,6 +19,7 @@ from .. import targets
 from . import kept
 
 ORBIT, DOLLY, DOLLY_ZOOM, TRUCK = "ORBIT", "DOLLY", "DOLLY_ZOOM", "TRUCK"
+NAMES = {ORBIT: "Orbit", DOLLY: "Dolly", DOLLY_ZOOM: "Dolly Zoom", TRUCK: "Truck"}
 _TURN = math.radians(0.5)  # for a pixel of the mouse, as a viewport's turntable
 _CLOSER = 0.005  # of the distance to the look-at point, for a pixel
 _PRECISE = 0.1
@@ -81,6 +82,9 @@ class Drag:
         """What is typed so far."""
         self.text = text
         self._follow()
+
+    def confirm(self) -> None:
+        kept.key_changes(self._camera, self._before, self._scene)
 
     def cancel(self) -> None:
         kept.restore(self._camera, self._before)

@@ -20,8 +20,9 @@ import numpy as np
 
 from ... import diagram as diagrams
 from ...pinhole import Triple
-from .. import datablocks, versions
+from .. import datablocks
 from . import overlay
+from .kept import key_changes
 from .kept import restore as _restore
 from .kept import state as _state
 
@@ -105,12 +106,7 @@ def end_drag() -> None:
     camera_object = bpy.data.objects.get((ended.camera_name, None)) if ended else None
     if camera_object is None or _state(camera_object) == ended.before:
         return
-    path = f"virtual_pinhole.{ended.name}"
-    scene = datablocks.scene_of(camera_object)
-    if scene.tool_settings.use_keyframe_insert_auto and any(
-        curve.data_path == path for curve in versions.action_curves(camera_object)
-    ):
-        camera_object.keyframe_insert(path)
+    key_changes(camera_object, ended.before, datablocks.scene_of(camera_object))
     _push_undo(f"Drag {_LABELS[ended.name]}", ended.window)
 
 

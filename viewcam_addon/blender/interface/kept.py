@@ -1,8 +1,8 @@
-"""A camera as it was before a drag, to the bit, for whoever cancels it."""
+"""A camera as it was before it is moved: to the bit, for whoever cancels a drag, and what has changed, for auto keying."""
 
 import bpy
 
-from .. import storage
+from .. import storage, versions
 
 # What moving a camera changes besides its values.
 _CHANNELS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
@@ -33,3 +33,21 @@ def restore(camera_object: bpy.types.Object, before: dict[str, object]) -> None:
             if present[path] != value:
                 owner, _, name = path.rpartition(".")
                 setattr(camera_object.path_resolve(owner) if owner else camera_object, name, value)
+
+
+def key_changes(camera_object: bpy.types.Object, before: dict[str, object], scene: bpy.types.Scene) -> None:
+    """Where auto keying is on, keyframes for what has changed since and has keyframes: as Blender's own fields get them.
+
+    That is values, and channels of the camera itself, which would win over the values at the next frame.
+    """
+    tools = scene.tool_settings
+    if not tools.use_keyframe_insert_auto:
+        return
+    options = {"INSERTKEY_REPLACE"} if tools.auto_keying_mode == "REPLACE_KEYS" else set()
+    present = state(camera_object)
+    for block, owner in ((camera_object, ""), (camera_object.data, "data.")):
+        curves = versions.action_curves(block)
+        if curves and not block.animation_data.action.library:
+            for path in dict.fromkeys(curve.data_path for curve in curves):
+                if f"{owner}{path}" in before and present[f"{owner}{path}"] != before[f"{owner}{path}"]:
+                    block.keyframe_insert(path, options=options)

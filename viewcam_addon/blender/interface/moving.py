@@ -8,6 +8,7 @@ In the edit mode of an object Ctrl-Z brings back that object's geometry and noth
 stands outside of it.
 """
 
+import contextlib
 import math
 from dataclasses import replace
 
@@ -18,7 +19,7 @@ from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import datablocks, preferences, targets
-from . import dragging, readouts, selection, viewport
+from . import dragging, kept, readouts, selection, viewport
 from .operators import CameraOperator
 
 
@@ -26,10 +27,17 @@ class _Move(CameraOperator):
     """A subclass says in `moved(pinhole, camera_object, scene)` where the camera goes."""
 
     def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
-        stated = cameras.stated(camera_object, scene)
-        pinhole = cameras.as_it_stands(camera_object, scene, in_use=False) if stated is None else stated
+        pinhole = _pinhole(camera_object, scene)
+        before = kept.state(camera_object)
         for finding in cameras.apply(camera_object, self.moved(pinhole, camera_object, scene), scene):
             self.report({"WARNING"}, finding)
+        kept.key_changes(camera_object, before, scene)
+
+
+def _pinhole(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
+    """The camera's values, or the camera as it stands if they are not enabled."""
+    stated = cameras.stated(camera_object, scene)
+    return cameras.as_it_stands(camera_object, scene, in_use=False) if stated is None else stated
 
 
 class _SelectionMove(_Move):
@@ -121,7 +129,7 @@ class VIEWCAM_OT_look_at_active(_Move, bpy.types.Operator):
 
 class VIEWCAM_OT_dolly_camera(_Move, bpy.types.Operator):
     bl_idname = "viewcam.dolly_camera"
-    bl_label = "Dolly"
+    bl_label = "Dolly to Distance"
     bl_description = "Move the eye along the view to a distance from the look-at point. The lens stays as it is"
 
     reach: bpy.props.FloatProperty(
@@ -132,6 +140,20 @@ class VIEWCAM_OT_dolly_camera(_Move, bpy.types.Operator):
         soft_min=0.001,
         options={"SKIP_SAVE"},
     )
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        """Ask for the distance: at the one that there is nothing would be seen to happen."""
+        found = self.found(context)
+        if found is None or self.properties.is_property_set("reach"):
+            return self.execute(context)
+        with contextlib.suppress(InputError):  # which is told where the distance is confirmed
+            pinhole = _pinhole(found, datablocks.scene_of(found))
+            self.reach = math.dist(pinhole.eye, pinhole.look_at)
+        return context.window_manager.invoke_props_dialog(self)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        self.layout.use_property_split = True
+        self.layout.prop(self, "reach")
 
     def moved(self, pinhole: Pinhole, _camera_object: bpy.types.Object, _scene: bpy.types.Scene) -> Pinhole:
         if not self.properties.is_property_set("reach"):
@@ -177,11 +199,14 @@ class VIEWCAM_OT_drag_camera(_Move, bpy.types.Operator):
     kind: bpy.props.EnumProperty(
         name="Move",
         description="How the camera goes with the mouse",
-        items=(
-            (dragging.ORBIT, "Orbit", "The eye goes around the look-at point"),
-            (dragging.DOLLY, "Dolly", "The eye goes towards the look-at point or away from it"),
-            (dragging.DOLLY_ZOOM, "Dolly Zoom", "The same, and the lens keeps the size of what is at the look-at point"),
-            (dragging.TRUCK, "Truck", "The camera goes sideways and up, and keeps its direction"),
+        items=tuple(
+            (kind, dragging.NAMES[kind], text)
+            for kind, text in (
+                (dragging.ORBIT, "The eye goes around the look-at point"),
+                (dragging.DOLLY, "The eye goes towards the look-at point or away from it"),
+                (dragging.DOLLY_ZOOM, "The same, and the lens keeps the size of what is at the look-at point"),
+                (dragging.TRUCK, "The camera goes sideways and up, and keeps its direction"),
+            )
         ),
         options={"SKIP_SAVE"},
     )
@@ -196,7 +221,7 @@ class VIEWCAM_OT_drag_camera(_Move, bpy.types.Operator):
         return dragging.moved(pinhole, self.kind, tuple(self.amount))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        found = bpy.data.objects.get(self.camera) if self.camera else datablocks.camera_in(context)
+        found = self.found(context)
         try:
             if found is None:
                 raise InputError("there is no camera: select one")
@@ -220,6 +245,7 @@ class VIEWCAM_OT_drag_camera(_Move, bpy.types.Operator):
             return {"CANCELLED"}
         elif event.type in {"LEFTMOUSE", "RET", "NUMPAD_ENTER"} and is_pressed:
             self.amount = drag.amount
+            drag.confirm()
             for finding in drag.findings:
                 self.report({"WARNING"}, finding)
             context.workspace.status_text_set(None)
@@ -234,7 +260,7 @@ class VIEWCAM_OT_drag_camera(_Move, bpy.types.Operator):
     def _tell(self, context: bpy.types.Context) -> None:
         typed = f" [{self._drag.text}]" if self._drag.text else ""
         keys = "Mouse or number: move    Shift: precise    LMB, Enter: confirm    RMB, Esc: cancel"
-        context.workspace.status_text_set(f"{self.bl_rna.properties['kind'].enum_items[self.kind].name}{typed}    {keys}")
+        context.workspace.status_text_set(f"{dragging.NAMES[self.kind]}{typed}    {keys}")
 
 
 class VIEWCAM_OT_frame_selection(_SelectionMove, bpy.types.Operator):

@@ -33,9 +33,13 @@ class CameraOperator:
         cls.poll_message_set("There is no camera")
         return False
 
+    def found(self, context: bpy.types.Context) -> bpy.types.Object | None:
+        """The object that is meant, if there is one."""
+        return bpy.data.objects.get(self.camera) if self.camera else datablocks.camera_in(context)
+
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
-            found = bpy.data.objects.get(self.camera) if self.camera else datablocks.camera_in(context)
+            found = self.found(context)
             if found is None:
                 raise InputError(f"there is no camera {self.camera!r}" if self.camera else "there is no camera: select one")
             self.work(found, datablocks.scene_of(found))

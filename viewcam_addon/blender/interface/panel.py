@@ -18,7 +18,7 @@ from bpy.app.translations import pgettext_iface as iface
 from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
-from .. import datablocks, findings, hold, targets
+from .. import datablocks, findings, hold, suspects, targets, versions
 from . import baking, clipboard, dragging, presets, readouts, scene_cameras
 
 
@@ -161,14 +161,11 @@ _MOVES = {
         ("viewcam.orbit_camera", {"text": "", "icon": "TRIA_DOWN"}, {"around": 0.0, "upwards": -_STEP}),
     ),
     "Drag": tuple(
-        ("viewcam.drag_camera", {"text": name}, {"kind": kind})
-        for kind, name in ((dragging.ORBIT, "Orbit"), (dragging.DOLLY, "Dolly"), (dragging.TRUCK, "Truck"))
+        ("viewcam.drag_camera", {"text": dragging.NAMES[kind]}, {"kind": kind})
+        for kind in (dragging.ORBIT, dragging.DOLLY, dragging.TRUCK)
     ),
-    "Zoom": (("viewcam.drag_camera", {"text": "Dolly Zoom"}, {"kind": dragging.DOLLY_ZOOM}),),
-    "Eye": (
-        ("viewcam.dolly_camera", {"text": "Dolly"}, {}),
-        ("viewcam.swap_camera", {"text": "Swap"}, {}),
-    ),
+    "Zoom": (("viewcam.drag_camera", {"text": dragging.NAMES[dragging.DOLLY_ZOOM]}, {"kind": dragging.DOLLY_ZOOM}),),
+    "Eye": (("viewcam.swap_camera", {"text": "Swap"}, {}),),
     "Up": (("viewcam.level_camera", {"text": "Level"}, {}),),
 }
 
@@ -200,10 +197,16 @@ def notices(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> list[Not
             found = []
         else:
             found = _doubts(camera_object, stated)
-            found += map(Notice, cameras.check(camera_object, stated, scene))
+            found += (_notice(finding, camera_object) for finding in cameras.check(camera_object, stated, scene))
     except InputError as error:
         return [Notice(datablocks.sentence(error))]
     return [*found, *map(Notice, datablocks.beyond_pinhole(camera_object, scene))]
+
+
+def _notice(finding: str, camera_object: bpy.types.Object) -> Notice:
+    """A finding, with the button that deletes the keyframes which it is about, if it is."""
+    is_about_keyframes = findings.DELETE_KEYFRAMES in finding and suspects.keyed(camera_object, versions.action_curves)
+    return Notice(finding, ("viewcam.delete_keyframes", iface("Delete These Keyframes")) if is_about_keyframes else None)
 
 
 def _doubts(camera_object: bpy.types.Object, stated: Pinhole) -> list[Notice]:

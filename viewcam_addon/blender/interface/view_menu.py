@@ -5,7 +5,7 @@ Blender's search (F3) looks through menus; what stands in none is found by devel
 
 import bpy
 
-from . import baking, clipboard, moving, operators, photo_matching, scene_cameras
+from . import baking, clipboard, dragging, moving, operators, photo_matching, scene_cameras
 
 
 class VIEWCAM_MT_cameras(bpy.types.Menu):
@@ -22,7 +22,11 @@ class VIEWCAM_MT_cameras(bpy.types.Menu):
             photo_matching.OPERATORS,
         ):
             for each in group:
-                self.layout.operator(each.bl_idname)
+                if each is moving.VIEWCAM_OT_drag_camera:
+                    for kind, name in dragging.NAMES.items():
+                        self.layout.operator(each.bl_idname, text=f"Drag: {name}").kind = kind
+                else:
+                    self.layout.operator(each.bl_idname)
             self.layout.separator()
         self.layout.menu(clipboard.VIEWCAM_MT_copy_camera_as.bl_idname)
 

@@ -10,7 +10,7 @@ bpy = pytest.importorskip("bpy")
 import viewcam_addon
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import versions
-from viewcam_addon.blender.interface import baking
+from viewcam_addon.blender.interface import baking, panel
 
 MODES = ("XYZ", "ZYX", "QUATERNION", "AXIS_ANGLE")
 
@@ -226,3 +226,23 @@ def test_a_range_that_runs_backwards_is_refused(over_the_target):
 def test_a_single_frame_is_baked(over_the_target, scene):
     (found,) = baking.bake([over_the_target], scene, 4, 4)
     assert found.ok and "between" not in found.sentence()
+
+
+def test_turned_on_again_after_a_bake_one_warning_names_the_keyframes_and_its_button_brings_the_live_camera_back(
+    over_the_target, scene, everything
+):
+    before = everything(over_the_target)
+    bpy.ops.viewcam.bake_camera()
+    over_the_target.virtual_pinhole.enabled = True
+    bpy.context.view_layer.update()
+    notice, *more = (each for each in panel.notices(over_the_target, scene) if "Keyframes" in each.sentence)
+    assert not more and "_" not in notice.sentence
+    assert notice.sentence.startswith(
+        "Keyframes set the location, rotation and focal length of 'Camera', and in a render they win"
+    )
+    assert bpy.ops.viewcam.delete_keyframes() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    assert everything(over_the_target)[3].keys() == before[3].keys()
+    assert [each for each in panel.notices(over_the_target, scene) if "Keyframes" in each.sentence] == []
+    with pytest.raises(RuntimeError, match="has keyframes of its own channels"):
+        bpy.ops.viewcam.delete_keyframes()
