@@ -25,6 +25,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from viewcam_addon.errors import InputError
 from viewcam_addon.files import written_whole
@@ -51,7 +52,7 @@ class Curve:
     ours : whether it is the method in use. league : curves compete with those of the same league only (a method that computes
         in float64 does not compete with what Blender stores in float32). tie : errors up to this count as equal, the chart's
         own tie if it is None. limit : no method, but what the others of its league must not exceed. spread : the least and
-        the most of each x, where it was measured several times.
+        the most of each x, where it was measured several times. minor : whether it stays in the background.
     """
 
     name: str
@@ -62,6 +63,7 @@ class Curve:
     tie: float | None = None
     limit: bool = False
     spread: Sequence[tuple[float, float]] = ()
+    minor: bool = False
 
     def __post_init__(self) -> None:
         if len(self.x) != len(self.y):
@@ -76,6 +78,8 @@ class Chart:
     tie : errors up to this count as equal, inf where nothing is judged.
     reverse : the failure lies at small x, and x falls to the right.
     log_x, log_y : whether the axes are logarithmic. levels : heights that methods are compared at.
+    rows : a row for each method, named at its left, with y written at its right: where methods have a point or two each. They
+        are what the points of a row are, the first filled and the second hollow.
     """
 
     name: str
@@ -89,6 +93,7 @@ class Chart:
     log_x: bool = True
     log_y: bool = True
     levels: tuple[float, ...] = ()
+    rows: tuple[str, ...] = ()
 
     def behind(self) -> list[str]:
         """One sentence for each place where the method in use is worse than twice the best of its league, and beyond a tie;
@@ -175,13 +180,17 @@ def draw(chart: Chart, path: Path, command: str) -> None:
         figure = Figure(figsize=(9, 4.8 + caption))
         up = 1 / figure.get_figheight()
         axes = figure.add_axes((0.085, (caption + 0.14) * up, 0.655, 4.2 * up))
-        _draw_axes(chart, axes)
-        for curve, *style in _styles(chart):
-            _draw_curve(curve, axes, *style)
-        order = {_label(curve): place for place, curve in enumerate(chart.curves)}
-        lines = sorted(axes.get_legend_handles_labels()[0], key=lambda line: order[line.get_label()])
-        look = {"frameon": False, "labelspacing": 0.8, "handlelength": 3, "fontsize": 8.5}
-        axes.legend(handles=lines, loc="upper left", bbox_to_anchor=(1.01, 1), **look)
+        if chart.rows:
+            axes.set_position((0.27, (caption + 0.14) * up, 0.54, 3.7 * up))  # with room for what heads the columns
+            _draw_rows(chart, axes)
+        else:
+            _draw_axes(chart, axes)
+            for curve, *style in _styles(chart):
+                _draw_curve(curve, axes, *style)
+            order = {_label(curve): place for place, curve in enumerate(chart.curves)}
+            lines = sorted(axes.get_legend_handles_labels()[0], key=lambda line: order[line.get_label()])
+            look = {"frameon": False, "labelspacing": 0.8, "handlelength": 3, "fontsize": 8.5}
+            axes.legend(handles=lines, loc="upper left", bbox_to_anchor=(1.01, 1), **look)
         figure.text(0.03, (caption - 0.5) * up, "\n".join(reading), va="top", linespacing=1.35)
         figure.text(0.03, 0.16 * up, f"{command}\n{machine()}", color=_FAINT, fontsize=7.5, linespacing=1.4)
         figure.savefig(temporary, format="svg", metadata={"Date": None, "Title": chart.title, "Description": chart.reading})
@@ -208,6 +217,8 @@ def _draw_axes(chart: Chart, axes: Axes) -> None:
     axes.spines[["top", "right"]].set_visible(False)
     if chart.log_x:
         axes.set_xscale("log")
+    elif all(float(x).is_integer() for curve in chart.curves for x in curve.x):
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     if chart.log_y:
         axes.set_yscale("log")
         axes.set_ylim(*_decades(chart))
@@ -216,6 +227,32 @@ def _draw_axes(chart: Chart, axes: Axes) -> None:
     for level in chart.levels:
         axes.axhline(level, color=_FAINT, linewidth=0.9, linestyle=(0, (4, 3)))
         axes.annotate(f"{level:g}", (0.995, level), xycoords=("axes fraction", "data"), ha="right", va="bottom", color=_FAINT)
+
+
+def _draw_rows(chart: Chart, axes: Axes) -> None:
+    """The best on top: by y, then by the first x. A line says how far a row's measurements spread."""
+    curves = sorted(chart.curves, key=lambda curve: (not math.isfinite(curve.y[0]), curve.y[0], min(curve.x)), reverse=True)
+    axes.figure.text(0.03, 0.955, chart.title, fontsize=12, fontweight="bold")
+    axes.set_xlabel(chart.x_label)
+    axes.grid(axis="x", color=_GRID, linewidth=0.8)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right", "left"]].set_visible(False)
+    axes.set_xscale("log" if chart.log_x else "linear")
+    axes.set_ylim(-0.6, len(curves) - 0.4)
+    axes.set_yticks(range(len(curves)), [curve.name for curve in curves])
+    axes.tick_params(axis="y", length=0)
+    for place, curve in enumerate(curves):
+        colour = _OURS if curve.ours else _COLOURS[0]
+        axes.axhline(place, color=_GRID, linewidth=0.8, zorder=0)
+        if curve.spread:
+            axes.hlines([place] * len(curve.x), *np.transpose(curve.spread), color=colour, linewidth=2.5, alpha=0.5)
+        for x, fill in zip(curve.x, (colour, _PAPER), strict=False):
+            axes.plot(x, place, "o", markersize=8, markeredgewidth=2, markeredgecolor=colour, markerfacecolor=fill)
+        answer = f"{curve.y[0]:.2g}" if math.isfinite(curve.y[0]) else "no answer"
+        axes.annotate(answer, (1.02, place), xycoords=("axes fraction", "data"), va="center")
+    axes.annotate(textwrap.fill(chart.y_label, 20), (1.02, 1.01), xycoords="axes fraction", va="bottom", color=_FAINT)
+    told = "   ".join(f"{mark} {what}" for mark, what in zip("●○", chart.rows, strict=False))
+    axes.annotate(told, (0, 1.02), xycoords="axes fraction", va="bottom", color=_FAINT)
 
 
 def _decades(chart: Chart) -> tuple[float, float]:
@@ -244,9 +281,11 @@ def _draw_curve(curve: Curve, axes: Axes, colour: str, marker: str, line: str) -
     low, high = axes.get_ylim()
     answered = np.isfinite(y)
     shown = np.where(answered, np.clip(y, low, high) if axes.get_yscale() == "log" else y, np.nan)
-    style = {"linewidth": 2.8, "markersize": 5} if curve.ours else {"linewidth": 1.2, "markersize": 4}
+    style = {"linewidth": 2.8, "markersize": 5} if curve.ours else {"linewidth": 1.6, "markersize": 4}
+    if curve.minor:
+        style = {"linewidth": 1.0, "markersize": 3, "alpha": 0.45}
     axes.plot(x, shown, color=colour, marker=marker, linestyle=line, label=_label(curve), clip_on=False, **style)
-    if curve.spread:
+    if curve.spread and not curve.minor:
         axes.hlines(shown, *np.transpose(curve.spread), color=colour, linewidth=1.2, alpha=0.6)
     if not answered.all():
         axes.plot(x[~answered], np.full((~answered).sum(), high), "x", color=colour, markersize=6, clip_on=False)

@@ -62,9 +62,10 @@ def _chart(name: str, title: str, measured: Mapping[str, Mapping[str, Sequence[f
         "time of a pose [ns]",
         "largest angle to the true axes [rad]",
         tuple(curves),
-        "Read what an answer costs, and what it is worth: fast is to the left, exact is below. A formula with two points was "
-        f"called with many poses at once, left, and with one at a time, right. Ours, in a second: {told}.",
+        "Read what an answer costs, and what it is worth: fast is to the left, exact is above. A formula with two points was "
+        f"called with many poses at once, filled, and with one at a time, hollow. Ours, in a second: {told}.",
         tie=EXACT,
+        rows=("many at once, or the only way", "one at a time"),
     )
 
 

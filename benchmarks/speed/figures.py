@@ -90,7 +90,7 @@ def _chart(
         f"{still.title}, {width} × {height}, {still.level}: the {figure.name}",
         f"seconds, {figure.seconds}: median, least and most of {rounds}",
         "RMS error of Combined",
-        standings.curves(tracks, reference.error),
+        standings.curves(tracks, reference.error, found),
         f"Read how long each takes to an error: {'; '.join(told)}. {reference.told()}{' Quick: not judged.' if quick else ''}",
         tie=0.0,
         levels=tuple(wanted),

@@ -145,14 +145,15 @@ def with_point_by_line(points: Sequence[Point], samples: int, error: float) -> l
     return [*points, Point(samples, [other.time + slope * (samples - other.parameter)], [error])]
 
 
-def curves(tracks: Tracks, least: float) -> tuple[Curve, ...]:
-    """least : points of smaller errors are left out."""
-    found = []
+def curves(tracks: Tracks, least: float, judged: Sequence[Standing] = ()) -> tuple[Curve, ...]:
+    """least : points of smaller errors are left out. judged : who is the best of his side in none stays in the background."""
+    found, best = [], {side.method for standing in judged for side in (standing.ours, standing.rival)}
     for method, points in tracks.items():
         shown = [point for point in points if point.error >= least]
         spread = tuple((min(point.seconds), max(point.seconds)) for point in shown)
         x, y = [point.time for point in shown], [point.error for point in shown]
-        found.append(Curve(method.name, x, y, ours=method.ours, spread=spread))
+        minor = bool(best) and method not in best
+        found.append(Curve(method.name, x, y, ours=method.ours, spread=spread, minor=minor))
     return tuple(found)
 
 

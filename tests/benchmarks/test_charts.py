@@ -1,4 +1,6 @@
+import dataclasses
 import math
+import re
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
@@ -101,4 +103,28 @@ def test_how_far_measurements_spread_is_drawn(tmp_path):
     for name, curve in (("with", Curve("ours", X, X, ours=True, spread=spread)), ("without", Curve("ours", X, X, ours=True))):
         charts.draw(chart_of(curve), tmp_path / f"{name}.svg", "viewcam chart something")
     sizes = [(tmp_path / f"{name}.svg").read_text(encoding="utf-8").count("<path") for name in ("with", "without")]
+    assert sizes[0] >= sizes[1] + len(spread)
+
+
+def test_methods_of_a_point_or_two_stand_in_rows_the_best_on_top_with_their_error_written_beside(tmp_path):
+    methods = (
+        Curve("lost", (0.1,), (math.nan,)),
+        Curve("theirs", (0.1, 1.0), (2e-7, 2e-7)),
+        Curve("ours", (0.2,), (1e-16,), ours=True, spread=((0.1, 0.3),)),
+    )
+    chart = dataclasses.replace(chart_of(*methods), rows=("at once", "one by one"))
+    charts.draw(chart, tmp_path / "chart.svg", "viewcam chart something")
+    text = (tmp_path / "chart.svg").read_text(encoding="utf-8")
+    for said in ("theirs", "ours", "1e-16", "2e-07", "no answer", "● at once", "○ one by one", "A title"):
+        assert said in text, f"{said!r} is not in the chart"
+    places = {name: float(re.search(rf'y="([-0-9.]+)"[^>]*>{name}<', text)[1]) for name in ("lost", "theirs", "ours")}
+    assert places["ours"] < places["theirs"] < places["lost"]
+
+
+def test_what_is_in_the_background_is_drawn_thin_and_without_its_spread(tmp_path):
+    spread = [(0.9, 1.2), (0.09, 0.12), (0.009, 0.012)]
+    sizes = []
+    for minor in (False, True):
+        charts.draw(chart_of(Curve("other", X, X, spread=spread, minor=minor)), tmp_path / "chart.svg", "viewcam chart")
+        sizes.append((tmp_path / "chart.svg").read_text(encoding="utf-8").count("<path"))
     assert sizes[0] >= sizes[1] + len(spread)

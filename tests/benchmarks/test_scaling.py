@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks import memory
 from benchmarks.charts import Curve
-from benchmarks.scaling import growth, pixels, point, scenes
+from benchmarks.scaling import growth, pixels, point, scenes, threads
 from benchmarks.scaling.point import ADAPTIVE, DIRECT, FILE, FIRST_DIRECT, FIRST_GEOMETRY, GEOMETRY, PREPARING, Work, measure
 from benchmarks.scaling.triangles import BYTES_A_TRIANGLE
 
@@ -140,3 +140,12 @@ def test_a_triangle_takes_less_than_300_bytes_beyond_the_scenes_own(make):
     least, most = (measure(functools.partial(make, count, (160, 90)), work) for count in counts)
     each = {stage: (peak - least.peak[stage]) / most.triangles for stage, peak in most.peak.items() if "first" not in stage}
     assert max(each.values()) < BYTES_A_TRIANGLE, f"bytes a triangle: {each}"
+
+
+def test_threads_are_charted_by_how_many_times_as_fast_they_are_as_one():
+    chart = threads.chart([Curve("picture", (1, 2, 4), (8.0, 4.0, 4.0))], (320, 180), 1_000)
+    assert chart.figures() == {
+        "work shared evenly": {"x": [1, 2, 4], "y": [1, 2, 4]},
+        "picture": {"x": [1, 2, 4], "y": [1, 2, 2]},
+    }
+    assert chart.reading.endswith("With 4: picture 2.00 (4 s).") and chart.behind() == []

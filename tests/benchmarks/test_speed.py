@@ -129,6 +129,17 @@ def contested(wanted, judged=True):
     return Contested("name", "A title", "x", "y", curves, "Read this.", 0.0, standings=found, times=times, judged=judged)
 
 
+def test_who_is_the_best_of_his_side_nowhere_stays_in_the_background():
+    slow = dataclasses.replace(CYCLES, name="Cycles, slowly")
+    tracks = {OURS: power_law(0.1, -0.5), CYCLES: power_law(1.0, -0.5), slow: power_law(10.0, -0.5)}
+    found = standings.standings(standings.times(tracks, [0.02], 0.0), {0.02: None})
+    assert {curve.name: curve.minor for curve in standings.curves(tracks, 0.0, found)} == {
+        "ours": False,
+        "Cycles": False,
+        "Cycles, slowly": True,
+    }
+
+
 def test_a_ratio_that_is_less_than_wanted_is_told_in_a_sentence_with_both_times():
     (sentence,) = contested(11.0).behind()
     assert "A title: to 0.02 ours 2.5 s, Cycles 25 s: 10.00 times as fast, wanted 11" in sentence
