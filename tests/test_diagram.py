@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from viewcam_addon.diagram import diagram, pixels_in_a_cell, up_tip
+from viewcam_addon.diagram import arrow, diagram, pixels_in_a_cell, up_tip
 from viewcam_addon.pinhole import Pinhole
 
 coordinates = st.floats(-1e3, 1e3).map(lambda x: round(x, 3))
@@ -120,3 +120,14 @@ def test_what_float32_can_not_draw_is_said():
     assert diagram(PLAIN, PLAIN.up, 0.5).is_drawable()
     assert not diagram(dataclasses.replace(PLAIN, distance=1e-300), PLAIN.up, 0.5).is_drawable()
     assert not diagram(dataclasses.replace(PLAIN, eye=(0, -1e30, 0)), PLAIN.up, 0.5).is_drawable()
+
+
+@given(points.filter(any))
+def test_an_arrow_has_its_shaft_and_four_barbs_of_one_length_that_all_end_in_its_tip(tip):
+    tip = np.array(tip)
+    lines, length = arrow(tip), np.linalg.norm(tip)
+    assert lines.shape == (5, 2, 3) and (lines[:, 0] == tip).all() and not lines[0, 1].any()
+    barbs = lines[1:, 1] - tip
+    np.testing.assert_allclose(np.linalg.norm(barbs, axis=1), 0.12816 * length, rtol=1e-4)
+    np.testing.assert_allclose(barbs @ tip, -0.12 * length**2, rtol=1e-9)
+    assert np.abs(barbs.mean(axis=0) + 0.12 * tip).max() <= ROUNDING * length

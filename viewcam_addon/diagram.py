@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 
 # Lengths, in distances to the drawn view plane. Up is longer than v, which it covers where the view is level.
 _AXIS, _UP = 0.4, 0.6
+# Of an arrow's length: how long its head is, and how far its four barbs stand off.
+_HEAD, _BARB = 0.12, 0.045
 # At most so many pixels of the grid, along the picture's larger side.
 _CELLS = 16
 
@@ -73,6 +75,16 @@ def up_tip(eye: Triple, look_at: Triple, up: Triple, share: float) -> Triple:
     """Where up's arrow ends, in world space; it starts at the eye, and its length says nothing. Parameters as in `diagram`."""
     length = _UP * share * math.dist(eye, look_at) / math.hypot(*up)
     return tuple(e + length * component for e, component in zip(eye, up, strict=True))
+
+
+def arrow(tip: Array) -> Array:
+    """(5, 2, 3): an arrow from the eye to `tip` (3,), relative to the eye: its shaft, and a head of four barbs about it."""
+    with np.errstate(all="ignore"):
+        across = np.cross(tip, np.eye(3)[np.argmin(np.abs(tip))])
+        across *= _BARB * np.linalg.norm(tip) / np.linalg.norm(across)
+        above = np.cross(tip, across) / np.linalg.norm(tip)
+    ends = (1 - _HEAD) * tip + np.stack([across, -across, above, -above])
+    return np.stack([np.broadcast_to(tip, (5, 3)), np.vstack([np.zeros(3), ends])], axis=1)
 
 
 def pixels_in_a_cell(width: int, height: int) -> int:

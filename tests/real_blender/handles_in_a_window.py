@@ -357,9 +357,32 @@ def look_through_the_camera():
     yield
     yield
     assert drawn._batches.cache_info() == before, "a viewport that looks through the camera draws its diagram"
+    yield from drag_the_look_at_point_that_is_looked_at()
     view.view_perspective = "PERSP"
     yield
     yield
+
+
+def drag_the_look_at_point_that_is_looked_at():
+    """Its handle is the only one, and pans: the point follows the mouse, and the camera turns to it."""
+    push_undo()
+    before, (eye, look_at, up, distance) = everything(), values().numbers()
+    start = pixel_of(look_at)
+    u, v = room("camera").stated(camera(), bpy.context.scene).basis()[:2]
+    for end, key in (((start[0] + 30, start[1] + 20), "ESC"), ((start[0] + 30, start[1] + 20), "")):
+        yield from grip(start)
+        yield from pull(start, end)
+        if key:
+            press(key, *end)
+            yield
+        yield from let_go(end)
+        assert key == "" or everything() == before, f"{key} did not bring back what was before the view was panned"
+    is_at_its_values()
+    found = values().numbers()
+    moved = np.subtract(found[1], look_at)
+    assert found[0] == eye and found[2:] == (up, distance) and moved @ u > 0.05 and moved @ v > 0.03, f"panned by {moved}"
+    yield from undo()
+    assert everything() == before
 
 
 def look_into_local_view():

@@ -92,6 +92,18 @@ def test_a_view_through_another_camera_shows_this_one(shown, posed_camera, add_c
     assert overlay._cameras(shown) == [posed_camera]
 
 
+def test_a_view_through_the_camera_marks_its_look_at_point_and_nothing_else(shown, posed_camera, monkeypatch):
+    monkeypatch.setattr(overlay, "_pixel", lambda point, context: point)
+    assert overlay.mark(shown) is None, "in another view the diagram shows it"
+    shown.region_data = SimpleNamespace(view_perspective="CAMERA")
+    assert overlay.mark(shown) == (0, 0, 1) and overlay.looked_through(shown) == posed_camera
+    posed_camera.virtual_pinhole.show_overlay = False
+    assert overlay.mark(shown) is None
+    posed_camera.virtual_pinhole.show_overlay = True
+    posed_camera.virtual_pinhole.enabled = False
+    assert overlay.mark(shown) is None
+
+
 def test_what_is_drawn_is_what_the_values_ask_for(shown, posed_camera):
     limit = posed_camera.constraints.new("LIMIT_LOCATION")  # holds the camera off its values
     limit.use_max_x, limit.max_x = True, 0

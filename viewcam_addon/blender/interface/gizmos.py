@@ -6,6 +6,9 @@ Blender sets; the values and the camera as they were until then are kept. Cancel
 of it comes back to the bit. A drag ends when none of Blender's modal operators drags a gizmo any more: then it becomes one step
 of undo, and a keyframe where a value has a curve and auto keying is on.
 
+A viewport that looks through the camera has the look-at point's handle alone, smaller and without snapping: dragging it pans.
+Eye and up would carry the view along, and what the mouse points at; these are dragged in another viewport.
+
 Rejected: custom gizmos (Python's do not react to the mouse), `eye` itself as the gizmo's property (cancelling would leave the
 camera where the values put it, not where it was), `Gizmo.use_undo` (from 5.2 on alone), and watching `is_modal` when the
 viewport is drawn (a quick drag is over before it is drawn, and in a quad view each view has its own handles).
@@ -51,8 +54,10 @@ _drag: _Drag | None = None
 def camera_in(context: bpy.types.Context) -> bpy.types.Object | None:
     """The camera that has handles in the context's viewport: the active object, if its values are in use and can be edited."""
     found = context.view_layer.objects.active
-    is_meant = found and found.is_editable and overlay.is_shown(found, context) and found.virtual_pinhole.show_handles
-    return found if is_meant else None
+    if not found or not found.is_editable:
+        return None
+    is_seen = overlay.is_shown(found, context) or overlay.looked_through(context) == found
+    return found if is_seen and found.virtual_pinhole.show_handles else None
 
 
 def place(camera_object: bpy.types.Object, name: str) -> Triple | None:
@@ -157,16 +162,17 @@ class VIEWCAM_GGT_handles(bpy.types.GizmoGroup):
             handle.target_set_prop("offset", context.window_manager.virtual_pinhole_handles, name)
             handle.draw_style = "CROSS_2D" if name == "look_at" else "RING_2D"
             handle.draw_options = {"ALIGN_VIEW", "FILL_SELECT"}
-            handle.use_snap = name != "up"
             handle.use_tooltip = handle.use_draw_modal = True
-            handle.scale_basis = 0.12
             handle.select_bias = _PRIORITY[name]
 
     def draw_prepare(self, context: bpy.types.Context) -> None:
         camera_object, theme = camera_in(context), context.preferences.themes[0].user_interface
+        is_through = camera_object is not None and overlay.looked_through(context) == camera_object
         for handle, name in zip(self.gizmos, _LABELS, strict=True):
-            handle.hide = camera_object is None or place(camera_object, name) is None
-            handle.color, handle.alpha = theme.gizmo_secondary if name == "up" else theme.gizmo_primary, 0.8
+            handle.hide = camera_object is None or place(camera_object, name) is None or (is_through and name != "look_at")
+            handle.scale_basis = 0.06 if is_through else 0.12
+            handle.use_snap = name != "up" and not is_through
+            handle.color, handle.alpha = theme.gizmo_secondary if name == "up" else theme.gizmo_primary, 1.0
             handle.color_highlight, handle.alpha_highlight = theme.gizmo_hi, 1.0
 
 

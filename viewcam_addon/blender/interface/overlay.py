@@ -2,7 +2,8 @@
 
 It is drawn in Blender's own drawing of the viewport and asks for none itself: whatever moves a camera redraws the viewport as
 it is. Lines are sent to the graphics card once for each camera and each pose (`_batches`), relative to the eye. A viewport that
-looks through the camera does not show its diagram, nor does one whose overlays are off.
+looks through the camera shows a small mark at its look-at point instead, and one whose overlays are off shows nothing. Lines
+and letters have a dark halo, with which the same colours read on light and on dark.
 
 Rejected: a custom gizmo (gizmos are drawn whole even where a surface hides them, and not with overlays), and mesh or empty
 objects in the scene (they would be in the file, the outliner and the render).
@@ -26,7 +27,10 @@ from .. import datablocks, preferences
 _NAMES = ("u", "v", "w")
 _LETTER_SIZE = 14  # points
 _LETTER_AT = 1.1  # of the axis, beyond its tip
+_BESIDE = 0.8  # of a letter's size, to the right and below the eye or the look-at point
 _FAINT = 0.35  # of a line's opacity, for the grid
+_HALO, _HALO_WIDTH = (0.0, 0.0, 0.0, 0.45), 2.5  # its colour, and by how many pixels it is wider than its line
+_MARK = (4.0, 9.0)  # pixels from the look-at point at which each of the mark's four strokes begins and ends
 
 _handlers = []
 
@@ -35,13 +39,17 @@ def is_shown(camera_object: bpy.types.Object, context: bpy.types.Context) -> boo
     """Whether a 3D viewport shows this object as an enabled camera, and does not look through it."""
     if camera_object.type != "CAMERA" or not camera_object.virtual_pinhole.enabled:
         return False
-    if not _is_viewport(context):
+    if not _is_viewport(context) or camera_object == looked_through(context):
         return False
-    space = context.space_data
-    looks_through = space.camera if space.use_local_camera else context.scene.camera
-    if context.region_data.view_perspective == "CAMERA" and camera_object == looks_through:
-        return False
-    return camera_object.visible_get(view_layer=context.view_layer, viewport=space)
+    return camera_object.visible_get(view_layer=context.view_layer, viewport=context.space_data)
+
+
+def looked_through(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The enabled camera that the context's viewport looks through."""
+    if not _is_viewport(context) or context.region_data.view_perspective != "CAMERA":
+        return None
+    found = context.space_data.camera if context.space_data.use_local_camera else context.scene.camera
+    return found if found and found.type == "CAMERA" and found.virtual_pinhole.enabled else None
 
 
 def _is_viewport(context: bpy.types.Context) -> bool:
@@ -85,7 +93,7 @@ def _batches(pinhole: Pinhole, up: Triple, share: float) -> dict | None:
         return None
     lines = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     frame = np.stack([figure.plane, np.roll(figure.plane, -1, axis=0)], axis=1)
-    arrows = {name: np.stack([np.zeros(3), tip]) for name, tip in zip((*_NAMES, "up"), (*figure.axes, figure.up), strict=True)}
+    arrows = {name: diagrams.arrow(tip) for name, tip in zip((*_NAMES, "up"), (*figure.axes, figure.up), strict=True)}
     parts = {"grid": figure.grid, "pyramid": figure.pyramid, "frame": frame, "view": figure.view, **arrows}
     batches = {
         name: batch_for_shader(lines, "LINES", {"pos": part.reshape(-1, 3).astype(np.float32)})
@@ -114,6 +122,7 @@ def _draw_lines() -> None:
     faint = (*line[:3], _FAINT * line[3])
     pens = {"grid": (faint, 1.0), "pyramid": (line, 1.0), "view": (line, 1.0), "frame": (line, 2.0), "up": (line, 2.0)}
     pens |= {name: (color, 2.5) for name, color in _axis_colors(context).items()}
+    halos = {name: (_HALO, width + _HALO_WIDTH) for name, (_, width) in pens.items() if name != "grid"}
     lines, flat = (gpu.shader.from_builtin(name) for name in ("POLYLINE_UNIFORM_COLOR", "UNIFORM_COLOR"))
     state = gpu.state
     before = state.blend_get(), state.depth_test_get(), state.depth_mask_get()
@@ -128,7 +137,7 @@ def _draw_lines() -> None:
             gpu.matrix.translate(figure[0].eye)
             flat.uniform_float("color", plane)
             batches["plane"].draw(flat)
-            for name, (color, width) in pens.items():
+            for name, (color, width) in (*halos.items(), *pens.items()):
                 if name in batches:
                     lines.uniform_float("viewportSize", state.viewport_get()[2:])
                     lines.uniform_float("lineWidth", width * pixel)
@@ -141,24 +150,66 @@ def _draw_lines() -> None:
 def _draw_letters() -> None:
     context = bpy.context
     figures = list(_figures(context))
+    _draw_mark(context)
     if not figures:
         return
     import blf
 
-    font, size, colors = 0, _LETTER_SIZE * context.preferences.system.ui_scale, _axis_colors(context)
+    font, size, line = 0, _LETTER_SIZE * context.preferences.system.ui_scale, tuple(preferences.get().line_color)
+    colors = _axis_colors(context) | dict.fromkeys(("up", "e", "l"), (*line[:3], 1.0))
+    beside = Vector((_BESIDE * size, -_BESIDE * size))
     blf.size(font, size)
+    blf.enable(font, blf.SHADOW)
+    blf.shadow(font, 5, *_HALO[:3], 1.0)
     for pinhole, up, share in figures:
         figure = _diagram(pinhole, up, share)
         eye = _pixel(pinhole.eye, context)
-        if figure is None or eye is None:
+        if figure is None:
             continue
-        for name, tip in zip(_NAMES, figure.axes, strict=True):
-            at = _pixel(np.add(pinhole.eye, _LETTER_AT * tip), context)
-            if at and (at - eye).length > size:
-                width, height = blf.dimensions(font, name)
-                blf.position(font, at.x - width / 2, at.y - height / 2, 0)
-                blf.color(font, *colors[name])
-                blf.draw(font, name)
+        tips = zip((*_NAMES, "up"), (*figure.axes, figure.up), strict=True)
+        places = {name: _pixel(np.add(pinhole.eye, _LETTER_AT * tip), context) for name, tip in tips} if eye else {}
+        places = {name: at for name, at in places.items() if at and (at - eye).length > size}
+        for name, at in (("e", eye), ("l", _pixel(pinhole.look_at, context))):
+            if at:
+                places[name] = at + beside
+        for name, at in places.items():
+            width, height = blf.dimensions(font, name)
+            blf.position(font, at.x - width / 2, at.y - height / 2, 0)
+            blf.color(font, *colors[name])
+            blf.draw(font, name)
+    blf.disable(font, blf.SHADOW)
+
+
+def mark(context: bpy.types.Context) -> Vector | None:
+    """Where the context's region has the look-at point of the camera that its viewport looks through."""
+    found = looked_through(context)
+    if found is None or not found.virtual_pinhole.show_overlay or not context.space_data.overlay.show_overlays:
+        return None
+    look_at = found.virtual_pinhole.numbers()[1]
+    return _pixel(look_at, context) if np.isfinite(look_at).all() else None
+
+
+def _draw_mark(context: bpy.types.Context) -> None:
+    at = mark(context)
+    if at is None:
+        return
+    import gpu
+    from gpu_extras.batch import batch_for_shader
+
+    pixel = context.preferences.system.pixel_size
+    strokes = [
+        (*(at + pixel * distance * Vector(side)), 0.0) for side in ((1, 0), (0, 1), (-1, 0), (0, -1)) for distance in _MARK
+    ]
+    lines = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+    batch = batch_for_shader(lines, "LINES", {"pos": strokes})
+    before = gpu.state.blend_get()
+    gpu.state.blend_set("ALPHA")
+    for color, width in ((_HALO, 1.0 + _HALO_WIDTH), (tuple(preferences.get().line_color), 1.0)):
+        lines.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
+        lines.uniform_float("lineWidth", width * pixel)
+        lines.uniform_float("color", color)
+        batch.draw(lines)
+    gpu.state.blend_set(before)
 
 
 def _pixel(point: Iterable[float], context: bpy.types.Context) -> Vector | None:
