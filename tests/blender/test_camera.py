@@ -294,3 +294,39 @@ def test_far_from_the_origin_reading_loses_no_digit_of_the_matrix(camera_object,
     # The matrix is orthonormal to float32, and reading takes the nearest orthonormal one.
     error = np.abs(np.column_stack(cameras.read(camera_object, scene).basis()) - axes).max()
     assert error <= 4 * FLOAT32, f"{error:.1e}"
+
+
+def test_the_focus_is_left_alone_unless_it_is_asked_to_stay_on_the_look_at_point(posed_camera, scene, empty):
+    focus, group = posed_camera.data.dof, posed_camera.virtual_pinhole
+    focus.focus_distance = 3.5
+    group.eye = (7, -6, 4)
+    bpy.context.view_layer.update()
+    assert focus.focus_distance == 3.5
+    group.focus_on_look_at = True
+    assert focus.focus_distance == pytest.approx(math.dist((7, -6, 4), (0, 0, 1)), rel=2.0**-23)
+    group.eye = (7, -6, 5)
+    assert focus.focus_distance == pytest.approx(math.dist((7, -6, 5), (0, 0, 1)), rel=2.0**-23)
+    target = empty("Target", (1, 2, 3))
+    group.look_at_target = target
+    target.location = (1, 2, 4)
+    bpy.context.view_layer.update()
+    assert focus.focus_distance == pytest.approx(math.dist((7, -6, 5), (1, 2, 4)), rel=2.0**-23)
+
+
+def test_keyframes_of_the_focus_distance_win_and_animated_values_pull_the_focus_in_the_render(posed_camera, scene):
+    from viewcam_addon.blender.scenes import depsgraph
+
+    group, focus = posed_camera.virtual_pinhole, posed_camera.data.dof
+    group.focus_on_look_at = True
+    for frame, z in ((1, 1.0), (11, 3.0)):
+        group.look_at = (0, 0, z)
+        group.keyframe_insert("look_at", frame=frame)
+    found = {}
+    for frame in (1, 11):
+        scene.frame_set(frame)
+        found[frame] = depsgraph.visit(scene, lambda graph: posed_camera.data.evaluated_get(graph).dof.focus_distance)
+    assert found == {frame: pytest.approx(math.dist((7, -6, 5), (0, 0, z)), rel=2.0**-23) for frame, z in ((1, 1), (11, 3))}
+    focus.focus_distance = 2.0
+    focus.keyframe_insert("focus_distance", frame=1)
+    scene.frame_set(5)
+    assert depsgraph.visit(scene, lambda graph: posed_camera.data.evaluated_get(graph).dof.focus_distance) == 2.0

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 bpy = pytest.importorskip("bpy")
@@ -289,3 +290,79 @@ def test_a_comparison_in_another_size_keeps_the_target(watching_camera, scene, t
     target.location.x = 3
     update()
     assert number_of(watching_camera, "look_at") == (3, 2, 3)
+
+
+@pytest.fixture
+def rig(scene):
+    """An armature at (0, 0, 2) with the bones Hip, from its origin up, and Head on it, whose head is 1 above."""
+    layer, armature = bpy.context.view_layer, bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
+    scene.collection.objects.link(armature)
+    armature.location = (0, 0, 2)
+    layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    hip, head = (armature.data.edit_bones.new(name) for name in ("Hip", "Head"))
+    hip.head, hip.tail = (0, 0, 0), (0, 0, 1)
+    head.head, head.tail, head.parent = (0, 0, 1), (0, 0, 1.5), hip
+    bpy.ops.object.mode_set(mode="OBJECT")
+    return armature
+
+
+@pytest.mark.parametrize("point", POINTS)
+@pytest.mark.parametrize("is_hidden", [False, True])
+def test_a_bone_is_followed_as_it_is_posed_hidden_or_not(posed_camera, scene, rig, point, is_hidden):
+    follow(posed_camera, point, rig)
+    assert number_of(posed_camera, point) == (0, 0, 2)
+    setattr(posed_camera.virtual_pinhole, f"{point}_bone", "Head")
+    update()
+    assert number_of(posed_camera, point) == pytest.approx((0, 0, 3), abs=1e-6)
+    rig.hide_viewport = is_hidden
+    update()
+    rig.pose.bones["Hip"].rotation_mode = "XYZ"
+    rig.pose.bones["Hip"].rotation_euler = (0, 0, 0)
+    rig.pose.bones["Hip"].location = (0.5, 0, 0)
+    update()
+    assert number_of(posed_camera, point) == pytest.approx((0.5, 0, 3), abs=1e-6)
+    assert is_where_stated(posed_camera, scene)
+
+
+def test_a_keyed_bone_is_followed_in_the_render(posed_camera, scene, rig):
+    from viewcam_addon.blender.scenes import depsgraph
+
+    follow(posed_camera, "look_at", rig)
+    posed_camera.virtual_pinhole.look_at_bone = "Head"
+    for frame, x in ((1, 0.0), (11, 2.0)):
+        rig.pose.bones["Hip"].location = (x, 0, 0)
+        rig.pose.bones["Hip"].keyframe_insert("location", frame=frame)
+    for frame, x in ((11, 2.0), (1, 0.0)):
+        scene.frame_set(frame)
+        found = depsgraph.visit(scene, lambda graph: cameras.read(posed_camera.evaluated_get(graph), scene))
+        assert -np.array(found.basis()[2]) == pytest.approx(_unit(np.subtract((x, 0, 3), (7, -6, 5))), abs=1e-6)
+
+
+def _unit(vector):
+    return vector / np.linalg.norm(vector)
+
+
+def test_a_bone_that_is_not_there_is_named_and_the_origin_followed(posed_camera, rig):
+    follow(posed_camera, "look_at", rig)
+    posed_camera.virtual_pinhole.look_at_bone = "Tail"
+    update()
+    assert number_of(posed_camera, "look_at") == (0, 0, 2)
+    (sentence,) = targets.warnings(posed_camera)
+    assert sentence == "The look-at target 'Rig' has no bone 'Tail', and its origin is followed: choose another, or clear it"
+    posed_camera.virtual_pinhole.look_at_bone = ""
+    assert targets.warnings(posed_camera) == []
+
+
+def test_a_bone_that_hangs_on_the_camera_is_not_followed(posed_camera, rig):
+    rig.pose.bones["Head"].constraints.new("COPY_LOCATION").target = posed_camera
+    assert not targets.can_be_target(posed_camera, rig)
+
+
+def test_letting_go_of_an_armature_forgets_the_bone_and_leaves_the_camera(posed_camera, scene, rig):
+    follow(posed_camera, "look_at", rig)
+    posed_camera.virtual_pinhole.look_at_bone = "Head"
+    update()
+    before = number_of(posed_camera, "look_at")
+    targets.release(posed_camera, "look_at")
+    assert number_of(posed_camera, "look_at") == before and posed_camera.virtual_pinhole.look_at_bone == ""

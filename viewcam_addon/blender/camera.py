@@ -17,7 +17,8 @@ its channels say), `matrix_world =` (4.9e-7; 2.5e-3 in gimbal lock; wrong by who
 
 **What is left alone.** The scene, always. Of the camera its sensor fit, and its sensor unless the lens would fall below
 Blender's 1 mm: then lens and sensor double together, and the artist's sensor comes back as soon as the distance allows. A
-negative scale mirrors the picture, as in Cycles; its sign changes only if the Pinhole asks for the other picture.
+negative scale mirrors the picture, as in Cycles; its sign changes only if the Pinhole asks for the other picture. The focus
+distance, unless the camera is told to keep it on the look-at point: that lies on the view's axis, so that |e − l| is its depth.
 """
 
 import contextlib
@@ -180,6 +181,8 @@ def place(
         if len(_in_place) == _MOST_IN_PLACE:
             _in_place.clear()
         _in_place.add((*order, *_state_of(camera_object)))
+    if storage.is_focused_on_look_at(camera_object):
+        _store(camera.dof, focus_distance=math.dist(pinhole.eye, pinhole.look_at))
     if is_carried and depsgraph is None and pose.is_told_by_its_pose(camera_object):
         place(camera_object, pinhole, scene, datablocks.depsgraph_of(scene))
 

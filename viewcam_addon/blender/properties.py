@@ -177,11 +177,23 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         update=_on_target,
         override={"LIBRARY_OVERRIDABLE"},
     )
+    eye_bone: bpy.props.StringProperty(
+        name="Eye Bone",
+        description="A bone of the armature, in whose head the camera stands. Empty: the armature's origin",
+        update=_on_target,
+        override={"LIBRARY_OVERRIDABLE"},
+    )
     look_at_target: bpy.props.PointerProperty(
         name="Look-At Target",
         description="An object at whose origin the camera looks, wherever it is moved. Empty: the point above counts",
         type=bpy.types.Object,
         poll=_can_be_target,
+        update=_on_target,
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    look_at_bone: bpy.props.StringProperty(
+        name="Look-At Bone",
+        description="A bone of the armature, at whose head the camera looks. Empty: the armature's origin",
         update=_on_target,
         override={"LIBRARY_OVERRIDABLE"},
     )
@@ -332,6 +344,14 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         description="Handles that drag eye, look-at and up in the 3D viewport, while the camera is active",
         default=True,
         update=_on_shown,
+        options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    focus_on_look_at: bpy.props.BoolProperty(
+        name="Focus on Look-At",
+        description="Keep the focus distance at that of the look-at point from the eye, along the view. A focus object, and "
+        "keyframes or a driver of the focus distance, win",
+        update=_edit_of(),
         options=set(),
         override={"LIBRARY_OVERRIDABLE"},
     )

@@ -44,6 +44,11 @@ def is_enabled(camera_object: bpy.types.Object) -> bool:
     return camera_object.virtual_pinhole.enabled
 
 
+def is_focused_on_look_at(camera_object: bpy.types.Object) -> bool:
+    """Whether the focus distance stays on the look-at point."""
+    return camera_object.virtual_pinhole.focus_on_look_at
+
+
 def load(camera_object: bpy.types.Object) -> CameraValues:
     """The values of a camera, its eye and look-at as they are where no target is followed (targets.values).
 

@@ -1,14 +1,16 @@
 """Eye and look-at as objects: the point is where its target stands, as long as one is set.
 
-That is the place of the target's evaluated origin: through parents, constraints, drivers and animation, at sub-frames, and in a
-render as the render has it. In Blender's float32, as all that is evaluated.
+That is the place of the target's evaluated origin, or where it is an armature of whose bones one is named, of that bone's head:
+through parents, constraints, drivers and animation, at sub-frames, and in a render as the render has it. In Blender's float32,
+as all that is evaluated.
 
 **Being told.** Blender evaluates an object that is hidden, excluded, kept out of the render or in another scene only where
 something visible depends on it, and a pointer in a property is no dependency: such a target would stand still, in the render
 alone even. So each target also feeds a driver, of an element of the hidden property `followed`, whose value says nothing. By
 it Blender keeps the target up to date, and tells animation.py of the camera whenever the target has moved. Rejected: drivers
 of eye and look-at themselves (0 where the target is deleted), a constraint without influence (it stands among the artist's
-own, and makes a loop of a target that hangs on the camera), looking at all cameras of the scene at every update.
+own, and makes a loop of a target that hangs on the camera), looking at all cameras of the scene at every update. A vertex group
+is no target: no driver depends on a mesh's shape. An empty with Blender's own Copy Location of the group is one.
 
 **Loops.** A target that the camera itself moves is not followed: the stored point counts, and `warnings` says how one hangs on
 the other. A target that is such a camera stands at its own eye, so that two cameras may look at each other.
@@ -55,7 +57,14 @@ def place(camera_object: bpy.types.Object, point: str) -> Triple | None:
         return place(target, "eye") or storage.load(target).eye
     if not target.is_evaluated:
         target = target.evaluated_get(datablocks.depsgraph_of(datablocks.scene_of(camera_object)))
-    return tuple(target.matrix_world.translation)
+    bone = bone_of(camera_object, point, target)
+    return tuple(target.matrix_world @ bone.head if bone else target.matrix_world.translation)
+
+
+def bone_of(camera_object: bpy.types.Object, point: str, target: bpy.types.Object) -> bpy.types.PoseBone | None:
+    """The bone of a point's target, evaluated or not, that is followed; None where it is no armature or has none so named."""
+    name = getattr(camera_object.virtual_pinhole, f"{point}_bone")
+    return target.pose.bones.get(name) if name and target.type == "ARMATURE" and target.pose else None
 
 
 def mirror(camera_object: bpy.types.Object, evaluated: bpy.types.Object) -> None:
@@ -77,17 +86,19 @@ def connect(camera_object: bpy.types.Object) -> None:
             if curve:
                 camera_object.driver_remove(_HOOK, index)
             continue
-        if curve and curve.driver.variables[0].targets[0].id != target:
+        bone = bone_of(camera_object, point, target)
+        followed = target, bone.name if bone else ""
+        if curve and (aim := curve.driver.variables[0].targets[0]) and (aim.id, aim.bone_target) != followed:
             camera_object.driver_remove(_HOOK, index)
             curve = None
         if curve is None:
-            _depend(camera_object.driver_add(_HOOK, index).driver, target)
+            _depend(camera_object.driver_add(_HOOK, index).driver, *followed)
 
 
-def _depend(driver: bpy.types.Driver, target: bpy.types.Object) -> None:
+def _depend(driver: bpy.types.Driver, target: bpy.types.Object, bone: str) -> None:
     driver.type = "SUM"
     variable = driver.variables.new()
-    variable.type, variable.targets[0].id = "TRANSFORMS", target
+    variable.type, variable.targets[0].id, variable.targets[0].bone_target = "TRANSFORMS", target, bone
     if target.type == "CAMERA":  # where it will be, its eye and its eye's target tell earlier than its transform
         for path in ("virtual_pinhole.eye[0]", f"{_HOOK}[0]"):
             aim = driver.variables.new().targets[0]
@@ -117,6 +128,7 @@ def release(camera_object: bpy.types.Object, point: str) -> None:
     if target_of(camera_object, point):  # set to None again, Blender would build the relations of all objects anew
         with storage.without_callbacks():
             setattr(camera_object.virtual_pinhole, f"{point}_target", None)
+            setattr(camera_object.virtual_pinhole, f"{point}_bone", "")
     connect(camera_object)
 
 
@@ -132,6 +144,8 @@ def warnings(camera_object: bpy.types.Object) -> list[str]:
             through = "".join(f" by {each.name!r}," for each in chain[1:-1])
             fault = "is the camera itself" if len(chain) == 1 else f"is moved{through} by the camera itself"
             sentences.append(f"{start} {fault}, and is not followed: choose another, or clear it")
+        elif (bone := getattr(camera_object.virtual_pinhole, f"{point}_bone")) and not bone_of(camera_object, point, target):
+            sentences.append(f"{start} has no bone {bone!r}, and its origin is followed: choose another, or clear it")
         elif not target.users_scene and not target.library:  # a linked one may well be in its own file's scene alone
             sentences.append(f"{start} is in no scene, deleted perhaps: clear it, or choose another")
         elif late := None if _is_led(target) else next(filter(_is_led, _carriers(target, set())), None):

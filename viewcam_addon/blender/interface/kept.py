@@ -6,7 +6,7 @@ from .. import storage, versions
 
 # What moving a camera changes besides its values.
 _CHANNELS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
-_LENS = ("lens", "shift_x", "shift_y", "sensor_width", "sensor_height", "virtual_pinhole_sensor")
+_LENS = ("lens", "shift_x", "shift_y", "sensor_width", "sensor_height", "virtual_pinhole_sensor", "dof.focus_distance")
 
 # Of the values these are told from the others.
 _TOLD = ("roll", "focal_length", "field_of_view")

@@ -79,6 +79,9 @@ def _draw_values(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> 
         row.enabled = targets.place(group.id_data, point) is None  # where the point is, its target says
         row.prop(group, point)
         column.prop(group, f"{point}_target", text="Object")
+        target = targets.target_of(group.id_data, point)
+        if target and target.type == "ARMATURE":
+            column.prop_search(group, f"{point}_bone", target.data, "bones", text="Bone")
     column.prop(group, "up")
     column.separator()
     _draw_lens(column.row(align=True), group)
@@ -234,6 +237,16 @@ def shown(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> list[reado
     return readouts.readouts(found, camera_object.data.lens, at_full_size, (length, reach) if length else None)
 
 
+def _draw_focus(blenders: bpy.types.Panel, context: bpy.types.Context) -> None:
+    """In Blender's own panel Depth of Field."""
+    camera_object = datablocks.camera_in(context)
+    if camera_object and camera_object.data == context.camera and camera_object.virtual_pinhole.enabled:
+        row = blenders.layout.row()
+        row.use_property_split = True
+        row.active = context.camera.dof.use_dof and context.camera.dof.focus_object is None
+        row.prop(camera_object.virtual_pinhole, "focus_on_look_at")
+
+
 class VIEWCAM_PT_data(_MainPanel, bpy.types.Panel):
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
@@ -291,3 +304,11 @@ CLASSES = (
     VIEWCAM_PT_data_readouts,
     VIEWCAM_PT_sidebar_readouts,
 )
+
+
+def register() -> None:
+    bpy.types.DATA_PT_camera_dof.append(_draw_focus)
+
+
+def unregister() -> None:
+    bpy.types.DATA_PT_camera_dof.remove(_draw_focus)
