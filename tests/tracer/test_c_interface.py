@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from viewcam_addon.tracer import native
+from viewcam_addon.tracer.scene.value_nodes import KINDS as VALUES
 
 EXAMPLES = int(os.environ.get("VIEWCAM_FUZZ_CALLS", "60"))
 HOSTILE = [0.0, -0.0, 1.0, -1.0, 0.5, 5e-324, 1e-300, 1e-30, 1e18, -1e18, 1e19, 1e300, np.inf, -np.inf, np.nan]
@@ -127,6 +128,23 @@ def light_up(draw, calls):
     calls("add_texture", calls.scene, width, height, draw(st.integers(2, 4)), draw(st.booleans()), pixels)
 
 
+def make_nodes(draw, calls):
+    """Nodes of all kinds, of whatever words and numbers, which name images and nodes that may not be there."""
+    for _ in range(draw(st.integers(0, 3))):
+        kind = draw(mostly(st.sampled_from(sorted(VALUES)), ["principled", ""]))
+        inputs = []
+        for name, default in VALUES.get(kind, {}).items():
+            words = default if isinstance(default, tuple) and isinstance(default[0], str) else ("true", "false")
+            given = native._Input(name.encode(), draw(mostly(st.sampled_from(words), ["guess"])).encode())
+            given.color.rgb[:] = [draw(NUMBER) for _ in range(3)]
+            given.color.image, given.color.node = (draw(mostly(st.integers(-1, 1), WHOLE)) for _ in range(2))
+            inputs.append(given)
+        given = native._Node(kind.encode(), (native._Input * len(inputs))(*inputs), draw(mostly(st.just(len(inputs)), [0])))
+        if calls("add_node", calls.scene, given):
+            rows, values = calls.at(numbers(draw, 6 * 5), np.float64), np.empty((5, 4))
+            calls("probe_nodes", calls.scene, 5, rows, values.ctypes.data)
+
+
 def trace(draw, calls):
     rays = calls.at(numbers(draw, 8 * 70), np.float64)
     t, objects, primitives, hidden = np.empty(70), np.empty(70, np.uint32), np.empty(70, np.uint32), np.empty(70, np.uint8)
@@ -178,6 +196,7 @@ def story(draw, calls):
     for _ in range(draw(st.integers(0, 2))):
         assert calls("add_material", calls.scene, None, 0)
         light_up(draw, calls)
+        make_nodes(draw, calls)
     trace(draw, calls)
     trace_light(draw, calls)
 
