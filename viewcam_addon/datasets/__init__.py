@@ -10,10 +10,12 @@ scales, centres or turns it.
 
 from dataclasses import dataclass
 
-from ..cameras import sidecar as record  # noqa: F401 - a name of this package
+from ..cameras import sidecar as record
 from ..cameras.camera import Camera
 from ..cameras.naming import check_image
 from ..pinhole import Pinhole
+
+__all__ = ["View", "record"]
 
 
 @dataclass(frozen=True)
