@@ -194,6 +194,17 @@ def what_a_camera_says(source):
     answer(camera.cropped, source.number(), source.number(), source.choice(WHOLES), 48)
 
 
+@attacks("pinhole.Pinhole.of_poses")
+def many_poses(source):
+    """Refused where one of them is, and else what they are one by one; but that in an array True is 1, as for NumPy."""
+    plane, draw = some_camera(source).plane, source.choice((source.number, source.finite))
+    numbers = [float(x) if isinstance(x, bool | np.bool_) else x for x in (draw() for _ in range(18))]
+    poses = [[numbers[i : i + 3] for i in (j, j + 3, j + 6)] for j in (0, 9)]
+    made = answer(Pinhole.of_poses, *zip(*poses, strict=True), [plane, plane])
+    alone = [answer(Pinhole, *pose, plane.distance, plane.width, plane.height, plane.principal_point) for pose in poses]
+    assert (made is REFUSED) if REFUSED in alone else (made == alone), (made, alone)
+
+
 @attacks("pinhole.Pinhole.ray_directions", "pinhole.Pinhole.view_plane", "pinhole.Pinhole.project", "pinhole.basis")
 def what_many_numbers_give(source):
     camera = some_camera(source)

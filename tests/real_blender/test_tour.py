@@ -25,7 +25,7 @@ def run_in_a_window(real_blender, script, *folder):
         cwd=ROOT,
         capture_output=True,
         text=True,
-        timeout=400,  # six times what it takes
+        timeout=1200,  # many times what it takes, on a busy machine too
     )
 
 

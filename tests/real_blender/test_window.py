@@ -51,7 +51,7 @@ def run_in_a_window(real_blender, script, *arguments, size=("1600", "1000")):
         cwd=ROOT,
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=1200,
     )
 
 

@@ -143,12 +143,6 @@ def bumpy(material):
     tree.links.new(bump.outputs[0], tree.nodes["Shader"].inputs["Normal"])
 
 
-def clipped(material):
-    made = bpy.data.images.new("Grey", 4, 4)
-    made.pixels.foreach_set(np.random.default_rng(3).random(64, np.float32))
-    texture(material, made, "Cubic").extension = "CLIP"
-
-
 def see_through(material):
     tree = material.node_tree
     mixed = tree.nodes.new("ShaderNodeMixShader")
@@ -157,7 +151,7 @@ def see_through(material):
     tree.links.new(mixed.outputs[0], tree.nodes["Output"].inputs["Surface"])
 
 
-STAND_INS = {toon: "not modelled", noisy: "not modelled", bumpy: "turns", clipped: "clip", see_through: "transparent"}
+STAND_INS = {toon: "not modelled", noisy: "not modelled", bumpy: "turns", see_through: "transparent"}
 
 
 @pytest.mark.parametrize("change", STAND_INS, ids=lambda change: change.__name__)
