@@ -8,6 +8,8 @@ Leaves through Blender's own door with status 0, or with 5 and a traceback.
 """
 
 import importlib
+import os
+import signal
 import sys
 import time
 import webbrowser
@@ -70,6 +72,13 @@ def begin():
         yield
     assert proof.running(), "the click has begun nothing"
     return proof.running(), y
+
+
+def begin_and_stop():
+    """The same, and its processes are stopped: it is on its way until it is ended, however quick machine and tracer are."""
+    comparison, y = yield from begin()
+    os.killpg(comparison._process._first.pid, signal.SIGSTOP)
+    return comparison, y
 
 
 def ended(comparison):
@@ -177,7 +186,7 @@ def take_the_edit_back_and_show_the_difference_again():
 
 
 def press_escape():
-    comparison, _ = yield from begin()
+    comparison, _ = yield from begin_and_stop()
     yield
     press("ESC", *NOWHERE)
     yield from ended(comparison)
@@ -186,7 +195,7 @@ def press_escape():
 
 def press_escape_during_playback():
     """Escape ends the playback; the next one the comparison."""
-    comparison, _ = yield from begin()
+    comparison, _ = yield from begin_and_stop()
     with bpy.context.temp_override(window=window()):
         bpy.ops.screen.animation_play()
     yield
@@ -200,7 +209,7 @@ def press_escape_during_playback():
 
 
 def press_cancel():
-    comparison, y = yield from begin()
+    comparison, y = yield from begin_and_stop()
     yield
     _, part = region(*SIDEBAR)
     there = yield from look(part.x + part.width * CANCEL, y, SIDEBAR)
@@ -210,7 +219,7 @@ def press_cancel():
 
 
 def undo_while_it_runs():
-    comparison, _ = yield from begin()
+    comparison, _ = yield from begin_and_stop()
     press("Z", *NOWHERE, ctrl=True, shift=True)
     yield
     press("Z", *NOWHERE, ctrl=True)
@@ -222,7 +231,7 @@ def undo_while_it_runs():
 
 
 def open_a_file_while_it_runs():
-    comparison, _ = yield from begin()
+    comparison, _ = yield from begin_and_stop()
     kept = proof.latest().temporary
     bpy.ops.wm.open_mainfile(filepath=str(FILE), load_ui=False)
     yield
@@ -232,7 +241,7 @@ def open_a_file_while_it_runs():
 
 def turn_the_add_on_off_while_it_runs():
     global proof
-    comparison, _ = yield from begin()
+    comparison, _ = yield from begin_and_stop()
     bpy.ops.preferences.addon_disable(module=ADDON)
     yield
     yield
@@ -243,7 +252,7 @@ def turn_the_add_on_off_while_it_runs():
 
 
 def quit_while_it_runs():
-    comparison, _ = yield from begin()
+    comparison, _ = yield from begin_and_stop()
     (FOLDER / "last.txt").write_text(str(comparison.folder))
     yield
 

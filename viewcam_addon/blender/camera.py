@@ -130,25 +130,21 @@ def follow(camera_object: bpy.types.Object, scene: bpy.types.Scene, edited: froz
         as `stated` and `apply` do. Nothing has changed then.
     """
     with _setting(camera_object):
-        _follow(camera_object, scene, edited)
-
-
-def _follow(camera_object: bpy.types.Object, scene: bpy.types.Scene, edited: frozenset[str]) -> None:
-    last = _agreed.get(camera_object.session_uid)
-    if edited != ALL and last and last.state != _state_of(camera_object):
-        with contextlib.suppress(InputError):
-            adopt_move(camera_object, scene, datablocks.depsgraph_of(scene), last.values, edited)
-    values, wanted = _level(camera_object, scene)
-    if values.pole == HOLD:
-        angle = hold.roll(camera_object, values, scene)
-        if not datablocks.is_animated(camera_object):  # in an animation the curves say what is held
-            if before := _stood_at(camera_object, values, scene):
-                angle = hold.after_edit(before, wanted, values.held_roll, values.hold_within)
-            values = replace(values, held_roll=angle)
-        wanted = rolls.turned(wanted, angle)
-    place(camera_object, wanted, scene)
-    storage.settle(camera_object, values.as_set(), datablocks.frame_of(scene))
-    agree(camera_object)
+        last = _agreed.get(camera_object.session_uid)
+        if edited != ALL and last and last.state != _state_of(camera_object):
+            with contextlib.suppress(InputError):
+                adopt_move(camera_object, scene, datablocks.depsgraph_of(scene), last.values, edited)
+        values, wanted = _level(camera_object, scene)
+        if values.pole == HOLD:
+            angle = hold.roll(camera_object, values, scene)
+            if not datablocks.is_animated(camera_object):  # in an animation the curves say what is held
+                if before := _stood_at(camera_object, values, scene):
+                    angle = hold.after_edit(before, wanted, values.held_roll, values.hold_within)
+                values = replace(values, held_roll=angle)
+            wanted = rolls.turned(wanted, angle)
+        place(camera_object, wanted, scene)
+        storage.settle(camera_object, values.as_set(), datablocks.frame_of(scene))
+        agree(camera_object)
 
 
 def place(
