@@ -504,7 +504,12 @@ def _focus_distance(camera_object: bpy.types.Object, pinhole: Pinhole, depsgraph
 
 
 def lens(camera_object: bpy.types.Object, unit: str) -> float:
-    """The lens in one of intrinsics.LENS_UNITS, zoom included; 0 where there is none."""
+    """The lens in one of intrinsics.LENS_UNITS, zoom included; 0 where there is none.
+
+    Blender reads it of every object, cameras or not: as it looks for what a library override has changed.
+    """
+    if camera_object.type != "CAMERA":
+        return 0.0
     frame, fit = datablocks.frame_of(datablocks.scene_of(camera_object)), camera_object.data.sensor_fit
     with contextlib.suppress(InputError, ZeroDivisionError):
         distance = storage.load(camera_object).distance_at_full_size(frame, fit)
@@ -514,6 +519,8 @@ def lens(camera_object: bpy.types.Object, unit: str) -> float:
 
 def set_lens(camera_object: bpy.types.Object, unit: str, value: float) -> None:
     """Say the distance that is this lens, and move nothing. The zoom stays, and what is no lens changes nothing."""
+    if camera_object.type != "CAMERA":
+        return
     frame, fit = datablocks.frame_of(datablocks.scene_of(camera_object)), camera_object.data.sensor_fit
     with contextlib.suppress(InputError, ZeroDivisionError):
         distance = intrinsics.distance_by_lens(unit, value, frame, datablocks.own_sensor(camera_object.data), fit)

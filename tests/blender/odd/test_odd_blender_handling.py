@@ -129,6 +129,17 @@ def test_an_override_of_a_camera_and_its_target_is_edited_here(aimed_camera, car
     assert camera_object.virtual_pinhole.numbers()[:2] == ((7, -6, 6), (1, 1, 1))
 
 
+@pytest.mark.parametrize("data", [lambda: None, lambda: bpy.data.meshes.new("Mesh"), lambda: bpy.data.lights.new("Sun", "SUN")])
+def test_all_values_of_what_is_no_camera_can_be_read_and_its_lens_set(scene, data):
+    """Blender reads them as it looks for what an override has changed, and any script may."""
+    group = bpy.data.objects.new("None", data()).virtual_pinhole
+    names = [each.identifier for each in group.bl_rna.properties]
+    before = {name: repr(getattr(group, name)) for name in names}
+    assert group.focal_length == group.field_of_view == group.roll == 0
+    group.focal_length, group.field_of_view = 50, 1
+    assert {name: repr(getattr(group, name)) for name in names} == before
+
+
 def test_renamed_all_goes_on(aimed_camera, odd):
     aimed_camera.name, aimed_camera.data.name, bpy.data.objects["Target"].name = "Shot", "Lens", "Aim"
     move("Aim", (1, 1, 1))
