@@ -47,32 +47,34 @@ def test_the_tracer_has_not_become_slower_by_a_third():
     assert not sentences, f"{sentences}, of {ratios}"
 
 
-def _doubled_trace():
-    """Each picture of geometry is traced twice."""
+def _traced_three_times():
+    """Each picture of geometry is traced three times."""
     render = Tracer.render
 
-    def twice(self):
+    def thrice(self):
+        render(self)
         render(self)
         return render(self)
 
-    Tracer.render = twice
+    Tracer.render = thrice
 
 
 def _sleep():
-    """Each picture of light takes a sleep as long as itself."""
+    """Each picture of light takes a sleep twice as long as itself."""
     render_light = Tracer.render_light
 
     def slow(self, *arguments):
         start = time.perf_counter()
         passes = render_light(self, *arguments)
-        time.sleep(time.perf_counter() - start)
+        time.sleep(2 * (time.perf_counter() - start))
         return passes
 
     Tracer.render_light = slow
 
 
 @pytest.mark.speed
-@pytest.mark.parametrize(("sabotage", "slower"), [(_doubled_trace, "geometry"), (_sleep, "direct")])
-def test_sabotage_is_told(sabotage, slower):
-    sentences = guard.fallen(guard.measure([slower], sabotage), {slower: RECORDED[slower]})
-    assert sentences
+@pytest.mark.parametrize(("sabotage", "name"), [(_traced_three_times, "geometry"), (_sleep, "direct")])
+def test_what_takes_three_times_as_long_is_told(sabotage, name):
+    # Against this machine's own ratio: half of what a third less allows is left for noise, whatever was recorded elsewhere.
+    undisturbed, slow = guard.measure([name]), guard.measure([name], sabotage)
+    assert guard.fallen(slow, undisturbed), f"{slow} is not told from {undisturbed}"
