@@ -8,6 +8,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.scenes import export_geometry, images
 from viewcam_addon.errors import InputError
 
 
@@ -249,3 +250,46 @@ def test_render_and_export_tell_the_same(blend, camera_object, tmp_path):
     assert told == job.export(job.Request(path)).ledger
     assert {entry.object: entry.status for entry in told} == {"Camera": "approximated", "Cube": "approximated"}
     assert (tmp_path / "picture.exr").stat().st_size > 1000
+
+
+def paint(cube, lit_by):
+    """Give the cube a material with an image, and light by the surface, a lamp or nothing."""
+    material = bpy.data.materials.new("Painted")
+    material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    texture, output = tree.nodes.new("ShaderNodeTexImage"), tree.nodes.new("ShaderNodeOutputMaterial")
+    shader = tree.nodes.new("ShaderNodeEmission" if lit_by == "surface" else "ShaderNodeBsdfDiffuse")
+    texture.image = bpy.data.images.new("Image", 4, 4)
+    tree.links.new(texture.outputs["Color"], shader.inputs["Color"])
+    tree.links.new(shader.outputs[0], output.inputs["Surface"])
+    cube.data.materials.append(material)
+    if lit_by == "lamp":
+        bpy.ops.object.light_add(type="SUN")
+
+
+@pytest.mark.parametrize("recenter", [False, True])
+@pytest.mark.parametrize(("lit_by", "level"), [("", "geometry"), ("surface", "direct"), ("lamp", "path")])
+def test_for_the_least_level_a_scene_is_exported_once(blend, monkeypatch, lit_by, level, recenter):
+    paint(bpy.data.objects["Cube"], lit_by)
+    path = blend()
+    wanted = job.export(job.Request(path, level=level, recenter=recenter))
+    read = []
+    for module, name in ((export_geometry, "mesh_of"), (images, "picture_of")):
+        function = getattr(module, name)
+        monkeypatch.setattr(module, name, lambda *given, f=function, name=name: read.append(name) or f(*given))
+    found = job.export(job.Request(path, level="auto", recenter=recenter))
+    assert sorted(read) == ["mesh_of"] + ["picture_of"] * (level != "geometry"), read
+    assert (found.ledger, list(found.materials), len(found.lamps)) == (wanted.ledger, list(wanted.materials), len(wanted.lamps))
+
+
+def test_what_is_flattened_so_that_cycles_does_not_draw_it_gives_no_light(blend, scene, tmp_path):
+    cube = bpy.data.objects["Cube"]
+    paint(cube, "surface")
+    cube.scale.z = 0
+    scene.collection.objects.link(cube.copy())
+    request = job.Request(blend(), level="auto")
+    exported = job.export(request)
+    assert not exported.materials and not exported.objects and not exported.geometries
+    assert {entry.reason for entry in exported.ledger} == {"flattened by its scale, and Cycles does not draw it"}
+    assert job.render(request, tmp_path / "picture.exr") == exported.ledger

@@ -15,11 +15,10 @@ import bpy
 from ...errors import InputError
 from ...tracer.scene import LedgerEntry, Scene
 from ...tracer.scene.film import LEVELS, NO_BOUNCES, SAMPLES
-from ...tracer.scene.levels import least_level
 from .. import datablocks, resolution
 from ..opening import opened
 from ..scenes import materials, recentering
-from ..scenes.export import Lighting, export_scene, survey
+from ..scenes.export import Lighting, export_scene, level_needed, survey
 from ..scenes.ledger import Ledger
 from ..temporary_settings import Overrides, numbered_indices
 from . import cycles
@@ -176,9 +175,7 @@ def _stage(request: Request) -> Iterator[_Stage]:
         layer = rendered_layer(scene)
         if request.clay:
             overrides.set(layer, "material_override", materials.plain(overrides))
-        level = request.level
-        if level == AUTO:
-            level, _ = least_level(export_scene(scene, layer, camera, Ledger(), lit=True))
+        level = level_needed(scene, layer, camera) if request.level == AUTO else request.level
         ledger = Ledger()
         for sentence in off:
             ledger.note(Path(bpy.data.filepath).name, "approximated", f"{sentence} (without --trust)")

@@ -12,7 +12,7 @@ from typing import TypeVar
 import bpy
 
 from ...errors import InputError
-from ..temporary_settings import overridden
+from ..temporary_settings import overridden, still_of_one_layer
 
 Result = TypeVar("Result")
 
@@ -56,6 +56,18 @@ def visit(scene: bpy.types.Scene, work: Callable[[bpy.types.Depsgraph], Result])
     if not outcome:
         raise InputError(f"Blender renders nothing of scene {scene.name!r}: check its render settings")
     return outcome[0]
+
+
+def visit_still(
+    scene: bpy.types.Scene,
+    view_layer: bpy.types.ViewLayer,
+    camera_object: bpy.types.Object,
+    work: Callable[[bpy.types.Depsgraph], Result],
+) -> Result:
+    """`visit` with the graph of a still picture of this view layer through this camera (temporary_settings.py)."""
+    with overridden() as overrides:
+        still_of_one_layer(overrides, scene, view_layer, camera_object)
+        return visit(scene, work)
 
 
 def only_cameras_changed(depsgraph: bpy.types.Depsgraph) -> bool:

@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 from ...tracer.scene import Mesh, Object, Scene, Spheres
 from ...tracer.scene.film import Bounces, Film
 from ...tracer.scene.lamps import RAYS, Lamp, World
-from ...tracer.scene.materials import Picture
+from ...tracer.scene.levels import level_of
+from ...tracer.scene.materials import PLAIN, Picture
 from .. import camera as cameras
 from .. import versions
-from ..temporary_settings import overridden, still_of_one_layer
 from . import export_geometry, features, film, lamps, world
-from .depsgraph import visit
+from .depsgraph import visit_still
 from .ledger import Ledger
 from .shading import Shading
 
@@ -52,6 +52,13 @@ class Surface:
     def materials(self) -> tuple[int, ...]:
         """The materials' pass indices."""
         return tuple(material.pass_index if material else 0 for material in self.slots)
+
+    @property
+    def used_slots(self) -> list[bpy.types.Material | None]:
+        """Those of `slots` that some face, or the points, have."""
+        if not isinstance(self.data, bpy.types.Mesh):
+            return [self.slots[0]]
+        return [self.slots[index] for index in sorted(export_geometry.used_slots(self.data, len(self.slots)))]
 
 
 @dataclass(frozen=True)
@@ -83,9 +90,7 @@ def export_scene(
         if the camera is no pinhole (orthographic, panoramic, sheared), or if Blender can't render the scene.
     """
     features.note_render(scene, view_layer, camera_object, ledger, lit)
-    with overridden() as overrides:
-        still_of_one_layer(overrides, scene, view_layer, camera_object)
-        return visit(scene, lambda depsgraph: scene_in(depsgraph, camera_object, ledger, lit))
+    return visit_still(scene, view_layer, camera_object, lambda depsgraph: scene_in(depsgraph, camera_object, ledger, lit))
 
 
 def survey(
@@ -102,9 +107,23 @@ def survey(
         return light_in(depsgraph, ledger) if lit else None
 
     features.note_render(scene, view_layer, camera_object, ledger, lit)
-    with overridden() as overrides:
-        still_of_one_layer(overrides, scene, view_layer, camera_object)
-        return visit(scene, look)
+    return visit_still(scene, view_layer, camera_object, look)
+
+
+def level_needed(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_object: bpy.types.Object) -> str:
+    """The least level (levels.py) that models all light of what `export_scene` gives, found without reading any geometry."""
+
+    def look(depsgraph: bpy.types.Depsgraph) -> str:
+        ledger, shading = Ledger(), Shading()
+        shown = [
+            (source.name, shading.reading(slot).material if slot else PLAIN)
+            for source, _ in placements(depsgraph, ledger, shading)
+            for slot in source.used_slots
+        ]
+        light = light_in(depsgraph, ledger)
+        return level_of(light.lamps, light.world, light.bounces, shown)[0]
+
+    return visit_still(scene, view_layer, camera_object, look)
 
 
 def light_in(depsgraph: bpy.types.Depsgraph, ledger: Ledger, images: dict[str, Picture] | None = None) -> Lighting:
@@ -132,18 +151,21 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
             geometries[names[source.key]] = geometry
         materials = shading.names(source.slots) if shading else ()
         placed = (source.object_index, source.materials, materials, source.hidden_from)
-        objects.append(Object(source.name, names[source.key], matrices, *placed))
+        matrix = matrices if len(matrices) > 1 else matrices[0]
+        objects.append(Object(source.name, names[source.key], matrix, *placed))
     return Scene(
         **_view_in(depsgraph, camera_object),
         geometries=geometries,
-        objects=tuple(_drawn(objects, geometries, ledger)),
-        **(
-            vars(light_in(depsgraph, ledger, shading.images)) | {"materials": shading.materials, "images": shading.images}
-            if shading
-            else {}
-        ),
+        objects=tuple(objects),
+        **(_shown_by_light(depsgraph, ledger, shading) if shading else {}),
         ledger=ledger.entries(),
     )
+
+
+def _shown_by_light(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading) -> dict[str, object]:
+    """What of a Scene makes its light, and what shows it."""
+    images = shading.pictures()
+    return vars(light_in(depsgraph, ledger, images)) | {"materials": shading.materials, "images": images}
 
 
 def seen_from(scene: Scene, depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) -> Scene:
@@ -162,7 +184,7 @@ def _view_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) ->
 
 
 def placements(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading | None = None) -> list[tuple[Surface, Matrix]]:
-    """Each surface that the camera may see, and its matrices to world space, (n, 4, 4), one for each instance.
+    """Each surface that the camera may see, and its matrices to world space, (n, 4, 4), one for each instance that is drawn.
 
     shading : reads the materials, where there shall be light; then other rays than the camera's may see a surface.
     """
@@ -183,7 +205,22 @@ def placements(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading 
         known[identity].append(number)
     for source, numbers in found.items():
         ledger.placed(source.name, len(numbers))
-    return [(source, _by_rows(matrices[numbers])) for source, numbers in found.items()]
+    return list(_drawn([(source, _by_rows(matrices[numbers])) for source, numbers in found.items()], ledger))
+
+
+def _drawn(placed: list[tuple[Surface, Matrix]], ledger: Ledger) -> Iterator[tuple[Surface, Matrix]]:
+    """Those that no scale of 0 flattens, of which Cycles draws only meshes that no other object uses."""
+    users: Counter[tuple[int, int]] = Counter()
+    for source, matrices in placed:
+        users[source.key] += len(matrices)
+    for source, matrices in placed:
+        with np.errstate(invalid="ignore"):  # what is not finite is not flat
+            drawn = np.linalg.det(matrices[:, :3, :3]) != 0
+        if not drawn.all() and (users[source.key] > 1 or not isinstance(source.data, bpy.types.Mesh)):
+            ledger.note(source.name, "exported", "flattened by its scale, and Cycles does not draw it")
+            matrices = matrices[drawn]
+        if len(matrices):
+            yield source, matrices
 
 
 def _by_rows(matrices: NDArray[np.float32]) -> Matrix:
@@ -236,21 +273,6 @@ def _geometry(source: Surface, ledger: Ledger, shading: Shading | None) -> Mesh 
             source.name, "exported", f"{nowhere} triangles have vertices that are not finite, and Cycles draws none of them"
         )
     return mesh
-
-
-def _drawn(objects: list[Object], geometries: dict[str, Mesh | Spheres], ledger: Ledger) -> Iterator[Object]:
-    """The objects without those that a scale of 0 flattens, of which Cycles draws only meshes that no other object uses."""
-    users: Counter[str] = Counter()
-    for placed in objects:
-        users[placed.geometry] += len(placed.matrices)
-    for placed in objects:
-        drawn = np.linalg.det(placed.matrices[:, :3, :3]) != 0
-        if not drawn.all() and (users[placed.geometry] > 1 or isinstance(geometries[placed.geometry], Spheres)):
-            ledger.note(placed.name, "exported", "flattened by its scale, and Cycles does not draw it")
-        else:
-            drawn[:] = True
-        if drawn.any():
-            yield replace(placed, matrix=placed.matrices[drawn] if drawn.sum() > 1 else placed.matrices[drawn][0])
 
 
 def _free_name(name: str, taken: dict[str, Mesh | Spheres]) -> str:

@@ -21,9 +21,8 @@ and instances, which the file has rounded to half a metre, come out elsewhere th
 """
 
 import contextlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any
 
 import bpy
 import numpy as np
@@ -35,9 +34,9 @@ from ...pinhole import Pinhole
 from ...tracer.scene import Object
 from .. import camera as cameras
 from .. import datablocks, findings, pose
-from ..temporary_settings import Overrides, overridden, still_of_one_layer
+from ..temporary_settings import Overrides, overridden
 from . import features, materials
-from .depsgraph import visit
+from .depsgraph import visit_still
 from .export import light_in, placements
 from .film import CYCLES_SETTINGS
 from .ledger import Ledger
@@ -129,14 +128,14 @@ def recentred(
     with overridden() as overrides:
         keys = set(bpy.data.shape_keys)
         overrides.afterwards(_remove_keys_but, keys)
-        view, placed, copies = _visit(
+        view, placed, copies = visit_still(
             scene, view_layer, camera_object, lambda depsgraph: _seen(depsgraph, camera_object, ledger, overrides, lit)
         )
         _remove_keys_but(keys)
         temporary = _empty_scene(overrides, scene, view_layer)
         camera = _camera(overrides, temporary, view)  # before all others: it asks for a depsgraph
         shown = _place(overrides, temporary, placed)
-        _visit(temporary, temporary.view_layers[0], camera, lambda depsgraph: _verify(depsgraph, shown, copies))
+        visit_still(temporary, temporary.view_layers[0], camera, lambda depsgraph: _verify(depsgraph, shown, copies))
         yield Recentred(temporary, camera, view.shown.eye, {each.name: source.name for each, source in shown.items()})
 
 
@@ -153,12 +152,6 @@ def as_in_file(objects: Iterable[Object], names: Mapping[str, str]) -> tuple[Obj
         replace(same[0], matrix=np.concatenate([each.matrices for each in same])) if len(same) > 1 else same[0]
         for same in found.values()
     )
-
-
-def _visit(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera_object: bpy.types.Object, work: Callable) -> Any:
-    with overridden() as overrides:
-        still_of_one_layer(overrides, scene, view_layer, camera_object)
-        return visit(scene, work)
 
 
 def _seen(

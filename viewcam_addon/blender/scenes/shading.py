@@ -7,24 +7,31 @@ from . import images, shaders
 
 
 class Shading:
-    """materials, images : as in `Scene`, of all that was asked for."""
-
     def __init__(self) -> None:
-        self.materials: dict[str, Material] = {}
-        self.images: dict[str, Picture] = {}
         self._readings: dict[str, shaders.Reading] = {}
 
     def reading(self, material: bpy.types.Material) -> shaders.Reading:
         """What an evaluated material is to the tracer."""
         name = material.original.name_full
         if name not in self._readings:
-            reading = self._readings[name] = shaders.read(material)
-            self.materials[name] = reading.material
-            self.images |= reading.tables
-            for key, image in reading.images.items():
-                if key not in self.images or key in reading.alphas:
-                    self.images[key] = images.picture_of(image, key in reading.alphas)
+            self._readings[name] = shaders.read(material)
         return self._readings[name]
+
+    @property
+    def materials(self) -> dict[str, Material]:
+        """As in `Scene`, all that were asked for."""
+        return {name: reading.material for name, reading in self._readings.items()}
+
+    def pictures(self) -> dict[str, Picture]:
+        """The images of all materials that were asked for, as in `Scene`; their pixels are read now."""
+        found: dict[str, Picture] = {}
+        alphas = {key for reading in self._readings.values() for key in reading.alphas}
+        for reading in self._readings.values():
+            found |= reading.tables
+            for key, image in reading.images.items():
+                if key not in found:
+                    found[key] = images.picture_of(image, key in alphas)
+        return found
 
     def names(self, slots: tuple[bpy.types.Material | None, ...]) -> tuple[str, ...]:
         """Keys in `materials`; "" is none."""

@@ -1,8 +1,10 @@
 """The least level that a scene needs: what it has not is not computed."""
 
+from collections.abc import Sequence
+
 from . import Object, Scene
-from .film import LEVELS
-from .lamps import World
+from .film import LEVELS, Bounces
+from .lamps import Lamp, World
 from .materials import PLAIN, Material
 from .shader_nodes import KINDS
 
@@ -12,37 +14,41 @@ _WHAT = {"diffuse": _REFLECTS, "principled": _REFLECTS, "glossy": _MIRRORS, "met
 
 def least_level(scene: Scene) -> tuple[str, str]:
     """The level (film.LEVELS) at which nothing is left out that this scene shows, and one sentence that says why."""
+    shown = [(placed.name, material) for placed in scene.objects for material in _materials(scene, placed)]
+    return level_of(scene.lamps, scene.world, scene.bounces, shown)
+
+
+def level_of(lamps: Sequence[Lamp], world: World, bounces: Bounces, shown: Sequence[tuple[str, Material]]) -> tuple[str, str]:
+    """`least_level` of what gives light. shown : (object's name, material), of each material that some part of it uses."""
     geometry, direct, path = LEVELS
-    light = _light(scene)
+    light = _light(lamps, world, shown)
     if light is None:
         return geometry, "Nothing gives light: no lamp, no surface and not the world."
-    bounces = scene.bounces
     if bounces.total == 0:
         return direct, f"Light comes from {light}, and the scene allows no bounces."
-    shown = [(placed, material) for placed in scene.objects for material in _materials(scene, placed)]
     scattering = [
-        (placed, closure.node.type)
-        for placed, material in shown
+        (name, closure.node.type)
+        for name, material in shown
         for closure in material.closures
         if KINDS[closure.node.type].scatters
     ]
     if not scattering:
         return direct, f"Light comes from {light}, and nothing reflects it."
-    for placed, kind in scattering:
+    for name, kind in scattering:
         if any(getattr(bounces, bounce) > 0 for bounce in KINDS[kind].scatters):
-            return path, f"Light comes from {light}, and {placed.name!r} {_WHAT.get(kind, 'is clear')}."
+            return path, f"Light comes from {light}, and {name!r} {_WHAT.get(kind, 'is clear')}."
     return direct, f"Light comes from {light}, and the scene allows no bounces of the kinds that it has."
 
 
-def _light(scene: Scene) -> str | None:
+def _light(lamps: Sequence[Lamp], world: World, shown: Sequence[tuple[str, Material]]) -> str | None:
     """The first thing that gives light."""
-    for lamp in scene.lamps:
+    for lamp in lamps:
         if any(getattr(lamp, "irradiance", ()) or getattr(lamp, "power", ())):
             return f"the lamp {lamp.name!r}"
-    for placed in scene.objects:
-        if any(closure.node.is_shining for material in _materials(scene, placed) for closure in material.closures):
-            return f"the surface of {placed.name!r}"
-    return "the world" if scene.world.radiance != World().radiance else None
+    for name, material in shown:
+        if any(closure.node.is_shining for closure in material.closures):
+            return f"the surface of {name!r}"
+    return "the world" if world.radiance != World().radiance else None
 
 
 def _materials(scene: Scene, placed: Object) -> list[Material]:
