@@ -1,11 +1,13 @@
 """Cameras of all kinds that formats must hold, points to see them by, and what float arithmetic allows a picture to err."""
 
+import contextlib
 import math
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
-from viewcam_addon.cameras import Camera
+from viewcam_addon.cameras import Camera, own
 from viewcam_addon.pinhole import Pinhole
 
 PLAIN = Pinhole((7, -6, 4), (0, 0, 1), (0, 0, 1), 600, 640, 360)
@@ -30,6 +32,20 @@ CAMERAS = {
 
 def camera(name: str) -> Camera:
     return Camera(name, CAMERAS[name], image=f"{name}.png")
+
+
+@contextlib.contextmanager
+def numbers_alone() -> Iterator[None]:
+    """A format's own numbers are read and not the values beside them, which would hide what is read wrongly of the numbers."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(own, "pinholes_in", lambda text: [])
+        yield
+
+
+@pytest.fixture(scope="module")
+def only_numbers():
+    with numbers_alone():
+        yield
 
 
 def points_before(pinhole: Pinhole, count: int = 40, seed: int = 1) -> np.ndarray:

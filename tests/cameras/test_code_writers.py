@@ -16,6 +16,8 @@ from viewcam_addon.pinhole import Pinhole
 
 from .conftest import CAMERAS, allowed, picture_error, points_before
 
+pytestmark = pytest.mark.usefixtures("only_numbers")
+
 SQUARE = [name for name, each in CAMERAS.items() if each.distance[0] == each.distance[1] and not each.mirrored]
 CENTRED = [name for name in SQUARE if CAMERAS[name].principal_point == (CAMERAS[name].width / 2, CAMERAS[name].height / 2)]
 

@@ -2,6 +2,8 @@
 
 import copy
 import json
+import math
+import re
 import struct
 import time
 from pathlib import Path
@@ -166,6 +168,34 @@ def test_a_damaged_file_is_read_or_refused(tmp_path, data):
         content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.sampled_from([0, 1, 127, 128, 255, 10, 200]))
     path.write_bytes(content[: data.draw(st.integers(0, len(content)))] if data.draw(st.booleans()) else content)
     read_or_refused(path)
+
+
+EXTREME = st.sampled_from([0, -1, 5e-324, 1e-300, 1e-160, 1e160, 1e300, 1.7e308, -1.7e308, 3.5, 360, None, "a", [1], 10**400])
+VALUES = st.fixed_dictionaries(
+    {name: st.tuples(*[EXTREME] * 3) for name in ("eye", "look_at", "up")}
+    | {"distance": EXTREME | st.tuples(EXTREME, EXTREME), "width": st.sampled_from([1, 640, 2**31, 10**15, 1.5])},
+    optional={"principal_point": st.tuples(EXTREME, EXTREME), "mirrored": st.booleans()},
+)
+
+
+@pytest.mark.parametrize(
+    "form", ["transforms", "bop", "gltf", "three_js", "opencv", "pbrt", "mitsuba", "pov_ray", "matrices", "vtk"]
+)
+@SETTINGS
+@given(values=VALUES)
+def test_whatever_values_stand_beside_the_numbers_the_numbers_are_read(form, values):
+    said = {"height": 360, **values}
+    text = re.sub(r"\{[^{}]*\"up\"[^{}]*\}", lambda _: json.dumps(said), cameras.write([camera("plain")], form))
+    (found,) = cameras.read(text, options=GIVEN)
+    assert math.dist(found.pinhole.eye, camera("plain").pinhole.eye) < 1e-14 * 64
+
+
+@pytest.mark.parametrize("eye", [1e307, 5e307, 1.7e308])
+def test_a_matrix_at_the_end_of_all_numbers_is_read_or_refused(eye):
+    document = json.loads(cameras.write([camera("plain")], "transforms"))
+    document["frames"][0]["transform_matrix"][0][3] = eye
+    document["frames"][0]["transform_matrix"][1][3] = -eye
+    read_or_refused(json.dumps(document))
 
 
 LARGE = {

@@ -18,6 +18,8 @@ from viewcam_addon.pinhole import Pinhole
 from .conftest import CAMERAS, allowed, points_before
 from .test_judges import FLOAT32, judged, same_picture
 
+pytestmark = pytest.mark.usefixtures("only_numbers")
+
 SQUARE = [name for name in CAMERAS if "not_square" not in name and name != "mirrored_and_shifted"]
 FORMATS = ["text", "pbrt", "mitsuba", "pov_ray", "matrices", "look_at", "three_js"]
 

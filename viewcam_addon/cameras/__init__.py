@@ -18,6 +18,12 @@ A format is a module in `FORMATS` with
     read(source, options) → list[Camera]            where cameras can be read; in the file's own world
     write(cameras, options) → text, or {file name: text or bytes}      where they can be written; in the file's own world
     SUFFIX                          of the file that it writes; "" where these are several in a folder
+    READER                          of what only writes: the module that reads it
+    notes_in(source) → texts        where a file that it wrote has this project's notes, if that is not its text
+
+**To the bit.** A matrix or an angle holds fewer digits than the values of which it was made. So a writer puts these beside
+(own.py's `document`, in a comment or wherever the format lets programs keep what is theirs), and here, for all formats alike, a
+camera takes them if written again they are read as that camera. Where somebody changed the numbers, the numbers count.
 
 Axes and scale are applied here, for all alike. The first format that recognises something reads it: the more certain ones
 stand first, and what takes any text last.
@@ -31,9 +37,12 @@ from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
+
 from .. import checks
 from ..errors import InputError
 from ..files import written_whole
+from ..pinhole import Pinhole
 from . import (
     arkit,
     bop,
@@ -120,8 +129,7 @@ FORMATS: dict[str, ModuleType] = {
 }
 """Name → module, in the order in which they are asked."""
 
-_REMEMBERED = re.compile(r"virtual_pinhole: (axes=\w+ scale=[\d.e+-]+)")
-_REMEMBERING = (("images.txt",), ("sparse", "0", "images.txt"), ("transforms.json",))
+_REMEMBERED = re.compile(rf"{own.KEY}: (axes=\w+ scale=[\d.e+-]+)")
 
 
 def readable() -> list[str]:
@@ -157,7 +165,9 @@ def read(given: str | Path, *, format: str | None = None, options: Options | Non
         raise
     if not cameras:
         raise InputError(f"{source.name} holds no camera: give another file")
-    told = _told_of_world(source, options)
+    notes = module.notes_in(source) if hasattr(module, "notes_in") else [source.text]
+    cameras = _to_the_bit(cameras, [pinhole for text in notes for pinhole in own.pinholes_in(text)], module, options)
+    told = _told_of_world(notes, options)
     found = [_doubted(_unmirrored(moved(camera, options), options)) for camera in cameras]
     return [camera.noted(*told) for camera in found] if told else found
 
@@ -232,10 +242,36 @@ def _module(name: str, does: str) -> ModuleType:
     return FORMATS[name]
 
 
-def _told_of_world(source: Source, options: Options) -> tuple[str, ...]:
+def _to_the_bit(cameras: list[Camera], stated: list[Pinhole], module: ModuleType, options: Options) -> list[Camera]:
+    """The cameras, with the stated values where these, written and read again, are the same camera."""
+    exact: dict[Pinhole, list[Pinhole]] = {}  # as it is read: the values, of which several may be read alike
+    writers = [each for each in FORMATS.values() if each is module or getattr(each, "READER", None) is module]
+    if len(stated) > len(cameras):  # then they are of others
+        return cameras
+    for writer in writers if stated else ():
+        again = _read_again(stated, writer, module, options)
+        for camera, pinhole in zip(reversed(again), reversed(stated), strict=False):
+            if (camera.pinhole.width, camera.pinhole.height) == (pinhole.width, pinhole.height):
+                exact.setdefault(camera.pinhole, []).append(pinhole)
+    return [replace(camera, pinhole=same.pop()) if (same := exact.get(camera.pinhole)) else camera for camera in cameras]
+
+
+def _read_again(pinholes: list[Pinhole], writer: ModuleType, reader: ModuleType, options: Options) -> list[Camera]:
+    """What is read of these pinholes where they are written; nothing if they can't be."""
+    if not hasattr(writer, "write"):
+        return []
+    try:
+        with np.errstate(all="ignore"):  # anything may stand in a file
+            written = writer.write([Camera(f"{number}", pinhole) for number, pinhole in enumerate(pinholes)], options)
+            again = reader.read(Source(written), options)
+    except InputError:
+        return []
+    return again if len(again) == len(pinholes) else []
+
+
+def _told_of_world(notes: Iterable[str], options: Options) -> tuple[str, ...]:
     """A note where the file remembers that it was written with other axes or another scale than it is read with."""
-    files = [source, *(source.file(*parts) for parts in _REMEMBERING)] if source.is_folder else [source]
-    said = next((found for file in files if file and (found := _REMEMBERED.search(file.text[:10_000]))), None)
+    said = next((found for text in notes if (found := _REMEMBERED.search(text[:10_000]))), None)
     if said is None or said[1] == options.remembered.partition(": ")[2]:
         return ()
     return (f"The file says that it was written with {said[1]}: choose the same to have the cameras back",)

@@ -33,6 +33,7 @@ Quaternion = tuple[float, float, float, float]
 # Of a rotation in a file, whose numbers have so many digits: what is worth a note, and what is none any more.
 _NOTED, _NO_ROTATION, _NO_QUATERNION = 1e-5, 2e-3, 1e-2
 _SCALED = 1e-3
+_FARTHEST = 2.0**1022  # as far again as the eye from the origin there must be room for the look-at point
 
 
 def camera_to_world(pinhole: Pinhole) -> Rows:
@@ -98,11 +99,14 @@ def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str, scaled: bool = False
         hint = "transpose it" if not any(row[3] for row in rows) else "it should be 0 0 0 1"
         raise InputError(f"the last row of the matrix of {what} is {checks.shown(matrix[3].tolist())}: {hint}")
     eye = checks.vector(f"the eye of {what}", [row[3] for row in rows], 3)
+    away = math.hypot(*eye)
+    if not away < _FARTHEST:
+        raise InputError(f"{what} is {away:g} units from the world's origin, beyond all numbers: give another matrix")
     (x, y, z), notes = rotation([row[:3] for row in rows], what, scaled)
     mirrored = _dot(_cross(x, y), z) < 0
     if mirrored:
         notes = (*notes, f"The axes of {what} are left-handed: the picture is mirrored")
-    reach = 2.0 ** math.ceil(math.log2(max(1.0, math.hypot(*eye))))
+    reach = 2.0 ** math.ceil(math.log2(max(1.0, away)))
     made = Pinhole(
         eye=eye,
         look_at=tuple(a - reach * b for a, b in zip(eye, z, strict=True)),

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from . import axes, naming, opencv
+from . import axes, naming, opencv, own
 from .camera import Camera, Options
 from .source import Record, Source, image_size, pixels
 
@@ -46,6 +46,10 @@ def read(source: Source, options: Options) -> list[Camera]:
     return cameras
 
 
+def notes_in(source: Source) -> list[str]:
+    return [_document(source).text]
+
+
 def write(cameras: Sequence[Camera], options: Options) -> str:
     naming.refuse_mirrored(cameras, FILE)
     half = opencv.half_pixel(options)
@@ -58,6 +62,7 @@ def write(cameras: Sequence[Camera], options: Options) -> str:
             "cam_R_w2c": [part for row in rows for part in row[:3]],
             "cam_t_w2c": [row[3] for row in rows],
             "depth_scale": 1.0,
+            own.KEY: own.document(camera.pinhole),
         }
         lines.append(f' "{number}": {json.dumps(said)}')
     return "{\n" + ",\n".join(lines) + "\n}\n"

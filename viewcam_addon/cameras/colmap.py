@@ -6,9 +6,9 @@ PINHOLE (fx, fy, cx, cy). The upper left corner of the picture is (0, 0), its fi
 
 **Images.** In text two lines each, the second one empty where written here: it would list image points. The pose takes world
 space to the camera's x right, y down, z into the view, as a unit quaternion (w first, Hamilton's) and a translation. All
-numbers have as many digits as bring back the same float64, and comments before them the values of which they were made, so that
-a camera comes back to the bit. Of text and binary in one folder the binary one counts, as for
-COLMAP.
+numbers have as many digits as bring back the same float64. Comments before them have the values of which they were made; a
+binary model, in which COLMAP leaves no room, has these in a file of their own beside it. Of text and binary in one folder the
+binary one counts, as for COLMAP.
 
 rigs and frames, new in COLMAP 3.12, are neither written nor read: without them each image is a frame of its own, as older
 readers take it, and with them the images repeat the poses that they compose.
@@ -17,14 +17,11 @@ Sources: COLMAP's doc/format.rst, doc/database.rst (pixel centres), src/colmap/s
 src/colmap/scene/reconstruction_io_text.cc and _binary.cc (what parts a line: a name ends at a space).
 """
 
-import contextlib
 import itertools
-import json
 import math
 import re
 import struct
 from collections.abc import Iterable, Iterator, Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -62,9 +59,9 @@ MODELS: dict[str, tuple[int, tuple[str, ...]]] = {
 }
 """Name → its number in binary files, and its parameters."""
 
-_EXACT = re.compile(r"^# virtual_pinhole (\d{1,18}) (\{[^\n]*+)$", re.MULTILINE)
 _STRAIGHT = ("f", "fx", "fy", "cx", "cy")
 _FILES = ("cameras", "images")
+NOTES = "virtual_pinhole.txt"
 _FOLDERS = ((), ("sparse", "0"), ("sparse",), ("colmap", "sparse", "0"))
 
 
@@ -91,26 +88,22 @@ def recognises(source: Source) -> bool:
 
 def read(source: Source, options: Options) -> list[Camera]:
     folder, suffix = _model(source)
-    files = [_file(folder / f"{name}{suffix}") for name in _FILES]
+    files = _files(source, folder, suffix)
     if suffix == ".bin":
         intrinsic, images = _binary_cameras(files[0]), [*_binary_images(files[1])]
     else:
         intrinsic, images = _text_cameras(files[0]), [*_text_images(files[1])]
-    exact = {} if suffix == ".bin" else _exact(files[1])
-    notes = (
-        ("The folder has the model as text, too: the binary one counts",) if _has(folder, ".txt") and suffix == ".bin" else ()
-    )
+    told = suffix == ".bin" and _files(source, folder, ".txt")
+    notes = ("The folder has the model as text, too: the binary one counts",) if told else ()
     planes = {}
     for image in images:
         if image.camera not in intrinsic:
-            raise InputError(f"{folder}: image {checks.shown(image.name)} is of camera {image.camera}, which is not there")
+            raise InputError(f"{source.name}: image {checks.shown(image.name)} is of camera {image.camera}, which is not there")
         if image.camera not in planes:
             planes[image.camera] = _plane(intrinsic[image.camera], f"camera {image.camera}", options)
     found = zip(images, naming.distinct([image.name for image in images]), _poses(images, planes), strict=True)
     cameras = []
     for image, name, (pinhole, more) in found:
-        if (same := own.stated(exact.get(image.number))) and _is_written_as(same, image, intrinsic[image.camera]):
-            pinhole, more = same, ()
         cameras.append(Camera(name, pinhole, True, (*notes, *planes[image.camera][1], *more), image.name))
     return cameras
 
@@ -126,33 +119,35 @@ def _poses(images: Sequence[_Image], planes: dict) -> list[tuple[Pinhole, tuple[
     return axes.pinholes(matrices, [planes[image.camera][0] for image in images], whats)
 
 
-def _model(source: Source) -> tuple[Path, str] | None:
-    """The folder of the model, and the suffix of its files."""
-    if source.path is None:
-        return None
+def notes_in(source: Source) -> list[str]:
+    folder, suffix = _model(source)
+    file = source.file(*folder, NOTES if suffix == ".bin" else f"{_FILES[1]}{suffix}")
+    return [file.text] if file else []
+
+
+def _model(source: Source) -> tuple[tuple[str, ...], str] | None:
+    """Where in a folder the model is, and the suffix of its files."""
     if not source.is_folder:
-        ours = source.path.stem in (*_FILES, "points3D", "rigs", "frames") and source.path.suffix in (".txt", ".bin")
-        return (source.path.parent, source.path.suffix) if ours and _has(source.path.parent, source.path.suffix) else None
-    for parts in _FOLDERS:
-        folder = source.path.joinpath(*parts)
+        path = source.path
+        ours = path and path.stem in (*_FILES, "points3D", "rigs", "frames") and path.suffix in (".txt", ".bin")
+        return ((), path.suffix) if ours and _files(source, (), path.suffix) else None
+    for folder in _FOLDERS:
         for suffix in (".bin", ".txt"):
-            if _has(folder, suffix):
-                if parts[-1:] == ("0",) and (others := [other.name for other in folder.parent.iterdir() if other.name != "0"]):
-                    numbers = [name for name in others if name.isdigit()]
-                    if numbers:
+            if _files(source, folder, suffix):
+                if source.path and folder[-1:] == ("0",):
+                    models = source.path.joinpath(*folder[:-1])
+                    if numbers := [other.name for other in models.iterdir() if other.name.isdigit() and other.name != "0"]:
                         raise InputError(
-                            f"{folder.parent} has {len(numbers) + 1} models, each a world of its own: give one of the folders"
+                            f"{models} has {len(numbers) + 1} models, each a world of its own: give one of the folders"
                         )
                 return folder, suffix
     return None
 
 
-def _has(folder: Path, suffix: str) -> bool:
-    return all((folder / f"{name}{suffix}").is_file() for name in _FILES)
-
-
-def _file(path: Path) -> Source:
-    return Source(path)
+def _files(source: Source, folder: Sequence[str], suffix: str) -> list[Source]:
+    """The files of cameras and images; none if one is not there."""
+    found = [source.file(*folder, f"{name}{suffix}") for name in _FILES]
+    return found if all(found) else []
 
 
 def _plane(intrinsic: _Intrinsics, what: str, options: Options) -> tuple[ViewPlane, tuple[str, ...]]:
@@ -218,21 +213,6 @@ def _text_images(source: Source) -> Iterator[_Image]:
                     f"line {number} of {source.name} is no list of image points, X Y POINT3D_ID: each image has two lines, "
                     "the second of which may be empty"
                 )
-
-
-def _exact(source: Source) -> dict[int, object]:
-    """The values that comments have of the images, by their numbers."""
-    found = {}
-    for line in _EXACT.finditer(source.text):
-        with contextlib.suppress(InputError):
-            found[int(line[1])] = Source(line[2]).document
-    return found
-
-
-def _is_written_as(pinhole: Pinhole, image: _Image, intrinsic: _Intrinsics) -> bool:
-    if pinhole.mirrored or intrinsics_of(pinhole) != intrinsic:
-        return False
-    return pose_of(pinhole) == (*image.quaternion, *image.translation)
 
 
 def _id(word: str, place: str) -> int:
@@ -317,18 +297,23 @@ def texts(cameras: Iterable[Camera]) -> dict[str, str]:
     cameras = naming.checked(cameras, "a COLMAP model")
     check_names(map(naming.image_of, cameras))
     numbers: dict[str, int] = {}
-    images, exact = [], []
+    images = []
     for number, camera in enumerate(cameras, start=1):
-        exact.append(f"# virtual_pinhole {number} {json.dumps(own.document(camera.pinhole))}\n")
         intrinsic = numbers.setdefault(_camera(camera.pinhole), len(numbers) + 1)
         images.append(f"{number} {_spaced(*pose_of(camera.pinhole))} {intrinsic} {naming.image_of(camera)}\n\n")
     return {
         "images.txt": "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME\n# POINTS2D[] as X Y POINT3D_ID\n"
-        + "".join([*exact, *images]),
+        + comments(cameras)
+        + "".join(images),
         "cameras.txt": "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n"
         + "".join(f"{number} {camera}\n" for camera, number in numbers.items()),
         "points3D.txt": "# POINT3D_ID X Y Z R G B ERROR TRACK[] as IMAGE_ID POINT2D_IDX\n",
     }
+
+
+def comments(cameras: Iterable[Camera]) -> str:
+    """A comment for each camera: its values."""
+    return "".join(f"# {own.comment(camera.pinhole)}\n" for camera in cameras)
 
 
 def intrinsics_of(pinhole: Pinhole) -> _Intrinsics:

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 
 from . import naming
 from .camera import Camera, Options
-from .colmap import MODELS, check_names, intrinsics_of, pose_of
+from .colmap import MODELS, NOTES, check_names, comments, intrinsics_of, pose_of
 
 TITLE = "COLMAP model, binary"
 SUFFIX = ""
 
 
-def write(cameras: Sequence[Camera], _options: Options) -> dict[str, bytes]:
+def write(cameras: Sequence[Camera], options: Options) -> dict[str, str | bytes]:
     cameras = naming.checked(cameras, "a COLMAP model")
     check_names(map(naming.image_of, cameras))
     numbers: dict[bytes, int] = {}
@@ -24,6 +24,7 @@ def write(cameras: Sequence[Camera], _options: Options) -> dict[str, bytes]:
         "images.bin": b"".join(images),
         "cameras.bin": struct.pack("<Q", len(numbers)) + b"".join(struct.pack("<I", i) + each for each, i in numbers.items()),
         "points3D.bin": struct.pack("<Q", 0),
+        NOTES: (f"# {options.remembered}\n" if options.remembered else "") + comments(cameras),
     }
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from .. import checks
 from ..errors import InputError
-from . import axes, naming
+from . import axes, naming, own
 from .camera import Camera, Options, not_a_pinhole
 from .source import Record, Source
 
@@ -77,17 +77,26 @@ def write(cameras: Sequence[Camera], options: Options) -> str:
     return json.dumps(document, indent=1, allow_nan=False) + "\n"
 
 
+def notes_in(source: Source) -> list[str]:
+    return [_json(source).text]
+
+
 def _document(source: Source) -> dict:
+    inner = _json(source)
+    if inner is not source and inner.json_problem:
+        raise InputError(f"the JSON in {source.name} is none ({inner.json_problem}): export it again")
+    return inner.document
+
+
+def _json(source: Source) -> Source:
+    """The JSON: the file itself, or what a GLB has of it."""
     data = source.data
     if data[:4] != b"glTF":
-        return source.document
+        return source
     if len(data) < 20 or data[16:20] != b"JSON":
         raise InputError(f"{source.name} is a GLB without its JSON: export it again, as glTF 2.0")
     (length,) = struct.unpack("<I", data[12:16])
-    inner = Source(data[20 : 20 + length].decode("utf-8", errors="replace"))
-    if inner.json_problem:
-        raise InputError(f"the JSON in {source.name} is none ({inner.json_problem}): export it again")
-    return inner.document
+    return Source(data[20 : 20 + length].decode("utf-8", errors="replace"))
 
 
 class _Worlds:
@@ -195,7 +204,13 @@ def _renamed(camera: Camera, name: str) -> Camera:
 def _node(index: int, camera: Camera) -> dict:
     rows = axes.camera_to_world(camera.pinhole)[:3]
     w, x, y, z = axes.quaternion(rows)
-    return {"name": camera.name, "camera": index, "translation": [row[3] for row in rows], "rotation": [x, y, z, w]}
+    return {
+        "name": camera.name,
+        "camera": index,
+        "translation": [row[3] for row in rows],
+        "rotation": [x, y, z, w],
+        "extras": {own.KEY: own.document(camera.pinhole)},
+    }
 
 
 def _perspective(camera: Camera) -> dict:
@@ -206,7 +221,7 @@ def _perspective(camera: Camera) -> dict:
     d_x, d_y = pinhole.distance
     lens = {
         "yfov": 2 * math.atan2(height / 2, d_y),
-        "aspectRatio": width * d_y / (height * d_x),
+        "aspectRatio": checks.number(f"the aspect of {camera.name}", width * d_y / (height * d_x)),
         "znear": _NEAR,
     }
     return {"name": camera.name, "type": "perspective", "perspective": lens, "extras": {"width": width, "height": height}}

@@ -686,6 +686,7 @@ def _written(camera: Camera) -> str:
     window = [-c_x / d_x * near, (width - c_x) / d_x * near, -c_y / d_y * near, (height - c_y) / d_y * near]
     vectors = ", ".join(texts.listed(vector, ", ") for vector in texts.look(pinhole))
     lines = [
+        f"// {own.comment(pinhole)}",
         f"windowSize = ({width}, {height});",
         f"glFrustum({texts.listed([*window, near, far], ', ')});",
         f"gluLookAt({vectors});",

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import InputError
-from . import axes, texts
+from . import axes, own, texts
 from .camera import Camera, Options
 from .source import Source
 
@@ -215,7 +215,8 @@ def view(camera: Camera) -> np.ndarray:
 def _written(camera: Camera) -> str:
     matrices = {"view": view(camera), "projection": projection(camera)}
     width, height = camera.pinhole.width, camera.pinhole.height
-    lines = [f"# {camera.name}: OpenGL, column vectors; near {_NEAR:g}, far {_FAR:g}", f"size = {width}, {height}"]
+    lines = [f"# {camera.name}: OpenGL, column vectors; near {_NEAR:g}, far {_FAR:g}", f"# {own.comment(camera.pinhole)}"]
+    lines += [f"size = {width}, {height}"]
     for name, matrix in matrices.items():
         rows = ",\n    ".join(f"[{texts.listed(row, ', ')}]" for row in matrix.tolist())
         lines.append(f"{name} = np.array([\n    {rows},\n])")

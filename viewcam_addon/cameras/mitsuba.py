@@ -20,7 +20,7 @@ import numpy as np
 
 from .. import checks
 from ..errors import InputError
-from . import axes, texts
+from . import axes, own, texts
 from .camera import Camera, Options, not_a_pinhole
 from .expressions import Expressions, Unknown, numbers
 from .source import Source
@@ -506,6 +506,7 @@ def _written(camera: Camera) -> str:
     e, l, up = (texts.listed(vector, ", ") for vector in texts.look(pinhole))
     return "\n".join(
         [
+            f"    <!-- {own.comment(pinhole)} -->",
             f'    <sensor type="perspective" id="{named}">',
             f'        <float name="fov" value="{texts.shortest(math.degrees(2 * math.atan(width / 2 / d_x)))}"/>',
             '        <string name="fov_axis" value="x"/>',

@@ -27,7 +27,7 @@ import numpy as np
 from .. import checks
 from ..errors import InputError
 from ..pinhole import ViewPlane
-from . import axes, distortion, naming
+from . import axes, distortion, naming, own
 from .camera import Camera, Options, not_a_pinhole
 from .source import Record, Source, flat, number, pixels
 
@@ -112,6 +112,7 @@ def _text(camera: Camera, options: Options) -> str:
         "%YAML:1.0",
         "---",
         *([f"# {options.remembered}"] if options.remembered else []),
+        f"# {own.comment(camera.pinhole)}",
         f"image_width: {camera.pinhole.width}",
         f"image_height: {camera.pinhole.height}",
         _matrix("camera_matrix", [[f_x, 0.0, c_x - half], [0.0, f_y, c_y - half], [0.0, 0.0, 1.0]]),

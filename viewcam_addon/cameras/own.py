@@ -11,6 +11,7 @@ plane: principal point in the middle, nothing mirrored, unless the text says so 
 Rejected: skipping words that are not understood, since one of them may turn the camera.
 """
 
+import contextlib
 import json
 import math
 import re
@@ -29,6 +30,10 @@ TITLE = "Virtual Pinhole's text, scene file or sidecar"
 SUFFIX = ".json"
 
 VECTORS = ("eye", "look_at", "up")
+KEY = "virtual_pinhole"
+"""Under which another format's file has a `document` beside its own numbers; or it stands so in a comment."""
+
+_DOCUMENTS = re.compile(rf"{KEY}[^\w{{]{{0,4}}+(?:\d{{1,18}}+ )?+(\{{[^{{}}]*+\}})")
 # What a text says, checked: eye, look_at, up; distance (one or two), width, height, principal_point, mirrored; fov, fov_x,
 # fov_y with their axis, degrees or radians as `_Angle` says.
 Values = dict[str, object]
@@ -112,16 +117,18 @@ def document(pinhole: Pinhole) -> dict:
     return document
 
 
-def stated(said: object) -> Pinhole | None:
-    """The camera whose values stand as a `document` beside a matrix that was made of them, which holds fewer of their digits;
-    None if they make none. It counts only while it is written as that matrix: if somebody changed that, the matrix counts.
-    """
-    if not isinstance(said, dict):
-        return None
-    try:
-        return Pinhole(**said)
-    except (InputError, TypeError):
-        return None
+def comment(pinhole: Pinhole) -> str:
+    """The values as a comment has them, without the signs of one."""
+    return f"{KEY} {json.dumps(document(pinhole))}"
+
+
+def pinholes_in(text: str) -> list[Pinhole]:
+    """The cameras whose values stand in a text, under KEY or in a `comment`; what makes none is passed over."""
+    found = []
+    for each in _DOCUMENTS.finditer(text):
+        with contextlib.suppress(ValueError, InputError, TypeError):
+            found.append(Pinhole(**json.loads(each[1])))
+    return found
 
 
 def camera(values: Values, options: Options, what: str) -> Camera:

@@ -23,7 +23,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..pinhole import Pinhole
-from . import axes, texts
+from . import axes, own, texts
 from .camera import Camera, Options, not_a_pinhole
 from .source import Source
 
@@ -320,6 +320,7 @@ def _written(camera: Camera) -> str:
     look = "  ".join(texts.listed(vector) for vector in texts.look(pinhole))
     return "\n".join(
         [
+            f"# {own.comment(pinhole)}",
             *mirror,
             f"LookAt {look}",
             f'Camera "perspective" "float fov" [ 90 ] "float screenwindow" [ {texts.listed(window)} ]',

@@ -21,7 +21,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import InputError
-from . import axes, texts
+from . import axes, own, texts
 from .camera import Camera, Options, not_a_pinhole
 from .expressions import Expressions, Unknown, numbers
 from .source import Source
@@ -291,7 +291,7 @@ def _written(camera: Camera) -> str:
     pinhole = camera.pinhole
     (d_x, d_y), (c_x, c_y), (width, height) = pinhole.distance, pinhole.principal_point, (pinhole.width, pinhole.height)
     e = texts.listed(pinhole.eye, ", ")
-    lines = [f"// +W{width} +H{height}", "camera {", f"  location <{e}>"]
+    lines = [f"// +W{width} +H{height}", f"// {own.comment(pinhole)}", "camera {", f"  location <{e}>"]
     if (c_x, c_y) == (width / 2, height / 2):
         across = texts.shortest(width / d_x)
         lines += [

@@ -30,9 +30,12 @@ _TRAILING_COMMA = re.compile(r'"(?:[^"\\]|\\.)*+"|,(?=\s*+[\]}])')
 
 
 class Source:
-    """What was given: `path` of a file or folder, or None for a text; `data`, its bytes; `text`, its characters."""
+    """What was given: `path` of a file or folder, or None for a text; `data`, its bytes; `text`, its characters.
 
-    def __init__(self, given: "str | Path | Source") -> None:
+    given : a text or its bytes, the Path of a file or folder, or the files of a folder by their names.
+    """
+
+    def __init__(self, given: "str | bytes | Path | Mapping[str, str | bytes]") -> None:
         self.path = given if isinstance(given, Path) else None
         self._given = given
 
@@ -43,7 +46,7 @@ class Source:
 
     @cached_property
     def is_folder(self) -> bool:
-        return self.path is not None and self.path.is_dir()
+        return self.path.is_dir() if self.path else isinstance(self._given, Mapping)
 
     @cached_property
     def data(self) -> bytes:
@@ -54,10 +57,10 @@ class Source:
         InputError
             if the file can't be read.
         """
-        if self.path is None:
-            return self._given.encode("utf-8", errors="replace")
         if self.is_folder:
             return b""
+        if self.path is None:
+            return self._given if isinstance(self._given, bytes) else self._given.encode("utf-8", errors="replace")
         try:
             if self.path.stat().st_size > _MOST_BYTES:
                 raise InputError(f"{self.path} is larger than {_MOST_BYTES >> 20} MiB: give the file of the cameras alone")
@@ -137,7 +140,8 @@ class Source:
     def file(self, *parts: str) -> "Source | None":
         """The file of that name in the folder, or beside this file; None if there is none."""
         if self.path is None:
-            return None
+            held = self._given.get("/".join(parts)) if self.is_folder else None
+            return None if held is None else Source(held)
         path = (self.path if self.is_folder else self.path.parent).joinpath(*parts)
         try:
             return Source(path) if path.is_file() else None
@@ -146,7 +150,7 @@ class Source:
 
     def files(self, pattern: str) -> Iterator["Source"]:
         """The files of the folder that fit a pattern, sorted."""
-        for path in sorted(self.path.glob(pattern)) if self.is_folder else ():
+        for path in sorted(self.path.glob(pattern)) if self.path and self.is_folder else ():
             if path.is_file():
                 yield Source(path)
 

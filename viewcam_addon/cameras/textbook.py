@@ -8,11 +8,12 @@ Source: K. Suffern, Ray Tracing from the Ground Up, chapter 9.
 
 from collections.abc import Sequence
 
-from . import texts
+from . import look_at, own, texts
 from .camera import Camera, Options
 from .unreal import centred_field_of_view
 
 TITLE = "textbook ray tracer (set_eye, set_lookat …)"
+READER = look_at
 SUFFIX = ".cpp"
 
 
@@ -24,6 +25,7 @@ def _written(camera: Camera) -> str:
     pinhole = camera.pinhole
     centred_field_of_view(camera, "a textbook ray tracer")
     lines = [
+        f"// {own.comment(pinhole)}",
         "Pinhole* camera = new Pinhole;",
         *(
             f"camera->set_{name}({texts.listed(vector, ', ')});"

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ..errors import InputError
-from . import axes, texts
+from . import axes, own, texts
 from .camera import Camera, Options, not_a_pinhole
 from .source import Record, Source
 
@@ -113,4 +113,5 @@ def _written(camera: Camera) -> dict:
             "width": width,
             "height": height,
         },
+        "userData": {own.KEY: own.document(pinhole)},
     }

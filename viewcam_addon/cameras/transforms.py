@@ -38,7 +38,6 @@ from .source import Record, Source, image_size
 TITLE = "transforms.json (NeRF, instant-ngp, nerfstudio)"
 SUFFIX = ".json"
 FILE = "transforms.json"
-EXACT = "virtual_pinhole"
 AABB_SCALES = tuple(2**exponent for exponent in range(8))
 
 _POSES = ("transform_matrix", "transform_matrix_start")
@@ -55,6 +54,10 @@ def recognises(source: Source) -> bool:
 
 def read(source: Source, options: Options) -> list[Camera]:
     return [camera for file in _files(source) for camera in _cameras(file, options)]
+
+
+def notes_in(source: Source) -> list[str]:
+    return [file.text for file in _files(source)]
 
 
 def write(cameras: Sequence[Camera], options: Options) -> str:
@@ -92,7 +95,7 @@ def document(cameras: Iterable[Camera], aabb_scale: int | None = None) -> dict[s
                 "file_path": naming.image_of(camera),
                 **({} if shared else picture),
                 "transform_matrix": axes.camera_to_world(camera.pinhole),
-                EXACT: own.document(camera.pinhole),
+                own.KEY: own.document(camera.pinhole),
             }
             for camera, picture in zip(cameras, pictures, strict=True)
         ],
@@ -137,29 +140,20 @@ def _cameras(source: Source, options: Options) -> list[Camera]:
     for frame, path, name in zip(frames, paths, naming.distinct(paths), strict=True):
         both = _merged(top, frame)
         known = tuple(
-            (key, str(value)) for key, value in both.values.items() if key not in ("frames", "file_path", EXACT, *_POSES)
+            (key, str(value)) for key, value in both.values.items() if key not in ("frames", "file_path", own.KEY, *_POSES)
         )
         key = known if "w" in both and "h" in both else (known, path)
         if key not in planes:
             planes[key] = _plane(both, source, path, options)
         plane, stated, notes = planes[key]
         matrix = _matrix(frame)
-        same = None if undone else own.stated(frame.get(EXACT))
-        if same and _is_written_as(same, matrix, both):
-            pinhole, more = same, ()
-        else:
-            pinhole, more = axes.pinhole(matrix if undone is None else undone(matrix), plane, frame.place)
+        pinhole, more = axes.pinhole(matrix if undone is None else undone(matrix), plane, frame.place)
         image = path if naming.has_suffix(path) or "file_path" not in frame else f"{path}.png"
         time = frame.number("time") if "time" in frame else None
         cameras.append(
             Camera(name, pinhole, stated, (*told, *notes, *more), image if "file_path" in frame else None, time=time)
         )
     return cameras
-
-
-def _is_written_as(pinhole: Pinhole, matrix: np.ndarray, both: Record) -> bool:
-    picture = _picture(pinhole)
-    return axes.camera_to_world(pinhole) == matrix.tolist() and all(both.get(key) == picture[key] for key in picture)
 
 
 def _merged(top: Record, frame: Record) -> Record:

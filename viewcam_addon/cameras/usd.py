@@ -19,7 +19,7 @@ import numpy as np
 from .. import checks
 from ..errors import InputError
 from ..pinhole import ViewPlane
-from . import axes
+from . import axes, own
 from .camera import Camera, Options, not_a_pinhole
 from .source import Source
 
@@ -68,6 +68,16 @@ def write(cameras: Sequence[Camera], options: Options) -> str:
         blocks.append(_prim(camera, _identifier(camera.name, taken)))
     told = f'    doc = "{options.remembered}"\n' if options.remembered else ""
     return f'#usda 1.0\n(\n{told}    metersPerUnit = 1\n    upAxis = "{up}"\n)\n\n' + "\n".join(blocks)
+
+
+def notes_in(source: Source) -> list[str]:
+    if source.text:
+        return [source.text]
+    from pxr import Usd
+
+    stage = _stage(source, Usd)
+    notes = (prim.GetCustomDataByKey(own.KEY) for prim in stage.Traverse())
+    return [stage.GetRootLayer().documentation, *(f"{own.KEY} {note}" for note in notes if note)]
 
 
 def _stage(source: Source, usd):
@@ -162,6 +172,9 @@ def _prim(camera: Camera, identifier: str) -> str:
     rows = ", ".join(f"({', '.join(map(repr, column))})" for column in columns)
     lines = [
         f'def Camera "{identifier}" (',
+        "    customData = {",
+        f"        string {own.KEY} = '{json.dumps(own.document(pinhole))}'",
+        "    }",
         f"    displayName = {json.dumps(camera.name, ensure_ascii=False)}",
         ")",
         "{",

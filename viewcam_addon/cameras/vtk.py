@@ -10,10 +10,11 @@ import math
 from collections.abc import Sequence
 
 from ..errors import InputError
-from . import naming, texts
+from . import look_at, naming, own, texts
 from .camera import Camera, Options
 
 TITLE = "VTK, PyVista"
+READER = look_at
 SUFFIX = ".py"
 
 
@@ -28,6 +29,7 @@ def _written(camera: Camera) -> str:
     if abs(d_x / d_y - 1) > 2.0**-23:
         raise InputError(f"VTK can't say that the pixels of {camera.name} are not square: change it, or write matrices")
     lines = [
+        f"# {own.comment(pinhole)}",
         f"windowSize = ({width}, {height})",
         *(
             f"camera.Set{name}({texts.listed(vector, ', ')})"
