@@ -63,7 +63,7 @@ def test_an_edit_passes_few_functions_and_none_calls_upward(posed_camera, name):
     functions, upward = walk_of(lambda: setattr(group, name, EDITS[name]))
     assert ("camera", "place") in functions
     assert not upward, upward
-    more = 4 if name == "distance" else 0  # it is told in which picture it is counted, which asks whether it is animated
+    more = 3 if name == "distance" else 0  # it is told in which picture it is counted, which asks whether it is animated
     assert len(functions) <= MOST + more, sorted(functions)
 
 

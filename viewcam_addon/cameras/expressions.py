@@ -289,8 +289,3 @@ def _angle_like(left: float, right: float) -> type:
 
 def _unknown(*values: object) -> Unknown:
     return next((value for value in values if isinstance(value, Unknown)), Unknown(0))
-
-
-def refuse_unknown(text: str, value: object, at: int, advice: str) -> None:
-    """Raise the InputError that shows what could not be computed."""
-    texts.fail(text, value.at if isinstance(value, Unknown) and value.at else at, advice)

@@ -81,7 +81,6 @@ class _Scene:
         self.at_camera: tuple | None = None
         self.lens: tuple[str, int, _Parameters] | None = None
         self.film: _Parameters | None = None
-        self.started_moving = 0
 
     def take(self, word: str, at: int, arguments: list, parameters: _Parameters) -> None:
         if word in _MOVES:

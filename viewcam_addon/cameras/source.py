@@ -322,10 +322,6 @@ def _not_finite(name: str) -> float:
     return float(name.replace("Infinity", "inf"))  # refused where a number is wanted
 
 
-class _NoXml(Exception):
-    pass
-
-
 def _parsed_xml(text: str) -> ElementTree.Element | None:
     builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate(namespace_separator="}")
     depth = 0

@@ -11,7 +11,6 @@ objects in the scene (they would be in the file, the outliner and the render).
 
 import functools
 from collections.abc import Iterable, Iterator
-from typing import ClassVar
 
 import bpy
 import numpy as np
@@ -23,6 +22,7 @@ from ...errors import InputError
 from ...pinhole import Pinhole, Triple
 from .. import camera as cameras
 from .. import datablocks, preferences
+from .panel_places import BelowProperties, BelowSidebar, SubPanel
 
 _NAMES = ("u", "v", "w")
 _LETTER_SIZE = 14  # points
@@ -220,15 +220,10 @@ def _pixel(point: Iterable[float], context: bpy.types.Context) -> Vector | None:
     return location_3d_to_region_2d(context.region, context.region_data, point)
 
 
-class _ShowPanel:
+class _ShowPanel(SubPanel):
     """The options of the diagram and the handles (gizmos.py)."""
 
     bl_label = "Show"
-    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return datablocks.camera_in(context) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         group, layout = datablocks.camera_in(context).virtual_pinhole, self.layout
@@ -242,18 +237,12 @@ class _ShowPanel:
         row.prop(group, "plane_at")
 
 
-class VIEWCAM_PT_data_show(_ShowPanel, bpy.types.Panel):
-    bl_space_type = "PROPERTIES"
-    bl_region_type = "WINDOW"
-    bl_context = "data"
-    bl_parent_id = "VIEWCAM_PT_data"
+class VIEWCAM_PT_data_show(_ShowPanel, BelowProperties, bpy.types.Panel):
+    pass
 
 
-class VIEWCAM_PT_sidebar_show(_ShowPanel, bpy.types.Panel):
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Pinhole"
-    bl_parent_id = "VIEWCAM_PT_sidebar"
+class VIEWCAM_PT_sidebar_show(_ShowPanel, BelowSidebar, bpy.types.Panel):
+    pass
 
 
 CLASSES = (VIEWCAM_PT_data_show, VIEWCAM_PT_sidebar_show)

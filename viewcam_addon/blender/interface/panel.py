@@ -10,7 +10,6 @@ go in (`iface`), and then not again.
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface
@@ -20,6 +19,7 @@ from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import datablocks, findings, hold, suspects, targets, versions
 from . import baking, clipboard, dragging, presets, readouts, scene_cameras
+from .panel_places import BelowProperties, BelowSidebar, CameraPanel, InProperties, InSidebar, SubPanel
 
 
 @dataclass(frozen=True)
@@ -35,13 +35,7 @@ class Notice:
         return findings.APPLY_AGAIN in self.sentence
 
 
-class _CameraPanel:
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return datablocks.camera_in(context) is not None
-
-
-class _MainPanel(_CameraPanel):
+class _MainPanel(CameraPanel):
     bl_label = "Virtual Pinhole"
 
     def draw_header(self, context: bpy.types.Context) -> None:
@@ -124,9 +118,8 @@ def _draw_notice(column: bpy.types.UILayout, notice: Notice, camera_object: bpy.
         column.operator(operator, text=text, translate=False).camera = camera_object.name
 
 
-class _MovePanel(_CameraPanel):
+class _MovePanel(SubPanel):
     bl_label = "Move"
-    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         name = datablocks.camera_in(context).name
@@ -173,9 +166,8 @@ _MOVES = {
 }
 
 
-class _ReadOutsPanel(_CameraPanel):
+class _ReadOutsPanel(SubPanel):
     bl_label = "Read-Outs"
-    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         column = self.layout.column(align=True)
@@ -247,53 +239,33 @@ def _draw_focus(blenders: bpy.types.Panel, context: bpy.types.Context) -> None:
         row.prop(camera_object.virtual_pinhole, "focus_on_look_at")
 
 
-class VIEWCAM_PT_data(_MainPanel, bpy.types.Panel):
-    bl_space_type = "PROPERTIES"
-    bl_region_type = "WINDOW"
-    bl_context = "data"
-
+class VIEWCAM_PT_data(_MainPanel, InProperties, bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         # The data may be a lamp's or a mesh's, and pinned data may have lost its object.
         return context.camera is not None and super().poll(context)
 
 
-class VIEWCAM_PT_sidebar(_MainPanel, bpy.types.Panel):
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Pinhole"
-
+class VIEWCAM_PT_sidebar(_MainPanel, InSidebar, bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return context.scene is not None
 
 
-class VIEWCAM_PT_data_move(_MovePanel, bpy.types.Panel):
-    bl_space_type = "PROPERTIES"
-    bl_region_type = "WINDOW"
-    bl_context = "data"
-    bl_parent_id = "VIEWCAM_PT_data"
+class VIEWCAM_PT_data_move(_MovePanel, BelowProperties, bpy.types.Panel):
+    pass
 
 
-class VIEWCAM_PT_sidebar_move(_MovePanel, bpy.types.Panel):
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Pinhole"
-    bl_parent_id = "VIEWCAM_PT_sidebar"
+class VIEWCAM_PT_sidebar_move(_MovePanel, BelowSidebar, bpy.types.Panel):
+    pass
 
 
-class VIEWCAM_PT_data_readouts(_ReadOutsPanel, bpy.types.Panel):
-    bl_space_type = "PROPERTIES"
-    bl_region_type = "WINDOW"
-    bl_context = "data"
-    bl_parent_id = "VIEWCAM_PT_data"
+class VIEWCAM_PT_data_readouts(_ReadOutsPanel, BelowProperties, bpy.types.Panel):
+    pass
 
 
-class VIEWCAM_PT_sidebar_readouts(_ReadOutsPanel, bpy.types.Panel):
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Pinhole"
-    bl_parent_id = "VIEWCAM_PT_sidebar"
+class VIEWCAM_PT_sidebar_readouts(_ReadOutsPanel, BelowSidebar, bpy.types.Panel):
+    pass
 
 
 CLASSES = (

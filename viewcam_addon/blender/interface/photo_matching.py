@@ -25,6 +25,7 @@ from .. import camera as cameras
 from .. import datablocks, targets
 from . import kept, overlay
 from .operators import CameraOperator
+from .panel_places import BelowSidebar, SubPanel
 
 EDGES, RECTANGLE, POINTS = "EDGES", "RECTANGLE", "POINTS"
 _AXES = "XYZ"
@@ -367,17 +368,8 @@ def _draw() -> None:
         blf.disable(0, blf.SHADOW)
 
 
-class VIEWCAM_PT_sidebar_match(bpy.types.Panel):
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Pinhole"
+class VIEWCAM_PT_sidebar_match(SubPanel, BelowSidebar, bpy.types.Panel):
     bl_label = "Photo Match"
-    bl_parent_id = "VIEWCAM_PT_sidebar"
-    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return datablocks.camera_in(context) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, context.window_manager.virtual_pinhole_match

@@ -7,7 +7,6 @@ playback), Cancel, another file, turning the add-on off and leaving Blender end 
 
 import atexit
 from pathlib import Path
-from typing import ClassVar
 
 import bpy
 from bpy.app.handlers import persistent
@@ -18,6 +17,7 @@ from .. import datablocks, preferences
 from ..render_settings import LEVELS
 from . import icons, proof_image, readouts
 from .comparing import Outcome, RunningComparison
+from .panel_places import BelowProperties, BelowSidebar, SubPanel
 
 _SECONDS = 0.2  # between two looks
 _MOST_LACKING = 4  # objects that the panel names
@@ -262,13 +262,8 @@ class VIEWCAM_OT_open_report(bpy.types.Operator):
         return bpy.ops.wm.url_open(url=_latest.report.absolute().as_uri())
 
 
-class _ProofPanel:
+class _ProofPanel(SubPanel):
     bl_label = "Proof"
-    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return datablocks.camera_in(context) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         camera_object = datablocks.camera_in(context)
@@ -283,18 +278,12 @@ class _ProofPanel:
             _draw_outcome(column, _latest, camera_object, context)
 
 
-class VIEWCAM_PT_data_proof(_ProofPanel, bpy.types.Panel):
-    bl_space_type = "PROPERTIES"
-    bl_region_type = "WINDOW"
-    bl_context = "data"
-    bl_parent_id = "VIEWCAM_PT_data"
+class VIEWCAM_PT_data_proof(_ProofPanel, BelowProperties, bpy.types.Panel):
+    pass
 
 
-class VIEWCAM_PT_sidebar_proof(_ProofPanel, bpy.types.Panel):
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Pinhole"
-    bl_parent_id = "VIEWCAM_PT_sidebar"
+class VIEWCAM_PT_sidebar_proof(_ProofPanel, BelowSidebar, bpy.types.Panel):
+    pass
 
 
 def _draw_settings(layout: bpy.types.UILayout, settings: ProofSettings) -> None:

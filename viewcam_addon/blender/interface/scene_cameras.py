@@ -13,6 +13,7 @@ from ...errors import InputError
 from .. import camera as cameras
 from .. import datablocks, own_picture, preferences
 from . import file_menu, viewport
+from .panel_places import BelowProperties, BelowSidebar, SubPanel
 
 _NAME = "Virtual Pinhole"
 _FROM = (7.0, -7.0, 5.0)  # a new camera's eye, from the point that it looks at
@@ -205,13 +206,8 @@ def draw_none(layout: bpy.types.UILayout) -> None:
     column.operator("viewcam.add_camera", text="Add from View", icon="VIEW_CAMERA").from_view = True
 
 
-class _PicturePanel:
+class _PicturePanel(SubPanel):
     bl_label = "Own Picture"
-    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return datablocks.camera_in(context) is not None
 
     def draw_header(self, context: bpy.types.Context) -> None:
         self.layout.prop(datablocks.camera_in(context).virtual_pinhole_picture, "use", text="")
@@ -245,31 +241,16 @@ _LABELS = {
 }
 
 
-class VIEWCAM_PT_data_picture(_PicturePanel, bpy.types.Panel):
-    bl_space_type = "PROPERTIES"
-    bl_region_type = "WINDOW"
-    bl_context = "data"
-    bl_parent_id = "VIEWCAM_PT_data"
+class VIEWCAM_PT_data_picture(_PicturePanel, BelowProperties, bpy.types.Panel):
+    pass
 
 
-class VIEWCAM_PT_sidebar_picture(_PicturePanel, bpy.types.Panel):
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Pinhole"
-    bl_parent_id = "VIEWCAM_PT_sidebar"
+class VIEWCAM_PT_sidebar_picture(_PicturePanel, BelowSidebar, bpy.types.Panel):
+    pass
 
 
-class VIEWCAM_PT_sidebar_cameras(bpy.types.Panel):
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Pinhole"
+class VIEWCAM_PT_sidebar_cameras(SubPanel, BelowSidebar, bpy.types.Panel):
     bl_label = "Cameras"
-    bl_parent_id = "VIEWCAM_PT_sidebar"
-    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return datablocks.camera_in(context) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

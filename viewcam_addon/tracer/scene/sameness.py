@@ -19,11 +19,6 @@ def same_things(one: Scene, other: Scene) -> bool:
     return same(one.objects, other.objects) and same(one.geometries, other.geometries)
 
 
-def same_materials(one: Scene, other: Scene) -> bool:
-    """Whether the names of materials mean the same."""
-    return same(one.materials, other.materials) and same(one.images, other.images)
-
-
 def same(one: object, other: object) -> bool:
     """Whether two values, of those that scenes are made of, are the same."""
     if one is other:
