@@ -55,7 +55,7 @@ ROOMS = {
     "shots": "errors checks files terminal pinhole moves tracer",
     "batch": "errors checks files events html_page child_process pinhole image cameras datasets comparison tracer shots",
     "blender": (
-        "errors checks files terminal html_page child_process pinhole roll rotation moves diagram photo_match image "
+        "errors checks files terminal html_page child_process png pinhole roll rotation moves diagram photo_match image "
         "intrinsics camera_values cameras comparison tracer shots batch"
     ),
     "commands": (

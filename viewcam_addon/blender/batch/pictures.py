@@ -11,9 +11,10 @@ from pathlib import Path
 
 import bpy
 
+from ... import png
 from ...errors import InputError
 from .. import versions
-from ..rendering import exr, png
+from ..rendering import exr
 from ..rendering.cycles import override_whole
 from ..temporary_settings import Overrides
 

@@ -5,7 +5,7 @@ import zlib
 
 import pytest
 
-from viewcam_addon.blender.rendering.png import is_whole, strip
+from viewcam_addon.png import is_whole, strip
 
 
 def chunk(kind, data):
