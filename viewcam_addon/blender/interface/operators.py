@@ -15,10 +15,8 @@ from .. import datablocks
 from . import readouts
 
 
-class CameraOperator:
-    """What all of them share. A subclass says in `work(camera_object, scene)` what it does."""
-
-    bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
+class NamesCamera:
+    """An operator that is told which camera it is for."""
 
     camera: bpy.props.StringProperty(
         name="Camera",
@@ -26,16 +24,22 @@ class CameraOperator:
         options={"SKIP_SAVE"},
     )
 
+    def found(self, context: bpy.types.Context) -> bpy.types.Object | None:
+        """The object that is meant, if there is one."""
+        return bpy.data.objects.get(self.camera) if self.camera else datablocks.camera_in(context)
+
+
+class CameraOperator(NamesCamera):
+    """What all of them share. A subclass says in `work(camera_object, scene)` what it does."""
+
+    bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if context.scene and len(bpy.data.cameras):
             return True
         cls.poll_message_set("There is no camera")
         return False
-
-    def found(self, context: bpy.types.Context) -> bpy.types.Object | None:
-        """The object that is meant, if there is one."""
-        return bpy.data.objects.get(self.camera) if self.camera else datablocks.camera_in(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:

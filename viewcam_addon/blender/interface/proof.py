@@ -17,6 +17,7 @@ from .. import datablocks, preferences
 from ..render_settings import LEVELS
 from . import icons, proof_image, readouts
 from .comparing import Outcome, RunningComparison
+from .operators import NamesCamera
 from .panel_places import BelowProperties, BelowSidebar, SubPanel
 
 _SECONDS = 0.2  # between two looks
@@ -119,7 +120,7 @@ class ProofSettings(bpy.types.PropertyGroup):
     )
 
 
-class VIEWCAM_OT_compare_with_cycles(bpy.types.Operator):
+class VIEWCAM_OT_compare_with_cycles(NamesCamera, bpy.types.Operator):
     bl_idname = "viewcam.compare_with_cycles"
     bl_label = "Compare with Cycles"
     bl_description = (
@@ -127,11 +128,6 @@ class VIEWCAM_OT_compare_with_cycles(bpy.types.Operator):
         "differ. The file stays as it is, and its unsaved edits count"
     )
 
-    camera: bpy.props.StringProperty(
-        name="Camera",
-        description="Name of the camera object, or empty for the active or the scene's camera",
-        options={"SKIP_SAVE"},
-    )
     _shown = ("", 0)  # the step and the second that were drawn last
 
     @classmethod
@@ -190,7 +186,7 @@ class VIEWCAM_OT_compare_with_cycles(bpy.types.Operator):
 
     def _begins(self, context: bpy.types.Context) -> bool:
         try:
-            found = bpy.data.objects.get(self.camera) if self.camera else datablocks.camera_in(context)
+            found = self.found(context)
             if found is None:
                 raise InputError(f"there is no camera {self.camera!r}: name another")
             _begin(found, context)
