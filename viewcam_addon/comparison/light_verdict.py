@@ -101,12 +101,34 @@ class RadianceComparison:
 
     @property
     def sentence(self) -> str:
-        """The verdict in one sentence."""
-        return sentence(self)
+        """The verdict in one sentence, which says where and by how much where there is a difference."""
+        combined = self.rows[0]
+        if not self.passed:
+            worst = [row for row in self.rows if not row.ok]
+            others = f"; {_listed([row.name for row in worst[1:]])} too" if len(worst) > 1 else ""
+            return f"Different here: {_difference(worst[0])}{_hint(worst[0])}{others}."
+        if not self.is_noisy:
+            row = combined.noise_free
+            return (
+                f"The same picture: over {row.count:,} pixels without noise the light differs by {row.values[0]:.1e} of its "
+                f"value in the median and by at most {row.values[-1]:.1e}, {percent(row.worst[1])} of what float32 allows"
+                f"{_edges(combined)}."
+            )
+        return (
+            f"The same within noise at {samples_words(self)}: no pixel and no tile differs by more than chance; "
+            f"{_mean_words(combined)}."
+        )
 
     def lines(self) -> list[str]:
-        """The result for the shell: a line for each quantity, and the verdict."""
-        return lines(self)
+        """A line for each quantity, aligned, what an eye sees, and the verdict last."""
+        table = _noisy_lines(self) if self.is_noisy else _noise_free_lines(self)
+        if self.equal:
+            table.append(f"{'To the last bit':<17}{', '.join(self.equal)}")
+        seen = self.appearance
+        expected = "" if seen.expected_relmse is None else f", of which noise explains {seen.expected_relmse:.2e}"
+        flip = "needs the package flip-evaluator" if seen.flip is None else f"{seen.flip:.4f}"
+        table.append(f"{'To the eye':<17}relMSE {seen.relmse:.2e}{expected}; FLIP {flip}")
+        return [*table, self.sentence]
 
     def to_json(self) -> dict:
         """Everything but the pictures, as plain JSON values."""
@@ -122,38 +144,6 @@ class RadianceComparison:
             "equal": list(self.equal),
             "appearance": asdict(self.appearance),
         }
-
-
-def sentence(comparison: RadianceComparison) -> str:
-    """The verdict in one sentence, which says where and by how much where there is a difference."""
-    combined = comparison.rows[0]
-    if not comparison.passed:
-        worst = [row for row in comparison.rows if not row.ok]
-        others = f"; {_listed([row.name for row in worst[1:]])} too" if len(worst) > 1 else ""
-        return f"Different here: {_difference(worst[0])}{_hint(worst[0])}{others}."
-    if not comparison.is_noisy:
-        row = combined.noise_free
-        return (
-            f"The same picture: over {row.count:,} pixels without noise the light differs by {row.values[0]:.1e} of its value "
-            f"in the median and by at most {row.values[-1]:.1e}, {percent(row.worst[1])} of what float32 allows"
-            f"{_edges(combined)}."
-        )
-    return (
-        f"The same within noise at {samples_words(comparison)}: no pixel and no tile differs by more than chance; "
-        f"{_mean_words(combined)}."
-    )
-
-
-def lines(comparison: RadianceComparison) -> list[str]:
-    """A line for each quantity, aligned, what an eye sees, and the verdict last."""
-    table = _noisy_lines(comparison) if comparison.is_noisy else _noise_free_lines(comparison)
-    if comparison.equal:
-        table.append(f"{'To the last bit':<17}{', '.join(comparison.equal)}")
-    seen = comparison.appearance
-    expected = "" if seen.expected_relmse is None else f", of which noise explains {seen.expected_relmse:.2e}"
-    flip = "needs the package flip-evaluator" if seen.flip is None else f"{seen.flip:.4f}"
-    table.append(f"{'To the eye':<17}relMSE {seen.relmse:.2e}{expected}; FLIP {flip}")
-    return [*table, comparison.sentence]
 
 
 def samples_words(comparison: RadianceComparison) -> str:

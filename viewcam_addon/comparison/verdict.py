@@ -68,12 +68,47 @@ class GeometryComparison:
 
     @property
     def sentence(self) -> str:
-        """The verdict in one sentence."""
-        return sentence(self)
+        """The verdict in one sentence, which names the gravest fault where there is one."""
+        if self.passed:
+            return _praise(self)
+        if self.hits == (0, 0):
+            return "Nothing to compare: no pixel of either picture shows an object, point the camera at something."
+        return "Not the same picture: " + "; ".join(_faults(self)[:_MOST_FAULTS]) + "."
 
     def lines(self) -> list[str]:
-        """The result for the shell: a line for each pass, and the verdict."""
-        return lines(self)
+        """One line for each pass, aligned, and the verdict last."""
+        head = (
+            f"{'pass':<16}{'pixels':>11}"
+            + "".join(f"{percentile_name(p):>10}" for p in PERCENTILES)
+            + f"  {'unit':<10}{'of tolerance':<16}"
+        )
+        table = [head.rstrip(), *(_row_line(row) for row in self.rows)]
+        mismatches = self.mismatches
+        table.append(
+            f"{'Mismatches':<16}{len(mismatches.kinds):>11,}  {_explained(self)}; "
+            f"unexplained {mismatches.unexplained_count} of "
+            f"{self.allowed_unexplained} allowed  {mark(self.mismatches_ok)}"
+        )
+        table += [
+            f"  {kind:<14}{count:>11,}  {explained:,} explained"
+            for kind, (count, explained) in mismatches.counts().items()
+            if count
+        ]
+        if self.systematic:
+            s = self.systematic
+            table.append(
+                f"{'Systematic':<16}{'':>11}  shift {s.shift_x:+.1e}, {s.shift_y:+.1e} px; zoom {s.zoom_x:+.1e}, "
+                f"{s.zoom_y:+.1e}; roll {s.roll:+.1e} rad; mean {s.mean:.1e} of {s.tolerance:.1e} px  {mark(s.ok)}"
+            )
+        if self.conversion:
+            c = self.conversion
+            table.append(
+                f"{'Conversion':<16}{'':>11}  stated camera against the one read back: {c.largest:.1e} px, {c.share:.0%} of "
+                f"what float32 storage allows  {mark(c.ok)}"
+            )
+        if self.far_from_origin:
+            table.append(self.far_from_origin.sentence)
+        return [*table, self.sentence]
 
     def to_json(self) -> dict:
         """Everything but the maps, as plain JSON values."""
@@ -98,51 +133,6 @@ class GeometryComparison:
 def allowed_unexplained(pinhole: Pinhole) -> int:
     """How many mismatches may stay unexplained in a picture of this size."""
     return pinhole.width * pinhole.height // PIXELS_PER_UNEXPLAINED
-
-
-def sentence(comparison: GeometryComparison) -> str:
-    """The verdict in one sentence, which names the gravest fault where there is one."""
-    if comparison.passed:
-        return _praise(comparison)
-    if comparison.hits == (0, 0):
-        return "Nothing to compare: no pixel of either picture shows an object, point the camera at something."
-    return "Not the same picture: " + "; ".join(_faults(comparison)[:_MOST_FAULTS]) + "."
-
-
-def lines(comparison: GeometryComparison) -> list[str]:
-    """One line for each pass, aligned, and the verdict last."""
-    head = (
-        f"{'pass':<16}{'pixels':>11}"
-        + "".join(f"{percentile_name(p):>10}" for p in PERCENTILES)
-        + f"  {'unit':<10}{'of tolerance':<16}"
-    )
-    table = [head.rstrip(), *(_row_line(row) for row in comparison.rows)]
-    mismatches = comparison.mismatches
-    table.append(
-        f"{'Mismatches':<16}{len(mismatches.kinds):>11,}  {_explained(comparison)}; "
-        f"unexplained {mismatches.unexplained_count} of "
-        f"{comparison.allowed_unexplained} allowed  {mark(comparison.mismatches_ok)}"
-    )
-    table += [
-        f"  {kind:<14}{count:>11,}  {explained:,} explained"
-        for kind, (count, explained) in mismatches.counts().items()
-        if count
-    ]
-    if comparison.systematic:
-        s = comparison.systematic
-        table.append(
-            f"{'Systematic':<16}{'':>11}  shift {s.shift_x:+.1e}, {s.shift_y:+.1e} px; zoom {s.zoom_x:+.1e}, {s.zoom_y:+.1e}; "
-            f"roll {s.roll:+.1e} rad; mean {s.mean:.1e} of {s.tolerance:.1e} px  {mark(s.ok)}"
-        )
-    if comparison.conversion:
-        c = comparison.conversion
-        table.append(
-            f"{'Conversion':<16}{'':>11}  stated camera against the one read back: {c.largest:.1e} px, {c.share:.0%} of what "
-            f"float32 storage allows  {mark(c.ok)}"
-        )
-    if comparison.far_from_origin:
-        table.append(comparison.far_from_origin.sentence)
-    return [*table, comparison.sentence]
 
 
 def _row_line(row: PassErrors) -> str:
