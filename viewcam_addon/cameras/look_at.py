@@ -40,8 +40,8 @@ SUFFIX = ".txt"
 _COMMENT = r"//[^\n]*+|/\*.*?(?:\*/|\Z)|#(?!\s*+define)[^\n]*+"
 _DEFINE = re.compile(r"#\s*+define\s++(\w++)\s++")
 _PATH = r"[A-Za-z_$][\w$]*+(?:(?:\s*+\(\s*+\))?+\s*+(?:\.|->|::)\s*+[A-Za-z_$][\w$]*+)*+"
-_STATEMENT = re.compile(rf"(?<![\w$.])(?<!->)(?<!::)({_PATH})\s*+(?:(=)(?!=)|(\()|(:)(?!:)|(\{{))")
-_PART = re.compile(r"\(\s*\)|\.|->|::|\s")
+_STATEMENT = re.compile(rf"(?<![\w$.])(?<!->)(?<!::)({_PATH})\s*+(=(?!=)|\(|:(?!:)|\{{)")
+_PARTS = re.compile(r"[\w$]++")
 _MADE = re.compile(r"(?<![\w$])([\w$]++)\s*+[=:]\s*+new\s++(?:THREE\s*+\.\s*+)?+PerspectiveCamera\b")
 _MOST_STATEMENTS = 10_000
 _IS_CODE = re.compile(r"\w\s*+\(\s*+[-\w.]|;\s*+$|\w\.\w++\s*+[=(]", re.MULTILINE)
@@ -200,13 +200,16 @@ class _Code:
 
     def __init__(self, text: str) -> None:
         self.text = texts.without(_COMMENT, text).replace("−", "-")
-        self.statements = [
-            (_PART.sub(" ", found[1]).split(), found[2] or found[3] or found[4] or found[5], found.end(), found.start())
-            for found in _STATEMENT.finditer(self.text)
-        ]
+        # The parts of a name, what follows it, where that ends, and where the name stands.
+        self.statements: list[tuple[list[str], str, int, int]] = []
         self.assigned: dict[str, list[int]] = {}
-        for parts, sign, at, _ in self.statements:
-            if sign == "=" or (sign in "({" and len(parts) == 1):
+        parts_of: dict[str, list[str]] = {}
+        for found in _STATEMENT.finditer(self.text):
+            path, sign = found.groups()
+            parts = parts_of.get(path) or parts_of.setdefault(path, _PARTS.findall(path))
+            at = found.end()
+            self.statements.append((parts, sign, at, found.start()))
+            if sign == "=" or (sign != ":" and len(parts) == 1):
                 self.assigned.setdefault(parts[-1], []).append(at if sign == "=" else at - 1)
         for found in _DEFINE.finditer(self.text):
             self.assigned.setdefault(found[1], []).append(found.end())
@@ -307,7 +310,7 @@ class _Code:
         if other := _OTHER_LENSES.search(self.text):
             not_a_pinhole("the text's camera", f"a {other[1] or other[2]}")
         for changed in _CHANGED.finditer(self.text):
-            parts = _PART.sub(" ", changed[1]).split()
+            parts = _PARTS.findall(changed[1])
             if self._is_camera(parts[:1]) and self._role(parts, "=") not in (None, "width", "height", "size"):
                 texts.fail(self.text, changed.start(), "this moves the camera from where it was, write where it is then")
         if moved := _VIEW_MOVED.search(self.text):

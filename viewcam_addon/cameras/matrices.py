@@ -65,6 +65,8 @@ def _found(text: str) -> list[tuple[str, list[float], int]]:
         numbers = _sixteen(text, _BEFORE.match(text, name.end()).end())
         if role and numbers:
             result.append((role, numbers, name.start()))
+            if len(result) > _MOST:
+                break
     return result
 
 
@@ -87,7 +89,7 @@ def read(source: Source, options: Options) -> list[Camera]:
     text = source.text
     given = _found(text)
     if len(given) > _MOST:
-        raise InputError(f"there are {len(given)} matrices: copy one camera's view and projection")
+        raise InputError(f"there are more than {_MOST} matrices: copy one camera's view and projection")
     found: dict[str, np.ndarray] = {}
     like_rows: bool | None = None  # where a view does not tell the order, it is the projection's
     for role, numbers, at in sorted(given, key=lambda matrix: matrix[0] == "view"):

@@ -60,11 +60,12 @@ def _has_statement(text: str) -> bool:
 def read(source: Source, options: Options) -> list[Camera]:
     text = texts.without(_COMMENT, source.text)
     scene = _Scene(text)
-    for word, at, arguments, parameters in _statements(text):
-        if word == "WorldBegin":
-            break
-        scene.take(word, at, arguments, parameters)
-    return [scene.camera(options)]
+    with np.errstate(all="ignore"):  # a transform beyond all numbers is refused where the camera takes it
+        for word, at, arguments, parameters in _statements(text):
+            if word == "WorldBegin":
+                break
+            scene.take(word, at, arguments, parameters)
+        return [scene.camera(options)]
 
 
 class _Scene:
@@ -72,7 +73,7 @@ class _Scene:
 
     def __init__(self, text: str) -> None:
         self.text = text
-        self.transform = np.eye(4)
+        self.transform = _NOTHING
         self.kept: list[np.ndarray] = []
         self.named: dict[str, np.ndarray] = {}
         self.is_lux = bool(_LUX.search(text))
@@ -86,18 +87,18 @@ class _Scene:
         if word in _MOVES:
             self._move(word, at, arguments)
         elif word in ("AttributeBegin", "TransformBegin"):
-            self.kept.append(self.transform.copy())
+            self.kept.append(self.transform)
         elif word in ("AttributeEnd", "TransformEnd"):
             self.transform = self.kept.pop() if self.kept else self.transform
             self.look = None
         elif word == "CoordinateSystem" and arguments:
-            self.named[str(arguments[0])] = self.transform.copy()
+            self.named[str(arguments[0])] = self.transform
         elif word == "CoordSysTransform":
             if arguments == ["camera"] and self.at_camera:
-                self.named["camera"] = np.linalg.inv(self.at_camera[0])
+                self.named["camera"] = np.linalg.inv(self._invertible(self.at_camera[0], at))
             if not arguments or arguments[0] not in self.named:
                 texts.fail(self.text, at, "name a CoordinateSystem that stands before it")
-            self.transform, self.look = self.named[arguments[0]].copy(), None
+            self.transform, self.look = self.named[arguments[0]], None
         elif word == "ActiveTransform" and arguments[:1] not in (["All"], []):
             texts.fail(self.text, at, "the camera moves while the shutter is open, give one transform for All")
         elif word in _NOT_READ and self.lens is None:
@@ -106,7 +107,7 @@ class _Scene:
             if not arguments or not isinstance(arguments[0], str):
                 texts.fail(self.text, at, 'give its kind, as in Camera "perspective"')
             self.lens = (arguments[0], at, parameters)
-            self.at_camera = (self.transform.copy(), self.look, self.mirrored)
+            self.at_camera = (self.transform, self.look, self.mirrored)
         elif word == "Film":
             self.film = parameters
 
@@ -114,21 +115,19 @@ class _Scene:
         if len(given) != _MOVES[word] or not all(isinstance(x, float) for x in given):
             texts.fail(self.text, at, f"give {_MOVES[word]} finite numbers for {word}")
         if word == "LookAt":
-            diagonal = self.transform.tolist()
-            mirrors = diagonal == np.diag([-1.0, 1, 1, 1]).tolist()
-            alone = mirrors or diagonal == np.eye(4).tolist()
+            before = self.transform.tolist()
+            mirrors = before == _MIRROR.tolist()
+            alone = mirrors or before == _NOTHING.tolist()
             self.look, self.mirrored = (given if alone else None), mirrors == self.is_lux
         else:
             self.look = None
         step = _matrix(word, given, self.text, at)
         if word == "LookAt" and self.is_lux:
-            step = np.diag([-1.0, 1, 1, 1]) @ step
+            step = _MIRROR @ step
         self.transform = step if word in ("Transform", "Identity") else self.transform @ step
-        if not np.isfinite(self.transform).all() or abs(np.linalg.det(self.transform[:3, :3])) < 1e-30:
-            texts.fail(self.text, at, "the transform up to here is flat or beyond all numbers, change it")
 
     def camera(self, options: Options) -> Camera:
-        kind, _, parameters = self.lens or ("perspective", 0, {})
+        kind, at, parameters = self.lens or ("perspective", 0, {})
         if kind != "perspective":
             not_a_pinhole(f"pbrt's Camera {kind[:40]!r}", f"{'of a real lens' if kind == 'realistic' else kind[:40]}")
         matrix, look, mirrored = self.at_camera or (self.transform, self.look, self.mirrored)
@@ -152,7 +151,7 @@ class _Scene:
             plane = axes.view_plane(d_x, d_y, c_x, c_top, (film.width, film.height))
             pinhole = texts.posed(look[0:3], look[3:6], look[6:9], plane, mirrored)
         else:
-            to_pixels = np.array([[d_x, 0, c_x], [0, -d_y, c_top], [0, 0, 1]]) @ matrix[:3, :3]
+            to_pixels = np.array([[d_x, 0, c_x], [0, -d_y, c_top], [0, 0, 1]]) @ self._invertible(matrix, at)[:3, :3]
             eye = np.linalg.solve(matrix[:3, :3], -matrix[:3, 3])
             pinhole, more = texts.projected(to_pixels, tuple(eye.tolist()), (film.width, film.height), "pbrt's camera")
             notes += more
@@ -161,6 +160,11 @@ class _Scene:
             pinhole = pinhole.cropped(x0, film.height - y1, x1 - x0, y1 - y0)
         camera = Camera("Camera", pinhole, film.is_stated, (*film.notes, *notes))
         return texts.mirroring(camera, "LuxRender" if self.is_lux else "pbrt")
+
+    def _invertible(self, matrix: np.ndarray, at: int) -> np.ndarray:
+        if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) < 1e-30:
+            texts.fail(self.text, at, "the transform up to here is flat or beyond all numbers, change it")
+        return matrix
 
     def _film(self, options: Options) -> tuple[texts.Film, tuple[int, int, int, int] | None]:
         """The film, and the pixels of it that are kept: x0, x1, y0, y1 from the top left."""
@@ -188,6 +192,7 @@ class _Scene:
         return film, crop
 
 
+_NOTHING, _MIRROR = np.eye(4), np.diag([-1.0, 1.0, 1.0, 1.0])
 _OF_LENS = {"fov", "halffov", "screenwindow", "frameaspectratio", "lensradius"}
 
 

@@ -24,6 +24,7 @@ MIRRORED = (
     "take it unmirrored if the scene was mirrored instead"
 )
 
+_UNSAID = re.compile(r"[\s_$-]++")
 _GAP = re.compile(r"[\s,;|()\[\]{}<>'\"]*+")
 _NUMBER = re.compile(r"[-+]?+(?:\d++(?:\.\d*+)?+|\.\d++)(?:[eE][-+]?+\d++)?+")
 _ASKEW, _NOTED = 2e-3, 1e-5  # cosine between the picture's sides: refused from, told from
@@ -31,7 +32,7 @@ _ASKEW, _NOTED = 2e-3, 1e-5  # cosine between the picture's sides: refused from,
 
 def plain(name: str) -> str:
     """A name without capitals, blanks, hyphens and underscores."""
-    return re.sub(r"[\s_$-]", "", name).lower()
+    return _UNSAID.sub("", name).lower()
 
 
 def fail(text: str, at: int, advice: str) -> NoReturn:
@@ -45,12 +46,15 @@ def fail(text: str, at: int, advice: str) -> NoReturn:
 
 def without(comments: str, text: str) -> str:
     """The text with blanks in place of what a pattern matches, so that places stay where they are; strings stay."""
-    return re.sub(
-        rf"\"(?:[^\"\\\n]|\\.){{0,1000}}+\"?+|{comments}",
-        lambda found: found[0] if found[0][0] == '"' else re.sub(r"[^\n]", " ", found[0]),
-        text,
-        flags=re.DOTALL,
-    )
+    pattern = re.compile(rf"(?:\"(?:[^\"\\\n]|\\.){{0,1000}}+\"?+)++|{comments}", flags=re.DOTALL)
+    return pattern.sub(_blanked, text)
+
+
+def _blanked(found: re.Match) -> str:
+    matched = found[0]
+    if matched[0] == '"':
+        return matched
+    return " " * len(matched) if "\n" not in matched else "\n".join(" " * len(line) for line in matched.split("\n"))
 
 
 def numbers(text: str, at: int, count: int, name: str) -> tuple[tuple[float, ...], int]:
