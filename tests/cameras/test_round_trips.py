@@ -249,6 +249,20 @@ def test_several_are_written_in_their_order_and_none_is_chosen_silently(tmp_path
         cameras.choose(back, "nobody")
 
 
+@pytest.mark.parametrize("form", [form for form in WRITTEN if form not in NO_POSE])
+def test_of_several_cameras_none_is_left_out_or_stands_in_anothers_world(tmp_path, form):
+    given = [Camera(f"{z}", Pinhole((7, -6, z), (0, 0, 1), (0, 0, 1), 600 + z, 640, 360)) for z in (2, 3, 4)]
+    files = cameras.save(given, tmp_path / ("all.usda" if form == "usd" else "all"), form)
+    if form in ("colmap", "colmap_binary"):  # of which each file leads to all
+        files = [tmp_path / "all"]
+    try:
+        back = [camera for path in files for camera in cameras.read(path, options=Options(size=(640, 360)))]
+    except InputError as error:  # code, of which one is copied
+        assert form in ("matrices", "look_at", "vtk", "textbook", "text"), str(error)
+    else:
+        assert [camera.pinhole for camera in back] == [camera.pinhole for camera in given]
+
+
 @pytest.mark.parametrize("form", ["transforms", "colmap", "gltf", "usd", "opencv", "ros"])
 def test_what_is_written_remembers_axes_and_scale_and_says_so_where_others_are_chosen(tmp_path, form):
     given = Options(axes="y_up", scale=0.01)

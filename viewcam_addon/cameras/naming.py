@@ -2,7 +2,7 @@
 
 import unicodedata
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import PurePosixPath
 
 from .. import checks
@@ -107,6 +107,20 @@ def refuse_taken(names: Sequence[str]) -> None:
         check_image(name)
     if twice := [name for name, count in Counter(name.casefold() for name in names).items() if count > 1]:
         raise InputError(f"{several(twice)} would be one file for several cameras: rename them")
+
+
+def a_file_each(cameras: Sequence[Camera], suffix: str, text: Callable[[Camera], str]) -> str | dict[str, str]:
+    """What `write` gives in a format whose files have one camera: its text, or of several the files, called as the cameras.
+
+    Raises
+    ------
+    InputError
+        as `refuse_taken` does.
+    """
+    if len(cameras) == 1:
+        return text(cameras[0])
+    refuse_taken([camera.name for camera in cameras])
+    return {f"{camera.name}{suffix}": text(camera) for camera in cameras}
 
 
 def refuse_mirrored(cameras: Iterable[Camera], written: str) -> None:

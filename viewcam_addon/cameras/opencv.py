@@ -85,10 +85,7 @@ def _four_rows(value: Any, name: str) -> np.ndarray:
 
 def write(cameras: Sequence[Camera], options: Options) -> str | dict[str, str]:
     naming.refuse_mirrored(cameras, "OpenCV's R, t")
-    if len(cameras) == 1:
-        return _text(cameras[0], options)
-    naming.refuse_taken([camera.name for camera in cameras])
-    return {f"{camera.name}{SUFFIX}": _text(camera, options) for camera in cameras}
+    return naming.a_file_each(cameras, SUFFIX, lambda camera: _text(camera, options))
 
 
 def half_pixel(options: Options, habit: str = "center") -> float:

@@ -23,7 +23,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..pinhole import Pinhole
-from . import axes, own, texts
+from . import axes, naming, own, texts
 from .camera import Camera, Options, not_a_pinhole
 from .source import Source
 
@@ -310,9 +310,9 @@ def _matrix(word: str, given: list[float], text: str, at: int) -> np.ndarray:
     return step
 
 
-def write(cameras: Sequence[Camera], options: Options) -> str:
-    """The statements before WorldBegin; of a picture in the middle and with square pixels as people write them."""
-    return "\n".join(map(_written, cameras))
+def write(cameras: Sequence[Camera], options: Options) -> str | dict[str, str]:
+    """The statements before WorldBegin. Each camera is a scene: a second one would stand in the first one's world."""
+    return naming.a_file_each(cameras, SUFFIX, _written)
 
 
 def _written(camera: Camera) -> str:

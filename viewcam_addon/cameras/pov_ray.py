@@ -21,7 +21,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import InputError
-from . import axes, own, texts
+from . import axes, naming, own, texts
 from .camera import Camera, Options, not_a_pinhole
 from .expressions import Expressions, Unknown, numbers
 from .source import Source
@@ -282,9 +282,9 @@ def _conditions(text: str) -> list[tuple[int, int]]:
     return result + [(start, len(text)) for start in opened[:1]]
 
 
-def write(cameras: Sequence[Camera], options: Options) -> str:
-    """camera { … } of each, without angles, whose lengths say the distances exactly."""
-    return "\n".join(map(_written, cameras))
+def write(cameras: Sequence[Camera], options: Options) -> str | dict[str, str]:
+    """camera { … } without angles, whose lengths say the distances exactly. Each is a scene, of which the last one counts."""
+    return naming.a_file_each(cameras, SUFFIX, _written)
 
 
 def _written(camera: Camera) -> str:

@@ -55,10 +55,7 @@ def read(source: Source, options: Options) -> list[Camera]:
 
 def write(cameras: Sequence[Camera], options: Options) -> str | dict[str, str]:
     naming.refuse_mirrored(cameras, "ROS camera_info")
-    if len(cameras) == 1:
-        return _text(cameras[0], options)
-    naming.refuse_taken([camera.name for camera in cameras])
-    return {f"{camera.name}{SUFFIX}": _text(camera, options) for camera in cameras}
+    return naming.a_file_each(cameras, SUFFIX, lambda camera: _text(camera, options))
 
 
 def _text(camera: Camera, options: Options) -> str:
