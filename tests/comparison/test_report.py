@@ -101,7 +101,8 @@ def test_the_report_stands_alone(compared, tmp_path):
 
 
 def test_what_comes_from_outside_is_escaped(compared, tmp_path):
-    text, page = written(tmp_path, *compared, ledger=LEDGER, facts={"Blender": "</td><b>5</b>"})
+    comparison, reference, test = compared
+    text, page = written(tmp_path, comparison, reference, replace(test, attributes={"Note": "</td><b>5</b>"}), ledger=LEDGER)
     assert text.count("<script>") == 1 and "a<b>.exr" not in text
     assert "<script>alert(1)</script>" in page.text and "</td><b>5</b>" in page.text
 

@@ -252,7 +252,7 @@ def _checked(key: str, name: str, value: object) -> object:
 # ---- keys and values
 
 
-def pairs(text: str, at: int = 0) -> Values:
+def pairs(text: str) -> Values:
     """Keys and their values, with or without = and : between them, and any brackets and separators around them.
 
     Raises
@@ -261,6 +261,7 @@ def pairs(text: str, at: int = 0) -> Values:
         at the first word that is no key.
     """
     values: Values = {}
+    at = 0
     while (at := _GAP.match(text, at).end()) < len(text):
         word = _word(text, at)
         if not word:

@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,11 +28,10 @@ def write_report(
     folder: str | os.PathLike[str],
     ledger: Sequence[Any] = (),
     command: str = "",
-    facts: Mapping[str, str] | None = None,
 ) -> Path:
     """Write folder/index.html and return its path.
 
-    tests : the pictures that were compared, in any number. ledger, command, facts : as for page.common.
+    tests : the pictures that were compared, in any number. ledger, command : as for page.common.
 
     Raises
     ------
@@ -49,7 +48,7 @@ def write_report(
     else:
         chart = charts.histogram(comparison.maps["Combined: roundings"].ravel())
     values = {
-        **page.common(comparison, reference, tests[0], ledger, command, facts or {}, comparison.pinhole),
+        **page.common(comparison, reference, tests[0], ledger, command, comparison.pinhole),
         "views": [combined, *(_view(comparison, name, values) for name, values in comparison.maps.items())],
         "worst": max(asked, key=lambda test: abs(test.worst.errors) / test.limit, default=None),
         "makers": (_maker(reference), _maker(tests[0])),

@@ -92,15 +92,14 @@ def common(
     test: Image,
     ledger: Sequence[Any],
     command: str,
-    facts: Mapping[str, str],
     pinhole: Pinhole,
     origin: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> dict[str, Any]:
     """What report.html is given by both reports; the views, the crops and their own parts are added to it.
 
     comparison : what `passed` and `sentence` are asked of. ledger : the scene's entries, with `object`, `status` and `reason`.
-    command : what repeats the comparison. facts : further lines for the last table, such as versions. pinhole : the camera that
-    is told. origin : the point of the world that its coordinates are counted from.
+    command : what repeats the comparison. pinhole : the camera that is told. origin : the point of the world that its
+    coordinates are counted from.
     """
     headline, _, rest = comparison.sentence.partition(": ")
     names = [Path(image.source).name for image in (reference, test)]
@@ -117,7 +116,7 @@ def common(
         "height": height,
         "percentile_names": [percentile_name(percentile) for percentile in PERCENTILES],
         "ledger": ledger,
-        "facts": _facts(reference, test, facts),
+        "facts": _facts(reference, test),
         "command": command,
         **_camera(pinhole, origin),
     }
@@ -178,8 +177,8 @@ def _camera(pinhole: Pinhole, origin: Sequence[float]) -> dict[str, Any]:
     }
 
 
-def _facts(reference: Image, test: Image, facts: Mapping[str, str]) -> dict[str, str]:
-    told = {"Reference": reference.source, "Test": test.source, **facts}
+def _facts(reference: Image, test: Image) -> dict[str, str]:
+    told = {"Reference": reference.source, "Test": test.source}
     for side, image in (("reference", reference), ("test", test)):
         told |= {f"{key} ({side})": value for key, value in sorted(image.attributes.items())}
     return told | {"Compared with": f"Python {platform.python_version()}, NumPy {np.__version__}"}

@@ -1,7 +1,7 @@
 """The report of a comparison of geometry; page.py has what it shares with that of light."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +24,10 @@ def write_report(
     folder: str | os.PathLike[str],
     ledger: Sequence[Any] = (),
     command: str = "",
-    facts: Mapping[str, str] | None = None,
 ) -> Path:
     """Write folder/index.html and return its path.
 
     ledger : the scene's entries, with `object`, `status` and `reason`. command : what repeats the comparison.
-    facts : further lines for the last table, such as versions.
 
     Raises
     ------
@@ -39,7 +37,7 @@ def write_report(
     shades = difference.shown(comparison, reference, [test])
     camera, far = comparison.stated or comparison.pinhole, comparison.far_from_origin
     values = {
-        **page.common(comparison, reference, test, ledger, command, facts or {}, camera, comparison.origin),
+        **page.common(comparison, reference, test, ledger, command, camera, comparison.origin),
         "mend": page.with_powers(far.sentence) if far else "",
         "views": _views(comparison, shades, reference, test),
         "marks": charts.marks(comparison.mismatches, (comparison.pinhole.width, comparison.pinhole.height)),

@@ -90,7 +90,7 @@ def bake(
     if last < first:
         raise InputError(f"the last frame {last} is before the first frame {first}: give the range in its order")
     for camera_object in camera_objects:
-        _check(camera_object, scene)
+        _check(camera_object)
     margin = 1 if scene.render.use_motion_blur else 0
     steps = 2 * keys_per_frame  # every other time is a keyframe's
     times = [first - margin + i / steps for i in range(steps * (last - first + 2 * margin) + 1)]
@@ -180,7 +180,7 @@ def _agreement(flight: _Flight, baked: Sequence[Pinhole], times: list[float]) ->
     return BakedAgreement(flight.camera_object.name, off[::2].max(), off[worst], times[worst], ok)
 
 
-def _check(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
+def _check(camera_object: bpy.types.Object) -> None:
     """Refuse, with one sentence, where keyframes would not make the live camera."""
     datablocks.check_perspective(camera_object)
     name, camera = camera_object.name, camera_object.data
