@@ -280,6 +280,21 @@ def test_polycam_3d_scanner_app_and_record3d_are_arkits(name):
     the_same(cameras.read(json.dumps(record)), known)
 
 
+def test_polycams_pictures_are_named_from_whichever_folder_is_given(tmp_path):
+    known = Known("plain")
+    k = {"fx": known.f_x, "fy": known.f_y, "cx": known.c_x, "cy": known.c_y, "width": known.width, "height": known.height}
+    document = json.dumps({f"t_{i}{j}": known.opengl[i, j] for i in range(3) for j in range(4)} | k)
+    for kind in ("", "corrected_"):
+        folder = tmp_path / "keyframes" / f"{kind}cameras"
+        folder.mkdir(parents=True)
+        (folder / "123.json").write_text(document)
+        for given in (tmp_path, folder, folder / "123.json"):
+            (camera,) = cameras.read(given)
+            assert (camera.name, camera.image) == ("123", f"keyframes/{kind}images/123.jpg")
+    (tmp_path / "frame_00001.json").write_text(document)
+    assert cameras.read(tmp_path / "frame_00001.json")[0].image == "frame_00001.jpg"
+
+
 @pytest.mark.parametrize("name", CENTRED)
 def test_gaussian_splatting_lists_camera_to_world(name):
     known = Known(name)

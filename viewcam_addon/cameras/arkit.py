@@ -1,11 +1,14 @@
 """What phones record: Polycam's and 3D Scanner App's JSON of each picture, and Record3D's metadata.
 
 All are ARKit's: world y up (against gravity), metres, camera x right, y up, z away from the view in the landscape picture.
-Polycam lists the matrix as t_00 … t_23, row after row; of its two folders the corrected one is meant. 3D Scanner App has
-cameraPoseARFrame, row after row. Record3D has a pose as qx qy qz qw tx ty tz and K column after column.
+Polycam lists the matrix as t_00 … t_23, row after row; of its two folders the corrected one is meant, and its pictures are in
+a folder beside it. 3D Scanner App has cameraPoseARFrame, row after row, and the picture beside it. Record3D has a pose as qx qy
+qz qw tx ty tz and K column after column.
 
 Source: nerfstudio's polycam_utils.py and record3d_utils.py, and ARKit's documentation of ARCamera.
 """
+
+from pathlib import Path
 
 import numpy as np
 
@@ -18,6 +21,7 @@ TITLE = "ARKit: Polycam, 3D Scanner App, Record3D"
 
 _Y_UP = "ARKit's y points up: the numbers stay as they are unless the axes Y up → Z up are chosen"
 _FOLDERS = ((), ("corrected_cameras",), ("keyframes", "corrected_cameras"), ("cameras",), ("keyframes", "cameras"))
+_PICTURES = {"cameras": "images", "corrected_cameras": "corrected_images"}
 _POLYCAM = {f"t_{row}{column}" for row in range(3) for column in range(4)}
 
 
@@ -76,7 +80,16 @@ def _camera(source: Source, options: Options) -> Camera:
         raise InputError(f"{name} has the focal length {min(f_x, f_y):g}: give one above 0")
     pinhole, notes = axes.pinhole(matrix, axes.view_plane(f_x, f_y, c_x, c_y, size), name)
     time = values.number("timestamp") * 1e-6 if "timestamp" in values and "t_00" in values else None
-    return Camera(name, pinhole, stated, notes, time=time)
+    return Camera(name, pinhole, stated, notes, _picture(source.path) if source.path else None, time=time)
+
+
+def _picture(path: Path) -> str:
+    """The picture of a camera's file: beside it, and Polycam's in a folder of their own, called from the recording's on."""
+    folder = path.parent
+    if folder.name not in _PICTURES:
+        return f"{path.stem}.jpg"
+    parts = (folder.parent.name,) if folder.parent.name == "keyframes" else ()
+    return "/".join((*parts, _PICTURES[folder.name], f"{path.stem}.jpg"))
 
 
 def _record3d(source: Source, options: Options) -> list[Camera]:

@@ -103,6 +103,16 @@ def test_no_file_makes_blender_open_a_picture_that_is_elsewhere(scene, tmp_path)
         assert import_cameras.picture_of(other, tmp_path / "given") is None
 
 
+def test_polycams_picture_is_found_from_whichever_folder_is_imported(tmp_path):
+    folder = tmp_path / "keyframes" / "images"
+    folder.mkdir(parents=True)
+    (folder / "123.jpg").touch()
+    (camera,) = around(1)
+    camera = Camera(camera.name, camera.pinhole, image="keyframes/images/123.jpg")
+    for given in (tmp_path, tmp_path / "keyframes", tmp_path / "keyframes" / "cameras"):
+        assert import_cameras.picture_of(camera, given) == folder / "123.jpg"
+
+
 def test_an_fspy_project_brings_its_picture(scene, tmp_path):
     write_picture(tmp_path / "picture.png")
     picture = (tmp_path / "picture.png").read_bytes()
