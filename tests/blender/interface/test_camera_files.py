@@ -105,7 +105,8 @@ def test_no_file_makes_blender_open_a_picture_that_is_elsewhere(scene, tmp_path)
 
 def test_polycams_picture_is_found_from_whichever_folder_is_imported(tmp_path):
     folder = tmp_path / "keyframes" / "images"
-    folder.mkdir(parents=True)
+    for each in (folder, tmp_path / "keyframes" / "cameras"):
+        each.mkdir(parents=True)
     (folder / "123.jpg").touch()
     (camera,) = around(1)
     camera = Camera(camera.name, camera.pinhole, image="keyframes/images/123.jpg")
