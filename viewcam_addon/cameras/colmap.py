@@ -83,11 +83,11 @@ class _Image(NamedTuple):
 
 
 def recognises(source: Source) -> bool:
-    return _model(source) is not None
+    return model(source) is not None
 
 
 def read(source: Source, options: Options) -> list[Camera]:
-    folder, suffix = _model(source)
+    folder, suffix = model(source)
     files = _files(source, folder, suffix)
     if suffix == ".bin":
         intrinsic, images = _binary_cameras(files[0]), [*_binary_images(files[1])]
@@ -120,13 +120,13 @@ def _poses(images: Sequence[_Image], planes: dict) -> list[tuple[Pinhole, tuple[
 
 
 def notes_in(source: Source) -> list[str]:
-    folder, suffix = _model(source)
+    folder, suffix = model(source)
     file = source.file(*folder, NOTES if suffix == ".bin" else f"{_FILES[1]}{suffix}")
     return [file.text] if file else []
 
 
-def _model(source: Source) -> tuple[tuple[str, ...], str] | None:
-    """Where in a folder the model is, and the suffix of its files."""
+def model(source: Source) -> tuple[tuple[str, ...], str] | None:
+    """Where in a folder the model is, part by part, and the suffix of its files; None if there is none."""
     if not source.is_folder:
         path = source.path
         ours = path and path.stem in (*_FILES, "points3D", "rigs", "frames") and path.suffix in (".txt", ".bin")

@@ -26,12 +26,13 @@ def tracks(path: Path, cameras: Sequence[Camera]) -> Tracks | None:
     """The points of the COLMAP model at a path, as these cameras' pictures show them; None if there are none."""
     folder = path if path.is_dir() else path.parent
     try:
-        model = colmap._model(Source(folder))
+        model = colmap.model(Source(folder))
     except OSError:
         return None
     if model is None:
         return None
-    where, suffix = model
+    parts, suffix = model
+    where = folder.joinpath(*parts)
     points = where / f"points3D{suffix}"
     if not points.is_file():
         return None
