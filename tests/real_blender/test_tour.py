@@ -15,11 +15,11 @@ ATTEMPTS = 2
 MOVING_SCRIPT = Path(__file__).with_name("moving_picture.py")
 
 
-def run_in_a_window(real_blender, script, *folder):
+def run_in_a_window(real_blender, script, height, *folder):
     return subprocess.run(
         [
             *(ROOT / ".ci" / "blender-window", "--factory-startup", "--addons", "bl_ext.user_default.virtual_pinhole"),
-            *("--enable-event-simulate", "-p", "0", "0", "1600", "2000", "--python", script, "--", *folder),
+            *("--enable-event-simulate", "-p", "0", "0", "1600", str(height), "--python", script, "--", *folder),
         ],
         env={**os.environ, "BLENDER_USER_RESOURCES": str(real_blender.user_folder)},
         cwd=ROOT,
@@ -33,7 +33,7 @@ def test_the_tour_goes_through_and_each_of_its_steps_is_undone_and_redone(real_b
     """VIEWCAM_PICTURES : a folder for the pictures of docs/artists.md; without it none are taken."""
     folder = [each for each in [os.environ.get("VIEWCAM_PICTURES")] if each]
     for _ in range(ATTEMPTS):
-        outcome = run_in_a_window(real_blender, SCRIPT, *folder)
+        outcome = run_in_a_window(real_blender, SCRIPT, 2000, *folder)
         if outcome.returncode == 0:
             break
     said = outcome.stdout + outcome.stderr
@@ -45,7 +45,7 @@ def test_the_tour_goes_through_and_each_of_its_steps_is_undone_and_redone(real_b
 def test_the_moving_picture_is_made(real_blender, tmp_path):
     from PIL import Image
 
-    outcome = run_in_a_window(real_blender, MOVING_SCRIPT, tmp_path)
+    outcome = run_in_a_window(real_blender, MOVING_SCRIPT, 1000, tmp_path)
     assert outcome.returncode == 0, outcome.stdout + outcome.stderr
     first, *rest = [Image.open(path).convert("RGB") for path in sorted(tmp_path.glob("frame-*.png"))]
     target = ROOT / os.environ["VIEWCAM_PICTURES"] / ".." / "moving.webp"

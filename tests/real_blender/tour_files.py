@@ -79,7 +79,7 @@ class Export(Step):
     """File › Export › Virtual Pinhole Scene."""
 
     picture = "export.png"
-    shows = (0.155, 0.0, 1.0, 0.955)  # without folders of whoever makes the pictures
+    shows = (0.155, 0.5, 1.0, 0.975)  # without folders of whoever makes the pictures
     edits = 0
 
     def prepare(self):
@@ -181,7 +181,7 @@ class Preferences(Step):
     """Another axis is up by default, and Level knows it."""
 
     picture = "preferences.png"
-    shows = (0.13, 0.55, 1.0, 0.72)  # without the folder that it is installed in
+    shows = (0.13, 0.783, 1.0, 0.865)  # without the folder that it is installed in
     edits, needs_a_window = 0, True
 
     def prepare(self):

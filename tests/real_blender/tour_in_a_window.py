@@ -70,7 +70,8 @@ def _shown(name):
         bottom = max(sidebar.y, lowest_button() - BELOW_BUTTONS)
         return (sidebar.x, bottom, sidebar.width, sidebar.y + sidebar.height - bottom), 100
     if name == "window":
-        return (0, 0, window().width, window().height), 60
+        empty = 0.29 * window().height  # below the panel
+        return (0, empty, window().width, window().height - empty), 60
     area = max(window().screen.areas, key=lambda area: area.width * area.height)
     left, bottom, right, top = (0.0, 0.0, 1.0, 1.0) if name == "area" else name
     x, y = area.x + left * area.width, area.y + bottom * area.height

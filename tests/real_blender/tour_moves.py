@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 from panel_in_a_window import region
 from tour_hands import call, push, unfold
-from tour_step import Step, axes, camera, is_at_its_values, select, values
+from tour_step import UPPER_PART, Step, axes, camera, is_at_its_values, select, values
 
 
 class _Move(Step):
@@ -29,7 +29,7 @@ class _Move(Step):
 class _SeenThroughTheCamera(_Move):
     """Its picture is taken through the camera."""
 
-    shows = "area"
+    shows = UPPER_PART
 
     def pose_for_the_picture(self):
         view = self._view()

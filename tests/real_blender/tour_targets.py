@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 from panel_in_a_window import NOWHERE, click, press
 from tour_hands import key_over, on_screen, strike
-from tour_step import Step, axes, camera, is_at_its_values, select, values
+from tour_step import UPPER_PART, Step, axes, camera, is_at_its_values, select, values
 
 FIELD = "virtual_pinhole.look_at_target"
 START, END = (2, -1, 0.5), (3, -1, 0.5)
@@ -45,7 +45,7 @@ class MoveTheTarget(Step):
     """G X 1: the camera follows as the object goes."""
 
     picture = "follow.png"
-    shows = "area"
+    shows = UPPER_PART
 
     def prepare(self):
         select("Ball")

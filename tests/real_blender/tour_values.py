@@ -5,7 +5,7 @@ import math
 import bpy
 import numpy as np
 from tour_hands import key_over, push, type_into
-from tour_step import SIZE, Step, axes, camera, is_at_its_values, room, values
+from tour_step import SIZE, UPPER_PART, Step, axes, camera, is_at_its_values, room, values
 
 TEXT = "eye=4,-6,3.5 look_at=0,0,1 up=0,0,1 d=700"
 
@@ -121,7 +121,7 @@ class Roll(Step):
     """An angle that turns up about the view."""
 
     picture = "roll.png"
-    shows = "area"
+    shows = UPPER_PART
 
     def by_hand(self):
         yield from type_into("virtual_pinhole.roll", "20")

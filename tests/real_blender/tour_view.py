@@ -4,14 +4,14 @@ import bpy
 import numpy as np
 from panel_in_a_window import region, window
 from tour_hands import VIEWPORT, drag, on_screen
-from tour_step import Step, is_at_its_values, room, select, values
+from tour_step import UPPER_PART, Step, is_at_its_values, room, select, values
 
 
 class DragTheLookAtPoint(Step):
     """By its handle; the camera turns."""
 
     picture = "handles.png"
-    shows = "area"
+    shows = UPPER_PART
 
     def prepare(self):
         values().eye, values().look_at, values().up = (4, -6, 3.5), (0, 0, 1), (0, 0, 1)
@@ -75,7 +75,7 @@ class ShowTheDiagramElsewhere(Step):
     """The view plane is drawn close to the look-at point."""
 
     picture = "diagram.png"
-    shows = "area"
+    shows = UPPER_PART
 
     def by_hand(self):
         values().plane_at = 0.8
