@@ -10,13 +10,10 @@ import math
 import sys
 from pathlib import Path
 
-import bpy
-from mathutils import Euler
-
 sys.path.append(str(Path(__file__).parent))
 import tour_step
-from panel_in_a_window import move, open_the_panels, region, start, window
-from tour_hands import photograph
+from panel_in_a_window import move, start, window
+from tour_hands import begin, photograph
 
 FOLDER = Path(sys.argv[sys.argv.index("--") + 1])
 FRAMES = 36
@@ -26,19 +23,9 @@ WIDTH, HEIGHT = 1310, 800  # of the window, from its upper left corner: the view
 
 def steps():
     yield
-    tour_step.make_the_scene()
-    bpy.context.preferences.system.viewport_aa = "OFF"  # drawn in software
-    view, _ = region("VIEW_3D", "WINDOW")
-    space = view.spaces.active
-    space.shading.color_type = "MATERIAL"
-    space.region_3d.view_rotation = Euler((math.radians(66), 0, math.radians(75))).to_quaternion()
-    space.region_3d.view_location, space.region_3d.view_distance = (1.2, -2.2, 1.2), 13
-    yield from open_the_panels()
-    camera = bpy.data.objects["Camera"]
-    values = camera.virtual_pinhole
+    yield from begin()
+    values = tour_step.values()
     values.enabled = True
-    window().view_layer.objects.active = camera
-    camera.select_set(True)
     move(*MOUSE_AWAY)
     for number in range(FRAMES):
         turn = 2 * math.pi * number / FRAMES

@@ -4,14 +4,10 @@ import os
 import subprocess
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).resolve().parent.parent.parent
 SCRIPT = Path(__file__).with_name("tour_in_a_window.py")
 # A virtual screen on a busy machine may lose a click: one loss is no finding, two at different times are.
 ATTEMPTS = 2
-
-
 MOVING_SCRIPT = Path(__file__).with_name("moving_picture.py")
 
 
@@ -29,7 +25,7 @@ def run_in_a_window(real_blender, script, height, *folder):
     )
 
 
-def test_the_tour_goes_through_and_each_of_its_steps_is_undone_and_redone(real_blender):
+def test_the_tour_goes_through_and_each_of_its_steps_is_undone_and_redone(real_blender, tmp_path):
     """VIEWCAM_PICTURES : a folder for the pictures of docs/artists.md; without it none are taken."""
     folder = [each for each in [os.environ.get("VIEWCAM_PICTURES")] if each]
     for _ in range(ATTEMPTS):
@@ -39,14 +35,15 @@ def test_the_tour_goes_through_and_each_of_its_steps_is_undone_and_redone(real_b
     said = outcome.stdout + outcome.stderr
     assert outcome.returncode == 0, said
     assert "done: the tour" in said and "Traceback" not in said, said  # what fails in a panel's draw() is only printed
+    if folder:
+        make_the_moving_picture(real_blender, tmp_path, ROOT / folder[0] / ".." / "moving.webp")
 
 
-@pytest.mark.skipif(not os.environ.get("VIEWCAM_PICTURES"), reason="it checks nothing: it makes the README's moving picture")
-def test_the_moving_picture_is_made(real_blender, tmp_path):
+def make_the_moving_picture(real_blender, frames, target):
+    """The README's."""
     from PIL import Image
 
-    outcome = run_in_a_window(real_blender, MOVING_SCRIPT, 1000, tmp_path)
+    outcome = run_in_a_window(real_blender, MOVING_SCRIPT, 1000, frames)
     assert outcome.returncode == 0, outcome.stdout + outcome.stderr
-    first, *rest = [Image.open(path).convert("RGB") for path in sorted(tmp_path.glob("frame-*.png"))]
-    target = ROOT / os.environ["VIEWCAM_PICTURES"] / ".." / "moving.webp"
+    first, *rest = [Image.open(path).convert("RGB") for path in sorted(frames.glob("frame-*.png"))]
     first.save(target, save_all=True, append_images=rest, duration=110, loop=0, quality=60)

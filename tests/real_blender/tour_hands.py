@@ -5,12 +5,14 @@ coordinate of a button is assumed: the mouse moves over the panel, and Blender i
 Where a button stood the last time is looked at first.
 """
 
+import math
 import subprocess
 
 import bpy
+import tour_step
 from bpy_extras.view3d_utils import location_3d_to_region_2d
-from mathutils import Vector
-from panel_in_a_window import NOWHERE, click, move, press, region, window
+from mathutils import Euler, Vector
+from panel_in_a_window import NOWHERE, click, move, open_the_panels, press, region, window
 
 SIDEBAR, PROPERTIES, VIEWPORT = ("VIEW_3D", "UI"), ("PROPERTIES", "WINDOW"), ("VIEW_3D", "WINDOW")
 SCREEN_HEIGHT = 2000
@@ -23,6 +25,18 @@ _KEYS = {"-": "MINUS", ".": "PERIOD", " ": "SPACE", "/": "SLASH", "=": "EQUAL", 
 _DIGITS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE")
 
 _found = {}
+
+
+def begin():
+    """Steps to where the tour starts."""
+    tour_step.make_the_scene()
+    bpy.context.preferences.system.viewport_aa = "OFF"  # drawn in software
+    view, _ = region("VIEW_3D", "WINDOW")
+    space = view.spaces.active
+    space.shading.color_type = "MATERIAL"
+    space.region_3d.view_rotation = Euler((math.radians(66), 0, math.radians(75))).to_quaternion()
+    space.region_3d.view_location, space.region_3d.view_distance = (1.2, -2.2, 1.2), 13
+    yield from open_the_panels()
 
 
 def under_the_mouse(where):

@@ -5,19 +5,17 @@ blender --enable-event-simulate -p 0 0 1600 2000 --addons … --python tour_in_a
 FOLDER : where the pictures of docs/artists.md go; without it none are taken. Leaves with status 0, or 5 and a traceback.
 """
 
-import math
 import sys
 import time
 from pathlib import Path
 
 import bpy
-from mathutils import Euler
 
 sys.path.append(str(Path(__file__).parent))
 import tour
 import tour_step
-from panel_in_a_window import move, open_the_panels, region, start, window
-from tour_hands import lowest_button, photograph, push_undo, redo, undo
+from panel_in_a_window import move, region, start, window
+from tour_hands import begin, lowest_button, photograph, push_undo, redo, undo
 
 FOLDER = next(map(Path, sys.argv[sys.argv.index("--") + 1 :]), None)
 MOUSE_AWAY = (200, 700)
@@ -80,14 +78,7 @@ def _shown(name):
 
 def steps():
     yield
-    tour_step.make_the_scene()
-    bpy.context.preferences.system.viewport_aa = "OFF"  # drawn in software
-    view, _ = region("VIEW_3D", "WINDOW")
-    space = view.spaces.active
-    space.shading.color_type = "MATERIAL"
-    space.region_3d.view_rotation = Euler((math.radians(66), 0, math.radians(75))).to_quaternion()
-    space.region_3d.view_location, space.region_3d.view_distance = (1.2, -2.2, 1.2), 13
-    yield from open_the_panels()
+    yield from begin()
     for each in tour.STEPS:
         started = time.perf_counter()
         yield from take(each())
