@@ -130,7 +130,7 @@ test-light-%: .venvs/%/ready
 # The zip built by a real Blender, in that Blender and in those that are wheels; and the panel in a window.
 test-blender: .venv/test $(WHEELS:%=.venvs/%/ready)
 	BLENDER=$$(.ci/find-blender) || exit 1; export BLENDER; \
-	.venv/bin/python -m pytest --numprocesses=2 --dist=loadfile tests/real_blender
+	.venv/bin/python -m pytest --numprocesses=2 --dist=loadfile --no-loadscope-reorder tests/real_blender
 
 extension: .venv/extension
 	blender=$$(.ci/find-blender) || exit 1; \

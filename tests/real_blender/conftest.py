@@ -18,8 +18,14 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent.parent
 INSIDE = Path(__file__).with_name("inside_blender.py")
 WHEELS = {version: ROOT / ".venvs" / version / "bin" / "python" for version in ("4.2", "4.5", "5.0", "5.2")}
+LONGEST = {Path(__file__).with_name("test_tour.py"), Path(__file__).with_name("test_suite.py")}
 PACKAGES = ("pytest", "pytest-timeout", "hypothesis", "mpmath", "distributed", "cryptography")
 PLATFORMS = {("Linux", "x86_64"): "linux-x64", ("Darwin", "arm64"): "macos-arm64", ("Darwin", "x86_64"): "macos-x64"}
+
+
+def pytest_collection_modifyitems(items):
+    """What takes minutes begins first: else one process takes the tour alone when the other has nothing left."""
+    items.sort(key=lambda item: item.path not in LONGEST)
 
 
 @dataclass(frozen=True)
