@@ -439,7 +439,6 @@ def test_pov_ray_turns_its_camera_by_the_sky(text, size, mirrored):
             "camera { location <1, 2, 3> right <1, .5, 0> up y direction z rotate x translate y scale <1,2,3> }",
             "sheared",
         ),
-        ("camera { location y look_at 0 }", "along its up"),
     ],
 )
 def test_what_of_pov_ray_is_no_pinhole_or_unsaid_is_refused(text, sentence):

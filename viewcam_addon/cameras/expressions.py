@@ -24,7 +24,7 @@ _TEMPLATE = re.compile(r"<[\w\s,:*]*+>(?=\s*+\()")
 _UNIT = re.compile(r"\s*+(?:(°|deg(?:rees?)?\b)|(rad(?:ians?)?\b))")
 _KEYWORD = re.compile(r"\s*+(?:([A-Za-z_]\w*+)|\"([^\"\n]{0,1000}+)\"|'([^'\n]{0,1000}+)')\s*+(=(?!=)|:(?!:))")
 _VECTOR = re.compile(
-    r"(?:make_?|d3dx|xm)?[a-z]?(?:vec(?:tor)?|point|float|double|cartesian|array|asarray|tuple|list|coord|position|xyz)_?[234]?[dfi]?_?t?"
+    r"(?:make_?|d3dx|xm|scalar)?[a-z]?(?:vec(?:tor)?|point|float|double|cartesian|array|asarray|tuple|list|coord|position|xyz)_?[234]?[dfi]?_?t?"
 )
 _CAST = re.compile(r"\(\s*+(?:unsigned\s++)?(?:float|double|int|GLfloat|GLdouble|FLOAT|real)\s*+\)\s*+(?=[\w(.])")
 _SKIPPED = re.compile(r"\"(?:[^\"\\\n]|\\.){0,1000}+\"|'(?:[^'\\\n]|\\.){0,1000}+'|[()\[\]{},;]")

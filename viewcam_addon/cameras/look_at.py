@@ -41,11 +41,15 @@ _COMMENT = r"//[^\n]*+|/\*.*?(?:\*/|\Z)|#(?!\s*+define)[^\n]*+"
 _DEFINE = re.compile(r"#\s*+define\s++(\w++)\s++")
 _PATH = r"[A-Za-z_$][\w$]*+(?:(?:\s*+\(\s*+\))?+\s*+(?:\.|->|::)\s*+[A-Za-z_$][\w$]*+)*+"
 _STATEMENT = re.compile(rf"(?<![\w$.])(?<!->)(?<!::)({_PATH})\s*+(=(?!=)|\(|:(?!:)|\{{)")
+_WINDOW = re.compile(r"renderer|ren\w{0,3}win|renderwindow")
+_LIGHT = re.compile(r"\bvtkLight\s*+>\s*+(\w++)|\b(\w++)\s*+=\s*+(?:vtk\w*+\s*+\.\s*+)?+vtkLight\s*+\(")
 _PARTS = re.compile(r"[\w$]++")
 _MADE = re.compile(r"(?<![\w$])([\w$]++)\s*+[=:]\s*+new\s++(?:THREE\s*+\.\s*+)?+PerspectiveCamera\b")
 _MOST_STATEMENTS = 10_000
 _IS_CODE = re.compile(r"\w\s*+\(\s*+[-\w.]|;\s*+$|\w\.\w++\s*+[=(]", re.MULTILINE)
 _CAMERA = re.compile(r"cam|view|eye|lens|observer", re.IGNORECASE)
+
+_NAMED_CAMERA = re.compile(r"cam", re.IGNORECASE)
 
 _EYE = "eye eyepos eyeposition eyepoint eyelocation lookfrom lookfrompoint campos camerapos camposition "
 _EYE += "cameraposition cameralocation camerafrom cameraorigin cameraeye cameracenter"
@@ -145,6 +149,8 @@ _MOVES |= {
     "setview",
 }
 _TURNED = {"rotation", "quaternion", "matrix", "matrixworld", "rotate"}
+_CONTROLS = re.compile(r"\bnew\s++(?:[A-Za-z]++\s*+\.\s*+)?+((?:Orbit|Trackball|Map|Arcball)Controls)\b")
+_OTHER_CONTROLS = re.compile(r"\bnew\s++(?:[A-Za-z]++\s*+\.\s*+)?+((?:FirstPerson|DeviceOrientation)Controls)\b")
 _PLACES = {"position", "up", "direction"}
 # What turns or moves a view that a look-at made: glm::rotate(view, …), mat4.rotateY(view, view, …).
 _VIEW_MOVED = re.compile(
@@ -152,6 +158,8 @@ _VIEW_MOVED = re.compile(
 )
 _GL_MOVES = {"gltranslatef", "gltranslated", "glrotatef", "glrotated", "glscalef", "glscaled", "glmultmatrixf", "glmultmatrixd"}
 _CHANGED = re.compile(rf"(?<![\w$.])({_PATH})\s*+[-+*/]=")
+_STEPPED = re.compile(r"(?<![\w$])([A-Za-z_$][\w$]*+)\s*+(?:[-+*/]=|\+\+|--)|(?:\+\+|--)\s*+([A-Za-z_$][\w$]*+)")
+_COORDINATE = re.compile(rf"(?<![\w$.])({_PATH})\s*+\[\s*+[0-2]\s*+\]\s*+[-+*/]?+=(?!=)")
 _VECTORS = {"eye", "target", "up", "direction"}
 _OF_VTK = re.compile(
     r"SetViewUp|SetFocalPoint|CameraFocalPoint|\bcamera_position\s*+=|\bcpos\s*+=|\bfocal_point\s*+=", re.IGNORECASE
@@ -213,6 +221,9 @@ class _Code:
                 self.assigned.setdefault(parts[-1], []).append(at if sign == "=" else at - 1)
         for found in _DEFINE.finditer(self.text):
             self.assigned.setdefault(found[1], []).append(found.end())
+        self._has_viewports = bool(re.search(r"\bSetViewport\s*+\(", self.text))
+        self._lights = {found[1] or found[2] for found in _LIGHT.finditer(self.text)}
+        self._changed = {found[1] or found[2] for found in _STEPPED.finditer(self.text)}
         self._following: set[str] = set()
         self._cameras = {found[1] for found in _MADE.finditer(self.text)}
         self._values: dict[str, object] = {}
@@ -235,7 +246,7 @@ class _Code:
         return self._roles[key]
 
     def _found_role(self, parts: list[str], sign: str) -> str | None:
-        if any("light" in part.lower() or "shadow" in part.lower() for part in parts):
+        if parts[0] in self._lights or any("light" in part.lower() or "shadow" in part.lower() for part in parts):
             return None
         key = texts.plain(parts[-1])
         before = texts.plain(parts[-2]) if len(parts) > 1 else ""
@@ -256,11 +267,13 @@ class _Code:
             return "frustum"
         if sign == "(" and key in _ORTHOGRAPHIC:
             return "orthographic"
-        if sign == "(" and key.removeprefix("set") == "size" and "renderer" in before:
+        if sign == "(" and key.removeprefix("set") == "size" and _WINDOW.search(before) and not self._has_viewports:
             return "size"
         if key in ("cameraposition", "cpos", "camera_position") and sign == "=":
             return "camera_position"
         bare = key.removeprefix("set")
+        if bare == "up" and sign == "(" and before and not self._is_camera(parts[:-1]):
+            return None  # keyboard.up("R")
         if bare in _SPECIFIC:
             return _SPECIFIC[bare]
         if self._is_camera(parts[:-1]):
@@ -272,7 +285,9 @@ class _Code:
         return None
 
     def _is_camera(self, parts: list[str]) -> bool:
-        return any(part in self._cameras or _CAMERA.search(part) for part in parts)
+        # Where cameras are made, an eye or a preview is another thing.
+        called = _NAMED_CAMERA if self._cameras else _CAMERA
+        return any(part in self._cameras or called.search(part) for part in parts)
 
     def _name(self, path: str) -> object:
         """What a name stands for: the one value that it is given."""
@@ -282,7 +297,12 @@ class _Code:
         if last in self._values:
             return self._values[last]
         self._lookups += 1
-        if last not in self.assigned or last in self._following or max(len(self._following) / 12, self._lookups / 5000) > 1:
+        if (
+            last in self._changed
+            or last not in self.assigned
+            or last in self._following
+            or max(len(self._following) / 12, self._lookups / 5000) > 1
+        ):
             return None
         self._following.add(last)
         try:
@@ -313,9 +333,20 @@ class _Code:
             parts = _PARTS.findall(changed[1])
             if self._is_camera(parts[:1]) and self._role(parts, "=") not in (None, "width", "height", "size"):
                 texts.fail(self.text, changed.start(), "this moves the camera from where it was, write where it is then")
+        for changed in _COORDINATE.finditer(self.text):
+            if self._role(_PARTS.findall(changed[1]), "=") in _VECTORS:
+                texts.fail(self.text, changed.start(), "this is one coordinate, write the whole vector where it is set")
+        for parts, sign, _, start in self.statements:
+            if len(parts) < 2 or sign != "=" or parts[-1] not in ("x", "y", "z", "X", "Y", "Z") or self._role(parts, sign):
+                continue
+            if self._role(parts[:-1], sign) in _VECTORS:
+                texts.fail(self.text, start, "this is one coordinate, write the whole vector where it is set")
+        if said.three and (turned := _OTHER_CONTROLS.search(self.text)):
+            texts.fail(self.text, turned.start(), "these turn the camera by themselves, write where it looks then")
         if moved := _VIEW_MOVED.search(self.text):
             texts.fail(self.text, moved.start(), "this moves the view by other means, write eye, look-at and up")
         parts_of: dict[str, dict[str, float]] = {}
+        placed: dict[str, str] = {}  # position or up: whose
         counted = 0
         moved_before = None  # the matrix of OpenGL that gluLookAt multiplies
         for parts, sign, at, start in self.statements:
@@ -330,6 +361,10 @@ class _Code:
                 texts.fail(self.text, start, "the camera is part of this, which may move it, write where it is in the scene")
             if role is None or (sign == ":" and role in ("width", "height", "size")):
                 continue
+            for name in {"position", "up"} & {*parts[1:]} if sign != ":" else ():
+                whose = ".".join(parts[: parts.index(name, 1)])
+                if placed.setdefault(name, whose) != whose:
+                    texts.fail(self.text, start, f"this is another camera than {placed[name][:40]}, copy one camera")
             counted += 1
             if counted > _MOST_STATEMENTS:
                 raise InputError(f"the text says more than {_MOST_STATEMENTS} things of cameras: copy one camera")
@@ -366,6 +401,8 @@ class _Code:
             role = {"position": "eye", "up": "up"}[name]
             usual = (0.0, 0.0, 0.0) if role == "eye" else (0.0, 1.0, 0.0)
             now = said.values.get(role, (usual, 0))[0]
+            if not isinstance(now, tuple):
+                continue  # computed before: refused where it is needed
             said.values[role] = (tuple(given.get(axis, old) for axis, old in zip("xyz", now, strict=True)), 0)
         return said
 
@@ -378,10 +415,10 @@ class _Code:
 
     def _set(self, said: _Said, role: str, value: object, at: int) -> None:
         before = said.values.get(role)
-        if before and before[0] != value and not isinstance(value, Unknown) and not isinstance(before[0], Unknown):
+        if before and before[0] != value and not _is_unknown(value) and not _is_unknown(before[0]):
             line = self.text.count("\n", 0, before[1]) + 1
             texts.fail(self.text, at, f"{role} is something else in line {line}, copy one camera")
-        if before is None or isinstance(value, Unknown):  # of what is known once and computed once nobody knows which counts
+        if before is None or _is_unknown(value):  # of what is known once and computed once nobody knows which counts
             said.values[role] = (value, at)
 
     def _plain(self, said: _Said, role: str, parts: list[str], sign: str, at: int, start: int) -> None:
@@ -475,6 +512,10 @@ class _Code:
                 self._set(said, "aspect_of_lens", aspect, start)
 
 
+def _is_unknown(value: object) -> bool:
+    return isinstance(value, Unknown) or (isinstance(value, tuple) and any(map(_is_unknown, value)))
+
+
 def _looks_declared(text: str, opened: int) -> bool:
     """Whether the brackets are the head of a function's definition."""
     try:
@@ -532,6 +573,9 @@ def _pose(said: _Said, text: str, options: Options) -> tuple:
     eye, target, up, direction = (found[role] for role in ("eye", "target", "up", "direction"))
     if said.three and eye is None:
         eye = (0.0, 0.0, 0.0)
+    if said.three and (turning := _CONTROLS.search(text)):
+        known = _known(values, "target_of_controls", text, "write the target in plain numbers") or (0.0, 0.0, 0.0)
+        target, notes = numbers(known, 3), (f"{turning[1]} turn the camera to their target, {known}",)
     if target is None and (aims := {point for _, point in said.aimed}):
         if len(aims) > 1:
             texts.fail(text, said.aimed[1][0], "it looks at several points, copy one camera")

@@ -40,7 +40,7 @@ _ROLES = {
 _NAMES = re.compile(
     r"\b(model[_ ]?view(?:[_ ]?proj(?:ection)?)?|view[_ ]?proj(?:ection)?|world_?to_?view|matrixWorldInverse"
     r"|view|proj(?:ection)?|mvp|persp(?:ective)?)"
-    r"([_ ]?mat(?:rix)?)?+\b\]?+['\"]?+\s*+(?:\([^()\n]{0,40}\))?+\s*+(?:=|:)?+\s*+"
+    r"([_ ]?mat(?:rix)?)?+\b(?:\s*+\[\s*+\d{1,2}+\s*+\])*+\]?+['\"]?+\s*+(?:\([^()\n]{0,40}\))?+\s*+(?:=|:)?+\s*+"
     r"(?=[^\w\s;.]|[-+.\d\n]|new\b|np\.|glm|mat|array|float|Matrix|XM|\[)",
     re.IGNORECASE,
 )

@@ -235,11 +235,7 @@ def _sensor(element: ElementTree.Element, name: str, kind: str, text, given: Map
                 raise InputError(f"Mitsuba's sensor {name} has two transforms: leave one of them")
             pose = _transform([child] if tag == "lookat" else list(child), name, text)
         elif tag == "film":
-            film = {
-                texts.plain(each.get("name", "")): text(each.get("value", ""))
-                for each in child
-                if each.get("value") is not None
-            }
+            film = {texts.plain(each.get("name", "")): _read(each, text) for each in child if each.get("value") is not None}
         elif tag == "animation":
             raise InputError(f"Mitsuba's sensor {name} moves while the shutter is open: give one transform")
         elif tag == "ref":
@@ -247,8 +243,17 @@ def _sensor(element: ElementTree.Element, name: str, kind: str, text, given: Map
                 f"Mitsuba's sensor {name} refers to {checks.shown(child.get('id'))}, which is not there: copy it as well"
             )
         elif child.get("value") is not None and key:
-            values[key] = text(child.get("value", ""))
+            values[key] = _read(child, text)
     return _Sensor(kind, name, values, film, pose)
+
+
+def _read(element: ElementTree.Element, text) -> str:
+    """The value; as it stands, and refused only where the camera needs it, if the command line says it."""
+    value = element.get("value", "")
+    try:
+        return text(value)
+    except InputError:
+        return value
 
 
 def _transform(steps: Sequence[ElementTree.Element], name: str, text) -> "np.ndarray | _Look":

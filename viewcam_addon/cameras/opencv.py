@@ -317,6 +317,11 @@ def refuse_other_lens(values: Mapping[str, Any], what: str) -> None:
             not_a_pinhole(what, f"of the model {checks.shown(value)}")
 
 
+def refuse_unknown_distortion(values: Mapping[str, Any], what: str) -> None:
+    """Raise InputError if there is a distortion in words that nobody knows."""
+    _coefficients(_by_name(values), what)
+
+
 def _coefficients(values: Mapping[str, Any], what: str) -> dict[str, float]:
     """The distortion, in a list or as keys of their own.
 

@@ -170,7 +170,7 @@ class _Scene:
         """The film, and the pixels of it that are kept: x0, x1, y0, y1 from the top left."""
         # A film without its size has that of the version, which nobody knows.
         if self.film is None or not {"xresolution", "yresolution", "cropwindow", "pixelbounds"} & self.film.keys():
-            return texts.film(options, "pbrt", default=_SIZE), None
+            return texts.film(options, "pbrt 3 and 4", default=_SIZE), None
         size = tuple(
             _whole(self.film, name, usual, self.text) for name, usual in zip(("xresolution", "yresolution"), _SIZE, strict=True)
         )

@@ -14,9 +14,11 @@ Sources: POV-Ray 3.7's source/backend/parser/parser.cpp (Parse_Camera) and sourc
 following #include, since a paste has no folder.
 """
 
+import bisect
+import contextlib
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -33,10 +35,11 @@ _CAMERA = re.compile(r"\bcamera\s*+\{")
 _COMMENT = r"//[^\n]*+|/\*.*?(?:\*/|\Z)"
 _DECLARE = re.compile(r"#\s*+(?:declare|local)\s++(\w++)\s*+=\s*+")
 _CONDITION = re.compile(r"#\s*+(if|ifdef|ifndef|while|for|switch|macro|end)\b")
-_VERSION = re.compile(r"#\s*+version\s++([\d.]++)")
+_VERSION = re.compile(r"#\s*+version\s++(\d++(?:\.\d++)?+)")
 _WORD = re.compile(r"\s*+([A-Za-z_]\w*+)")
 _VECTORS = ("location", "right", "up", "direction", "sky", "look_at")
 _SIZE = (800, 600)
+_PARALLEL = 1e-10  # POV-Ray's EPSILON
 _MOVES = ("rotate", "translate", "scale", "matrix")
 _KINDS = (
     *("orthographic", "fisheye", "ultra_wide_angle", "omnimax", "panoramic", "cylinder", "spherical", "mesh_camera"),
@@ -61,7 +64,8 @@ def recognises(source: Source) -> bool:
 def read(source: Source, options: Options) -> list[Camera]:
     text = texts.without(_COMMENT, source.text)
     version = _VERSION.search(text)
-    if version and float(version[1][:4].rstrip(".") or 4) < 3.5:
+    number = float(version[1]) if version else 3.7
+    if version and number < 3.5:
         texts.fail(
             text, version.start(), "before version 3.5 the order of the statements counted otherwise, write #version 3.7"
         )
@@ -69,7 +73,7 @@ def read(source: Source, options: Options) -> list[Camera]:
     if found is None:
         raise InputError(f"{source.name} has camera {{ … }} in comments only: give one outside of them")
     start, others = found
-    camera = _Block(text, start, options, _size(source.text)).camera()
+    camera = _Block(text, start, options, _size(source.text), number).camera()
     return [camera.noted(*([f"Of {others + 1} cameras the last is the one in use"] if others else []))]
 
 
@@ -98,14 +102,15 @@ def _in_use(text: str) -> tuple[int, int] | None:
 class _Block:
     """A camera whose block opens at a place."""
 
-    def __init__(self, text: str, opened: int, options: Options, size: tuple[int, int] | None) -> None:
-        self.text, self.options, self.size = text, options, size
+    def __init__(self, text: str, opened: int, options: Options, size: tuple[int, int] | None, version: float) -> None:
+        self.text, self.options, self.size, self.version = text, options, size, version
         self.conditions = _conditions(text)
         self._refuse_condition(opened)
         self.declared = {}
         for found in _DECLARE.finditer(text, 0, opened):
             self.declared.setdefault(found[1], []).append(found.end())
-        self._resolving: set[str] = set()
+        self._before, self._depth = opened, 0
+        self._values: dict[int, object] = {}  # by where it is declared
         self._aspect_of_film = False
         self.film: texts.Film | None = None
         self.reader = Expressions(text, self._name, angled=True)
@@ -123,15 +128,30 @@ class _Block:
         if path in ("image_width", "image_height"):
             self._aspect_of_film = True
             return float(self._filmed().width if path == "image_width" else self._filmed().height)
-        if path not in self.declared or path in self._resolving or len(self._resolving) > 20:
+        place = self._declared_at(path)
+        if place is None or self._depth > 20:
             return None
-        places = self.declared[path]
-        self._refuse_condition(places[-1])
-        self._resolving.add(path)
-        try:
-            return Expressions(self.text, self._name, angled=True).value(places[-1])[0]
-        finally:
-            self._resolving.discard(path)
+        if place not in self._values:
+            self._depth += 1
+            with self._standing_at(place):
+                self._values[place] = Expressions(self.text, self._name, angled=True).value(place)[0]
+            self._depth -= 1
+        return self._values[place]
+
+    def _declared_at(self, name: str) -> int | None:
+        """Where it was declared before it is used: what it stands for is not what it is declared as later."""
+        places = self.declared.get(name, [])
+        count = bisect.bisect_left(places, self._before)
+        if not count:
+            return None
+        self._refuse_condition(places[count - 1])
+        return places[count - 1]
+
+    @contextlib.contextmanager
+    def _standing_at(self, place: int) -> Iterator[None]:
+        before, self._before = self._before, place
+        yield
+        self._before = before
 
     def _filmed(self) -> texts.Film:
         if self.film is None:
@@ -171,13 +191,12 @@ class _Block:
             return end
         if word in _MOVES:
             return self._move(word, at)
-        if is_first and word in self.declared and depth < 5:
-            place = self.declared[word][-1]
-            self._refuse_condition(place)
-            if camera := _CAMERA.match(self.text, place):
+        place = self._declared_at(word) if is_first and depth < 5 else None
+        if place is not None and (camera := _CAMERA.match(self.text, place)):
+            with self._standing_at(place):
                 self._collect(camera.end() - 1, depth + 1)
-                return at
-        texts.fail(self.text, start, "a camera of location, look_at, sky, angle, right, up, direction and moves is")
+            return at
+        texts.fail(self.text, start, "give location, look_at, sky, angle, right, up, direction and moves alone")
 
     def _vector(self, value: object, at: int, word: str) -> tuple[float, float, float]:
         if isinstance(value, float):
@@ -212,6 +231,9 @@ class _Block:
         said = self.said
         if said.get("aperture"):
             raise InputError("the camera's aperture blurs, so it is no pinhole: set it to 0 for its middle")
+        if "right" not in said and self.version >= 3.8:  # as wide as the picture
+            said["right"] = (self._filmed().width * self._filmed().pixel_aspect / self._filmed().height, 0.0, 0.0)
+            self._aspect_of_film = True
         right = np.array(said.get("right", (1.33, 0.0, 0.0)))
         up, direction = np.array(said.get("up", _UNITS["y"])), np.array(said.get("direction", _UNITS["z"]))
         sky, eye = said.get("sky", _UNITS["y"]), np.array(said.get("location", (0.0, 0.0, 0.0)))
@@ -225,6 +247,12 @@ class _Block:
             direction = direction / lengths[2] * (lengths[0] / 2 / math.tan(math.radians(angle) / 2))
             lengths[2] = math.hypot(*direction)
         is_left_handed = float(np.cross(up, direction) @ right) > 0
+        along = np.array(said["look_at"]) - eye if "look_at" in said else np.zeros(3)
+        if along.any() and np.abs(np.cross(sky, along / math.hypot(*along))).max() < _PARALLEL:
+            along, right = along / math.hypot(*along), right / lengths[0]  # POV-Ray keeps right as it is then
+            up, direction = np.cross(along, right) * lengths[1], along * lengths[2]
+            right = right * (lengths[0] if is_left_handed else -lengths[0])
+            said = {word: value for word, value in said.items() if word != "look_at"}
         film = self._film(lengths[0] / lengths[1])
         size = (film.width, film.height)
         # A picture whose pixels nobody said has square ones, and a width that is whole: half a pixel may be missing there.

@@ -44,6 +44,8 @@ def read(source: Source, options: Options) -> list[Camera]:
         notes += opencv.settled(
             opencv.coefficients(Record({"data": numbers}, what).numbers("data", len(numbers)), what), plane, what, options
         )
+    else:
+        opencv.refuse_unknown_distortion(document.values, what)
     if "rectification_matrix" in document:
         turn = np.array(document.record("rectification_matrix").numbers("data", 9)).reshape(3, 3)
         if np.abs(turn - np.eye(3)).max() > 1e-9:

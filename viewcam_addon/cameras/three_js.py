@@ -25,12 +25,18 @@ _DEEPEST = 50
 
 
 def recognises(source: Source) -> bool:
-    top = source.document.get("object")
-    return isinstance(top, dict) and isinstance(top.get("type"), str)
+    return bool(_tops(source))
+
+
+def _tops(source: Source) -> list[dict]:
+    """The object; of a file of the editor the camera of its window and the scene."""
+    among = (source.document, source.document.get("camera"), source.document.get("scene"))
+    found = [each.get("object") for each in among if isinstance(each, dict)]
+    return [top for top in found if isinstance(top, dict) and isinstance(top.get("type"), str)]
 
 
 def read(source: Source, options: Options) -> list[Camera]:
-    found = list(_cameras(source.document["object"], np.eye(4), 0))
+    found = [camera for top in _tops(source) for camera in _cameras(top, np.eye(4), 0)]
     pinholes = [(item, matrix) for item, matrix in found if item.get("type") == "PerspectiveCamera"]
     if not pinholes:
         if found:
