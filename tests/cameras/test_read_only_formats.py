@@ -96,6 +96,16 @@ def test_metashape_stands_in_its_chunk(name):
     assert read.name == "left" and read.image == "left.jpg" and any("not aligned" in note for note in read.notes)
 
 
+def test_metashapes_chunk_says_once_more_where_its_component_stands():
+    text = metashape(Known("plain")).replace('<camera id="0"', '<camera id="0" component_id="0"')
+    placed = text[text.index("<transform><rotation>") : text.index("</chunk>")]
+    components = f'<components><component id="0" active="true">{placed}</component><component id="1"/></components>'
+    text = text.replace("</cameras>", f"</cameras>{components}")
+    the_same(cameras.read(text), Known("plain"))
+    with pytest.raises(InputError, match=r"component '1', of which .* is, has no transform"):
+        cameras.read(text.replace('component_id="0"', 'component_id="1"'))
+
+
 def test_metashapes_distortion_is_refused_with_its_pixels_or_taken_without():
     known = Known("plain")
     text = metashape(known, "<k1>-0.1</k1><p1>0.001</p1>")
@@ -119,10 +129,8 @@ def test_reality_capture_counts_in_the_longer_side(name):
     the_same(cameras.read(text, options=Options(size=(known.width, known.height))), known)
 
 
-@pytest.mark.parametrize("name", UNMIRRORED)
-def test_meshroom_lists_its_rotation_column_by_column(name):
-    known = Known(name)
-    sfm = {
+def meshroom(known):
+    return {
         "version": ["1", "2", "11"],
         "views": [{"viewId": "7", "poseId": "7", "intrinsicId": "3", "path": "/photos/a.b.jpg"}],
         "intrinsics": [
@@ -150,8 +158,31 @@ def test_meshroom_lists_its_rotation_column_by_column(name):
             }
         ],
     }
-    read = the_same(cameras.read(json.dumps(sfm)), known)
+
+
+@pytest.mark.parametrize("name", UNMIRRORED)
+def test_meshroom_lists_its_rotation_column_by_column(name):
+    read = the_same(cameras.read(json.dumps(meshroom(Known(name)))), Known(name))
     assert read.name == "a.b" and read.image == "/photos/a.b.jpg"
+
+
+@pytest.mark.parametrize(
+    ("version", "f_y"), [("1.2.3", 1000 / 0.5), ("1.2.4", 1000 / 0.5), ("1.2.5", 1000 * 0.5), ("1.2.10", 1000 * 0.5)]
+)
+def test_meshrooms_ratio_of_pixels_was_the_other_way_round_before_1_2_5(version, f_y):
+    """aliceVision/sfmDataIO/jsonIO.cpp; from 1.2.11 on the focal length is that of the height."""
+    sfm = meshroom(Known("plain")) | {"version": version.split(".")}
+    (intrinsic,) = sfm["intrinsics"]
+    intrinsic |= {"focalLength": repr(1000 / Known("plain").width * 36), "pixelRatio": "0.5"}
+    (camera,) = cameras.read(json.dumps(sfm))
+    assert camera.pinhole.distance == pytest.approx((1000, f_y), rel=4 * 2**-53)
+
+
+def test_meshrooms_cameras_of_a_rig_are_refused():
+    sfm = meshroom(Known("plain"))
+    sfm["views"][0] |= {"rigId": "5", "subPoseId": "1", "isPoseIndependant": "false"}
+    with pytest.raises(InputError, match="rig"):
+        cameras.read(json.dumps(sfm))
 
 
 @pytest.mark.parametrize("name", ONE_FOCAL)
@@ -243,6 +274,31 @@ def test_a_trajectory_is_an_animation_through_the_intrinsics_that_are_given(tmp_
         cameras.read(path)
 
 
+def test_a_head_that_says_w_first_is_believed():
+    known = Known("plain")
+    x, y, z, w = known.quaternion()
+    text = f"# timestamp tx ty tz qw qx qy qz\n12.5 {text_of(known.e)} {text_of([w, x, y, z])}\n"
+    the_same(cameras.read(text, options=Options(base=CAMERAS["plain"])), known)
+
+
+def test_what_was_tracked_stands_on_euroc_s_body_as_its_own_sensor_says(tmp_path):
+    known = Known("plain")
+    plane = ViewPlane(known.pinhole.distance, known.pinhole.principal_point, known.width, known.height)
+    body = np.array([[0, -1, 0, 0.2], [0, 0, -1, 0.1], [1, 0, 0, -0.3], [0, 0, 0, 1]], float)  # the camera on the body
+    marker = np.array([[0, 0, 1, -0.1], [1, 0, 0, 0.4], [0, 1, 0, 0.2], [0, 0, 0, 1]], float)
+    camera = np.eye(4)
+    camera[:3] = np.column_stack([known.opencv.T, known.e])
+    tracked = camera @ np.linalg.inv(body) @ marker
+    x, y, z, w = pytest.importorskip("scipy.spatial.transform").Rotation.from_matrix(tracked[:3, :3]).as_quat().tolist()
+    for name, mounted in (("cam0", body), ("vicon0", marker)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "sensor.yaml").write_text(f"T_BS:\n  data: [{', '.join(map(repr, mounted.ravel().tolist()))}]\n")
+    numbers = ",".join(map(repr, [*tracked[:3, 3].tolist(), w, x, y, z]))
+    data = tmp_path / "vicon0" / "data.csv"
+    data.write_text(f"#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w []\n0,{numbers}\n")
+    the_same(cameras.read(data, options=Options(view_plane=plane)), known)
+
+
 def test_eight_numbers_without_a_quaternion_are_no_trajectory_of_tum():
     """Nuke's .chan has as many: frame, place, three angles in degrees, field of view."""
     with pytest.raises(InputError, match="quaternion of pose 0 has the length 46"):
@@ -280,6 +336,28 @@ def test_polycam_3d_scanner_app_and_record3d_are_arkits(name):
     the_same(cameras.read(json.dumps(record)), known)
 
 
+def test_arkits_last_row_may_be_rounded_to_float32():
+    known = Known("plain")
+    scanner = {"cameraPoseARFrame": [*known.opengl.ravel(), 0, 0, 0, 1 - 2.0**-23]}
+    scanner["intrinsics"] = [known.f_x, 0, known.c_x, 0, known.f_y, known.c_y, 0, 0, 1]
+    options = Options(size=(known.width, known.height))
+    the_same(cameras.read(json.dumps(scanner), options=options), known)
+    scanner["cameraPoseARFrame"][-1] = 0.99
+    with pytest.raises(InputError, match="last row"):
+        cameras.read(json.dumps(scanner), options=options)
+
+
+def test_record3ds_intrinsics_may_be_another_for_each_picture():
+    poses = [[0, 0, 0, 1, index, 0, 0] for index in range(2)]
+    record = {"poses": poses, "K": [700, 0, 0, 0, 700, 0, 320, 240, 1], "w": 640, "h": 480}
+    record["perFrameIntrinsicCoeffs"] = [[710, 720, 310, 250], [800, 810, 300, 260]]
+    found = [camera.pinhole for camera in cameras.read(json.dumps(record))]
+    assert [pinhole.distance for pinhole in found] == [(710, 720), (800, 810)]
+    assert [pinhole.principal_point for pinhole in found] == [(310, 480 - 250), (300, 480 - 260)]  # from below
+    with pytest.raises(InputError, match="perFrameIntrinsicCoeffs"):
+        cameras.read(json.dumps(record | {"perFrameIntrinsicCoeffs": [[710, 720, 310, 250]]}))
+
+
 def test_polycams_pictures_are_named_from_whichever_folder_is_given(tmp_path):
     known = Known("plain")
     k = {"fx": known.f_x, "fy": known.f_y, "cx": known.c_x, "cy": known.c_y, "width": known.width, "height": known.height}
@@ -302,6 +380,14 @@ def test_gaussian_splatting_lists_camera_to_world(name):
     said |= {"position": known.e.tolist(), "rotation": known.opencv.T.tolist()}
     read = the_same(cameras.read(json.dumps([said])), known)
     assert read.name == "00001" and any("principal point" in note for note in read.notes)
+
+
+def test_gaussian_splattings_principal_point_counts_where_it_is_said():
+    known = Known("shifted")
+    said = {"id": 0, "img_name": "1", "width": known.width, "height": known.height, "fx": known.f_x, "fy": known.f_y}
+    said |= {"position": known.e.tolist(), "rotation": known.opencv.T.tolist(), "cx": known.c_x, "cy": known.c_y}
+    read = the_same(cameras.read(json.dumps([said])), known)
+    assert not any("principal point" in note for note in read.notes)
 
 
 KALIBR = """cam0:
@@ -372,6 +458,8 @@ def test_a_distortion_that_no_picture_shows_is_taken_and_its_figure_said():
         ({"camera_intrinsics": [700, 700, 400, 300]}, "has camera_intrinsics, which programs read differently"),
         ({"K": [[700, 0, 400], [0, 700, 300], [0, 0, 1]]}, "has K, which"),
         ({"camera_type": "equirectangular"}, "equirectangular"),
+        ({"camera_convention": "opencv"}, "camera_convention 'opencv'"),
+        ({"from_mitsuba": True}, "from_mitsuba"),
         ({"w": 800}, "w 800 and the size is given as 640 × 480"),
     ],
 )
@@ -382,3 +470,26 @@ def test_what_a_transforms_json_says_in_other_words_is_not_passed_over(more, tol
     for document in ({**more, "frames": [frame]}, {"frames": [{**frame, **more}]}):
         with pytest.raises(InputError, match=told):
             cameras.read(json.dumps({"camera_angle_x": 0.7, **document}), options=given)
+
+
+def test_a_camera_of_usd_stands_at_every_time_that_has_a_sample(tmp_path):
+    pytest.importorskip("pxr")
+    samples = ", ".join(f"{time}: ({time + 1}, 0, 0)" for time in range(3))
+    text = f"""#usda 1.0
+    def Camera "mono" {{
+        float3 xformOp:translate.timeSamples = {{ {samples} }}
+        uniform token[] xformOpOrder = ["xformOp:translate"]
+    }}"""
+    (tmp_path / "a.usda").write_text(text)
+    found = cameras.read(tmp_path / "a.usda", options=Options(size=(640, 480)))
+    assert [camera.pinhole.eye for camera in found] == [(1, 0, 0), (2, 0, 0), (3, 0, 0)]
+
+
+@pytest.mark.parametrize("pointer", ["/nodes/1/translation", "/cameras/0/perspective/yfov"])
+def test_an_animation_of_gltf_by_a_pointer_is_told(pointer):
+    document = {"asset": {"version": "2.0"}, "cameras": [{"type": "perspective", "perspective": {"yfov": 0.8, "znear": 0.1}}]}
+    document |= {"nodes": [{"name": "floor"}, {"name": "mono", "camera": 0}], "scenes": [{"nodes": [0, 1]}]}
+    target = {"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": pointer}}}
+    for animations, is_told in (([], False), ([{"channels": [{"sampler": 0, "target": target}]}], True)):
+        (camera,) = cameras.read(json.dumps(document | {"animations": animations}), options=Options(size=(640, 480)))
+        assert any("animated" in note for note in camera.notes) == is_told

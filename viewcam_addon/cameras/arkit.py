@@ -97,17 +97,24 @@ def _record3d(source: Source, options: Options) -> list[Camera]:
     k = np.array(values.numbers("K", 9)).reshape(3, 3).T
     if not (k[0, 0] > 0 and k[1, 1] > 0):
         raise InputError(f"K of {source.name} has no focal lengths above 0: record it again")
-    plane = axes.view_plane(k[0, 0], k[1, 1], k[0, 2], k[1, 2], (values.size("w"), values.size("h")))
+    size = (values.size("w"), values.size("h"))
+    plane = axes.view_plane(k[0, 0], k[1, 1], k[0, 2], k[1, 2], size)
     poses = values.get("poses")
     if not isinstance(poses, list) or not poses:
         raise InputError(f"{source.name} has no poses: record it again")
     rate = values.number("fps", 60.0, 1e-3)
     whats = [f"pose {index}" for index in range(len(poses))]
+    planes = [plane] * len(poses)
+    if "perFrameIntrinsicCoeffs" in values:
+        each = values.get("perFrameIntrinsicCoeffs")
+        if not isinstance(each, list) or len(each) != len(poses):
+            raise InputError(f"perFrameIntrinsicCoeffs of {source.name} should be four numbers for each pose: record it again")
+        planes = [axes.view_plane(*Record({"k": k}, what).numbers("k", 4), size) for k, what in zip(each, whats, strict=True)]
     numbers = [Record({"pose": pose}, what).numbers("pose", 7) for pose, what in zip(poses, whats, strict=True)]
     x, y, z, w, *eyes = np.array(numbers).T
     turns = axes.rotations_of(np.stack([w, x, y, z], axis=-1), whats)
     matrices = np.concatenate([turns, np.stack(eyes, axis=-1)[:, :, None]], axis=2)
     return [
         Camera(f"pose_{index:04d}", pinhole, True, notes, time=index / rate)
-        for index, (pinhole, notes) in enumerate(axes.pinholes(matrices, [plane] * len(poses), whats))
+        for index, (pinhole, notes) in enumerate(axes.pinholes(matrices, planes, whats))
     ]

@@ -40,8 +40,11 @@ def read(source: Source, _options: Options) -> list[Camera]:
         matrix = np.eye(4)
         matrix[:3, :3] = np.array(picture.numbers("rotation", 9)).reshape(3, 3)
         matrix[:3, 3] = picture.numbers("position", 3)
-        plane = axes.view_plane(f_x, f_y, width / 2, height / 2, (width, height))
+        c_x, c_y = picture.number("cx", width / 2), picture.number("cy", height / 2)
+        plane = axes.view_plane(f_x, f_y, c_x, c_y, (width, height))
         pinhole, notes = axes.pinhole(axes.of_opencv(matrix), plane, picture.place)
         image = path if naming.has_suffix(path) else None
-        cameras.append(Camera(name, pinhole, True, (*notes, _MIDDLE), image))
+        if not ("cx" in picture and "cy" in picture):
+            notes = (*notes, _MIDDLE)
+        cameras.append(Camera(name, pinhole, True, notes, image))
     return cameras

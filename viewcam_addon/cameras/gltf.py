@@ -10,6 +10,7 @@ Source: Khronos' glTF 2.0 specification, sections 3.10 and 5.12.
 
 import json
 import math
+import re
 import struct
 from collections.abc import Sequence
 
@@ -150,8 +151,18 @@ def _index(node: Record, key: str, count: int) -> int:
 
 def _moving(document: Record) -> set[int]:
     channels = [channel for animation in _list(document.get("animations")) for channel in _list(_key(animation, "channels"))]
-    nodes = [_key(_key(channel, "target"), "node") for channel in channels]
-    return {node for node in nodes if isinstance(node, int)}
+    targets = [_key(channel, "target") for channel in channels]
+    nodes = {node for target in targets if isinstance(node := _key(target, "node"), int)}
+    for target in targets:
+        pointer = _key(_key(_key(target, "extensions"), "KHR_animation_pointer"), "pointer")
+        if isinstance(pointer, str) and (found := re.match(r"/(nodes|cameras)/(\d{1,9})/", pointer)):
+            kind, index = found[1], int(found[2])
+            nodes |= (
+                {index}
+                if kind == "nodes"
+                else {number for number, node in enumerate(_list(document.get("nodes"))) if _key(node, "camera") == index}
+            )
+    return nodes
 
 
 def _list(value: object) -> list:

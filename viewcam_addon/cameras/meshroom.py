@@ -60,6 +60,10 @@ def read(source: Source, options: Options) -> list[Camera]:
         if intrinsic not in planes:
             planes[intrinsic] = _plane(intrinsics[intrinsic], version, options)
         plane, notes = planes[intrinsic]
+        if "rigId" in view and str(view.get("isPoseIndependant")).lower() in ("false", "0"):
+            raise InputError(
+                f"view {checks.shown(name)} is of a rig, on whose pose its cameras stand: give each a pose of its own"
+            )
         pose = poses[str(view.get("poseId"))].record("pose").record("transform")
         matrix = np.eye(4)
         matrix[:3, :3] = np.array(pose.numbers("rotation", 9)).reshape(3, 3)  # column by column is its transpose, row by row
@@ -91,7 +95,10 @@ def _plane(intrinsic: Record, version: tuple[int, ...], options: Options) -> tup
         )
     else:
         f = intrinsic.number("focalLength", least=1e-9) / intrinsic.number("sensorWidth", least=1e-9) * width
-        f_x, f_y = (f / ratio, f) if version >= (1, 2, 11) else (f, f * ratio)
+        if version >= (1, 2, 11):
+            f_x, f_y = f / ratio, f
+        else:  # before 1.2.5 the field held f_x / f_y
+            f_x, f_y = (f, f * ratio) if version >= (1, 2, 5) else (f, f / ratio)
     if not (f_x > 0 and f_y > 0):
         raise InputError(f"{intrinsic.place} has the focal length {min(f_x, f_y):g}: let Meshroom estimate it first")
     c_x, c_y = intrinsic.numbers("principalPoint", 2) if "principalPoint" in intrinsic else (0.0, 0.0)

@@ -1,9 +1,10 @@
 """Agisoft Metashape's cameras as XML.
 
-A camera's transform is from its axes (x right, y down, z into the view) to its component, that one's to the chunk, and the
-chunk's to the world; all three count here. The principal point is an offset from the picture's middle, whose first pixel's
-centre is (0.5, 0.5). b1 is what the distance across has more than the other, b2 is skew, which no pinhole has. P1 and P2 are
-OpenCV's p2 and p1. Skew is told and left out as lens distortion is.
+A camera's transform is from its axes (x right, y down, z into the view) to its component, and that one's to the world. The
+chunk's own transform is that of its active component once more, or stands alone in files without components. The principal
+point is an offset from the picture's middle, whose first pixel's centre is (0.5, 0.5). b1 is what the distance across has more
+than the other, b2 is skew, which no pinhole has. P1 and P2 are OpenCV's p2 and p1. Skew is told and left out as lens distortion
+is.
 
 Source: the Metashape manual's camera model, and its exported files. nerfstudio's reader leaves out the chunk's transform.
 """
@@ -34,9 +35,10 @@ def read(source: Source, options: Options) -> list[Camera]:
     found, lost = [], 0
     for chunk in source.xml.iter("chunk"):
         whole = _placed(chunk.find("transform"), "the chunk")
-        components = {
+        components = {  # in the world, as the chunk's own transform repeats of the active one
             component.get("id"): _placed(component.find("transform"), f"component {component.get('id')}")
             for component in chunk.iter("component")
+            if component.find("transform") is not None
         }
         planes: dict[str | None, tuple[ViewPlane, tuple[str, ...]]] = {}
         sensors = {sensor.get("id"): sensor for sensor in chunk.iter("sensor")}
@@ -56,8 +58,10 @@ def read(source: Source, options: Options) -> list[Camera]:
             numbers = flat(f"the transform of {what}", (transform.text or ""))
             if len(numbers) != 16:
                 raise InputError(f"the transform of {what} has {len(numbers)} numbers: it should have 16")
-            component = components.get(camera.get("component_id"), np.eye(4))
-            matrix = axes.of_opencv(whole @ component @ np.array(numbers).reshape(4, 4))
+            belongs = camera.get("component_id")
+            if components and belongs is not None and belongs not in components:
+                raise InputError(f"component {checks.shown(belongs)}, of which {what} is, has no transform: align it first")
+            matrix = axes.of_opencv(components.get(belongs, whole) @ np.array(numbers).reshape(4, 4))
             pinhole, more = axes.pinhole(_without_scale(matrix), plane, what)
             image = label if naming.has_suffix(label) else None
             found.append(Camera(naming.stem(label), pinhole, True, (*notes, *more), image))

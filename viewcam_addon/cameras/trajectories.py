@@ -22,6 +22,7 @@ from .source import Record, Source, numbered_lines, table
 TITLE = "trajectories of TUM, KITTI and EuRoC"
 
 _MOST = 1_000_000
+_W_FIRST = re.compile(r"^#.*\bq_?w\b.*\bq_?x\b", re.MULTILINE)
 _KITTI_STEP = 0.1  # seconds; its pictures are taken at 10 Hz
 
 
@@ -48,7 +49,8 @@ def read(source: Source, options: Options) -> list[Camera]:
         matrices[:, :3] = rows[:, :12].reshape(-1, 3, 4)
     else:
         times = rows[:, 0] * (1 if kind == "TUM" else 1e-9)
-        quaternions = rows[:, [7, 4, 5, 6] if kind == "TUM" else [4, 5, 6, 7]]  # w x y z
+        w_stands_last = kind == "TUM" and not _W_FIRST.search(source.text[:2000])
+        quaternions = rows[:, [7, 4, 5, 6] if w_stands_last else [4, 5, 6, 7]]  # w x y z
         matrices[:, :3, :3], matrices[:, :3, 3] = axes.rotations_of(quaternions, whats), rows[:, 1:4]
     found = axes.pinholes(axes.of_opencv(matrices @ mounted)[:, :3], [plane] * len(rows), whats)
     digits = max(4, len(str(len(rows) - 1)))
@@ -82,8 +84,15 @@ def _sensor(source: Source, options: Options) -> tuple[np.ndarray, ViewPlane | N
             f"{source.name} has poses of the body, not of a camera: put it where ../cam0/sensor.yaml of the data set is found"
         )
     values = Record(file.yaml, str(file.path))
+    beside = source.file("sensor.yaml")
+    own = Record(beside.yaml, str(beside.path)) if beside else None
     opencv.refuse_other_lens(values.values, "cam0")
     mounted = np.array(values.record("T_BS").numbers("data", 16)).reshape(4, 4)
+    if own and "T_BS" in own:  # where what was tracked, as a Vicon marker, stands on the body
+        turn, at = np.hsplit(np.array(own.record("T_BS").numbers("data", 16)).reshape(4, 4)[:3], [3])
+        back = np.eye(4)
+        back[:3] = np.hstack([turn.T, -turn.T @ at])
+        mounted = back @ mounted
     if options.view_plane or "intrinsics" not in values:
         return mounted, None, ()
     f_x, f_y, c_x, c_y = values.numbers("intrinsics", 4)

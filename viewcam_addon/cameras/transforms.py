@@ -45,6 +45,8 @@ _PINHOLES = ("PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "
 _OTHER_CAMERAS = ("is_fisheye", "ftheta_p0", "latlong", "equirectangular", "orthographic")
 _NOT_READ = ("k", "intrinsic", "intrinsics", "intrinsic_matrix", "camera_intrinsics", "camera_matrix", "cam_k")
 _LENS = ("k1", "k2", "k3", "k4", "p1", "p2")  # the order of distortion_params, too
+_AXES = ("opengl", "blender", "nerf", "nerfstudio")
+_OTHER_AXES = ("from_mitsuba", "normal_mts_args", "from_na")
 _SAME_FOCAL = 1e-3  # relative: what camera_angle_x and fl_x may differ by for the few digits of one
 
 
@@ -186,6 +188,16 @@ def _plane(both: Record, source: Source, path: str, options: Options) -> tuple[V
     for key in _OTHER_CAMERAS:
         if both.values.get(key) or (both.values.get(key) == 0.0 and key == "ftheta_p0"):
             not_a_pinhole(both.place, f"a camera with {key}")
+    convention = both.get("camera_convention")
+    if convention is not None and str(convention).lower() not in _AXES:
+        raise InputError(
+            f"{both.place} has the camera_convention {checks.shown(convention)}: write its matrices in opengl's axes"
+        )
+    for key in _OTHER_AXES:
+        if both.values.get(key):
+            raise InputError(
+                f"{both.place} has {key}, by which the camera's axes are others: write its matrix in OpenGL's axes"
+            )
     size, stated = _size(both, source, path, options)
     focal = {along: _focal(both, along, side) for along, side in zip("xy", size, strict=True)}
     if not any(focal.values()):

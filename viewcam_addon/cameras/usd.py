@@ -94,10 +94,8 @@ def _stage(source: Source, usd):
 def _cameras(prim, stage, options: Options, usd, usd_geom) -> Iterator[Camera]:
     camera = usd_geom.Camera(prim)
     name = prim.GetDisplayName() or prim.GetName()
-    times = {0.0} | {
-        time for attribute in _attributes(prim, camera, usd_geom) for time in attribute.GetTimeSamples()[:_MOST_SAMPLES]
-    }
-    varying = sorted(times - {0.0} if len(times) > 1 else times)
+    times = {time for attribute in _attributes(prim, camera, usd_geom) for time in attribute.GetTimeSamples()[:_MOST_SAMPLES]}
+    varying = sorted(times) or [0.0]
     for time in varying:
         code = usd.TimeCode(time) if len(varying) > 1 or time else usd.TimeCode.EarliestTime()
         called = f"{name} {time:g}" if len(varying) > 1 else name
