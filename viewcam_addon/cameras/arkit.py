@@ -109,7 +109,8 @@ def _record3d(source: Source, options: Options) -> list[Camera]:
         each = values.get("perFrameIntrinsicCoeffs")
         if not isinstance(each, list) or len(each) != len(poses):
             raise InputError(f"perFrameIntrinsicCoeffs of {source.name} should be four numbers for each pose: record it again")
-        planes = [axes.view_plane(*Record({"k": k}, what).numbers("k", 4), size) for k, what in zip(each, whats, strict=True)]
+        of_poses = [Record({"perFrameIntrinsicCoeffs": one}, what) for one, what in zip(each, whats, strict=True)]
+        planes = [axes.view_plane(*one.numbers("perFrameIntrinsicCoeffs", 4), size) for one in of_poses]
     numbers = [Record({"pose": pose}, what).numbers("pose", 7) for pose, what in zip(poses, whats, strict=True)]
     x, y, z, w, *eyes = np.array(numbers).T
     turns = axes.rotations_of(np.stack([w, x, y, z], axis=-1), whats)

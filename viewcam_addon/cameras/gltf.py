@@ -156,12 +156,8 @@ def _moving(document: Record) -> set[int]:
     for target in targets:
         pointer = _key(_key(_key(target, "extensions"), "KHR_animation_pointer"), "pointer")
         if isinstance(pointer, str) and (found := re.match(r"/(nodes|cameras)/(\d{1,9})/", pointer)):
-            kind, index = found[1], int(found[2])
-            nodes |= (
-                {index}
-                if kind == "nodes"
-                else {number for number, node in enumerate(_list(document.get("nodes"))) if _key(node, "camera") == index}
-            )
+            index, every = int(found[2]), enumerate(_list(document.get("nodes")))
+            nodes |= {number for number, node in every if (number if found[1] == "nodes" else _key(node, "camera")) == index}
     return nodes
 
 

@@ -48,7 +48,6 @@ _MADE = re.compile(r"(?<![\w$])([\w$]++)\s*+[=:]\s*+new\s++(?:THREE\s*+\.\s*+)?+
 _MOST_STATEMENTS = 10_000
 _IS_CODE = re.compile(r"\w\s*+\(\s*+[-\w.]|;\s*+$|\w\.\w++\s*+[=(]", re.MULTILINE)
 _CAMERA = re.compile(r"cam|view|eye|lens|observer", re.IGNORECASE)
-
 _NAMED_CAMERA = re.compile(r"cam", re.IGNORECASE)
 
 _EYE = "eye eyepos eyeposition eyepoint eyelocation lookfrom lookfrompoint campos camerapos camposition "
@@ -149,6 +148,7 @@ _MOVES |= {
     "setview",
 }
 _TURNED = {"rotation", "quaternion", "matrix", "matrixworld", "rotate"}
+# Where they are made they turn the camera to their target, whatever it looked at before.
 _CONTROLS = re.compile(r"\bnew\s++(?:[A-Za-z]++\s*+\.\s*+)?+((?:Orbit|Trackball|Map|Arcball)Controls)\b")
 _OTHER_CONTROLS = re.compile(r"\bnew\s++(?:[A-Za-z]++\s*+\.\s*+)?+((?:FirstPerson|DeviceOrientation)Controls)\b")
 _PLACES = {"position", "up", "direction"}

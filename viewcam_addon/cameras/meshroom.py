@@ -97,8 +97,10 @@ def _plane(intrinsic: Record, version: tuple[int, ...], options: Options) -> tup
         f = intrinsic.number("focalLength", least=1e-9) / intrinsic.number("sensorWidth", least=1e-9) * width
         if version >= (1, 2, 11):
             f_x, f_y = f / ratio, f
-        else:  # before 1.2.5 the field held f_x / f_y
-            f_x, f_y = (f, f * ratio) if version >= (1, 2, 5) else (f, f / ratio)
+        elif version >= (1, 2, 5):
+            f_x, f_y = f, f * ratio
+        else:  # then the ratio was f_x / f_y
+            f_x, f_y = f, f / ratio
     if not (f_x > 0 and f_y > 0):
         raise InputError(f"{intrinsic.place} has the focal length {min(f_x, f_y):g}: let Meshroom estimate it first")
     c_x, c_y = intrinsic.numbers("principalPoint", 2) if "principalPoint" in intrinsic else (0.0, 0.0)

@@ -132,10 +132,8 @@ class _Block:
         if place is None or self._depth > 20:
             return None
         if place not in self._values:
-            self._depth += 1
             with self._standing_at(place):
                 self._values[place] = Expressions(self.text, self._name, angled=True).value(place)[0]
-            self._depth -= 1
         return self._values[place]
 
     def _declared_at(self, name: str) -> int | None:
@@ -150,8 +148,12 @@ class _Block:
     @contextlib.contextmanager
     def _standing_at(self, place: int) -> Iterator[None]:
         before, self._before = self._before, place
-        yield
-        self._before = before
+        self._depth += 1
+        try:
+            yield
+        finally:
+            self._before = before
+            self._depth -= 1
 
     def _filmed(self) -> texts.Film:
         if self.film is None:
