@@ -205,6 +205,16 @@ LARGE = {
     "quotes": '{"' + '\\"' * 125_000,
     "keys": "{" + ", ".join(f'"{i}": 1' for i in range(15_000)) + ', "a": 1, "a": 2}',
     "elements": "<a>" * 75_000,
+    "pointers": json.dumps(
+        {
+            "asset": {"version": "2.0"},
+            "cameras": [{"type": "perspective", "perspective": {"yfov": 1, "znear": 1}}],
+            "nodes": [{"camera": 0}, *[{}] * 60_000],
+            "animations": [
+                {"channels": [{"target": {"extensions": {"KHR_animation_pointer": {"pointer": "/cameras/0/x"}}}}] * 3_000}
+            ],
+        }
+    ),
     "numbers": "1 2 3 4 5 6 7 8\n" * 15_000,
     "words": "eye " * 62_500,
     "yaml": "camera_matrix: a\n" * 15_000,

@@ -152,13 +152,13 @@ def _index(node: Record, key: str, count: int) -> int:
 def _moving(document: Record) -> set[int]:
     channels = [channel for animation in _list(document.get("animations")) for channel in _list(_key(animation, "channels"))]
     targets = [_key(channel, "target") for channel in channels]
-    nodes = {node for target in targets if isinstance(node := _key(target, "node"), int)}
+    moving = {"nodes": {node for target in targets if isinstance(node := _key(target, "node"), int)}, "cameras": set()}
     for target in targets:
         pointer = _key(_key(_key(target, "extensions"), "KHR_animation_pointer"), "pointer")
         if isinstance(pointer, str) and (found := re.match(r"/(nodes|cameras)/(\d{1,9})/", pointer)):
-            index, every = int(found[2]), enumerate(_list(document.get("nodes")))
-            nodes |= {number for number, node in every if (number if found[1] == "nodes" else _key(node, "camera")) == index}
-    return nodes
+            moving[found[1]].add(int(found[2]))
+    through = ((number, _key(node, "camera")) for number, node in enumerate(_list(document.get("nodes"))))
+    return moving["nodes"] | {number for number, camera in through if isinstance(camera, int) and camera in moving["cameras"]}
 
 
 def _list(value: object) -> list:
