@@ -11,21 +11,20 @@ import tempfile
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from . import child_process
 from . import image as images
-from .comparison import geometry, radiance
-from .comparison.light_verdict import RadianceComparison
-from .comparison.verdict import GeometryComparison
 from .errors import InputError
 from .image import Image
-from .labels import scene_labels
-from .labels.scene_labels import Labels
 from .tracer import render as tracing
 from .tracer.scene import Scene, scene_file
 from .tracer.scene.film import MOST_SAMPLES, SAMPLES
 from .tracer.scene.levels import least_level
+
+if TYPE_CHECKING:  # each function imports what no other needs: a picture is traced before half of it would be loaded
+    from .comparison.light_verdict import RadianceComparison
+    from .comparison.verdict import GeometryComparison
+    from .labels.scene_labels import Labels
 
 File = str | os.PathLike[str]
 
@@ -79,11 +78,11 @@ def render(
 
 def label(
     scene: Scene | File,
-    labels: Collection[str] = scene_labels.KINDS[:-1],
+    labels: Collection[str] = ("depth", "normals", "position", "masks", "amodal"),
     previous: Scene | File | None = None,
     next: Scene | File | None = None,
     threads: int | None = None,
-) -> Labels:
+) -> "Labels":
     """What is true of a scene's picture, exact at the centre of each pixel.
 
     scene : or the path of a scene file, as the others. labels : some of "depth", "normals", "position", "masks", "amodal" and
@@ -97,6 +96,8 @@ def label(
     InputError
         if there is no such label, flow has no other frame, or frames differ in size.
     """
+    from .labels import scene_labels
+
     frame = scene if isinstance(scene, Scene) else read_scene(scene)
     before, after = (each if each is None or isinstance(each, Scene) else read_scene(each) for each in (previous, next))
     return scene_labels.label(frame, labels, before, after, threads)
@@ -108,7 +109,7 @@ def compare(
     scene: Scene | File | None = None,
     threads: int | None = None,
     test_samples: int | None = None,
-) -> GeometryComparison | RadianceComparison:
+) -> "GeometryComparison | RadianceComparison":
     """What a picture differs from the tracer's by, how much, and whether it is explained.
 
     reference : the tracer's, of `render` or an EXR. tests : Cycles', say; several of different seeds where there is noise.
@@ -122,6 +123,8 @@ def compare(
     InputError
         if sizes differ, a pass is missing, the camera is not known, or several pictures have no noise to tell.
     """
+    from .comparison import geometry, radiance
+
     several = tests if isinstance(tests, Sequence) and not isinstance(tests, str) else [tests]
     if files := [each for each in (reference, *several) if not isinstance(each, Image)]:
         images.check_same_frames(files)
@@ -171,6 +174,8 @@ def check(blend: File, *options: File) -> Check:
 
 def run(command: str, *words: File) -> Check:
     """What `viewcam check` or `viewcam compare` finds, in a process of its own; raises as `check` does."""
+    from . import child_process
+
     with tempfile.TemporaryDirectory(prefix="viewcam-") as folder:
         result, errors = Path(folder) / "result.json", _Errors()
         given = [str(word) for word in (*words, "--json", result)]

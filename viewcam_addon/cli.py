@@ -356,13 +356,15 @@ def _told(options: argparse.Namespace, status: int, sentence: str, problems: Seq
 
 def _write_result(options: argparse.Namespace, status: int, result: dict[str, Any], seconds: float) -> int:
     """Write the result where that was asked for; the exit status if that fails, else 0."""
-    from . import checks, junit
-
     try:
         if options.json:
+            from . import checks
+
             with written_whole(options.json) as temporary:
                 temporary.write_text(json.dumps(checks.for_json(result), indent=2, allow_nan=False) + "\n", encoding="utf-8")
         if path := getattr(options, "junit", None):
+            from . import junit
+
             junit.write(path, options.words, status, result, seconds)
     except InputError as error:
         return _told(options, error.exit_status, str(error))[0]

@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..child_process import run_viewcam
 from ..errors import InputError
 from ..events import Events
 from ..terminal import say, silent_libraries
@@ -105,6 +104,8 @@ def compare(options: argparse.Namespace) -> Result:
 
 
 def check(options: argparse.Namespace) -> Result:
+    from ..child_process import run_viewcam
+
     with tempfile.TemporaryDirectory(prefix="viewcam-") as temporary:
         folder = options.report or Path(temporary)
         scene, reference = folder / "scene.json", folder / "reference.exr"
