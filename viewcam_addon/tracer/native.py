@@ -51,10 +51,16 @@ _KINDS = {kind: 1 << number for number, kind in enumerate(RAYS)}
 _GRID = 16.0
 
 
+class _Attribute(Structure):
+    _fields_ = [("name", c_char_p), ("width", c_int32), ("values", c_void_p)]
+
+
 class _Mesh(Structure):
     _fields_ = [
         *((name, c_size_t) for name in ("vertex_count", "count")),
         *((name, c_void_p) for name in ("vertices", "triangles", "materials", "normals", "uvs", "colours")),
+        ("attributes", POINTER(_Attribute)),
+        ("attribute_count", c_size_t),
     ]
 
 
@@ -277,7 +283,12 @@ class CoreScene:
             (geometry.corner_uvs, np.float32, (count, 3, 2)),
             (geometry.corner_colours, np.float32, (count, 3, 3)),
         )
-        mesh = _Mesh(len(geometry.vertices), count, *(self._keep(*part) for part in parts))
+        attributes = [
+            _Attribute(name.encode(), values.shape[2], self._keep(values, np.float32, (count, 3, None)))
+            for name, values in geometry.attributes.items()
+        ]
+        addresses = [self._keep(*part) for part in parts]
+        mesh = _Mesh(len(geometry.vertices), count, *addresses, (_Attribute * len(attributes))(*attributes), len(attributes))
         self.check(self.core.add_mesh(self.handle, mesh))
 
     def _add_objects(self, placed: Object, geometry: int, materials: Mapping[str, int]) -> None:
@@ -520,7 +531,8 @@ def _described_node(node: Node, images: Mapping[str, int], nodes: Mapping[Node, 
     for name in KINDS[node.type].inputs:
         value = node[name]
         if isinstance(value, str | bool):
-            inputs.append(_Input(name.encode(), str(value).lower().encode(), _color(WHITE, images, nodes)))
+            word = value if isinstance(value, str) else str(value).lower()
+            inputs.append(_Input(name.encode(), word.encode(), _color(WHITE, images, nodes)))
         elif value is not None:
             inputs.append(_Input(name.encode(), None, _color(value, images, nodes)))
     return _Node(node.type.encode(), (_Input * len(inputs))(*inputs), len(inputs))

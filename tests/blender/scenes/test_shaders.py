@@ -84,6 +84,7 @@ VALUES = [
     node("mix_color", factor=node("fresnel", ior=1.25), a=CHECKS, b=Colour((1.0, 1.0, 1.0), vertex=True), blend="dodge"),
     node("mix_number", a=node("separate", color=CHECKS, output="y"), clamp_factor=False),
     node("combine_color", x=node("rgb_to_bw", color=CHECKS), z=node("object_info", output="object_index")),
+    node("attribute", name="Paint", output="alpha"),
     node("combine_xyz", y=node("clamp", value=node("geometry"), max=0.5)),
     node("hue_saturation", color=node("gamma", color=node("bright_contrast", color=node("invert", color=CHECKS)), gamma=0.5)),
 ]
@@ -315,15 +316,18 @@ def test_how_an_image_is_used_otherwise_is_named(diffuse, image, change, words):
     approximately(diffuse, "'Image Texture'", words)
 
 
-def test_where_an_image_is_laid_out_otherwise_is_named(diffuse, image):
+def test_an_image_is_laid_out_by_what_the_mesh_has(diffuse, image):
     texture = link(diffuse, "ShaderNodeTexImage", 0, "Color")
     texture.image = image
     coordinates = link(diffuse, "ShaderNodeTexCoord", "UV", "Vector", texture.name)
     exactly(diffuse)
     diffuse.node_tree.links.new(coordinates.outputs["Generated"], texture.inputs["Vector"])
-    approximately(diffuse, "'Texture Coordinate'", "not modelled")
+    assert exactly(diffuse).attributes == {"generated"}
     link(diffuse, "ShaderNodeUVMap", 0, "Vector", texture.name).uv_map = "Second"
-    assert exactly(diffuse) and shaders.read(diffuse).uv == "Second"
+    assert exactly(diffuse).attributes == {"Second"}
+    coordinates.from_instancer = True
+    diffuse.node_tree.links.new(coordinates.outputs["UV"], texture.inputs["Vector"])
+    approximately(diffuse, "'Texture Coordinate'", "instancer")
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 1e30])

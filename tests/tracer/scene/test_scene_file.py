@@ -36,8 +36,13 @@ def assert_same_scene(first, second):
         for field, array in vars(geometry).items():
             read_back = getattr(other, field)
             assert (array is None) == (read_back is None), f"{field} of {name}"
-            if array is not None:
-                assert array.dtype == read_back.dtype and np.array_equal(array, read_back), f"{field} of {name}"
+            if isinstance(array, dict):
+                assert list(array) == list(read_back)
+                pairs = [(each, read_back[key]) for key, each in array.items()]
+            else:
+                pairs = [] if array is None else [(array, read_back)]
+            for one, again in pairs:
+                assert one.dtype == again.dtype and np.array_equal(one, again), f"{field} of {name}"
     for placed, other in zip(first.objects, second.objects, strict=True):
         assert np.array_equal(placed.matrix, other.matrix)
         assert replace(placed, matrix=np.eye(4)).name == other.name

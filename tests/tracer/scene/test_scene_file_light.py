@@ -118,7 +118,11 @@ bounces = st.builds(Bounces, *[st.integers(0, 1024)] * 4)
 @given(data=st.data())
 def test_light_that_is_written_is_read_back_to_the_last_bit(make_scene, make_mesh, random_scene, tmp_path_factory, data):
     rng = np.random.default_rng(0)
-    mesh = replace(make_mesh(np.eye(3), [[0, 1, 2]]), corner_colours=rng.random((1, 3, 3), np.float32))
+    mesh = replace(
+        make_mesh(np.eye(3), [[0, 1, 2]]),
+        corner_colours=rng.random((1, 3, 3), np.float32),
+        attributes={"Weight": rng.random((1, 3, 1), np.float32)},
+    )
     scene = make_scene(random_scene(0).camera, mesh)
     chosen = data.draw(st.dictionaries(names, materials, max_size=3))
     given_names = tuple(data.draw(st.lists(st.sampled_from(["", *chosen]), max_size=2)))

@@ -267,7 +267,8 @@ def _geometry(source: Surface, ledger: Ledger, shading: Shading | None) -> Mesh 
     if not isinstance(source.data, bpy.types.Mesh):
         return export_geometry.spheres_of(source.data)
     colours = shading.vertex_colours(source.slots) if shading else None
-    mesh = export_geometry.mesh_of(source.data, len(source.materials), colours)
+    attributes = shading.attributes(source.slots) if shading else ()
+    mesh = export_geometry.mesh_of(source.data, len(source.materials), colours, attributes)
     if nowhere := len(source.data.loop_triangles) - len(mesh.triangles):
         ledger.note(
             source.name, "exported", f"{nowhere} triangles have vertices that are not finite, and Cycles draws none of them"

@@ -6,6 +6,8 @@ corner normals, in which a flat face has one normal for all of its triangles. Un
 is another case: they have the normals of their triangles, and their neighbours the normals of their vertices.
 """
 
+from collections.abc import Collection
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -13,17 +15,30 @@ from numpy.typing import NDArray
 from ...tracer.scene import Mesh, Spheres
 from .. import versions
 
+GENERATED = "generated"
+# Type of an attribute → the field that has its values, and how many they are.
+_ATTRIBUTES = {
+    "FLOAT": ("value", 1),
+    "INT": ("value", 1),
+    "INT8": ("value", 1),
+    "BOOLEAN": ("value", 1),
+    "FLOAT2": ("vector", 2),
+    "FLOAT_VECTOR": ("vector", 3),
+    "FLOAT_COLOR": ("color", 4),
+    "BYTE_COLOR": ("color", 4),
+}
 # Cycles' radius of points that have none.
 DEFAULT_RADIUS = 0.01
 
 Array = NDArray[np.generic]
 
 
-def mesh_of(mesh: bpy.types.Mesh, slot_count: int, colours: str | None = None) -> Mesh:
+def mesh_of(mesh: bpy.types.Mesh, slot_count: int, colours: str | None = None, attributes: Collection[str] = ()) -> Mesh:
     """The triangles of an evaluated mesh, object space.
 
     slot_count : the object's material slots, which material indices are clamped to. colours : the colour attribute to bring
-    along, "" being the one that is active for rendering, or None.
+    along, "" being the one that is active for rendering, or None. attributes : those to bring along by name, as in `Mesh`; of
+    those that the mesh has not, nothing comes.
     """
     mesh.calc_loop_triangles()
     vertices = read(mesh.vertices, "co", np.float32, 3).astype(np.float64)
@@ -42,6 +57,11 @@ def mesh_of(mesh: bpy.types.Mesh, slot_count: int, colours: str | None = None) -
         corner_normals=_corner_normals(mesh, vertices, triangles, corners, faces),
         corner_uvs=_corner_uvs(mesh, corners),
         corner_colours=None if colours is None else _corner_colours(mesh, colours, triangles, corners),
+        attributes={
+            name: values
+            for name in sorted(attributes)
+            if (values := _corner_values(mesh, name, triangles, corners, faces)) is not None
+        },
     )
 
 
@@ -106,6 +126,29 @@ def _corner_colours(mesh: bpy.types.Mesh, name: str, triangles: Array, corners: 
         return np.zeros((*corners.shape, 3), np.float32)
     colours = np.ascontiguousarray(read(attribute.data, "color", np.float32, 4)[:, :3])
     return colours[corners if attribute.domain == "CORNER" else triangles]
+
+
+def _corner_values(mesh: bpy.types.Mesh, name: str, triangles: Array, corners: Array, faces: Array) -> Array | None:
+    """(triangles, 3, k) float32: an attribute as Cycles has it, or None where the mesh has none of this name."""
+    if name == GENERATED:
+        return _generated(mesh)[triangles]
+    attribute = mesh.attributes.get(name)
+    if attribute is None or attribute.data_type not in _ATTRIBUTES:
+        return None
+    field, width = _ATTRIBUTES[attribute.data_type]
+    dtype = {"BOOLEAN": np.bool_, "INT": np.int32, "INT8": np.int32}.get(attribute.data_type, np.float32)
+    values = read(attribute.data, field, dtype, width).astype(np.float32).reshape(-1, width)
+    at = {"POINT": triangles, "CORNER": corners, "FACE": np.repeat(faces[:, np.newaxis], 3, axis=1)}.get(attribute.domain)
+    return None if at is None else np.ascontiguousarray(values[at])
+
+
+def _generated(mesh: bpy.types.Mesh) -> Array:
+    """(vertices, 3) float32: where vertices are in the texture space, before anything deformed them."""
+    size = np.array(mesh.texspace_size, np.float32)
+    with np.errstate(divide="ignore"):
+        scale = np.where(size != 0, np.float32(0.5) / size, np.float32(0))
+    places = read(mesh.vertices, "undeformed_co", np.float32, 3)
+    return places * scale - (np.array(mesh.texspace_location, np.float32) * scale - np.float32(0.5))
 
 
 def _attribute(owner: bpy.types.ID, name: str, field: str, dtype: type, width: int = 1, domain: str = "POINT") -> Array | None:

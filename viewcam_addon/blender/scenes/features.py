@@ -143,17 +143,10 @@ def note_object(
 
 def _note_light(placed: Placed, slots: list[bpy.types.Material | None], ledger: Ledger, shading: Shading) -> None:
     """What matters as soon as there is light."""
-    shown, real, parent = placed
-    data = shown.data
+    _, real, parent = placed
     readings = [shading.reading(material) for material in filter(None, slots)]
     if len({reading.vertex for reading in readings} - {None}) > 1:
         ledger.note(placed.name, "approximated", "shows two colour attributes, and only the first comes along")
-    active = next((layer.name for layer in data.uv_layers if layer.active_render), None) if hasattr(data, "uv_layers") else None
-    for material, reading in zip(filter(None, slots), readings, strict=True):
-        if reading.uv not in (None, active):
-            reason = f"material {material.name!r} uses the UV map {reading.uv!r}, and the active one stands in"
-            ledger.note(placed.name, "approximated", reason)
-            ledger.call_for_cycles(material.original, materials.stand_in, reading)
     note_linking(placed, ledger)
     for each in (real.original, parent.original):
         for owner, name in versions.shadow_terminator(each):

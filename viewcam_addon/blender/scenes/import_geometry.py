@@ -12,11 +12,14 @@ from numpy.typing import NDArray
 from ...tracer.scene import Mesh, Spheres
 from .. import datablocks, versions
 from ..temporary_settings import Overrides, overridden
+from .export_geometry import GENERATED
 from .ledger import Ledger
 
 Array = NDArray[np.generic]
 
 UV_MAP, COLOURS = "UVMap", "Color"
+# Numbers a corner → the type of an attribute, and the field that has its values.
+_ATTRIBUTES = {1: ("FLOAT", "value"), 2: ("FLOAT2", "vector"), 3: ("FLOAT_VECTOR", "vector"), 4: ("FLOAT_COLOR", "color")}
 # Of a unit vector's float32 components, three roundings by which Blender's arithmetic may be off.
 _ROUNDING = 3 * 2.0**-23
 
@@ -37,11 +40,19 @@ def mesh_from(made: Mesh, name: str, overrides: Overrides, ledger: Ledger) -> bp
     mesh.polygons.foreach_set("material_index", made.materials[drawn].astype(np.int32))
     mesh.polygons.foreach_set("use_smooth", np.full(len(corners) // 3, made.corner_normals is not None))
     mesh.update(calc_edges=True)
+    for attribute, values in made.attributes.items():
+        if attribute != GENERATED:  # Cycles makes it itself
+            kind, field = _ATTRIBUTES[values.shape[2]]
+            mesh.attributes.new(attribute, kind, "CORNER").data.foreach_set(field, values[drawn].ravel())
     if made.corner_uvs is not None:
-        mesh.uv_layers.new(name=UV_MAP, do_init=False).uv.foreach_set("vector", made.corner_uvs[drawn].ravel())
+        layer = mesh.uv_layers.new(name=UV_MAP, do_init=False)
+        layer.uv.foreach_set("vector", made.corner_uvs[drawn].ravel())
+        layer.active_render = True
     if made.corner_colours is not None:
         colours = np.concatenate([made.corner_colours[drawn], np.ones((len(corners) // 3, 3, 1), np.float32)], axis=2)
-        mesh.color_attributes.new(COLOURS, "FLOAT_COLOR", "CORNER").data.foreach_set("color", colours.ravel())
+        attributes = mesh.color_attributes
+        attributes.new(COLOURS, "FLOAT_COLOR", "CORNER").data.foreach_set("color", colours.ravel())
+        attributes.render_color_index = len(attributes) - 1
     if made.corner_normals is not None and len(corners):
         off = _set_normals(mesh, made.corner_normals[drawn].reshape(-1, 3))
         if off > _ROUNDING:

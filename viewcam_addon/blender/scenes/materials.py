@@ -116,7 +116,7 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
             setattr(added, name, wanted)
         for name, theirs in value.words.items():
             _choose(added, theirs, value_nodes.word_of(node.type, node[name]))
-        for name, theirs in value.flags.items():
+        for name, theirs in (value.flags | value.names).items():
             setattr(added, theirs, node[name])
         if node.type == "image" and node["image"] is not None:
             added.image = reading.images[node["image"].image]

@@ -128,14 +128,12 @@ class Reading:
     """What a Blender material is to the tracer.
 
     images : key in `Colour.image` → the image. vertex : the colour attribute that `Colour.vertex` stands for ("" is the one
-    that is active for rendering), or None. uv : the UV map that an image is laid out by, or None for the active one. reasons :
-    why it is approximated, one clause each, about the material.
+    that is active for rendering), or None. reasons : why it is approximated, one clause each, about the material.
     """
 
     material: Material = PLAIN
     images: dict[str, bpy.types.Image] = field(default_factory=dict)
     vertex: str | None = None
-    uv: str | None = None
     alphas: set[str] = field(default_factory=set)
     tables: dict[str, Picture] = field(default_factory=dict)
     reasons: list[str] = field(default_factory=list)
@@ -188,7 +186,7 @@ class _Reader:
         node = source.node
         if node.type == "TEX_IMAGE" and source.socket.name == "Color":
             return self._image(source)
-        if node.type in ("VERTEX_COLOR", "ATTRIBUTE") and source.socket.name == "Color":
+        if node.type == "VERTEX_COLOR" and source.socket.name == "Color" and self._is_first(node.layer_name):
             return self._vertex(source)
         if node.type == "VECT_MATH" and node.operation == "MULTIPLY":
             return self._product(source)
@@ -238,22 +236,17 @@ class _Reader:
         return True
 
     def _is_uv(self, vector: Output) -> bool:
-        """Whether an output is the UV of a mesh; of another map than the active one, it is noted."""
+        """Whether an output is the UV map of a mesh that is active for rendering."""
         if vector.node.type == "UVMAP" and not vector.node.from_instancer:
-            self.reading.uv = vector.node.uv_map or self.reading.uv
-            return True
+            return not vector.node.uv_map
         return vector.node.type == "TEX_COORD" and vector.socket.name == "UV" and not vector.node.from_instancer
 
+    def _is_first(self, name: str) -> bool:
+        """Whether a colour attribute is the one that `Colour.vertex` stands for; others are attributes like any."""
+        return self.reading.vertex in (None, name)
+
     def _vertex(self, output: Output) -> Colour:
-        node = output.node
-        if node.type == "ATTRIBUTE" and node.attribute_type != "GEOMETRY":
-            self._reason(output, "is not modelled")
-            return self.viewport
-        name = node.layer_name if node.type == "VERTEX_COLOR" else node.attribute_name
-        if self.reading.vertex not in (None, name):
-            self._reason(output, "shows another colour attribute than the first")
-        else:
-            self.reading.vertex = name
+        self.reading.vertex = output.node.layer_name
         return Colour(_WHITE, vertex=True)
 
     def _number(self, output: Output, name: str | int, otherwise: float) -> float:
@@ -431,10 +424,14 @@ class _Tree(_Reader):
     def _value(self, output: Output) -> Colour | Node | None:
         """The nodes that make a value; None where a reason says that it is not modelled."""
         node = output.node
-        if node.type in ("VERTEX_COLOR", "ATTRIBUTE") and output.socket.name == "Color":
+        if node.type == "VERTEX_COLOR" and output.socket.name == "Color" and self._is_first(node.layer_name):
             return self._vertex(output)
         if node.type == "UVMAP" and self._is_uv(output):
             return Node("texture_coordinate")
+        if node.type == "TEX_COORD" and output.socket.name == "Object" and node.object is not None:
+            return _in_space_of(node.object)
+        if node.type == "CAMERA":
+            return _from_camera(output.socket.name)
         if node.type == "VALTORGB":
             return self._ramp(output)
         found = value_nodes.value_of(output)
@@ -487,8 +484,10 @@ class _Tree(_Reader):
         node = output.node
         if ours in ("fresnel", "layer_weight") and isinstance(nodes.source(output.input("Normal")), Output):
             return "has a Normal that is not modelled"
-        if ours == "texture_coordinate" and (node.from_instancer or node.object is not None):
-            return "has another object's coordinates"
+        if ours == "texture_coordinate" and node.from_instancer and output.socket.name in ("UV", "Generated"):
+            return "has its instancer's coordinates"
+        if ours == "attribute" and node.type == "VERTEX_COLOR" and not node.layer_name:
+            return "has an attribute without a name"
         return None
 
     def _ramp(self, output: Output) -> Node | None:
@@ -524,6 +523,34 @@ class _Tree(_Reader):
                 ("output", "alpha" if output.socket.name == "Alpha" else "color"),
             ),
         )
+
+
+def _node(type: str, **inputs: object) -> Node:
+    return Node(type, tuple(inputs.items()))
+
+
+def _in_space_of(block: bpy.types.Object) -> Node:
+    """Where a point of a surface is in an object's space."""
+    inverse = np.linalg.inv(np.array(block.matrix_world, np.float64))
+    position = _node("geometry", output="position")
+    rows = (
+        _node(
+            "math",
+            operation="add",
+            a=_node("vector_math", operation="dot_product", a=position, b=tuple(row[:3])),
+            b=(row[3],) * 3,
+        )
+        for row in inverse[:3].tolist()
+    )
+    return _node("combine_xyz", **dict(zip("xyz", rows, strict=True)))
+
+
+def _from_camera(output: str) -> Node:
+    """What a Camera Data node says."""
+    place = _node("texture_coordinate", output="camera")
+    if output == "View Z Depth":
+        return _node("separate", color=place, output="z")
+    return _node("vector_math", operation="length" if output == "View Distance" else "normalize", a=place)
 
 
 def _pattern(colour: Colour) -> tuple:

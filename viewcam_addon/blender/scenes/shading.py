@@ -39,6 +39,11 @@ class Shading:
             self.reading(material)
         return tuple(material.original.name_full if material else "" for material in slots)
 
+    def attributes(self, slots: tuple[bpy.types.Material | None, ...]) -> set[str]:
+        """What a mesh of these materials is asked for by name, as `Mesh.attributes` has it."""
+        materials = [self.reading(material).material for material in filter(None, slots)]
+        return {name for material in materials for name in material.attributes}
+
     def vertex_colours(self, slots: tuple[bpy.types.Material | None, ...]) -> str | None:
         """The colour attribute that a mesh of these materials is coloured by, "" being the active one, or None."""
         readings = (self.reading(material) for material in filter(None, slots))

@@ -12,8 +12,9 @@ from .nodes import Output
 class Value:
     """A type of node as Blender has it.
 
-    kind : its type; class_name : its class. inputs : ours → the identifier of theirs. words, flags : ours → the property.
-    outputs : the identifier of theirs → our word for it, None where we have one output. fixed : property → what it must be.
+    kind : its type; class_name : its class. inputs : ours → the identifier of theirs. words, flags, names : ours → the
+    property. outputs : the identifier of theirs → our word for it, None where we have one output. fixed : property → what it
+    must be.
     """
 
     kind: str
@@ -22,7 +23,8 @@ class Value:
     outputs: dict[str, str | None]
     words: dict[str, str] = field(default_factory=dict)
     flags: dict[str, str] = field(default_factory=dict)
-    fixed: dict[str, str] = field(default_factory=dict)
+    fixed: dict[str, str | bool] = field(default_factory=dict)
+    names: dict[str, str] = field(default_factory=dict)
 
 
 def _same(*names: str) -> dict[str, str]:
@@ -47,7 +49,37 @@ VALUES: tuple[tuple[str, Value], ...] = (
     ),
     (
         "texture_coordinate",
-        Value("TEX_COORD", "ShaderNodeTexCoord", {}, _words("UV", "Object", "Normal", "Reflection")),
+        Value(
+            "TEX_COORD",
+            "ShaderNodeTexCoord",
+            {},
+            _words("UV", "Generated", "Object", "Normal", "Reflection", "Camera", "Window"),
+        ),
+    ),
+    (
+        "attribute",
+        Value(
+            "ATTRIBUTE",
+            "ShaderNodeAttribute",
+            {},
+            {"Color": "color", "Vector": "vector", "Fac": "number", "Alpha": "alpha"},
+            names={"name": "attribute_name"},
+            fixed={"attribute_type": "GEOMETRY"},
+        ),
+    ),
+    (
+        "attribute",
+        Value(
+            "VERTEX_COLOR",
+            "ShaderNodeVertexColor",
+            {},
+            {"Color": "color", "Alpha": "alpha"},
+            names={"name": "layer_name"},
+        ),
+    ),
+    (
+        "attribute",
+        Value("UVMAP", "ShaderNodeUVMap", {}, {"UV": "vector"}, names={"name": "uv_map"}, fixed={"from_instancer": False}),
     ),
     (
         "mapping",
@@ -222,6 +254,7 @@ def value_of(output: Output) -> tuple[str, Value] | None:
 def given_words(output: Output, ours: str, value: Value) -> dict[str, str | bool] | str:
     """The words and flags of a node; or, where one is not modelled, that clause."""
     found: dict[str, str | bool] = {name: bool(getattr(output.node, theirs)) for name, theirs in value.flags.items()}
+    found |= {name: getattr(output.node, theirs) for name, theirs in value.names.items()}
     for name, theirs in value.words.items():
         word = getattr(output.node, theirs)
         if (ours, word) == ("image", "Smart"):

@@ -11,6 +11,16 @@ struct Camera {
     uint32_t width = 0, height = 0;
     double t_min = 0, t_max = INFINITE;  // of the clip range, whose own ends are visible
 
+    // Where a point is: to the right, up and ahead; and where that is in the picture, from 0 to 1.
+    Vec3 to_camera(Vec3 point) const {
+        Vec3 from = point - eye;
+        return {dot(from, right), dot(from, up), dot(from, forward)};
+    }
+    Vec2 window(Vec3 point) const {
+        Vec3 at = to_camera(point);
+        return {(at.x / at.z * distance.x + principal_point.x) / width, (at.y / at.z * distance.y + principal_point.y) / height};
+    }
+
     // Through a place in the picture, in pixels from its lower left corner, as pinhole.py's view_plane has it.
     Ray ray(double column, double row) const {
         double x = (column - principal_point.x) / distance.x, y = (row - principal_point.y) / distance.y;

@@ -25,12 +25,20 @@ enum ViewcamPass {
 };
 
 /* vertices: (vertex_count, 3), object space. triangles: (count, 3). materials: (count,), slots of the object. The rest or null:
- * corner_normals: (count, 3, 3). corner_uvs: (count, 3, 2). corner_colors: (count, 3, 3), linear. */
+ * corner_normals: (count, 3, 3). corner_uvs: (count, 3, 2). corner_colors: (count, 3, 3), linear. attributes: each with values
+ * (count, 3, width), width from 1 to 4. */
+typedef struct {
+    const char* name;
+    int32_t width;
+    const float* values;
+} ViewcamAttribute;
 typedef struct {
     size_t vertex_count, count;
     const double* vertices;
     const int32_t *triangles, *materials;
     const float *corner_normals, *corner_uvs, *corner_colors;
+    const ViewcamAttribute* attributes;
+    size_t attribute_count;
 } ViewcamMesh;
 
 typedef struct {

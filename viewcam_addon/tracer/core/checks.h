@@ -39,6 +39,11 @@ inline void mesh(const ViewcamMesh& given) {
     bool within = true;
     for (size_t i = 0; i < 3 * given.count; i++) within &= uint32_t(given.triangles[i]) < given.vertex_count;
     that(within, "a mesh has a triangle that names no vertex");
+    that(!given.attribute_count || given.attributes, "a mesh lacks its attributes");
+    for (size_t i = 0; i < given.attribute_count; i++) {
+        const ViewcamAttribute& one = given.attributes[i];
+        that(one.name && one.width >= 1 && one.width <= 4 && (one.values || !given.count), "a mesh has an attribute without a name or values");
+    }
 }
 inline void spheres(const ViewcamSpheres& given) {
     that(given.count < LEAF, "there are too many spheres");

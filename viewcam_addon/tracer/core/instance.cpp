@@ -59,7 +59,12 @@ const ViewcamCore core = {
                 mesh.vertex_count = given->vertex_count, mesh.count = given->count;
                 mesh.vertices = given->vertices, mesh.triangles = given->triangles, mesh.materials = given->materials;
                 mesh.corner_normals = given->corner_normals, mesh.corner_uvs = given->corner_uvs, mesh.corner_colors = given->corner_colors;
-                scene_of(scene).geometries.push_back(mesh);
+                for (size_t i = 0; i < mesh.vertex_count; i++) mesh.bounds.add(Vec3{mesh.vertices[3 * i], mesh.vertices[3 * i + 1], mesh.vertices[3 * i + 2]});
+                for (size_t i = 0; i < given->attribute_count; i++) {
+                    const ViewcamAttribute& one = given->attributes[i];
+                    mesh.attributes.push_back({one.name, one.width, one.values});
+                }
+                scene_of(scene).geometries.push_back(std::move(mesh));
             });
         },
     .add_spheres =

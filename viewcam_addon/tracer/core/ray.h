@@ -51,6 +51,7 @@ struct Interaction {
     Vec3 shading;          // unit, smooth where the mesh is, turned to the other side where `normal` is
     Vec2 uv;               // of the mesh's UV map, 0 without one
     Vec3 vertex_color;     // linear, 0 on what has none
+    Vec2 barycentric;      // of a triangle, the shares of its second and third corner
     double offset = 0;     // how far along ±normal rays that leave must start, so that they do not meet where they start
     uint32_t material = 0; // index into Scene::materials
     uint32_t slot = 0;     // index into Scene::slots

@@ -135,7 +135,7 @@ class Scene {
 
     // What a material is told of a point that a path reaches.
     ShadingPoint shading(const Interaction& point, Vec3 incoming) const {
-        return {point, incoming, illumination.textures, illumination.version, &illumination.nodes, &objects[point.object], origin};
+        return {point, incoming, illumination.textures, illumination.version, &illumination.nodes, &objects[point.object], origin, this};
     }
 
     // What lights need. triangle_count: 0 of spheres. material: of a triangle, an index into illumination.materials. corners: in
@@ -336,5 +336,33 @@ class Scene {
     std::vector<TriangleBvh> triangles_;  // of geometries that instances stand for
     Bvh instances_;
 };
+
+inline ShadingPoint::Values ShadingPoint::attribute(const std::string& name) const {
+    auto mesh = scene && object ? std::get_if<TriangleMesh>(&scene->geometries[object->geometry]) : nullptr;
+    if (!mesh) return {};
+    for (const Attribute& one : mesh->attributes) {
+        if (one.name != name) continue;
+        const float* corners = one.values + 3 * size_t(one.width) * point.primitive;
+        double b1 = point.barycentric.x, b2 = point.barycentric.y, found[4] = {0, 0, 0, 1};
+        for (int i = 0; i < one.width; i++)
+            found[i] = corners[i] * (1 - b1 - b2) + corners[one.width + i] * b1 + corners[2 * one.width + i] * b2;
+        return {{found[0], found[1], found[2]}, found[3], one.width};
+    }
+    return {};
+}
+inline Vec3 ShadingPoint::in_camera() const { return scene ? scene->camera.to_camera(point.position) : Vec3{}; }
+inline Vec3 ShadingPoint::in_window() const {
+    if (!scene) return {};
+    Vec2 place = scene->camera.window(point.position);
+    return {place.x, place.y, 0};
+}
+inline Vec3 ShadingPoint::generated() const {
+    if (Values given = attribute("generated"); given.width == 3) return given.first;
+    auto mesh = scene && object ? std::get_if<TriangleMesh>(&scene->geometries[object->geometry]) : nullptr;
+    if (!mesh) return {};
+    Vec3 place = object->to_object(point.position - object->to_world.translation()) - mesh->bounds.low, size = mesh->bounds.high - mesh->bounds.low;
+    auto along = [](double from, double size) { return size > 0 ? from / size : 0.5; };
+    return {along(place.x, size.x), along(place.y, size.y), along(place.z, size.z)};
+}
 
 }  // namespace viewcam::VIEWCAM_ISA

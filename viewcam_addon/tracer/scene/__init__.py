@@ -32,6 +32,8 @@ class Mesh:
         that has smooth ones, the three corners hold the face's own normal.
     corner_uvs : (m, 3, 2) float32, or None where the mesh has no UV map.
     corner_colours : (m, 3, 3) float32, linear, what `Colour.vertex` stands for, or None.
+    attributes : name → (m, 3, k) float32, k from 1 to 4, what nodes ask for by name. Those that Cycles makes have its names:
+        "generated", where each corner is in the mesh's texture space.
     materials : (m,) int32, the index of each triangle's material in `Object.material_indices`.
     """
 
@@ -41,6 +43,7 @@ class Mesh:
     corner_normals: NDArray[np.float32] | None = None
     corner_uvs: NDArray[np.float32] | None = None
     corner_colours: NDArray[np.float32] | None = None
+    attributes: dict[str, NDArray[np.float32]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         count = len(self.triangles)
@@ -53,6 +56,10 @@ class Mesh:
             _check_shape("corner_uvs", self.corner_uvs, (count, 3, 2))
         if self.corner_colours is not None:
             _check_shape("corner_colours", self.corner_colours, (count, 3, 3))
+        for name, values in self.attributes.items():
+            _check_shape(f"attribute {shown(name)}", values, (count, 3, None))
+            if not 1 <= values.shape[2] <= 4:
+                raise InputError(f"attribute {shown(name)} has {values.shape[2]} numbers a corner: give 1 to 4")
         if count and not 0 <= self.triangles.min() <= self.triangles.max() < len(self.vertices):
             raise InputError(f"triangles name a vertex outside 0 … {len(self.vertices) - 1}: check the mesh")
         if not np.isfinite(self.vertices).all():

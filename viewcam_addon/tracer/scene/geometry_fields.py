@@ -18,7 +18,13 @@ def geometry_document(geometry: Mesh | Spheres, prefix: str, arrays: dict[str, N
     document: dict = {"type": "mesh" if isinstance(geometry, Mesh) else "spheres"}
     for field in dataclasses.fields(geometry):
         array = getattr(geometry, field.name)
-        if array is not None:
+        if isinstance(array, dict):
+            named = {
+                name: array_document(values, f"{prefix}.attribute{number}", arrays)
+                for number, (name, values) in enumerate(array.items())
+            }
+            document |= {field.name: named} if named else {}
+        elif array is not None:
             document[field.name] = array_document(array, f"{prefix}.{field.name}", arrays)
     return document
 
@@ -45,13 +51,17 @@ def geometry(field: Field, arrays: Arrays) -> Mesh | Spheres:
 
 def _mesh(field: Field, arrays: Arrays) -> Mesh:
     of_corners = {"corner_normals": 3, "corner_uvs": 2, "corner_colours": 3}
-    keys = field.fields(("type", "vertices", "triangles"), ("materials", *of_corners))
+    keys = field.fields(("type", "vertices", "triangles"), ("materials", "attributes", *of_corners))
     triangles = keys["triangles"].array(arrays, np.int32, (None, 3))
     count = len(triangles)
     return Mesh(
         vertices=keys["vertices"].array(arrays, np.float64, (None, 3)),
         triangles=triangles,
         materials=_materials(keys, arrays, count),
+        attributes={
+            name: each.array(arrays, np.float32, (count, 3, None))
+            for name, each in (keys["attributes"].named("attribute").items() if "attributes" in keys else ())
+        },
         **{key: keys[key].array(arrays, np.float32, (count, 3, width)) for key, width in of_corners.items() if key in keys},
     )
 

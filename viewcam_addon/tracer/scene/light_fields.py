@@ -179,7 +179,7 @@ def _node_input(field: Field, default: object, of_value: bool) -> Any:
         return field.truth()
     if default is value_nodes.IMAGE:
         return Colour(_WHITE, field.text())
-    if isinstance(default, tuple) and isinstance(default[0], str):
+    if default is value_nodes.NAME or (isinstance(default, tuple) and isinstance(default[0], str)):
         return field.text()
     if isinstance(field.value, list) and of_value:
         return field.vector(3)

@@ -72,6 +72,16 @@ class Material:
                 found += [(f"{name} of {kind}", colour) for colour in colours]
         return tuple(found)
 
+    @property
+    def attributes(self) -> set[str]:
+        """What its nodes ask meshes for, by name."""
+        values = [
+            value
+            for closure in self.closures
+            for _, value in (*closure.node.inputs, *(("", each) for each, _ in closure.factors))
+        ]
+        return {name for value in values if isinstance(value, Node) for name in value.attributes}
+
 
 PLAIN = Material(diffuse=Colour((0.8, 0.8, 0.8)))
 """What a surface without a material is made of, in Blender as here."""

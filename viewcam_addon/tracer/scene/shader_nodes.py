@@ -131,6 +131,8 @@ class Node:
             return Node("texture_coordinate")
         if default is None or default is value_nodes.IMAGE:
             return None
+        if default is value_nodes.NAME:
+            return ""
         if isinstance(default, tuple) and isinstance(default[0], str):
             return default[0]
         return _number_or_colour(default, self.is_value)
@@ -157,6 +159,14 @@ class Node:
                 yield value
             elif isinstance(value, Node):
                 yield from value.colours
+
+    @property
+    def attributes(self) -> Iterator[str]:
+        """What it asks meshes for by name, and what feeds it does."""
+        yield from value_nodes.attributes_of(self.type, self.__getitem__)
+        for _, value in self.inputs:
+            if isinstance(value, Node):
+                yield from value.attributes
 
     @property
     def is_shining(self) -> bool:
@@ -222,6 +232,10 @@ def _checked(name: str, value: Any, known: Any, of_value: bool) -> Any:
     if isinstance(known, bool):
         if not isinstance(value, bool):
             raise InputError(f"{name} is {checks.shown(value)}: give true or false")
+        return value
+    if known is value_nodes.NAME:
+        if not isinstance(value, str):
+            raise InputError(f"{name} is {checks.shown(value)}: give a name")
         return value
     if known is value_nodes.IMAGE:
         if not isinstance(value, Colour) or value != Colour(WHITE, value.image):

@@ -4,12 +4,15 @@ The names and defaults are those of Blender's nodes, in small letters; what they
 takes a number takes a colour's luminance, and a vector's mean.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
 Vector = tuple[float, float, float]
 
 IMAGE = "an image"
 """The default of an input that names an image."""
+NAME = "a name"
+"""The default of an input that names what a mesh has."""
 UV = "uv"
 """The default of a vector that is the mesh's UV where nothing else is given."""
 
@@ -41,7 +44,8 @@ KINDS: dict[str, Mapping[str, Default]] = {
         "straight": False,
         "output": ("color", "alpha"),
     },
-    "texture_coordinate": {"output": ("uv", "object", "normal", "reflection")},
+    "texture_coordinate": {"output": ("uv", "generated", "object", "normal", "reflection", "camera", "window")},
+    "attribute": {"name": NAME, "output": ("color", "vector", "number", "alpha")},
     "mapping": {
         "vector": BLACK,
         "location": BLACK,
@@ -84,3 +88,11 @@ KINDS: dict[str, Mapping[str, Default]] = {
     "invert": {"factor": 1.0, "color": BLACK},
     "rgb_to_bw": {"color": GREY},
 }
+
+
+def attributes_of(kind: str, value_of: Callable[[str], Any]) -> Iterator[str]:
+    """What a node asks meshes for by name. kind : its type. value_of : input → its value."""
+    if kind == "attribute":
+        yield value_of("name")
+    if kind == "texture_coordinate" and value_of("output") == "generated":
+        yield "generated"

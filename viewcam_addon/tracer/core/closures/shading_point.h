@@ -22,6 +22,7 @@ inline double luminance(Vec3 rgb) { return 0.2126390 * rgb.x + 0.7151687 * rgb.y
 
 struct Object;
 struct ValueNodes;
+class Scene;
 
 // A point of a surface that a path reaches along `incoming`, and the scene's images and nodes. object: that has the surface.
 // origin: of rendering space, in the world.
@@ -33,6 +34,7 @@ struct ShadingPoint {
     const ValueNodes* nodes = nullptr;
     const Object* object = nullptr;
     Vec3 origin;
+    const Scene* scene = nullptr;
 
     // What an input is given here; as light, and of a colour the luminance.
     Vec3 value(const Color& color) const { return color.node == NONE ? color.at(textures, point) : value_of_node(color.node); }
@@ -53,6 +55,19 @@ struct ShadingPoint {
     bool is_smooth(const Microfacets& facets) const {
         return facets.alpha_x * facets.alpha_y <= (version < CYCLES_4_3 ? 5e-7 : 2e-10);
     }
+
+    // What the mesh has here under a name, up to four numbers; {0, 0, 0, 1} where it has nothing. Defined in scene.h.
+    struct Values {
+        Vec3 first;
+        double fourth = 1;
+        int width = 0;
+    };
+    Values attribute(const std::string& name) const;
+    // Where this is in the box round the mesh's vertices, from 0 to 1; ½ along what has no extent.
+    Vec3 generated() const;
+    // As Camera has it: to the right, up and ahead; and in the picture, from 0 to 1.
+    Vec3 in_camera() const;
+    Vec3 in_window() const;
 
    private:
     Vec3 value_of_node(uint32_t node) const;

@@ -10,7 +10,7 @@ struct TextureCoordinateNode {
     static constexpr const char* NAME = "texture_coordinate";
     static constexpr Gives GIVES = Gives::VECTOR;
     static constexpr bool VARIES = true;
-    enum { UV, OBJECT, NORMAL, REFLECTION } output;
+    enum { UV, OBJECT, NORMAL, REFLECTION, GENERATED, CAMERA, WINDOW } output;
 
     explicit TextureCoordinateNode(const Inputs& in) : output(output_of(in.choice("output"))) {}
     Vec3 eval(const ShadingPoint& at) const {
@@ -19,13 +19,37 @@ struct TextureCoordinateNode {
             case UV: return {point.uv.x, point.uv.y, 0};
             case OBJECT: return at.object ? at.object->to_object(point.position - at.object->to_world.translation()) : point.position;
             case NORMAL: return at.object ? safe::normalized(at.object->to_world.transposed(point.shading)) : point.shading;
+            case GENERATED: return at.generated();
+            case CAMERA: return at.in_camera();
+            case WINDOW: return at.in_window();
             default: return reflected(at.incoming, point.shading);
         }
     }
 
    private:
     static decltype(output) output_of(const std::string& name) {
-        return name == "uv" ? UV : name == "object" ? OBJECT : name == "normal" ? NORMAL : REFLECTION;
+        return name == "uv" ? UV : name == "object" ? OBJECT : name == "normal" ? NORMAL : name == "generated" ? GENERATED : name == "camera" ? CAMERA : name == "window" ? WINDOW : REFLECTION;
+    }
+};
+
+// What a mesh has under a name: a colour, a vector, their mean, or the fourth number, which is 1 where there is none.
+struct AttributeNode {
+    static constexpr const char* NAME = "attribute";
+    static constexpr Gives GIVES = Gives::COLOR;
+    static constexpr bool VARIES = true;
+    std::string name;
+    enum { COLOR, VECTOR, NUMBER, ALPHA } output;
+
+    explicit AttributeNode(const Inputs& in)
+        : name(in.choice("name")),
+          output(in.choice("output") == "color" ? COLOR : in.choice("output") == "vector" ? VECTOR : in.choice("output") == "number" ? NUMBER : ALPHA) {}
+    Gives gives() const { return output == VECTOR ? Gives::VECTOR : GIVES; }
+    Vec3 eval(const ShadingPoint& at) const {
+        ShadingPoint::Values found = at.attribute(name);
+        if (output == ALPHA) return grey(found.fourth);
+        Vec3 value = found.width == 1 ? grey(found.first.x) : found.first;
+        if (output == NUMBER && found.width == 2) return grey(value.x);  // as in Cycles
+        return output == NUMBER ? grey((value.x + value.y + value.z) / 3) : value;
     }
 };
 

@@ -20,8 +20,8 @@ struct ConstantNode {
 };
 
 // One line a node. Each has a NAME, by which a scene asks for it, what it GIVES, by which it becomes a number, and `eval`; VARIES
-// where it depends on more than its inputs.
-using ValueNode = std::variant<ConstantNode, ImageNode, TextureCoordinateNode, MappingNode, GeometryNode, ObjectInfoNode, FresnelNode, LayerWeightNode,
+// where it depends on more than its inputs; `gives` where the node itself knows what it gives.
+using ValueNode = std::variant<ConstantNode, ImageNode, TextureCoordinateNode, AttributeNode, MappingNode, GeometryNode, ObjectInfoNode, FresnelNode, LayerWeightNode,
                                MathNode, VectorMathNode, MapRangeNode, ClampNode, SeparateNode, CombineXYZNode, CombineColorNode, MixColorNode, MixNumberNode, GammaNode,
                                BrightContrastNode, HueSaturationNode, InvertNode, LuminanceNode>;
 
@@ -37,7 +37,7 @@ struct ValueNodes {
         return std::visit([&](const auto& kind) { return finite(kind.eval(at)); }, all[node]);
     }
     double number(uint32_t node, const ShadingPoint& at) const {
-        return std::visit([&](const auto& kind) { return number_of(finite(kind.eval(at)), kind.GIVES); }, all[node]);
+        return std::visit([&](const auto& kind) { return number_of(finite(kind.eval(at)), gives(kind)); }, all[node]);
     }
 
     // Adds the node of this name; std::invalid_argument if there is none.
@@ -53,6 +53,12 @@ struct ValueNodes {
    private:
     static constexpr double LARGEST = 1e18;
 
+    template <class Kind> static Gives gives(const Kind& kind) {
+        if constexpr (requires { kind.gives(); })
+            return kind.gives();
+        else
+            return kind.GIVES;
+    }
     static double finite(double x) { return x < LARGEST ? larger(x, -LARGEST) : x > 0 ? LARGEST : 0; }
     static Vec3 finite(Vec3 v) { return {finite(v.x), finite(v.y), finite(v.z)}; }
 

@@ -9,11 +9,20 @@
 // longer.
 #pragma once
 #include <bit>
+#include <string>
+#include <vector>
 
 #include "../accel/packet.h"
 #include "object.h"
 
 namespace viewcam::VIEWCAM_ISA {
+
+// What the corners of a mesh's triangles have under a name. values: (count, 3, width).
+struct Attribute {
+    std::string name;
+    int width;
+    const float* values;
+};
 
 // A mesh as it came from Python, whose arrays outlive the scene.
 struct TriangleMesh {
@@ -24,6 +33,8 @@ struct TriangleMesh {
     const float* corner_normals = nullptr;   // (count, 3, 3), or nothing
     const float* corner_uvs = nullptr;       // (count, 3, 2), or nothing
     const float* corner_colors = nullptr;    // (count, 3, 3), linear, or nothing
+    std::vector<Attribute> attributes;
+    Bounds bounds;                           // of the vertices
 
     Vec3 corner(size_t triangle, int i) const {
         const double* v = vertices + 3 * size_t(triangles[3 * triangle + i]);
@@ -239,6 +250,7 @@ class TriangleSurfaces {
             to.backside = bool(turned >> i & 1) != hits_[i].object->mirrored;
             to.material = uint32_t(mesh.materials[triangle]);
             to.has_uv = mesh.corner_uvs;
+            to.barycentric = {b1_[i], b2_[i]};
             to.uv = {};
             if (mesh.corner_uvs) {
                 const float* uv = mesh.corner_uvs + 6 * triangle;
