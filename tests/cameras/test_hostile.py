@@ -221,6 +221,12 @@ LARGE = {
     "indents": "".join(" " * min(i, 50) + "a:\n" for i in range(5_000)),
     "spaces": " " * 250_000,
     "commas": "," * 250_000,
+    "calls": "eye(" * 62_500,
+    "projections": "perspective(" * 21_000,
+    "rows": "view = " + "vec4(" * 100 + "view = vec4(" * 20_000,
+    "looks": "LookAt 1 2 3 4 5 6 0 0 1\n" * 10_000,
+    "sensors": "<sensor type='thinlens'/>" * 5_000 + "<sensor type='perspective'/>" * 5_000,
+    "defaults": "".join(f"<default name='a{i}' value='{i}'/>" for i in range(5_000)) + "<sensor type='$a17'/>" * 5_000,
     "digits": '{"frames": [{"transform_matrix": ' + "9" * 249_000 + "}]}",
 }
 

@@ -49,6 +49,14 @@ def test_a_position_that_is_computed_and_then_changed_in_one_coordinate_is_refus
         read("const eye = new THREE.Mesh(ball, red); camera.position.z = 5;")
 
 
+@pytest.mark.parametrize("later", ["r = f(r);", "r = clamp(r, 1, 9);", "if (near) { r = distance(a, b); }", "r = 5; " * 30])
+def test_a_name_that_is_known_once_and_computed_elsewhere_is_not_known(later):
+    code = "float r = 5; {} gluPerspective(60, 1.333, 1, 100); gluLookAt(r, 0, 0, 0, 0, 0, 0, 0, 1);"
+    assert read(code.format("")).pinhole.eye == (5, 0, 0)
+    with pytest.raises(InputError, match="plain numbers"):
+        read(code.format(later))
+
+
 def test_meshes_that_are_called_eyes_are_no_cameras():
     assert read(THREE + "leftEye.position.x = -3; rightEye.position.x = 3;").pinhole.eye == (3, 4, 5)
 

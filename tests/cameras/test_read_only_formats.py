@@ -270,6 +270,7 @@ def test_a_trajectory_is_an_animation_through_the_intrinsics_that_are_given(tmp_
         (tmp_path / "cam0" / "sensor.yaml").write_text(f"T_BS:\n  cols: 4\n  rows: 4\n  data: {unit}\n")
     read = the_same(cameras.read(path, options=Options(view_plane=plane)), known)
     assert read.time == (0.0 if kind == "KITTI" else 12.5) and not read.size_stated
+    assert any("whose poses" in note for note in read.notes) == (kind != "EuRoC")
     with pytest.raises(InputError, match="how it sees"):
         cameras.read(path)
 

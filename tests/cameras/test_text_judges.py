@@ -299,6 +299,13 @@ def test_pbrts_transforms_and_windows_are_read_as_its_formulas_have_them(name, s
     assert camera.pinhole.mirrored == (name != "mirrored_back") == any("mirrored" in note for note in camera.notes)
 
 
+def test_of_several_cameras_pbrt_uses_the_last_and_a_note_says_so():
+    text = 'LookAt 1 0 0 0 0 0 0 0 1 Camera "perspective" Identity LookAt 2 0 0 0 0 0 0 0 1 Camera "perspective" "float fov" 40'
+    (camera,) = cameras.read(text)
+    assert camera.pinhole.eye == (2, 0, 0) and any("2 Cameras" in note for note in camera.notes)
+    assert not any("Cameras" in note for note in cameras.read(text.partition("Identity")[2])[0].notes)
+
+
 def test_pbrts_crop_window_keeps_whole_pixels_and_moves_nothing():
     text = 'LookAt 7 -6 4 0 0 1 0 0 1 Camera "perspective" Film "rgb" "integer xresolution" 641 "integer yresolution" 359'
     whole, part = (cameras.read(f"{text} {more}")[0].pinhole for more in ("", '"float cropwindow" [.1 .5 .25 .75]'))

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from . import texts
 
 _DEEPEST = 30
-_MOST_STEPS = 20_000
+_MOST_STEPS = 100_000  # of all values of a text
 
 _BLANK = re.compile(r"\s*+")
 _NUMBER = re.compile(r"(?:0[xX][\da-fA-F]++|(?:\d++(?:\.\d*+)?+|\.\d++)(?:[eE][-+]?+\d++)?+)(?:[fFlLuU]\b)?+(?![A-Za-z_\d.])")
@@ -78,7 +78,6 @@ class Expressions:
 
     def value(self, at: int) -> tuple[object, int]:
         """The value at a place, and where it ends; an `Unknown` if it is none."""
-        self._steps = 0
         try:
             return self._sum(at, 0)
         except _Failed:
@@ -86,7 +85,6 @@ class Expressions:
 
     def arguments(self, opened: int) -> tuple[list, dict[str, object], int]:
         """What stands in the brackets that open at a place: values, named values, and where the brackets end."""
-        self._steps = 0
         try:
             return self._list(opened, 0)
         except _Failed:

@@ -45,7 +45,7 @@ _WINDOW = re.compile(r"renderer|ren\w{0,3}win|renderwindow")
 _LIGHT = re.compile(r"\bvtkLight\s*+>\s*+(\w++)|\b(\w++)\s*+=\s*+(?:vtk\w*+\s*+\.\s*+)?+vtkLight\s*+\(")
 _PARTS = re.compile(r"[\w$]++")
 _MADE = re.compile(r"(?<![\w$])([\w$]++)\s*+[=:]\s*+new\s++(?:THREE\s*+\.\s*+)?+PerspectiveCamera\b")
-_MOST_STATEMENTS = 10_000
+_MOST_STATEMENTS = 2_000
 _IS_CODE = re.compile(r"\w\s*+\(\s*+[-\w.]|;\s*+$|\w\.\w++\s*+[=(]", re.MULTILINE)
 _CAMERA = re.compile(r"cam|view|eye|lens|observer", re.IGNORECASE)
 _NAMED_CAMERA = re.compile(r"cam", re.IGNORECASE)
@@ -160,6 +160,8 @@ _GL_MOVES = {"gltranslatef", "gltranslated", "glrotatef", "glrotated", "glscalef
 _CHANGED = re.compile(rf"(?<![\w$.])({_PATH})\s*+[-+*/]=")
 _STEPPED = re.compile(r"(?<![\w$])([A-Za-z_$][\w$]*+)\s*+(?:[-+*/]=|\+\+|--)|(?:\+\+|--)\s*+([A-Za-z_$][\w$]*+)")
 _COORDINATE = re.compile(rf"(?<![\w$.])({_PATH})\s*+\[\s*+[0-2]\s*+\]\s*+[-+*/]?+=(?!=)")
+_COORDINATES = {*"xyzXYZ"}
+_CHANGES = {"glloadidentity", "glpushmatrix", "resetcamera", "add", *_GL_MOVES}
 _VECTORS = {"eye", "target", "up", "direction"}
 _OF_VTK = re.compile(
     r"SetViewUp|SetFocalPoint|CameraFocalPoint|\bcamera_position\s*+=|\bcpos\s*+=|\bfocal_point\s*+=", re.IGNORECASE
@@ -208,28 +210,42 @@ class _Code:
 
     def __init__(self, text: str) -> None:
         self.text = texts.without(_COMMENT, text).replace("−", "-")
-        # The parts of a name, what follows it, where that ends, and where the name stands.
-        self.statements: list[tuple[list[str], str, int, int]] = []
-        self.assigned: dict[str, list[int]] = {}
-        parts_of: dict[str, list[str]] = {}
-        for found in _STATEMENT.finditer(self.text):
-            path, sign = found.groups()
-            parts = parts_of.get(path) or parts_of.setdefault(path, _PARTS.findall(path))
-            at = found.end()
-            self.statements.append((parts, sign, at, found.start()))
-            if sign == "=" or (sign != ":" and len(parts) == 1):
-                self.assigned.setdefault(parts[-1], []).append(at if sign == "=" else at - 1)
-        for found in _DEFINE.finditer(self.text):
-            self.assigned.setdefault(found[1], []).append(found.end())
         self._has_viewports = bool(re.search(r"\bSetViewport\s*+\(", self.text))
-        self._lights = {found[1] or found[2] for found in _LIGHT.finditer(self.text)}
+        self._lights = {found[1] or found[2] for found in _LIGHT.finditer(self.text)} if "vtkLight" in text else set()
         self._changed = {found[1] or found[2] for found in _STEPPED.finditer(self.text)}
         self._following: set[str] = set()
         self._cameras = {found[1] for found in _MADE.finditer(self.text)}
         self._values: dict[str, object] = {}
         self._lookups = 0
         self._roles: dict[tuple[str, ...], str | None] = {}
+        # Of those that may say something of a camera: the parts of a name, what follows it, where that ends, and where the
+        # name stands.
+        self.statements: list[tuple[list[str], str, int, int]] = []
+        self.assigned: dict[str, list[int]] = {}
+        known: dict[tuple[str, str], tuple[list[str], bool]] = {}
+        for found in _STATEMENT.finditer(self.text):
+            path, sign = key = found.groups()
+            if key not in known:
+                parts = _PARTS.findall(path)
+                known[key] = (parts, self._may_say(parts, sign))
+            parts, may_say = known[key]
+            if may_say:
+                self.statements.append((parts, sign, found.end(), found.start()))
+                if len(self.statements) > _MOST_STATEMENTS:  # refused in `said`
+                    break
+            if sign == "=" or (sign != ":" and len(parts) == 1):
+                self.assigned.setdefault(parts[-1], []).append(found.end() - (sign != "="))
+        for found in _DEFINE.finditer(self.text):
+            self.assigned.setdefault(found[1], []).append(found.end())
         self.reader = Expressions(self.text, self._name)
+
+    def _may_say(self, parts: list[str], sign: str) -> bool:
+        """Whether a statement has a role, is one coordinate of what has one, or is a call that changes what others say."""
+        if self._role(parts, sign):
+            return True
+        if len(parts) > 1 and parts[-1] in _COORDINATES and self._role(parts[:-1], sign) in _VECTORS:
+            return True
+        return sign == "(" and texts.plain(parts[-1]) in _CHANGES
 
     def says_pose(self) -> bool:
         for parts, sign, _, _ in self.statements:
@@ -246,7 +262,8 @@ class _Code:
         return self._roles[key]
 
     def _found_role(self, parts: list[str], sign: str) -> str | None:
-        if parts[0] in self._lights or any("light" in part.lower() or "shadow" in part.lower() for part in parts):
+        whole = ".".join(parts).lower()
+        if parts[0] in self._lights or "light" in whole or "shadow" in whole:
             return None
         key = texts.plain(parts[-1])
         before = texts.plain(parts[-2]) if len(parts) > 1 else ""
@@ -301,31 +318,34 @@ class _Code:
             last in self._changed
             or last not in self.assigned
             or last in self._following
+            or len(self.assigned[last]) > 20
             or max(len(self._following) / 12, self._lookups / 5000) > 1
         ):
             return None
         self._following.add(last)
         try:
-            found = [self._at(place) for place in self.assigned[last][:20]]
+            found = [self._at(place) for place in self.assigned[last]]
         finally:
             self._following.discard(last)
-        known = [value for value in found if not isinstance(value, Unknown)]
-        value = known[0] if known and all(value == known[0] for value in known) else None
+        # What is known once and computed elsewhere is not known.
+        value = found[0] if not any(map(_is_unknown, found)) and all(each == found[0] for each in found) else None
         if not self._following:
             self._values[last] = value
         return value
 
     def _at(self, place: int) -> object:
         if self.text[place : place + 1] in ("(", "{"):  # vec3 eye(1, 2, 3)
-            values, named, _ = Expressions(self.text, self._name).arguments(place)
+            values, named, _ = self.reader.arguments(place)
             if named:
                 return Unknown(place)
             return values[0] if len(values) == 1 else tuple(values)
-        return Expressions(self.text, self._name).value(place)[0]
+        return self.reader.value(place)[0]
 
     # ---- what it says
 
     def said(self) -> _Said:
+        if len(self.statements) > _MOST_STATEMENTS:
+            raise InputError(f"the text says more than {_MOST_STATEMENTS} things of cameras: copy one camera")
         said = _Said(three=bool(re.search(r"\bTHREE\b|PerspectiveCamera", self.text)))
         if other := _OTHER_LENSES.search(self.text):
             not_a_pinhole("the text's camera", f"a {other[1] or other[2]}")
@@ -337,7 +357,7 @@ class _Code:
             if self._role(_PARTS.findall(changed[1]), "=") in _VECTORS:
                 texts.fail(self.text, changed.start(), "this is one coordinate, write the whole vector where it is set")
         for parts, sign, _, start in self.statements:
-            if len(parts) < 2 or sign != "=" or parts[-1] not in ("x", "y", "z", "X", "Y", "Z") or self._role(parts, sign):
+            if len(parts) < 2 or sign != "=" or parts[-1] not in _COORDINATES or self._role(parts, sign):
                 continue
             if self._role(parts[:-1], sign) in _VECTORS:
                 texts.fail(self.text, start, "this is one coordinate, write the whole vector where it is set")
@@ -347,7 +367,6 @@ class _Code:
             texts.fail(self.text, moved.start(), "this moves the view by other means, write eye, look-at and up")
         parts_of: dict[str, dict[str, float]] = {}
         placed: dict[str, str] = {}  # position or up: whose
-        counted = 0
         moved_before = None  # the matrix of OpenGL that gluLookAt multiplies
         for parts, sign, at, start in self.statements:
             role = self._role(parts, sign)
@@ -365,9 +384,6 @@ class _Code:
                 whose = ".".join(parts[: parts.index(name, 1)])
                 if placed.setdefault(name, whose) != whose:
                     texts.fail(self.text, start, f"this is another camera than {placed[name][:40]}, copy one camera")
-            counted += 1
-            if counted > _MOST_STATEMENTS:
-                raise InputError(f"the text says more than {_MOST_STATEMENTS} things of cameras: copy one camera")
             if role == "moves" and sign != ":":
                 texts.fail(self.text, start, "this moves or bends the camera by other means, write eye, look-at and up")
             elif role == "moves":
@@ -518,11 +534,12 @@ def _is_unknown(value: object) -> bool:
 
 def _looks_declared(text: str, opened: int) -> bool:
     """Whether the brackets are the head of a function's definition."""
+    head = text[opened : opened + 2_000]
     try:
-        end = texts.closing(text, opened, "()")
+        end = texts.closing(head, 0, "()")
     except InputError:
         return False
-    return bool(re.match(r"\)\s*(?:const\s*)?(?:->[^;{]{0,40})?[{:]", text[end : end + 60]))
+    return bool(re.match(r"\)\s*(?:const\s*)?(?:->[^;{]{0,40})?[{:]", head[end : end + 60]))
 
 
 def read(source: Source, options: Options) -> list[Camera]:

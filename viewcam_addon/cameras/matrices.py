@@ -44,7 +44,8 @@ _NAMES = re.compile(
     r"(?=[^\w\s;.]|[-+.\d\n]|new\b|np\.|glm|mat|array|float|Matrix|XM|\[)",
     re.IGNORECASE,
 )
-_BEFORE = re.compile(r"(?:\s|new\b|[A-Za-z_][\w.:]*+\s*+(?=\(|\{)|=|[\[({<])*+")
+_BEFORE = re.compile(r"(?:\s++|new\b|[A-Za-z_][\w.:]*+\s*+(?=\(|\{)|=|[\[({<]){0,20}+")
+_ROW = re.compile(r"[\s,()\[\]{}]*+(?:glm::)?+(?:d?vec4|float4|array|np\.array)\s*+(?=[\[({])")
 _SIZE = re.compile(
     r"\b(?:size|viewport|resolution)\b['\"]?+\s*+[=:]\s*+[\[({]?+\s*+(\d{1,9}+)\s*+[x×,\s]\s*+(\d{1,9}+)", re.IGNORECASE
 )
@@ -72,10 +73,12 @@ def _found(text: str) -> list[tuple[str, list[float], int]]:
 
 def _sixteen(text: str, at: int) -> list[float] | None:
     numbers: list[float] = []
+    rows = 0
     while len(numbers) < 16:
         found = _NUMBER.match(text, at)
         if not found:
-            skipped = re.compile(r"[\s,()\[\]{}]*+(?:glm::)?+(?:d?vec4|float4|array|np\.array)\s*+(?=[\[({])").match(text, at)
+            rows += 1
+            skipped = _ROW.match(text, at) if rows <= 4 else None
             if not skipped:
                 return None
             at = skipped.end()

@@ -11,6 +11,7 @@ Only what stands inside a sensor counts: emitters have a `lookat`, too. Sources:
 src/sensors/perspective.cpp, include/mitsuba/core/transform.h (look_at, has_scale), src/core/python/xml.py.
 """
 
+import itertools
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -30,12 +31,14 @@ TITLE = "Mitsuba scene"
 SUFFIX = ".xml"
 
 _SIZE = (768, 576)
+_MOST = 4_000
 _DIAGONAL_OF_FILM = math.hypot(36, 24)  # mm
 _XML = re.compile(r"<\s*+(?:sensor|scene|lookat|transform)\b", re.IGNORECASE)
 _PYTHON = re.compile(r"(?:to_world|type)['\"]\s*+:|\blook_at\s*+\(|\bload_dict\s*+\(")
 _SENSOR = re.compile(
     r"['\"]type['\"]\s*+:\s*+['\"](perspective|thinlens|orthographic|radiancemeter|distant|irradiancemeter|batch)['\"]"
 )
+_DEFAULT = re.compile(r"\$([^\s,$]{1,100}+)")
 _LOOK = re.compile(r"\blook_at\s*+\(")
 _FOV_AXES = ("x", "y", "diagonal", "smaller", "larger")
 _SENSORS = ("perspective", "thinlens", "orthographic", "radiancemeter", "distant", "irradiancemeter", "batch")
@@ -90,13 +93,16 @@ def read(source: Source, options: Options) -> list[Camera]:
     root = source_xml(source) if source.text.lstrip().startswith("<") else None
     if source.text.lstrip().startswith("<") and root is None:
         raise InputError(f"{source.name} looks like XML and is none: copy whole elements")
-    sensors = list(_in_xml(root) if root is not None else _in_python(source.text))
+    sensors = list(itertools.islice(_in_xml(root) if root is not None else _in_python(source.text), _MOST + 1))
+    if len(sensors) > _MOST:
+        raise InputError(f"{source.name} has more than {_MOST} sensors: copy those that are meant")
     pinholes = [sensor for sensor in sensors if sensor.kind == "perspective"]
     if not pinholes:
         if sensors:
             not_a_pinhole(f"Mitsuba's sensor {sensors[0].name}", f"a {sensors[0].kind}")
         raise InputError(f"{source.name} has no sensor, which is Mitsuba's word for a camera: copy the sensor")
-    left_out = tuple(f"The sensor {s.name} is a {s.kind}, no pinhole, and was left out" for s in sensors if s not in pinholes)
+    others = [sensor for sensor in sensors if sensor.kind != "perspective"]
+    left_out = tuple(f"The sensor {sensor.name} is a {sensor.kind}, no pinhole, and was left out" for sensor in others)
     return [_camera(sensor, options).noted(*left_out) for sensor in pinholes]
 
 
@@ -184,14 +190,17 @@ def _whole(value: object, name: str, least: int = 1) -> int:
 
 
 def _in_xml(root: ElementTree.Element) -> Iterator[_Sensor]:
-    defaults = {e.get("name"): e.get("value", "") for e in root.iter("default")}
+    defaults = {e.get("name", ""): e.get("value", "") for e in root.iter("default")}
     given = {e.get("id"): e for e in root.iter() if e.get("id")}
+
+    def said(found: re.Match) -> str:  # the longest name that is one: $fovx may be $fov and an x
+        name = next((name for end in range(len(found[1]), 0, -1) if (name := found[1][:end]) in defaults), None)
+        return found[0] if name is None else defaults[name] + found[1][len(name) :]
 
     def text(value: str) -> str:
         if "$" not in value:
             return value
-        for name in sorted((name for name in defaults if name), key=len, reverse=True):
-            value = value.replace(f"${name}", defaults[name])
+        value = _DEFAULT.sub(said, value)
         if "$" in value:
             raise InputError(f"{checks.shown(value)} stands for a value that the text does not say: write the value")
         return value

@@ -36,6 +36,7 @@ SUFFIX = ".yml"
 
 _K = ("k", "cameramatrix", "intrinsicmatrix", "intrinsics", "intrinsic", "mtx", "cammatrix", "camk", "kmatrix")
 _R = ("r", "rot", "rotation", "rmat", "rotationmatrix", "rw2c")
+_SAYS_K = re.compile(r"(?:k|matrix|intrinsics?|mtx)[\s_$\"'-]*+:", re.IGNORECASE)  # each of these
 _RVEC = ("rvec", "rodrigues", "rotationvector", "rvecs")
 _T = ("t", "tvec", "translation", "translationvector", "trans", "tw2c")
 _EXTRINSIC = (
@@ -190,7 +191,7 @@ def _document(source: Source) -> Mapping[str, Any]:
         return {f"camera {i}": value for i, value in enumerate(source.json)}
     if source.text.lstrip()[:1] == "<":
         return _xml(source)
-    return source.yaml
+    return source.yaml if _SAYS_K.search(source.text) else {}
 
 
 def _npz(source: Source) -> dict[str, Any]:

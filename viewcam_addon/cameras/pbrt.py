@@ -42,6 +42,7 @@ _LUX = re.compile(r'\bFilm\s*+"(?:fleximage|multiimage)"|^[ \t]*+SearchPath[ \t]
 _MOVES = {"LookAt": 9, "Translate": 3, "Scale": 3, "Rotate": 4, "Transform": 16, "ConcatTransform": 16, "Identity": 0}
 _NOT_READ = {"Include", "Import"}
 _SIZE = (1280, 720)
+_MOST_MOVES = 1_000
 _HARMLESS = {"shutteropen", "shutterclose", "focaldistance", "lensradius", "medium", "hither", "yon"}
 
 # A parameter: its name, its values (numbers or texts), and where it stands.
@@ -54,7 +55,7 @@ def recognises(source: Source) -> bool:
 
 def _has_statement(text: str) -> bool:
     """Whether a LookAt is followed by a number, or a Camera by the name of one."""
-    return bool(_STATEMENT.search(texts.without(_COMMENT, text[: 2**20])))
+    return ("LookAt" in text or "Camera" in text) and bool(_STATEMENT.search(texts.without(_COMMENT, text[: 2**20])))
 
 
 def read(source: Source, options: Options) -> list[Camera]:
@@ -74,6 +75,7 @@ class _Scene:
     def __init__(self, text: str) -> None:
         self.text = text
         self.transform = _NOTHING
+        self.moves = self.cameras = 0
         self.kept: list[np.ndarray] = []
         self.named: dict[str, np.ndarray] = {}
         self.is_lux = bool(_LUX.search(text))
@@ -104,6 +106,7 @@ class _Scene:
         elif word in _NOT_READ and self.lens is None:
             texts.fail(self.text, at, "other files are not read, copy the camera out of that one")
         elif word == "Camera":
+            self.cameras += 1
             if not arguments or not isinstance(arguments[0], str):
                 texts.fail(self.text, at, 'give its kind, as in Camera "perspective"')
             self.lens = (arguments[0], at, parameters)
@@ -114,6 +117,9 @@ class _Scene:
     def _move(self, word: str, at: int, given: list) -> None:
         if len(given) != _MOVES[word] or not all(isinstance(x, float) for x in given):
             texts.fail(self.text, at, f"give {_MOVES[word]} finite numbers for {word}")
+        self.moves += 1
+        if self.moves > _MOST_MOVES:
+            raise InputError(f"the text has more than {_MOST_MOVES} transforms before WorldBegin: copy one camera")
         if word == "LookAt":
             before = self.transform.tolist()
             mirrors = before == _MIRROR.tolist()
@@ -132,6 +138,8 @@ class _Scene:
             not_a_pinhole(f"pbrt's Camera {kind[:40]!r}", f"{'of a real lens' if kind == 'realistic' else kind[:40]}")
         matrix, look, mirrored = self.at_camera or (self.transform, self.look, self.mirrored)
         notes = [f"pbrt's {name} was not taken" for name in parameters if name not in (*_HARMLESS, *_OF_LENS)]
+        if self.cameras > 1:
+            notes.append(f"The text has {self.cameras} Cameras, of which pbrt uses the last: so did this")
         if self.lens is None:
             if look is None:
                 raise InputError("the text has no Camera, only its pose: copy the Camera statement as well")

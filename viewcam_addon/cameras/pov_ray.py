@@ -133,7 +133,7 @@ class _Block:
             return None
         if place not in self._values:
             with self._standing_at(place):
-                self._values[place] = Expressions(self.text, self._name, angled=True).value(place)[0]
+                self._values[place] = self.reader.value(place)[0]
         return self._values[place]
 
     def _declared_at(self, name: str) -> int | None:

@@ -32,7 +32,7 @@ _ASKEW, _NOTED = 2e-3, 1e-5  # cosine between the picture's sides: refused from,
 
 def plain(name: str) -> str:
     """A name without capitals, blanks, hyphens and underscores."""
-    return _UNSAID.sub("", name).lower()
+    return (name if name.isalnum() else _UNSAID.sub("", name)).lower()
 
 
 def fail(text: str, at: int, advice: str) -> NoReturn:

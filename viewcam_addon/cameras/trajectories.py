@@ -4,7 +4,9 @@
     KITTI   twelve numbers              3 × 4, row by row, camera to the world of the first one
     EuRoC   ns, p, q w x y z, …         of the body; a cam0/sensor.yaml of the data set says how the camera stands on it
 
-Camera axes are x right, y down, z into the view. Each pose becomes a camera with its time, so that they make one animation.
+Camera axes are x right, y down, z into the view. TUM's and KITTI's files do not say whether the poses are the camera's or a
+body's; the first is their convention, and a note says that it was taken. Each pose becomes a camera with its time, so that
+they make one animation.
 
 Sources: the data sets' own pages, and evo's file_interface.py for the order of numbers.
 """
@@ -22,6 +24,7 @@ from .source import Record, Source, numbered_lines, table
 TITLE = "trajectories of TUM, KITTI and EuRoC"
 
 _MOST = 1_000_000
+_WHOSE = "The file does not say whose poses it has: taken as the camera's, to the world, x right, y down, z into the view"
 _W_FIRST = re.compile(r"^#.*\bq_?w\b.*\bq_?x\b", re.MULTILINE)
 _KITTI_STEP = 0.1  # seconds; its pictures are taken at 10 Hz
 
@@ -37,7 +40,7 @@ def read(source: Source, options: Options) -> list[Camera]:
         raise InputError(f"{source.name} has {rows.shape[1]} numbers in a line: a pose has at least 8")
     if len(rows) > _MOST:
         raise InputError(f"{source.name} has {len(rows)} poses: give at most {_MOST}")
-    mounted, plane, notes = np.eye(4), None, ()
+    mounted, plane, notes = np.eye(4), None, (_WHOSE,)
     if kind == "EuRoC":
         mounted, plane, notes = _sensor(source, options)
     plane = options.view_plane or plane or options.plane_or_refuse(source.name)
