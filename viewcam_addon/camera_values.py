@@ -101,7 +101,7 @@ class CameraValues:
 
     def growth(self, frame: Frame, sensor_fit: str) -> float:
         """The factor on the distance in the picture of `frame`: 1 unless the field of view of another picture is kept."""
-        if self.keeps != FIELD_OF_VIEW or self.counted_in is None:
+        if self.keeps != FIELD_OF_VIEW or self.counted_in in (None, without_border(frame)):
             return 1.0
         return intrinsics.growth(sensor_fit, self.counted_in, frame)
 

@@ -10,7 +10,7 @@ Every matrix is (3, 3) float64 and takes column vectors: its columns are the ima
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,15 +54,14 @@ def _opposite(angle: float) -> float:
 
 def from_euler(angles: Sequence[float], order: str) -> Array:
     """The rotation matrix of the angles about x, y and z, applied in `order`."""
-    result = np.eye(3)
+    rows = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     for axis in order:
         i = "XYZ".index(axis)
         j, k = (i + 1) % 3, (i + 2) % 3
         sine, cosine = math.sin(angles[i]), math.cos(angles[i])
-        turn = np.eye(3)
-        turn[j, j], turn[j, k], turn[k, j], turn[k, k] = cosine, -sine, sine, cosine
-        result = turn @ result
-    return result
+        pairs = list(zip(rows[j], rows[k], strict=True))
+        rows[j], rows[k] = [cosine * a - sine * b for a, b in pairs], [sine * a + cosine * b for a, b in pairs]
+    return np.array(rows)
 
 
 def _axes(order: str) -> tuple[int, int, int, int]:
@@ -142,11 +141,12 @@ def _wound(angle: float, near: float) -> float:
     return angle + 2 * math.pi * round((near - angle) / (2 * math.pi))
 
 
-def neighbours(numbers: Sequence[float]) -> NDArray[np.float32]:
-    """(3ⁿ, n): the n numbers rounded to float32, then all that differ from these by a step of float32 in some of them."""
+def neighbours(numbers: Sequence[float]) -> Iterator[tuple[float, ...]]:
+    """The n numbers rounded to float32, then all 3ⁿ − 1 that differ from these by a step of float32 in some of them."""
     rounded = np.array(numbers, dtype=np.float32)
-    below, above = (np.nextafter(rounded, np.float32(limit)) for limit in (-np.inf, np.inf))
-    return np.array(list(itertools.product(*zip(rounded, below, above, strict=True))))
+    yield tuple(rounded.tolist())
+    choices = np.column_stack([rounded, *(np.nextafter(rounded, np.float32(limit)) for limit in (-np.inf, np.inf))])
+    yield from itertools.islice(itertools.product(*choices.tolist()), 1, None)
 
 
 def nearest(matrix: Array) -> Array:
@@ -161,15 +161,24 @@ def skew(matrix: Array) -> float:
     return float(np.abs((columns.T @ columns)[[0, 0, 1], [1, 2, 2]]).max())
 
 
+def largest_error(matrix: Iterable, axes: Array) -> float:
+    """The largest difference between the axes of a (4, 4) matrix, of whatever length, and those wanted: (3, 3), as columns."""
+    largest = 0.0
+    for *column, _, wanted in zip(*matrix, axes.T.tolist(), strict=False):
+        size = math.hypot(*column) or 1.0
+        largest = max(largest, *[abs(number / size - other) for number, other in zip(column, wanted, strict=True)])
+    return largest
+
+
 def float64(numbers: Iterable) -> Array:
     """The numbers of a Blender matrix or vector. From 5.0 on NumPy takes these for float32, and would compute in it."""
     return np.array(numbers, dtype=np.float64)
 
 
 def mirrors(matrix: Iterable) -> bool:
-    """Whether a (4, 4) matrix mirrors; one that is not finite does nothing."""
-    matrix = float64(matrix)
-    return bool(np.isfinite(matrix).all() and np.linalg.det(matrix[:3, :3]) < 0)
+    """Whether a (4, 4) matrix of float32 numbers mirrors; one that is not finite does nothing."""
+    (a, b, c, _), (d, e, f, _), (g, h, i, _), _ = matrix
+    return -math.inf < a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g) < 0
 
 
 def has_inverse(matrix: Array) -> bool:
@@ -196,12 +205,12 @@ class Channels:
     @property
     def full_scale(self) -> Array:
         """(3,): the scale, delta included."""
-        return float64(self.scale) * float64(self.delta_scale)
+        return float64([a * b for a, b in zip(self.scale, self.delta_scale, strict=True)])
 
     @property
     def signs(self) -> Array:
         """(3,): −1 for each axis that the scale turns round."""
-        return np.where(self.full_scale < 0, -1.0, 1.0)
+        return float64([-1.0 if size < 0 else 1.0 for size in self.full_scale])
 
     @property
     def delta(self) -> Array:
@@ -218,7 +227,7 @@ class Channels:
         """
         is_free = np.array_equal(parent, IDENTITY)  # as most cameras are, which need no linear algebra
         u, v, w = pinhole.basis()
-        wanted = np.column_stack([-u if pinhole.mirrored else u, v, w])
+        wanted = np.array([-u if pinhole.mirrored else u, v, w]).T
         scale, signs = float64(self.scale), self.signs
         local = wanted if is_free else np.linalg.solve(parent[:3, :3], wanted)
         if (pinhole.mirrored if is_free else np.linalg.det(local) < 0) != (signs.prod() < 0):

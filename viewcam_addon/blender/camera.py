@@ -23,7 +23,6 @@ distance, unless the camera is told to keep it on the look-at point: that lies o
 
 import contextlib
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import bpy
@@ -64,7 +63,7 @@ class _Agreement:
 
 
 _agreed: dict[int, _Agreement] = {}  # by the camera's session_uid
-_being_set: list[int] = []  # session_uid of cameras whose values were edited, until they stand there
+_being_set: list[int] = []  # session_uid of cameras whose values were edited, until they stand there: neither has been moved
 
 
 def apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene) -> list[str]:
@@ -80,8 +79,11 @@ def apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Sc
         if the object is no perspective camera, if the pinhole has another size or pixel aspect than the scene renders, or if
         a number is too large for Blender. Nothing has changed then.
     """
-    with _setting(camera_object):
+    _being_set.append(camera_object.session_uid)
+    try:
         left = _apply(camera_object, pinhole, scene)
+    finally:
+        _being_set.pop()
     agree(camera_object)
     return left + check(camera_object, pinhole, scene)
 
@@ -129,12 +131,14 @@ def follow(camera_object: bpy.types.Object, scene: bpy.types.Scene, edited: froz
     InputError
         as `stated` and `apply` do. Nothing has changed then.
     """
-    with _setting(camera_object):
+    _being_set.append(camera_object.session_uid)
+    try:
         last = _agreed.get(camera_object.session_uid)
         if edited != ALL and last and last.state != _state_of(camera_object):
             with contextlib.suppress(InputError):
                 adopt_move(camera_object, scene, datablocks.depsgraph_of(scene), last.values, edited)
         values, wanted = _level(camera_object, scene)
+        picture = without_border(datablocks.frame_of(scene))
         if values.pole == HOLD:
             angle = hold.roll(camera_object, values, scene)
             if not datablocks.is_animated(camera_object):  # in an animation the curves say what is held
@@ -143,8 +147,11 @@ def follow(camera_object: bpy.types.Object, scene: bpy.types.Scene, edited: froz
                 values = replace(values, held_roll=angle)
             wanted = rolls.turned(wanted, angle)
         place(camera_object, wanted, scene)
-        storage.settle(camera_object, values.as_set(), datablocks.frame_of(scene))
+        if values.pole == HOLD or not values.set_for == values.counted_in == picture:
+            storage.settle(camera_object, values.as_set(), picture)
         agree(camera_object)
+    finally:
+        _being_set.pop()
 
 
 def place(
@@ -157,8 +164,9 @@ def place(
     """
     camera, frame = camera_object.data, datablocks.frame_of(scene)
     is_carried = bool(camera_object.parent or camera_object.constraints)
-    within = depsgraph or datablocks.depsgraph_of(scene)
-    parent = pose.parent_matrix(camera_object, within) if is_carried else rotation.IDENTITY
+    parent = rotation.IDENTITY
+    if is_carried:
+        parent = pose.parent_matrix(camera_object, depsgraph or datablocks.depsgraph_of(scene))
     before = _state_of(camera_object)
     channels, _, grown_from = before
     order = (pinhole, frame, parent.tobytes())
@@ -210,7 +218,8 @@ def refit(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
 def _store(block: bpy.types.ID, **properties: float | tuple[float, ...]) -> None:
     """Set what Blender does not hold already. It evaluates and draws anew what is set, and for a lens looks at all objects."""
     for name, value in properties.items():
-        if not np.array_equal(np.float32(value), getattr(block, name)):
+        held = getattr(block, name)
+        if np.float32(value).tolist() != (held if isinstance(held, float) else list(held)):
             setattr(block, name, value)
 
 
@@ -339,16 +348,6 @@ def adopt(camera_object: bpy.types.Object, scene: bpy.types.Scene, keep: frozens
     if "distance" in keep:
         distance = values.distance_at_full_size(frame, camera_object.data.sensor_fit)
     state(camera_object, eye, look_at, up, distance, frame)
-
-
-@contextlib.contextmanager
-def _setting(camera_object: bpy.types.Object) -> Iterator[None]:
-    """Values and camera may differ within the block: neither has been moved."""
-    _being_set.append(camera_object.session_uid)
-    try:
-        yield
-    finally:
-        _being_set.pop()
 
 
 def is_being_set(camera_object: bpy.types.Object) -> bool:

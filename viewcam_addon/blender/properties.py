@@ -61,23 +61,22 @@ _on_lens = _edit_of("distance")
 
 def _on_distance(group: "VirtualPinhole", context: bpy.types.Context) -> None:
     """Who states a distance means the pixels of the picture as it is now."""
+    camera_object = group.id_data
     if not storage.is_storing:
-        values = storage.load(group.id_data)
-        if not storage.is_counted_in_earlier(group.id_data, values):
-            _count_in_present_picture(group)
+        with contextlib.suppress(InputError):  # the panel finds the same error and shows it
+            picture = without_border(datablocks.frame_of(datablocks.scene_of(camera_object)))
+            values = storage.load(camera_object)
+            if values.counted_in != picture and not storage.is_counted_in_earlier(camera_object, values):
+                storage.store(camera_object, replace(values, counted_in=picture), "counted_in")
     _on_lens(group, context)
 
 
 def _on_keeps(group: "VirtualPinhole", context: bpy.types.Context) -> None:
     if not storage.is_storing:
-        _count_in_present_picture(group)
+        with contextlib.suppress(InputError):
+            picture = without_border(datablocks.frame_of(datablocks.scene_of(group.id_data)))
+            storage.store(group.id_data, replace(storage.load(group.id_data), counted_in=picture), "counted_in")
     _on_lens(group, context)
-
-
-def _count_in_present_picture(group: "VirtualPinhole") -> None:
-    with contextlib.suppress(InputError):  # the panel finds the same error and shows it
-        picture = without_border(datablocks.frame_of(datablocks.scene_of(group.id_data)))
-        storage.store(group.id_data, replace(storage.load(group.id_data), counted_in=picture), "counted_in")
 
 
 def _on_pole(group: "VirtualPinhole", context: bpy.types.Context) -> None:

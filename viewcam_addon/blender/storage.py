@@ -110,8 +110,9 @@ def begin(camera_object: bpy.types.Object) -> None:
 def settle(camera_object: bpy.types.Object, values: CameraValues, frame: Frame) -> None:
     """Take note that the camera has been set by these values for the picture of `frame`; the distance now counts its pixels."""
     before = load(camera_object)
-    after = replace(before, view_when_set=values.view_when_set, held_roll=values.held_roll, set_for=without_border(frame))
-    if before.keeps != FIELD_OF_VIEW or not is_counted_in_earlier(camera_object, before):
+    view = values.view_when_set if before.pole == HOLD else None
+    after = replace(before, view_when_set=view, held_roll=values.held_roll, set_for=without_border(frame))
+    if after.counted_in != after.set_for and not is_counted_in_earlier(camera_object, before):
         after = after.counted_anew(frame, camera_object.data.sensor_fit)
     store(camera_object, after, *(name for name in _NOTED if getattr(after, name) != getattr(before, name)))
 
