@@ -160,7 +160,7 @@ def trace(draw, calls):
 
 
 def trace_light(draw, calls):
-    bounces = [draw(mostly(st.integers(0, 4), [-1, 9])) for _ in range(4)]
+    bounces = [draw(mostly(st.integers(0, 4), [-1, 9])) for _ in range(5)]
     error = draw(mostly(st.sampled_from([0.0, 0.1]), HOSTILE))
     settings = native._LightSettings(seed=1, samples=draw(mostly(st.integers(1, 9), [0, 2**24 + 1, 2**32 - 1])), error=error)
     settings.bounces[:] = bounces
@@ -194,7 +194,7 @@ def story(draw, calls):
         return
     look(draw, calls)
     for _ in range(draw(st.integers(0, 2))):
-        assert calls("add_material", calls.scene, None, 0)
+        assert calls("add_material", calls.scene, None, 0, 1)
         light_up(draw, calls)
         make_nodes(draw, calls)
     trace(draw, calls)

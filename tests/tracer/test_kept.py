@@ -8,7 +8,7 @@ import pytest
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import Keeper, Tracer, render
 from viewcam_addon.tracer.scene import Mesh
-from viewcam_addon.tracer.scene.film import NO_BOUNCES
+from viewcam_addon.tracer.scene.film import Bounces
 from viewcam_addon.tracer.scene.lamps import Point, Sun
 from viewcam_addon.tracer.scene.materials import Colour, Material
 from viewcam_addon.tracer.scene.sameness import same, same_things
@@ -32,7 +32,7 @@ def scene(make_lit, make_mesh, make_spheres, ball):
     ground = make_mesh(GROUND, [[0, 1, 2], [0, 2, 3]])
     things = ((ball(12), GREEN), (soup, RED), (ground, None), (spheres, RED))
     lamps = (Sun("sun", towards=(0.48, -0.6, 0.64), irradiance=(2.0, 2.0, 2.0)),)
-    lit = make_lit(camera(), *things, lamps=lamps, bounces=NO_BOUNCES)
+    lit = make_lit(camera(), *things, lamps=lamps, bounces=Bounces().none)
     objects = tuple(replace(o, hidden_from=frozenset({"shadow"}) if o.name == "object 1" else frozenset()) for o in lit.objects)
     return replace(lit, objects=objects)
 

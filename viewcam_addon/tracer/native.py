@@ -14,6 +14,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int, c_int32, c_size_t, c_uint32, c_void_p
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,6 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from .scene import Mesh, Object, Scene, Spheres, placing
 from .scene.colours import WHITE
-from .scene.film import NO_BOUNCES
 from .scene.lamps import RAYS, Area, Lamp, Point, Spot, Sun
 from .scene.materials import PLAIN, Colour, Material
 from .scene.sameness import same_things
@@ -128,7 +128,7 @@ class _Film(Structure):
 
 
 class _LightSettings(Structure):
-    _fields_ = [("bounces", c_int32 * 4), ("seed", c_uint32), ("samples", c_uint32), ("error", c_double)]
+    _fields_ = [("bounces", c_int32 * 5), ("seed", c_uint32), ("samples", c_uint32), ("error", c_double)]
 
 
 class _LightPasses(Structure):
@@ -159,7 +159,7 @@ class _Core(Structure):
         ("clear_light", _function(c_int, c_void_p)),
         ("add_texture", _function(c_int, c_void_p, c_int, c_int, c_int, c_int, c_void_p)),
         ("add_node", _function(c_int, c_void_p, POINTER(_Node))),
-        ("add_material", _function(c_int, c_void_p, c_void_p, c_int)),
+        ("add_material", _function(c_int, c_void_p, c_void_p, c_int, c_int)),
         ("add_lamp", _function(c_int, c_void_p, POINTER(_Lamp))),
         ("set_film", _function(c_int, c_void_p, POINTER(_Film))),
         ("light_create", _function(c_int, c_void_p, POINTER(_LightSettings), POINTER(c_void_p))),
@@ -339,7 +339,8 @@ class CoreScene:
                     if isinstance(value, Node):
                         self._add_nodes(value, images, nodes)
             closures = [described_closure(closure, images, nodes) for closure in material.closures]
-            self.check(self.core.add_material(self.handle, (_Closure * len(closures))(*closures), len(closures)))
+            described = (_Closure * len(closures))(*closures)
+            self.check(self.core.add_material(self.handle, described, len(closures), material.transparent_shadow))
         for lamp in scene.lamps:
             if not lamp.is_dark:
                 self.check(self.core.add_lamp(self.handle, described_lamp(lamp)))
@@ -450,9 +451,9 @@ class CoreLight:
     def __init__(self, scene: CoreScene, given: Scene, level: str, samples: int, seed: int, error: float | None) -> None:
         self._scene, self._handle = scene, c_void_p()
         scene.illuminate(given)
-        bounces = given.bounces if level == "path" else NO_BOUNCES
+        bounces = given.bounces if level == "path" else given.bounces.none
         settings = _LightSettings(seed=seed & 0xFFFFFFFF, samples=samples, error=error or 0.0)
-        settings.bounces[:] = bounces.total, bounces.diffuse, bounces.glossy, bounces.transmission
+        settings.bounces[:] = astuple(bounces)
         scene.check(scene.core.light_create(scene.handle, settings, ctypes.byref(self._handle)))
 
     def __del__(self) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer.scene.film import NO_BOUNCES, Bounces
+from viewcam_addon.tracer.scene.film import Bounces
 from viewcam_addon.tracer.scene.lamps import Area, Point, Sun, World
 from viewcam_addon.tracer.scene.levels import least_level
 from viewcam_addon.tracer.scene.materials import Colour, Material
@@ -69,7 +69,7 @@ def test_mirrors_and_glass_need_paths(scene, material, words):
 @pytest.mark.parametrize(
     ("material", "bounces", "words"),
     [
-        (None, NO_BOUNCES, "allows no bounces"),
+        (None, Bounces().none, "allows no bounces"),
         (Material(emission=WHITE), Bounces(), "nothing reflects"),
         (Material(diffuse=BLACK), Bounces(), "nothing reflects"),
         (Material(diffuse=WHITE), Bounces(diffuse=0), "of the kinds"),

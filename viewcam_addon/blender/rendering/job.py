@@ -14,7 +14,7 @@ import bpy
 
 from ...errors import InputError
 from ...tracer.scene import LedgerEntry, Scene
-from ...tracer.scene.film import LEVELS, NO_BOUNCES, SAMPLES
+from ...tracer.scene.film import LEVELS, SAMPLES
 from .. import datablocks, resolution
 from ..opening import opened
 from ..scenes import materials, recentering
@@ -155,7 +155,7 @@ def _render(
         rendering(number + 1)
         picture = None
         if stage.is_lit:
-            bounces = NO_BOUNCES if stage.level == "direct" else light.bounces
+            bounces = light.bounces.none if stage.level == "direct" else light.bounces
             picture = cycles.LightSettings(light.film, bounces, share, request.seed + number)
         cycles.render(
             stage.scene, stage.view_layer, stage.camera, path, stage.ledger.remedies.values(), request.threads, picture

@@ -128,7 +128,7 @@ def note_object(
     for material in filter(None, slots):
         if not shading:  # the Normal pass; mirrors and glass bend normals on both sides (scattering.specular_normal)
             ledger.call_for_cycles(material.original, materials.keep_normals)
-        reasons = materials.departures(material)
+        reasons = materials.departures(material, lit=shading is not None)
         if shading:
             reasons += shading.reading(material).reasons
         for reason in reasons:

@@ -11,6 +11,7 @@ BOUNCES = {
     "diffuse": "diffuse_bounces",
     "glossy": "glossy_bounces",
     "transmission": "transmission_bounces",
+    "transparent": "transparent_max_bounces",
 }
 CAUSTICS = ("caustics_reflective", "caustics_refractive")
 

@@ -79,6 +79,7 @@ def paint(material: bpy.types.Material, made: Material, shown: dict[str, bpy.typ
         material.use_nodes = True
     tree = material.node_tree
     tree.nodes.clear()
+    material.use_transparent_shadow = made.transparent_shadow
     adder = nodes.Adder(tree)
     output = adder.add("ShaderNodeOutputMaterial")
     materials.add_surface(adder, output, shaders.Reading(made, shown, ""))

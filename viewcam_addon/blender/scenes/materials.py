@@ -34,8 +34,11 @@ _SHADERS = {
 }
 
 
-def departures(material: bpy.types.Material) -> list[str]:
-    """Why this material's surface is not what level geometry models, one clause each; empty for most materials."""
+def departures(material: bpy.types.Material, lit: bool = False) -> list[str]:
+    """Why this material's surface is not what level geometry models, one clause each; empty for most materials.
+
+    lit : or what the levels of light do, beside what shaders.py says.
+    """
     tree = versions.node_tree(material)
     if tree is None:
         return []
@@ -48,7 +51,7 @@ def departures(material: bpy.types.Material) -> list[str]:
     if output.inputs["Volume"].is_linked:
         reasons.append("has a volume")
     all_nodes = list(_nodes(tree, set()))
-    if any(node.type in _TRANSPARENT or _sees_through(node) for node in all_nodes):
+    if not lit and any(node.type in _TRANSPARENT or _sees_through(node) for node in all_nodes):
         reasons.append("is transparent")
     if any(node.type in _TURNING or _is_turned(node) for node in all_nodes):
         reasons.append("turns the normals")

@@ -88,6 +88,7 @@ SHADERS = {
         {"color": "Color", "roughness": "Roughness", "ior": "IOR"},
         _DISTRIBUTION,
     ),
+    "transparent": Shader("BSDF_TRANSPARENT", "ShaderNodeBsdfTransparent", {"color": "Color"}),
     "emission": Shader("EMISSION", "ShaderNodeEmission", {"color": "Color", "strength": "Strength"}),
     "principled": Shader(
         "BSDF_PRINCIPLED",
@@ -107,6 +108,7 @@ SHADERS = {
             "coat_tint": "Coat Tint",
             "emission_color": "Emission Color",
             "emission_strength": "Emission Strength",
+            "alpha": "Alpha",
         },
         _DISTRIBUTION,
         _THICKNESS | {"Anisotropic": 0.0, "Subsurface Weight": 0.0, "Sheen Weight": 0.0, "Thin Wall": 0.0},
@@ -152,7 +154,8 @@ def read(material: bpy.types.Material) -> Reading:
     if not plain.reading.reasons:
         return plain.reading
     tree = _Tree(viewport)
-    tree.reading.material = Material(surface=tree.surface(Input(output.inputs["Surface"])))
+    surface = tree.surface(Input(output.inputs["Surface"]))
+    tree.reading.material = Material(surface=surface, transparent_shadow=material.use_transparent_shadow)
     is_plain = len(plain.reading.reasons) < len(tree.reading.reasons) or plain.reading.reasons == tree.reading.reasons
     return plain.reading if is_plain else tree.reading
 
@@ -306,6 +309,7 @@ class _Components(_Reader):
     def _principled(self, output: Output) -> dict[str, Colour]:
         for name in _PRINCIPLED_ZERO:
             self._want(output, name, 0.0)
+        self._want(output, "Alpha", 1.0)
         if constant_number(output, "IOR") != 1.0:
             self._want(output, "Specular IOR Level", 0.0)
         found = {"diffuse": self._colour(output, "Base Color")}

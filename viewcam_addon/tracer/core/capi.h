@@ -89,7 +89,8 @@ typedef struct {
     int (*add_texture)(ViewcamScene*, int width, int height, int channels, int srgb, const float* pixels);
     /* Of materials' inputs; it names nodes that were added before. */
     int (*add_node)(ViewcamScene*, const ViewcamNode*);
-    int (*add_material)(ViewcamScene*, const ViewcamClosure*, int count);
+    /* transparent_shadow: whether shadow rays go through it where it is transparent. */
+    int (*add_material)(ViewcamScene*, const ViewcamClosure*, int count, int transparent_shadow);
     int (*add_lamp)(ViewcamScene*, const ViewcamLamp*);
     int (*set_film)(ViewcamScene*, const ViewcamFilm*);
     /* What is made must be freed before its scene, or what gives light there, changes. */

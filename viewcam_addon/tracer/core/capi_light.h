@@ -49,9 +49,9 @@ typedef struct {
     double filter_width, exposure;
 } ViewcamFilm;
 
-/* bounces: in all, diffuse, glossy, transmission. error: 0 for the same number of samples everywhere. */
+/* bounces: in all, diffuse, glossy, transmission; surfaces gone straight through. error: 0 for the same number of samples everywhere. */
 typedef struct {
-    int32_t bounces[4];
+    int32_t bounces[5];
     uint32_t seed, samples;
     double error;
 } ViewcamLightSettings;

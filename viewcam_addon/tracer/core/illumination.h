@@ -21,9 +21,10 @@ struct Lamp {
     uint32_t hidden_from = 0;
 };
 
-// How often light is scattered before it must reach a light: in all, and by each kind of surface. Cycles' own counting.
+// How often light is scattered before it must reach a light: in all, and by each kind of surface; and how often it may go straight
+// through a surface. Cycles' own counting.
 struct Bounces {
-    int total = 0, diffuse = 0, glossy = 0, transmission = 0;
+    int total = 0, diffuse = 0, glossy = 0, transmission = 0, transparent = 0;
 };
 
 struct Illumination {

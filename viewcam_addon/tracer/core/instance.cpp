@@ -180,8 +180,8 @@ const ViewcamCore core = {
                 add_node(scene_of(scene), *node);
             });
         },
-    .add_material = [](ViewcamScene* scene, const ViewcamClosure* closures,
-                       int count) { return guarded([&] { add_material(scene_of(scene), closures, count); }); },
+    .add_material = [](ViewcamScene* scene, const ViewcamClosure* closures, int count,
+                       int transparent_shadow) { return guarded([&] { add_material(scene_of(scene), closures, count, transparent_shadow); }); },
     .add_lamp =
         [](ViewcamScene* scene, const ViewcamLamp* lamp) {
             return guarded([&] {

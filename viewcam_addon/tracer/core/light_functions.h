@@ -34,8 +34,9 @@ inline WeightedClosure closure_of(const ViewcamClosure& given, const ValueNodes&
     for (int i = 0; i < given.factor_count; i++) made.factors.push_back({color_of(given.factors[i].value, nodes), bool(given.factors[i].rest)});
     return made;
 }
-inline void add_material(Scene& scene, const ViewcamClosure* closures, int count) {
+inline void add_material(Scene& scene, const ViewcamClosure* closures, int count, bool transparent_shadow) {
     Material material;
+    material.transparent_shadow = transparent_shadow;
     for (int i = 0; i < count; i++) material.closures.push_back(closure_of(closures[i], scene.illumination.nodes));
     material.prepare(scene.illumination.textures);
     scene.illumination.materials.push_back(std::move(material));
@@ -66,7 +67,7 @@ inline void set_film(Scene& scene, const ViewcamFilm& given) {
 inline void clear_light(Scene& scene) { scene.illumination = {}; }
 
 inline TileSampler* create_light(const Scene& scene, const ViewcamLightSettings& given) {
-    Bounces bounces{given.bounces[0], given.bounces[1], given.bounces[2], given.bounces[3]};
+    Bounces bounces{given.bounces[0], given.bounces[1], given.bounces[2], given.bounces[3], given.bounces[4]};
     return new TileSampler(scene, bounces, given.seed, given.samples, given.error);
 }
 inline void trace_light(const TileSampler& sampler, uint32_t row, uint32_t column, const ViewcamLightPasses& to, const volatile int* stop) {

@@ -10,14 +10,15 @@
 #include "closures/glossy.h"
 #include "closures/metallic.h"
 #include "closures/principled.h"
+#include "closures/transparent.h"
 
 namespace viewcam::VIEWCAM_ISA {
 
 // One line a closure. Each has a NAME, by which a scene asks for it, KINDS, the kinds of rays that its lobes scatter, and `add_to`;
 // `kinds` where its inputs leave some of them out, `is_rough` where it may spread light otherwise than diffuse surfaces do,
-// `mean_emission` and `shines_evenly` where it shines.
+// `mean_emission` and `shines_evenly` where it shines, `lets_through` where light may go straight through it.
 using Closure = std::variant<DiffuseClosure, GlossyClosure, GlassClosure, RefractionClosure, EmissionClosure, TranslucentClosure, MetallicClosure,
-                             PrincipledClosure>;
+                             PrincipledClosure, TransparentClosure>;
 
 // A factor of a closure's weight, from 0 to 1: a mixture's, or what it leaves to the other side.
 struct MixFactor {
@@ -41,6 +42,7 @@ template <size_t I = 0> Closure closure_of(std::string_view name, const Inputs& 
 
 struct Material {
     std::vector<WeightedClosure> closures;
+    bool transparent_shadow = true;  // whether shadow rays, too, go through what is transparent
 
     // The kinds of rays that its lobes scatter.
     uint32_t kinds() const { return kinds_; }
@@ -48,6 +50,8 @@ struct Material {
     uint32_t rough_kinds() const { return rough_kinds_; }
     bool scatters() const { return kinds_; }
     bool emits() const { return !is_black(mean_emission_); }
+    // Whether it may let light straight through.
+    bool is_transparent() const { return transparent_; }
     // About what it gives off, black only where it gives off nothing; and whether that is what it gives off everywhere.
     Vec3 mean_emission() const { return mean_emission_; }
     bool shines_evenly() const { return shines_evenly_; }
@@ -62,6 +66,7 @@ struct Material {
                     kinds_ |= kinds;
                     if constexpr (requires { closure.is_rough(); })
                         if (closure.is_rough()) rough_kinds_ |= kinds & ~DIFFUSE;
+                    if constexpr (requires { closure.lets_through(); }) transparent_ |= closure.lets_through();
                     if constexpr (requires { closure.mean_emission(textures); }) {
                         mean_emission_ += closure.mean_emission(textures) * mean_weight(one, textures);
                         shines_evenly_ &= closure.shines_evenly() && std::none_of(one.factors.begin(), one.factors.end(), [](const MixFactor& factor) { return factor.value.varies(); });
@@ -114,7 +119,7 @@ struct Material {
 
     uint32_t kinds_ = 0, rough_kinds_ = 0;
     Vec3 mean_emission_;
-    bool shines_evenly_ = true;
+    bool shines_evenly_ = true, transparent_ = false;
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

@@ -12,7 +12,16 @@ constexpr uint32_t NONE = 0xffffffffu;
 constexpr double DOUBLE_ROUNDING = 0x1p-53;
 
 // The kinds of rays that objects and lights may be hidden from, as bits; tracer/native.py numbers scene/lamps.py RAYS so.
-enum RayKind : uint32_t { CAMERA = 1, DIFFUSE = 2, GLOSSY = 4, TRANSMISSION = 8, SHADOW = 16 };
+// NO_RAY: what a light is sampled for.
+enum RayKind : uint32_t { NO_RAY = 0, CAMERA = 1, DIFFUSE = 2, GLOSSY = 4, TRANSMISSION = 8, SHADOW = 16 };
+
+// What a material may ask of the ray that has come to it. kind: of its last scattering; diffuse, singular: what scattered it;
+// depth: scatterings so far.
+struct RayState {
+    RayKind kind = CAMERA;
+    bool diffuse = false, singular = false;
+    int depth = 0;
+};
 
 // A ray in rendering space (scene.h). direction: of any length; t counts in it. What is met must lie in t_min < t < t_max.
 struct Ray {

@@ -134,8 +134,8 @@ class Scene {
     }
 
     // What a material is told of a point that a path reaches.
-    ShadingPoint shading(const Interaction& point, Vec3 incoming) const {
-        return {point, incoming, illumination.textures, illumination.version, &illumination.nodes, &objects[point.object], origin, this};
+    ShadingPoint shading(const Interaction& point, Vec3 incoming, RayState ray) const {
+        return {point, incoming, illumination.textures, illumination.version, &illumination.nodes, &objects[point.object], origin, this, ray};
     }
 
     // What lights need. triangle_count: 0 of spheres. material: of a triangle, an index into illumination.materials. corners: in

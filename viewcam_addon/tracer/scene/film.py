@@ -51,18 +51,21 @@ class Film:
 @dataclass(frozen=True)
 class Bounces:
     """How often light is scattered before it must reach a lamp: in all, and by each kind of surface; 0 is light that comes
-    straight from a lamp. Cycles' own counting and defaults."""
+    straight from a lamp. transparent : how often it may go straight through a surface. Cycles' own counting and defaults."""
 
     total: int = 12
     diffuse: int = 4
     glossy: int = 4
     transmission: int = 12
+    transparent: int = 8
 
     def __post_init__(self) -> None:
-        for name in ("total", "diffuse", "glossy", "transmission"):
+        for name in ("total", "diffuse", "glossy", "transmission", "transparent"):
             value = getattr(self, name)
             if type(value) is not int or not 0 <= value <= 1024:
                 raise InputError(f"{name} of the bounces is {checks.shown(value)}: give a whole number from 0 to 1024")
 
-
-NO_BOUNCES = Bounces(0, 0, 0, 0)
+    @property
+    def none(self) -> "Bounces":
+        """Those of level direct: light comes straight, if through what is transparent."""
+        return Bounces(0, 0, 0, 0, self.transparent)

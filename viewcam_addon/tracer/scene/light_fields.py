@@ -31,12 +31,11 @@ _READERS: dict[str, Callable[[Field], Any]] = {
     **dict.fromkeys(("towards", "irradiance", "position", "power", "radiance", "rotation"), lambda field: field.vector(3)),
     **dict.fromkeys(("angle", "radius", "blend", "filter_width", "exposure"), Field.number),
     **dict.fromkeys(("casts_shadow", "soft_falloff", "ellipse", "transparent", "closest"), Field.truth),
-    **dict.fromkeys(("total", "diffuse", "glossy", "transmission"), lambda field: field.whole(0)),
     **dict.fromkeys(("filter", "image"), Field.text),
     "size": lambda field: field.vector(2),
     "hidden_from": lambda field: hidden_from(field),
 }
-"""How the values are read that are called the same as in Lamp, World, Film and Bounces."""
+"""How the values are read that are called the same as in Lamp, World and Film."""
 
 
 def light_document(scene: Scene, arrays: dict[str, NDArray]) -> dict:
@@ -101,7 +100,8 @@ def _changed(owner: Lamp | World | Film | Bounces) -> dict[str, Any]:
 
 
 def _material_document(material: Material) -> dict[str, Any]:
-    document = {} if material.ior == Material.ior else {"ior": material.ior}
+    plain = ((name, getattr(material, name)) for name in ("ior", "transparent_shadow"))
+    document: dict[str, Any] = {name: value for name, value in plain if value != getattr(Material, name)}
     for each in dataclasses.fields(material):
         colour = getattr(material, each.name)
         if isinstance(colour, Colour):
@@ -143,13 +143,16 @@ def _picture(field: Field, arrays: Arrays) -> Picture:
 
 
 def _material(field: Field) -> Material:
-    components = [each.name for each in dataclasses.fields(Material) if each.name not in ("ior", "surface")]
-    keys = field.fields((), (*components, "ior", "surface"))
+    others = ("ior", "surface", "transparent_shadow")
+    components = [each.name for each in dataclasses.fields(Material) if each.name not in others]
+    keys = field.fields((), (*components, *others))
     given: dict[str, Any] = {name: _colour(keys[name]) for name in components if name in keys}
     if "ior" in keys:
         given["ior"] = keys["ior"].number()
     if "surface" in keys:
         given["surface"] = _node(keys["surface"])
+    if "transparent_shadow" in keys:
+        given["transparent_shadow"] = keys["transparent_shadow"].truth()
     try:
         return Material(**given)
     except InputError as error:
@@ -220,7 +223,7 @@ def _lamp(field: Field) -> Lamp:
 def _simple(kind: type, field: Field) -> Any:
     """A World, Film or Bounces."""
     keys = field.fields((), tuple(each.name for each in dataclasses.fields(kind)))
-    values = {name: _READERS[name](each) for name, each in keys.items()}
+    values = {name: each.whole(0) if kind is Bounces else _READERS[name](each) for name, each in keys.items()}
     try:
         return kind(**values)
     except InputError as error:

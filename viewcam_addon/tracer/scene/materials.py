@@ -21,7 +21,7 @@ class Material:
     diffuse : albedo of a Lambert surface, both of its sides. emission : radiance, of both sides. mirror : reflectance of a
     perfect mirror. glass : colour of what is reflected and refracted by a clear dielectric, shared out by Fresnel's equations.
     refraction : colour of what is refracted, nothing being reflected. ior : of glass and refraction, inside over outside.
-    surface : the shader that is in their place.
+    surface : the shader that is in their place. transparent_shadow : whether shadow rays go through it where it is transparent.
     """
 
     diffuse: Colour | None = None
@@ -31,9 +31,12 @@ class Material:
     refraction: Colour | None = None
     ior: float = 1.45
     surface: Node | None = None
+    transparent_shadow: bool = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "ior", checks.number("ior of a material", self.ior, 1e-3, 1e3))
+        truth = checks.truth("transparent_shadow of a material", self.transparent_shadow)
+        object.__setattr__(self, "transparent_shadow", truth)
         if self.surface is not None and self.surface.is_value:
             raise InputError(f"the surface of a material is a node {self.surface.type!r}: give a shader")
         if self.surface is not None and self.colours:

@@ -60,6 +60,7 @@ KINDS: dict[str, Kind] = {
         ("transmission",),
     ),
     "emission": Kind({"color": WHITE, "strength": 1.0}),
+    "transparent": Kind({"color": WHITE}),
     "principled": Kind(
         {
             "base_color": GREY,
@@ -76,6 +77,7 @@ KINDS: dict[str, Kind] = {
             "coat_tint": WHITE,
             "emission_color": WHITE,
             "emission_strength": 0.0,
+            "alpha": 1.0,
             "distribution": DISTRIBUTIONS[:2],
         },
         ("diffuse", "glossy", "transmission"),

@@ -1,4 +1,4 @@
-// What closures become at a point of a surface: the BSDF, a sum of lobes, and what it gives off.
+// What closures become at a point of a surface: the BSDF, a sum of lobes, what it gives off and what it lets straight through.
 //
 // A path takes one lobe only, chosen in proportion to the lobes' colours, and its weight is divided by that share: where there
 // is one lobe, it is taken and nothing is random. Glass is two lobes, shared out by Fresnel's equations.
@@ -40,9 +40,16 @@ class BSDF {
         if (!Kind::DELTA) spread_ |= Kind::KIND;
     }
     void emit(Vec3 radiance) { emission_ += radiance; }
+    void let_through(Vec3 transparency) { transparency_ += transparency; }
 
     bool is_black() const { return count_ == 0; }
     Vec3 emission() const { return emission_; }
+    Vec3 transparency() const { return transparency_; }
+    // The share of it in all that goes on from here, by which a path is let through.
+    double chance_through() const {
+        double through = transparency_.x + transparency_.y + transparency_.z;
+        return through > 0 ? through / (through + total_) : 0;
+    }
     // The kinds of rays that light from any one direction is scattered into all over: what lights can be sampled for.
     uint32_t spread_kinds() const { return spread_; }
     // The albedo of what is diffuse, which a pass of its own shows.
@@ -111,7 +118,7 @@ class BSDF {
     double shares_[MOST_LOBES], total_ = 0;
     int count_ = 0;
     uint32_t kinds_ = 0, spread_ = 0;
-    Vec3 emission_;
+    Vec3 emission_, transparency_;
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

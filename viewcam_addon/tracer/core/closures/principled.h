@@ -1,4 +1,4 @@
-// The principled surface: layers, from the top a coat, then emission, metal, glass, a specular reflection and what is diffuse.
+// The principled surface: as much of it as its alpha tells, in layers, from the top a coat, then emission, metal, glass, a specular reflection and what is diffuse.
 //
 // A layer leaves to those below it what its albedo does not take. As in Cycles (measured with 4.2, 4.5, 5.0 and 5.2 under a sun
 // without a size). Sheen, subsurface scattering and thin films have no lobes here.
@@ -12,7 +12,7 @@ struct PrincipledClosure {
     static constexpr const char* NAME = "principled";
     static constexpr uint32_t KINDS = DIFFUSE | GLOSSY | TRANSMISSION;
     Color base_color, metallic, roughness, ior, diffuse_roughness, specular_level, specular_tint, transmission, coat_weight, coat_roughness, coat_ior,
-        coat_tint, emission_color, emission_strength;
+        coat_tint, emission_color, emission_strength, alpha;
     Distribution distribution;
 
     explicit PrincipledClosure(const Inputs& in)
@@ -20,12 +20,16 @@ struct PrincipledClosure {
           diffuse_roughness(in["diffuse_roughness"]), specular_level(in["specular_ior_level"]), specular_tint(in["specular_tint"]),
           transmission(in["transmission_weight"]), coat_weight(in["coat_weight"]), coat_roughness(in["coat_roughness"]),
           coat_ior(in["coat_ior"]), coat_tint(in["coat_tint"]), emission_color(in["emission_color"]),
-          emission_strength(in["emission_strength"]), distribution(in.choice("distribution")) {}
+          emission_strength(in["emission_strength"]), alpha(in["alpha"]), distribution(in.choice("distribution")) {}
 
     uint32_t kinds() const { return transmission.is_black() ? DIFFUSE | GLOSSY : KINDS; }
     bool is_rough() const { return true; }
+    bool lets_through() const { return alpha.varies() || alpha.rgb.x < 1; }
     bool shines_evenly() const { return mean_emission({}).x == 0; }
-    Vec3 mean_emission(const std::vector<Texture>& textures) const { return emission_color.mean(textures) * emission_strength.mean(textures); }
+    Vec3 mean_emission(const std::vector<Texture>& textures) const {
+        double share = alpha.varies() ? 1 : unit_range(alpha.rgb.x);
+        return emission_color.mean(textures) * emission_strength.mean(textures) * share;
+    }
 
     void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
         Vec3 base = not_negative(at.color(base_color)), tint = not_negative(at.color(specular_tint)), clamped = unit_range(base);
@@ -33,6 +37,10 @@ struct PrincipledClosure {
         double cosine = -dot(normal, at.incoming), index = larger(at.number(ior), LEAST_IOR);
         Microfacets facets = distribution.facets(at.number(roughness));
 
+        if (double share = unit_range(at.number(alpha)); share < 1) {
+            bsdf.let_through(weight * (1 - share));
+            weight *= share;
+        }
         weight = below_coat(bsdf, at, weight);
         bsdf.emit(weight * at.color(emission_color) * at.number(emission_strength));
         if (double share = unit_range(at.number(metallic)); share > NEGLIGIBLE) {

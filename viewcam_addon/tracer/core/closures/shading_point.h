@@ -25,7 +25,7 @@ struct ValueNodes;
 class Scene;
 
 // A point of a surface that a path reaches along `incoming`, and the scene's images and nodes. object: that has the surface.
-// origin: of rendering space, in the world.
+// origin: of rendering space, in the world. ray: what has come along.
 struct ShadingPoint {
     const Interaction& point;
     Vec3 incoming;
@@ -35,6 +35,7 @@ struct ShadingPoint {
     const Object* object = nullptr;
     Vec3 origin;
     const Scene* scene = nullptr;
+    RayState ray;
 
     // What an input is given here; as light, and of a colour the luminance.
     Vec3 value(const Color& color) const { return color.node == NONE ? color.at(textures, point) : value_of_node(color.node); }

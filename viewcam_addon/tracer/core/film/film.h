@@ -22,10 +22,10 @@ namespace viewcam::VIEWCAM_ISA {
 // scattering; after more, the first of them diffuse; and what mirrors and glass show. All light is the picture.
 enum Category : uint8_t { COLOR, EMISSION, ENVIRONMENT, DIRECT, INDIRECT, OTHER, CATEGORIES };
 
-// What one path brings. covered: whether the eye sees a surface.
+// What one path brings. covered: how much of the world behind all it hides from the eye.
 struct PathLight {
     Vec3 of[CATEGORIES];
-    bool covered = false;
+    double covered = 0;
     uint8_t brought = 0;  // categories that anything was added to, as bits: the others are not summed
 
     void add(Category category, Vec3 rgb) {
@@ -94,7 +94,7 @@ class Pixel {
     void write(const LightPasses& passes, size_t pixel, const FilmSettings& film, Vec3 variance) const {
         Vec3 color = totals_[COLOR] / count_;
         store(passes.combined + 4 * pixel, combined(film));
-        passes.combined[4 * pixel + 3] = film.transparent ? float(double(covered_) / count_) : 1.0f;
+        passes.combined[4 * pixel + 3] = film.transparent ? float(covered_ / count_) : 1.0f;
         store(passes.diffuse_color + 3 * pixel, color);
         store(passes.emission + 3 * pixel, mean(EMISSION, film));
         store(passes.environment + 3 * pixel, mean(ENVIRONMENT, film));
@@ -129,7 +129,8 @@ class Pixel {
     Vec3 first_, differences_;  // the first sample, and the sum of all differences from it
     Vec3 spread_;               // their squares
     Vec3 before_, squares_;     // the sum of differences when the last batch began, and the batches' own sums, squared
-    uint32_t count_ = 0, covered_ = 0;
+    double covered_ = 0;
+    uint32_t count_ = 0;
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

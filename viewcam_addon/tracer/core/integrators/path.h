@@ -8,6 +8,10 @@
 // Level `direct` is level `path` without bounces, as Cycles counts them: a path may be scattered once more than there are
 // bounces, in all and by each kind of surface, and where it comes to then, only what shines there counts.
 //
+// Where a surface is transparent, a path goes straight on as often as that has a share in all that goes on there, on the same ray,
+// from behind what it has met; else it is scattered. What shines there counts in either case. A shadow ray takes along the product of
+// what it goes through. Of two surfaces in the same place one counts.
+//
 // Nothing is traced that can't bring anything: without lights no shadow rays, without anything bright that rays could run into
 // no last ray, without either one ray a sample. What a path brings depends on its own numbers alone, and is added up in an order
 // of its own: whichever paths go along with it, and whether rays are traced in packets, changes no bit.
@@ -48,15 +52,19 @@ class PathIntegrator {
         most_of_[DIFFUSE] = bounces.diffuse + 1;
         most_of_[GLOSSY] = bounces.glossy + 1;
         most_of_[TRANSMISSION] = bounces.transmission + 1;
+        most_passed_ = bounces.transparent;
+        ended_after_ = bounces.transparent + (scene.illumination.version < CYCLES_5_0);
         bool shines = false;
         for (const Material& material : scene.illumination.materials) {
             shines |= material.emits();
             kinds_ |= material.kinds();
+            transparent_ |= material.is_transparent();
+            mixed_ |= material.is_transparent() && material.scatters();
             spread_ |= (material.kinds() & DIFFUSE) | material.rough_kinds();
         }
         for (RayKind kind : {DIFFUSE, GLOSSY, TRANSMISSION}) {
             meets_[kind] = shines || lights_.environment().lights(kind) || lights_.meets_lamps(kind);
-            only_sky_[kind] = !shines && !lights_.meets_lamps(kind) && !scene.hides_anything();
+            only_sky_[kind] = !shines && !transparent_ && !lights_.meets_lamps(kind) && !scene.hides_anything();
         }
         lit_ = !scene.illumination.lamps.empty() || shines || !is_black(lights_.environment().radiance);
     }
@@ -66,7 +74,7 @@ class PathIntegrator {
 
     // Whether paths through the same point of the film may bring different light.
     bool is_random() const {
-        bool random = kinds_ & GLOSSY && kinds_ & TRANSMISSION;
+        bool random = mixed_ || (kinds_ & GLOSSY && kinds_ & TRANSMISSION);
         for (RayKind kind : {DIFFUSE, GLOSSY, TRANSMISSION})
             random |= spread_ & kind && (lights_.is_random() || std::min(most_, most_of_[kind]) > 1 || meets_[kind]);
         return lit_ && random;
@@ -78,11 +86,11 @@ class PathIntegrator {
         block.light = light;
         block.live = 0;
         std::fill_n(light, count, PathLight{});
-        start(rays, count, block);
+        start(samples, rays, count, block);
         for (int depth = 1; block.live > 0 && lit_; depth++) {
             scatter(samples, depth, block);
             gather(depth, block);
-            arrive(depth, block);
+            arrive(samples, depth, block);
         }
     }
 
@@ -98,6 +106,8 @@ class PathIntegrator {
         Category category = COLOR;
         RayKind kind = CAMERA;
         bool last = false, through = false;  // through: whether light from behind counts where it leaves
+        bool diffuse = false;                // what its ray was scattered by
+        int passed = 0;                      // surfaces that it has gone straight through
         uint16_t scattered[3] = {};  // diffuse, glossy, transmission
         Vec3 weight{1, 1, 1};
         Ray ray;
@@ -108,6 +118,7 @@ class PathIntegrator {
         int sample;
         Category category;
         bool traced;
+        int passed;
         Vec3 light, other;  // other: of what is not diffuse where the eye sees it
     };
     struct Block {
@@ -128,42 +139,118 @@ class PathIntegrator {
     }
 
     const Material& material(const Interaction& point) const { return scene_.illumination.materials[point.material]; }
-    ShadingPoint shading(const Interaction& point, Vec3 incoming) const { return scene_.shading(point, incoming); }
+    // Where a path has come to along its ray. depth: scatterings before.
+    ShadingPoint shading(const Interaction& point, const Path& path, Vec3 incoming, int depth) const {
+        return scene_.shading(point, incoming, {path.kind, path.diffuse, path.kind != CAMERA && path.pdf == INFINITE, depth});
+    }
+
+    bool has_ended(const Path& path) const { return path.passed > 0 && path.passed >= ended_after_; }
+
+    // Whether a path goes straight through a surface; what it brings from now on is weighted by the chance of that. u: a number in
+    // [0, 1) that chooses, or −1 where none has been made yet.
+    bool passes(Path& path, const ShadingPoint& at, const CameraSample& sample, int depth, double& u) const {
+        BSDF bsdf = material(at.point).bsdf(at);
+        double chance = path.last ? !is_black(bsdf.transparency()) : bsdf.chance_through();
+        if (!(chance > 0)) return false;
+        if (chance < 1) {
+            if (u < 0) u = sampler_.number(sampler_.key(sample.pixel), sample.number, SobolSampler::dimension(depth + 1, SobolSampler::THROUGH));
+            if (u >= chance) {
+                path.weight = min(path.weight / (1 - chance), MOST_WEIGHT);
+                u = (u - chance) / (1 - chance);
+                return false;
+            }
+            u /= chance;
+        }
+        path.weight = min(path.weight * bsdf.transparency() / chance, MOST_WEIGHT);
+        path.passed++;
+        return true;
+    }
+    // Takes a path from the first surface that its ray meets through all that lets it through, and adds what shines there. Whether it
+    // is scattered at `point`, where it then is. depth: how often it has been scattered.
+    bool follow(Path& path, Ray ray, Hit hit, Interaction& point, const CameraSample& sample, int depth, Block& block) const {
+        PathLight& light = block.light[path.sample];
+        for (double u = -1;;) {
+            const Material& made_of = material(point);
+            ShadingPoint at = shading(point, path, path.ray.direction, depth);
+            if (made_of.emits()) {
+                double share = 1;
+                if (path.pdf < INFINITE && lights_.has_meshes())
+                    share = power_heuristic(path.pdf, lights_.pdf_li(block.points[path.from], point, path.ray.direction, hit.t, path.through));
+                light.add(path.kind == CAMERA ? EMISSION : path.category, path.weight * made_of.emission(at) * share);
+            }
+            if (has_ended(path)) return false;
+            if (path.kind == CAMERA && made_of.scatters()) light.add(COLOR, path.weight * made_of.diffuse_color(at));
+            if (!made_of.is_transparent() || !passes(path, at, sample, depth, u)) return made_of.scatters() && !path.last;
+            ray.t_min = hit.t;
+            hit = scene_.closest(ray, path.kind);
+            meet_lamps(path, ray, hit, depth, block);
+            if (!hit) {
+                leave(path, ray, depth, block);
+                return false;
+            }
+            point = scene_.interaction(ray, hit);
+        }
+    }
+    // Adds what lamps bring that a path's ray runs through before it meets anything.
+    void meet_lamps(const Path& path, const Ray& ray, const Hit& hit, int depth, Block& block) const {
+        if (!lights_.meets_lamps(path.kind)) return;
+        double size = path.kind == CAMERA ? length(ray.direction) : 1;
+        LightRay seen{ray.origin, ray.direction / size, ray.t_min * size, smaller(ray.t_max, hit.t) * size, !hit};
+        Vec3 radiance = path.pdf == INFINITE ? lights_.le(seen, path.kind)
+                                             : lights_.le(seen, path.kind, block.points[path.from], path.pdf, depth == 1, path.through);
+        block.light[path.sample].add(path.kind == CAMERA ? EMISSION : path.category, path.weight * radiance);
+    }
+    // Adds what the world brings to a path that leaves the scene.
+    void leave(const Path& path, const Ray& ray, int depth, Block& block) const {
+        PathLight& light = block.light[path.sample];
+        if (path.kind == CAMERA) {
+            light.add(ENVIRONMENT, path.weight * lights_.environment().le(normalize(ray.direction), CAMERA));
+            light.covered = 1 - mean(path.weight);
+        } else {
+            light.add(path.category, path.weight * lights_.environment_le(ray.direction, path.kind, block.points[path.from], path.pdf, depth == 1, path.through));
+        }
+    }
+    // What of light comes along a shadow ray that meets something: none but where all that stands in its way lets some through.
+    Vec3 transmittance(Ray ray, int passed) const {
+        Vec3 left{1, 1, 1};
+        while (!is_black(left)) {
+            Hit hit = scene_.closest(ray, SHADOW);
+            if (!hit) return left;
+            Interaction point = scene_.interaction(ray, hit);
+            const Material& made_of = material(point);
+            if (!made_of.is_transparent() || !made_of.transparent_shadow || ++passed > most_passed_) return {};
+            left *= made_of.bsdf(scene_.shading(point, ray.direction, {SHADOW})).transparency();
+            ray.t_min = hit.t;
+        }
+        return left;
+    }
 
     // What the eye's rays come to, and the light that is of this alone.
-    void start(const Ray* rays, int count, Block& block) const {
+    void start(const CameraSample* samples, const Ray* rays, int count, Block& block) const {
         Hit hits[MOST];
         const Ray* met_by[MOST];
         int from[MOST], met = 0;
         scene_.closest(rays, count, CAMERA, hits);
         for (int i = 0; i < count; i++) {
-            PathLight& light = block.light[i];
-            if (lights_.meets_lamps(CAMERA)) {
-                double size = length(rays[i].direction), farthest = smaller(rays[i].t_max, hits[i].t);
-                light.add(EMISSION, lights_.le({rays[i].origin, rays[i].direction / size, rays[i].t_min * size, farthest * size, !hits[i]}, CAMERA));
-            }
+            Path& path = block.paths[met];  // the rest is known when it is scattered
+            path.sample = i, path.from = met;
+            path.category = COLOR, path.kind = CAMERA, path.last = path.diffuse = false, path.pdf = INFINITE, path.passed = 0;
+            path.scattered[0] = path.scattered[1] = path.scattered[2] = 0;
+            path.weight = {1, 1, 1};
+            meet_lamps(path, rays[i], hits[i], 0, block);
             if (!hits[i]) {
-                light.add(ENVIRONMENT, lights_.environment().le(normalize(rays[i].direction), CAMERA));
+                leave(path, rays[i], 0, block);
                 continue;
             }
-            light.covered = true;
+            block.light[i].covered = 1;
             from[met] = i, met_by[met] = &rays[i], hits[met++] = hits[i];
         }
         scene_.interactions(met_by, hits, met, block.points);
         for (int k = 0; k < met; k++) {
-            PathLight& light = block.light[from[k]];
-            const Interaction& point = block.points[k];
-            const Material& made_of = material(point);
-            Vec3 ahead = normalize(met_by[k]->direction);
-            if (made_of.emits()) light.add(EMISSION, made_of.emission(shading(point, ahead)));
-            if (!made_of.scatters()) continue;
-            light.add(COLOR, made_of.diffuse_color(shading(point, ahead)));
-            Path& path = block.paths[block.live++];  // the rest is known when it is scattered
-            path.sample = from[k], path.from = k;
-            path.category = COLOR;
-            path.scattered[0] = path.scattered[1] = path.scattered[2] = 0;
-            path.weight = {1, 1, 1};
-            path.ray.direction = ahead;
+            Path& path = block.paths[block.live];
+            if (block.live < k) path = block.paths[k];
+            path.ray.direction = normalize(met_by[k]->direction);
+            if (follow(path, *met_by[k], hits[k], block.points[k], samples[from[k]], 0, block)) block.live++;
         }
     }
 
@@ -174,7 +261,7 @@ class PathIntegrator {
         for (int i = 0; i < block.live; i++) {
             const Path& path = block.paths[i];
             const Interaction& point = block.points[path.from];
-            BSDF bsdf = material(point).bsdf(shading(point, path.ray.direction));
+            BSDF bsdf = material(point).bsdf(shading(point, path, path.ray.direction, depth - 1));
             if (bsdf.is_black()) continue;
             const CameraSample& sample = samples[path.sample];
             uint32_t key = sampler_.key(sample.pixel);
@@ -210,7 +297,7 @@ class PathIntegrator {
             Path& next = block.onwards[onwards];
             next = path;
             next.from = path.from;
-            next.kind = sampled.kind;
+            next.kind = sampled.kind, next.diffuse = sampled.is_diffuse;
             next.last = last & sampled.kind;
             next.scattered[row(sampled.kind)]++;
             next.through = through;
@@ -246,7 +333,7 @@ class PathIntegrator {
         if (is_black(light.diffuse) && is_black(light.other)) return;
         int place = block.lit[choice.slot]++;
         bool traced = choice.light->casts_shadow;
-        block.shadowed[choice.slot][place] = {path.sample, after(path.category, true, depth), traced, light.diffuse * path.weight / choice.chance,
+        block.shadowed[choice.slot][place] = {path.sample, after(path.category, true, depth), traced, path.passed, light.diffuse * path.weight / choice.chance,
                                               light.other * path.weight / choice.chance};
         if (traced) block.shadow_rays[choice.slot][place] = shadow_ray(point, sample);
     }
@@ -262,56 +349,43 @@ class PathIntegrator {
                 scene_.occluded(rays, count, hidden);
             else
                 for (int i = 0; i < count; i++) hidden[i] = shadowed[i].traced && scene_.occluded(rays[i]);
-            for (int i = 0; i < count; i++)
+            for (int i = 0; i < count; i++) {
+                PathLight& light = block.light[shadowed[i].sample];
                 if (!hidden[i]) {
-                    PathLight& light = block.light[shadowed[i].sample];
                     light.add(shadowed[i].category, shadowed[i].light);
                     light.add(OTHER, shadowed[i].other);
+                } else if (transparent_) {
+                    Vec3 left = transmittance(rays[i], shadowed[i].passed);
+                    light.add(shadowed[i].category, shadowed[i].light * left);
+                    light.add(OTHER, shadowed[i].other * left);
                 }
+            }
         }
     }
 
-    Vec3 environment_le(const Path& path, int depth, const Block& block) const {
-        return lights_.environment_le(path.ray.direction, path.kind, block.points[path.from], path.pdf, depth == 1, path.through);
-    }
-
     // Where rays come to; adds what shines there.
-    void arrive(int depth, Block& block) const {
+    void arrive(const CameraSample* samples, int depth, Block& block) const {
         const Ray* met_by[MOST];
         Hit hits[MOST];
         int arrived[MOST], met = 0;
         for (int i = 0; i < block.live; i++) {
             const Path& path = block.onwards[i];
-            PathLight& light = block.light[path.sample];
             if (path.last && only_sky_[path.kind]) {
-                if (!scene_.occluded(path.ray)) light.add(path.category, path.weight * environment_le(path, depth, block));
+                if (!scene_.occluded(path.ray)) leave(path, path.ray, depth, block);
                 continue;
             }
             Hit hit = scene_.closest(path.ray, path.kind);
-            if (lights_.meets_lamps(path.kind)) {
-                LightRay ray{path.ray.origin, path.ray.direction, 0, hit.t, !hit};
-                light.add(path.category, path.weight * (path.pdf == INFINITE ? lights_.le(ray, path.kind)
-                                                                             : lights_.le(ray, path.kind, block.points[path.from], path.pdf,
-                                                                                          depth == 1, path.through)));
-            }
+            meet_lamps(path, path.ray, hit, depth, block);
             if (hit)
                 arrived[met] = i, met_by[met] = &path.ray, hits[met++] = hit;
             else
-                light.add(path.category, path.weight * environment_le(path, depth, block));
+                leave(path, path.ray, depth, block);
         }
         scene_.interactions(met_by, hits, met, block.arrivals);
         int live = 0;
         for (int k = 0; k < met; k++) {
-            const Path& path = block.onwards[arrived[k]];
-            const Interaction& point = block.arrivals[k];
-            const Material& made_of = material(point);
-            if (made_of.emits()) {
-                double share = 1;
-                if (path.pdf < INFINITE && lights_.has_meshes())
-                    share = power_heuristic(path.pdf, lights_.pdf_li(block.points[path.from], point, path.ray.direction, hits[k].t, path.through));
-                block.light[path.sample].add(path.category, path.weight * made_of.emission(shading(point, path.ray.direction)) * share);
-            }
-            if (path.last || !made_of.scatters()) continue;
+            Path& path = block.onwards[arrived[k]];
+            if (!follow(path, path.ray, hits[k], block.arrivals[k], samples[path.sample], depth, block)) continue;
             block.paths[live] = path;
             block.paths[live].from = k;
             live++;
@@ -327,7 +401,8 @@ class PathIntegrator {
     SobolSampler sampler_;
     int most_, most_of_[TRANSMISSION + 1] = {};
     bool meets_[TRANSMISSION + 1] = {}, only_sky_[TRANSMISSION + 1] = {};
-    bool lit_;
+    bool lit_, transparent_ = false, mixed_ = false;  // whether materials let anything straight through, and beside that scatter
+    int most_passed_, ended_after_;                   // surfaces that shadow rays, and paths, go straight through
     uint32_t kinds_ = 0, spread_ = 0;  // of rays that any material scatters, and all over
 };
 

@@ -36,7 +36,7 @@ class SobolSampler {
    public:
     // How many dimensions the film has, and each scattering, and which of a scattering's are for what.
     static constexpr int FILM = 2, SCATTERING = 8, ROWS = FILM + SCATTERING;
-    enum Purpose { LIGHT = 0, LIGHT_POINT = 1, DIRECTION = 3, LOBE = 5, ROULETTE = 6 };
+    enum Purpose { LIGHT = 0, LIGHT_POINT = 1, DIRECTION = 3, LOBE = 5, ROULETTE = 6, THROUGH = 7 };
     // The dimension of a purpose at the depth-th scattering, from 1.
     static int dimension(int depth, Purpose purpose) { return FILM + SCATTERING * (depth - 1) + purpose; }
 

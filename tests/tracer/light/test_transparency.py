@@ -1,0 +1,80 @@
+"""What light goes straight through, on paper: colours multiply, alphas cover, and a white furnace stays white."""
+
+import numpy as np
+import pytest
+
+from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.tracer.render import render
+from viewcam_addon.tracer.scene.film import Bounces, Film
+from viewcam_addon.tracer.scene.lamps import Sun, World
+from viewcam_addon.tracer.scene.materials import Colour, Material
+from viewcam_addon.tracer.scene.shader_nodes import node
+
+DOWN = Pinhole((0, 0, 4), (0, 0, 0), (0, 1, 0), 40, 32, 24)
+TINT = (0.9, 0.6, 0.3)
+ROUNDED = 2.0**-22  # a picture is a mean of float64, rounded once, and the cosine of a float32 direction
+SUN = Sun("sun", towards=(0, 0, 1), irradiance=(np.pi,) * 3)
+
+
+def square(make_mesh, height):
+    return make_mesh([[-9, -9, height], [9, -9, height], [9, 9, height], [-9, 9, height]], [[0, 1, 2], [0, 2, 3]])
+
+
+def surface(kind, **inputs):
+    return Material(surface=node(kind, **inputs))
+
+
+def half(colour=(1.0, 1.0, 1.0), share=0.5):
+    return surface("mix", factor=share, first=node("transparent"), second=node("diffuse", color=colour))
+
+
+@pytest.mark.parametrize("level", ["direct", "path"])
+@pytest.mark.parametrize("panes", [0, 1, 3])
+def test_panes_multiply_their_colours_on_the_way_to_the_eye_and_to_the_sun(make_mesh, make_lit, panes, level):
+    things = [(square(make_mesh, 0.5 + number / 4), surface("transparent", color=TINT)) for number in range(panes)]
+    scene = make_lit(DOWN, (square(make_mesh, 0.0), Material(diffuse=Colour((0.5, 0.5, 0.5)))), *things, lamps=(SUN,))
+    expected = 0.5 * np.array(TINT) ** (2 * panes)
+    shown = render(scene, level, 2, threads=1)["Combined"][..., :3]
+    assert np.abs(shown - expected).max() <= ROUNDED, (shown[0, 0], expected)
+
+
+def test_a_shadow_is_black_where_shadow_rays_do_not_go_through(make_mesh, make_lit):
+    pane = Material(surface=node("transparent", color=TINT), transparent_shadow=False)
+    things = (square(make_mesh, 0.0), Material(diffuse=Colour((0.5, 0.5, 0.5)))), (square(make_mesh, 1.0), pane)
+    assert not render(make_lit(DOWN, *things, lamps=(SUN,)), "path", 2, threads=1)["Combined"][..., :3].any()
+
+
+@pytest.mark.parametrize("cycles", [(4, 2), (5, 2)])
+def test_beyond_the_limit_all_is_dark(make_mesh, make_lit, cycles):
+    """As Cycles counts: of three panes before a light the last must not be more than the limit, or one more before 5.0."""
+    things = [(square(make_mesh, 0.5 + number / 4), surface("transparent")) for number in range(3)]
+    for most in (1, 2, 3):
+        glowing = (square(make_mesh, 0.0), Material(emission=Colour((1, 1, 1))))
+        scene = make_lit(DOWN, glowing, *things, bounces=Bounces(transparent=most), cycles=cycles)
+        is_seen = most + (cycles < (5, 0)) >= 3
+        assert render(scene, "path", 1, threads=1)["Combined"][..., :3].mean() == is_seen, most
+
+
+def test_the_pictures_alpha_is_what_the_surface_covers(make_mesh, make_lit):
+    scene = make_lit(DOWN, (square(make_mesh, 0.0), half(share=0.3)), world=World((1, 1, 1)), film=Film(transparent=True))
+    alpha = render(scene, "path", 64, threads=1)["Combined"][..., 3].astype(float)
+    assert abs(alpha.mean() - 0.3) <= 4 * np.sqrt(0.3 * 0.7 / (64 * alpha.size))
+
+
+@pytest.mark.parametrize("share", [0.2, 0.8])
+def test_a_white_furnace_stays_white(closed_ball, make_lit, share):
+    """A ball that lets a part of the light through and scatters the rest, inside and outside, in a world that is white."""
+    camera = Pinhole((0, 0, 4), (0, 0, 0), (0, 1, 0), 24, 16, 12)
+    lots = Bounces(64, 64, 64, 64, 1024)
+    passes = render(
+        make_lit(camera, (closed_ball(6), half(share=share)), world=World((1, 1, 1)), bounces=lots), "path", 64, threads=1
+    )
+    shown, error = passes["Combined"][..., :3].astype(float), np.sqrt(passes["Variance"].sum()) / passes["Variance"].size
+    assert abs(shown.mean() - 1) <= 4 * error + ROUNDED and error < 0.01, (shown.mean(), error)
+
+
+def test_the_bits_are_the_same_for_any_number_of_threads(closed_ball, make_lit):
+    camera = Pinhole((0, 0, 4), (0, 0, 0), (0, 1, 0), 40, 64, 40)
+    scene = make_lit(camera, (closed_ball(6), half()), lamps=(SUN,), world=World((0.5, 0.6, 0.7)))
+    one, three = (render(scene, "path", 4, threads=threads)["Combined"] for threads in (1, 3))
+    assert np.array_equal(one, three)
