@@ -53,7 +53,9 @@ ROOMS = {
     "api": "errors child_process image comparison tracer labels",
     "pytest_plugin": "errors junit api",
     "shots": "errors checks files terminal pinhole moves tracer",
-    "batch": "errors checks files events html_page child_process pinhole image cameras datasets comparison tracer shots",
+    "batch": (
+        "errors checks files events html_page child_process pinhole image cameras datasets comparison tracer labels shots"
+    ),
     "blender": (
         "errors checks files terminal html_page child_process png pinhole roll rotation moves diagram photo_match image "
         "intrinsics camera_values cameras comparison tracer shots batch"

@@ -59,6 +59,28 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
             os.replace(temporary, file)
 
 
+@contextlib.contextmanager
+def written_together(folder: Path, name: str) -> Iterator[Path]:
+    """A temporary folder whose files stand in `folder` when the block has ended well, in place of those there; else none does.
+
+    name : what the temporary one is called by, hidden beside them: .NAME-1a2b3c4d.labels.
+
+    Raises
+    ------
+    InputError
+        if it can't be made there; FullDiskError if the disk is full.
+    """
+    temporary = folder / f".{name}-{secrets.token_hex(4)}.labels"
+    with _in_a_sentence(folder):
+        temporary.mkdir()
+        try:
+            yield temporary
+            for path in sorted(temporary.iterdir()):
+                os.replace(path, folder / path.name)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
+
+
 def read_bytes(path: str | os.PathLike[str]) -> bytes:
     """The content of a file.
 

@@ -40,6 +40,10 @@ class Renderer:
     def problems(self, shots, check):
         return [f"{{shot.name}} is impossible" for shot in shots if shot.name.startswith("impossible")]
     def render(self, shot, image, preview):
+        said = {{"camera": {{"eye": shot.eye, "d": shot.d}}, "warnings": ["a warning"]}}
+        said |= {{"rendered": {{"width": shot.width, "height": shot.height}}}}
+        if image is None:
+            return said
         note("render", shot.name)
         image.write_bytes(b"half of it")
         kind = shot.name.split("_")[0]
@@ -59,8 +63,7 @@ class Renderer:
             raise KeyError("a bug")
         image.write_bytes(hashlib.sha256(repr((self.seed, shot)).encode()).digest())
         preview.write_bytes(b"preview")
-        said = {{"camera": {{"eye": shot.eye, "d": shot.d}}, "warnings": ["a warning"]}}
-        return said | {{"rendered": {{"width": shot.width, "height": shot.height}}}}
+        return said
     def check(self, shot):
         first = not any(line.split()[:2] == ["check", shot.name] for line in open(os.path.join(FOLDER, "diary.txt")))
         note("check", shot.name)

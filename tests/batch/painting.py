@@ -18,7 +18,7 @@ sys.path[:0] = [str(TESTS), str(TESTS.parent)]
 from batch_folders import assert_same, contents
 
 from viewcam_addon.batch import one
-from viewcam_addon.batch.folder import Folder
+from viewcam_addon.batch.folder import Folder, Outputs
 from viewcam_addon.batch.interruption import Interruption
 from viewcam_addon.batch.run import run as run_batch
 from viewcam_addon.shots import Shot, settings_hash
@@ -32,17 +32,18 @@ class Painter:
     """A Renderer (batch/renderer.py) that draws nothing.
 
     pause : seconds between the pieces of a file. broken : error by the name of the shot that meets it. unlike : names of shots
-    whose check fails.
+    whose check fails. unlabelled : error by the name of the shot whose labels meet it.
     """
 
-    def __init__(self, seed=0, pause=0.0, broken=None, unlike=()):
+    def __init__(self, seed=0, pause=0.0, broken=None, unlike=(), unlabelled=None):
         self.seed, self.pause, self.broken, self.unlike = seed, pause, broken or {}, unlike
-        self.painted = []
+        self.painted, self.labelled, self.unlabelled = [], [], unlabelled or {}
 
     def render(self, shot, image, preview):
-        self.painted.append(shot.name)
+        if image:
+            self.painted.append(shot.name)
         piece = hashlib.sha256(repr((self.seed, shot)).encode()).digest()
-        for path, pieces in ((image, 6), (preview, 2)):
+        for path, pieces in ((image, 6), (preview, 2)) if image else ():
             with open(path, "wb") as file:
                 for _ in range(pieces):
                     file.write(piece)
@@ -51,6 +52,15 @@ class Painter:
         if shot.name in self.broken:
             raise self.broken[shot.name]
         return {"rendered": {"width": 4, "height": 3}, "warnings": [], "versions": {"painter": "1"}}
+
+    def label(self, shot, picture, kinds, depth_steps):
+        self.labelled.append((shot.name, tuple(kinds)))
+        if shot.name in self.unlabelled:
+            raise self.unlabelled[shot.name]
+        names = [f"{shot.name}.{kind}.png" for kind in kinds] + [f"{shot.name}.labels.json"]
+        for name in names:
+            picture.with_name(name).write_text(json.dumps([name, self.seed, depth_steps]))
+        return names
 
     def check(self, shot):
         passed = shot.name not in self.unlike
@@ -83,14 +93,15 @@ def hashes(listed, seed=0):
     return {shot.name: settings_hash(shot, {"seed": seed}) for shot in listed}
 
 
-def paint(path, count=5, painter=None, events=None, check=False, part="", **how):
+def paint(path, count=5, painter=None, events=None, check=False, labels=(), picture=True, part="", **how):
     """Run a batch of `count` shots, or of those listed, in the folder of that path."""
     listed = shots(count) if isinstance(count, int) else count
+    outputs = Outputs(picture, check, labels)
     painter, folder = painter or Painter(), Folder(Path(path), part)
     settings = hashes(listed, painter.seed)
-    work, events = one.in_turn(folder, painter, settings, check), events or Listener()
+    work, events = one.in_turn(folder, painter, settings, outputs), events or Listener()
     with Interruption(functools.partial(events.tell, "stopping")) as interruption:
-        return run_batch(listed, folder, settings, work, events, check=check, interruption=interruption, **how)
+        return run_batch(listed, folder, settings, work, events, outputs=outputs, interruption=interruption, **how)
 
 
 def die_before(step):

@@ -17,7 +17,7 @@ import pytest
 
 from viewcam_addon import child_process, cli
 from viewcam_addon.batch import cluster, one, render_client, run
-from viewcam_addon.batch.folder import Folder
+from viewcam_addon.batch.folder import Folder, Outputs
 from viewcam_addon.batch.render_client import ServedRenderer
 from viewcam_addon.errors import InputError
 from viewcam_addon.shots import Shot
@@ -55,8 +55,8 @@ MADE_FROM = {"blend": "a scene", "blender": "stand-in", "seed": None}
 def run_on(machines, blend, folder, listed, ear=None, check=False, made_from=MADE_FROM, interruption=None):
     """The summary of a batch on these workers."""
     folder = Folder(folder)
-    work = machines.work(blend, folder, settings_of(listed), made_from, check=check)
-    how = {"resume": True, "check": check, "interruption": interruption}
+    work = machines.work(blend, folder, settings_of(listed), made_from, outputs=Outputs(check=check))
+    how = {"resume": True, "outputs": Outputs(check=check), "interruption": interruption}
     return run.run(listed, folder, settings_of(listed), work, ear or Ear(), **how)
 
 
@@ -92,8 +92,8 @@ def test_two_workers_write_the_bytes_of_one_process_and_each_loads_once(stand_in
 
     folder = Folder(tmp_path / "one")
     with ServedRenderer(blend) as renderer:
-        work = one.in_turn(folder, renderer, settings_of(listed), True)
-        run.run(listed, folder, settings_of(listed), work, Ear(), check=True)
+        work = one.in_turn(folder, renderer, settings_of(listed), Outputs(check=True))
+        run.run(listed, folder, settings_of(listed), work, Ear(), outputs=Outputs(check=True))
     one_process, two_workers = contents(tmp_path / "one"), contents(tmp_path / "two")
     assert len(one_process) == 12 * 3 + 1
     assert one_process == two_workers

@@ -209,5 +209,5 @@ def test_a_comparer_that_was_lost_is_started_again(scene_path, picture):
 def test_without_openexr_it_is_said_what_to_install(scene_path, picture, monkeypatch):
     taken = picture(CAMERA)
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
-    with Comparer() as comparer, pytest.raises(InputError, match="a check needs OpenEXR: install"):
+    with Comparer() as comparer, pytest.raises(InputError, match="need OpenEXR: install"):
         comparer.verdict(scene_path, taken, CAMERA, CLIP)

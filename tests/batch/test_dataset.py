@@ -36,7 +36,7 @@ def finish(folder):
         folder.preview(name).write_bytes(b"preview!")
         stated = record.record(STATED)["camera"]
         told = {"rendered": {"width": 320, "height": 180}, "warnings": [], "timing": {"seconds": 0.5}}
-        made_from = {"settings": settings, "bytes": {"image": 7, "preview": 8}}
+        made_from = {"settings": settings, "image": f"{name}.exr", "bytes": {"image": 7, "preview": 8}}
         write_json(folder.sidecar(name), {**made_from, **told, **record.record(camera), "stated": stated})
 
     return put

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from viewcam_addon.batch.folder import Folder, write_json
+from viewcam_addon.batch.folder import Folder, Outputs, write_json
 from viewcam_addon.errors import FullDiskError, InputError
 from viewcam_addon.files import written_whole
 
@@ -28,7 +28,7 @@ def made_from(painting):
 
 
 def test_a_shot_that_was_rendered_is_finished(folder, painting):
-    record = folder.finished("shot_000", made_from(painting), check=True)
+    record = folder.finished("shot_000", made_from(painting), Outputs(check=True))
     assert record["image"] == "shot_000.exr" and record["check"]["passed"]
     assert record == json.loads(folder.sidecar("shot_000").read_text(encoding="utf-8"))
 
@@ -51,9 +51,9 @@ def test_a_shot_that_was_rendered_is_finished(folder, painting):
 )
 def test_a_shot_that_is_not_whole_is_not_finished(folder, painting, harm):
     harm(folder)
-    assert folder.finished("shot_000", made_from(painting), check=False) is None
+    assert folder.finished("shot_000", made_from(painting)) is None
     other = painting.hashes(painting.shots(2))["shot_001"]
-    assert folder.finished("shot_001", other, check=False), "the other shot is as it was"
+    assert folder.finished("shot_001", other), "the other shot is as it was"
 
 
 @pytest.mark.parametrize("value", [None, {"a": 1}, [5], "gone"])
@@ -71,18 +71,18 @@ def test_a_sidecar_that_lacks_a_key_or_has_it_otherwise_is_not_finished(folder, 
     else:
         owner[key] = value
     write_json(sidecar, record)
-    assert folder.finished("shot_000", made_from(painting), check=True) is None
+    assert folder.finished("shot_000", made_from(painting), Outputs(check=True)) is None
 
 
 def test_a_shot_of_other_settings_is_not_finished(folder):
-    assert folder.finished("shot_000", "0" * 64, check=False) is None
+    assert folder.finished("shot_000", "0" * 64) is None
 
 
 def test_a_shot_that_was_not_checked_is_finished_only_where_no_check_is_asked_for(tmp_path, painting):
     painting.paint(tmp_path, 2)
     folder = Folder(tmp_path)
-    assert folder.finished("shot_000", made_from(painting), check=False)
-    assert folder.finished("shot_000", made_from(painting), check=True) is None
+    assert folder.finished("shot_000", made_from(painting))
+    assert folder.finished("shot_000", made_from(painting), Outputs(check=True)) is None
 
 
 @settings(max_examples=20)  # each waits for the disk

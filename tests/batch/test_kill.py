@@ -45,7 +45,7 @@ def test_a_batch_that_dies_before_any_step_is_continued_to_the_same_bytes(tmp_pa
         died += 1
         for name in hashes[0]:
             for seed, made in enumerate(folders):
-                if folder.finished(name, hashes[seed][name], check=False):
+                if folder.finished(name, hashes[seed][name]):
                     assert pictures(folder, name) == pictures(Folder(made), name), f"step {step}: {name} is not what it says"
                     done.add((name, seed))
         assert painting.paint(folder.path, 2, painter=painting.Painter(seed=1), resume=True).exit_status == 0

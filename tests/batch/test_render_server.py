@@ -10,7 +10,7 @@ import pytest
 
 from viewcam_addon import child_process
 from viewcam_addon.batch import one, render_client
-from viewcam_addon.batch.folder import Folder
+from viewcam_addon.batch.folder import Folder, Outputs
 from viewcam_addon.batch.render_client import ServedRenderer
 from viewcam_addon.errors import FullDiskError, InputError
 from viewcam_addon.shots import Shot
@@ -101,7 +101,7 @@ def test_an_error_arrives_as_it_is_and_costs_no_blender(renderer, stand_in, tmp_
 def test_a_full_disk_there_is_one_here_and_nothing_is_left_in_the_folder(renderer, tmp_path):
     folder = Folder(tmp_path / "out")
     with pytest.raises(FullDiskError, match=r"full\.\w+ can't be written \(No space left on device\)"):
-        one.render_one(shot("full"), folder, renderer, "hash", check=False)
+        one.render_one(shot("full"), folder, renderer, "hash", Outputs())
     assert list(folder.path.iterdir()) == []
 
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from viewcam_addon.batch import run
-from viewcam_addon.batch.folder import Folder
+from viewcam_addon.batch.folder import Folder, Outputs
 from viewcam_addon.errors import FullDiskError, InputError
 
 FULL = FullDiskError("a.exr can't be written (No space left on device): choose another folder or free some space")
@@ -169,7 +169,7 @@ def test_the_disk_may_be_full_at_any_file(tmp_path, painting, monkeypatch, fits)
 def test_work_may_take_several_shots_and_give_them_back_in_any_order(tmp_path, painting):
     listed = painting.shots(7)
     folder, made_from = Folder(tmp_path / "a"), painting.hashes(listed)
-    one_by_one = painting.one.in_turn(folder, painting.Painter(), made_from, False)
+    one_by_one = painting.one.in_turn(folder, painting.Painter(), made_from, Outputs())
 
     def work(shots):
         taken = list(shots)
@@ -228,7 +228,7 @@ def test_a_batch_waits_for_what_another_one_renders_and_takes_over_if_that_is_ki
             waited = []
 
             def work(shots):
-                one_by_one = painting.one.in_turn(folder, painter, made_from, False)
+                one_by_one = painting.one.in_turn(folder, painter, made_from, Outputs())
                 return one_by_one(_watched(shots, waited, other, killed))
 
             listed = painting.shots(1)

@@ -30,7 +30,7 @@ from typing import Any
 from ..errors import FullDiskError, InputError, bug
 from ..shots import Shot
 from . import render_client
-from .folder import Folder
+from .folder import Folder, Outputs
 from .one import Outcome, Work
 
 _WORKER = "viewcam_addon.batch.worker"  # as the workers know it
@@ -108,7 +108,7 @@ class Cluster:
         made_from: Mapping[str, Any],
         seed: int | None = None,
         threads: int | None = None,
-        check: bool = False,
+        outputs: Outputs | None = None,
         trust: bool = False,
         time_limit: float | None = None,
     ) -> Work:
@@ -129,7 +129,7 @@ class Cluster:
         }
 
         def work(shots: Iterator[Shot | None]) -> Iterator[tuple[Shot, Outcome]]:
-            yield from _Flight(self, scene, folder, settings, check).outcomes(shots)
+            yield from _Flight(self, scene, folder, settings, outputs or Outputs()).outcomes(shots)
 
         return work
 
@@ -168,9 +168,9 @@ def _scheduler_asked() -> Iterator[None]:
 class _Flight:
     """The shots of one batch, from when they are submitted until their outcome is known."""
 
-    def __init__(self, cluster: Cluster, scene: dict, folder: Folder, settings: Mapping[str, str], check: bool) -> None:
+    def __init__(self, cluster: Cluster, scene: dict, folder: Folder, settings: Mapping[str, str], outputs: Outputs) -> None:
         self._cluster, self._scene, self._folder = cluster, scene, folder
-        self._settings, self._check = settings, check
+        self._settings, self._outputs = settings, outputs
         self._flying: dict[str, tuple[Any, Shot]] = {}
         self._landed: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._suspects: list[Shot] = []
@@ -216,7 +216,13 @@ class _Flight:
 
     def _submit(self, shot: Shot) -> None:
         fields = dataclasses.asdict(shot)
-        arguments = (self._scene, str(self._folder.path.absolute()), fields, self._settings[shot.name], self._check)
+        arguments = (
+            self._scene,
+            str(self._folder.path.absolute()),
+            fields,
+            self._settings[shot.name],
+            dataclasses.asdict(self._outputs),
+        )
         future = self._cluster.submit(shot.name, *arguments, workers=self._fit() if self._unfit else None)
         self._flying[future.key] = future, shot
         future.add_done_callback(self._landed.put)
@@ -301,7 +307,7 @@ class _Flight:
             time.sleep(_MOMENT)
 
     def _record(self, shot: Shot) -> dict[str, Any] | None:
-        return self._folder.finished(shot.name, self._settings[shot.name], self._check)
+        return self._folder.finished(shot.name, self._settings[shot.name], self._outputs)
 
 
 class _Render:

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 
 def lacking() -> str | None:
-    """What a check needs and does not find here, as a sentence; its search path is ours."""
+    """What a check or a label needs and does not find here, as a sentence; its search path is ours."""
     if importlib.util.find_spec("OpenEXR") is None:
-        return "a check needs OpenEXR: install the extension from its zip, or pip install OpenEXR"
+        return "checks and labels need OpenEXR: install the extension from its zip, or pip install OpenEXR"
     return None
 
 

@@ -37,7 +37,7 @@ def write(folder: Folder, shots: Sequence[Shot], settings: Mapping[str, str], su
         if a camera is mirrored or a name holds a space, which these formats can't say, or if the files can't be written;
         FullDiskError if the disk is full.
     """
-    records = {shot.name: folder.finished(shot.name, settings[shot.name], check=False) for shot in shots}
+    records = {shot.name: folder.finished(shot.name, settings[shot.name]) for shot in shots}
     missing = [name for name, record in records.items() if record is None]
     if missing:
         return f"no dataset is written, since {len(missing)} of {len(shots)} shots are missing: {several(missing)}"

@@ -1,20 +1,37 @@
 """The folder of a batch: what stands where, and which shots are there already.
 
-A shot NAME is three files, NAME.exr, NAME.png and NAME.json. The last one, its sidecar, is written when the other two stand,
-and taken away before they are replaced. It says how many bytes they have, and from what they were made (shots.settings_hash).
+A shot NAME is three files, NAME.exr, NAME.png and NAME.json, and those of its labels. NAME.json, its sidecar, is written when
+the others stand, and taken away before they are replaced. It says how many bytes they have, and from what they were made
+(shots.settings_hash).
 Rejected: to hash the pictures as well; each was written whole, and to read them all again would cost more than it finds.
 """
 
 import json
 import re
+import shutil
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
 from ..files import read_bytes, written_whole
 
-_TEMPORARY = re.compile(r"\.(.+)-[0-9a-f]{8}\.(?:exr|png|json|html|txt)")
+_TEMPORARY = re.compile(r"\.(.+)-[0-9a-f]{8}\.(?:exr|png|json|html|txt|labels)")
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """What a batch makes of each shot, beside its sidecar.
+
+    picture : EXR and preview. check : whether its geometry is compared with the tracer. labels : kinds of labels.KINDS.
+    depth_steps : of the labels' 16-bit depth, in a scene unit.
+    """
+
+    picture: bool = True
+    check: bool = False
+    labels: tuple[str, ...] = ()
+    depth_steps: float = 1000.0
 
 
 class Folder:
@@ -48,19 +65,49 @@ class Folder:
     def sidecar(self, name: str) -> Path:
         return self.path / f"{name}.json"
 
-    def finished(self, name: str, settings: str, check: bool) -> dict[str, Any] | None:
-        """The sidecar of the shot, if it is there whole and made from these settings, else None.
+    def finished(self, name: str, settings: str, outputs: Outputs | None = None) -> dict[str, Any] | None:
+        """The sidecar of the shot, if all that it tells of is there whole and made from these settings, else None.
 
-        check : whether it must have been checked, too.
+        outputs : what it must tell of; by default the picture alone.
         """
+        outputs, record = outputs or Outputs(), self.told(name)
+        try:
+            if record is None or record.get("settings") != settings or record.get("bytes") != self._sizes(name, record):
+                return None
+        except OSError:  # one is missing
+            return None
+        labels = record.get("labels", {})
+        is_all = (
+            ("image" in record or not outputs.picture)
+            and ("check" in record or not outputs.check)
+            and set(outputs.labels) <= set(labels.get("kinds", ()))
+            and (not outputs.labels or labels["depth_steps"] == outputs.depth_steps)
+        )
+        return record if is_all else None
+
+    def told(self, name: str) -> dict[str, Any] | None:
+        """The sidecar of the shot, whatever it was made from; None where it is missing, or somebody else's."""
         try:
             record = json.loads(read_bytes(self.sidecar(name)).decode("utf-8"))
-            sizes = {"image": self.image(name).stat().st_size, "preview": self.preview(name).stat().st_size}
-        except (OSError, ValueError, RecursionError):  # missing, or somebody else's
+        except (OSError, ValueError, RecursionError):
             return None
-        if not _is_sidecar(record) or record.get("settings") != settings or record.get("bytes") != sizes:
-            return None
-        return None if check and "check" not in record else record
+        return record if _is_sidecar(record, name) else None
+
+    def _sizes(self, name: str, record: Mapping[str, Any]) -> dict[str, int]:
+        """Of the files that a sidecar tells of, by what `bytes` calls them."""
+        paths = {"image": self.image(name), "preview": self.preview(name)} if "image" in record else {}
+        paths |= {file: self.path / file for file in record.get("labels", {}).get("files", ())}
+        return {key: path.stat().st_size for key, path in paths.items()}
+
+    def remove_former(self, name: str, record: Mapping[str, Any], of_labels_only: bool) -> None:
+        """Remove what a former sidecar tells of, and the sidecar first. of_labels_only : all but the picture."""
+        self.sidecar(name).unlink(missing_ok=True)
+        files = list(record.get("labels", {}).get("files", ()))
+        for path in (
+            *(self.path / file for file in reversed(files)),  # the JSON first, which says that the others are there
+            *(() if of_labels_only or "image" not in record else (self.image(name), self.preview(name))),
+        ):
+            path.unlink(missing_ok=True)
 
     def remove_leftovers(self, shots: Iterable[str]) -> None:
         """Remove what a batch that was killed wrote halfway; nobody may be writing here.
@@ -70,11 +117,13 @@ class Folder:
         ours = {*shots, self.summary.stem, self.contact_sheet.stem}
         for path in self.path.iterdir():
             found = _TEMPORARY.fullmatch(path.name)
-            if found and found[1] in ours:
+            if found and found[1] in ours and path.is_dir():
+                shutil.rmtree(path, ignore_errors=True)
+            elif found and found[1] in ours:
                 path.unlink(missing_ok=True)
 
 
-def _is_sidecar(record: Any) -> bool:
+def _is_sidecar(record: Any, name: str) -> bool:
     """Whether it says all that the summary and the contact sheet tell of a shot; else it is somebody else's, or damaged."""
 
     def has(owner: Any, **kinds: type | tuple[type, ...]) -> bool:
@@ -86,6 +135,19 @@ def _is_sidecar(record: Any) -> bool:
         and has(record["timing"], seconds=(int, float))
         and all(isinstance(warning, str) for warning in record["warnings"])
         and ("check" not in record or has(record["check"], passed=bool, verdict=str))
+        and ("labels" not in record or _are_labels(record["labels"], name))
+    )
+
+
+def _are_labels(told: Any, name: str) -> bool:
+    """Whether a sidecar's labels are files of its shot, which no other folder has."""
+    return (
+        isinstance(told, dict)
+        and isinstance(told.get("depth_steps"), int | float)
+        and all(
+            isinstance(told.get(key), list) and all(isinstance(each, str) for each in told[key]) for key in ("kinds", "files")
+        )
+        and all(file.startswith(f"{name}.") and not set(file) & {"/", "\\", "\0"} for file in told["files"])
     )
 
 

@@ -10,7 +10,7 @@ import math
 import os
 import platform
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from ..child_process import AnswerTimeout, ProcessEnded, ServerProcess
 from ..errors import InputError
 from ..pinhole import Pinhole
 from ..shots import Shot
+from .folder import Outputs
 
 BLENDER = "VIEWCAM_BLENDER"
 """The variable that names the Blender."""
@@ -31,7 +32,7 @@ class ServedRenderer:
     """A scene held open by a Blender in another process, which is started when it is first needed. See BlenderRenderer.
 
     blend : the file. seed, threads, trust : as the command line has them. program : that of this process, which is no Blender.
-    time_limit : seconds that a shot may take, rendered and checked, once the file is open.
+    time_limit : seconds that a shot may take, rendered, labelled and checked, once the file is open.
 
     Every method raises InputError, also if that Blender can't be started or ends again and again, and OSError where it could
     not write.
@@ -55,9 +56,14 @@ class ServedRenderer:
         """Start the Blender and open the file, unless that is done."""
         self._ask()
 
-    def render(self, shot: Shot, image: Path, preview: Path) -> dict[str, Any]:
-        self._rendering = {"render": {"shot": dataclasses.asdict(shot), "image": str(image), "preview": str(preview)}}
+    def render(self, shot: Shot, image: Path | None, preview: Path | None) -> dict[str, Any]:
+        paths = {"image": image and str(image), "preview": preview and str(preview)}
+        self._rendering = {"render": {"shot": dataclasses.asdict(shot), **paths}}
         return self._ask(self._rendering)
+
+    def label(self, shot: Shot, picture: Path, kinds: Sequence[str], depth_steps: float) -> list[str]:
+        said = {"picture": str(picture), "kinds": list(kinds), "depth_steps": depth_steps}
+        return self._ask(self._rendering, {"label": {"shot": dataclasses.asdict(shot), **said}})
 
     def check(self, shot: Shot) -> dict[str, Any]:
         return self._ask(self._rendering, {"check": {"shot": dataclasses.asdict(shot)}})
@@ -76,9 +82,9 @@ class ServedRenderer:
     def made_from(self) -> dict[str, Any]:
         return self._ask({"made_from": {}})
 
-    def problems(self, shots: Iterable[Shot], check: bool = False) -> tuple[str, ...]:
+    def problems(self, shots: Iterable[Shot], outputs: Outputs | None = None) -> tuple[str, ...]:
         said = [dataclasses.asdict(shot) for shot in shots]
-        return tuple(self._ask({"problems": {"shots": said, "check": check}}))
+        return tuple(self._ask({"problems": {"shots": said, "outputs": dataclasses.asdict(outputs or Outputs())}}))
 
     def close(self) -> None:
         """End the Blender."""
@@ -115,7 +121,7 @@ class ServedRenderer:
             if "render" in request:
                 self._ends = time.monotonic() + self._limit if self._limit else math.inf
             try:
-                answer = self._server.ask(request, self._ends if request.keys() & {"render", "check"} else math.inf)
+                answer = self._server.ask(request, self._ends if request.keys() & {"render", "label", "check"} else math.inf)
             except AnswerTimeout as late:
                 self.close()
                 limit = f"the shot took longer than the time limit of {self._limit:g} s, and its Blender was ended"

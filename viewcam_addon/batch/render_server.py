@@ -13,6 +13,7 @@ from typing import Any
 
 from .. import child_process
 from ..shots import Shot
+from .folder import Outputs
 
 IDLE = 120.0
 """Seconds after which a Blender that is asked for nothing ends: a farm's worker outlives the batches that it worked for."""
@@ -41,8 +42,11 @@ class _Served:
     def open(self, blend: str, seed: int | None, threads: int | None, trust: bool) -> None:
         self._renderer = self._stack.enter_context(self._opened(Path(blend), seed=seed, threads=threads, trust=trust))
 
-    def render(self, shot: dict[str, Any], image: str, preview: str) -> dict[str, Any]:
-        return self._renderer.render(Shot(**shot), Path(image), Path(preview))
+    def render(self, shot: dict[str, Any], image: str | None, preview: str | None) -> dict[str, Any]:
+        return self._renderer.render(Shot(**shot), image and Path(image), preview and Path(preview))
+
+    def label(self, shot: dict[str, Any], picture: str, kinds: list[str], depth_steps: float) -> list[str]:
+        return self._renderer.label(Shot(**shot), Path(picture), kinds, depth_steps)
 
     def check(self, shot: dict[str, Any]) -> dict[str, Any]:
         return self._renderer.check(Shot(**shot))
@@ -59,8 +63,8 @@ class _Served:
     def made_from(self) -> dict[str, Any]:
         return self._renderer.made_from()
 
-    def problems(self, shots: list[dict[str, Any]], check: bool) -> list[str]:
-        return list(self._renderer.problems([Shot(**shot) for shot in shots], check))
+    def problems(self, shots: list[dict[str, Any]], outputs: dict[str, Any]) -> list[str]:
+        return list(self._renderer.problems([Shot(**shot) for shot in shots], Outputs(**outputs)))
 
 
 _ANSWERS: dict[str, Callable[..., Any]] = {name: method for name, method in vars(_Served).items() if name[0] != "_"}

@@ -13,7 +13,7 @@ from ..errors import FullDiskError, InputError, told
 from ..events import Events
 from ..shots import Shot
 from . import sheet, summary
-from .folder import Folder, write_json
+from .folder import Folder, Outputs, write_json
 from .interruption import Interruption
 from .locks import Claims
 from .one import Work
@@ -29,14 +29,14 @@ def run(
     *,
     resume: bool = False,
     overwrite: bool = False,
-    check: bool = False,
+    outputs: Outputs | None = None,
     interruption: Interruption | None = None,
 ) -> Summary:
     """Render the shots into the folder; at the end it has a summary and a contact sheet of all of them.
 
     settings : the hash of what each is made from (shots.settings_hash), by name. work : renders them (one.in_turn, or a
     cluster's). resume : keep what is there from the same settings; overwrite : keep nothing; with neither there may be none.
-    check : a shot is done when it is checked, too. interruption : when it is heard, no more shots are begun.
+    outputs : what a shot that is done has; by default its picture. interruption : when it is heard, no more shots are begun.
 
     Tells batch_started(shots, kept, folder), then for each shot_started(shot) and shot_done(shot, seconds, image, passed), or
     shot_failed(shot, error), or shot_elsewhere(shot); batch_finished(done, kept, elsewhere, failed, left, seconds,
@@ -47,7 +47,7 @@ def run(
     InputError
         if some of these shots are there already and neither is said, or if the folder can't be written.
     """
-    batch = _Batch(shots, folder, settings, events, check, interruption)
+    batch = _Batch(shots, folder, settings, events, outputs or Outputs(), interruption)
     with Claims(folder.lock) as claims:
         batch.begin(resume, overwrite)
         batch.tidy(claims)
@@ -66,10 +66,10 @@ class _Batch:
         folder: Folder,
         settings: Mapping[str, str],
         events: Events,
-        check: bool,
+        outputs: Outputs,
         interruption: Interruption | None,
     ) -> None:
-        self._shots, self._folder, self._events, self._check = shots, folder, events, check
+        self._shots, self._folder, self._events, self._outputs = shots, folder, events, outputs
         self._interruption = interruption
         self._settings = {shot.name: settings[shot.name] for shot in shots}
         self._started = time.monotonic()
@@ -88,7 +88,7 @@ class _Batch:
             )
         if overwrite:
             for name in present:
-                self._folder.sidecar(name).unlink(missing_ok=True)
+                self._folder.remove_former(name, self._folder.told(name) or {}, of_labels_only=self._outputs.picture)
         self._todo.extend(shot for shot in self._shots if not self._is_there(shot))
         self._kept = len(self._shots) - len(self._todo)
         self._events.tell("batch_started", shots=len(self._shots), kept=self._kept, folder=self._folder.path)
@@ -130,13 +130,13 @@ class _Batch:
             return
         self._rendered += 1
         seconds, passed = outcome["timing"]["seconds"], outcome.get("check", {}).get("passed")
-        image = self._folder.image(shot.name)
+        image = self._folder.image(shot.name) if "image" in outcome else None
         self._events.tell("shot_done", shot=shot.name, seconds=seconds, image=image, passed=passed)
 
     def sum_up(self) -> Summary:
         """Write the summary and the contact sheet of what the folder now holds."""
         pictures, rows = [], []
-        for result in summary.results(self._folder, self._settings, self._check, self._errors):
+        for result in summary.results(self._folder, self._settings, self._outputs, self._errors):
             pictures.append(sheet.picture(result))
             rows.append(result.to_json())
         seconds = time.monotonic() - self._started
@@ -165,4 +165,4 @@ class _Batch:
         return self._interruption.number if self._interruption else None
 
     def _is_there(self, shot: Shot) -> bool:
-        return self._folder.finished(shot.name, self._settings[shot.name], self._check) is not None
+        return self._folder.finished(shot.name, self._settings[shot.name], self._outputs) is not None

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
-from .folder import Folder
+from .folder import Folder, Outputs
 
 
 @dataclass(frozen=True)
@@ -39,10 +39,10 @@ class Result:
         return told
 
 
-def results(folder: Folder, settings: Mapping[str, str], check: bool, errors: Mapping[str, str]) -> Iterator[Result]:
+def results(folder: Folder, settings: Mapping[str, str], outputs: Outputs, errors: Mapping[str, str]) -> Iterator[Result]:
     """Each shot of the list, in its order. settings : hashes, errors : sentences, by the shot's name."""
     for name, made_from in settings.items():
-        record = folder.finished(name, made_from, check)
+        record = folder.finished(name, made_from, outputs)
         yield Result(name, record, None if record else errors.get(name))
 
 

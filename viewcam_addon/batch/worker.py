@@ -12,7 +12,7 @@ from typing import Any
 
 from ..errors import FullDiskError, InputError, told
 from ..shots import Shot
-from .folder import Folder
+from .folder import Folder, Outputs
 from .one import render_one
 from .render_client import ServedRenderer
 
@@ -49,10 +49,11 @@ _blender = _Blender()
 _one_at_a_time = threading.Lock()  # a worker may have several threads
 
 
-def render(scene: dict[str, Any], folder: str, shot: dict[str, Any], settings: str, check: bool) -> dict[str, str]:
+def render(scene: dict[str, Any], folder: str, shot: dict[str, Any], settings: str, outputs: dict[str, Any]) -> dict[str, str]:
     """Render a shot into the folder.
 
     scene : `blend`, `seed`, `threads`, `trust`, `time_limit` and `made_from`, what the batch says the file is made from.
+    outputs : the fields of Outputs.
 
     Returns nothing if the shot is there, {"failed": sentence} or {"full": sentence} if it is not, and {"unfit": sentence} if
     no shot of this batch can be rendered here.
@@ -65,7 +66,7 @@ def render(scene: dict[str, Any], folder: str, shot: dict[str, Any], settings: s
         except Exception as error:
             return {"unfit": told(error)}
         try:
-            render_one(Shot(**shot), Folder(Path(folder)), renderer, settings, check)
+            render_one(Shot(**shot), Folder(Path(folder)), renderer, settings, Outputs(**outputs))
         except FullDiskError as error:
             return {"full": str(error)}
         except Exception as error:  # told as the shot's, and the next one is tried

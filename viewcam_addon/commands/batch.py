@@ -18,10 +18,11 @@ from .. import cameras, crashes
 from .. import shots as lists
 from ..batch import cluster, dataset, one, render_client, render_server
 from ..batch import run as running
-from ..batch.folder import Folder
+from ..batch.folder import Folder, Outputs
 from ..batch.interruption import Interruption
 from ..batch.summary import Summary
 from ..errors import InputError
+from ..labels import KINDS
 from ..shots import ENGINES, LEVELS, Shot, ShotsError
 from ..terminal import say, silent_libraries
 from . import Result, blender_room
@@ -39,6 +40,8 @@ examples:
       an animation; what is there from the same settings is kept
   {command}{file} --cameras 'Cam*' --out views --check
       each camera so called, compared with the reference tracer
+  {command}{file} --orbit 1000 --out truth --labels depth,masks --labels-only
+      ground truth without pictures; without --labels-only beside them
   {command}{file} --orbit 200 --out nerf --transforms
       with transforms.json and COLMAP text for those who learn the scene
   {command}{file} shots.csv --out renders --workers 2
@@ -104,6 +107,11 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
     known = "the same, unless what they were made from can't all be known: then render all of them anew"
     kept.add_argument("--resume-known", action="store_true", help=known)
     kept.add_argument("--overwrite", action="store_true", help="render all of them anew")
+    words = f"ground truth beside each shot: all, or some of {','.join(KINDS)}"
+    written.add_argument("--labels", type=types.names, metavar="LABELS", default=(), help=words)
+    written.add_argument("--labels-only", action="store_true", help="no pictures: labels alone, and no engine renders")
+    words = "steps of the labels' 16-bit depth in a scene unit (default: 1000, millimetres of metres)"
+    written.add_argument("--depth-steps", type=types.above_zero, metavar="N", default=1000.0, help=words)
     written.add_argument("--check", action="store_true", help="compare each shot's geometry with the reference tracer")
     written.add_argument(
         "--transforms", choices=["png", "exr"], nargs="?", const="png", help="transforms.json and COLMAP text of the png or exr"
@@ -125,10 +133,11 @@ def _address(text: str) -> str:
 
 def run(options: argparse.Namespace) -> Result:
     _refuse_contradictions(options)
+    outputs = _outputs(options)
     heard = functools.partial(options.events.tell, "stopping")
     with silent_libraries(), Interruption(heard, crashes.passed_on) as interruption, contextlib.ExitStack() as stack:
         renderer = stack.enter_context(_renderer(options))
-        job = _job(options, renderer)
+        job = _job(options, renderer, outputs)
         if _on_cluster(options):
             blend, program = renderer.blend, renderer.program
             stack.close()  # the workers open the file themselves
@@ -137,13 +146,13 @@ def run(options: argparse.Namespace) -> Result:
             machines = stack.enter_context(cluster.opened(options.scheduler or None, options.workers, program))
         folder = Folder(options.out, options.shard.strip().replace("/", "-of-") if options.shard else "")
         if _on_cluster(options):
-            about = (job.made_from, options.seed, options.threads, options.check, options.trust, options.time_limit)
+            about = (job.made_from, options.seed, options.threads, outputs, options.trust, options.time_limit)
             work = machines.work(blend, folder, job.settings, *about)
         else:
-            work = one.in_turn(folder, renderer, job.settings, options.check)
+            work = one.in_turn(folder, renderer, job.settings, outputs)
         unknown = tuple(job.made_from.get("unknown", ()))
         anew = options.overwrite or bool(options.resume_known and unknown)
-        how = {"resume": options.resume or options.resume_known, "overwrite": anew, "check": options.check}
+        how = {"resume": options.resume or options.resume_known, "overwrite": anew, "outputs": outputs}
         summary = running.run(job.shots, folder, job.settings, work, options.events, interruption=interruption, **how)
         words = dataset.write(folder, job.all_shots, job.settings, options.transforms) if options.transforms else ""
     _tell(options, summary, folder, unknown)
@@ -169,8 +178,33 @@ def _refuse_contradictions(options: argparse.Namespace) -> None:
         raise InputError(f"--camera is that of --orbit and --frames, and {sources[0]} says the cameras itself: leave it out")
     if options.frame is not None and sources[0] == "--frames":
         raise InputError("--frame and --frames say both which frame: leave one of them out")
+    if options.labels_only and not options.labels:
+        raise InputError("--labels-only leaves nothing to write: say which with --labels")
+    if options.labels_only and options.transforms:
+        raise InputError("--transforms names the pictures, and --labels-only makes none: leave one of them out")
     if options.scheduler and options.workers is not None:
         raise InputError("a scheduler with an address has its workers already: leave --workers out")
+
+
+def _outputs(options: argparse.Namespace) -> Outputs:
+    labels = KINDS if tuple(options.labels) == ("all",) else options.labels
+    if unknown := [kind for kind in labels if kind not in KINDS]:
+        raise InputError(f"there is no label {unknown[0]!r}: give all, or some of {', '.join(KINDS)}")
+    kinds = tuple(kind for kind in KINDS if kind in labels)
+    return Outputs(not options.labels_only, options.check, kinds, options.depth_steps)
+
+
+def _refuse_names_of_labels(shots: Sequence[Shot]) -> None:
+    """Labels of a shot a are called a.labels.exr and the like, and so would be the picture of a shot a.labels."""
+    names = {lists.one_file(shot.name): shot.name for shot in shots}
+    for name in names:
+        stem, _, rest = name.partition(".")
+        while rest:
+            if stem in names:
+                other, shot = names[stem], names[name]
+                raise InputError(f"the shots {other!r} and {shot!r} may have labels of one name: call one of them otherwise")
+            more, _, rest = rest.partition(".")
+            stem = f"{stem}.{more}"
 
 
 def _on_cluster(options: argparse.Namespace) -> bool:
@@ -191,15 +225,17 @@ def _renderer(options: argparse.Namespace) -> contextlib.AbstractContextManager:
     return blender_room("batch.renderer").BlenderRenderer(options.blend, options.seed, options.threads, options.trust)
 
 
-def _job(options: argparse.Namespace, renderer: Any) -> _Job:
+def _job(options: argparse.Namespace, renderer: Any, outputs: Outputs) -> _Job:
     """All that is to be rendered, once nothing is wrong with it."""
     listed = _shots(options, renderer)
     shots = [_completed(shot, options) for shot in (lists.shard(listed, options.shard) if options.shard else listed)]
     all_shots = [_completed(shot, options) for shot in listed] if options.shard and options.transforms else shots
-    if problems := renderer.problems(all_shots, options.check):
+    if problems := renderer.problems(all_shots, outputs):
         raise ShotsError(str(options.shots or options.blend or renderer.blend), tuple(problems))
     if _on_cluster(options) and renderer.blend is None:
         raise InputError("this file is nowhere that workers could open it: save it first")
+    if outputs.labels:
+        _refuse_names_of_labels(all_shots)
     if options.transforms:
         dataset.refuse(all_shots, options.transforms)
     made_from = renderer.made_from()

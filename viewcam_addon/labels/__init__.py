@@ -7,3 +7,5 @@ coco.py: those of many pictures as one file.
 A label is what lies at the centre of its pixel: nothing is averaged over a pixel, and two labels of one pixel are of the same
 point. Rejected: labels made of the passes that a renderer writes (float32, indices shared by instances, no occlusion).
 """
+
+KINDS = ("depth", "normals", "position", "masks", "amodal", "flow")

@@ -72,6 +72,8 @@ def _geometry(surfaces: Surfaces, instance: Instance) -> Mesh | Spheres:
 
 def _is_alike(one: Mesh | Spheres, other: Mesh | Spheres) -> bool:
     """Whether the primitives of two geometries are the same ones, wherever they stand."""
+    if one is other:
+        return True
     if isinstance(one, Mesh) and isinstance(other, Mesh):
         return np.array_equal(one.triangles, other.triangles)
     return isinstance(one, Spheres) and isinstance(other, Spheres) and len(one.radii) == len(other.radii)

@@ -10,11 +10,9 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..image import BACKGROUND_DEPTH, Image
 from ..tracer.scene import Scene
-from . import masks
+from . import KINDS, masks
 from .motion import Motion, motion
-from .surfaces import Silhouettes, Surfaces, box
-
-KINDS = ("depth", "normals", "position", "masks", "amodal", "flow")
+from .surfaces import Keepers, Silhouettes, Surfaces
 
 _TO_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 """From u, v, w to x right, y down, z forward."""
@@ -40,15 +38,18 @@ def label(
     previous: Scene | None = None,
     next: Scene | None = None,
     threads: int | None = None,
+    keepers: Keepers | None = None,
 ) -> Labels:
-    """The labels of a scene's picture. Parameters and errors are those of api.label."""
+    """The labels of a scene's picture. keepers : of what other scenes share with it. The rest is as in api.label."""
     if unknown := [kind for kind in kinds if kind not in KINDS]:
         raise InputError(f"there is no label {unknown[0]!r}: give some of {', '.join(KINDS)}")
     others = {"Forward": next, "Backward": previous}
     if "flow" in kinds and not any(others.values()):
         raise InputError("flow goes to another frame: give the scene of the next or of the previous one")
-    surfaces = Surfaces(scene, threads)
+    keepers = keepers or Keepers(threads=threads)
+    surfaces = Surfaces(scene, threads, keepers.of(scene))
     passes: dict[str, NDArray] = {}
+    shape = surfaces.depth.shape  # traced now: of another frame with the same things the surfaces would use up this tracer
     if "depth" in kinds:
         passes |= _depths(surfaces)
     if "normals" in kinds:
@@ -68,10 +69,10 @@ def label(
     if "flow" in kinds:
         for name, other in others.items():
             if other is not None:
-                found = motion(surfaces, Surfaces(other, threads))
+                found = motion(surfaces, Surfaces(other, threads, keepers.of(other)))
                 passes |= _motions(name, found)
                 lost[name.lower()] = list(found.lost)
-    planes = {name: np.asarray(values, np.float32).reshape(*surfaces.depth.shape, -1) for name, values in passes.items()}
+    planes = {name: np.asarray(values, np.float32).reshape(*shape, -1) for name, values in passes.items()}
     told = _instances(surfaces, with_masks="masks" in kinds, with_amodal="amodal" in kinds)
     return Labels(Image(planes, scene.camera, {"software": "Virtual Pinhole"}), told, lost)
 
@@ -91,19 +92,19 @@ def _motions(name: str, found: Motion) -> dict[str, NDArray]:
 
 
 def _instances(surfaces: Surfaces, with_masks: bool, with_amodal: bool) -> list[dict[str, Any]]:
-    shown = {id(instance): pixels for instance, pixels in surfaces.shown}
-    silhouettes, camera = Silhouettes(surfaces), surfaces.camera
+    shown, camera = dict(surfaces.shown_numbers), surfaces.camera
+    silhouettes = Silhouettes(surfaces).pixels() if with_amodal else None
     u, v, w = camera.basis()
     to_camera = np.eye(4)
     to_camera[:3, :3] = [-u if camera.mirrored else u, v, w]
     to_camera[:3, 3] = -to_camera[:3, :3] @ np.array(camera.eye)
     told, none = [], np.empty(0, np.intp)
-    for instance in surfaces.instances:
-        visible = shown.get(id(instance), none)
-        whole = silhouettes.pixels(instance, visible) if with_amodal else visible
+    for number, instance in enumerate(surfaces.instances):
+        visible = shown.get(number, none)
+        whole = visible if silhouettes is None else silhouettes[number]
         if not len(whole):
             continue
-        least, greatest = box(surfaces.scene.geometries[instance.placed.geometry])
+        least, greatest = surfaces.keeper.box(instance.placed.geometry)
         figures: dict[str, Any] = {
             "id": instance.id,
             "name": instance.key[0],

@@ -2,6 +2,8 @@
 
 import hashlib
 import itertools
+import os
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -9,14 +11,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..pinhole import Pinhole
+from ..tracer import render
 from ..tracer.native import CoreScene
-from ..tracer.render import Tracer
 from ..tracer.scene import Mesh, Object, Scene, Spheres
+from ..tracer.scene.sameness import same_things
+from ..tracer.tiles import over_threads
 
 Array = NDArray[np.float64]
 
 # What the tracer's float32 passes may differ from float64 where they show the same surface: one rounding, and its own.
 _SAME_DEPTH = 2.0**-22
+
+_MOST_RAYS = 2**18
+"""Of silhouettes that are traced at a time, 130 bytes each."""
+
+_NONE = np.empty(0, np.intp)
 
 _MOST_IDS = 2**24 - 1
 """What float32 counts to, and three bytes of a colour hold."""
@@ -62,26 +71,99 @@ def instances(scene: Scene) -> list[Instance]:
     return found
 
 
+class Keeper:
+    """Of scenes with the same things, what serves from one camera to the next: hierarchies, instances, boxes.
+
+    The surfaces that it was last given for are those that can be traced.
+    """
+
+    def __init__(self, scene: Scene, threads: int | None = None) -> None:
+        self.scene, self.instances, self.tracers = scene, instances(scene), render.Keeper()
+        self.threads = threads or os.cpu_count() or 1
+        self._alone: dict[tuple[str, bytes], CoreScene] = {}
+        self._boxes: dict[str, tuple[Array, Array]] = {}
+        self._corners: dict[int, Array] = {}
+
+    def box(self, name: str) -> tuple[Array, Array]:
+        """That of a geometry: see `box`."""
+        if name not in self._boxes:
+            self._boxes[name] = box(self.scene.geometries[name])
+        return self._boxes[name]
+
+    def corners(self, instance: Instance) -> Array:
+        """(8, 3): those of an instance's box, world space."""
+        if instance.id not in self._corners:
+            corners = np.array(list(itertools.product(*zip(*self.box(instance.placed.geometry), strict=True))))
+            self._corners[instance.id] = corners @ instance.matrix[:3, :3].T + instance.matrix[:3, 3]
+        return self._corners[instance.id]
+
+    def alone(self, name: str, matrix: Array) -> CoreScene:
+        """One geometry in one place."""
+        if (key := (name, matrix.tobytes())) not in self._alone:
+            geometry = self.scene.geometries[name]
+            geometry = replace(geometry, materials=np.zeros_like(geometry.materials))
+            middle = sum(self.box(name)) / 2
+            away = tuple(middle + np.array([0, 0, 1 + np.abs(middle).max()]))
+            camera = Pinhole(tuple(middle), away, (0, 1, 0), 1, 1, 1)  # only so that rendering space's origin is near
+            self._alone[key] = CoreScene(Scene(camera, {name: geometry}, (Object("", name, matrix),)), 1)
+        return self._alone[key]
+
+
+class Keepers:
+    """The keepers of the last few scenes. most : how many."""
+
+    def __init__(self, most: int = 1, threads: int | None = None) -> None:
+        self._most, self._threads = most, threads
+        self._kept: list[Keeper] = []
+
+    def of(self, scene: Scene) -> Keeper:
+        """That of the scene with the same things, the last one now."""
+        found = next((each for each in self._kept if same_things(scene, each.scene)), None) or Keeper(scene, self._threads)
+        self._kept = [*(each for each in self._kept if each is not found), found][-self._most :]
+        return found
+
+
 class Surfaces:
-    """A scene's surfaces at the pixels' centres; rows from the bottom.
+    """A scene's surfaces at the pixels' centres, which are traced when they are asked for; rows from the bottom.
 
     depth : (height, width) planar depth z = −w·(P − e), inf where nothing is. instance, primitive : (height, width), −1 there:
     indices into `instances` and of the geometry's triangles or spheres.
     """
 
-    def __init__(self, scene: Scene, threads: int | None = None) -> None:
-        self.scene, self.camera, self.instances = scene, scene.camera, instances(scene)
-        self._tracer = Tracer(scene, threads)
-        self.depth, self.instance, self.primitive = self._tracer.hits()
+    def __init__(self, scene: Scene, threads: int | None = None, keeper: "Keeper | None" = None) -> None:
+        self.keeper = keeper or Keeper(scene, threads)
+        self.scene, self.camera, self.instances = scene, scene.camera, self.keeper.instances
+        self._tracer = self.keeper.tracers.tracer(scene, threads)
+
+    @cached_property
+    def _hits(self) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
+        return self._tracer.hits()
+
+    @property
+    def depth(self) -> Array:
+        return self._hits[0]
+
+    @property
+    def instance(self) -> NDArray[np.int64]:
+        return self._hits[1]
+
+    @property
+    def primitive(self) -> NDArray[np.int64]:
+        return self._hits[2]
 
     @cached_property
     def shown(self) -> list[tuple[Instance, NDArray[np.intp]]]:
         """Each instance that any pixel shows, and its pixels, by their numbers row by row."""
+        return [(self.instances[number], pixels) for number, pixels in self.shown_numbers]
+
+    @cached_property
+    def shown_numbers(self) -> list[tuple[int, NDArray[np.intp]]]:
+        """The same, by the numbers of instances."""
         order = np.argsort(self.instance, axis=None, kind="stable")
         numbers = self.instance.ravel()[order]
         starts = np.flatnonzero(np.diff(numbers, prepend=-2))
         parts = np.split(order, starts[1:])
-        return [(self.instances[numbers[s]], part) for s, part in zip(starts, parts, strict=True) if numbers[s] >= 0]
+        return [(int(numbers[s]), part) for s, part in zip(starts, parts, strict=True) if numbers[s] >= 0]
 
     @cached_property
     def points(self) -> Array:
@@ -157,60 +239,86 @@ class Silhouettes:
     """Whole instances of a scene, each as if it stood alone before the camera."""
 
     def __init__(self, surfaces: Surfaces) -> None:
-        self._surfaces, self._cores, self._boxes = surfaces, {}, {}
+        self._surfaces, self._keeper = surfaces, surfaces.keeper
 
-    def pixels(self, instance: Instance, visible: NDArray[np.intp]) -> NDArray[np.intp]:
-        """(n,), in order. visible : those that show it among the others, which belong to it in any case."""
-        columns, rows = self._reach(instance)
-        if not (len(columns) and len(rows)) or "camera" in instance.placed.hidden_from:
-            return visible
-        # In its object's space, so that a geometry is made ready once for all its instances; what is flattened, in the world.
+    def pixels(self) -> list[NDArray[np.intp]]:
+        """Of each instance (n,), in order; what shows it among the others belongs to it in any case.
+
+        Rays are traced in the objects' spaces, so that a geometry is made ready once for all its instances, and those of many
+        instances at a time; what is flattened is traced in the world.
+        """
+        surfaces = self._surfaces
+        shown = {number: pixels for number, pixels in surfaces.shown_numbers}
+        found = [shown.get(number, _NONE) for number in range(len(surfaces.instances))]
+        if not surfaces.instances:
+            return found
+        is_flat = np.linalg.det(np.array([each.matrix[:3, :3] for each in surfaces.instances])) == 0
+        first, last = self._reaches()
+        groups: dict[tuple[str, int | None], list[int]] = {}
+        for number, instance in enumerate(surfaces.instances):
+            if (last[number] > first[number]).all() and "camera" not in instance.placed.hidden_from:
+                groups.setdefault((instance.placed.geometry, number if is_flat[number] else None), []).append(number)
+        pieces = []
+        for (name, flat), numbers in groups.items():
+            core = self._keeper.alone(name, np.eye(4) if flat is None else surfaces.instances[flat].matrix)
+            areas = (last[numbers] - first[numbers]).prod(axis=1)
+            parts = np.cumsum(areas) // _MOST_RAYS
+            pieces += [(core, np.array(numbers)[parts == part], flat is not None) for part in np.unique(parts)]
+
+        def trace(piece: tuple[CoreScene, NDArray[np.intp], bool]) -> None:
+            core, numbers, is_flat = piece
+            for number, hit in self._hits(core, numbers, is_flat, first, last):
+                found[number] = np.union1d(found[number], hit) if len(found[number]) else hit
+
+        for _ in over_threads(trace, pieces, self._keeper.threads, lambda: None, lambda: None):
+            pass
+        return found
+
+    def _hits(
+        self, core: CoreScene, numbers: NDArray[np.intp], is_flat: bool, first: NDArray[np.intp], last: NDArray[np.intp]
+    ) -> Iterator[tuple[int, NDArray[np.intp]]]:
+        """The pixels of some instances that rays meet in what the core has. first, last : of `_reaches`."""
         camera, (near, far) = self._surfaces.camera, self._surfaces.scene.clip
-        is_flat = np.linalg.det(instance.matrix[:3, :3]) == 0
-        turned, eye = np.eye(3), np.array([camera.eye])
+        eye, (u, v, w) = np.array(camera.eye), camera.basis()
+        axes = np.array([-u if camera.mirrored else u, v, -w])
+        turned, eyes = np.broadcast_to(axes, (len(numbers), 3, 3)), np.broadcast_to(eye, (len(numbers), 3))
         if not is_flat:
-            turned, eye = instance.inverse[:3, :3].T, instance.local(eye)
-        u, v, w = camera.basis()
-        x, y = camera.view_plane(np.arange(*columns) + 0.5, 0.5)[0], camera.view_plane(0.5, np.arange(*rows) + 0.5)[1]
-        axes = np.array([-u if camera.mirrored else u, v, -w]) @ turned
-        directions = (x[:, None] * axes[0] + axes[2]) + (y[:, None] * axes[1])[:, None]
-        core = self._core(instance.placed.geometry, instance.matrix if is_flat else np.eye(4))
-        rays = core.rays(eye, directions.reshape(-1, 3), np.nextafter(near, 0.0), np.nextafter(far, np.inf))
-        hit = np.flatnonzero(core.closest(rays)[1] >= 0)
-        row, column = np.divmod(hit, len(x))
-        return np.union1d((row + rows[0]) * camera.width + column + columns[0], visible)
-
-    def _core(self, name: str, matrix: Array) -> CoreScene:
-        if (key := (name, matrix.tobytes())) not in self._cores:
-            alone = Object("", name, matrix)
-            geometry = self._surfaces.scene.geometries[name]
-            geometry = replace(geometry, materials=np.zeros_like(geometry.materials))
-            middle = sum(self._box(name)) / 2
-            away = tuple(middle + np.array([0, 0, 1 + np.abs(middle).max()]))
-            camera = Pinhole(tuple(middle), away, (0, 1, 0), 1, 1, 1)  # only so that rendering space's origin is near
-            self._cores[key] = CoreScene(Scene(camera, {name: geometry}, (alone,)), 1)
-        return self._cores[key]
-
-    def _box(self, name: str) -> tuple[Array, Array]:
-        if name not in self._boxes:
-            self._boxes[name] = box(self._surfaces.scene.geometries[name])
-        return self._boxes[name]
-
-    def _reach(self, instance: Instance) -> tuple[tuple[int, int], tuple[int, int]]:
-        """From which column and row to before which an instance is at most, by the corners of its box."""
-        camera, (least, greatest) = self._surfaces.camera, self._box(instance.placed.geometry)
-        corners = np.array(list(itertools.product(*zip(least, greatest, strict=True))))
-        column, row, depth = camera.project(corners @ instance.matrix[:3, :3].T + instance.matrix[:3, 3])
-        if not (depth > 0).any():
-            return (0, 0), (0, 0)
-        if not ((depth > 0).all() and np.isfinite(column).all() and np.isfinite(row).all()):
-            return (0, camera.width), (0, camera.height)
-        # Half a pixel and more beyond the centres that lie within, for rounding.
-        spans = [(np.floor(places.min()) - 1, np.ceil(places.max()) + 1) for places in (column, row)]
-        return tuple(
-            (int(min(max(first, 0), size)), int(min(max(last, 0), size)))
-            for (first, last), size in zip(spans, (camera.width, camera.height), strict=True)
+            some = [self._surfaces.instances[number] for number in numbers]
+            turned = axes @ np.array([each.inverse[:3, :3].T for each in some])
+            eyes = np.array([each.local(eye) for each in some])
+        across, down = (last - first)[numbers].T
+        ends = np.cumsum(across * down)
+        owner = np.repeat(np.arange(len(numbers)), across * down)
+        place = np.arange(ends[-1]) - (ends - across * down)[owner]
+        row, column = np.divmod(place, across[owner])
+        row, column = row + first[numbers, 1][owner], column + first[numbers, 0][owner]
+        x, y = (
+            camera.view_plane(np.arange(camera.width) + 0.5, 0.5)[0],
+            camera.view_plane(0.5, np.arange(camera.height) + 0.5)[1],
         )
+        directions = x[column, None] * turned[owner, 0] + y[row, None] * turned[owner, 1] + turned[owner, 2]
+        rays = core.rays(eyes[owner], directions, np.nextafter(near, 0.0), np.nextafter(far, np.inf))
+        hit = core.closest(rays)[1] >= 0
+        starts = np.concatenate([[0], np.cumsum(hit)[ends - 1]])
+        pixels = (row * camera.width + column)[hit]
+        for number, start, end in zip(numbers.tolist(), starts, starts[1:], strict=False):
+            yield number, pixels[start:end]
+
+    def _reaches(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """From which column and row to before which instances are at most, by their boxes' corners: each (n, 2)."""
+        camera = self._surfaces.camera
+        size = np.array([camera.width, camera.height])
+        corners = np.stack([self._keeper.corners(each) for each in self._surfaces.instances])
+        column, row, depth = camera.project(corners)
+        places = np.stack([column, row], axis=-1)
+        is_before = (depth > 0).any(axis=1)
+        is_whole = (depth > 0).all(axis=1) & np.isfinite(places).all(axis=(1, 2))
+        places = np.where(is_whole[:, None, None], places, 0.0)
+        # Half a pixel and more beyond the centres that lie within, for rounding.
+        first = np.where(is_whole[:, None], np.floor(places.min(axis=1)) - 1, 0)
+        last = np.where(is_whole[:, None], np.ceil(places.max(axis=1)) + 1, size)
+        first, last = np.clip(first, 0, size), np.where(is_before[:, None], np.clip(last, 0, size), 0)
+        return first.astype(np.intp), last.astype(np.intp)
 
 
 def box(geometry: Mesh | Spheres) -> tuple[Array, Array]:

@@ -19,6 +19,7 @@ from ..errors import InputError
 from ..files import read_bytes
 from . import documents, table
 from .makers import frames, from_cameras, from_pinholes, orbit
+from .names import one_file
 from .problems import Problems, ShotsError
 from .rows import shots_of
 from .settings import settings_hash
@@ -34,6 +35,7 @@ __all__ = [
     "from_cameras",
     "from_pinholes",
     "is_list",
+    "one_file",
     "orbit",
     "read",
     "settings_hash",

@@ -13,7 +13,7 @@ from viewcam_addon import cli
 from viewcam_addon.batch.comparer import Comparer
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import versions
-from viewcam_addon.blender.batch import checking
+from viewcam_addon.blender.batch import checking, scene_files
 from viewcam_addon.blender.batch.renderer import BlenderRenderer
 from viewcam_addon.errors import InputError
 from viewcam_addon.shots import Shot
@@ -237,8 +237,8 @@ def test_a_check_gives_back_all_that_it_changes(stage, batch):
 
 def test_things_that_move_are_read_again_and_things_that_stand_are_not(stage, batch, monkeypatch):
     written = []
-    write = checking.scene_file.write
-    monkeypatch.setattr(checking.scene_file, "write", lambda scene, path: written.append(path) or write(scene, path))
+    write = scene_files.scene_file.write
+    monkeypatch.setattr(scene_files.scene_file, "write", lambda scene, path: written.append(path) or write(scene, path))
     found = verdicts(batch(LEFT, RIGHT, replace(LEFT, name="small", width=64, height=64)))
     assert all(each["passed"] for each in found.values()) and len(written) == 1, "a scene that stands still is written once"
     assert not written[0].exists(), "the checks' folder is left behind"
@@ -273,8 +273,8 @@ def follow_the_camera(moved):
 def test_what_geometry_nodes_move_with_the_active_camera_is_read_for_each_shot(stage, batch, monkeypatch):
     """Nothing in the file has changed from shot to shot, and the scene is another all the same."""
     read = []
-    export = checking.export_scene
-    monkeypatch.setattr(checking, "export_scene", lambda *given: read.append(1) or export(*given))
+    export = scene_files.export_scene
+    monkeypatch.setattr(scene_files, "export_scene", lambda *given: read.append(1) or export(*given))
     shots = (LEFT, RIGHT, replace(LEFT, name="again"))
     assert all(each["passed"] for each in verdicts(batch(*shots)).values()) and len(read) == 1
     read.clear()

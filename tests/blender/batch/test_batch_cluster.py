@@ -15,7 +15,7 @@ bpy = pytest.importorskip("bpy")
 pytest.importorskip("distributed")
 
 from viewcam_addon.batch import cluster, one, run
-from viewcam_addon.batch.folder import Folder
+from viewcam_addon.batch.folder import Folder, Outputs
 from viewcam_addon.blender.batch.renderer import BlenderRenderer
 from viewcam_addon.shots import Shot, settings_hash
 
@@ -72,7 +72,7 @@ def alone(blend, tmp_path_factory):
     with BlenderRenderer(blend) as renderer:
         made_from = renderer.made_from()
         settings = {each.name: settings_hash(each, made_from) for each in SHOTS}
-        summary = run.run(SHOTS, folder, settings, one.in_turn(folder, renderer, settings, False), Ear())
+        summary = run.run(SHOTS, folder, settings, one.in_turn(folder, renderer, settings, Outputs()), Ear())
     assert summary.exit_status == 0, summary.to_json()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     return made_from, settings, contents(folder.path)
@@ -168,5 +168,5 @@ def test_whoever_is_killed_the_files_are_those_of_one_process_and_each_worker_lo
 
 def test_the_files_of_another_seed_would_be_others(blend, alone, tmp_path):
     with BlenderRenderer(blend, seed=7) as renderer:
-        record = one.render_one(SHOTS[1], Folder(tmp_path), renderer, "hash", False)
+        record = one.render_one(SHOTS[1], Folder(tmp_path), renderer, "hash", Outputs())
     assert json.dumps(record) and (tmp_path / "shot_0.exr").read_bytes() != alone[2]["shot_0.exr"]

@@ -14,6 +14,7 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon import shots as lists
 from viewcam_addon.batch import comparer
+from viewcam_addon.batch.folder import Outputs
 from viewcam_addon.blender.batch import graphics, pictures
 from viewcam_addon.blender.batch.renderer import BlenderRenderer
 from viewcam_addon.blender.rendering import exr
@@ -345,7 +346,7 @@ def test_a_scene_without_a_view_layer_to_render_is_said_before(stage):
 def test_a_check_that_could_not_be_had_is_said_before(stage, monkeypatch):
     monkeypatch.setattr(comparer, "lacking", lambda: "a check needs OpenEXR")
     with BlenderRenderer() as renderer:
-        assert renderer.problems([LEFT], check=True) == ("a check needs OpenEXR",)
+        assert renderer.problems([LEFT], Outputs(check=True)) == ("a check needs OpenEXR",)
         assert renderer.problems([LEFT]) == ()
 
 

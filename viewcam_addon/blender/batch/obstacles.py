@@ -7,6 +7,7 @@ import bpy
 
 from ... import checks, html_page, intrinsics
 from ...batch import comparer
+from ...batch.folder import Outputs
 from ...errors import InputError
 from ...pinhole import Pinhole
 from ...shots import Shot
@@ -19,19 +20,19 @@ _DRAWN = (versions.EEVEE, "BLENDER_WORKBENCH")
 
 
 def obstacles(
-    shots: Sequence[Shot], check: bool, scene: bpy.types.Scene, own: bpy.types.Object, settings: ShotSettings
+    shots: Sequence[Shot], outputs: Outputs, scene: bpy.types.Scene, own: bpy.types.Object, settings: ShotSettings
 ) -> Iterator[str]:
-    """One sentence for each obstacle. check : whether each shot will be checked. own : the camera for the four values."""
+    """One sentence for each obstacle. outputs : what is wanted of each shot. own : the camera for the four values."""
     if not any(layer.use for layer in scene.view_layers):
         yield f"scene {scene.name!r} renders nothing: all of its view layers are off, let one render"
-    engines = sorted({settings.engine_of(shot) for shot in shots})
-    if ("CYCLES" in engines or check) and not hasattr(scene, "cycles"):
+    engines = sorted({settings.engine_of(shot) for shot in shots}) if outputs.picture else []
+    if ("CYCLES" in engines or outputs.check) and not hasattr(scene, "cycles"):
         yield "Cycles is disabled: enable the add-on Cycles Render Engine in Blender's preferences"
     for engine in engines:
         if engine in _DRAWN and not graphics.are_there():
             needs = f"{engine_name(engine)} draws with a GPU, and Blender can't open one here"
             yield f"{needs}: choose CYCLES or VIEWCAM, or start a display"
-    for lacking in (html_page.lacking(), comparer.lacking() if check else None):
+    for lacking in (html_page.lacking(), comparer.lacking() if outputs.check or outputs.labels else None):
         if lacking:
             yield lacking
     among = cameras_of(scene, own)

@@ -20,6 +20,7 @@ from typing import Any
 
 import bpy
 
+from ...batch.folder import Outputs
 from ...cameras.sidecar import record
 from ...pinhole import Pinhole
 from ...shots import Shot
@@ -29,8 +30,9 @@ from ..opening import opened
 from ..rendering.engine import VIEWCAM_RenderEngine
 from ..scenes.depsgraph import render_still
 from ..temporary_settings import Overrides
-from . import obstacles, origins, pictures
+from . import obstacles, origins, persistent_data, pictures
 from .checking import Checker
+from .labelling import ShotLabels
 from .shot_settings import ShotSettings
 
 _NAME = "viewcam batch"
@@ -67,6 +69,7 @@ class BlenderRenderer:
             self._settings = ShotSettings(overrides, self.scene, self._threads, self._seed, off)
             self._own = _own_camera(overrides, self.scene, self._of_file)
             self._checker = stack.enter_context(Checker(self._threads))
+            self._labels = stack.enter_context(ShotLabels(self._threads))
             self._loan = stack.pop_all()
         return self
 
@@ -125,12 +128,12 @@ class BlenderRenderer:
         """
         return origins.made_from() | {"seed": self._seed} | ({"trust": True} if self._trust else {})
 
-    def problems(self, shots: Sequence[Shot], check: bool = False) -> tuple[str, ...]:
-        """One sentence for each reason why a shot can't be rendered or checked, as far as it is known before anything is."""
-        return tuple(obstacles.obstacles(shots, check, self.scene, self._own, self._settings))
+    def problems(self, shots: Sequence[Shot], outputs: Outputs | None = None) -> tuple[str, ...]:
+        """One sentence for each reason why a shot can't be had, as far as it is known before anything is rendered."""
+        return tuple(obstacles.obstacles(shots, outputs or Outputs(), self.scene, self._own, self._settings))
 
-    def render(self, shot: Shot, image: Path, preview: Path) -> dict[str, Any]:
-        """Write the shot's picture and preview to these two paths; what the sidecar says of it (batch.renderer.Renderer).
+    def render(self, shot: Shot, image: Path | None, preview: Path | None) -> dict[str, Any]:
+        """Write the shot's picture and preview to these two paths, or nothing where they are None; what the sidecar says of it.
 
         Raises
         ------
@@ -141,22 +144,37 @@ class BlenderRenderer:
         """
         self._settings.set(shot)
         warnings = self._aim(shot)
-        if self._settings.engine == "EEVEE" and not self._has_drawn:  # see persistent_data.py
+        if image and preview:
+            if self._settings.engine == "EEVEE" and not self._has_drawn:  # see persistent_data.py
+                render_still(self.scene)
+                self._has_drawn = True
             render_still(self.scene)
-            self._has_drawn = True
-        render_still(self.scene)
-        if self.scene.render.engine == VIEWCAM_RenderEngine.bl_idname:
-            warnings += VIEWCAM_RenderEngine.warnings
-        pictures.write(self.scene, image, preview)
+            if self.scene.render.engine == VIEWCAM_RenderEngine.bl_idname:
+                warnings += VIEWCAM_RenderEngine.warnings
+            pictures.write(self.scene, image, preview)
         evaluated = self.scene.camera.evaluated_get(datablocks.depsgraph_of(self.scene))
         self._taken = cameras.read(evaluated, self.scene)
         return {
             **record(self._taken, datablocks.camera_data_of(evaluated)),
             **({"stated": record(self._stated)["camera"]} if self._stated else {}),
-            "rendered": self._settings.rendered(),
+            "rendered": self._settings.rendered(bool(image)),
             "warnings": [*self._settings.warnings, *warnings],
             "versions": origins.versions(),
         }
+
+    def label(self, shot: Shot, picture: Path, kinds: Sequence[str], depth_steps: float) -> list[str]:
+        """Write the labels of the shot that was just rendered beside a picture; the names of their files (labelling.py).
+
+        Raises
+        ------
+        InputError
+            if the scene can't be exported, or the labels not be written.
+        """
+        is_still = shot.camera is None
+        names = self._labels.write(self.scene, self.scene.camera, self._taken, picture, kinds, depth_steps, is_still)
+        if "flow" in kinds:  # other frames were looked at
+            persistent_data.drop(self.scene)
+        return names
 
     def check(self, _shot: Shot) -> dict[str, Any]:
         """Compare the shot that was just rendered with the tracer (checking.py).

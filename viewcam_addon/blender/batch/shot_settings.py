@@ -135,14 +135,17 @@ class ShotSettings:
             yield scene.cycles, "use_layer_samples"
         yield scene.virtual_pinhole_reference, "level"
 
-    def rendered(self) -> dict[str, object]:
-        """What the scene is set to, as a sidecar says it; None where the engine has no such thing."""
+    def rendered(self, by_engine: bool = True) -> dict[str, object]:
+        """What the scene is set to, as a sidecar says it; None where the engine has no such thing.
+
+        by_engine : whether there is a picture, of which the engine knows more.
+        """
         scene, engine = self._scene, self._scene.render.engine
         samples, seed = _samples(scene).get(engine), _seeds(scene).get(engine)
         return {
             "engine": self.engine,
             "samples": getattr(*samples) if samples else None,
-            "level": VIEWCAM_RenderEngine.level if engine == "VIEWCAM" else None,
+            "level": VIEWCAM_RenderEngine.level if engine == "VIEWCAM" and by_engine else None,
             "seed": seed.seed if seed else None,
             "width": datablocks.frame_of(scene).window[2],
             "height": datablocks.frame_of(scene).window[3],
