@@ -54,6 +54,43 @@ def test_what_is_edited_while_it_is_active_is_the_camera_s(plain, square, scene)
     assert (scene.render.resolution_x, scene.frame_end) == (640, 999)
 
 
+@pytest.mark.parametrize("linked", [False, True])
+def test_a_duplicate_of_the_active_camera_has_its_picture_as_it_is_now_and_then_one_of_its_own(plain, square, scene, linked):
+    activate(square, scene)
+    scene.render.resolution_x, scene.frame_end = 640, 999
+    bpy.context.view_layer.update()
+    for each in scene.objects:
+        each.select_set(each == square)
+    bpy.context.view_layer.objects.active = square
+    bpy.ops.object.duplicate(linked=linked)
+    twin = bpy.context.object
+    assert own_picture.of_camera(twin, scene) == own_picture.of_camera(square, scene)
+    activate(twin, scene)
+    assert (scene.render.resolution_x, scene.frame_end) == (640, 999) and own_picture.owner(scene) == twin
+    scene.render.resolution_x = 320
+    activate(square, scene)
+    assert scene.render.resolution_x == 640
+
+
+def test_a_camera_at_rest_is_not_written_to(plain, square, scene):
+    activate(square, scene)
+    told = []
+
+    def note(_scene, depsgraph):
+        told.extend(update.id.name for update in depsgraph.updates)
+
+    bpy.app.handlers.depsgraph_update_post.append(note)
+    try:
+        for each in scene.objects:
+            if each.type != "CAMERA":
+                each.location.x += 1
+        bpy.context.view_layer.update()
+        bpy.context.view_layer.update()
+    finally:
+        bpy.app.handlers.depsgraph_update_post.remove(note)
+    assert "Square" not in told and "Plain" not in told, told
+
+
 def test_from_one_own_picture_to_another_and_back_to_the_scene_s(plain, square, add_camera, scene):
     before = own_picture._numbers(scene)
     activate(square, scene)

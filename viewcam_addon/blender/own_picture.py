@@ -66,11 +66,13 @@ def switch(scene: bpy.types.Scene) -> None:
     """Let the scene have the picture of its camera, or its own, if it has not."""
     lent, active = scene.virtual_pinhole_picture, scene.camera
     wanted = active if active and active.virtual_pinhole_picture.use else None
-    if scene.library or (lent.camera == wanted and lent.is_lent == (wanted is not None)):
+    if scene.library:
+        return
+    if lent.is_lent and lent.camera and lent.camera.is_editable:  # at once, as a duplicate takes what the camera has
+        _copy(_numbers(scene), lent.camera.virtual_pinhole_picture)
+    if lent.camera == wanted and lent.is_lent == (wanted is not None):
         return
     if lent.is_lent:
-        if lent.camera and lent.camera.is_editable:
-            _copy(_numbers(scene), lent.camera.virtual_pinhole_picture)
         _set(scene, _of_group(lent))
     lent.is_lent, lent.camera = wanted is not None, wanted
     if wanted:
@@ -88,7 +90,8 @@ def _of_group(group: OwnPicture) -> dict[str, float]:
 
 def _copy(numbers: dict[str, float], group: OwnPicture) -> None:
     for name, value in numbers.items():
-        setattr(group, name, value)
+        if getattr(group, name) != value:  # what is set is evaluated again
+            setattr(group, name, value)
 
 
 def _set(scene: bpy.types.Scene, numbers: dict[str, float]) -> None:
