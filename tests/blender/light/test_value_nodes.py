@@ -16,9 +16,9 @@ from viewcam_addon.tracer import render
 from viewcam_addon.tracer.scene.shader_nodes import KINDS
 
 MOST, TYPICAL = 2e-5, 2e-6  # calibrated: float32 of UV up to 2, at images of 4 pixels, and 4.2 has another luminance by 1e-5
-BYTES = 10 if bpy.app.version >= (5, 2) else 1  # calibrated: 5.2 decodes colours of bytes by about 2e-4 otherwise
+BYTES = 10 if bpy.app.version >= (5, 2) else 1  # calibrated: from 5.1 on Cycles has corners' colours of bytes in half floats
 JUMPS = 0.04  # of the pixels
-PARTS = 2  # in which the nodes are shown, so that each has pixels enough
+PARTS = 3  # in which the nodes are shown, so that each has pixels enough
 
 
 class N:
@@ -125,6 +125,7 @@ def graphs(image, straight):
     for word in ("LINEAR", "CONSTANT", "EASE", "B_SPLINE"):
         found[f"ramp {word}"] = N("ValToRGB", {"Fac": U}, "Color", stops=stops, ramp=word)
     found["ramp alpha"] = N("ValToRGB", {"Fac": a}, "Alpha", stops=stops)
+    found |= procedural()
     found["gamma"] = N("Gamma", {"Color": a, "Gamma": 1.7})
     found["bright"] = N("BrightContrast", {"Color": a, "Bright": 0.1, "Contrast": 0.4})
     found["hue"] = N("HueSaturation", {"Color": a, "Hue": 0.63, "Saturation": 1.2, "Value": 0.8, "Fac": 0.9})
@@ -133,6 +134,50 @@ def graphs(image, straight):
     found["separate"] = N("SeparateColor", {"Color": b}, "Green")
     found["clamp"] = N("Clamp", {"Value": U, "Min": 0.2, "Max": 0.8})
     found["number of a vector"] = N("Math", {"Value": OBJECT, "Value_001": a}, operation="ADD")
+    return found
+
+
+def procedural():
+    """Textures that are formulas: noise on whole coordinates, too, where hashes must be the same."""
+    place = N("Mapping", {"Vector": OBJECT, "Rotation": (0.3, -0.4, 1.1), "Location": (0.2, -0.3, 0.1)})
+    cells = N("VectorMath", {"Vector": N("VectorMath", {"Vector": place, "Scale": 7.0}, operation="SCALE")}, operation="FLOOR")
+    found = {}
+    for kind in KINDS["noise"].inputs["kind"]:
+        inputs = {"Vector": place, "Scale": 1.7, "Detail": 2.5, "Roughness": 0.6, "Lacunarity": 2.2, "Offset": 0.3, "Gain": 1.4}
+        found[f"noise {kind}"] = N("TexNoise", inputs, "Fac", noise_type=kind.upper())
+    for dimensions in ("1D", "2D", "3D", "4D"):
+        inputs = {"Vector": place, "W": U, "Scale": 2.0, "Detail": 1.0, "Distortion": 0.4}
+        found[f"noise {dimensions}"] = N("TexNoise", inputs, "Color", noise_dimensions=dimensions, normalize=dimensions == "2D")
+        whole = {
+            "Vector": cells,
+            "W": N("Math", {"Value": N("Math", {"Value": U, "Value_001": 5}, operation="MULTIPLY")}, operation="FLOOR"),
+        }
+        found[f"white noise {dimensions}"] = N("TexWhiteNoise", whole, "Color", noise_dimensions=dimensions)
+    found["white noise value"] = N("TexWhiteNoise", {"Vector": cells}, "Value")
+    found["noise of generated"] = N("TexNoise", {}, "Fac")
+    a, b = two_colours()
+    for word in ("Color", "Fac"):
+        found[f"checker {word}"] = N("TexChecker", {"Vector": place, "Color1": a, "Color2": b, "Scale": 3.3}, word)
+        found[f"magic {word}"] = N("TexMagic", {"Vector": place, "Scale": 1.3, "Distortion": 1.2}, word, turbulence_depth=4)
+        inputs = {
+            "Vector": place,
+            "Color1": a,
+            "Color2": b,
+            "Mortar": (0.9, 0.1, 0.3, 1),
+            "Scale": 1.5,
+            "Mortar Size": 0.07,
+            "Bias": -0.2,
+        }
+        settings = {"offset": 0.3, "offset_frequency": 3, "squash": 0.6, "squash_frequency": 2}
+        found[f"brick {word}"] = N("TexBrick", inputs, word, **settings)
+    for kind in KINDS["gradient"].inputs["kind"]:
+        found[f"gradient {kind}"] = N("TexGradient", {"Vector": place}, gradient_type=kind.upper())
+    inputs = {"Vector": place, "Scale": 0.8, "Distortion": 0.7, "Detail": 1.5, "Detail Scale": 1.4, "Phase Offset": 0.3}
+    for direction, profile in (("X", "SIN"), ("Y", "SAW"), ("Z", "TRI"), ("DIAGONAL", "SIN")):
+        rings = direction.replace("DIAGONAL", "SPHERICAL")
+        words = {"bands_direction": direction, "rings_direction": rings, "wave_profile": profile}
+        found[f"wave bands {direction}"] = N("TexWave", inputs, "Color", **words)
+        found[f"wave rings {direction}"] = N("TexWave", inputs | {"Distortion": 0.0}, "Fac", wave_type="RINGS", **words)
     return found
 
 

@@ -85,6 +85,18 @@ VALUES = [
     node("mix_number", a=node("separate", color=CHECKS, output="y"), clamp_factor=False),
     node("combine_color", x=node("rgb_to_bw", color=CHECKS), z=node("object_info", output="object_index")),
     node("attribute", name="Paint", output="alpha"),
+    node("noise", scale=node("wave", profile="saw", kind="rings", rings="spherical"), kind="hetero_terrain", dimensions="4d"),
+    node("checker", vector=node("texture_coordinate"), color1=node("gradient", kind="radial"), color2=GREEN, output="factor"),
+    node(
+        "brick",
+        color1=RED,
+        color2=node("magic", depth=5.0, output="factor"),
+        mortar_size=0.0625,
+        mortar_smooth=0.125,
+        offset_frequency=3.0,
+        squash=0.75,
+    ),
+    node("white_noise", vector=node("texture_coordinate", output="window"), output="color"),
     node("combine_xyz", y=node("clamp", value=node("geometry"), max=0.5)),
     node("hue_saturation", color=node("gamma", color=node("bright_contrast", color=node("invert", color=CHECKS)), gamma=0.5)),
 ]
@@ -234,9 +246,9 @@ def test_what_has_no_weight_in_a_mixture_is_not_looked_at(diffuse, factor, left)
 def test_a_factor_that_is_not_modelled_is_a_half(diffuse):
     mixed = add_shader(diffuse, "ShaderNodeMixShader", (1, diffuse.node_tree.nodes["Shader"]))
     mixed.name = "Blend"
-    link(diffuse, "ShaderNodeTexNoise", 0, 0, "Blend")
+    link(diffuse, "ShaderNodeTexVoronoi", 0, 0, "Blend")
     show(diffuse, mixed)
-    (closure,) = approximately(diffuse, "'Noise Texture'", "not modelled").closures
+    (closure,) = approximately(diffuse, "'Voronoi Texture'", "not modelled").closures
     assert closure.node["color"] == Colour(RED) and closure.factors == ((Colour((0.5, 0.5, 0.5)), True),)
 
 
@@ -247,7 +259,7 @@ def test_other_shaders_are_lamberts_of_their_colour(make_material):
 
 def test_what_has_no_colour_has_the_viewports(make_material):
     unknown = make_material("s", "ShaderNodeBsdfDiffuse")
-    link(unknown, "ShaderNodeTexNoise", 1, "Color").name = "Clouds"
+    link(unknown, "ShaderNodeTexVoronoi", 1, "Color").name = "Clouds"
     unknown.diffuse_color = colour(GREEN)
     assert approximately(unknown, "'Clouds'", "not modelled") == Material(diffuse=Colour(GREEN))
 

@@ -15,6 +15,7 @@ import bpy
 from ...errors import InputError
 from ...tracer.scene.materials import PLAIN, Colour
 from ...tracer.scene.shader_nodes import KINDS, Node
+from ...tracer.scene.value_nodes import GENERATED, UV
 from .. import versions
 from ..temporary_settings import Overrides
 from . import images, nodes, shaders, value_nodes
@@ -121,10 +122,12 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
             _choose(added, theirs, value_nodes.word_of(node.type, node[name]))
         for name, theirs in (value.flags | value.names).items():
             setattr(added, theirs, node[name])
+        for name, theirs in value.numbers.items():
+            setattr(added, theirs, type(getattr(added, theirs))(node[name][0]))
         if node.type == "image" and node["image"] is not None:
             added.image = reading.images[node["image"].image]
         for name, theirs in value.inputs.items():
-            if node[name] != Node("texture_coordinate") or node.type != "image":
+            if KINDS[node.type].inputs[name] not in (UV, GENERATED) or name in dict(node.inputs):
                 _colour(adder, value_nodes.input_of(added, theirs), node[name], reading)
     word = dict(node.inputs).get("output", node["output"] if "output" in KINDS[node.type].inputs else None)
     found = [socket for socket in added.outputs if value.outputs.get(socket.identifier, "") == word]

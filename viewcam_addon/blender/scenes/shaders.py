@@ -19,6 +19,7 @@ import numpy as np
 
 from ...tracer.scene.materials import LARGEST_RADIANCE, PLAIN, Colour, Material, Picture
 from ...tracer.scene.shader_nodes import KINDS, Node
+from ...tracer.scene.value_nodes import GENERATED, UV
 from .. import versions
 from . import images, nodes, value_nodes
 from .nodes import Input, Output
@@ -464,7 +465,7 @@ class _Tree(_Reader):
             read = self._value_input(Input(value_nodes.input_of(node, theirs), output.groups), KINDS[ours].inputs[name])
             if read is None:
                 return None
-            if (ours, name, read) != ("image", "vector", (0.0, 0.0, 0.0)):
+            if KINDS[ours].inputs[name] not in (UV, GENERATED) or isinstance(read, Colour | Node):
                 given[name] = read
         made = Node(ours, tuple(given.items()))
         plain = Node("image", tuple((name, made[name]) for name in ("image", "interpolation"))) if ours == "image" else None
@@ -488,6 +489,8 @@ class _Tree(_Reader):
         node = output.node
         if ours in ("fresnel", "layer_weight") and isinstance(nodes.source(output.input("Normal")), Output):
             return "has a Normal that is not modelled"
+        if hasattr(node, "texture_mapping") and not maps_plainly(node):
+            return "has a mapping of its own"
         if ours == "texture_coordinate" and node.from_instancer and output.socket.name in ("UV", "Generated"):
             return "has its instancer's coordinates"
         if ours == "attribute" and node.type == "VERTEX_COLOR" and not node.layer_name:

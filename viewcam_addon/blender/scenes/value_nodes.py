@@ -12,7 +12,7 @@ from .nodes import Output
 class Value:
     """A type of node as Blender has it.
 
-    kind : its type; class_name : its class. inputs : ours → the identifier of theirs. words, flags, names : ours → the
+    kind : its type; class_name : its class. inputs : ours → the identifier of theirs. words, flags, names, numbers : ours → the
     property. outputs : the identifier of theirs → our word for it, None where we have one output. fixed : property → what it
     must be.
     """
@@ -25,6 +25,7 @@ class Value:
     flags: dict[str, str] = field(default_factory=dict)
     fixed: dict[str, str | bool] = field(default_factory=dict)
     names: dict[str, str] = field(default_factory=dict)
+    numbers: dict[str, str] = field(default_factory=dict)
 
 
 def _same(*names: str) -> dict[str, str]:
@@ -36,6 +37,7 @@ def _words(*names: str) -> dict[str, str | None]:
 
 
 _COLOR = {"Color": None}
+_FACTOR_OR_COLOR = {"Color": "color", "Fac": "factor"}
 VALUES: tuple[tuple[str, Value], ...] = (
     (
         "image",
@@ -224,6 +226,82 @@ VALUES: tuple[tuple[str, Value], ...] = (
         ),
     ),
     ("invert", Value("INVERT", "ShaderNodeInvert", {"color": "Color", "factor": "Fac"}, _COLOR)),
+    (
+        "noise",
+        Value(
+            "TEX_NOISE",
+            "ShaderNodeTexNoise",
+            _same("Vector", "W", "Scale", "Detail", "Roughness", "Lacunarity", "Offset", "Gain", "Distortion"),
+            _FACTOR_OR_COLOR,
+            {"dimensions": "noise_dimensions", "kind": "noise_type"},
+            {"normalize": "normalize"},
+        ),
+    ),
+    (
+        "white_noise",
+        Value(
+            "TEX_WHITE_NOISE",
+            "ShaderNodeTexWhiteNoise",
+            _same("Vector", "W"),
+            _words("Value", "Color"),
+            {"dimensions": "noise_dimensions"},
+        ),
+    ),
+    (
+        "checker",
+        Value("TEX_CHECKER", "ShaderNodeTexChecker", _same("Vector", "Color1", "Color2", "Scale"), _FACTOR_OR_COLOR),
+    ),
+    (
+        "gradient",
+        Value(
+            "TEX_GRADIENT",
+            "ShaderNodeTexGradient",
+            _same("Vector"),
+            {"Color": None, "Fac": None},
+            {"kind": "gradient_type"},
+        ),
+    ),
+    (
+        "wave",
+        Value(
+            "TEX_WAVE",
+            "ShaderNodeTexWave",
+            _same("Vector", "Scale", "Distortion", "Detail", "Detail Scale", "Detail Roughness", "Phase Offset"),
+            {"Color": None, "Fac": None},
+            {"kind": "wave_type", "bands": "bands_direction", "rings": "rings_direction", "profile": "wave_profile"},
+        ),
+    ),
+    (
+        "magic",
+        Value(
+            "TEX_MAGIC",
+            "ShaderNodeTexMagic",
+            _same("Vector", "Scale", "Distortion"),
+            _FACTOR_OR_COLOR,
+            numbers={"depth": "turbulence_depth"},
+        ),
+    ),
+    (
+        "brick",
+        Value(
+            "TEX_BRICK",
+            "ShaderNodeTexBrick",
+            _same(
+                "Vector",
+                "Color1",
+                "Color2",
+                "Mortar",
+                "Scale",
+                "Mortar Size",
+                "Mortar Smooth",
+                "Bias",
+                "Brick Width",
+                "Row Height",
+            ),
+            _FACTOR_OR_COLOR,
+            numbers={name: name for name in ("offset", "offset_frequency", "squash", "squash_frequency")},
+        ),
+    ),
     ("rgb_to_bw", Value("RGBTOBW", "ShaderNodeRGBToBW", {"color": "Color"}, {"Val": None})),
 )
 """What we call each, and what it is; of what is one thing to us the first is made."""
@@ -251,10 +329,11 @@ def value_of(output: Output) -> tuple[str, Value] | None:
     return None
 
 
-def given_words(output: Output, ours: str, value: Value) -> dict[str, str | bool] | str:
+def given_words(output: Output, ours: str, value: Value) -> dict[str, object] | str:
     """The words and flags of a node; or, where one is not modelled, that clause."""
-    found: dict[str, str | bool] = {name: bool(getattr(output.node, theirs)) for name, theirs in value.flags.items()}
+    found: dict[str, object] = {name: bool(getattr(output.node, theirs)) for name, theirs in value.flags.items()}
     found |= {name: getattr(output.node, theirs) for name, theirs in value.names.items()}
+    found |= {name: (float(getattr(output.node, theirs)),) * 3 for name, theirs in value.numbers.items()}
     for name, theirs in value.words.items():
         word = getattr(output.node, theirs)
         if (ours, word) == ("image", "Smart"):

@@ -131,6 +131,8 @@ class Node:
         default = KINDS[self.type].inputs[name]
         if default is value_nodes.UV:
             return Node("texture_coordinate")
+        if default is value_nodes.GENERATED:
+            return Node("texture_coordinate", (("output", "generated"),))
         if default is None or default is value_nodes.IMAGE:
             return None
         if default is value_nodes.NAME:
@@ -166,8 +168,8 @@ class Node:
     def attributes(self) -> Iterator[str]:
         """What it asks meshes for by name, and what feeds it does."""
         yield from value_nodes.attributes_of(self.type, self.__getitem__)
-        for _, value in self.inputs:
-            if isinstance(value, Node):
+        for name in KINDS[self.type].inputs:
+            if isinstance(value := self[name], Node):
                 yield from value.attributes
 
     @property

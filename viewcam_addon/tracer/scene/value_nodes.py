@@ -16,10 +16,14 @@ NAME = "a name"
 UV = "uv"
 """The default of a vector that is the mesh's UV where nothing else is given."""
 
+GENERATED = "generated"
+"""The default of a vector that is the place in the mesh's texture space where nothing else is given."""
+
 Default = float | Vector | tuple[str, ...] | bool | str
 
 BLACK, GREY, WHITE = (0.0, 0.0, 0.0), (0.5, 0.5, 0.5), (1.0, 1.0, 1.0)
 
+DIMENSIONS = ("3d", "1d", "2d", "4d")
 MATH = (
     "add subtract multiply divide multiply_add power logarithm sqrt inverse_sqrt absolute exponent minimum maximum less_than "
     "greater_than sign compare smooth_min smooth_max round floor ceil trunc fract modulo floored_modulo wrap snap pingpong "
@@ -87,6 +91,64 @@ KINDS: dict[str, Mapping[str, Default]] = {
     "hue_saturation": {"hue": 0.5, "saturation": 1.0, "value": 1.0, "factor": 1.0, "color": (0.8, 0.8, 0.8)},
     "invert": {"factor": 1.0, "color": BLACK},
     "rgb_to_bw": {"color": GREY},
+    "noise": {
+        "vector": GENERATED,
+        "w": 0.0,
+        "scale": 5.0,
+        "detail": 2.0,
+        "roughness": 0.5,
+        "lacunarity": 2.0,
+        "offset": 0.0,
+        "gain": 1.0,
+        "distortion": 0.0,
+        "dimensions": DIMENSIONS,
+        "kind": ("fbm", "multifractal", "hybrid_multifractal", "ridged_multifractal", "hetero_terrain"),
+        "normalize": True,
+        "output": ("factor", "color"),
+    },
+    "white_noise": {"vector": GENERATED, "w": 0.0, "dimensions": DIMENSIONS, "output": ("value", "color")},
+    "checker": {
+        "vector": GENERATED,
+        "color1": (0.8, 0.8, 0.8),
+        "color2": (0.2, 0.2, 0.2),
+        "scale": 5.0,
+        "output": ("color", "factor"),
+    },
+    "gradient": {
+        "vector": GENERATED,
+        "kind": ("linear", "quadratic", "easing", "diagonal", "spherical", "quadratic_sphere", "radial"),
+    },
+    "wave": {
+        "vector": GENERATED,
+        "scale": 5.0,
+        "distortion": 0.0,
+        "detail": 2.0,
+        "detail_scale": 1.0,
+        "detail_roughness": 0.5,
+        "phase_offset": 0.0,
+        "kind": ("bands", "rings"),
+        "bands": ("x", "y", "z", "diagonal"),
+        "rings": ("x", "y", "z", "spherical"),
+        "profile": ("sin", "saw", "tri"),
+    },
+    "magic": {"vector": GENERATED, "scale": 5.0, "distortion": 1.0, "depth": 2.0, "output": ("color", "factor")},
+    "brick": {
+        "vector": GENERATED,
+        "color1": (0.8, 0.8, 0.8),
+        "color2": (0.2, 0.2, 0.2),
+        "mortar": BLACK,
+        "scale": 5.0,
+        "mortar_size": 0.02,
+        "mortar_smooth": 0.1,
+        "bias": 0.0,
+        "brick_width": 0.5,
+        "row_height": 0.25,
+        "offset": 0.5,
+        "offset_frequency": 2.0,
+        "squash": 1.0,
+        "squash_frequency": 2.0,
+        "output": ("color", "factor"),
+    },
 }
 
 

@@ -9,6 +9,7 @@
 #include "color.h"
 #include "geometry.h"
 #include "image.h"
+#include "procedural.h"
 
 namespace viewcam::VIEWCAM_ISA {
 
@@ -23,7 +24,8 @@ struct ConstantNode {
 // where it depends on more than its inputs; `gives` where the node itself knows what it gives.
 using ValueNode = std::variant<ConstantNode, ImageNode, TextureCoordinateNode, AttributeNode, MappingNode, GeometryNode, ObjectInfoNode, FresnelNode, LayerWeightNode,
                                MathNode, VectorMathNode, MapRangeNode, ClampNode, SeparateNode, CombineXYZNode, CombineColorNode, MixColorNode, MixNumberNode, GammaNode,
-                               BrightContrastNode, HueSaturationNode, InvertNode, LuminanceNode>;
+                               BrightContrastNode, HueSaturationNode, InvertNode, LuminanceNode, NoiseNode, WhiteNoiseNode, CheckerNode,
+                               GradientNode, WaveNode, MagicNode, BrickNode>;
 
 // A number of a value that is of some sort: a colour's luminance, a vector's mean.
 inline double number_of(Vec3 value, Gives sort) {
