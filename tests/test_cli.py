@@ -394,3 +394,38 @@ def test_a_command_with_blender_leaves_no_folder_among_the_temporary_files(tmp_p
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert list(temporary.iterdir()) == []
+
+
+def test_a_picture_made_elsewhere_is_judged_by_the_channels_that_are_named(tmp_path, capfd):
+    import OpenEXR
+
+    from viewcam_addon import image
+
+    scene, traced, made = tmp_path / "scene.json", tmp_path / "traced.exr", tmp_path / "made.exr"
+    scene.write_text(json.dumps(SCENE))
+    assert main(["render", str(scene), str(traced)]) == 0
+    passes = image.read(traced).passes
+    away = np.linalg.norm(passes["Position"] - np.array(SCENE["camera"]["eye"]), axis=-1)
+    hit = passes["Depth"][..., 0] < image.BACKGROUND_DEPTH
+    pixels = {f"P.{letter}": passes["Position"][::-1, :, i] for i, letter in enumerate("XYZ")}
+    pixels |= {"far": np.where(hit, away, np.inf)[::-1], "id": passes["Object Index"][::-1, :, 0]}
+    OpenEXR.File({}, {name: np.ascontiguousarray(values, np.float32) for name, values in pixels.items()}).write(str(made))
+    compare = ["compare", str(traced), str(made), "--scene", str(scene), "--channels"]
+    result = tmp_path / "result.json"
+    stated = ["position=P.X,P.Y,P.Z", "distance=far", "object-index=id"]
+    assert main([*compare, *stated, "--json", str(result), "--report", str(tmp_path / "report")]) == 0
+    found = json.loads(result.read_text())
+    assert [row["name"] for row in found["passes"]] == ["Position", "Position depth", "Depth"]
+    assert "Normal" in found["not_compared"] and (tmp_path / "report" / "index.html").is_file()
+    assert main([*compare, "distance=far", "--report", str(tmp_path / "depth")]) == 0
+    assert main([*compare, "position=P.Y,P.X,P.Z"]) == 1
+    assert "no channel 'W': name some of P.X" in fails(capfd, *compare[:-1], "--channels", "depth=W")
+    assert "names no pass" in fails(capfd, *compare[:-1], "--channels", "depht=far")
+    assert "position has 3 channels" in fails(capfd, *compare[:-1], "--channels", "position=far")
+    assert "name depth, distance or position" in fails(capfd, *compare[:-1], "--channels", "object-index=id")
+
+
+def test_another_engine_is_checked_by_its_geometry_alone(capfd):
+    assert "--engine EEVEE is checked at level geometry" in fails(
+        capfd, "check", "any.blend", "--engine", "EEVEE", "--level", "path"
+    )

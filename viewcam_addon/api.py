@@ -23,6 +23,7 @@ from .tracer.scene.levels import least_level
 
 if TYPE_CHECKING:  # each function imports what no other needs: a picture is traced before half of it would be loaded
     from .comparison.light_verdict import RadianceComparison
+    from .comparison.renderers import Renderer
     from .comparison.verdict import GeometryComparison
     from .labels.scene_labels import Labels
 
@@ -109,12 +110,16 @@ def compare(
     scene: Scene | File | None = None,
     threads: int | None = None,
     test_samples: int | None = None,
+    renderer: "Renderer | None" = None,
+    partial: bool = False,
 ) -> "GeometryComparison | RadianceComparison":
     """What a picture differs from the tracer's by, how much, and whether it is explained.
 
     reference : the tracer's, of `render` or an EXR. tests : Cycles', say; several of different seeds where there is noise.
     scene : what the reference shows, with which pixels on edges are traced again. Without it none of them is explained.
-    test_samples : of each test picture, where that is not what its file tells.
+    test_samples : of each test picture, where that is not what its file tells. renderer : who made it, one of
+    comparison.renderers; Cycles by default. partial : of geometry, whether it may lack passes: Depth, Distance or Position is
+    enough.
 
     Returns geometry's comparison or that of light: `.passed`, `.sentence`, `.lines()`, `.to_json()`.
 
@@ -123,7 +128,7 @@ def compare(
     InputError
         if sizes differ, a pass is missing, the camera is not known, or several pictures have no noise to tell.
     """
-    from .comparison import geometry, radiance
+    from .comparison import geometry, radiance, renderers
 
     several = tests if isinstance(tests, Sequence) and not isinstance(tests, str) else [tests]
     if files := [each for each in (reference, *several) if not isinstance(each, Image)]:
@@ -138,12 +143,13 @@ def compare(
         return radiance.compare(of, pictures, camera, test_samples)
     if len(pictures) != 1:
         raise InputError(f"{of.source} has no noise that several pictures could tell: compare it with one")
+    by = renderer or renderers.CYCLES
     if scene is None:
-        return geometry.compare(of, pictures[0], camera)
+        return geometry.compare(of, pictures[0], camera, renderer=by, partial=partial)
     # The picture may be of another size than the scene says, or of the stated camera.
     surface_at = tracing.Tracer(replace(scene, camera=camera), threads).surface_at
     stated = scene.stated_camera if camera == scene.camera else None
-    return geometry.compare(of, pictures[0], camera, surface_at, stated, scene.origin)
+    return geometry.compare(of, pictures[0], camera, surface_at, stated, scene.origin, by, partial)
 
 
 @dataclass(frozen=True)

@@ -38,6 +38,22 @@ def names(text: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(",") if name.strip())
 
 
+_OF_GEOMETRY = {"depth": 1, "distance": 1, "position": 3, "normal": 3, "uv": 2, "object-index": 1, "material-index": 1}
+
+
+def channels(text: str) -> tuple[str, list[str]]:
+    """The name of a pass, as image.py has it, and its channels."""
+    name, stated, listed = text.partition("=")
+    if not stated or name.lower() not in _OF_GEOMETRY:
+        known = ", ".join(_OF_GEOMETRY)
+        raise argparse.ArgumentTypeError(f"{text!r} names no pass: write position=P.X,P.Y,P.Z, or one of {known}")
+    found, count = names(listed), _OF_GEOMETRY[name.lower()]
+    if len(found) != count:
+        has = "1 channel" if count == 1 else f"{count} channels"
+        raise argparse.ArgumentTypeError(f"{text!r} has {len(found)}: {name.lower()} has {has}, with commas between them")
+    return ("UV" if name.lower() == "uv" else name.replace("-", " ").title()), list(found)
+
+
 def png(text: str) -> Path:
     path = Path(text)
     if path.suffix.lower() != ".png":

@@ -217,13 +217,18 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         )
         # Cycles' file counts one that is left out.
         added.add_argument("--test-samples", type=types.positive, help=argparse.SUPPRESS)
+        words = "what TEST.exr holds, made elsewhere: position=P.X,P.Y,P.Z depth=Z; also distance, normal, uv, object-index"
+        added.add_argument("--channels", metavar="PASS=CHANNELS", type=types.channels, nargs="+", help=words)
         report(added)
 
-    @command("check", "Export, trace, render with Cycles and compare, all in one go.")
+    @command("check", "Export, trace, render with Cycles or another engine and compare, all in one go.")
     def add_check(added: argparse.ArgumentParser) -> None:
         added.set_defaults(run=verification.check)
         blend(added)
         scene_choices(added)
+        engines = ["CYCLES", "EEVEE", "WORKBENCH"]
+        words = "who renders; all but Cycles at level geometry (default: %(default)s)"
+        added.add_argument("--engine", choices=engines, default="CYCLES", help=words)
         error(added, "the tracer takes")
         against = "the scene that Cycles must show, as viewcam export wrote it (default: what the file holds now)"
         added.add_argument("--scene", metavar="SCENE.json", type=Path, help=against)
@@ -278,7 +283,9 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         added.set_defaults(
             blend=verification.DEMO_SCENE, camera=None, frame=None, size=None, strict=False, recenter=False, clay=False
         )
-        added.set_defaults(difference=None, sides=None, repeat=None, scene=None, trust=False, writes=("report",))
+        added.set_defaults(
+            difference=None, sides=None, repeat=None, scene=None, trust=False, engine="CYCLES", writes=("report",)
+        )
         light(added)
         error(added, "the tracer takes")
         added.add_argument(

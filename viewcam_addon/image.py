@@ -23,7 +23,7 @@ import json
 import math
 import os
 from collections import defaultdict
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -149,9 +149,53 @@ def read(path: str | os.PathLike[str], only: Collection[str] | None = None) -> I
         if there is no such file, if it is no EXR or a damaged one, if it holds no known pass, or, by its header, a part of a
         picture only, another size than its camera's, or more than there is memory for.
     """
+    found, camera, attributes = _pixels(Path(path))
+    passes = {name: _stacked(channels) for name, channels in _passes(found).items() if only is None or name in only}
+    if not passes:
+        wanted = ", ".join(only or CHANNELS)
+        raise InputError(f"{path} holds none of the passes {wanted}: render a multilayer EXR with them")
+    return Image(passes, camera, attributes, str(path))
+
+
+def read_channels(path: str | os.PathLike[str], named: Mapping[str, Sequence[str]]) -> Image:
+    """Read an EXR of which it is told what its channels hold.
+
+    named : pass → its channels, each by its whole name or by how that ends, `Depth.Z` for `ViewLayer.Depth.Z`.
+
+    Raises
+    ------
+    InputError
+        as `read` does, and if there is no such channel, or more than one.
+    """
+    found, camera, attributes = _pixels(Path(path))
+
+    def channel(wanted: str) -> NDArray:
+        names = [wanted] if wanted in found else [name for name in found if name.endswith(f".{wanted}")]
+        if len(names) == 1:
+            return found[names[0]]
+        if names:
+            raise InputError(f"{path} has several channels {wanted!r}: name one of {', '.join(names)}")
+        raise InputError(f"{path} has no channel {wanted!r}: name some of {', '.join(found)}")
+
+    passes = {name: _stacked([channel(wanted) for wanted in channels]) for name, channels in named.items()}
+    return Image(passes, camera, attributes, str(path))
+
+
+def text_attribute(path: str | os.PathLike[str], name: str) -> str:
+    """A text attribute of a file, "" where it has none; without a pixel being read. Raises as `read` does of a header."""
+    value = _headers(Path(path))[0].get(name)
+    return value if isinstance(value, str) else ""
+
+
+def _stacked(channels: Sequence[NDArray]) -> NDArray[np.float32]:
+    """(height, width, channels), rows from the bottom."""
+    return np.stack([channel[::-1] for channel in channels], axis=-1).astype(np.float32, copy=False)
+
+
+def _pixels(path: Path) -> tuple[dict[str, NDArray], Pinhole | None, dict[str, str]]:
+    """The channels of a file, rows from the top, its camera and its text attributes."""
     import OpenEXR
 
-    path = Path(path)
     headers = _headers(path)
     camera = _camera(headers[0].get(_CAMERA_ATTRIBUTE), path)
     frame = _frame(headers, path)
@@ -169,18 +213,10 @@ def read(path: str | os.PathLike[str], only: Collection[str] | None = None) -> I
     if len(parts) < len(headers):  # a part whose pixels fail is left out
         raise InputError(f"{path} is cut short or damaged, its pixels can't be read: render it again")
     channels = {name: channel.pixels for part in parts for name, channel in part.channels.items()}
-    passes = {
-        name: np.stack([channel[::-1] for channel in found], axis=-1).astype(np.float32, copy=False)
-        for name, found in _passes(channels).items()
-        if only is None or name in only
-    }
-    if not passes:
-        wanted = ", ".join(only or CHANNELS)
-        raise InputError(f"{path} holds none of the passes {wanted}: render a multilayer EXR with them")
     attributes = {
         key: value for key, value in headers[0].items() if isinstance(value, str) and key not in (_CAMERA_ATTRIBUTE, "name")
     }
-    return Image(passes, camera, attributes, str(path))
+    return channels, camera, attributes
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,7 @@ def viewcam_check(request: pytest.FixtureRequest) -> "Callable[..., Check]":
     """Fails the test unless Cycles renders what a .blend file says: `viewcam_check(blend, level="direct", size="320x180")`.
 
     blend : its path, from the test's own folder. Options are those of `viewcam check`: `level`, `samples`, `camera`, `frame`,
-    `size`, … With `scene`, a scene file, the picture must be that scene's, whatever the .blend says now.
+    `size`, `engine`, … With `scene`, a scene file, the picture must be that scene's, whatever the .blend says now.
 
     Returns the viewcam_addon.Check: `.sentence`, `.figures`.
     """

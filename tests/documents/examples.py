@@ -37,6 +37,8 @@ NOT_RUN = {
     "make bench": _LONG,
     "make charts": _LONG,
     "viewcam chart poses": _LONG,
+    "viewcam compare traced.exr elsewhere.exr --scene scene.json --channels position=P.X,P.Y,P.Z distance=dist.Y "
+    "object-index=id.X": "tests/test_cli.py names the channels of a file of its own",
     "viewcam chart scaling --only triangles": _LONG,
     "viewcam chart speed": _LONG,
     "viewcam chart stability --only roll spheres": _LONG,

@@ -29,6 +29,8 @@ class Overrides:
     def set(self, owner: bpy.types.bpy_struct, name: str, value: Any) -> None:
         """Set a property until the overrides end."""
         before = getattr(owner, name)
+        if isinstance(before, bpy.types.bpy_prop_array):  # which would be the new value by then
+            before = tuple(before)
         if before != value:
             self.afterwards(setattr, owner, name, before)
             setattr(owner, name, value)

@@ -147,6 +147,10 @@ def modifier_input(modifier: bpy.types.NodesModifier, identifier: str) -> Any:
 EEVEE = "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
 
 
+# Whether EEVEE draws a view layer's material in place of all others. Measured: 4.2 does not, 5.0 and 5.2 do.
+EEVEE_OVERRIDES_MATERIALS = bpy.app.version >= (5, 0)
+
+
 def compositor(scene: bpy.types.Scene) -> bpy.types.NodeTree | None:
     """The nodes that make the picture of what was rendered, if any. Since 5.0 they are a group of their own."""
     if bpy.app.version >= (5, 0):

@@ -82,15 +82,24 @@ def cycles(options: argparse.Namespace) -> Result:
 
 def compare(options: argparse.Namespace) -> Result:
     from .. import api, image
-    from ..comparison import difference, light_report, radiance, report
+    from ..comparison import difference, light_report, radiance, renderers, report
 
     image.check_same_frames([options.reference, *options.tests])
-    reference, tests = image.read(options.reference), [image.read(path) for path in options.tests]
+    reference = image.read(options.reference)
+    is_light = radiance.carries_light(reference)
+    if options.channels:
+        if is_light:
+            raise InputError(f"--channels are of geometry, and {options.reference} shows light: trace it at level geometry")
+        tests, renderer = [image.read_channels(path, _stated(options.channels)) for path in options.tests], renderers.CYCLES
+    else:
+        tests, (renderer, *_) = zip(*map(renderers.read, options.tests), strict=True)
+    partial = bool(options.channels) or renderer is not renderers.CYCLES
     scene = api.read_scene(options.scene) if options.scene else None
-    comparison = api.compare(reference, tests, scene, options.threads, options.test_samples)
+    comparison = api.compare(reference, tests, scene, options.threads, options.test_samples, renderer, partial)
+    if partial:
+        tests = [renderers.completed(test, comparison.pinhole) for test in tests]
     ledger = scene.ledger if scene else ()
     words = f"viewcam {options.repeat or options.words}"
-    is_light = radiance.carries_light(reference)
     write_report, tests = (light_report.write_report, tests) if is_light else (report.write_report, tests[0])
     say(*_ledger_lines(ledger), *comparison.lines())
     if options.report:
@@ -103,16 +112,26 @@ def compare(options: argparse.Namespace) -> Result:
     return 0 if comparison.passed else 1, result
 
 
+def _stated(channels: Sequence[tuple[str, list[str]]]) -> dict[str, list[str]]:
+    """What --channels says, checked to tell where things are."""
+    if not {"Depth", "Distance", "Position"} & {name for name, _ in channels}:
+        raise InputError("--channels tells nothing of where things are: name depth, distance or position")
+    return dict(channels)
+
+
 def check(options: argparse.Namespace) -> Result:
     from ..child_process import run_viewcam
 
+    if options.engine != "CYCLES" and (options.level != "geometry" or options.error):
+        raise InputError(f"--engine {options.engine} is checked at level geometry alone: leave --level and --error out")
     with tempfile.TemporaryDirectory(prefix="viewcam-") as temporary:
         folder = options.report or Path(temporary)
         scene, reference = folder / "scene.json", folder / "reference.exr"
         count = seeds(options.level, options.samples)
-        tests = [folder / f"cycles-{i + 1}.exr" for i in range(count)] if count > 1 else [folder / "cycles.exr"]
+        name = options.engine.lower()
+        tests = [folder / f"{name}-{i + 1}.exr" for i in range(count)] if count > 1 else [folder / f"{name}.exr"]
         numbered = {} if options.scene is None else {"numbered": _numbered(options.scene)}
-        level = _export_and_render(options, scene, tests, **numbered)
+        level = _export_and_render(options, scene, tests, engine=options.engine, **numbered)
         size = []
         if options.scene:
             scene, size = options.scene, ["--size", "x".join(map(str, options.size))] if options.size else []
@@ -174,7 +193,7 @@ def _export_and_render(options: argparse.Namespace, scene_path: Path, image_path
     with silent_libraries():
         scene = blender_room("rendering.job").export_and_render(_request(options, **more), image_paths, rendering)
     scene_file.write(scene, scene_path)
-    say(f"exported and rendered with Cycles in {time.perf_counter() - started:.1f} s")
+    say(f"exported and rendered with {options.engine.capitalize()} in {time.perf_counter() - started:.1f} s")
     return _told_level(scene)["level"] if options.level == "auto" else options.level
 
 

@@ -94,8 +94,9 @@ def _of_geometry(comparison: GeometryComparison) -> tuple[pictures.Picture, str,
     marks = marks[: len(colours), : len(colours[0])]
     share = marks[..., 3:] / 255.0
     blended = np.round(colours * (1 - share) + marks[..., :3] * share).astype(np.uint8)
-    words = f"Dark {figure(low)} px off, light {figure(high)} px. Another surface seen: red, or teal where explained"
-    return blended, words, {"kind": "logarithmic", "low": low, "high": high, "unit": "px"}
+    unit = "px" if row.unit == "px" else "of the depth"
+    words = f"Dark {figure(low)} {unit} off, light {figure(high)} {unit}. Another surface seen: red, or teal where explained"
+    return blended, words, {"kind": "logarithmic", "low": low, "high": high, "unit": unit}
 
 
 def _of_light(comparison: RadianceComparison) -> tuple[pictures.Picture, str, dict[str, Any]]:

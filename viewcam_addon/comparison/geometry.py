@@ -28,6 +28,7 @@ from .mismatches import (
     largest_around,
     reach_of,
 )
+from .renderers import CYCLES, Renderer, completed
 from .statistics import PassErrors, measure
 from .tolerances import Array, Seen, in_float32
 from .verdict import GeometryComparison, allowed_unexplained
@@ -50,12 +51,15 @@ def compare(
     surface_at: SurfaceAt | None = None,
     stated: Pinhole | None = None,
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    renderer: Renderer = CYCLES,
+    partial: bool = False,
 ) -> GeometryComparison:
     """Compare two pictures of one camera.
 
     pinhole : the camera that traced the reference. surface_at : re-traces sub-pixel positions of the reference's scene;
     without it no mismatch can be explained. stated : the camera as the four values state it; with it the conversion's error
-    is measured too. origin : that of both pictures, in the world.
+    is measured too. origin : that of both pictures, in the world. renderer : the test's.
+    partial : whether the test may lack passes, all but one of Depth, Distance and Position; they are not judged then.
 
     Whatever float32 can hold may stand in the pictures: what can't be computed with is not within tolerance.
 
@@ -64,21 +68,26 @@ def compare(
     InputError
         if the sizes differ, a pass is missing, or the reference is not what `surface_at` sees.
     """
-    expected, seen = _passes(reference, test, pinhole)
+    measured = set(test.passes) | ({"Depth"} if "Distance" in test.passes else set())
+    expected, seen = _passes(reference, test, pinhole, partial)
     _check_figures(reference.source, expected, pinhole)
     size = (pinhole.height, pinhole.width)
     hit = tolerances.is_hit(expected)
     shift = np.where(hit, tolerances.ray_shift(pinhole, expected), np.nan)
     off_x, off_y, along = _displacement(pinhole, seen)
-    agreement = SurfaceAgreement(pinhole, np.hypot(off_x, off_y), _slopes(expected, hit, size))
+    across = np.hypot(off_x, off_y) if "Position" in measured else np.zeros(len(off_x))
+    agreement = SurfaceAgreement(pinhole, across, _slopes(expected, hit, size), renderer)
 
     kinds = kinds_of(expected, seen, agreement)
     # At an edge the ray may meet either surface, so a re-traced one is judged by the steepest slope around.
     steepest = {name: largest_around(slope.reshape(size)).ravel() for name, slope in agreement.slopes.items()}
-    around = replace(agreement, slopes=steepest)
+    # Where an edge has moved, a pixel shows the surface's plane beyond it: as far as edges move, and its slope's worth.
+    beyond = replace(renderer, centre=renderer.centre + renderer.edges)
+    around = replace(agreement, slopes=steepest, renderer=beyond)
     if surface_at is not None:
         _check_reference(reference.source, expected, np.flatnonzero(kinds >= 0), agreement, surface_at)
-    mismatches = _mismatches(kinds, seen, reach_of(shift.reshape(size)).ravel(), around, surface_at)
+    reach = reach_of(shift.reshape(size)).ravel() + renderer.edges
+    mismatches = _mismatches(kinds, seen, reach, around, surface_at)
 
     compared = hit & np.isin(kinds, (-1, KINDS.index("material index"), KINDS.index("surface")))
     # What is explained, or few enough to be let pass, is no error of the passes; what is not, shows in their figures.
@@ -87,10 +96,16 @@ def compare(
     chosen = np.flatnonzero(compared)
     errors = agreement.at(chosen).errors(at(expected, chosen), at(seen, chosen))
     depth = expected["Depth"][chosen, 0].astype(np.float64)
-    errors["Position depth"] = (np.abs(along[chosen] - depth) / depth, *errors["Depth"][1:])
     systematic = None
-    if len(chosen):
-        systematic = systematic_error(pinhole, chosen, off_x[chosen], off_y[chosen], errors["Position"][1])
+    if "Position" in measured:
+        errors["Position depth"] = (np.abs(along[chosen] - depth) / depth, *errors["Depth"][1:])
+        if len(chosen):
+            off = off_x[chosen], off_y[chosen]
+            systematic = systematic_error(pinhole, chosen, *off, errors["Position"][1], renderer.centre)
+    else:
+        del errors["Position"]
+    if "Depth" not in measured:
+        del errors["Depth"]
     rows, maps = _measure(errors, chosen, size)
 
     depths = expected["Depth"][hit, 0]
@@ -98,12 +113,16 @@ def compare(
     if stated is not None and len(depths):
         conversion = conversion_error(stated, pinhole, np.percentile(depths, (0, 50, 100)))
     hits = (int(hit.sum()), int(tolerances.is_hit(seen).sum()))
-    roundings = errors["Position"][0] / errors["Position"][1]
-    far = far_from_origin(pinhole, expected, chosen, rows[0])
-    return GeometryComparison(pinhole, stated, hits, rows, mismatches, systematic, conversion, maps, roundings, far, origin)
+    error, one_rounding, _ = errors[rows[0].name]
+    roundings = error / one_rounding
+    far = far_from_origin(pinhole, expected, chosen, rows[0]) if "Position" in measured else None
+    lacking = tuple(name for name in _CHANNELS if name in expected and name not in measured)
+    return GeometryComparison(
+        pinhole, stated, hits, rows, mismatches, systematic, conversion, maps, roundings, far, origin, lacking
+    )
 
 
-def _passes(reference: Image, test: Image, pinhole: Pinhole) -> tuple[Seen, Seen]:
+def _passes(reference: Image, test: Image, pinhole: Pinhole, partial: bool) -> tuple[Seen, Seen]:
     """The passes that both sides are compared in, each as (pixels, channels)."""
     for image in (reference, test):
         if image.size != (pinhole.width, pinhole.height):
@@ -115,7 +134,9 @@ def _passes(reference: Image, test: Image, pinhole: Pinhole) -> tuple[Seen, Seen
     expected = {name: reference[name] for name in names} | {
         name: reference[name] for name in _FOR_TOLERANCES if name in reference.passes
     }
-    seen = {name: test[name] for name in names}
+    if partial:
+        test = completed(test, pinhole)
+    seen = {name: test[name] for name in names if not partial or name in test.passes}
     return _flattened(expected), _flattened(seen)
 
 

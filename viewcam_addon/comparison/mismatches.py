@@ -12,13 +12,14 @@ Rejected: accepting a pixel when a neighbour shows the test's object. Next to an
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..pinhole import Pinhole
 from . import tolerances
+from .renderers import CYCLES, Renderer
 from .tolerances import Array, Seen
 
 # surface_at(columns, rows, px, py) -> dict of pass name to (n, channels) float32: what rays through sub-pixel positions see.
@@ -92,38 +93,40 @@ class SurfaceAgreement:
     """Judges whether the test picture shows the surface that a ray sees, within the tolerance of the last percentile.
 
     across : (n,) pixels, how far each of the test's positions, projected, lies from the centre of its pixel.
-    slopes : pass name to (n,), how much Normal and UV change per pixel there (tolerances.slopes).
+    slopes : pass name to (n,), how much Normal and UV change per pixel there (tolerances.slopes). renderer : the test's.
     """
 
     pinhole: Pinhole
     across: Array
     slopes: dict[str, Array]
+    renderer: Renderer = CYCLES
 
     def at(self, chosen: NDArray) -> "SurfaceAgreement":
         """That of some of the pixels, by their indices."""
-        return SurfaceAgreement(self.pinhole, self.across[chosen], {name: slope[chosen] for name, slope in self.slopes.items()})
+        slopes = {name: slope[chosen] for name, slope in self.slopes.items()}
+        return replace(self, across=self.across[chosen], slopes=slopes)
 
     def errors(self, expected: Seen, seen: Seen) -> dict[str, tuple[Array, Array, Array | float]]:
         """For each pass: (error, what one rounding causes, what storage and the filter's bias cause), each (n,).
 
         The last may be one number. Tolerances are taken at `expected`. Meaningless where either side missed.
         """
-        depth = expected["Depth"][..., 0].astype(np.float64)
+        depth, centre = expected["Depth"][..., 0].astype(np.float64), self.renderer.centre
         errors = {
-            "Position": (self.across, tolerances.position_shift(self.pinhole, expected), tolerances.FILTER_BIAS),
+            "Position": (self.across, tolerances.position_shift(self.pinhole, expected), centre),
             "Depth": (
                 np.abs(seen["Depth"][..., 0] - depth) / depth,
                 tolerances.depth_error(self.pinhole, expected),
-                tolerances.FLOAT32 + tolerances.FILTER_BIAS * tolerances.depth_slope(self.pinhole, expected),
+                self.renderer.depth_storage(depth) + centre * tolerances.depth_slope(self.pinhole, expected),
             ),
         }
-        if "Normal" in self.slopes:
+        if "Normal" in self.slopes and "Normal" in seen:
             one_rounding = tolerances.normal_error(self.pinhole, expected, self.slopes["Normal"])
-            floor = tolerances.NORMAL_STORAGE + tolerances.FILTER_BIAS * self.slopes["Normal"]
+            floor = self.renderer.normal + centre * self.slopes["Normal"]
             errors["Normal"] = (tolerances.angle_between(expected["Normal"], seen["Normal"]), one_rounding, floor)
-        if "UV" in self.slopes:
+        if "UV" in self.slopes and "UV" in seen:
             apart = np.abs(expected["UV"][..., :2].astype(np.float64) - seen["UV"][..., :2]).max(axis=-1)
-            floor = tolerances.uv_storage(expected) + tolerances.FILTER_BIAS * self.slopes["UV"]
+            floor = tolerances.uv_storage(expected) + centre * self.slopes["UV"]
             errors["UV"] = (apart, tolerances.uv_error(self.pinhole, expected, self.slopes["UV"]), floor)
         return errors
 

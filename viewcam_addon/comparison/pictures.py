@@ -50,10 +50,11 @@ def png(picture: Picture, scale: NDArray[np.uint8] | None = None) -> bytes:
 
 
 def shaded(image: Image) -> Picture:
-    """Depth, Normal and Object Index as a clay model: a key light, a sky, darker where one thing stands behind another."""
+    """Depth (and, where they are there, Normal and Object Index) as a clay model: a key light, a sky, darker where one thing
+    stands behind another."""
     depth = image["Depth"][..., 0].astype(np.float64)
     hit = depth < BACKGROUND_DEPTH
-    tint = _tints(image["Object Index"][..., 0])
+    tint = _tints(image.passes.get("Object Index", np.zeros((*depth.shape, 1), np.float32))[..., 0])
     light = np.ones(depth.shape)
     if "Normal" in image.passes:
         normal = np.nan_to_num(image["Normal"].astype(np.float64))

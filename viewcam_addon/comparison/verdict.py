@@ -31,6 +31,7 @@ class GeometryComparison:
     roundings : (n,) float64, the error of each compared position over what one rounding of float32 causes there.
     far_from_origin : what the distance from the origin costs, None where that is nothing to speak of.
     origin : the point of the world from which the coordinates of both pictures are counted.
+    lacking : passes that only the reference has.
     """
 
     pinhole: Pinhole
@@ -44,6 +45,7 @@ class GeometryComparison:
     roundings: Array
     far_from_origin: FarFromOrigin | None = None
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    lacking: tuple[str, ...] = ()
 
     @property
     def pixels(self) -> int:
@@ -62,7 +64,7 @@ class GeometryComparison:
     @property
     def passed(self) -> bool:
         """Whether the two are the same picture. False, too, where there was nothing to compare."""
-        systematic_ok = self.systematic is not None and self.systematic.ok
+        systematic_ok = self.systematic is None or self.systematic.ok  # where nothing is compared no row is
         conversion_ok = self.conversion is None or self.conversion.ok
         return systematic_ok and conversion_ok and self.mismatches_ok and all(row.ok for row in self.rows)
 
@@ -106,6 +108,8 @@ class GeometryComparison:
                 f"{'Conversion':<16}{'':>11}  stated camera against the one read back: {c.largest:.1e} px, {c.share:.0%} of "
                 f"what float32 storage allows  {mark(c.ok)}"
             )
+        if self.lacking:
+            table.append(f"{'Not compared':<16}{'':>11}  {', '.join(self.lacking)}: the test picture has none")
         if self.far_from_origin:
             table.append(self.far_from_origin.sentence)
         return [*table, self.sentence]
@@ -127,6 +131,7 @@ class GeometryComparison:
             "conversion": self.conversion and self.conversion.to_json(),
             "far_from_home": self.far_from_origin and self.far_from_origin.to_json(),
             "origin": list(self.origin),
+            "not_compared": list(self.lacking),
         }
 
 
@@ -145,21 +150,24 @@ def _row_line(row: PassErrors) -> str:
 
 
 def _praise(comparison: GeometryComparison) -> str:
-    position = comparison.rows[0]
+    first = comparison.rows[0]
     count = len(comparison.mismatches.kinds)
     edges = f"; {count:,} on edges, {_explained(comparison)}" if count else ""
-    median, nearly_all = (position.values[PERCENTILES.index(p)] for p in (50.0, 99.9))
+    median, nearly_all = (first.values[PERCENTILES.index(p)] for p in (50.0, 99.9))
+    unit = first.unit if first.name == "Position" else "of the depth"
     return (
-        f"The same picture: over {position.count:,} pixels the median is {median:.1e} px off and 99.9 % are within "
-        f"{nearly_all:.1e} px; every one stays within {percent(position.worst[1])} of what float32 allows there{edges}."
+        f"The same picture: over {first.count:,} pixels the median is {median:.1e} {unit} off and 99.9 % are within "
+        f"{nearly_all:.1e} {unit}; every one stays within {percent(first.worst[1])} of what float32 allows there{edges}."
     )
 
 
 def _faults(comparison: GeometryComparison) -> list[str]:
     """What is wrong, the gravest first."""
     faults = []
-    position = comparison.rows[0]
-    if position.count and not (position.ok and comparison.systematic.ok):
+    position, rest = comparison.rows[0], comparison.rows[1:]
+    if position.name != "Position":
+        rest = comparison.rows
+    elif position.count and not (position.ok and comparison.systematic.ok):
         i = PERCENTILES.index(position.worst[0])
         faults.append(
             f"positions are {position.values[i]:.2g} px off at {percentile_name(PERCENTILES[i])}, "
@@ -171,7 +179,7 @@ def _faults(comparison: GeometryComparison) -> list[str]:
             f"{count - explained:,} of {kind}" for kind, (count, explained) in mismatches.counts().items() if count > explained
         )
         faults.append(f"{mismatches.unexplained_count:,} pixels see another surface ({kinds}), {_why_unexplained(comparison)}")
-    for row in comparison.rows[1:]:
+    for row in rest:
         if row.count and not row.ok:
             percentile, share = row.worst
             value = row.values[PERCENTILES.index(percentile)]

@@ -15,9 +15,9 @@ bpy = pytest.importorskip("bpy")
 from viewcam_addon import shots as lists
 from viewcam_addon.batch import comparer
 from viewcam_addon.batch.folder import Outputs
-from viewcam_addon.blender.batch import graphics, pictures
+from viewcam_addon.blender.batch import pictures
 from viewcam_addon.blender.batch.renderer import BlenderRenderer
-from viewcam_addon.blender.rendering import exr
+from viewcam_addon.blender.rendering import exr, graphics
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.shots import Shot

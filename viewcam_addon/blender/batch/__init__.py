@@ -9,5 +9,4 @@ checking.py    whether Cycles and the tracer see the same through a shot's camer
 labelling.py   ground truth of a shot, by the tracer
 scene_files.py the scene for those two, kept from shot to shot
 obstacles.py   why a shot can't be rendered, known before anything is
-graphics.py    whether EEVEE can draw here
 """

@@ -13,7 +13,7 @@ from ...pinhole import Pinhole
 from ...shots import Shot
 from .. import camera as cameras
 from .. import datablocks, versions
-from . import graphics
+from ..rendering import graphics
 from .shot_settings import ShotSettings, engine_name
 
 _DRAWN = (versions.EEVEE, "BLENDER_WORKBENCH")

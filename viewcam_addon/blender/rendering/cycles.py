@@ -98,9 +98,24 @@ def render(
     """
     if not hasattr(scene, "cycles"):
         raise InputError("Cycles is disabled: enable the add-on Cycles Render Engine in Blender's preferences")
-    with written_whole(path) as temporary, overridden() as overrides:
-        still_of_one_layer(overrides, scene, view_layer, camera_object, keep)
+    with overridden() as overrides:
         override_settings(overrides, scene, view_layer, light)
+        render_file(overrides, scene, view_layer, camera_object, path, remedies, threads, keep)
+
+
+def render_file(
+    overrides: Overrides,
+    scene: bpy.types.Scene,
+    view_layer: bpy.types.ViewLayer,
+    camera_object: bpy.types.Object,
+    path: str | os.PathLike[str],
+    remedies: Iterable[Remedy] = (),
+    threads: int | None = None,
+    keep: bool = False,
+) -> None:
+    """Render as `render` does, with the engine and the passes that are set already."""
+    with written_whole(path) as temporary:
+        still_of_one_layer(overrides, scene, view_layer, camera_object, keep)
         _override_file(overrides, scene, temporary)
         if threads:
             overrides.set(scene.render, "threads_mode", "FIXED")
@@ -117,11 +132,11 @@ def override_settings(
 ) -> None:
     """Everything but the file; benchmarks render without one."""
     overrides.set(scene.render, "engine", "CYCLES")
-    _override_all(overrides, scene.cycles, _SAMPLING)
+    override_all(overrides, scene.cycles, _SAMPLING)
     passes = _PASSES
     if light:
         overrides.set(scene.render, "film_transparent", light.film.transparent)
-        _override_all(overrides, scene.cycles, _LIGHT | _settings_of(light))
+        override_all(overrides, scene.cycles, _LIGHT | _settings_of(light))
         passes = _PASSES_OF_LIGHT + (_PASSES_OF_CENTRES if light.samples == 1 else ())
     _override_passes(overrides, view_layer, passes)
 
@@ -135,7 +150,8 @@ def _settings_of(light: LightSettings) -> dict[str, object]:
     return settings
 
 
-def _override_all(overrides: Overrides, owner: bpy.types.bpy_struct, settings: dict[str, object]) -> None:
+def override_all(overrides: Overrides, owner: bpy.types.bpy_struct, settings: dict[str, object]) -> None:
+    """Set the properties that this version has of those in `settings`."""
     for name, value in settings.items():
         if hasattr(owner, name):  # versions know fewer of them
             overrides.set(owner, name, value)

@@ -21,7 +21,7 @@ from ..scenes import materials, recentering
 from ..scenes.export import Lighting, export_scene, level_needed, survey
 from ..scenes.ledger import Ledger
 from ..temporary_settings import Overrides, numbered_indices
-from . import cycles
+from . import cycles, rasters
 
 AUTO = "auto"
 
@@ -36,6 +36,7 @@ class Request:
     that models all light of the scene (levels.py). samples : a pixel, of all of Cycles' pictures together, from level `direct`
     on. clay : whether one and the same material covers all surfaces. trust : whether what is in the file may run and write
     (opening.py). numbered : what `export_and_render` numbers for the index passes where the file does not: objects, materials.
+    engine : CYCLES, or EEVEE or WORKBENCH at level `geometry` (rasters.py).
     """
 
     blend: str | os.PathLike[str] | None = None
@@ -51,6 +52,7 @@ class Request:
     clay: bool = False
     trust: bool = False
     numbered: tuple[str, ...] = ("objects", "materials")
+    engine: str = "CYCLES"
 
 
 @dataclass(frozen=True)
@@ -157,9 +159,11 @@ def _render(
         if stage.is_lit:
             bounces = light.bounces.none if stage.level == "direct" else light.bounces
             picture = cycles.LightSettings(light.film, bounces, share, request.seed + number)
-        cycles.render(
-            stage.scene, stage.view_layer, stage.camera, path, stage.ledger.remedies.values(), request.threads, picture
-        )
+        of, remedies = (stage.scene, stage.view_layer, stage.camera, path), stage.ledger.remedies.values()
+        if request.engine == "CYCLES":
+            cycles.render(*of, remedies, request.threads, picture)
+        else:
+            rasters.render(*of, request.engine, remedies, request.threads)
 
 
 @contextlib.contextmanager

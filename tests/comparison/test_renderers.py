@@ -1,0 +1,126 @@
+"""Pictures made elsewhere: less than all passes is judged as far as it goes, and what an engine encodes is read back."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from viewcam_addon import image
+from viewcam_addon.comparison import renderers
+from viewcam_addon.comparison.geometry import compare
+from viewcam_addon.errors import InputError
+from viewcam_addon.image import BACKGROUND_DEPTH, Image
+
+
+def only(picture, *names):
+    """The picture with these passes alone; Distance is made of its Position."""
+    passes = dict(picture.passes)
+    away = np.linalg.norm(picture["Position"].astype(float) - picture.camera.eye, axis=-1, keepdims=True)
+    passes["Distance"] = np.where(picture["Depth"] < BACKGROUND_DEPTH, away, 0.0).astype(np.float32)
+    return replace(picture, passes={name: passes[name] for name in names})
+
+
+def judged(scene, test, **options):
+    return compare(scene.picture(), test, scene.pinhole, scene.surface_at, partial=True, **options)
+
+
+ENOUGH = [("Depth",), ("Distance",), ("Position",), ("Position", "Depth", "Object Index"), ("Distance", "Normal")]
+
+
+@pytest.mark.parametrize("names", ENOUGH)
+def test_each_of_depth_distance_and_position_is_enough_and_only_what_is_there_is_judged(names, paper_scene):
+    comparison = judged(paper_scene, only(paper_scene.rendered(), *names))
+    assert comparison.passed, "\n".join(comparison.lines())
+    given = {"Depth" if name == "Distance" else name for name in names}
+    assert {row.name for row in comparison.rows} - {"Position depth"} == given - {"Object Index"}
+    assert given | set(comparison.lacking) == {"Depth", "Position", "Normal", "UV", "Object Index", "Material Index"}
+
+
+@pytest.mark.parametrize("names", ENOUGH)
+@pytest.mark.parametrize("off", [(0.02, 0.0), (0.0, -0.02)])
+def test_a_fiftieth_of_a_pixel_is_found_by_each_of_them(names, off, paper_scene):
+    moved = paper_scene.picture(0.5 + off[0], 0.5 + off[1])
+    comparison = compare(paper_scene.picture(), only(moved, *names), paper_scene.pinhole, partial=True)
+    assert not all(row.ok for row in comparison.rows) or len(comparison.mismatches.kinds) > 1000, comparison.sentence
+
+
+def test_with_a_position_alone_a_moved_ball_is_found(paper_scene):
+    other = replace(paper_scene, spheres=((0.001, 0.0, 1.0, 1.0), *paper_scene.spheres[1:]))
+    assert not judged(paper_scene, only(other.picture(), "Position")).passed
+
+
+def test_all_passes_are_asked_of_cycles(paper_scene):
+    with pytest.raises(InputError, match="has no pass 'Normal'"):
+        compare(paper_scene.picture(), only(paper_scene.rendered(), "Depth", "Position"), paper_scene.pinhole)
+
+
+@pytest.mark.parametrize("nothing", [0.0, np.inf, 1e10, 3e38])
+def test_nothing_is_nothing_however_a_renderer_writes_it(nothing, paper_scene):
+    reference = paper_scene.picture()
+    missed = reference["Depth"] >= BACKGROUND_DEPTH
+    assert missed.any()
+    depth = np.where(missed, np.float32(nothing), reference["Depth"])
+    found = renderers.completed(Image({"Depth": depth}), paper_scene.pinhole)
+    assert (found["Depth"] == reference["Depth"]).all() and (found["Position"][missed[..., 0]] == 0).all()
+
+
+@given(values=st.lists(st.floats(-60000, 60000, width=32), min_size=3, max_size=3), index=st.integers(0, 32767))
+def test_halves_add_up_to_what_was_written(values, index):
+    """As the shader parts them: the nearest whole steps first, each part kept as half a float."""
+    given = {"Position": np.array(values), "Normal": np.array(values) / 60000, "Object Index": np.full(3, float(index))}
+    passes = {"Combined": np.ones((1, 1, 4), np.float32)}
+    for name, rest in given.items():
+        rest = rest.astype(np.float32)
+        for part, step in zip(renderers.part_names(name), (*renderers.PARTS[name], None), strict=True):
+            kept = rest if step is None else np.floor((rest + np.float32(step / 2)) / np.float32(step)) * np.float32(step)
+            rest = rest - kept
+            passes[part] = kept.astype(np.float16).astype(np.float32).reshape(1, 1, 3)
+    found = renderers._decoded(Image(passes), "EEVEE")
+    assert found["Object Index"] == index
+    step = 2.0**-24  # half floats have no finer one
+    assert np.abs(found["Position"] - given["Position"]).max() <= step + 2.0**-24 * np.abs(given["Position"]).max()
+    assert np.abs(found["Normal"] - given["Normal"]).max() <= 2.0**-21
+
+
+@given(index=st.integers(0, 32767))
+def test_a_colour_holds_an_index_and_half_a_float_of_it_does(index):
+    digits = [index // renderers.DIGITS**place % renderers.DIGITS / renderers.DIGITS for place in range(3)]
+    # Workbench's pictures are halves, now and then the next lower one.
+    colour = np.nextafter(np.array([*digits, 1.0], np.float16), np.float16(0)).astype(np.float32).reshape(1, 1, 4)
+    picture = Image({"Combined": colour, "Depth": np.full((1, 1, 1), 5.0, np.float32)})
+    assert renderers._decoded(picture, "WORKBENCH")["Object Index"] == index
+
+
+def test_an_edge_that_a_rasteriser_moves_is_explained_and_no_farther_one(paper_scene):
+    edges = renderers.RENDERERS["EEVEE"].edges
+
+    def shifted(off):
+        """Its edges alone: where another object is seen than through the centre, what is seen beside it."""
+        exact, beside = paper_scene.picture(), paper_scene.picture(0.5 + off, 0.5)
+        other = exact["Object Index"] != beside["Object Index"]
+        passes = {name: np.where(other, beside[name], exact[name]) for name in ("Position", "Normal", "Object Index")}
+        return judged(paper_scene, replace(exact, passes=passes), renderer=renderers.RENDERERS["EEVEE"])
+
+    near, far = shifted(0.7 * edges), shifted(0.2)
+    assert near.passed and len(near.mismatches.kinds) >= 1, near.sentence
+    assert far.mismatches.unexplained_count > 5
+
+
+def test_channels_are_found_by_their_whole_name_or_its_end_and_others_are_named(tmp_path):
+    import OpenEXR
+
+    numbers = np.arange(12, dtype=np.float32).reshape(3, 4)
+    channels = {name: numbers + i for i, name in enumerate(("aov.P.X", "aov.P.Y", "aov.P.Z", "Z", "left.Z"))}
+    path = tmp_path / "a.exr"
+    OpenEXR.File({}, channels).write(str(path))
+    read = image.read_channels(path, {"Position": ["P.X", "P.Y", "P.Z"], "Depth": ["Z"]})
+    assert (read["Position"][0, 0] == numbers[-1, 0] + np.arange(3)).all() and (
+        read["Depth"][..., 0] == numbers[::-1] + 3
+    ).all()
+    with pytest.raises(InputError, match=r"no channel 'P.W': name some of .*aov\.P\.X"):
+        image.read_channels(path, {"Depth": ["P.W"]})
+    with pytest.raises(InputError, match=r"several channels 'Q': name one of a\.Q, b\.Q"):
+        OpenEXR.File({}, {"a.Q": numbers, "b.Q": numbers}).write(str(path))
+        image.read_channels(path, {"Depth": ["Q"]})
