@@ -380,7 +380,7 @@ def test_a_pipe_in_place_of_a_file_is_refused_and_not_waited_for(tmp_path, monke
 
 def test_a_pipe_in_place_of_a_sidecar_is_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "shot.json")
-    assert Folder(tmp_path).finished("shot", "hash", check=False) is None
+    assert Folder(tmp_path).finished("shot", "hash") is None
 
 
 def test_a_command_with_blender_leaves_no_folder_among_the_temporary_files(tmp_path):
