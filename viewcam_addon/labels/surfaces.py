@@ -286,23 +286,20 @@ class Silhouettes:
             some = [self._surfaces.instances[number] for number in numbers]
             turned = axes @ np.array([each.inverse[:3, :3].T for each in some])
             eyes = np.array([each.local(eye) for each in some])
-        across, down = (last - first)[numbers].T
-        ends = np.cumsum(across * down)
-        owner = np.repeat(np.arange(len(numbers)), across * down)
-        place = np.arange(ends[-1]) - (ends - across * down)[owner]
-        row, column = np.divmod(place, across[owner])
-        row, column = row + first[numbers, 1][owner], column + first[numbers, 0][owner]
         x, y = (
             camera.view_plane(np.arange(camera.width) + 0.5, 0.5)[0],
             camera.view_plane(0.5, np.arange(camera.height) + 0.5)[1],
         )
-        directions = x[column, None] * turned[owner, 0] + y[row, None] * turned[owner, 1] + turned[owner, 2]
-        rays = core.rays(eyes[owner], directions, np.nextafter(near, 0.0), np.nextafter(far, np.inf))
-        hit = core.closest(rays)[1] >= 0
-        starts = np.concatenate([[0], np.cumsum(hit)[ends - 1]])
-        pixels = (row * camera.width + column)[hit]
-        for number, start, end in zip(numbers.tolist(), starts, starts[1:], strict=False):
-            yield number, pixels[start:end]
+        directions = []
+        for (left, low), (right, high), (across, up, ahead) in zip(first[numbers], last[numbers], turned, strict=True):
+            row = x[left:right, None] * across + ahead
+            directions.append((row + (y[low:high, None] * up)[:, None]).reshape(-1, 3))
+        origins = np.repeat(eyes, [len(each) for each in directions], axis=0)
+        rays = core.rays(origins, np.concatenate(directions), np.nextafter(near, 0.0), np.nextafter(far, np.inf))
+        ends = np.cumsum([len(each) for each in directions])[:-1]
+        for number, hit in zip(numbers.tolist(), np.split(core.closest(rays)[1] >= 0, ends), strict=True):
+            rows, columns = np.divmod(np.flatnonzero(hit), last[number, 0] - first[number, 0])
+            yield number, (rows + first[number, 1]) * camera.width + columns + first[number, 0]
 
     def _reaches(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """From which column and row to before which instances are at most, by their boxes' corners: each (n, 2)."""
