@@ -272,7 +272,7 @@ def sidecar() -> Feed:
 
     from viewcam_addon import shots as lists
     from viewcam_addon.batch import dataset, one, run
-    from viewcam_addon.batch.folder import Folder
+    from viewcam_addon.batch.folder import Folder, Outputs
     from viewcam_addon.cameras.sidecar import record
     from viewcam_addon.errors import InputError, told
     from viewcam_addon.pinhole import Pinhole
@@ -287,9 +287,9 @@ def sidecar() -> Feed:
 
     def batch(folder: Path) -> Folder:
         place = Folder(folder)
-        work = one.in_turn(place, Painter(), settings, True)
+        work = one.in_turn(place, Painter(), settings, Outputs(check=True))
         heard = painting.Listener()
-        run.run(wanted, place, settings, work, heard, resume=True, check=True)
+        run.run(wanted, place, settings, work, heard, resume=True, outputs=Outputs(check=True))
         for _, fields in heard.heard:
             judge(str(fields.get("error", "")))
         return place
