@@ -72,14 +72,16 @@ def check(sides, names=("Combined",)):
         assert off.max() <= FLOAT32 * max(theirs[name].max(), 1), f"{name} is off by {off.max():.2g}\n{told}"
 
 
-@pytest.mark.parametrize("below", ["ShaderNodeBsdfDiffuse", "ShaderNodeEmission", None])
-@pytest.mark.parametrize("most", [0, 1, 2, 8])
+DIFFUSE, GLOWING = "ShaderNodeBsdfDiffuse", "ShaderNodeEmission"
+
+
+@pytest.mark.parametrize(("below", "most"), [(DIFFUSE, 0), (DIFFUSE, 2), (DIFFUSE, 8), (GLOWING, 1), (GLOWING, 2), (None, 1)])
 def test_as_many_panes_are_gone_through_as_in_cycles(stage, both, scene, below, most):
     pane = stage(below)
     pane.node_tree.nodes["Shader"].inputs["Color"].default_value = TINT
     scene.cycles.transparent_max_bounces = most
     scene.render.film_transparent = True
-    if below == "ShaderNodeBsdfDiffuse":
+    if below == DIFFUSE:
         set_black(scene.world)
     sides = both("direct")
     check(sides, ("Combined", "Diffuse Color", "Environment"))
@@ -138,8 +140,7 @@ def deviation(sides):
     return off, ours["Combined"][..., 3].mean() - alphas.mean(), alphas.std(ddof=1)
 
 
-@pytest.mark.parametrize("kind", ["alpha", "mix"])
-@pytest.mark.parametrize("level", ["direct", "path"])
+@pytest.mark.parametrize(("kind", "level"), [("alpha", "path"), ("mix", "direct")])
 def test_what_lets_a_part_of_the_light_through(stage, both, scene, kind, level):
     """Under a sky and a sun, over a floor and nothing; the sky is found by chance and by rays to it alike."""
     pane = stage(above="ShaderNodeBsdfPrincipled" if kind == "alpha" else "ShaderNodeBsdfTransparent")
