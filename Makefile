@@ -110,8 +110,9 @@ tests-5.0 = $(TOUCHING_BLENDER)
 tests-4.2 = $(TOUCHING_BLENDER) $(QUICK)
 tests-5.2 = $(TOUCHING_BLENDER) $(QUICK) tests/batch
 
+# Few examples of each property: make test has the many, and what a version changes, it changes for most of them.
 test-wheel-%: .venvs/%/ready
-	$(call PARALLEL,.venvs/$*) $(tests-$*)
+	$(call PARALLEL,.venvs/$*) --hypothesis-profile=quick $(tests-$*)
 
 test-light: $(WHEELS:%=test-light-%)
 
