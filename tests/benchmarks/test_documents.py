@@ -9,7 +9,7 @@ import pytest
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
-@pytest.mark.parametrize("subject", ["stability", "light", "speed", "scaling", "poses"])
+@pytest.mark.parametrize("subject", ["stability", "light", "speed", "scaling", "poses", "judge"])
 def test_the_page_shows_every_chart_and_the_figures_that_it_was_drawn_from(subject):
     figures = json.loads((DOCS / "charts" / f"{subject}.json").read_text(encoding="utf-8"))
     page = (DOCS / f"{subject}.md").read_text(encoding="utf-8")
