@@ -343,3 +343,21 @@ def test_generated_coordinates_are_those_of_the_mesh_before_it_was_deformed(
     told = met.sum(), *np.percentile(apart, (50, 99, 100))
     # Calibrated: 3e-7, 7e-6, and where the grid is seen edge-on 4.5e-5, of Cycles' barycentric coordinates in float32.
     assert met.sum() > 300 and told[1] < 1e-6 and told[2] < 1e-5 and told[3] < 1e-4, told
+
+
+def test_generated_coordinates_of_a_point_cloud_are_named_since_they_do_not_come_along(
+    scene, camera, add, make_material, node_group
+):
+    material = make_material("Generated", "ShaderNodeEmission")
+    nodes = material.node_tree
+    nodes.links.new(N("TexCoord", output="Generated").add(nodes), nodes.nodes["Shader"].inputs["Color"])
+    data = bpy.data.meshes.new("Point")
+    data.from_pydata([(0, 0, 0)], [], [])
+    tree, source, target = node_group()
+    points, paint = tree.nodes.new("GeometryNodeMeshToPoints"), tree.nodes.new("GeometryNodeSetMaterial")
+    paint.inputs["Material"].default_value = material
+    for output, goal in ((source, points), (points, paint), (paint, target)):
+        tree.links.new(output.outputs[0], goal.inputs[0])
+    add(data, "Drop").modifiers.new("Nodes", "NODES").node_group = tree
+    (entry,) = job.export(job.Request(level="direct")).ledger
+    assert (entry.object, entry.status) == ("Drop", "approximated") and "'generated'" in entry.reason, entry

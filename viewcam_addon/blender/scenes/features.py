@@ -143,7 +143,12 @@ def note_object(
 
 def _note_light(placed: Placed, slots: list[bpy.types.Material | None], ledger: Ledger, shading: Shading) -> None:
     """What matters as soon as there is light."""
-    _, real, parent = placed
+    shown, real, parent = placed
+    if isinstance(shown.data, bpy.types.PointCloud):
+        for asked in sorted(shading.attributes(tuple(slots))):
+            ledger.note(
+                placed.name, "approximated", f"is a point cloud, of which the attribute {asked!r} does not come along: 0"
+            )
     readings = [shading.reading(material) for material in filter(None, slots)]
     if len({reading.vertex for reading in readings} - {None}) > 1:
         ledger.note(placed.name, "approximated", "shows two colour attributes, and only the first comes along")
