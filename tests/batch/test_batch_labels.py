@@ -87,7 +87,7 @@ def test_a_shot_whose_labels_are_not_whole_is_not_finished(folder, painting, spo
     assert not folder.finished("left", "a hash", DEPTH) and not folder.finished("left", "a hash")
 
 
-@pytest.mark.parametrize("file", ["../left.depth.png", "left.png/../../x", "other.png", 7])
+@pytest.mark.parametrize("file", ["../left.depth.png", "left.png/../../x", "other.png", "left.\ud800.png", 7])
 def test_a_sidecar_that_tells_of_files_elsewhere_is_somebody_elses(folder, painting, file):
     render_one(SHOT, folder, painting.Painter(), "a hash", DEPTH)
     record = json.loads(folder.sidecar("left").read_text())

@@ -147,8 +147,13 @@ def _are_labels(told: Any, name: str) -> bool:
         and all(
             isinstance(told.get(key), list) and all(isinstance(each, str) for each in told[key]) for key in ("kinds", "files")
         )
-        and all(file.startswith(f"{name}.") and not set(file) & {"/", "\\", "\0"} for file in told["files"])
+        and all(file.startswith(f"{name}.") and _is_file_name(file) for file in told["files"])
     )
+
+
+def _is_file_name(text: str) -> bool:
+    """Whether it is one of a file in the folder, which text of a damaged sidecar need not be."""
+    return not set(text) & {"/", "\\", "\0"} and text.encode("utf-8", "replace").decode("utf-8") == text
 
 
 def write_json(path: Path, document: Mapping[str, Any]) -> None:
