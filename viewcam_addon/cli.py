@@ -23,6 +23,9 @@ from .errors import InputError, bug
 from .files import check_writable, is_printed_to, written_whole
 from .tracer.scene.film import SAMPLES
 
+_FOLDERS = ("kitti",)
+"""Datasets of labels that are folders, not files."""
+
 
 def main(arguments: Sequence[str] | None = None, blend_is_open: bool = False, ended_by: int | None = None) -> int:
     """Run one sub-command and return its exit status.
@@ -258,16 +261,15 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         trust(added)
         added.add_argument("--size", type=types.size, metavar="WxH", help="pixels, where the file does not say")
 
-    @command("labels", "Gather the labels of a folder's pictures into one file of a dataset.")
+    @command("labels", "Make a dataset of the labels of a folder's pictures.")
     def add_labels(added: argparse.ArgumentParser) -> None:
         from .commands import labels
 
         added.set_defaults(run=labels.run, writes=("output",))
-        added.add_argument("folder", metavar="FOLDER", type=Path, help="where viewcam render --labels masks has written")
-        added.add_argument("output", metavar="OUT.json", type=Path)
-        added.add_argument(
-            "--to", choices=["coco", "panoptic"], default="coco", help="COCO's instances, or its panoptic format"
-        )
+        added.add_argument("folder", metavar="FOLDER", type=Path, help="where viewcam render --labels has written")
+        added.add_argument("output", metavar="OUT", type=Path, help="a file of COCO's; of another format a new folder")
+        words = "COCO's instances (default) or its panoptic format; KITTI's depth and flow"
+        added.add_argument("--to", choices=["coco", "panoptic", *_FOLDERS], default="coco", help=words)
         added.add_argument("--amodal", action="store_true", help="whole objects, in place of what is visible of them")
 
     @command("camera", "List the cameras of another program's file, or write them for a third one.")
@@ -346,7 +348,8 @@ def _check_outputs(options: argparse.Namespace) -> None:
                 raise
     for name in options.writes:
         if path := getattr(options, name):
-            _check_output(path / "index.html" if name == "report" else path, is_text=False)
+            is_folder = name == "report" or getattr(options, "to", None) in _FOLDERS
+            _check_output(path / "index.html" if is_folder else path, is_text=False)
 
 
 def _check_output(path: Path, is_text: bool) -> None:

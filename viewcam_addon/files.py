@@ -81,6 +81,32 @@ def written_together(folder: Path, name: str) -> Iterator[Path]:
             shutil.rmtree(temporary, ignore_errors=True)
 
 
+@contextlib.contextmanager
+def folder_written_whole(folder: Path) -> Iterator[Path]:
+    """Give a temporary folder beside `folder`, and call it that when the block has ended well; else nothing of it stays.
+
+    Raises
+    ------
+    InputError
+        if something stands there that is no empty folder, or it can't be written; FullDiskError if the disk is full.
+    """
+    folder = folder.absolute()
+    with _in_a_sentence(folder):
+        if os.path.lexists(folder) and not (folder.is_dir() and not any(folder.iterdir())):
+            raise InputError(f"{folder} is there already: give the name of a new folder")
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        temporary = folder.with_name(f".{folder.name}-{secrets.token_hex(4)}.labels")
+        temporary.mkdir()
+        try:
+            yield temporary
+            getattr(os, "sync", lambda: None)()  # thousands of small files: at once, and not one by one
+            if folder.exists():
+                folder.rmdir()
+            os.replace(temporary, folder)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
+
+
 def read_bytes(path: str | os.PathLike[str]) -> bytes:
     """The content of a file.
 

@@ -1,21 +1,24 @@
-"""`viewcam labels`: the labels of many pictures as one file of a dataset."""
+"""`viewcam labels`: the labels of many pictures as a dataset: one file, or a folder."""
 
 import argparse
 import json
 
 from ..errors import InputError
 from ..files import written_whole
-from ..labels import coco
+from ..labels import coco, kitti
 from ..terminal import say
 from . import Result
 
 
 def run(options: argparse.Namespace) -> Result:
     if options.amodal and options.to != "coco":
-        raise InputError("--amodal is for COCO's instances: a pixel of a panoptic picture is of one segment")
-    document = coco.panoptic(options.folder) if options.to == "panoptic" else coco.instances(options.folder, options.amodal)
-    with written_whole(options.output) as temporary:
-        temporary.write_text(json.dumps(document) + "\n", encoding="utf-8")
-    counts = {name: len(document[name]) for name in ("images", "annotations", "categories")}
+        raise InputError("--amodal is for COCO's instances: other formats have a place for either mask, or for one")
+    if options.to == "kitti":
+        counts = kitti.write(options.folder, options.output)
+    else:
+        document = coco.panoptic(options.folder) if options.to == "panoptic" else coco.instances(options.folder, options.amodal)
+        with written_whole(options.output) as temporary:
+            temporary.write_text(json.dumps(document) + "\n", encoding="utf-8")
+        counts = {name: len(document[name]) for name in ("images", "annotations", "categories")}
     say(f"{options.output}: " + ", ".join(f"{count:,} {name}" for name, count in counts.items()))
     return 0, {"output": str(options.output), **counts}

@@ -5,6 +5,7 @@ Each appears whole, and the JSON last: where it stands, so do the others. An old
 
 import json
 import struct
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -98,6 +99,28 @@ def read(path: Path) -> dict[str, Any]:
     if not (is_one and is_whole):
         raise InputError(f"{path} is of another version or format: write it again with viewcam render --labels")
     return told
+
+
+def name(path: Path) -> str:
+    """What a label file's picture is called, and all that belongs to it: shot of shot.labels.json."""
+    return path.name.removesuffix(".labels.json")
+
+
+def passes(path: Path, told: dict[str, Any], wanted: Sequence[str]) -> dict[str, NDArray[np.float32]]:
+    """Those passes of a label file's EXR that it has: (height, width, channels), rows from the **top**.
+
+    Raises
+    ------
+    InputError
+        if they can't be read, or are of another picture.
+    """
+    chosen = [each for each in wanted if each in told.get("passes", ())]
+    if not chosen:
+        return {}
+    found = image.read(path.with_name(f"{name(path)}.labels.exr"), chosen)
+    if found.size != (told["camera"]["width"], told["camera"]["height"]):
+        raise InputError(f"{path} is of another picture than {found.source}: write both again with viewcam render --labels")
+    return {each: found[each][::-1] for each in chosen}
 
 
 def _told(path: Path, labels: Labels, names: list[str], depth_steps: float) -> dict[str, Any]:
