@@ -290,7 +290,7 @@ def test_the_menu_entry_goes_with_the_add_on(registered_addon, menu, entry):
     try:
         for _ in range(3):
             viewcam_addon.unregister()
-            assert len(functions()) == count - 2  # that of the cameras as well
+            assert len(functions()) == count - 1
             viewcam_addon.register()
             assert len(functions()) == count
     finally:

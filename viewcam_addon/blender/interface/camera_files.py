@@ -18,7 +18,6 @@ from .. import datablocks
 from . import clipboard, file_menu
 from .camera_options import READING, ReadingOptions, WorldOptions
 
-_MENU_TEXT = "Cameras (COLMAP, fSpy, pbrt, …)"
 _DROPPED = ".json;.txt;.bin;.xml;.yaml;.yml;.fspy;.sfm;.xmp;.out;.npy;.csv;.pbrt;.pov"
 _MOST_NOTES = 12
 
@@ -232,22 +231,4 @@ class VIEWCAM_FH_cameras(bpy.types.FileHandler):
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
-def _draw_export(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
-    menu.layout.operator("viewcam.export_cameras", text=_MENU_TEXT)
-
-
-def _draw_import(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
-    menu.layout.operator("viewcam.import_cameras", text=_MENU_TEXT)
-
-
 CLASSES = (VIEWCAM_OT_import_cameras, VIEWCAM_OT_export_cameras, VIEWCAM_FH_cameras)
-
-
-def register() -> None:
-    bpy.types.TOPBAR_MT_file_export.append(_draw_export)
-    bpy.types.TOPBAR_MT_file_import.append(_draw_import)
-
-
-def unregister() -> None:
-    bpy.types.TOPBAR_MT_file_import.remove(_draw_import)
-    bpy.types.TOPBAR_MT_file_export.remove(_draw_export)

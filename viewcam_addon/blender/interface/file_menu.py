@@ -1,4 +1,4 @@
-"""File › Export and File › Import: Virtual Pinhole Scene, and what could not come along.
+"""File › Export and File › Import: Virtual Pinhole Scene, and what could not come along; entries of camera_files.py as well.
 
 The export is that of `viewcam export` (job.py), at the current frame through the scene's camera; the import is that of
 import_scene.py, also for a file that is dropped on a viewport. What is not whole in the ledger is summed up in a report and
@@ -19,7 +19,7 @@ from .. import datablocks
 from . import readouts
 
 _SUFFIX = ".json"
-_MENU_TEXT = "Virtual Pinhole Scene (.json)"
+_ENTRIES = (("scene", "Virtual Pinhole Scene (.json)"), ("cameras", "Cameras (COLMAP, fSpy, pbrt, …)"))
 _POPUP_ENTRIES = 12
 _POPUP_WIDTH = 480
 
@@ -185,11 +185,13 @@ def show(lines: Sequence[tuple[str, str]], title: str, context: bpy.types.Contex
 
 
 def _draw_export(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
-    menu.layout.operator("viewcam.export_scene", text=_MENU_TEXT)
+    for what, text in _ENTRIES:
+        menu.layout.operator(f"viewcam.export_{what}", text=text)
 
 
 def _draw_import(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
-    menu.layout.operator("viewcam.import_scene", text=_MENU_TEXT)
+    for what, text in _ENTRIES:
+        menu.layout.operator(f"viewcam.import_{what}", text=text)
 
 
 CLASSES = (VIEWCAM_OT_export_scene, VIEWCAM_OT_import_scene, VIEWCAM_FH_scene)
