@@ -49,7 +49,7 @@ ROOMS = {
     "datasets": "files pinhole cameras",
     "comparison": "errors files html_page pinhole image png",
     "tracer": "errors checks memory files pinhole image",
-    "labels": "errors files png pinhole image tracer",
+    "labels": "errors files png pinhole image cameras tracer",
     "api": "errors child_process image comparison tracer labels",
     "pytest_plugin": "errors junit api",
     "shots": "errors checks files terminal pinhole moves tracer",

@@ -23,7 +23,7 @@ from .errors import InputError, bug
 from .files import check_writable, is_printed_to, written_whole
 from .tracer.scene.film import SAMPLES
 
-_FOLDERS = ("kitti",)
+_FOLDERS = ("bop", "kitti")
 """Datasets of labels that are folders, not files."""
 
 
@@ -268,7 +268,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         added.set_defaults(run=labels.run, writes=("output",))
         added.add_argument("folder", metavar="FOLDER", type=Path, help="where viewcam render --labels has written")
         added.add_argument("output", metavar="OUT", type=Path, help="a file of COCO's; of another format a new folder")
-        words = "COCO's instances (default) or its panoptic format; KITTI's depth and flow"
+        words = "COCO's instances (default) or its panoptic format; a scene of BOP's; KITTI's depth and flow"
         added.add_argument("--to", choices=["coco", "panoptic", *_FOLDERS], default="coco", help=words)
         added.add_argument("--amodal", action="store_true", help="whole objects, in place of what is visible of them")
 

@@ -5,16 +5,18 @@ import json
 
 from ..errors import InputError
 from ..files import written_whole
-from ..labels import coco, kitti
+from ..labels import bop, coco, kitti
 from ..terminal import say
 from . import Result
+
+_FOLDERS = {"bop": bop, "kitti": kitti}
 
 
 def run(options: argparse.Namespace) -> Result:
     if options.amodal and options.to != "coco":
         raise InputError("--amodal is for COCO's instances: other formats have a place for either mask, or for one")
-    if options.to == "kitti":
-        counts = kitti.write(options.folder, options.output)
+    if options.to in _FOLDERS:
+        counts = _FOLDERS[options.to].write(options.folder, options.output)
     else:
         document = coco.panoptic(options.folder) if options.to == "panoptic" else coco.instances(options.folder, options.amodal)
         with written_whole(options.output) as temporary:

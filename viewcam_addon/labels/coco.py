@@ -24,7 +24,7 @@ def instances(folder: Path, amodal: bool = False) -> Document:
     kind = "amodal" if amodal else "visible"
     annotations: list[Document] = []
     for number, (path, told) in enumerate(pictures, start=1):
-        for each in _with(kind, path, told):
+        for each in with_mask(kind, path, told):
             annotations.append(
                 {
                     "id": len(annotations) + 1,
@@ -51,7 +51,7 @@ def panoptic(folder: Path) -> Document:
                 "bbox": each["visible"]["bbox"],
                 "iscrowd": 0,
             }
-            for each in _with("visible", path, told)
+            for each in with_mask("visible", path, told)
         ]
         file_name = files.of_picture(Path(told["picture"]), "instances.png").name
         annotations.append({"image_id": number, "file_name": file_name, "segments_info": segments})
@@ -80,7 +80,7 @@ def found(folder: Path) -> tuple[list[tuple[Path, Document]], dict[str, int]]:
     return pictures, {name: number for number, name in enumerate(names, start=1)}
 
 
-def _with(kind: str, path: Path, told: Document) -> Sequence[Document]:
+def with_mask(kind: str, path: Path, told: Document) -> Sequence[Document]:
     """The instances that have such a mask."""
     label = "masks" if kind == "visible" else kind
     if any(kind not in each for each in told["instances"]):

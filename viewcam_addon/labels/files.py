@@ -3,9 +3,10 @@
 Each appears whole, and the JSON last: where it stands, so do the others. An older one goes first.
 """
 
+import contextlib
 import json
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -99,6 +100,17 @@ def read(path: Path) -> dict[str, Any]:
     if not (is_one and is_whole):
         raise InputError(f"{path} is of another version or format: write it again with viewcam render --labels")
     return told
+
+
+@contextlib.contextmanager
+def understood(path: Path) -> Iterator[None]:
+    """What a label file lacks that the block wants of it, as the sentence of `read`."""
+    try:
+        yield
+    except InputError:
+        raise
+    except (ValueError, LookupError, TypeError, AttributeError) as error:
+        raise InputError(f"{path} is no label file that can be read: write it again with viewcam render --labels") from error
 
 
 def name(path: Path) -> str:

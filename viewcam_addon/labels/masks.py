@@ -25,6 +25,13 @@ def described(pixels: NDArray[np.intp], shape: tuple[int, int]) -> dict[str, Any
     return {"area": len(pixels), "bbox": box, "segmentation": {"size": list(shape), "counts": counts}}
 
 
+def decoded(segmentation: dict[str, Any]) -> NDArray[np.bool_]:
+    """(height, width), rows from the **top**: the mask of uncompressed run lengths. Raises ValueError if they don't fill it."""
+    height, width = segmentation["size"]
+    counts = segmentation["counts"]
+    return np.repeat(np.arange(len(counts)) % 2 == 1, counts).reshape(width, height).T
+
+
 def _run_lengths(places: NDArray[np.intp], size: int) -> list[int]:
     """Lengths of runs, of zeros first (0 where the first pixel is set), of the places in order that are set."""
     breaks = np.flatnonzero(np.diff(places) > 1)
