@@ -23,7 +23,7 @@ from .errors import InputError, bug
 from .files import check_writable, is_printed_to, written_whole
 from .tracer.scene.film import SAMPLES
 
-_FOLDERS = ("bop", "kitti")
+_FOLDERS = ("bop", "colmap", "kitti")
 """Datasets of labels that are folders, not files."""
 
 
@@ -268,9 +268,11 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         added.set_defaults(run=labels.run, writes=("output",))
         added.add_argument("folder", metavar="FOLDER", type=Path, help="where viewcam render --labels has written")
         added.add_argument("output", metavar="OUT", type=Path, help="a file of COCO's; of another format a new folder")
-        words = "COCO's instances (default) or its panoptic format; a scene of BOP's; KITTI's depth and flow"
+        words = "COCO's instances (default) or panoptic format; BOP's scene; COLMAP's points and tracks; KITTI's depth and flow"
         added.add_argument("--to", choices=["coco", "panoptic", *_FOLDERS], default="coco", help=words)
         added.add_argument("--amodal", action="store_true", help="whole objects, in place of what is visible of them")
+        words = "for COLMAP: points that are sampled in each picture (default: 1000)"
+        added.add_argument("--points", type=types.positive, metavar="N", help=words)
 
     @command("camera", "List the cameras of another program's file, or write them for a third one.")
     def add_camera(added: argparse.ArgumentParser) -> None:

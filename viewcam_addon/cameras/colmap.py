@@ -1,10 +1,10 @@
-"""A COLMAP model: text and binary in; text out, and binary by colmap_binary.py; and a points3D without points, since none are
-known.
+"""A COLMAP model: text and binary in; text out, and binary by colmap_binary.py; and a points3D without points where none are
+known: labels/colmap.py knows some.
 
 **Cameras.** One for each set of intrinsics that the pictures have: SIMPLE_PINHOLE (f, cx, cy) where pixels are square, else
 PINHOLE (fx, fy, cx, cy). The upper left corner of the picture is (0, 0), its first pixel's centre (0.5, 0.5).
 
-**Images.** In text two lines each, the second one empty where written here: it would list image points. The pose takes world
+**Images.** In text two lines each, the second one a list of image points, empty where there are none. The pose takes world
 space to the camera's x right, y down, z into the view, as a unit quaternion (w first, Hamilton's) and a translation. All
 numbers have as many digits as bring back the same float64. Comments before them have the values of which they were made; a
 binary model, in which COLMAP leaves no room, has these in a file of their own beside it. Of text and binary in one folder the
@@ -80,6 +80,18 @@ class _Image(NamedTuple):
     quaternion: tuple[float, ...]
     translation: tuple[float, ...]
     camera: int
+
+
+class Tracks(NamedTuple):
+    """Points in world space, and where pictures show them.
+
+    positions : (n, 3). colours : (n, 3), 0 … 255. shown : of each picture the numbers of the points that it shows, (m,) from 0,
+    and their places, (m, 2): x to the right and y down from the picture's corner.
+    """
+
+    positions: np.ndarray
+    colours: np.ndarray
+    shown: Sequence[tuple[np.ndarray, np.ndarray]]
 
 
 def recognises(source: Source) -> bool:
@@ -286,8 +298,10 @@ def check_names(files: Iterable[str]) -> None:
         raise InputError(f"a COLMAP model can't name a picture with a space, as {naming.several(parted)}: rename it")
 
 
-def texts(cameras: Iterable[Camera]) -> dict[str, str]:
-    """Name of the file → what it holds; cameras and images are numbered from 1, in their order.
+def texts(cameras: Iterable[Camera], tracks: Tracks | None = None) -> dict[str, str]:
+    """Name of the file → what it holds; cameras, images and points are numbered from 1, in their order.
+
+    tracks : of the cameras' pictures, in their order; without them there are no points.
 
     Raises
     ------
@@ -297,18 +311,37 @@ def texts(cameras: Iterable[Camera]) -> dict[str, str]:
     cameras = naming.checked(cameras, "a COLMAP model")
     check_names(map(naming.image_of, cameras))
     numbers: dict[str, int] = {}
+    places, points = _points(tracks, len(cameras))
     images = []
-    for number, camera in enumerate(cameras, start=1):
+    for number, (camera, line) in enumerate(zip(cameras, places, strict=True), start=1):
         intrinsic = numbers.setdefault(_camera(camera.pinhole), len(numbers) + 1)
-        images.append(f"{number} {_spaced(*pose_of(camera.pinhole))} {intrinsic} {naming.image_of(camera)}\n\n")
+        images.append(f"{number} {_spaced(*pose_of(camera.pinhole))} {intrinsic} {naming.image_of(camera)}\n{line}\n")
     return {
         "images.txt": "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME\n# POINTS2D[] as X Y POINT3D_ID\n"
         + comments(cameras)
         + "".join(images),
         "cameras.txt": "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n"
         + "".join(f"{number} {camera}\n" for camera, number in numbers.items()),
-        "points3D.txt": "# POINT3D_ID X Y Z R G B ERROR TRACK[] as IMAGE_ID POINT2D_IDX\n",
+        "points3D.txt": "# POINT3D_ID X Y Z R G B ERROR TRACK[] as IMAGE_ID POINT2D_IDX\n" + points,
     }
+
+
+def _points(tracks: Tracks | None, images: int) -> tuple[list[str], str]:
+    """The second line of each image, and the lines of points3D.txt. Their error is 0: places are projections."""
+    if tracks is None:
+        return images * [""], ""
+    shown_in: list[list[str]] = [[] for _ in tracks.positions]
+    lines = []
+    for image, (points, places) in enumerate(tracks.shown, start=1):
+        found = list(zip(points.tolist(), places.tolist(), strict=True))
+        lines.append(" ".join(f"{_spaced(*place)} {point + 1}" for point, place in found))
+        for index, (point, _) in enumerate(found):
+            shown_in[point].append(f"{image} {index}")
+    told = zip(tracks.positions.tolist(), tracks.colours.tolist(), shown_in, strict=True)
+    return lines, "".join(
+        f"{number} {_spaced(*position)} {_spaced(*colour)} 0.0 {' '.join(track)}\n"
+        for number, (position, colour, track) in enumerate(told, start=1)
+    )
 
 
 def comments(cameras: Iterable[Camera]) -> str:

@@ -27,7 +27,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import cameras
-from ..cameras.source import image_size
 from ..errors import InputError
 from ..files import folder_written_whole
 from ..pinhole import Pinhole
@@ -40,9 +39,6 @@ _MILLIMETRES = 1000.0
 
 _SAME = 1e-6
 """What figures of one object may differ in from picture to picture: float32's rounding of a matrix, and a little more."""
-
-_PICTURES = {".png": ".png", ".jpg": ".jpg", ".jpeg": ".jpg"}
-"""Suffixes, and what BOP calls them."""
 
 
 def write(folder: Path, output: Path) -> dict[str, int]:
@@ -173,18 +169,13 @@ def _camera(told: Document) -> Document:
 
 
 def _copy_rgb(path: Path, told: Document, output: Path, number: int) -> bool:
-    """Whether there is one."""
-    for suffix, theirs in _PICTURES.items():
-        picture = path.with_name(f"{files.name(path)}{suffix}")
-        size = image_size(picture)
-        if size is None:
-            continue
-        if size != (told["camera"]["width"], told["camera"]["height"]):
-            raise InputError(f"{picture} has {size[0]} × {size[1]} pixels and its labels have others: render both anew")
-        (output / "rgb").mkdir(exist_ok=True)
-        shutil.copyfile(picture, output / "rgb" / f"{number:06d}{theirs}")
-        return True
-    return False
+    """Whether there is a picture."""
+    picture = files.photograph(path, told)
+    if picture is None:
+        return False
+    (output / "rgb").mkdir(exist_ok=True)
+    shutil.copyfile(picture, output / "rgb" / f"{number:06d}{picture.suffix.replace('jpeg', 'jpg')}")
+    return True
 
 
 def _lines(values: dict[str, Any]) -> str:

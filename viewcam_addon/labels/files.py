@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import image
+from ..cameras.source import image_size
 from ..errors import InputError
 from ..files import check_writable, is_replaced, read_bytes, written_whole
 from ..image import BACKGROUND_DEPTH
@@ -116,6 +117,23 @@ def understood(path: Path) -> Iterator[None]:
 def name(path: Path) -> str:
     """What a label file's picture is called, and all that belongs to it: shot of shot.labels.json."""
     return path.name.removesuffix(".labels.json")
+
+
+def photograph(path: Path, told: dict[str, Any]) -> Path | None:
+    """The PNG or JPEG of what a label file tells of, if one stands beside it.
+
+    Raises
+    ------
+    InputError
+        if it has another size.
+    """
+    found = (path.with_name(f"{name(path)}{suffix}") for suffix in (".png", ".jpg", ".jpeg"))
+    for picture, size in ((each, image_size(each)) for each in found):
+        if size == (told["camera"]["width"], told["camera"]["height"]):
+            return picture
+        if size:
+            raise InputError(f"{picture} has {size[0]} × {size[1]} pixels and its labels have others: render both anew")
+    return None
 
 
 def passes(path: Path, told: dict[str, Any], wanted: Sequence[str]) -> dict[str, NDArray[np.float32]]:

@@ -1,0 +1,168 @@
+"""COLMAP's points and tracks: pycolmap reads and adjusts them, and rays in the scene say what each picture really sees."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import viewcam_addon as vp
+from viewcam_addon.cli import main
+from viewcam_addon.labels import colmap, files
+from viewcam_addon.labels.surfaces import Surfaces
+from viewcam_addon.png import encoded
+
+from .conftest import CAMERA, moved, room
+
+EYES = [(1.0, -7, 3), (2.2, -6.5, 3.4), (-1.5, -6.5, 2.6), (1.5, 8, 3.5)]  # the last one sees all from behind
+
+# Points are off their surface by depth's rounding to float32, 2⁻²⁵ of it along the ray of one picture; along the ray of another
+# one that meets the surface at an angle by up to 100 times as much.
+SLACK = 100 * 2.0**-24
+
+
+def labelled(folder, scenes, kinds=("depth", "masks")):
+    for i, scene in enumerate(scenes):
+        files.write(folder / f"{i}.exr", vp.label(scene, kinds))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Four pictures of a room that stands still, and their model."""
+    scenes = [room(replace(CAMERA, eye=eye)) for eye in EYES]
+    shots = labelled(tmp_path_factory.mktemp("colmap") / "shots", scenes)
+    assert main(["labels", str(shots), str(shots.parent / "model"), "--to", "colmap", "--points", "600"]) == 0
+    return SimpleNamespace(scenes=scenes, shots=shots, model=shots.parent / "model")
+
+
+def points_of(model):
+    """By hand: positions, colours, and which image shows which point, (points, images)."""
+    lines = [line.split() for line in (model / "points3D.txt").read_text().splitlines() if not line.startswith("#")]
+    shown = np.zeros((len(lines), len(list(model.parent.glob("shots/*.json")))), bool)
+    for i, line in enumerate(lines):
+        shown[i, np.array(line[8::2], int) - 1] = True
+    return np.array([line[1:4] for line in lines], float), np.array([line[4:7] for line in lines], int), shown
+
+
+def really_seen(scene, positions):
+    none = np.full(len(positions), -1)
+    return Surfaces(scene).seen_first(positions, none, none, SLACK)
+
+
+def reconstruction(written):
+    return pytest.importorskip("pycolmap").Reconstruction(written.model)
+
+
+def test_pycolmap_reads_it_and_each_track_projects_to_its_places(written):
+    model = reconstruction(written)
+    assert [model.images[i].name for i in sorted(model.images)] == ["0.exr", "1.exr", "2.exr", "3.exr"]
+    assert model.is_valid() and model.num_points3D() > 1000
+    worst, count = 0.0, 0
+    for point in model.points3D.values():
+        assert point.track.length() >= 2
+        for each in point.track.elements:
+            image = model.images[each.image_id]
+            worst = max(worst, np.abs(image.project_point(point.xyz) - image.points2D[each.point2D_idx].xy).max())
+            count += 1
+    assert count == sum(image.num_points3D for image in model.images.values())
+    assert worst <= 1e-9, f"a point projects {worst:.3g} pixels beside its place"
+
+
+def test_what_a_track_names_rays_see_and_few_pictures_that_see_a_point_are_not_named(written):
+    positions, _, shown = points_of(written.model)
+    seen = np.stack([really_seen(scene, positions) for scene in written.scenes], axis=1)
+    assert not (shown & ~seen).any(), f"{(shown & ~seen).sum()} of {shown.sum()} places are hidden"
+    assert (shown & seen).sum() >= 0.85 * seen.sum(), f"{shown.sum()} of {seen.sum()} places are found"
+    assert not seen.all(), "the test wants hidden points"
+
+
+def test_that_test_finds_a_test_of_depth_that_lets_all_pass(written, tmp_path, monkeypatch):
+    monkeypatch.setattr(colmap, "_ROUNDING", 1.0)
+    colmap.write(written.shots, tmp_path / "model", 600)
+    (tmp_path / "shots").symlink_to(written.shots)
+    positions, _, shown = points_of(tmp_path / "model")
+    seen = np.stack([really_seen(scene, positions) for scene in written.scenes], axis=1)
+    assert (shown & ~seen).any()
+
+
+@pytest.mark.parametrize("disturbed", [False, True])
+def test_a_bundle_adjustment_moves_no_camera_and_brings_one_back_that_was_moved(written, disturbed):
+    pycolmap = pytest.importorskip("pycolmap")
+    model = reconstruction(written)
+    before = {number: image.cam_from_world().matrix() for number, image in model.images.items()}
+    if disturbed:
+        away = np.random.default_rng(1)
+        for point in model.points3D.values():
+            point.xyz = point.xyz + away.normal(scale=0.01, size=3)
+        frame = model.frames[model.images[3].frame_id]
+        turn = pycolmap.Rotation3d(np.array([0.002, -0.001, 0.003]))
+        pose = frame.rig_from_world
+        frame.rig_from_world = pycolmap.Rigid3d(turn * pose.rotation, pose.translation + np.array([0.02, -0.01, 0.03]))
+        assert np.abs(model.images[3].cam_from_world().matrix() - before[3]).max() > 0.01
+    config, options = pycolmap.BundleAdjustmentConfig(), pycolmap.BundleAdjustmentOptions()
+    for number in model.images:
+        config.add_image(number)
+    for number in model.cameras:
+        config.set_constant_cam_intrinsics(number)
+    config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
+    options.print_summary = False
+    pycolmap.create_default_bundle_adjuster(options, config, model).solve()
+    off = max(np.abs(image.cam_from_world().matrix() - before[number]).max() for number, image in model.images.items())
+    scene = 10.0  # from the cameras to the farthest points
+    assert off <= 1e-6 * scene, f"a camera was moved by {off:.3g}"
+
+
+def test_what_moves_from_picture_to_picture_has_no_track_from_one_to_the_other(tmp_path):
+    """The first two pictures have the cubes here, the others there: where they were, the floor is seen now."""
+    there = np.array([moved(1.6, 0.5, 0.4, 0.3, 0.4), moved(0.3, 2, 0.8, 0.1, 0.8)])
+    scenes = [room(replace(CAMERA, eye=eye), cubes=there if i > 1 else None) for i, eye in enumerate(EYES)]
+    shots = labelled(tmp_path / "shots", scenes)
+    colmap.write(shots, tmp_path / "model")
+    _, colours, shown = points_of(tmp_path / "model")
+    ids = colours @ [1, 256, 65536]
+    labels = vp.label(scenes[0], ("masks",)).instances
+    still, moving = (next(each["id"] for each in labels if (each["name"], each["number"]) == ("Cube", i)) for i in range(2))
+    crosses = shown[:, :2].any(axis=1) & shown[:, 2:].any(axis=1)
+    assert (ids == moving).sum() > 10 and not crosses[ids == moving].any()
+    assert crosses[ids == still].any() and crosses[ids == next(each["id"] for each in labels if each["name"] == "Floor")].any()
+
+
+def test_points_lie_evenly_over_what_is_shown():
+    state = np.zeros((48, 64), int)
+    found = colmap._sampled(0, CAMERA, np.full((48, 64), 5.0), state, state.astype(np.float32), 192)
+    column, row, _ = CAMERA.project(found.positions)
+    counts = np.histogram2d(row, column, bins=(6, 8), range=((0, 48), (0, 64)))[0]
+    assert counts.sum() == 192 and counts.min() > 0
+    assert counts.std() <= 1.2, f"4 are wanted in each 8 × 8 pixels; they spread by {counts.std():.3g}, and thrown dice's by 2"
+
+
+def test_the_same_labels_give_the_same_bytes(written, tmp_path):
+    colmap.write(written.shots, tmp_path / "again", 600)
+    one, two = ({path.name: path.read_bytes() for path in folder.iterdir()} for folder in (written.model, tmp_path / "again"))
+    assert one == two and set(one) == {"cameras.txt", "images.txt", "points3D.txt"}
+
+
+def test_a_picture_beside_its_labels_is_the_one_that_is_named(tmp_path):
+    shots = labelled(tmp_path / "shots", [room()])
+    (shots / "0.png").write_bytes(encoded(np.zeros((48, 64, 3), np.uint8)))
+    assert colmap.write(shots, tmp_path / "model") == {"images": 1, "points": 0, "observations": 0}
+    assert " 1 0.png\n" in (tmp_path / "model" / "images.txt").read_text()
+
+
+@pytest.mark.parametrize(
+    ("name", "kinds", "words", "sentence"),
+    [
+        ("a", ("depth",), [], "a.labels.json has no masks: render it with --labels depth,masks"),
+        ("a", ("masks",), [], "a.labels.json has no depth: render it with --labels depth,masks"),
+        ("a b", ("depth", "masks"), [], "can't name a picture with a space"),
+        ("a", ("depth", "masks"), ["--to", "bop", "--points", "9"], "--points are those of a COLMAP model"),
+    ],
+)
+def test_what_can_not_be_written_is_one_sentence_and_leaves_no_folder(tmp_path, capfd, name, kinds, words, sentence):
+    files.write(tmp_path / f"{name}.exr", vp.label(room(), kinds))
+    before = sorted(path.name for path in tmp_path.iterdir())
+    assert main(["labels", str(tmp_path), str(tmp_path / "out"), "--to", "colmap", *words]) == 2
+    (line,) = capfd.readouterr().err.strip().splitlines()
+    assert sentence in line and "bug" not in line
+    assert sorted(path.name for path in tmp_path.iterdir()) == before, "something was left behind"
