@@ -64,8 +64,7 @@ def test_an_edit_passes_few_functions_and_none_calls_upward(posed_camera, name, 
     functions, upward = walk_of(lambda: setattr(group, name, EDITS[name]))
     assert ("camera", "place") in functions
     assert not upward, upward
-    more = 1 if name == "distance" else 0  # it is told in which picture it is counted
-    assert len(functions) <= MOST + more, sorted(functions)
+    assert len(functions) <= MOST, sorted(functions)
 
 
 def test_no_edit_calls_upward_whatever_the_camera_is_set_to(posed_camera, empty):

@@ -59,16 +59,19 @@ _on_edited = _edit_of(*cameras.ALL)
 _on_lens = _edit_of("distance")
 
 
-def _on_distance(group: "VirtualPinhole", context: bpy.types.Context) -> None:
+def _on_distance(group: "VirtualPinhole", _context: bpy.types.Context) -> None:
     """Who states a distance means the pixels of the picture as it is now."""
+    if storage.is_storing:
+        return
     camera_object = group.id_data
-    if not storage.is_storing:
-        with contextlib.suppress(InputError):  # the panel finds the same error and shows it
-            picture = without_border(datablocks.frame_of(datablocks.scene_of(camera_object)))
-            values = storage.load(camera_object)
-            if values.counted_in != picture and not storage.is_counted_in_earlier(camera_object, values):
-                storage.store(camera_object, replace(values, counted_in=picture), "counted_in")
-    _on_lens(group, context)
+    with contextlib.suppress(InputError):  # the panel finds the same error and shows it
+        scene = datablocks.scene_of(camera_object)
+        picture = without_border(datablocks.frame_of(scene))
+        values = storage.load(camera_object)
+        if values.counted_in != picture and not storage.is_counted_in_earlier(camera_object, values):
+            storage.store(camera_object, replace(values, counted_in=picture), "counted_in")
+        if group.enabled:
+            cameras.follow(camera_object, scene, frozenset({"distance"}))
 
 
 def _on_keeps(group: "VirtualPinhole", context: bpy.types.Context) -> None:
