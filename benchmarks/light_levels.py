@@ -20,7 +20,6 @@ from pathlib import Path
 from benchmarks import race
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import Scene, scene_file
-from viewcam_addon.tracer.scene.film import NO_BOUNCES
 from viewcam_addon.tracer.scene.lamps import World
 
 SCENES = Path(__file__).resolve().parent.parent / "sample_scenes"
@@ -107,7 +106,9 @@ def prepare_cycles(contest: Contest, path: Path, threads: int) -> dict[str, race
     scene.render.resolution_x, scene.render.resolution_y = contest.size
     exported = export_scene(scene, view_layer, camera_object, ledger, lit=True)
     scene_file.write(exported, path)
-    light = cycles.LightSettings(exported.film, NO_BOUNCES if contest.level == "direct" else exported.bounces, contest.samples)
+    light = cycles.LightSettings(
+        exported.film, exported.bounces.none if contest.level == "direct" else exported.bounces, contest.samples
+    )
 
     def picture() -> float:
         with overridden() as overrides:

@@ -13,7 +13,6 @@ from viewcam_addon.blender.scenes.export import export_scene
 from viewcam_addon.blender.scenes.ledger import Ledger, Remedy
 from viewcam_addon.blender.temporary_settings import Overrides, still_of_one_layer
 from viewcam_addon.tracer.scene import scene_file
-from viewcam_addon.tracer.scene.film import NO_BOUNCES
 
 from .. import race, suzannes
 
@@ -51,7 +50,9 @@ def prepare(
         if level == "geometry":
             return None
         samples = int(parameter) if sampling == "samples" else _MOST_SAMPLES
-        return cycles.LightSettings(exported.film, NO_BOUNCES if level == "direct" else exported.bounces, samples, seed)
+        return cycles.LightSettings(
+            exported.film, exported.bounces.none if level == "direct" else exported.bounces, samples, seed
+        )
 
     overrides = Overrides(contextlib.ExitStack())  # given back with the process
     still_of_one_layer(overrides, scene, view_layer, camera_object)
