@@ -223,7 +223,7 @@ template <bool ANY, class Visit> inline void traverse_packet(const Bvh& bvh, Pac
                 for (; at > base && stack[at - 1].distance < distance[i]; at--) stack[at] = stack[at - 1];
                 stack[at] = {node.child[i], entry.child, distance[i], uint16_t(i), uint16_t(group)};
             }
-        } else if (group < groups) {
+        } else if (group < groups && entry.child != NOTHING) {  // see traverse
             bool nearer = false;
             for (int g = group; g < groups; g++) {
                 if (g > group) rays = parent ? rays_of(*parent, entry.slot, g) : 255;

@@ -61,7 +61,8 @@ template <class Visit> inline bool traverse(const Bvh& bvh, BoxRay& ray, const V
             while (met) push(take_bit(met));
             current = stack[--size].child;
         }
-        if (!missed && visit(current & ~LEAF)) return true;
+        // NOTHING is met by a ray that comes from so far that its place is no number.
+        if (!missed && current != NOTHING && visit(current & ~LEAF)) return true;
         do {
             if (!size) return false;
             size--;
