@@ -242,3 +242,14 @@ def test_spheres_of_an_instance_far_from_its_own_origin_are_met(make_scene, make
     met = core.closest(rays)[1] >= 0
     clear = np.abs(off - 0.4) > 1e-6
     assert np.array_equal(met[clear], (off < 0.4)[clear])
+
+
+def test_rays_of_any_numbers_end_no_process():
+    """What is not there in a node is met by no ray, though its distance may be no number."""
+    corners = np.array([[i, j, k % 3] for i, j, k in np.random.default_rng(0).integers(0, 9, (15, 3))], np.float64)
+    mesh = Mesh(vertices=corners, triangles=np.arange(15, dtype=np.int32).reshape(5, 3), materials=np.zeros(5, np.int32))
+    core = CoreScene(Scene(camera=CAMERA, geometries={"Mesh": mesh}, objects=[Object("Mesh", "Mesh", np.eye(4))]), 1)
+    hostile = [0, 1, -1, 1e-300, 1e300, -1e300, 1e308, -1e308, 1e39, -1e39, 5e-324, np.inf, -np.inf, np.nan]
+    rays = np.random.default_rng(1).choice(hostile, (20_000, 8))
+    for packets in (False, True):
+        assert len(core.closest(rays, packets=packets)[0]) == len(core.occluded(rays, packets=packets)) == len(rays)
