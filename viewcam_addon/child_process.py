@@ -31,7 +31,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from multiprocessing import connection
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from .errors import FullDiskError, InputError, NotModelledError, bug
 from .events import Events
@@ -259,6 +259,39 @@ class ServerProcess:
         self._process.wait(_EXIT_TIMEOUT)
         status = self._process.status()
         return f"with signal {-status}" if status is not None and status < 0 else f"with status {status}"
+
+
+class ServerOnDemand:
+    """A server process that is started with the first question, and again if it was lost.
+
+    name : what sentences call it. module : of this package, which serves when it is run.
+    """
+
+    def __init__(self, name: str, module: str) -> None:
+        self._name, self._module = name, module
+        self._server: ServerProcess | None = None
+
+    def ask(self, request: Mapping[str, Any]) -> Any:
+        """What the process answers; raises as ServerProcess does."""
+        if self._server is None:
+            self._server = ServerProcess(self._name, module(self._module), environment())
+        try:
+            return self._server.ask(request)
+        except ProcessEnded:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """End the process."""
+        if self._server is not None:
+            self._server.close()
+            self._server = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
 
 def serve(handle: str, answers: Callable[[dict[str, Any]], Any], idle: float | None = None) -> None:

@@ -29,12 +29,12 @@ def lacking() -> str | None:
     return None
 
 
-class Comparer:
-    """The comparer, as the one who asks has it. The process is started with the first question, and again if it was lost."""
+class Comparer(child_process.ServerOnDemand):
+    """The comparer, as the one who asks has it."""
 
     def __init__(self, threads: int | None = None) -> None:
+        super().__init__("the comparer", "batch.comparer")
         self._threads = threads
-        self._server: child_process.ServerProcess | None = None
 
     def verdict(
         self, scene: Path, image: Path, camera: Pinhole, clip: tuple[float, float], stated: Pinhole | None = None
@@ -54,12 +54,8 @@ class Comparer:
         InputError
             if scene or picture can't be read or are not of the same size, there is no OpenEXR, or the process ended first.
         """
-        if self._server is None:
-            if sentence := lacking():
-                raise InputError(sentence)
-            self._server = child_process.ServerProcess(
-                "the comparer", child_process.module("batch.comparer"), child_process.environment()
-            )
+        if sentence := lacking():
+            raise InputError(sentence)
         request = {
             "scene": str(scene),
             "image": str(image),
@@ -68,23 +64,7 @@ class Comparer:
             "stated": stated and dataclasses.asdict(stated),
             "threads": self._threads,
         }
-        try:
-            return self._server.ask(request)
-        except child_process.ProcessEnded:
-            self.close()
-            raise
-
-    def close(self) -> None:
-        """End the process."""
-        if self._server is not None:
-            self._server.close()
-            self._server = None
-
-    def __enter__(self) -> "Comparer":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
+        return self.ask(request)
 
 
 class _Scenes:

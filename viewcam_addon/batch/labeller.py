@@ -24,12 +24,12 @@ _MOST_SCENES = 4
 """Kept: a frame, its neighbours, and the one that comes next."""
 
 
-class Labeller:
-    """The labeller, as the one who asks has it. The process is started with the first question, and again if it was lost."""
+class Labeller(child_process.ServerOnDemand):
+    """The labeller, as the one who asks has it."""
 
     def __init__(self, threads: int | None = None) -> None:
+        super().__init__("the labeller", "batch.labeller")
         self._threads = threads
-        self._server: child_process.ServerProcess | None = None
 
     @staticmethod
     def frame(scene: Path, camera: Pinhole, clip: tuple[float, float]) -> dict[str, Any]:
@@ -46,11 +46,8 @@ class Labeller:
         InputError
             if scenes can't be read or labels not be written, there is no OpenEXR, or the process ended first.
         """
-        if self._server is None:
-            if sentence := lacking():
-                raise InputError(sentence)
-            command = child_process.module("batch.labeller")
-            self._server = child_process.ServerProcess("the labeller", command, child_process.environment())
+        if sentence := lacking():
+            raise InputError(sentence)
         request = {
             "frames": dict(frames),
             "picture": str(picture),
@@ -58,23 +55,7 @@ class Labeller:
             "depth_steps": depth_steps,
             "threads": self._threads,
         }
-        try:
-            return self._server.ask(request)["files"]
-        except child_process.ProcessEnded:
-            self.close()
-            raise
-
-    def close(self) -> None:
-        """End the process."""
-        if self._server is not None:
-            self._server.close()
-            self._server = None
-
-    def __enter__(self) -> "Labeller":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
+        return self.ask(request)["files"]
 
 
 class _Scenes:
