@@ -118,3 +118,23 @@ def test_a_signal_to_a_batch_counts_once_whether_one_process_has_it_or_both(run,
     send(child.pid, number)
     child.communicate()
     assert child.returncode == 128 + number
+
+
+@pytest.mark.parametrize("command", ["batch", "check"])
+def test_a_signal_that_comes_when_blender_has_ended_changes_no_status(command):
+    late = f"""
+import os, signal
+from viewcam_addon import crashes
+waitpid = os.waitpid
+def wait_and_be_signalled(*process):
+    ended = waitpid(*process)
+    os.kill(os.getpid(), signal.SIGTERM)
+    return ended
+os.waitpid = wait_and_be_signalled
+if crashes.survived([{command!r}]) is None:
+    os._exit(143)
+"""
+    ended = subprocess.run(
+        [sys.executable, "-c", late], env=child_process.environment(), capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == 143, ended.stderr

@@ -45,10 +45,13 @@ def survived(words: list[str]) -> int | None:
         return None
 
     def answer(number: int, _: object) -> None:
-        if is_batch:
-            os.kill(child, passing[number])
-        elif number == signal.SIGTERM:  # SIGINT the terminal has sent to both
-            os.kill(child, number)
+        try:
+            if is_batch:
+                os.kill(child, passing[number])
+            elif number == signal.SIGTERM:  # SIGINT the terminal has sent to both
+                os.kill(child, number)
+        except ProcessLookupError:  # it had the signal as well, has ended with it and been waited for
+            pass
 
     for asked in _ASKED_FOR:
         if signal.getsignal(asked) is not signal.SIG_IGN:
