@@ -1,6 +1,7 @@
 """Cycles as a contestant, in a process with Blender in it."""
 
 import contextlib
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -25,12 +26,12 @@ _MOST_SAMPLES = 4096
 
 
 def prepare(
-    scene_name: str, level: str, size: tuple[int, int], path: Path, threads: int, box_filter: bool = False
+    scene_name: str, level: str, size: tuple[int, int], path: Path, threads: int, for_mitsuba: bool = False
 ) -> dict[str, race.Runner]:
     """In Blender's process: write the scene, and offer renders.
 
     scene_name : of a sample scene, "suzannes" for six of them or "three suzannes". path : where the tracer's scene goes.
-    box_filter : instead of the scene's.
+    for_mitsuba : through a box filter and without materials, which is what mitsuba3.py translates.
     """
     viewcam_addon.register()
     if scene_name in _SUZANNES:
@@ -41,9 +42,11 @@ def prepare(
     view_layer, camera_object = scene.view_layers[0], scene.camera
     camera_object.virtual_pinhole.enabled = False  # else its lens would follow the resolution
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = *size, 100
-    if box_filter:
+    if for_mitsuba:
         scene.cycles.pixel_filter_type = "BOX"
     exported = export_scene(scene, view_layer, camera_object, ledger, lit=level != "geometry")
+    if for_mitsuba:
+        exported = replace(exported, objects=tuple(replace(placed, materials=()) for placed in exported.objects))
     scene_file.write(exported, path)
 
     def light(sampling: str, parameter: float, seed: int) -> cycles.LightSettings | None:

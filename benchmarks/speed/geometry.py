@@ -24,7 +24,7 @@ from .figures import PICTURE, WHOLE, Figure
 from .standings import Contested, measured
 from .stills import CYCLES, OURS, prepare_cycles, start_contestant
 
-_WANTED = {PICTURE: 3.0, WHOLE: 1.5}
+_WANTED = {PICTURE: 12.0, WHOLE: 6.0}
 _LEAST_SHARE = {"geometry": 0.6, "direct": 0.8}
 _SAMPLES = 16  # of the picture whose rays are counted at `direct`
 _ONCE = (1.0,)
