@@ -58,7 +58,7 @@ ROOMS = {
     ),
     "blender": (
         "errors checks files terminal html_page child_process png pinhole roll rotation moves diagram photo_match image "
-        "intrinsics camera_values cameras comparison tracer shots batch"
+        "intrinsics camera_values cameras comparison tracer labels shots batch"
     ),
     "commands": (
         "errors files terminal argument_types events crashes child_process pinhole image cameras comparison tracer labels "

@@ -10,7 +10,7 @@ import viewcam_addon as vp
 from viewcam_addon import image
 from viewcam_addon.cli import main
 from viewcam_addon.errors import InputError
-from viewcam_addon.labels import files
+from viewcam_addon.labels import PASSES, files
 from viewcam_addon.tracer.scene import scene_file
 
 from .conftest import CAMERA, moved, room
@@ -43,6 +43,11 @@ def test_the_exr_has_every_pass_to_the_last_bit(written):
     assert set(found.passes) == set(labels.image.passes) and found.camera == labels.image.camera
     for name, values in labels.image.passes.items():
         np.testing.assert_array_equal(found[name], values)
+
+
+def test_the_passes_of_each_label_are_those_that_are_told_beforehand(written):
+    labels, _ = written
+    assert list(labels.image.passes) == [name for names in PASSES.values() for name in names]
 
 
 def test_no_json_of_an_older_frame_stands_beside_files_of_a_newer(written, tmp_path, monkeypatch):

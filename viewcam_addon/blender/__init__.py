@@ -15,6 +15,7 @@ def _rooms() -> list[ModuleType]:
         clipboard,
         file_menu,
         gizmos,
+        labels,
         moving,
         operators,
         overlay,
@@ -30,7 +31,7 @@ def _rooms() -> list[ModuleType]:
     from .rendering import engine
 
     buttons = [operators, moving, clipboard, baking, presets]
-    shown = [panel, scene_cameras, photo_matching, proof, render_all, overlay, gizmos]
+    shown = [panel, scene_cameras, photo_matching, proof, render_all, labels, overlay, gizmos]
     followers = [animation, resolution, own_picture]
     return [
         preferences,

@@ -8,4 +8,14 @@ A label is what lies at the centre of its pixel: nothing is averaged over a pixe
 point. Rejected: labels made of the passes that a renderer writes (float32, indices shared by instances, no occlusion).
 """
 
-KINDS = ("depth", "normals", "position", "masks", "amodal", "flow")
+PASSES = {
+    "depth": ("Depth", "Distance"),
+    "normals": ("Normal", "Camera Normal"),
+    "position": ("Position", "Object Position"),
+    "masks": ("Instance", "Material Index"),
+    "amodal": (),
+    "flow": tuple(f"{way} {what}" for way in ("Forward", "Backward") for what in ("Flow", "Motion", "Hidden")),
+}
+"""The labels, and the passes of each: of flow those of a direction that has another frame."""
+
+KINDS = tuple(PASSES)

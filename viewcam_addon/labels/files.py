@@ -6,7 +6,7 @@ Each appears whole, and the JSON last: where it stands, so do the others. An old
 import contextlib
 import json
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,22 @@ _UNKNOWN_FLOW = 1e10
 """What Middlebury's format has where no flow is known; everything above 1e9 counts as that."""
 
 
+_FILES = {
+    "depth.png": "Depth",
+    "instances.png": "Instance",
+    "forward.flo": "Forward Flow",
+    "forward_hidden.png": "Forward Hidden",
+    "backward.flo": "Backward Flow",
+    "backward_hidden.png": "Backward Hidden",
+}
+"""Beside the EXR and the JSON, and the pass that each shows."""
+
+
+def endings(passes: Collection[str]) -> list[str]:
+    """Of the files that are written of labels with these passes, in order."""
+    return [*["labels.exr"][: len(passes)], *(each for each, name in _FILES.items() if name in passes), "labels.json"]
+
+
 def of_picture(path: Path, ending: str) -> Path:
     """The label file that belongs to a picture: shot.exr → shot.labels.json."""
     return path.with_name(f"{path.stem}.{ending}")
@@ -51,33 +67,32 @@ def write(path: Path, labels: Labels, depth_steps: float = DEPTH_STEPS) -> list[
     """
     if not is_replaced(path):
         raise InputError(f"{path} is no file beside which labels could stand: give the name of one")
-    passes, told_in = labels.image.passes, of_picture(path, "labels.json")
+    passes = labels.image.passes
+    *others, told_in = (of_picture(path, ending) for ending in endings(passes))
     check_writable(told_in)
     if is_replaced(told_in):
         told_in.unlink(missing_ok=True)
-    written = [of_picture(path, "labels.exr")] if passes else []
-    if passes:
-        image.write(written[0], labels.image)
-    others = {}
-    if "Depth" in passes:
-        others["depth.png"] = encoded(depth_levels(passes["Depth"][::-1, :, 0], depth_steps))
-    if "Instance" in passes:
-        others["instances.png"] = encoded(id_colours(passes["Instance"][::-1, :, 0]))
-    for name in ("Forward", "Backward"):
-        if f"{name} Flow" in passes:
-            others[f"{name.lower()}.flo"] = middlebury(passes[f"{name} Flow"][::-1])
-            others[f"{name.lower()}_hidden.png"] = encoded(
-                np.uint8(255) * (passes[f"{name} Hidden"][::-1, :, 0] != 0).astype(np.uint8)
-            )
-    for ending, content in others.items():
-        written.append(of_picture(path, ending))
-        with written_whole(written[-1]) as temporary:
+    for each in others:
+        if each.suffix == ".exr":
+            image.write(each, labels.image)
+            continue
+        ending = each.name.removeprefix(f"{path.stem}.")
+        content = _content(ending, passes[_FILES[ending]][::-1], depth_steps)
+        with written_whole(each) as temporary:
             temporary.write_bytes(content)
-    written.append(told_in)
     with written_whole(told_in) as temporary:
-        told = _told(path, labels, [each.name for each in written[:-1]], depth_steps)
+        told = _told(path, labels, [each.name for each in others], depth_steps)
         temporary.write_text(json.dumps(told, allow_nan=False) + "\n", encoding="utf-8")
-    return written
+    return [*others, told_in]
+
+
+def _content(ending: str, values: NDArray[np.float32], depth_steps: float) -> bytes:
+    """Of one of `_FILES`. values : of its pass, rows from the top."""
+    if ending == "depth.png":
+        return encoded(depth_levels(values[..., 0], depth_steps))
+    if ending == "instances.png":
+        return encoded(id_colours(values[..., 0]))
+    return middlebury(values) if ending.endswith(".flo") else encoded(np.uint8(255) * (values[..., 0] != 0).astype(np.uint8))
 
 
 def read(path: Path) -> dict[str, Any]:

@@ -7,24 +7,20 @@ that waits, and a scene whose camera and resolution change under the artist's ha
 """
 
 import atexit
-import json
-import shutil
-import tempfile
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import bpy
 from bpy.app.handlers import persistent
 
-from ... import child_process
 from ...errors import InputError
 from ...shots.names import made_fit, one_file
 from .. import datablocks, own_picture
-from . import comparing, scene_cameras
+from . import scene_cameras
+from .background_batch import BackgroundBatch, shot
 
 _SECONDS = 0.5  # between two looks
-_SAID, _SHEET = "said.txt", "contact-sheet.html"
+_SHEET = "contact-sheet.html"
 
 _running: "Rendering | None" = None
 _latest: Path | None = None  # the last contact sheet
@@ -38,109 +34,47 @@ def shots(scene: bpy.types.Scene, animation: bool) -> list[dict[str, Any]]:
     InputError
         if there is none, or one has pixels of another shape than the scene, which a batch can't give it.
     """
-    rows, taken, render = [], set(), scene.render
+    rows, taken = [], set()
     for camera_object in scene_cameras.of_scene(scene):
         if camera_object.hide_render:
             continue
-        picture = own_picture.of_camera(camera_object, scene)
-        share = picture["resolution_percentage"] / 100
-        if picture["pixel_aspect_x"] * render.pixel_aspect_y != picture["pixel_aspect_y"] * render.pixel_aspect_x:
-            raise InputError(f"camera {camera_object.name!r} has pixels of another shape than the scene: render it alone")
         name = made_fit(camera_object.name)
         while one_file(name) in taken:
             name += "_"
         taken.add(one_file(name))
+        picture = own_picture.of_camera(camera_object, scene)
         frames = range(picture["frame_start"], picture["frame_end"] + 1) if animation else (scene.frame_current,)
-        for frame in frames:
-            rows.append(
-                {
-                    "name": f"{name}_{frame:04d}" if animation else name,
-                    "camera": camera_object.name,
-                    "width": max(4, int(picture["resolution_x"] * share)),
-                    "height": max(4, int(picture["resolution_y"] * share)),
-                    "frame": frame,
-                }
-            )
+        rows += [shot(camera_object, scene, f"{name}_{frame:04d}" if animation else name, frame) for frame in frames]
     if not rows:
         raise InputError(f"scene {scene.name!r} has no camera that is rendered: add one, or show one in renders")
     return rows
 
 
-class Rendering:
-    """One batch on its way, from the moment it is made. folder : of the pictures.
-
-    Raises
-    ------
-    InputError
-        if there is no camera, a folder can't be made, the copy not written or the child not started.
-    """
+class Rendering(BackgroundBatch):
+    """The pictures on their way. Raises InputError as its base and `shots` do."""
 
     def __init__(self, scene: bpy.types.Scene, into: Path, animation: bool = False) -> None:
-        rows = shots(scene, animation)
-        self.count = len(rows)
-        name = made_fit(f"{Path(bpy.data.filepath).stem or 'untitled'} all cameras")
-        self.folder = into / f"{name} {datetime.now():%Y-%m-%d %H.%M.%S}"
-        try:
-            self._temporary = Path(tempfile.mkdtemp(prefix="viewcam-", dir=bpy.app.tempdir or None))
-        except OSError as error:
-            raise InputError(f"no folder for the copy can be made ({error.strerror}): free some space") from error
-        try:
-            self.folder.mkdir(parents=True)
-            copy, listed = (
-                self._temporary / f"{Path(bpy.data.filepath).stem or 'untitled'}.blend",
-                self._temporary / "shots.json",
-            )
-            comparing.save_copy(copy)
-            listed.write_text(json.dumps(rows), encoding="utf-8")
-            command = comparing.command(copy, scene, "batch", [str(listed), "--out", str(self.folder)])
-            scripts = bpy.utils.system_resource("SCRIPTS")
-            variables = child_process.environment(scripts, **{key: str(self._temporary) for key in ("TMPDIR", "TMP", "TEMP")})
-            self._process = child_process.ProcessGroup(command, self._temporary / _SAID, variables)
-        except OSError as error:
-            self._clear()
-            raise InputError(f"{self.folder} can't be written ({error.strerror}): choose another folder") from error
-        except InputError:
-            self._clear()
-            raise
+        super().__init__(scene, into, "all cameras", shots(scene, animation), "*.exr")
 
     def progress(self) -> tuple[float, str]:
         """How far it is, from 0 to 1, and what it is doing."""
-        done = min(len(list(self.folder.glob("*.exr"))), self.count)
-        return done / self.count, f"Rendering picture {min(done + 1, self.count)} of {self.count}"
+        return self.done / self.count, f"Rendering picture {min(self.done + 1, self.count)} of {self.count}"
 
     @property
     def sheet(self) -> Path:
         return self.folder / _SHEET
 
-    def wait(self) -> None:
-        """Until there is something to poll."""
-        self._process.wait()
-
     def poll(self) -> tuple[bool, str] | None:
         """Whether all went well, and a sentence; None while it runs."""
-        status = self._process.status()
-        if status is None:
+        ended = self.ended()
+        if ended is None:
             return None
-        self._process.end()
-        said = (self._temporary / _SAID).read_text(encoding="utf-8", errors="replace")
-        done = len(list(self.folder.glob("*.exr")))
-        self._clear()
+        status, sentence = ended
         if status == 0:
             return True, f"{self.count} picture{'s' if self.count > 1 else ''} in {self.folder}"
         if self.sheet.is_file():
-            return False, f"{done} of {self.count} pictures in {self.folder}: the contact sheet says what went wrong"
-        return False, comparing.failure(said, status)
-
-    def cancel(self) -> None:
-        """End it at once; the pictures that are there stay."""
-        self._process.end()
-        self._clear()
-
-    def _clear(self) -> None:
-        """Remove the copy, and the folder of the pictures if there is none."""
-        shutil.rmtree(self._temporary, ignore_errors=True)
-        if self.folder.is_dir() and not any(self.folder.iterdir()):
-            self.folder.rmdir()
+            return False, f"{self.done} of {self.count} pictures in {self.folder}: the contact sheet says what went wrong"
+        return False, sentence
 
 
 class VIEWCAM_OT_render_all_cameras(bpy.types.Operator):

@@ -1,0 +1,118 @@
+"""A `viewcam batch` beside Blender: of a copy of the file as it stands, into a new folder, while the artist works on.
+
+Nothing here needs a window. Whoever starts one asks it now and then how far it is, or ends it.
+"""
+
+import json
+import shutil
+import tempfile
+from collections.abc import Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ... import child_process
+from ...errors import InputError
+from ...shots.names import made_fit
+from .. import own_picture
+from . import comparing
+
+_SAID = "said.txt"
+
+
+def shot(camera_object: bpy.types.Object, scene: bpy.types.Scene, name: str, frame: int) -> dict[str, Any]:
+    """A row of a list of shots: a camera in its own picture, at a frame.
+
+    Raises
+    ------
+    InputError
+        if it has pixels of another shape than the scene, which a batch can't give it.
+    """
+    picture, render = own_picture.of_camera(camera_object, scene), scene.render
+    share = picture["resolution_percentage"] / 100
+    if picture["pixel_aspect_x"] * render.pixel_aspect_y != picture["pixel_aspect_y"] * render.pixel_aspect_x:
+        raise InputError(f"camera {camera_object.name!r} has pixels of another shape than the scene: render it alone")
+    return {
+        "name": name,
+        "camera": camera_object.name,
+        "width": max(4, int(picture["resolution_x"] * share)),
+        "height": max(4, int(picture["resolution_y"] * share)),
+        "frame": frame,
+    }
+
+
+class BackgroundBatch:
+    """One on its way, from the moment it is made.
+
+    into : where a folder is made for it, named by file, `what` and time. shots : the list. files : what each shot that is done
+    has one of there. words : more for the command.
+
+    Raises
+    ------
+    InputError
+        if a folder can't be made, the copy not be written or the child not be started.
+    """
+
+    def __init__(
+        self,
+        scene: bpy.types.Scene,
+        into: Path,
+        what: str,
+        shots: Sequence[dict[str, Any]],
+        files: str,
+        words: Sequence[str] = (),
+    ) -> None:
+        self.count, self._files = len(shots), files
+        stem = Path(bpy.data.filepath).stem or "untitled"
+        self.folder = into / f"{made_fit(f'{stem} {what}')} {datetime.now():%Y-%m-%d %H.%M.%S}"
+        try:
+            self._temporary = Path(tempfile.mkdtemp(prefix="viewcam-", dir=bpy.app.tempdir or None))
+        except OSError as error:
+            raise InputError(f"no folder for the copy can be made ({error.strerror}): free some space") from error
+        try:
+            self.folder.mkdir(parents=True)
+            copy, listed = self._temporary / f"{stem}.blend", self._temporary / "shots.json"
+            comparing.save_copy(copy)
+            listed.write_text(json.dumps(shots), encoding="utf-8")
+            command = comparing.command(copy, scene, "batch", [str(listed), "--out", str(self.folder), *words])
+            scripts = bpy.utils.system_resource("SCRIPTS")
+            variables = child_process.environment(scripts, **{key: str(self._temporary) for key in ("TMPDIR", "TMP", "TEMP")})
+            self._process = child_process.ProcessGroup(command, self._temporary / _SAID, variables)
+        except OSError as error:
+            self._clear()
+            raise InputError(f"{self.folder} can't be written ({error.strerror}): choose another folder") from error
+        except InputError:
+            self._clear()
+            raise
+
+    @property
+    def done(self) -> int:
+        """How many shots."""
+        return min(len(list(self.folder.glob(self._files))), self.count)
+
+    def wait(self) -> None:
+        """Until it has ended."""
+        self._process.wait()
+
+    def ended(self) -> tuple[int, str] | None:
+        """With which status, and what to say of one that is not 0; None while it runs."""
+        status = self._process.status()
+        if status is None:
+            return None
+        self._process.end()
+        said = (self._temporary / _SAID).read_text(encoding="utf-8", errors="replace")
+        self._clear()
+        return status, comparing.failure(said, status) if status else ""
+
+    def cancel(self) -> None:
+        """End it at once; what is there stays."""
+        self._process.end()
+        self._clear()
+
+    def _clear(self) -> None:
+        """Remove the copy, and the folder of the files if there is none."""
+        shutil.rmtree(self._temporary, ignore_errors=True)
+        if self.folder.is_dir() and not any(self.folder.iterdir()):
+            self.folder.rmdir()

@@ -1,0 +1,256 @@
+"""The sub-panel "Labels": what is true of the camera's picture, written at this frame by one click.
+
+It shows which files there will be before they are written. They are a batch of one shot with labels alone, in the background,
+in a new folder that is named by file, camera, frame and time: nothing is written over, and the artist's scene is not touched,
+though flow needs the frames before and after. What it came to belongs to this session of Blender.
+"""
+
+import atexit
+from pathlib import Path
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ...errors import InputError
+from ...labels import KINDS, PASSES, files
+from ...shots.names import made_fit
+from .. import datablocks
+from . import readouts
+from .background_batch import BackgroundBatch, shot
+from .operators import NamesCamera
+from .panel_places import BelowProperties, BelowSidebar, SubPanel
+
+_SECONDS = 0.2  # between two looks
+
+_KINDS = (
+    ("DEPTH", "Depth", "Along the camera's axis and along the rays; in a PNG of 16 bits as well"),
+    ("NORMALS", "Normals", "In world space, and as the camera sees them"),
+    ("POSITION", "Position", "In world space, and in each object's own coordinates"),
+    ("MASKS", "Masks", "Which object and which material each pixel shows; areas, boxes and run lengths of what is visible"),
+    ("AMODAL", "Amodal", "Areas, boxes and run lengths of each object as if it stood alone"),
+    ("FLOW", "Flow", "Where each point is in the next and in the previous frame, and whether it is hidden there"),
+)
+
+_running: "Writing | None" = None
+_latest: "tuple[Path | None, str] | None" = None  # where the last ones are, and a sentence
+
+
+def latest() -> "tuple[Path | None, str] | None":
+    """Where the last labels are (None where there are none), and a sentence; None if none were written in this session."""
+    return _latest
+
+
+def end() -> None:
+    """End the writing on its way, and forget what the last came to."""
+    global _running, _latest
+    if _running:
+        _running.cancel()
+    _running = _latest = None
+
+
+class LabelSettings(bpy.types.PropertyGroup):
+    """`window_manager.virtual_pinhole_labels`: which labels, and where they go."""
+
+    kinds: bpy.props.EnumProperty(
+        name="Labels", description="What is written", items=_KINDS, options={"ENUM_FLAG"}, default={"DEPTH", "MASKS"}
+    )
+    depth_steps: bpy.props.FloatProperty(
+        name="Depth Steps",
+        description="Steps of the PNG's depth in a scene unit: 1000 are millimetres of metres. Beyond 65535 of them it is 0",
+        default=files.DEPTH_STEPS,
+        min=1e-6,
+        soft_min=1.0,
+        soft_max=10000.0,
+    )
+    folder: bpy.props.StringProperty(
+        name="Folder",
+        description="Where a folder is made for the labels, named by file, camera, frame and time. Without it, beside the file",
+        subtype="DIR_PATH",
+    )
+
+    def chosen(self) -> list[str]:
+        """Of labels.KINDS, in order."""
+        return [kind for kind in KINDS if kind.upper() in self.kinds]
+
+    def into(self) -> Path:
+        """The folder. Raises InputError where none is said, and the file has none."""
+        if not self.folder and not bpy.data.filepath:
+            raise InputError("there is no folder for the labels, and the file is not saved: choose one, or save it")
+        return Path(bpy.path.abspath(self.folder or "//"))
+
+
+def file_names(camera_object: bpy.types.Object, kinds: list[str]) -> list[str]:
+    """Of what a click writes, but for the batch's own: the camera first."""
+    name = made_fit(camera_object.name)
+    passes = [each for kind in kinds for each in PASSES[kind]]
+    return [f"{name}.json", *(f"{name}.{ending}" for ending in files.endings(passes))]
+
+
+class Writing(BackgroundBatch):
+    """The labels of a camera at the scene's frame, on their way. Raises InputError as its base does, or if there are none."""
+
+    def __init__(self, camera_object: bpy.types.Object, scene: bpy.types.Scene, settings: LabelSettings) -> None:
+        datablocks.check_perspective(camera_object)
+        if not (kinds := settings.chosen()):
+            raise InputError("no label is chosen: choose some")
+        frame = scene.frame_current
+        row = shot(camera_object, scene, made_fit(camera_object.name), frame)
+        words = ["--labels", ",".join(kinds), "--labels-only", "--depth-steps", f"{settings.depth_steps:.7g}"]
+        super().__init__(scene, settings.into(), f"{camera_object.name} {frame:04d} labels", [row], "*.labels.json", words)
+
+    def poll(self) -> tuple[Path | None, str] | None:
+        """Where they are, and a sentence; None while it runs."""
+        ended = self.ended()
+        if ended is None:
+            return None
+        status, sentence = ended
+        return (None, sentence) if status else (self.folder, f"Written to {self.folder}")
+
+
+class VIEWCAM_OT_write_labels(NamesCamera, bpy.types.Operator):
+    bl_idname = "viewcam.write_labels"
+    bl_label = "Write Labels"
+    bl_description = (
+        "Write what is true of this camera's picture at this frame, as the reference tracer finds it, in the background. The "
+        "file stays as it is, and its unsaved edits count"
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if _running:
+            cls.poll_message_set("Labels are being written")
+            return False
+        if context.scene and datablocks.camera_in(context):
+            return True
+        cls.poll_message_set("There is no camera")
+        return False
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        global _running
+        try:
+            found = self.found(context)
+            if found is None:
+                raise InputError(f"there is no camera {self.camera!r}: name another")
+            _running = Writing(found, context.scene, context.window_manager.virtual_pinhole_labels)
+        except InputError as error:
+            self.report({"ERROR"}, datablocks.sentence(error))
+            return {"CANCELLED"}
+        if not bpy.app.background:
+            bpy.app.timers.register(_look, first_interval=_SECONDS)
+            return {"FINISHED"}
+        try:  # for scripts: wait for it
+            _running.wait()
+            _poll()
+        except BaseException:  # Ctrl-C
+            end()
+            raise
+        folder, sentence = _latest
+        self.report({"INFO" if folder else "ERROR"}, sentence)
+        return {"FINISHED" if folder else "CANCELLED"}
+
+
+class VIEWCAM_OT_cancel_labels(bpy.types.Operator):
+    bl_idname = "viewcam.cancel_labels"
+    bl_label = "Cancel"
+    bl_description = "End the writing of labels"
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        return _running is not None
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        end()
+        return {"FINISHED"}
+
+
+class _LabelsPanel(SubPanel):
+    bl_label = "Labels"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        camera_object, settings, layout = (
+            datablocks.camera_in(context),
+            context.window_manager.virtual_pinhole_labels,
+            self.layout,
+        )
+        layout.use_property_split, layout.use_property_decorate = True, False
+        column = layout.column()
+        column.active = _running is None
+        column.column(align=True).prop(settings, "kinds")
+        if "DEPTH" in settings.kinds:
+            column.prop(settings, "depth_steps")
+        column.prop(settings, "folder")
+        if settings.kinds:
+            names = layout.column(align=True)
+            names.active = False
+            for i, name in enumerate(file_names(camera_object, settings.chosen())):
+                names.label(text=name, icon="BLANK1" if i else "FILE", translate=False)
+        row = layout.row(align=True)
+        if _running:
+            row.label(text="Writing labels", icon="SORTTIME")
+            row.operator("viewcam.cancel_labels", text="", icon="CANCEL")
+        else:
+            row.operator("viewcam.write_labels", icon="PLAY").camera = camera_object.name
+        if _latest:
+            _draw_latest(layout, context, *_latest)
+
+
+def _draw_latest(layout: bpy.types.UILayout, context: bpy.types.Context, folder: Path | None, sentence: str) -> None:
+    width = context.region.width / context.preferences.system.ui_scale - 60
+    column = layout.column(align=True)
+    for i, line in enumerate(readouts.wrapped(sentence, width)):
+        column.label(text=line, icon="BLANK1" if i else "CHECKMARK" if folder else "ERROR", translate=False)
+    if folder:
+        column.operator("wm.path_open", text="Open Folder", icon="FILE_FOLDER").filepath = str(folder)
+
+
+class VIEWCAM_PT_data_labels(_LabelsPanel, BelowProperties, bpy.types.Panel):
+    pass
+
+
+class VIEWCAM_PT_sidebar_labels(_LabelsPanel, BelowSidebar, bpy.types.Panel):
+    pass
+
+
+def _poll() -> bool:
+    """Whether it has ended."""
+    global _running, _latest
+    outcome = _running.poll()
+    if outcome:
+        _running, _latest = None, outcome
+    return outcome is not None
+
+
+def _look() -> float | None:
+    """Blender's timer asks again after so many seconds, as long as it goes on."""
+    goes_on = _running is not None and not _poll()
+    if not goes_on:
+        for window in bpy.context.window_manager.windows:
+            for area in window.screen.areas:
+                if area.type in ("PROPERTIES", "VIEW_3D"):
+                    area.tag_redraw()
+    return _SECONDS if goes_on else None
+
+
+@persistent
+def _on_load(*_: object) -> None:
+    end()
+
+
+CLASSES = (VIEWCAM_OT_write_labels, VIEWCAM_OT_cancel_labels, VIEWCAM_PT_data_labels, VIEWCAM_PT_sidebar_labels)
+
+
+def register() -> None:
+    bpy.utils.register_class(LabelSettings)
+    bpy.types.WindowManager.virtual_pinhole_labels = bpy.props.PointerProperty(type=LabelSettings)
+    bpy.app.handlers.load_pre.append(_on_load)
+    atexit.register(end)
+
+
+def unregister() -> None:
+    end()
+    atexit.unregister(end)
+    if bpy.app.timers.is_registered(_look):
+        bpy.app.timers.unregister(_look)
+    bpy.app.handlers.load_pre.remove(_on_load)
+    del bpy.types.WindowManager.virtual_pinhole_labels
+    bpy.utils.unregister_class(LabelSettings)
