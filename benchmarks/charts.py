@@ -25,7 +25,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator
 
 from viewcam_addon.errors import InputError
 from viewcam_addon.files import written_whole
@@ -238,6 +238,8 @@ def _draw_rows(chart: Chart, axes: Axes) -> None:
     axes.set_axisbelow(True)
     axes.spines[["top", "right", "left"]].set_visible(False)
     axes.set_xscale("log" if chart.log_x else "linear")
+    if chart.log_x:
+        axes.xaxis.set_minor_locator(LogLocator(subs=(2, 5)))  # 3 × 10⁻¹ would meet 4 × 10⁻¹
     axes.set_ylim(-0.6, len(curves) - 0.4)
     axes.set_yticks(range(len(curves)), [curve.name for curve in curves])
     axes.tick_params(axis="y", length=0)
