@@ -366,3 +366,187 @@ def test_letting_go_of_an_armature_forgets_the_bone_and_leaves_the_camera(posed_
     before = number_of(posed_camera, "look_at")
     targets.release(posed_camera, "look_at")
     assert number_of(posed_camera, "look_at") == before and posed_camera.virtual_pinhole.look_at_bone == ""
+
+
+@pytest.fixture
+def patch(scene):
+    """A grid at (1, 2, 3), turned, whose group Some weighs five of its vertices, and one by nothing."""
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=4, y_subdivisions=4, location=(1, 2, 3), rotation=(0.3, 0.2, 0.1))
+    block = bpy.context.object
+    block.vertex_groups.new(name="Other").add(range(20), 1.0, "REPLACE")
+    group = block.vertex_groups.new(name="Some")
+    for index, weight in ((0, 1.0), (3, 0.25), (7, 0.5), (12, 0.125), (16, 0.75), (18, 0.0)):
+        group.add([index], weight, "REPLACE")
+    bpy.context.view_layer.objects.active = None
+    return block
+
+
+@pytest.fixture
+def where_blender_has_it(scene, empty, patch):
+    """() → the place of an empty that has Blender's own Copy Location of the group: the judge."""
+    judge = empty("Judge")
+    constraint = judge.constraints.new("COPY_LOCATION")
+    constraint.target, constraint.subtarget = patch, "Some"
+
+    def place():
+        update()
+        return tuple(judge.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.translation)
+
+    return place
+
+
+def deformed_by_a_key(patch, empty):
+    patch.shape_key_add(name="Basis")
+    key = patch.shape_key_add(name="Bent")
+    for i, point in enumerate(key.data):
+        point.co.z += 0.1 * i
+    return lambda share: setattr(key, "value", share)
+
+
+def deformed_by_a_hook(patch, empty):
+    hook, modifier = empty("Hook"), patch.modifiers.new("Hook", "HOOK")
+    modifier.object = hook
+    modifier.vertex_indices_set([0, 3, 7])
+    return lambda share: setattr(hook, "location", (share, 2 * share, 0))
+
+
+def deformed_and_made_finer(patch, empty):
+    modifier = patch.modifiers.new("Wave", "WAVE")
+    patch.modifiers.new("Finer", "SUBSURF")
+    return lambda share: setattr(modifier, "height", share)
+
+
+def moved_with_its_vertices(patch, empty):
+    return lambda share: (patch.data.vertices[7].co.__setitem__(2, share), patch.data.update())
+
+
+def weighed_otherwise(patch, empty):
+    return lambda share: patch.vertex_groups["Some"].add([18], share, "REPLACE")
+
+
+@pytest.mark.parametrize("point", POINTS)
+@pytest.mark.parametrize("is_hidden", [False, True])
+@pytest.mark.parametrize(
+    "deform", [deformed_by_a_key, deformed_by_a_hook, deformed_and_made_finer, moved_with_its_vertices, weighed_otherwise]
+)
+def test_a_vertex_group_is_followed_where_blenders_own_constraints_have_it(
+    posed_camera, scene, patch, empty, where_blender_has_it, point, is_hidden, deform
+):
+    follow(posed_camera, point, patch)
+    assert number_of(posed_camera, point) == pytest.approx((1, 2, 3), abs=1e-6)
+    setattr(posed_camera.virtual_pinhole, f"{point}_group", "Some")
+    found = [number_of(posed_camera, point)]
+    assert found[0] == pytest.approx(where_blender_has_it(), abs=1e-6)
+    assert math.dist(found[0], (1, 2, 3)) > 0.1
+    change = deform(patch, empty)
+    patch.hide_viewport = is_hidden
+    for share in (0.25, 1.0):
+        change(share)
+        update()
+        found.append(number_of(posed_camera, point))
+        assert found[-1] == pytest.approx(where_blender_has_it(), abs=1e-6)  # sums of few numbers below 8, in float32 there
+        assert math.dist(*found[-2:]) > 1e-3, "the group has not moved, and nothing is tried"
+        assert is_where_stated(posed_camera, scene)
+    patch.location.x = 4
+    update()
+    assert number_of(posed_camera, point) == pytest.approx(where_blender_has_it(), abs=2e-6)
+
+
+def test_a_vertex_group_is_followed_as_it_is_edited(posed_camera, patch, where_blender_has_it):
+    import bmesh
+
+    follow(posed_camera, "look_at", patch)
+    posed_camera.virtual_pinhole.look_at_group = "Some"
+    bpy.context.view_layer.objects.active = patch
+    bpy.ops.object.mode_set(mode="EDIT")
+    try:
+        edited = bmesh.from_edit_mesh(patch.data)
+        edited.verts.ensure_lookup_table()
+        edited.verts[0].co.z += 2
+        bmesh.update_edit_mesh(patch.data)
+        update()
+        assert number_of(posed_camera, "look_at") == pytest.approx(where_blender_has_it(), abs=1e-6)
+    finally:
+        bpy.ops.object.mode_set(mode="OBJECT")
+    assert number_of(posed_camera, "look_at") == pytest.approx(where_blender_has_it(), abs=1e-6)
+
+
+def test_a_keyed_vertex_group_is_followed_in_the_render(posed_camera, scene, patch, empty):
+    from viewcam_addon.blender.scenes import depsgraph
+
+    follow(posed_camera, "look_at", patch)
+    posed_camera.virtual_pinhole.look_at_group = "Some"
+    deformed_by_a_key(patch, empty)
+    key = patch.data.shape_keys.key_blocks["Bent"]
+    for frame, share in ((1, 0.0), (11, 1.0)):
+        key.value = share
+        key.keyframe_insert("value", frame=frame)
+    found = {}
+    for frame in (11, 1):
+        scene.frame_set(frame)
+        at = number_of(posed_camera, "look_at")
+        seen = depsgraph.visit(scene, lambda graph: cameras.read(posed_camera.evaluated_get(graph), scene))
+        assert -np.array(seen.basis()[2]) == pytest.approx(_unit(np.subtract(at, (7, -6, 5))), abs=1e-6)
+        found[frame] = at
+    assert math.dist(found[1], found[11]) > 0.5
+
+
+@pytest.mark.parametrize("name", ["None", "Empty"])
+def test_a_vertex_group_that_has_no_vertex_is_named_and_the_origin_followed(posed_camera, patch, name):
+    patch.vertex_groups.new(name="Empty").add([0], 0.0, "REPLACE")
+    follow(posed_camera, "look_at", patch)
+    posed_camera.virtual_pinhole.look_at_group = name
+    update()
+    assert number_of(posed_camera, "look_at") == pytest.approx((1, 2, 3), abs=1e-6)
+    (sentence,) = targets.warnings(posed_camera)
+    start = "The look-at target 'Grid' has no vertex in a group"
+    assert sentence == f"{start} {name!r}, and its origin is followed: choose another, or clear it"
+    posed_camera.virtual_pinhole.look_at_group = "Some"
+    assert targets.warnings(posed_camera) == []
+
+
+@pytest.mark.parametrize("kind", ["HOOK", "NODES"])
+def test_a_vertex_group_that_the_camera_deforms_is_not_followed_and_the_origin_is(posed_camera, patch, kind):
+    modifier = patch.modifiers.new("By the Camera", kind)
+    if kind == "HOOK":
+        modifier.object = posed_camera
+    else:
+        tree = bpy.data.node_groups.new("By the Camera", "GeometryNodeTree")
+        tree.interface.new_socket("Object", in_out="INPUT", socket_type="NodeSocketObject").default_value = posed_camera
+        for way in ("INPUT", "OUTPUT"):
+            tree.interface.new_socket("Mesh", in_out=way, socket_type="NodeSocketGeometry")
+        ends = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+        tree.links.new(ends[0].outputs["Mesh"], ends[1].inputs["Mesh"])
+        modifier.node_group = tree
+    follow(posed_camera, "look_at", patch)
+    assert targets.warnings(posed_camera) == [] and number_of(posed_camera, "look_at") == pytest.approx((1, 2, 3), abs=1e-6)
+    posed_camera.virtual_pinhole.look_at_group = "Some"
+    (sentence,) = targets.warnings(posed_camera)
+    assert sentence.startswith("The look-at target 'Grid' is moved by the camera itself, and is not followed")
+
+
+def test_letting_go_of_a_mesh_forgets_its_group_and_leaves_the_camera(posed_camera, patch):
+    follow(posed_camera, "look_at", patch)
+    posed_camera.virtual_pinhole.look_at_group = "Some"
+    update()
+    before = number_of(posed_camera, "look_at")
+    targets.release(posed_camera, "look_at")
+    assert number_of(posed_camera, "look_at") == before and posed_camera.virtual_pinhole.look_at_group == ""
+
+
+def test_a_vertex_group_is_looked_at_once_until_some_mesh_is_evaluated(posed_camera, patch):
+    follow(posed_camera, "look_at", patch)
+    posed_camera.virtual_pinhole.look_at_group = "Some"
+    update()
+    number_of(posed_camera, "look_at")
+    ((key, kept),) = targets._shapes.items()
+    for x in (8, 9):
+        posed_camera.virtual_pinhole.eye[0] = x
+        update()
+        number_of(posed_camera, "look_at")
+    assert targets._shapes[key] is kept
+    patch.data.vertices[0].co.z = 1
+    patch.data.update()
+    update()
+    number_of(posed_camera, "look_at")
+    assert list(targets._shapes.values()) != [kept]

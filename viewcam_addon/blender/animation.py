@@ -26,6 +26,7 @@ from .datablocks import is_animated
 @persistent
 def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
     depsgraph = depsgraph or bpy.context.evaluated_depsgraph_get()
+    targets.forget_shapes(depsgraph)
     for block in [update.id.original for update in depsgraph.updates]:
         if _is_camera(block) and is_animated(block):
             _follow(block, scene, depsgraph)
@@ -40,6 +41,7 @@ def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
     Blender evaluates what this sets without calling it again, so that a constraint in the way makes no endless loop.
     """
+    targets.forget_shapes(depsgraph)
     if depsgraph.id_type_updated("SCENE"):
         resolution.follow(scene)
     for block in [update.id.original for update in depsgraph.updates]:
@@ -53,6 +55,7 @@ def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 @persistent
 def on_load(_path: str, _more: object = None) -> None:
     """Targets may have moved where the add-on was not, and Blender does not save the drivers of an override's own targets."""
+    targets.forget_shapes()
     scene = bpy.context.scene
     watching = [each for each in scene.objects if each.type == "CAMERA" and targets.names(each)]
     for camera_object in watching:
@@ -64,6 +67,7 @@ def on_load(_path: str, _more: object = None) -> None:
 @persistent
 def on_undo(_scene: bpy.types.Scene, _more: object = None) -> None:
     """Undo may bring back a camera's channels and not evaluate them, so that its values would follow where it was before."""
+    targets.forget_shapes()
     for block in bpy.data.objects:
         if _is_camera(block) and not cameras.is_untouched(block, by_values=False):
             cameras.forget(block)
@@ -117,5 +121,6 @@ def unregister() -> None:
     bpy.app.handlers.undo_post.remove(on_undo)
     bpy.app.handlers.load_post.remove(on_load)
     cameras.forget()
+    targets.forget_shapes()
     bpy.app.handlers.depsgraph_update_post.remove(on_update)
     bpy.app.handlers.frame_change_post.remove(on_frame_change)

@@ -185,6 +185,13 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         update=_on_target,
         override={"LIBRARY_OVERRIDABLE"},
     )
+    eye_group: bpy.props.StringProperty(
+        name="Eye Vertex Group",
+        description="A vertex group of the mesh, in whose middle the camera stands: its vertices' mean by weight, deformed as "
+        "they are. Empty: the mesh's origin",
+        update=_on_target,
+        override={"LIBRARY_OVERRIDABLE"},
+    )
     look_at_target: bpy.props.PointerProperty(
         name="Look-At Target",
         description="An object at whose origin the camera looks, wherever it is moved. Empty: the point above counts",
@@ -196,6 +203,13 @@ class VirtualPinhole(bpy.types.PropertyGroup):
     look_at_bone: bpy.props.StringProperty(
         name="Look-At Bone",
         description="A bone of the armature, at whose head the camera looks. Empty: the armature's origin",
+        update=_on_target,
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    look_at_group: bpy.props.StringProperty(
+        name="Look-At Vertex Group",
+        description="A vertex group of the mesh, at whose middle the camera looks: its vertices' mean by weight, deformed as "
+        "they are. Empty: the mesh's origin",
         update=_on_target,
         override={"LIBRARY_OVERRIDABLE"},
     )

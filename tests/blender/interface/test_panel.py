@@ -149,6 +149,10 @@ class Layout:
         assert name in owner.bl_rna.properties, f"{owner} has no {name}"
         self._draw("prop", name, look)
 
+    def prop_search(self, owner, name, source, names, **look):
+        assert name in owner.bl_rna.properties and names in source.bl_rna.properties
+        self.drawn.append(("prop_search", name, {**look, "source": names}, self, None))
+
     def operator(self, name, **look):
         return self._draw("operator", name, look)
 
@@ -217,6 +221,16 @@ def test_a_point_that_follows_a_target_can_not_be_edited(posed_camera, empty):
     posed_camera.virtual_pinhole.look_at_target = empty("Target")
     locked = [name for name, layout in properties_drawn(panel.VIEWCAM_PT_data).items() if not layout.is_all("enabled")]
     assert locked == ["look_at"]
+
+
+@pytest.mark.parametrize(("kind", "field"), [("MESH", "look_at_group"), ("ARMATURE", "look_at_bone"), ("EMPTY", None)])
+def test_a_target_s_vertex_group_or_bone_is_chosen_below_it(posed_camera, scene, kind, field):
+    data = {"MESH": bpy.data.meshes, "ARMATURE": bpy.data.armatures}
+    target = bpy.data.objects.new("Target", data[kind].new("Target") if kind in data else None)
+    scene.collection.objects.link(target)
+    posed_camera.virtual_pinhole.look_at_target = target
+    searched = [(name, look["source"]) for what, name, look, *_ in drawn(panel.VIEWCAM_PT_data) if what == "prop_search"]
+    assert searched == ([(field, {"look_at_group": "vertex_groups", "look_at_bone": "bones"}[field])] if field else [])
 
 
 def test_apply_again_is_not_marked_where_it_mends_nothing(posed_camera, scene):

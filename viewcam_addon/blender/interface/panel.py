@@ -76,6 +76,8 @@ def _draw_values(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> 
         target = targets.target_of(group.id_data, point)
         if target and target.type == "ARMATURE":
             column.prop_search(group, f"{point}_bone", target.data, "bones", text="Bone")
+        elif target and target.type == "MESH":
+            column.prop_search(group, f"{point}_group", target, "vertex_groups", text="Group")
     column.prop(group, "up")
     column.separator()
     _draw_lens(column.row(align=True), group)
