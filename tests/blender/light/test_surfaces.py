@@ -219,10 +219,13 @@ def test_without_nodes_the_viewports_colours_count(pictures, floor, scene):
     assert sides[0].traced["Environment"].max() == pytest.approx(0.3)
 
 
-def test_images_that_are_missing_are_told_and_stood_in_for(pictures, floor, tmp_path):
-    missing = bpy.data.images.new("ProcessEnded", 4, 4)
+@pytest.mark.parametrize("is_named", [True, False])
+def test_images_that_are_missing_are_the_magenta_that_cycles_shows(pictures, floor, tmp_path, is_named):
+    missing = bpy.data.images.new("Gone", 4, 4)
     missing.source, missing.filepath = "FILE", str(tmp_path / "gone.png")
-    texture(floor, missing, "Linear")
+    texture(floor, missing if is_named else None, "Linear")
     sides = pictures(scenes=1)
     check(sides, FLAT)
-    assert "is missing" in told(sides)["Floor"]
+    assert not told(sides) and sides[0].exported.materials["Floor"].diffuse.rgb == (1.0, 0.0, 1.0)
+    (said,) = (entry.reason for entry in sides[0].exported.ledger if entry.object == "Floor")
+    assert ("'Gone', which is missing: magenta" if is_named else "without an image: magenta") in said

@@ -108,6 +108,20 @@ def test_an_image_that_is_used_otherwise_is_its_mean_over_the_sphere(sky, export
     assert "'Environment Texture' that varies" in told["World"] and "constant" in told["World"]
 
 
+@pytest.mark.parametrize("is_named", [True, False])
+def test_an_image_that_is_missing_is_the_magenta_that_cycles_shows(set_world, export, tmp_path, is_named):
+    world = set_world(strength=2.0)
+    texture = world.node_tree.nodes.new("ShaderNodeTexEnvironment")
+    world.node_tree.links.new(texture.outputs["Color"], background_of(world).inputs["Color"])
+    if is_named:
+        texture.image = bpy.data.images.new("Gone", 4, 4)
+        texture.image.source, texture.image.filepath = "FILE", str(tmp_path / "gone.hdr")
+    exported, told = export()
+    assert exported.world.radiance == (2.0, 0.0, 2.0) and exported.world.image is None and not told
+    (said,) = (entry.reason for entry in exported.ledger if entry.object == world.name)
+    assert said.startswith("the world ") and said.endswith("magenta, as Cycles has it")
+
+
 def test_other_worlds_are_their_colour_in_the_viewport(set_world, export):
     world = set_world()
     world.color = (0.25, 0.5, 1.0)

@@ -10,7 +10,7 @@ import bpy
 
 from ...tracer.scene.lamps import RAYS
 from .. import datablocks, versions
-from . import export_geometry, materials
+from . import export_geometry, images, materials
 from .ledger import Ledger
 from .shading import Shading
 
@@ -131,6 +131,8 @@ def note_object(
         reasons = materials.departures(material, lit=shading is not None)
         if shading:
             reasons += shading.reading(material).reasons
+            for missing in images.missing(versions.node_tree(material)):
+                ledger.note(name, "exported", f"material {material.name!r} {missing}")
         for reason in reasons:
             ledger.note(name, "approximated", f"material {material.name!r} {reason}, and a plain one stands in")
         if reasons and shading:

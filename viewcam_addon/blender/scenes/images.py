@@ -7,18 +7,40 @@ import numpy as np
 
 from ...tracer.scene.materials import Picture
 from ..temporary_settings import Overrides
+from . import nodes
 
 _LINEAR = ("Non-Color", "Linear Rec.709", "Raw", "Linear")
 
+MISSING = (1.0, 0.0, 1.0, 1.0)
+"""What Cycles shows in place of an image that is not there, linear (kernel/types.h, IMAGE_TEXTURE_MISSING)."""
+
+
+def shows_nothing(node: bpy.types.Node) -> bool:
+    """Whether a texture node has no image, or one whose file is not there: then it is MISSING."""
+    if node.type not in ("TEX_IMAGE", "TEX_ENVIRONMENT"):
+        return False
+    image = node.image and node.image.original
+    return image is None or (image.source == "FILE" and not (image.has_data or min(image.size)))
+
+
+def missing(tree: bpy.types.NodeTree | None) -> list[str]:
+    """What of a tree shows no image, one clause each; whether it leads to the output is not asked."""
+    found = {}
+    for node in nodes.all_of(tree) if tree else ():
+        if shows_nothing(node):
+            shown = (
+                f"shows {node.image.name!r}, which is missing" if node.image else f"has a node {node.name!r} without an image"
+            )
+            found[f"{shown}: magenta, as Cycles has it"] = None
+    return list(found)
+
 
 def obstacle(image: bpy.types.Image | None) -> str | None:
-    """Why this image can't be a picture, one clause, or None where it can."""
-    if image is None:
-        return "has no image"
+    """Why this image, which is not missing, can't be a picture, one clause, or None where it can."""
     if image.source not in ("FILE", "GENERATED"):
         return f"shows {image.name!r}, which is no single still image"
-    if not (image.has_data or image.size[0]) or not min(image.size):
-        return f"shows {image.name!r}, which is missing"
+    if not min(image.size):
+        return f"shows {image.name!r}, which has no pixels"
     space = image.colorspace_settings.name
     if space != "sRGB" and space not in _LINEAR:
         return f"shows {image.name!r}, whose colours are {space}"

@@ -7,7 +7,6 @@ they are. At the levels of light the same is done to every material that the tra
 shaders.py has found.
 """
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import bpy
@@ -51,7 +50,7 @@ def departures(material: bpy.types.Material, lit: bool = False) -> list[str]:
         reasons.append("is displaced")
     if output.inputs["Volume"].is_linked:
         reasons.append("has a volume")
-    all_nodes = list(_nodes(tree, set()))
+    all_nodes = list(nodes.all_of(tree))
     if not lit and any(node.type in _TRANSPARENT or _sees_through(node) for node in all_nodes):
         reasons.append("is transparent")
     if any(node.type in _TURNING or _is_turned(node) for node in all_nodes):
@@ -211,18 +210,6 @@ def plain(overrides: Overrides) -> bpy.types.Material:
         material.use_nodes = True
     stand_in(overrides, material, shaders.Reading(PLAIN))
     return material
-
-
-def _nodes(tree: bpy.types.NodeTree, seen: set[bpy.types.NodeTree]) -> Iterator[bpy.types.Node]:
-    """All nodes of the tree and of the groups in it; whether they lead to the output is not asked."""
-    seen.add(tree)
-    for node in tree.nodes:
-        if node.mute:
-            continue
-        yield node
-        group = getattr(node, "node_tree", None)
-        if group and group not in seen:
-            yield from _nodes(group, seen)
 
 
 def _sees_through(node: bpy.types.Node) -> bool:

@@ -4,6 +4,7 @@ An input is followed to the node that feeds it: reroutes, muted nodes and node g
 has a value of its own.
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import bpy
@@ -64,6 +65,22 @@ def _through(node: bpy.types.Node, socket: bpy.types.NodeSocket, groups: tuple[b
 def _by_identifier(node: bpy.types.Node, socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...]) -> Input | None:
     inner = next((each for each in node.inputs if each.identifier == socket.identifier), None)
     return inner and Input(inner, groups)
+
+
+def all_of(tree: bpy.types.NodeTree, seen: set[bpy.types.NodeTree] | None = None) -> Iterator[bpy.types.Node]:
+    """All nodes of the tree and of the groups in it that are not muted; whether they lead to the output is not asked.
+
+    seen : trees that are left out.
+    """
+    seen = set() if seen is None else seen
+    seen.add(tree)
+    for node in tree.nodes:
+        if node.mute:
+            continue
+        yield node
+        group = getattr(node, "node_tree", None)
+        if group and group not in seen:
+            yield from all_of(group, seen)
 
 
 def override_output(overrides: Overrides, tree: bpy.types.NodeTree, kind: str) -> tuple[bpy.types.Node, "Adder"]:

@@ -604,6 +604,8 @@ def constant_colour(output: Output, name: str | int) -> RGB | None:
 
 def _constant(of: Input) -> object:
     source = nodes.source(of)
+    if isinstance(source, Output) and images.shows_nothing(source.node):
+        return images.MISSING[3] if source.socket.name == "Alpha" else images.MISSING[:3]
     if isinstance(source, Output) and source.node.type not in ("RGB", "VALUE"):
         return None
     return source.socket.default_value

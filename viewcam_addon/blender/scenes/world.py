@@ -26,6 +26,8 @@ def world_of(world: bpy.types.World | None, ledger: Ledger, pictures: dict[str, 
     if world is None:
         return World()
     radiance, wrapped, reasons = _read(world)
+    for missing in images.missing(versions.node_tree(world)):
+        ledger.note(world.name, "exported", f"the world {missing}")
     for reason in reasons:
         ledger.note(world.name, "approximated", f"the world {reason}, and a constant one stands in")
     if reasons:
