@@ -59,7 +59,7 @@ def charts(
     path : where pictures may be written.
     """
     enough = max(0.9 * min(still.wanted), reference.error)
-    effort = Effort(rounds=1, enough=enough, longest=1) if quick else Effort(rounds=3, enough=enough, longest=3)
+    effort = Effort(rounds=1, enough=enough, longest=1) if quick else Effort(rounds=3, enough=enough, longest=8)
     pictures = contest.measure(sides, methods, "picture", reference.error_of, effort, path)
     few = [
         dataclasses.replace(method, parameters=contest.near(points, tuple(still.wanted)))
