@@ -426,6 +426,7 @@ def test_a_picture_made_elsewhere_is_judged_by_the_channels_that_are_named(tmp_p
 
 
 def test_another_engine_is_checked_by_its_geometry_alone(capfd):
+    assert "--device is for Cycles" in fails(capfd, "check", "any.blend", "--engine", "EEVEE", "--device", "CUDA")
     assert "--engine EEVEE is checked at level geometry" in fails(
         capfd, "check", "any.blend", "--engine", "EEVEE", "--level", "path"
     )

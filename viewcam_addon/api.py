@@ -86,8 +86,8 @@ def label(
 ) -> "Labels":
     """What is true of a scene's picture, exact at the centre of each pixel.
 
-    scene : or the path of a scene file, as the others. labels : some of "depth", "normals", "position", "masks", "amodal" and
-    "flow"; docs/labels.md says what each brings. previous, next : the frames before and after, for "flow".
+    scene : or the path of a scene file, as the others. labels : some of "depth", "normals", "position", "masks", "amodal",
+    "flow" and "coverage"; docs/labels.md says what each brings. previous, next : the frames before and after, for "flow".
     threads : all cores where None.
 
     Returns the passes as an Image, and what is told of each instance as plain JSON values.

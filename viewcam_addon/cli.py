@@ -192,7 +192,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
             "--labels",
             type=types.names,
             metavar="LABELS",
-            help="write ground truth beside the picture: some of depth,normals,position,masks,amodal,flow",
+            help="write ground truth beside the picture: some of depth,normals,position,masks,amodal,flow,coverage",
         )
         for other in ("previous", "next"):
             words = f"the {other} frame, for --labels flow"
@@ -232,6 +232,9 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         engines = ["CYCLES", "EEVEE", "WORKBENCH"]
         words = "who renders; all but Cycles at level geometry (default: %(default)s)"
         added.add_argument("--engine", choices=engines, default="CYCLES", help=words)
+        devices = ["CPU", "CUDA", "OPTIX", "HIP", "ONEAPI", "METAL"]
+        words = "what Cycles renders on, all of that kind (default: %(default)s)"
+        added.add_argument("--device", choices=devices, default="CPU", help=words)
         error(added, "the tracer takes")
         against = "the scene that Cycles must show, as viewcam export wrote it (default: what the file holds now)"
         added.add_argument("--scene", metavar="SCENE.json", type=Path, help=against)
@@ -288,7 +291,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
             blend=verification.DEMO_SCENE, camera=None, frame=None, size=None, strict=False, recenter=False, clay=False
         )
         added.set_defaults(
-            difference=None, sides=None, repeat=None, scene=None, trust=False, engine="CYCLES", writes=("report",)
+            difference=None, sides=None, repeat=None, scene=None, trust=False, engine="CYCLES", device="CPU", writes=("report",)
         )
         light(added)
         error(added, "the tracer takes")

@@ -74,7 +74,9 @@ _LABELS = {
         for name, channels in (("Flow", "XY"), ("Motion", "XYZ"), ("Hidden", "X"))
     },
 }
-CHANNELS = _LIGHT | _OPTIONAL | _GEOMETRY | _LABELS
+# Cryptomatte's layers: id and share of one object, and of another.
+COVERAGE_PASSES = tuple(f"CryptoObject{number:02}" for number in range(17))
+CHANNELS = _LIGHT | _OPTIONAL | _GEOMETRY | _LABELS | dict.fromkeys(COVERAGE_PASSES, "rgba")
 # What Blender 4 calls some of them in a file.
 OLDER_NAMES = {
     "IndexOB": "Object Index",

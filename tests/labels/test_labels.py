@@ -125,16 +125,6 @@ def test_an_amodal_mask_is_the_object_alone(camera):
             np.testing.assert_array_equal(mask, alone, err_msg=f"{placed.name} {number}")
 
 
-@settings(max_examples=5)
-@given(cameras)
-def test_the_normal_that_stands_in_where_a_ray_meets_two_surfaces_is_the_surface_s_own(camera):
-    """Of flat and round things the true normal is the shading normal."""
-    surfaces = Surfaces(room(camera))
-    expected = surfaces.normals().reshape(-1, 3)
-    for instance, pixels in surfaces.shown:
-        np.testing.assert_allclose(surfaces._true_normals(instance, pixels), expected[pixels], atol=1e-6)
-
-
 def test_what_is_flattened_has_labels_too():
     flat = moved(0, -1, 0.5, 0.3, 0.5) @ np.diag([1, 1, 0, 1.0])
     scene = room(cubes=np.array([flat, moved(2, 1, 1)]))

@@ -124,6 +124,8 @@ def check(options: argparse.Namespace) -> Result:
 
     if options.engine != "CYCLES" and (options.level != "geometry" or options.error):
         raise InputError(f"--engine {options.engine} is checked at level geometry alone: leave --level and --error out")
+    if options.engine != "CYCLES" and options.device != "CPU":
+        raise InputError(f"--device is for Cycles, and {options.engine} renders on what the graphics driver has: leave it out")
     with tempfile.TemporaryDirectory(prefix="viewcam-") as temporary:
         folder = options.report or Path(temporary)
         scene, reference = folder / "scene.json", folder / "reference.exr"
@@ -131,7 +133,7 @@ def check(options: argparse.Namespace) -> Result:
         name = options.engine.lower()
         tests = [folder / f"{name}-{i + 1}.exr" for i in range(count)] if count > 1 else [folder / f"{name}.exr"]
         numbered = {} if options.scene is None else {"numbered": _numbered(options.scene)}
-        level = _export_and_render(options, scene, tests, engine=options.engine, **numbered)
+        level = _export_and_render(options, scene, tests, engine=options.engine, device=options.device, **numbered)
         size = []
         if options.scene:
             scene, size = options.scene, ["--size", "x".join(map(str, options.size))] if options.size else []

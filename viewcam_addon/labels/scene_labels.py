@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..image import BACKGROUND_DEPTH, Image
 from ..tracer.scene import Scene
-from . import KINDS, masks
+from . import KINDS, coverage, masks
 from .motion import Motion, motion
 from .surfaces import Keepers, Silhouettes, Surfaces
 
@@ -23,7 +23,8 @@ class Labels:
     """What is true of a picture.
 
     image : the passes that were asked for, rows from the bottom, with the camera; docs/labels.md says what each holds.
-    instances : plain JSON values of each instance of which a pixel is shown or, with amodal masks, would be if it stood alone.
+    instances : plain JSON values of each instance of which a pixel is shown or, with amodal masks, would be if it stood alone,
+    or with coverage is shown in part.
     lost : of the other frames, "forward" and "backward": names of visible objects that have no counterpart there.
     """
 
@@ -34,7 +35,7 @@ class Labels:
 
 def label(
     scene: Scene,
-    kinds: Collection[str] = KINDS[:-1],
+    kinds: Collection[str] = ("depth", "normals", "position", "masks", "amodal"),
     previous: Scene | None = None,
     next: Scene | None = None,
     threads: int | None = None,
@@ -47,13 +48,14 @@ def label(
     if "flow" in kinds and not any(others.values()):
         raise InputError("flow goes to another frame: give the scene of the next or of the previous one")
     keepers = keepers or Keepers(threads=threads)
-    surfaces = Surfaces(scene, threads, keepers.of(scene))
+    needed = {"normals": "Normal", "masks": "Material Index"}
+    surfaces = Surfaces(scene, threads, keepers.of(scene), [name for kind, name in needed.items() if kind in kinds])
     passes: dict[str, NDArray] = {}
     shape = surfaces.depth.shape  # traced now: of another frame with the same things the surfaces would use up this tracer
     if "depth" in kinds:
         passes |= _depths(surfaces)
     if "normals" in kinds:
-        normals = surfaces.normals()
+        normals = surfaces.passes["Normal"]
         u, v, w = scene.camera.basis()
         axes = np.stack([-u if scene.camera.mirrored else u, -v, -w], axis=1)
         passes |= {"Normal": normals, "Camera Normal": normals @ axes}
@@ -64,7 +66,7 @@ def label(
         passes |= {"Position": surfaces.points, "Object Position": local}
     if "masks" in kinds:
         ids = np.array([*(instance.id for instance in surfaces.instances), 0])  # the last is that of −1
-        passes |= {"Instance": ids[surfaces.instance], "Material Index": surfaces.material_indices()}
+        passes |= {"Instance": ids[surfaces.instance], "Material Index": surfaces.passes["Material Index"]}
     lost = {}
     if "flow" in kinds:
         for name, other in others.items():
@@ -72,15 +74,20 @@ def label(
                 found = motion(surfaces, Surfaces(other, threads, keepers.of(other)))
                 passes |= _motions(name, found)
                 lost[name.lower()] = list(found.lost)
+    covered = coverage.coverage(surfaces) if "coverage" in kinds else None  # the last who traces: see there
+    if covered:
+        passes |= covered.passes
     planes = {name: np.asarray(values, np.float32).reshape(*shape, -1) for name, values in passes.items()}
-    told = _instances(surfaces, with_masks="masks" in kinds, with_amodal="amodal" in kinds)
-    return Labels(Image(planes, scene.camera, {"software": "Virtual Pinhole"}), told, lost)
+    told = _instances(surfaces, covered, with_masks="masks" in kinds, with_amodal="amodal" in kinds)
+    header = {"software": "Virtual Pinhole", **(covered.header if covered else {})}
+    return Labels(Image(planes, scene.camera, header), told, lost)
 
 
 def _depths(surfaces: Surfaces) -> dict[str, NDArray]:
-    hit = np.isfinite(surfaces.depth)
-    away = surfaces.points - np.array(surfaces.camera.eye)
-    distance = np.sqrt((away * away).sum(-1))
+    camera, hit = surfaces.camera, np.isfinite(surfaces.depth)
+    x, _ = camera.view_plane(np.arange(camera.width) + 0.5, 0.5)
+    _, y = camera.view_plane(0.5, np.arange(camera.height) + 0.5)
+    distance = surfaces.depth * np.sqrt(x * x + (y * y + 1)[:, None])
     return {
         "Depth": np.where(hit, surfaces.depth, BACKGROUND_DEPTH),
         "Distance": np.where(hit, distance, BACKGROUND_DEPTH),
@@ -91,18 +98,24 @@ def _motions(name: str, found: Motion) -> dict[str, NDArray]:
     return {f"{name} Flow": found.flow, f"{name} Motion": found.displacement, f"{name} Hidden": found.hidden}
 
 
-def _instances(surfaces: Surfaces, with_masks: bool, with_amodal: bool) -> list[dict[str, Any]]:
-    shown, camera = dict(surfaces.shown_numbers), surfaces.camera
-    silhouettes = Silhouettes(surfaces).pixels() if with_amodal else None
+def _instances(
+    surfaces: Surfaces, covered: coverage.Coverage | None, with_masks: bool, with_amodal: bool
+) -> list[dict[str, Any]]:
+    camera, all_of_them, shape = surfaces.camera, surfaces.instances, surfaces.instance.shape
+    if not all_of_them:
+        return []
+    visible = masks.of_picture(surfaces.instance, len(all_of_them))
+    amodal = masks.of_pixels(Silhouettes(surfaces).pixels(), shape) if with_amodal else visible
     u, v, w = camera.basis()
     to_camera = np.eye(4)
     to_camera[:3, :3] = [-u if camera.mirrored else u, v, w]
     to_camera[:3, 3] = -to_camera[:3, :3] @ np.array(camera.eye)
-    told, none = [], np.empty(0, np.intp)
-    for number, instance in enumerate(surfaces.instances):
-        visible = shown.get(number, none)
-        whole = visible if silhouettes is None else silhouettes[number]
-        if not len(whole):
+    matrices = np.stack([each.matrix for each in all_of_them])
+    in_world, in_camera = matrices.tolist(), (_TO_OPENCV @ to_camera @ matrices).tolist()
+    told = []
+    for number, (instance, seen, whole) in enumerate(zip(all_of_them, visible, amodal, strict=True)):
+        share = coverage.told(covered, number) if covered else None
+        if whole is None and share is None:
             continue
         least, greatest = surfaces.keeper.box(instance.placed.geometry)
         figures: dict[str, Any] = {
@@ -110,14 +123,16 @@ def _instances(surfaces: Surfaces, with_masks: bool, with_amodal: bool) -> list[
             "name": instance.key[0],
             "number": instance.key[1],
             "object_index": instance.placed.object_index,
-            "object_to_world": instance.matrix.tolist(),
-            "object_to_camera": (_TO_OPENCV @ to_camera @ instance.matrix).tolist(),
+            "object_to_world": in_world[number],
+            "object_to_camera": in_camera[number],
             "box": {"min": least.tolist(), "max": greatest.tolist()},
         }
         if with_masks:
-            figures["visible"] = masks.described(visible, surfaces.instance.shape)
+            figures["visible"] = seen
         if with_amodal:
-            figures["amodal"] = masks.described(whole, surfaces.instance.shape)
-            figures["visible_fraction"] = len(visible) / len(whole)
+            figures["amodal"] = whole
+            figures["visible_fraction"] = seen["area"] / whole["area"] if seen else 0.0
+        if covered:
+            figures["coverage"] = share
         told.append(figures)
     return told

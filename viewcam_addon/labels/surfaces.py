@@ -3,7 +3,7 @@
 import hashlib
 import itertools
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -15,12 +15,9 @@ from ..tracer import render
 from ..tracer.native import CoreScene
 from ..tracer.scene import Mesh, Object, Scene, Spheres
 from ..tracer.scene.sameness import same_things
-from ..tracer.tiles import over_threads
+from ..tracer.tiles import Passes, over_threads
 
 Array = NDArray[np.float64]
-
-# What the tracer's float32 passes may differ from float64 where they show the same surface: one rounding, and its own.
-_SAME_DEPTH = 2.0**-22
 
 _MOST_RAYS = 2**18
 """Of silhouettes that are traced at a time, 130 bytes each."""
@@ -127,17 +124,20 @@ class Surfaces:
     """A scene's surfaces at the pixels' centres, which are traced when they are asked for; rows from the bottom.
 
     depth : (height, width) planar depth z = −w·(P − e), inf where nothing is. instance, primitive : (height, width), −1 there:
-    indices into `instances` and of the geometry's triangles or spheres.
+    indices into `instances` and of the geometry's triangles or spheres. passes : those of level `geometry` that were named
+    when it was made, of the same points.
     """
 
-    def __init__(self, scene: Scene, threads: int | None = None, keeper: "Keeper | None" = None) -> None:
+    def __init__(
+        self, scene: Scene, threads: int | None = None, keeper: "Keeper | None" = None, names: Collection[str] = ()
+    ) -> None:
         self.keeper = keeper or Keeper(scene, threads)
         self.scene, self.camera, self.instances = scene, scene.camera, self.keeper.instances
-        self._tracer = self.keeper.tracers.tracer(scene, threads)
+        self._tracer, self._names = self.keeper.tracers.tracer(scene, threads), names
 
     @cached_property
-    def _hits(self) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
-        return self._tracer.hits()
+    def _hits(self) -> tuple[Array, NDArray[np.int64], NDArray[np.int64], Passes]:
+        return self._tracer.hits(self._names)
 
     @property
     def depth(self) -> Array:
@@ -150,6 +150,10 @@ class Surfaces:
     @property
     def primitive(self) -> NDArray[np.int64]:
         return self._hits[2]
+
+    @property
+    def passes(self) -> Passes:
+        return self._hits[3]
 
     @cached_property
     def shown(self) -> list[tuple[Instance, NDArray[np.intp]]]:
@@ -181,40 +185,6 @@ class Surfaces:
     def local_points(self, instance: Instance, pixels: NDArray[np.intp]) -> Array:
         """(n, 3): the points of an instance's pixels in its object's space."""
         return instance.local(self.points.reshape(-1, 3)[pixels])
-
-    def normals(self) -> NDArray[np.float32]:
-        """(height, width, 3): the shading normals, world space, unit length, on the camera's side; 0 where nothing is."""
-        passes = self._tracer.render(names=("Depth", "Normal"))
-        found, hit = passes["Normal"], np.isfinite(self.depth)
-        found[~hit] = 0.0
-        with np.errstate(invalid="ignore"):
-            other = hit & ~(np.abs(passes["Depth"][..., 0] - self.depth) <= _SAME_DEPTH * self.depth)
-        # A ray that meets two surfaces on their common outline may have met the other one here: then this one's own.
-        for instance, pixels in self.shown if other.any() else ():
-            chosen = pixels[other.ravel()[pixels]]
-            if len(chosen):
-                found.reshape(-1, 3)[chosen] = self._true_normals(instance, chosen)
-        return found
-
-    def _true_normals(self, instance: Instance, pixels: NDArray[np.intp]) -> Array:
-        geometry, primitive = self.scene.geometries[instance.placed.geometry], self.primitive.ravel()[pixels]
-        if isinstance(geometry, Spheres):
-            normals = self.local_points(instance, pixels) - geometry.centers[primitive]
-        else:
-            a, b, c = np.moveaxis(geometry.vertices[geometry.triangles[primitive]], 1, 0)
-            normals = np.cross(b - a, c - a)
-        normals = normals @ instance.inverse[:3, :3]  # the transposed inverse, of rows
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        towards = np.array(self.camera.eye) - self.points.reshape(-1, 3)[pixels]
-        return normals * np.where((normals * towards).sum(1, keepdims=True) < 0, -1.0, 1.0)
-
-    def material_indices(self) -> NDArray[np.int64]:
-        """(height, width): what the Material Index pass shows, 0 where nothing is."""
-        found = np.zeros(self.instance.size, np.int64)
-        for instance, pixels in self.shown:
-            slots = self.scene.geometries[instance.placed.geometry].materials[self.primitive.ravel()[pixels]]
-            found[pixels] = np.array(instance.placed.material_indices)[slots]
-        return found.reshape(self.instance.shape)
 
     def seen_first(self, points: Array, owners: NDArray[np.int64], primitives: NDArray[np.int64], slack: float) -> NDArray:
         """Whether the camera sees points of its scene's surfaces: (n,) bool, False beside the picture and beyond the clip.

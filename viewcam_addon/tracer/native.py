@@ -42,6 +42,8 @@ LIGHT = (
     "Variance",
     "Sample Count",
 )
+NO_HIT = 0xFFFFFFFF
+"""In place of the number of what is met, where nothing is."""
 TILE = 32
 """Pixels, the side of the tiles in which light is traced."""
 
@@ -153,6 +155,7 @@ class _Core(Structure):
         ("set_camera", _function(c_int, c_void_p, POINTER(_Camera))),
         ("bytes", _function(c_size_t, c_void_p)),
         ("render_geometry", _function(c_int, c_void_p, c_uint32, c_uint32, c_void_p, c_size_t, c_void_p)),
+        ("render_hits", _function(c_int, c_void_p, c_uint32, c_uint32, c_void_p, c_size_t, *[c_void_p] * 4)),
         ("surface_at", _function(c_int, c_void_p, c_size_t, c_void_p, c_void_p, c_void_p)),
         ("closest", _function(c_int, c_void_p, c_size_t, c_void_p, c_uint32, c_int, c_void_p, c_void_p, c_void_p)),
         ("occluded", _function(c_int, c_void_p, c_size_t, c_void_p, c_int, c_void_p)),
@@ -382,6 +385,14 @@ class CoreScene:
         planes = _planes(passes, height * width)
         self.check(self.core.render_geometry(self.handle, rows.start, rows.stop, planes, height * width, stop))
 
+    def render_hits(self, passes: Passes, hits: tuple[NDArray, NDArray, NDArray], rows: range, stop: Any = None) -> None:
+        """The same, and what is met, each (height, width): the planar depth, float64, inf where nothing is; the object and its
+        primitive, uint32, `NO_HIT` there.
+        """
+        addresses = [_address(each) for each in hits]
+        planes = _planes(passes, hits[0].size)
+        self.check(self.core.render_hits(self.handle, rows.start, rows.stop, planes, hits[0].size, *addresses, stop))
+
     def surface_at(self, passes: Passes, columns: NDArray, rows: NDArray) -> None:
         """The same of n places in the picture; passes (n, channels)."""
         columns, rows = array(columns, np.float64, (None,)), array(rows, np.float64, (len(columns),))
@@ -407,7 +418,7 @@ class CoreScene:
         t, found = np.empty(len(rays)), np.empty((2, len(rays)), np.uint32)
         addresses = _address(t), _address(found[0]), _address(found[1])
         self.check(self.core.closest(self.handle, len(rays), _address(rays), _KINDS[kind], packets, *addresses))
-        objects, primitives = np.where(found == 0xFFFFFFFF, -1, found.astype(np.int64))
+        objects, primitives = np.where(found == NO_HIT, -1, found.astype(np.int64))
         return t, objects, primitives
 
     def occluded(self, rays: NDArray, packets: bool = True) -> NDArray[np.bool_]:

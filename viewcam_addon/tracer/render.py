@@ -64,12 +64,11 @@ class Tracer:
     def render(self, watcher: Watcher | None = None, names: Collection[str] = tuple(PASSES)) -> Passes:
         """Pass name → (height, width, channels) float32, rows from the bottom: the surfaces at the pixel centres."""
         passes = self._blank(lambda shape: unwritten(shape, names))
-        bands = (range(first, min(first + BAND, self._camera.height)) for first in range(0, self._camera.height, BAND))
 
         def trace(rows: range, stop: int) -> None:
             self._core.render_geometry(passes, rows, stop)
 
-        for rows in self._in_threads(trace, bands, watcher):
+        for rows in self._in_threads(trace, self._bands(), watcher):
             if watcher is not None:
                 watcher.tile(passes, rows)
         return passes
@@ -106,29 +105,22 @@ class Tracer:
                 watcher.tile(passes, range(row, min(row + native.TILE, height)))
         return passes
 
-    def hits(self) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    def hits(self, names: Collection[str] = ()) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], Passes]:
         """What the pixels' centres show, each (height, width), rows from the bottom: the planar depth, inf where nothing is;
         which instance, counting through the objects and the places of each; and which of its geometry's primitives, −1 where
-        none is.
+        none is. And of these same points the passes that `names` are, as `render` has them.
         """
-        camera = self._camera
-        u, v, w = camera.basis()
-        x, _ = camera.view_plane(np.arange(camera.width) + 0.5, 0.5)
-        _, y = camera.view_plane(0.5, np.arange(camera.height) + 0.5)
-        across, up = x[:, None] * (-u if camera.mirrored else u) - w, y[:, None] * v
-        shape = camera.height, camera.width
-        found = np.empty(shape), np.empty(shape, np.int64), np.empty(shape, np.int64)
+        shape = self._camera.height, self._camera.width
+        depth, objects, primitives = np.empty(shape), np.empty(shape, np.uint32), np.empty(shape, np.uint32)
+        passes = self._blank(lambda shape: unwritten(shape, names)) if names else {}
 
-        def trace(rows: range, _: int) -> None:
-            some = slice(rows.start, rows.stop)
-            directions = (up[some, None] + across).reshape(-1, 3)  # of length 1 along −w: distances are depths
-            for whole, part in zip(found, self.closest(np.array([camera.eye]), directions), strict=True):
-                whole[some] = part.reshape(len(rows), -1)
+        def trace(rows: range, stop: int) -> None:
+            self._core.render_hits(passes, (depth, objects, primitives), rows, stop)
 
-        bands = (range(first, min(first + BAND, camera.height)) for first in range(0, camera.height, BAND))
-        for _ in self._in_threads(trace, bands, None):
+        for _ in self._in_threads(trace, self._bands(), None):
             pass
-        return found
+        # −1 is what NO_HIT is as a number with a sign; no scene has 2³¹ of either.
+        return depth, objects.view(np.int32).astype(np.int64), primitives.view(np.int32).astype(np.int64), passes
 
     def closest(self, origins: ArrayLike, directions: ArrayLike) -> tuple[NDArray, NDArray, NDArray]:
         """What rays meet first within the clip range, in lengths of their directions; the rest as in `hits`, each (n,).
@@ -150,6 +142,10 @@ class Tracer:
         passes = unwritten(column.shape)
         self._core.surface_at(passes, column, row)
         return passes
+
+    def _bands(self) -> Iterator[range]:
+        height = self._camera.height
+        return (range(first, min(first + BAND, height)) for first in range(0, height, BAND))
 
     def _blank(self, make: Callable[[tuple[int, int]], Passes]) -> Passes:
         """A picture's passes, before anything else takes memory for it."""

@@ -1,5 +1,6 @@
 """The sub-panel Labels: what it says it will write is what is written, beside Blender, and nothing of it is in the file."""
 
+import json
 import sys
 from pathlib import Path
 
@@ -51,8 +52,6 @@ def test_each_label_can_be_chosen_and_none_is_unknown():
 
 
 def test_a_click_starts_a_batch_of_this_frame_with_labels_alone(settings, camera, stand_in, scene):
-    import json
-
     settings.kinds, settings.depth_steps = {"FLOW", "DEPTH"}, 250
     bpy.data.objects["Hero: close"].select_set(True)
     assert bpy.ops.viewcam.write_labels(camera="Hero: close") == {"FINISHED"}
@@ -70,6 +69,14 @@ def test_a_child_that_dies_leaves_no_folder_and_its_last_words_are_said(settings
         bpy.ops.viewcam.write_labels()
     folder, sentence = labels.latest()
     assert folder is None and "out of memory" in sentence and list(Path(settings.folder).iterdir()) == []
+
+
+def test_a_shot_that_fails_is_said_in_its_own_words(settings, camera, monkeypatch):
+    summary = '{"shots": [{"name": "Hero", "error": "the disk is full"}]}'
+    fails = "import pathlib, sys; pathlib.Path(sys.argv[3], 'summary.json').write_text(sys.argv[-1]); sys.exit(4)"
+    monkeypatch.setattr(comparing, "command", lambda *given: [sys.executable, "-c", fails, *given[3], summary])
+    with pytest.raises(RuntimeError, match="The disk is full"):
+        bpy.ops.viewcam.write_labels()
 
 
 def test_while_labels_are_written_there_is_cancel_and_no_second_start(settings, camera, monkeypatch, scene):

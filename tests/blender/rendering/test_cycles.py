@@ -1,6 +1,7 @@
 """Cycles' settings are overridden: restored whatever happens, and right while they last."""
 
 import ctypes
+from types import SimpleNamespace
 
 import pytest
 
@@ -311,3 +312,43 @@ def test_a_file_whose_colour_mode_its_format_does_not_know_is_rendered(crowded, 
     view_layer = crowded.view_layers[0]
     cycles.render(crowded, view_layer, crowded.camera, tmp_path / "picture.exr")
     assert settings.file_format == "JPEG" and settings.color_mode in ("BW", "RGB")
+
+
+class _Device:
+    def __init__(self, kind):
+        self.type, self.use = kind, kind == "CPU"
+
+
+class _Preferences:
+    """Cycles' own, of a machine with a graphics card."""
+
+    def __init__(self):
+        self.compute_device_type = "NONE"
+        self.devices = [_Device("CUDA"), _Device("CPU")]
+
+    def get_device_types(self, _context):
+        return [("NONE", "None", "", 0), ("CUDA", "CUDA", "", 1), ("HIP", "HIP", "", 4)]
+
+    def get_devices_for_type(self, kind):
+        return [each for each in self.devices if each.type in (kind, "CPU")]
+
+
+def test_a_device_is_all_of_its_kind_and_no_processor_beside_them(fresh_blender, scene, monkeypatch):
+    preferences = _Preferences()
+    addons = {"cycles": SimpleNamespace(preferences=preferences)}
+    context = SimpleNamespace(preferences=SimpleNamespace(addons=addons))
+    monkeypatch.setattr(cycles, "bpy", SimpleNamespace(context=context))
+    with overridden() as overrides:
+        cycles._override_device(overrides, scene, "CUDA")
+        assert [each.use for each in preferences.devices] == [True, False]
+        assert preferences.compute_device_type == "CUDA" and scene.cycles.device == "GPU"
+    assert [each.use for each in preferences.devices] == [False, True] and preferences.compute_device_type == "NONE"
+    with overridden() as overrides, pytest.raises(InputError, match=r"no HIP device that Cycles .* are CUDA, HIP\): leave"):
+        cycles._override_device(overrides, scene, "HIP")
+    assert scene.cycles.device == "CPU"
+
+
+def test_a_device_that_is_not_there_is_one_sentence_and_nothing_is_rendered(fresh_blender, scene, camera, tmp_path):
+    with pytest.raises(InputError, match="there is no METAL device that Cycles could render on"):
+        cycles.render(scene, scene.view_layers[0], camera, tmp_path / "a.exr", device="METAL")
+    assert not (tmp_path / "a.exr").exists()

@@ -6,6 +6,8 @@ though flow needs the frames before and after. What it came to belongs to this s
 """
 
 import atexit
+import contextlib
+import json
 from pathlib import Path
 
 import bpy
@@ -21,6 +23,7 @@ from .operators import NamesCamera
 from .panel_places import BelowProperties, BelowSidebar, SubPanel
 
 _SECONDS = 0.2  # between two looks
+_SUMMARY = "summary.json"
 
 _KINDS = (
     ("DEPTH", "Depth", "Along the camera's axis and along the rays; in a PNG of 16 bits as well"),
@@ -29,6 +32,7 @@ _KINDS = (
     ("MASKS", "Masks", "Which object and which material each pixel shows; areas, boxes and run lengths of what is visible"),
     ("AMODAL", "Amodal", "Areas, boxes and run lengths of each object as if it stood alone"),
     ("FLOW", "Flow", "Where each point is in the next and in the previous frame, and whether it is hidden there"),
+    ("COVERAGE", "Coverage", "How much of each pixel each object has, as Cryptomatte: for soft masks"),
 )
 
 _running: "Writing | None" = None
@@ -104,7 +108,11 @@ class Writing(BackgroundBatch):
         if ended is None:
             return None
         status, sentence = ended
-        return (None, sentence) if status else (self.folder, f"Written to {self.folder}")
+        if status == 0:
+            return self.folder, f"Written to {self.folder}"
+        with contextlib.suppress(OSError, ValueError, LookupError):  # why that one shot failed
+            sentence = json.loads((self.folder / _SUMMARY).read_text(encoding="utf-8"))["shots"][0]["error"]
+        return None, sentence[:1].upper() + sentence[1:]
 
 
 class VIEWCAM_OT_write_labels(NamesCamera, bpy.types.Operator):

@@ -85,6 +85,7 @@ def render(
     threads: int | None = None,
     light: LightSettings | None = None,
     keep: bool = False,
+    device: str = "CPU",
 ) -> None:
     """Render one view layer at the current frame to a multilayer EXR, whole or not at all.
 
@@ -100,6 +101,8 @@ def render(
         raise InputError("Cycles is disabled: enable the add-on Cycles Render Engine in Blender's preferences")
     with overridden() as overrides:
         override_settings(overrides, scene, view_layer, light)
+        if device != "CPU":
+            _override_device(overrides, scene, device)
         render_file(overrides, scene, view_layer, camera_object, path, remedies, threads, keep)
 
 
@@ -139,6 +142,20 @@ def override_settings(
         override_all(overrides, scene.cycles, _LIGHT | _settings_of(light))
         passes = _PASSES_OF_LIGHT + (_PASSES_OF_CENTRES if light.samples == 1 else ())
     _override_passes(overrides, view_layer, passes)
+
+
+def _override_device(overrides: Overrides, scene: bpy.types.Scene, device: str) -> None:
+    """All of a kind, and no processor beside them."""
+    preferences = bpy.context.preferences.addons["cycles"].preferences
+    known = [kind for kind, *_ in preferences.get_device_types(bpy.context) if kind != "NONE"]
+    found = preferences.get_devices_for_type(device) if device in known else ()
+    if not any(each.type == device for each in found):
+        others = f"those that this Blender knows are {', '.join(known)}" if known else "this Blender knows none"
+        raise InputError(f"there is no {device} device that Cycles could render on ({others}): leave --device out, for the CPU")
+    overrides.set(preferences, "compute_device_type", device)
+    for each in found:
+        overrides.set(each, "use", each.type == device)
+    overrides.set(scene.cycles, "device", "GPU")
 
 
 def _settings_of(light: LightSettings) -> dict[str, object]:

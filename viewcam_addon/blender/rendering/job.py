@@ -36,7 +36,7 @@ class Request:
     that models all light of the scene (levels.py). samples : a pixel, of all of Cycles' pictures together, from level `direct`
     on. clay : whether one and the same material covers all surfaces. trust : whether what is in the file may run and write
     (opening.py). numbered : what `export_and_render` numbers for the index passes where the file does not: objects, materials.
-    engine : CYCLES, or EEVEE or WORKBENCH at level `geometry` (rasters.py).
+    engine : CYCLES, or EEVEE or WORKBENCH at level `geometry` (rasters.py). device : what Cycles renders on (cycles.py).
     """
 
     blend: str | os.PathLike[str] | None = None
@@ -53,6 +53,7 @@ class Request:
     trust: bool = False
     numbered: tuple[str, ...] = ("objects", "materials")
     engine: str = "CYCLES"
+    device: str = "CPU"
 
 
 @dataclass(frozen=True)
@@ -161,7 +162,7 @@ def _render(
             picture = cycles.LightSettings(light.film, bounces, share, request.seed + number)
         of, remedies = (stage.scene, stage.view_layer, stage.camera, path), stage.ledger.remedies.values()
         if request.engine == "CYCLES":
-            cycles.render(*of, remedies, request.threads, picture)
+            cycles.render(*of, remedies, request.threads, picture, device=request.device)
         else:
             rasters.render(*of, request.engine, remedies, request.threads)
 

@@ -115,7 +115,15 @@ const ViewcamCore core = {
         [](const ViewcamScene* scene, uint32_t first_row, uint32_t end_row, float* const* planes, size_t stride, const volatile int* stop) {
             return guarded([&] {
                 check::rows(scene_of(scene), first_row, end_row);
-                render_geometry(scene_of(scene), first_row, end_row, {planes, stride}, stop);
+                render_geometry(scene_of(scene), first_row, end_row, {planes, stride}, {}, stop);
+            });
+        },
+    .render_hits =
+        [](const ViewcamScene* scene, uint32_t first_row, uint32_t end_row, float* const* planes, size_t stride, double* depth, uint32_t* objects,
+           uint32_t* primitives, const volatile int* stop) {
+            return guarded([&] {
+                check::rows(scene_of(scene), first_row, end_row);
+                render_geometry(scene_of(scene), first_row, end_row, {planes, stride}, {depth, objects, primitives}, stop);
             });
         },
     .surface_at =

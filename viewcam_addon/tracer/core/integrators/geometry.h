@@ -20,6 +20,12 @@ struct GeometryPasses {
     void write(ViewcamPass pass, size_t pixel, Vec3 v) const { write(pass, pixel, v.x, v.y, v.z); }
 };
 
+// Where, and on what, the rays of the pixels end, in float64; null is not wanted. Where nothing is: infinity and NO_HIT twice.
+struct GeometryHits {
+    double* depth;
+    uint32_t *object, *primitive;
+};
+
 // What up to 64 rays met, written as Cycles writes it, also where that is nothing. pixels: where in the planes.
 inline void write_geometry(const Scene& scene, const Ray* rays, const Hit* hits, int count, const GeometryPasses& passes, const size_t* pixels) {
     constexpr double BACKGROUND_DEPTH = 1e10;
@@ -57,7 +63,9 @@ inline void write_geometry(const Scene& scene, const Ray* rays, const Hit* hits,
 
 // The pixel centres of some rows, from the bottom, in blocks of 16 × 4, as many columns as fill the cache lines of the passes;
 // `*stop`, if there is one, ends it early.
-inline void render_geometry(const Scene& scene, uint32_t begin, uint32_t end, const GeometryPasses& passes, const volatile int* stop) {
+inline void render_geometry(
+    const Scene& scene, uint32_t begin, uint32_t end, const GeometryPasses& passes, const GeometryHits& ends, const volatile int* stop
+) {
     constexpr uint32_t WIDTH = 16, HEIGHT = 4;
     const Camera& camera = scene.camera;
     Ray rays[WIDTH * HEIGHT];
@@ -74,6 +82,8 @@ inline void render_geometry(const Scene& scene, uint32_t begin, uint32_t end, co
                 }
             scene.closest(rays, count, CAMERA, hits);
             write_geometry(scene, rays, hits, count, passes, pixels);
+            for (int i = 0; ends.depth && i < count; i++)
+                ends.depth[pixels[i]] = hits[i].t, ends.object[pixels[i]] = hits[i].object, ends.primitive[pixels[i]] = hits[i].primitive;
         }
 }
 
