@@ -21,6 +21,7 @@ def test_every_button_of_a_camera_stands_in_the_menu_which_the_search_reads(regi
     classes = (*moving.CLASSES, *operators.CLASSES, *baking.CLASSES, *clipboard.IN_MENUS, *scene_cameras.OPERATORS)
     classes += photo_matching.OPERATORS
     assert set(entries) == {each.bl_idname for each in classes} and menus == ["VIEWCAM_MT_copy_camera_as"]
+    assert "viewcam.copy_readout" not in entries, "without a text of its own, as from a menu, it would empty the clipboard"
     assert drags == ["Drag: Orbit", "Drag: Dolly", "Drag: Dolly Zoom", "Drag: Truck"]
     assert all(getattr(bpy.ops.viewcam, entry.split(".")[1]).get_rna_type() for entry in entries)
 
