@@ -139,6 +139,22 @@ def test_a_constant_emission_is_a_factor(add_lamp, export):
     assert point.power == close((30.0, 15.0, 7.5)) and not told
 
 
+def test_emissions_are_mixed_and_added_and_fall_off_as_light_does(add_lamp, export):
+    tree = use_nodes(add_lamp("POINT", energy=10.0).data)
+    first = next(node for node in tree.nodes if node.type == "EMISSION")
+    second, mixed, falloff = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("Emission", "MixShader", "LightFalloff"))
+    second.inputs["Color"].default_value, mixed.inputs[0].default_value = (0, 1, 0, 1), 0.25
+    falloff.inputs["Strength"].default_value = 4.0
+    tree.links.new(falloff.outputs["Quadratic"], first.inputs["Strength"])
+    for number, shader in enumerate((first, second), start=1):
+        tree.links.new(shader.outputs[0], mixed.inputs[number])
+    tree.links.new(mixed.outputs[0], next(node for node in tree.nodes if node.type == "OUTPUT_LIGHT").inputs["Surface"])
+    ((point,), told) = export()
+    assert point.power == close((30.0, 32.5, 30.0)) and not told
+    falloff.inputs["Smooth"].default_value = 1.0
+    assert "nodes are not modelled" in export()[1]["Lamp"]
+
+
 def attach_falloff(block):
     tree = use_nodes(block.data)
     emission = next(node for node in tree.nodes if node.type == "EMISSION")

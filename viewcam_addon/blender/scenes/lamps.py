@@ -17,7 +17,7 @@ from .. import versions
 from ..temporary_settings import Overrides
 from . import features, nodes, shaders
 from .ledger import Ledger
-from .nodes import Input, Output
+from .nodes import Input
 from .shaders import RGB
 
 _WHITE = (1.0, 1.0, 1.0)
@@ -106,13 +106,9 @@ def _emission(name: str, light: bpy.types.Light, ledger: Ledger) -> RGB:
     output = tree and tree.get_output_node("CYCLES")
     if not output:
         return _WHITE
-    surface = nodes.source(Input(output.inputs["Surface"]))
-    if not isinstance(surface, Output):
-        return (0.0, 0.0, 0.0)
-    if surface.node.type == "EMISSION":
-        rgb, strength = shaders.constant_colour(surface, "Color"), shaders.constant_number(surface, "Strength")
-        if rgb is not None and strength is not None:
-            return _times(rgb, strength)
+    emission = shaders.plain_emission(Input(output.inputs["Surface"]))
+    if emission is not None:
+        return emission
     ledger.note(name, "approximated", "its nodes are not modelled, and plain light stands in")
     ledger.call_for_cycles(light.original, _make_plain)
     return _WHITE

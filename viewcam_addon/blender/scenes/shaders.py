@@ -166,6 +166,14 @@ def in_the_viewport(material: bpy.types.Material) -> Reading:
     return Reading(Material(diffuse=Colour(possible(material.diffuse_color[:3]) or PLAIN.diffuse.rgb)))
 
 
+def plain_emission(of: Input) -> RGB | None:
+    """What shaders give off that do nothing else, the same everywhere; None where they do, or it varies or is not modelled."""
+    reader = _Components(Colour(_WHITE))
+    found = reader.surface(of)
+    emission = found.pop("emission", Colour((0.0, 0.0, 0.0)))
+    return None if found or reader.reading.reasons or _pattern(emission) != _pattern(Colour(_WHITE)) else emission.rgb
+
+
 class _Reader:
     """Follows the nodes to colours and numbers, and gathers what they ask for."""
 
@@ -606,6 +614,9 @@ def _constant(of: Input) -> object:
     source = nodes.source(of)
     if isinstance(source, Output) and images.shows_nothing(source.node):
         return images.MISSING[3] if source.socket.name == "Alpha" else images.MISSING[:3]
+    if isinstance(source, Output) and source.node.type == "LIGHT_FALLOFF" and source.socket.name == "Quadratic":
+        # As light falls off of itself.
+        return _constant(source.input("Strength")) if _constant(source.input("Smooth")) == 0 else None
     if isinstance(source, Output) and source.node.type not in ("RGB", "VALUE"):
         return None
     return source.socket.default_value
