@@ -133,7 +133,7 @@ def toon(material):
 
 def noisy(material):
     tree = material.node_tree
-    tree.links.new(tree.nodes.new("ShaderNodeTexVoronoi").outputs[1], tree.nodes["Shader"].inputs["Color"])
+    tree.links.new(tree.nodes.new("ShaderNodeWireframe").outputs[0], tree.nodes["Shader"].inputs["Color"])
 
 
 def bumpy(material):

@@ -101,6 +101,36 @@ def test_shadows_of_what_is_transparent(stage, both, scene, is_seen_through):
     assert (sides[1]["Combined"][4, -4, 0] > 0.1) == is_seen_through
 
 
+@pytest.mark.parametrize("below", [DIFFUSE, "ShaderNodeBsdfGlossy"])
+def test_a_pane_is_told_of_the_ray_what_cycles_tells_it(stage, both, scene, below):
+    """Its colour is made of all that Light Path says: of the eye's rays, of those to the sun, and of those from a mirror."""
+    pane = stage(below)
+    tree = pane.node_tree
+    said = tree.nodes.new("ShaderNodeLightPath")
+    total = None
+    weights = {"Ray Length": 0.01, "Is Camera Ray": 0.3, "Is Glossy Ray": 0.2, "Is Reflection Ray": 0.1, "Is Shadow Ray": 0.37}
+    weights |= {"Is Singular Ray": 0.05, "Is Diffuse Ray": 0.8, "Is Transmission Ray": 0.9, "Ray Depth": 0.07}
+    weights |= {"Diffuse Depth": 0.6, "Glossy Depth": 0.021, "Transparent Depth": 0.043, "Transmission Depth": 0.9}
+    for name, weight in weights.items():
+        term = tree.nodes.new("ShaderNodeMath")
+        term.operation = "MULTIPLY_ADD"
+        tree.links.new(said.outputs[name], term.inputs[0])
+        term.inputs[1].default_value, term.inputs[2].default_value = weight, 0.2
+        if total:
+            tree.links.new(total.outputs[0], term.inputs[2])
+        total = term
+    tree.links.new(total.outputs[0], tree.nodes["Shader"].inputs["Color"])
+    if below == DIFFUSE:
+        set_black(scene.world)
+    else:
+        bpy.data.materials["Floor"].node_tree.nodes["Shader"].inputs["Roughness"].default_value = 0.0
+        bpy.data.objects.remove(next(block for block in scene.objects if block.type == "LIGHT"))
+    sides = both("path")
+    check(sides)
+    shown = sides[1]["Combined"][4, 4::8, 0]
+    assert len(set(np.round(shown, 3))) == PANES + 1, shown
+
+
 def test_cut_out_leaves(stage, both, scene):
     """An image whose pixels are there or not, as a Principled surface's alpha: there is no chance in it."""
     leaf = stage(above="ShaderNodeBsdfPrincipled")

@@ -4,6 +4,7 @@ What is shown is a tenth of the value, kept between −3 and 3, and a half more,
 The bound is absolute; where a value jumps (closest pixels, floors, divisions) Cycles' float32 may stand elsewhere, in a few.
 """
 
+import itertools
 import zlib
 
 import numpy as np
@@ -17,6 +18,7 @@ from viewcam_addon.tracer.scene.shader_nodes import KINDS
 
 MOST, TYPICAL = 2e-5, 2e-6  # calibrated: float32 of UV up to 2, at images of 4 pixels, and 4.2 has another luminance by 1e-5
 BYTES = 10 if bpy.app.version >= (5, 2) else 1  # calibrated: from 5.1 on Cycles has corners' colours of bytes in half floats
+GLOW = 25 if bpy.app.version >= (5, 2) else 1  # calibrated: Cycles' red of 5.2 is another by up to 1e-4 than that of 4.2 to 5.0
 JUMPS = 0.04  # of the pixels
 PARTS = 3  # in which the nodes are shown, so that each has pixels enough
 
@@ -35,6 +37,14 @@ class N:
                     node.color_ramp.elements.new(position).color = colour
             elif name == "ramp":
                 node.color_ramp.interpolation = value
+            elif name == "curves":
+                for curve, points in zip(node.mapping.curves, value, strict=False):
+                    curve.points[0].location, curve.points[-1].location = points[0], points[-1]
+                    for point in points[1:-1]:
+                        curve.points.new(*point)
+                node.mapping.update()
+            elif name == "extend":
+                node.mapping.extend = value
             else:
                 setattr(node, name, value)
         for name, value in self.inputs.items():
@@ -76,8 +86,8 @@ def graphs(image, straight):
     found["math clamp"] = N("Math", {"Value": U, "Value_001": V}, operation="ADD", use_clamp=True)
     for word in KINDS["vector_math"].inputs["operation"]:
         theirs = {"fract": "FRACTION"}.get(word, word.upper())
-        if word in ("power", "sign") and bpy.app.version < (4, 3):
-            continue  # they came with 4.3
+        if theirs not in bpy.types.ShaderNodeVectorMath.bl_rna.properties["operation"].enum_items:
+            continue  # some came with 4.3
         inputs = {"Vector": OBJECT, "Vector_001": a, "Vector_002": (0.3, 0.2, 0.1), "Scale": 0.7}
         found[f"vector math {word}"] = N("VectorMath", inputs, operation=theirs)
     for word in KINDS["mix_color"].inputs["blend"]:
@@ -113,7 +123,7 @@ def graphs(image, straight):
             found[f"attribute {name} {word}"] = N("Attribute", output=word, attribute_name=name)
     found["colour attribute"] = N("VertexColor", output="Color", layer_name="Byte")
     found["colour attribute alpha"] = N("VertexColor", output="Alpha", layer_name="Tint")
-    for word in ("Position", "Normal", "True Normal", "Incoming", "Backfacing"):
+    for word in ("Position", "Normal", "True Normal", "Incoming", "Backfacing", "Tangent", "Parametric"):
         found[f"geometry {word}"] = N("NewGeometry", output=word)
     for word in ("Location", "Object Index"):
         found[f"object {word}"] = N("ObjectInfo", output=word)
@@ -132,8 +142,63 @@ def graphs(image, straight):
     found["invert"] = N("Invert", {"Color": a, "Fac": 0.7})
     found["luminance"] = N("RGBToBW", {"Color": a})
     found["separate"] = N("SeparateColor", {"Color": b}, "Green")
+    found |= curves(a)
+    found |= conversions(a, b)
     found["clamp"] = N("Clamp", {"Value": U, "Min": 0.2, "Max": 0.8})
     found["number of a vector"] = N("Math", {"Value": OBJECT, "Value_001": a}, operation="ADD")
+    return found
+
+
+def curves(color):
+    """Of colours, vectors and numbers; beyond their ends either way."""
+    bent = (((0.1, 0.9), (0.4, 0.2), (0.8, 1.3)), ((0.0, 0.0), (1.0, 0.6)), ((-0.2, 0.1), (0.5, 0.5), (0.9, -0.3)))
+    common = ((0.0, 0.1), (0.7, 0.4), (1.0, 1.0))
+    found = {}
+    for word in ("EXTRAPOLATED", "HORIZONTAL"):
+        found[f"rgb curves {word}"] = N("RGBCurve", {"Color": color, "Fac": 0.9}, curves=(*bent, common), extend=word)
+        found[f"vector curves {word}"] = N("VectorCurve", {"Vector": OBJECT, "Fac": 1.0}, curves=bent, extend=word)
+        found[f"float curve {word}"] = N("FloatCurve", {"Value": U, "Factor": V}, curves=bent[:1], extend=word)
+    return found
+
+
+def conversions(a, b):
+    """Of ways to write colours, of ranges, of vectors."""
+    found = {}
+    for mode in ("HSV", "HSL"):
+        parts = N("SeparateColor", {"Color": a}, mode=mode)
+        for word in ("Red", "Green", "Blue"):
+            found[f"separate {mode} {word}"] = N("SeparateColor", {"Color": b}, word, mode=mode)
+        found[f"combine {mode}"] = N("CombineColor", {"Red": parts, "Green": 0.7, "Blue": V}, mode=mode)
+    for word in KINDS["map_range"].inputs["interpolation"]:
+        ends = {"From_Min_FLOAT3": (0.2, 0.1, 1.0), "From_Max_FLOAT3": (1.1, 0.1, -0.4), "To_Min_FLOAT3": (0.9, -0.4, 0.1)}
+        ends |= {"To_Max_FLOAT3": (0.1, 0.7, 0.8), "Steps_FLOAT3": (3.0, 2.0, 0.0)}
+        for clamp in (False, True):
+            settings = {"interpolation_type": word.upper(), "data_type": "FLOAT_VECTOR", "clamp": clamp}
+            found[f"map range of vectors {word} {clamp}"] = N("MapRange", {"Vector": OBJECT} | ends, **settings)
+    found["clamp range"] = N("Clamp", {"Value": U, "Min": 0.8, "Max": 0.2}, clamp_type="RANGE")
+    for mode, factor in (("UNIFORM", {"Factor_Float": V}), ("NON_UNIFORM", {"Factor_Vector": UV})):
+        for clamp in (False, True):
+            inputs = factor | {"A_Vector": OBJECT, "B_Vector": (0.3, -0.4, 1.2)}
+            settings = {"data_type": "VECTOR", "factor_mode": mode, "clamp_factor": clamp}
+            found[f"mix vectors {mode} {clamp}"] = N("Mix", inputs, **settings)
+    for word in KINDS["vector_rotate"].inputs["kind"]:
+        inputs = {"Vector": OBJECT, "Center": (0.2, -0.1, 0.3)}
+        inputs |= {"Rotation": (0.3, -0.4, 1.1)} if word == "euler_xyz" else {"Angle": 0.8}
+        inputs |= {"Axis": (0.3, 0.5, -0.9)} if word == "axis_angle" else {}
+        for invert in (False, True):
+            found[f"vector rotate {word} {invert}"] = N("VectorRotate", inputs, rotation_type=word.upper(), invert=invert)
+    for kind in ("POINT", "VECTOR", "NORMAL"):
+        for start, end in itertools.permutations(("WORLD", "OBJECT", "CAMERA"), 2):
+            words = {"vector_type": kind, "convert_from": start, "convert_to": end}
+            found[f"vector transform {kind} {start} {end}"] = N("VectorTransform", {"Vector": OBJECT}, **words)
+    kelvin = N("MapRange", {"Value": U, "To Min": 500.0, "To Max": 9000.0}, clamp=False)
+    found["blackbody"] = N("Blackbody", {"Temperature": kelvin})
+    nanometres = N("MapRange", {"Value": U, "To Min": 400.0, "To Max": 700.0}, clamp=False)
+    found["wavelength"] = N("Wavelength", {"Wavelength": nanometres})
+    for word in ("Normal", "Dot"):
+        found[f"normal {word}"] = N("Normal", {"Normal": OBJECT}, word)
+    for word in ("Is Camera Ray", "Is Shadow Ray", "Ray Length"):
+        found[f"light path {word}"] = N("LightPath", output=word)
     return found
 
 
@@ -178,6 +243,22 @@ def procedural():
         words = {"bands_direction": direction, "rings_direction": rings, "wave_profile": profile}
         found[f"wave bands {direction}"] = N("TexWave", inputs, "Color", **words)
         found[f"wave rings {direction}"] = N("TexWave", inputs | {"Distortion": 0.0}, "Fac", wave_type="RINGS", **words)
+    return found | voronoi(place)
+
+
+def voronoi(place):
+    """Every feature in every dimension, by one metric after the other, and the metrics' own."""
+    found, metrics = {}, itertools.cycle(("MINKOWSKI", "CHEBYCHEV", "MANHATTAN", "EUCLIDEAN"))
+    words = {"DISTANCE_TO_EDGE": ("Distance",), "N_SPHERE_RADIUS": ("Radius",)}
+    for feature in ("F1", "F2", "SMOOTH_F1", "DISTANCE_TO_EDGE", "N_SPHERE_RADIUS"):
+        for dimensions in ("1D", "2D", "3D", "4D"):
+            plain = feature not in words and dimensions in ("2D", "3D")
+            for word in words.get(feature, ("Distance", "Color", "W" if dimensions in ("1D", "4D") else "Position")):
+                inputs = {"Vector": place, "W": U, "Scale": 1.9, "Exponent": 1.7, "Randomness": 0.8, "Smoothness": 0.4}
+                inputs |= {} if plain or word == "Radius" else {"Detail": 1.3, "Roughness": 0.6, "Lacunarity": 1.8}
+                settings = {"feature": feature, "voronoi_dimensions": dimensions, "normalize": dimensions == "2D"}
+                settings["distance"] = next(metrics)
+                found[f"voronoi {feature} {dimensions} {word}"] = N("TexVoronoi", inputs, word, **settings)
     return found
 
 
@@ -212,7 +293,11 @@ def floor(scene, camera, add, make_material, set_world, read_passes, tmp_path):
                 values = mesh.attributes.new(attribute, kind, domain).data
                 values.foreach_set(field, rng.uniform(0, 1, width * len(values)))
             mesh.materials.append(material)
-            add(mesh, name, pass_index=number + 1)
+            block = add(mesh, name, pass_index=number + 1)
+            if name.startswith("vector transform"):  # the others stand in the world as they are in themselves
+                block.location, block.rotation_euler, block.scale = (0.3, -0.2, 0.1), (0.5, 0.2, -0.4), (1.2, 0.7, -0.9)
+                bpy.context.view_layer.update()
+                mesh.transform(block.matrix_world.inverted())
         path = tmp_path / "floor.exr"
         exported = job.export_and_render(job.Request(threads=2, level="direct", samples=1), [path])
         assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
@@ -232,7 +317,7 @@ def check(found):
     for name, (ours, theirs) in found.items():
         assert len(ours) > 20, (name, len(ours))
         apart = np.abs(ours - theirs).max(axis=1) / np.maximum(np.abs(theirs).max(axis=1), 1)
-        scale = BYTES if name.startswith(("attribute Byte", "colour attribute")) else 1
+        scale = BYTES if name.startswith(("attribute Byte", "colour attribute")) else GLOW if name == "blackbody" else 1
         apart /= scale
         if np.median(apart) > TYPICAL or (apart > MOST).mean() > JUMPS:
             told.append(f"{name}: p50 {np.median(apart):.1e}, {(apart > MOST).mean():.1%} above {MOST}, most {apart.max():.1e}")

@@ -125,6 +125,9 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
             setattr(added, theirs, type(getattr(added, theirs))(node[name][0]))
         if node.type == "image" and node["image"] is not None:
             added.image = reading.images[node["image"].image]
+        if "table" in KINDS[node.type].inputs:
+            table, ends = reading.images[node["table"].image], (node["least"][0], node["most"][0])
+            value_nodes.draw_curves(added.mapping, table, *ends, node["extrapolate"])
         for name, theirs in value.inputs.items():
             if KINDS[node.type].inputs[name] not in (UV, GENERATED) or name in dict(node.inputs):
                 _colour(adder, value_nodes.input_of(added, theirs), node[name], reading)

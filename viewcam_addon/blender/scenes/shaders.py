@@ -37,8 +37,11 @@ _PRINCIPLED_ZERO = (
     "Thin Film Thickness",
 )
 _WHITE = (1.0, 1.0, 1.0)
+_BLACK = Colour((0.0, 0.0, 0.0))
 _RAMP = 256  # Cycles looks ramps up in a table of one more
 _BESIDE = 1e-6  # of a pixel: where a step lies is the pixel's that it leads to
+# What Light Path says alike of rays that meet a light and of those that are sent to it.
+_SURE_OF_PATHS = ("Is Camera Ray", "Is Shadow Ray", "Ray Length")
 _LUMINANCE = (0.2126390, 0.7151687, 0.0721923)
 
 
@@ -154,7 +157,7 @@ def read(material: bpy.types.Material) -> Reading:
     plain.reading.material = Material(**components, **({} if plain.ior is None else {"ior": plain.ior}))
     if not plain.reading.reasons:
         return plain.reading
-    tree = _Tree(viewport)
+    tree = _Tree(viewport, not components.get("emission", _BLACK).is_black)
     surface = tree.surface(Input(output.inputs["Surface"]))
     tree.reading.material = Material(surface=surface, transparent_shadow=material.use_transparent_shadow)
     is_plain = len(plain.reading.reasons) < len(tree.reading.reasons) or plain.reading.reasons == tree.reading.reasons
@@ -379,6 +382,10 @@ class _Components(_Reader):
 class _Tree(_Reader):
     """Reads shaders as a tree of shader nodes."""
 
+    def __init__(self, viewport: Colour, shines: bool) -> None:
+        super().__init__(viewport)
+        self._shines = shines
+
     def surface(self, of: Input | None) -> Node | None:
         """The tracer's node, or None where there is no surface."""
         source = of and nodes.source(of)
@@ -447,6 +454,8 @@ class _Tree(_Reader):
             return _from_camera(output.socket.name)
         if node.type == "VALTORGB":
             return self._ramp(output)
+        if node.type == "NORMAL":
+            return self._along(output)
         found = value_nodes.value_of(output)
         if found is None:
             self._reason(output, "is not modelled")
@@ -469,6 +478,8 @@ class _Tree(_Reader):
                     return None
                 given["straight"] = images.is_multiplied(image)
                 self.reading.alphas.add(image.name_full)
+        if "table" in KINDS[ours].inputs:
+            given |= self._curves(output)
         for name, theirs in value.inputs.items():
             read = self._value_input(Input(value_nodes.input_of(node, theirs), output.groups), KINDS[ours].inputs[name])
             if read is None:
@@ -501,9 +512,32 @@ class _Tree(_Reader):
             return "has a mapping of its own"
         if ours == "texture_coordinate" and node.from_instancer and output.socket.name in ("UV", "Generated"):
             return "has its instancer's coordinates"
+        if ours == "light_path" and self._shines and output.socket.identifier not in _SURE_OF_PATHS:
+            return f"says the {output.socket.name} of light"
         if ours == "attribute" and node.type == "VERTEX_COLOR" and not node.layer_name:
             return "has an attribute without a name"
         return None
+
+    def _curves(self, output: Output) -> dict[str, object]:
+        """The table that Cycles makes of a node's curves."""
+        mapping = output.node.mapping
+        pixels, least, most = value_nodes.curve_table(mapping)
+        key = f"Curves {zlib.crc32(pixels.tobytes()):08x}"
+        self.reading.tables[key] = Picture(pixels)
+        ends = {"least": (least,) * 3, "most": (most,) * 3}
+        return ends | {"table": Colour(_WHITE, key), "extrapolate": mapping.extend == "EXTRAPOLATED"}
+
+    def _along(self, output: Output) -> Node | None:
+        """What a Normal node says: its direction, and how far another one goes along it."""
+        direction = _node("vector_math", operation="normalize", a=tuple(output.node.outputs["Normal"].default_value))
+        if output.socket.name == "Normal":
+            return direction
+        other = self._value_input(Input(output.node.inputs[0], output.groups), None)
+        if other is None:
+            return None
+        return _node(
+            "vector_math", operation="dot_product", a=direction, b=_node("vector_math", operation="normalize", a=other)
+        )
 
     def _ramp(self, output: Output) -> Node | None:
         """A Color Ramp, as the picture of 257 pixels that Cycles makes of it."""

@@ -3,8 +3,10 @@
 from dataclasses import dataclass, field
 
 import bpy
+import numpy as np
 
 from ...tracer.scene.shader_nodes import KINDS
+from ...tracer.scene.value_nodes import LIGHT_PATH
 from .nodes import Output
 
 
@@ -99,7 +101,37 @@ VALUES: tuple[tuple[str, Value], ...] = (
             "NEW_GEOMETRY",
             "ShaderNodeNewGeometry",
             {},
-            _words("Position", "Normal", "True Normal", "Incoming", "Backfacing"),
+            _words("Position", "Normal", "True Normal", "Incoming", "Backfacing", "Tangent", "Parametric"),
+        ),
+    ),
+    (
+        "vector_rotate",
+        Value(
+            "VECTOR_ROTATE",
+            "ShaderNodeVectorRotate",
+            _same("Vector", "Center", "Axis", "Angle", "Rotation"),
+            {"Vector": None},
+            {"kind": "rotation_type"},
+            {"invert": "invert"},
+        ),
+    ),
+    (
+        "vector_transform",
+        Value(
+            "VECT_TRANSFORM",
+            "ShaderNodeVectorTransform",
+            {"vector": "Vector"},
+            {"Vector": None},
+            {"kind": "vector_type", "from": "convert_from", "to": "convert_to"},
+        ),
+    ),
+    (
+        "light_path",
+        Value(
+            "LIGHT_PATH",
+            "ShaderNodeLightPath",
+            {},
+            _words(*(name.replace("_", " ").title() for name in LIGHT_PATH.split())),
         ),
     ),
     ("object_info", Value("OBJECT_INFO", "ShaderNodeObjectInfo", {}, _words("Location", "Object Index"))),
@@ -139,27 +171,40 @@ VALUES: tuple[tuple[str, Value], ...] = (
         ),
     ),
     (
-        "clamp",
+        "map_range_vector",
         Value(
-            "CLAMP",
-            "ShaderNodeClamp",
-            _same("Value", "Min", "Max"),
-            {"Result": None},
-            fixed={"clamp_type": "MINMAX"},
+            "MAP_RANGE",
+            "ShaderNodeMapRange",
+            {
+                "value": "Vector",
+                "from_min": "From_Min_FLOAT3",
+                "from_max": "From_Max_FLOAT3",
+                "to_min": "To_Min_FLOAT3",
+                "to_max": "To_Max_FLOAT3",
+                "steps": "Steps_FLOAT3",
+            },
+            {"Vector": None},
+            {"interpolation": "interpolation_type"},
+            {"clamp": "clamp"},
+            {"data_type": "FLOAT_VECTOR"},
         ),
+    ),
+    (
+        "clamp",
+        Value("CLAMP", "ShaderNodeClamp", _same("Value", "Min", "Max"), {"Result": None}, {"kind": "clamp_type"}),
     ),
     (
         "separate",
         Value("SEPXYZ", "ShaderNodeSeparateXYZ", {"color": "Vector"}, {"X": "x", "Y": "y", "Z": "z"}),
     ),
     (
-        "separate",
+        "separate_color",
         Value(
             "SEPARATE_COLOR",
             "ShaderNodeSeparateColor",
             {"color": "Color"},
             {"Red": "x", "Green": "y", "Blue": "z"},
-            fixed={"mode": "RGB"},
+            {"mode": "mode"},
         ),
     ),
     (
@@ -173,7 +218,7 @@ VALUES: tuple[tuple[str, Value], ...] = (
             "ShaderNodeCombineColor",
             {"x": "Red", "y": "Green", "z": "Blue"},
             _COLOR,
-            fixed={"mode": "RGB"},
+            {"mode": "mode"},
         ),
     ),
     (
@@ -211,6 +256,41 @@ VALUES: tuple[tuple[str, Value], ...] = (
             {"data_type": "FLOAT"},
         ),
     ),
+    (
+        "mix_vector",
+        Value(
+            "MIX",
+            "ShaderNodeMix",
+            {"factor": "Factor_Float", "a": "A_Vector", "b": "B_Vector"},
+            {"Result_Vector": None},
+            {},
+            {"clamp_factor": "clamp_factor"},
+            {"data_type": "VECTOR", "factor_mode": "UNIFORM"},
+        ),
+    ),
+    (
+        "mix_components",
+        Value(
+            "MIX",
+            "ShaderNodeMix",
+            {"factor": "Factor_Vector", "a": "A_Vector", "b": "B_Vector"},
+            {"Result_Vector": None},
+            {},
+            {"clamp_factor": "clamp_factor"},
+            {"data_type": "VECTOR", "factor_mode": "NON_UNIFORM"},
+        ),
+    ),
+    ("rgb_curves", Value("CURVE_RGB", "ShaderNodeRGBCurve", {"factor": "Fac", "color": "Color"}, _COLOR)),
+    (
+        "vector_curves",
+        Value("CURVE_VEC", "ShaderNodeVectorCurve", {"factor": "Fac", "vector": "Vector"}, {"Vector": None}),
+    ),
+    (
+        "float_curve",
+        Value("CURVE_FLOAT", "ShaderNodeFloatCurve", _same("Factor", "Value"), {"Value": None}),
+    ),
+    ("blackbody", Value("BLACKBODY", "ShaderNodeBlackbody", _same("Temperature"), _COLOR)),
+    ("wavelength", Value("WAVELENGTH", "ShaderNodeWavelength", _same("Wavelength"), _COLOR)),
     ("gamma", Value("GAMMA", "ShaderNodeGamma", _same("Color", "Gamma"), _COLOR)),
     (
         "bright_contrast",
@@ -302,6 +382,17 @@ VALUES: tuple[tuple[str, Value], ...] = (
             numbers={name: name for name in ("offset", "offset_frequency", "squash", "squash_frequency")},
         ),
     ),
+    (
+        "voronoi",
+        Value(
+            "TEX_VORONOI",
+            "ShaderNodeTexVoronoi",
+            _same("Vector", "W", "Scale", "Detail", "Roughness", "Lacunarity", "Smoothness", "Exponent", "Randomness"),
+            _words("Distance", "Color", "Position", "W", "Radius"),
+            {"dimensions": "voronoi_dimensions", "feature": "feature", "metric": "distance"},
+            {"normalize": "normalize"},
+        ),
+    ),
     ("rgb_to_bw", Value("RGBTOBW", "ShaderNodeRGBToBW", {"color": "Color"}, {"Val": None})),
 )
 """What we call each, and what it is; of what is one thing to us the first is made."""
@@ -345,6 +436,48 @@ def given_words(output: Output, ours: str, value: Value) -> dict[str, object] | 
         found[name] = known
     word = value.outputs[output.socket.identifier]
     return found if word is None else found | {"output": word}
+
+
+_TABLE = 256  # Cycles looks curves up in a table of one more
+
+
+def curve_table(mapping: bpy.types.CurveMapping) -> tuple[np.ndarray, float, float]:
+    """The table that Cycles makes of curves, (1, 257, 3) float32, and where it begins and ends.
+
+    Of four curves the last changes the three channels before the others do; one is that of all.
+    """
+    mapping.update()  # as Cycles does: a change of how it goes on beyond its ends alone makes no new one
+    curves = list(mapping.curves)
+    least = min(curve.points[0].location[0] for curve in curves)
+    most = max(curve.points[len(curve.points) - 1].location[0] for curve in curves)
+    places = [least + i / _TABLE * (most - least) for i in range(_TABLE + 1)]
+    if len(curves) == 4:
+        common = curves.pop()
+        places = [mapping.evaluate(common, place) for place in places]
+    channels = [[mapping.evaluate(curve, place) for place in places] for curve in curves]
+    return np.array([channels * (3 // len(channels))], np.float32).transpose(0, 2, 1), least, most
+
+
+def draw_curves(mapping: bpy.types.CurveMapping, table: bpy.types.Image, least: float, most: float, extrapolate: bool) -> None:
+    """Let curves go straight between a table's entries."""
+    pixels = np.empty(len(table.pixels), np.float32)
+    table.pixels.foreach_get(pixels)
+    row = pixels.reshape(table.size[1], table.size[0], table.channels)[table.size[1] // 2]
+    places = np.linspace(least, most, len(row))
+    mapping.use_clip = False
+    mapping.clip_min_x = -100.0  # Blender's own table reaches at least from one end to the other, which must not cross
+    mapping.clip_max_x, mapping.clip_min_x = most, least
+    mapping.extend = "EXTRAPOLATED" if extrapolate else "HORIZONTAL"
+    for channel, curve in enumerate(mapping.curves):
+        points = np.column_stack([places, places if channel == 3 else row[:, channel]]).tolist()
+        if channel == 3 or len(points) == 1:
+            points = [points[0], points[-1]]
+        curve.points[0].location, curve.points[len(curve.points) - 1].location = points[0], points[-1]
+        for x, y in points[1:-1]:
+            curve.points.new(x, y)
+        for point in curve.points:
+            point.handle_type = "VECTOR"
+    mapping.update()
 
 
 def input_of(node: bpy.types.Node, identifier: str) -> bpy.types.NodeSocket:

@@ -16,6 +16,7 @@ struct Camera {
         Vec3 from = point - eye;
         return {dot(from, right), dot(from, up), dot(from, forward)};
     }
+    Vec3 from_camera(Vec3 direction) const { return right * direction.x + up * direction.y + forward * direction.z; }
     Vec2 window(Vec3 point) const {
         Vec3 at = to_camera(point);
         return {(at.x / at.z * distance.x + principal_point.x) / width, (at.y / at.z * distance.y + principal_point.y) / height};

@@ -1,5 +1,6 @@
 // Rays, what they hit, and what is known of the surface there.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <limits>
 
@@ -16,11 +17,14 @@ constexpr double DOUBLE_ROUNDING = 0x1p-53;
 enum RayKind : uint32_t { NO_RAY = 0, CAMERA = 1, DIFFUSE = 2, GLOSSY = 4, TRANSMISSION = 8, SHADOW = 16 };
 
 // What a material may ask of the ray that has come to it. kind: of its last scattering; diffuse, singular: what scattered it;
-// depth: scatterings so far.
+// depth: scatterings so far; scattered: those that were diffuse, glossy and transmission; passed: surfaces that it has gone straight
+// through; length: how far it has come, of rays that are not from the eye.
 struct RayState {
     RayKind kind = CAMERA;
     bool diffuse = false, singular = false;
-    int depth = 0;
+    int depth = 0, passed = 0;
+    std::array<uint16_t, 3> scattered = {};
+    double length = 0;
 };
 
 // A ray in rendering space (scene.h). direction: of any length; t counts in it. What is met must lie in t_min < t < t_max.

@@ -351,6 +351,14 @@ inline ShadingPoint::Values ShadingPoint::attribute(const std::string& name) con
     return {};
 }
 inline Vec3 ShadingPoint::in_camera() const { return scene ? scene->camera.to_camera(point.position) : Vec3{}; }
+inline Vec3 ShadingPoint::camera_eye() const { return scene ? scene->camera.eye + origin : Vec3{}; }
+inline Vec3 ShadingPoint::to_camera(Vec3 direction) const { return scene ? scene->camera.to_camera(scene->camera.eye + direction) : direction; }
+inline Vec3 ShadingPoint::from_camera(Vec3 direction) const { return scene ? scene->camera.from_camera(direction) : direction; }
+inline double ShadingPoint::ray_length() const {
+    if (ray.kind != CAMERA || !scene) return ray.length;
+    double ahead = in_camera().z;
+    return length(point.position - scene->camera.eye) * (1 - (ahead > 0 ? scene->camera.t_min / ahead : 0));
+}
 inline Vec3 ShadingPoint::in_window() const {
     if (!scene) return {};
     Vec2 place = scene->camera.window(point.position);

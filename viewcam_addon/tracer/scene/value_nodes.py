@@ -27,15 +27,23 @@ DIMENSIONS = ("3d", "1d", "2d", "4d")
 MATH = (
     "add subtract multiply divide multiply_add power logarithm sqrt inverse_sqrt absolute exponent minimum maximum less_than "
     "greater_than sign compare smooth_min smooth_max round floor ceil trunc fract modulo floored_modulo wrap snap pingpong "
-    "sine cosine tangent arcsine arccosine arctangent arctan2 radians degrees"
+    "sine cosine tangent arcsine arccosine arctangent arctan2 sinh cosh tanh radians degrees"
 )
 VECTOR_MATH = (
-    "add subtract multiply divide multiply_add cross_product project reflect dot_product distance length scale normalize "
-    "absolute power sign minimum maximum floor ceil fract modulo wrap snap sine cosine tangent"
+    "add subtract multiply divide multiply_add cross_product project reflect refract faceforward dot_product distance length "
+    "scale normalize absolute power sign minimum maximum round floor ceil fract modulo wrap snap sine cosine tangent"
 )
 BLENDS = (
     "mix darken multiply burn lighten screen dodge add overlay soft_light linear_light difference exclusion subtract divide "
     "hue saturation color value"
+)
+
+COLOR_MODES = ("rgb", "hsv", "hsl")
+INTERPOLATIONS = ("linear", "stepped", "smoothstep", "smootherstep")
+CURVES: dict[str, Default] = {"table": IMAGE, "least": 0.0, "most": 1.0, "extrapolate": True, "factor": 1.0}
+LIGHT_PATH = (
+    "is_camera_ray is_shadow_ray is_diffuse_ray is_glossy_ray is_singular_ray is_reflection_ray is_transmission_ray ray_length "
+    "ray_depth diffuse_depth glossy_depth transparent_depth transmission_depth"
 )
 
 # Input → its default: a number, three, words to choose from (the first is the default), whether something holds, IMAGE or UV.
@@ -57,8 +65,24 @@ KINDS: dict[str, Mapping[str, Default]] = {
         "scale": WHITE,
         "kind": ("point", "texture", "vector", "normal"),
     },
-    "geometry": {"output": ("position", "normal", "true_normal", "incoming", "backfacing")},
+    "vector_rotate": {
+        "vector": BLACK,
+        "center": BLACK,
+        "axis": (0.0, 0.0, 1.0),
+        "angle": 0.0,
+        "rotation": BLACK,
+        "kind": ("axis_angle", "x_axis", "y_axis", "z_axis", "euler_xyz"),
+        "invert": False,
+    },
+    "vector_transform": {
+        "vector": GREY,
+        "kind": ("vector", "point", "normal"),
+        "from": ("world", "object", "camera"),
+        "to": ("object", "world", "camera"),
+    },
+    "geometry": {"output": ("position", "normal", "true_normal", "incoming", "backfacing", "tangent", "parametric")},
     "object_info": {"output": ("location", "object_index")},
+    "light_path": {"output": tuple(LIGHT_PATH.split())},
     "fresnel": {"ior": 1.5},
     "layer_weight": {"blend": 0.5, "output": ("fresnel", "facing")},
     "math": {"operation": tuple(MATH.split()), "a": 0.5, "b": 0.5, "c": 0.5, "clamp": False},
@@ -70,13 +94,24 @@ KINDS: dict[str, Mapping[str, Default]] = {
         "to_min": 0.0,
         "to_max": 1.0,
         "steps": 4.0,
-        "interpolation": ("linear", "stepped", "smoothstep", "smootherstep"),
+        "interpolation": INTERPOLATIONS,
         "clamp": True,
     },
-    "clamp": {"value": 1.0, "min": 0.0, "max": 1.0},
+    "map_range_vector": {
+        "value": BLACK,
+        "from_min": BLACK,
+        "from_max": WHITE,
+        "to_min": BLACK,
+        "to_max": WHITE,
+        "steps": (4.0, 4.0, 4.0),
+        "interpolation": INTERPOLATIONS,
+        "clamp": True,
+    },
+    "clamp": {"value": 1.0, "min": 0.0, "max": 1.0, "kind": ("minmax", "range")},
     "separate": {"color": BLACK, "output": ("x", "y", "z")},
     "combine_xyz": {"x": 0.0, "y": 0.0, "z": 0.0},
-    "combine_color": {"x": 0.0, "y": 0.0, "z": 0.0},
+    "separate_color": {"color": (0.8, 0.8, 0.8), "mode": COLOR_MODES, "output": ("x", "y", "z")},
+    "combine_color": {"x": 0.0, "y": 0.0, "z": 0.0, "mode": COLOR_MODES},
     "mix_color": {
         "factor": 0.5,
         "a": GREY,
@@ -86,6 +121,13 @@ KINDS: dict[str, Mapping[str, Default]] = {
         "clamp_result": False,
     },
     "mix_number": {"factor": 0.5, "a": 0.0, "b": 0.0, "clamp_factor": True},
+    "mix_vector": {"factor": 0.5, "a": BLACK, "b": BLACK, "clamp_factor": True},
+    "mix_components": {"factor": GREY, "a": BLACK, "b": BLACK, "clamp_factor": True},
+    "rgb_curves": {"color": BLACK, **CURVES},
+    "vector_curves": {"vector": BLACK, **CURVES},
+    "float_curve": {"value": 1.0, **CURVES},
+    "blackbody": {"temperature": 6500.0},
+    "wavelength": {"wavelength": 500.0},
     "gamma": {"color": WHITE, "gamma": 1.0},
     "bright_contrast": {"color": WHITE, "bright": 0.0, "contrast": 0.0},
     "hue_saturation": {"hue": 0.5, "saturation": 1.0, "value": 1.0, "factor": 1.0, "color": (0.8, 0.8, 0.8)},
@@ -149,6 +191,22 @@ KINDS: dict[str, Mapping[str, Default]] = {
         "squash_frequency": 2.0,
         "output": ("color", "factor"),
     },
+    "voronoi": {
+        "vector": GENERATED,
+        "w": 0.0,
+        "scale": 5.0,
+        "detail": 0.0,
+        "roughness": 0.5,
+        "lacunarity": 2.0,
+        "smoothness": 1.0,
+        "exponent": 0.5,
+        "randomness": 1.0,
+        "dimensions": DIMENSIONS,
+        "feature": ("f1", "f2", "smooth_f1", "distance_to_edge", "n_sphere_radius"),
+        "metric": ("euclidean", "manhattan", "chebychev", "minkowski"),
+        "normalize": False,
+        "output": ("distance", "color", "position", "w", "radius"),
+    },
 }
 
 
@@ -156,5 +214,5 @@ def attributes_of(kind: str, value_of: Callable[[str], Any]) -> Iterator[str]:
     """What a node asks meshes for by name. kind : its type. value_of : input → its value."""
     if kind == "attribute":
         yield value_of("name")
-    if kind == "texture_coordinate" and value_of("output") == "generated":
+    if kind in ("texture_coordinate", "geometry") and value_of("output") in ("generated", "tangent"):
         yield "generated"

@@ -69,6 +69,12 @@ struct ShadingPoint {
     // As Camera has it: to the right, up and ahead; and in the picture, from 0 to 1.
     Vec3 in_camera() const;
     Vec3 in_window() const;
+    // Where the camera is, in the world, and directions along its axes: those of the world where there is none.
+    Vec3 camera_eye() const;
+    Vec3 to_camera(Vec3 direction) const;
+    Vec3 from_camera(Vec3 direction) const;
+    // How long the ray is that has come along: from where it left a surface, or from the camera's clip start.
+    double ray_length() const;
 
    private:
     Vec3 value_of_node(uint32_t node) const;

@@ -108,7 +108,7 @@ class PathIntegrator {
         bool last = false, through = false;  // through: whether light from behind counts where it leaves
         bool diffuse = false;                // what its ray was scattered by
         int passed = 0;                      // surfaces that it has gone straight through
-        uint16_t scattered[3] = {};  // diffuse, glossy, transmission
+        std::array<uint16_t, 3> scattered = {};  // diffuse, glossy, transmission
         Vec3 weight{1, 1, 1};
         Ray ray;
         double pdf = INFINITE;
@@ -118,7 +118,7 @@ class PathIntegrator {
         int sample;
         Category category;
         bool traced;
-        int passed;
+        RayState ray;
         Vec3 light, other;  // other: of what is not diffuse where the eye sees it
     };
     struct Block {
@@ -141,7 +141,8 @@ class PathIntegrator {
     const Material& material(const Interaction& point) const { return scene_.illumination.materials[point.material]; }
     // Where a path has come to along its ray. depth: scatterings before.
     ShadingPoint shading(const Interaction& point, const Path& path, Vec3 incoming, int depth) const {
-        return scene_.shading(point, incoming, {path.kind, path.diffuse, path.kind != CAMERA && path.pdf == INFINITE, depth});
+        bool singular = path.kind != CAMERA && path.pdf == INFINITE;
+        return scene_.shading(point, incoming, {path.kind, path.diffuse, singular, depth, path.passed, path.scattered, point.t});
     }
 
     bool has_ended(const Path& path) const { return path.passed > 0 && path.passed >= ended_after_; }
@@ -211,15 +212,17 @@ class PathIntegrator {
         }
     }
     // What of light comes along a shadow ray that meets something: none but where all that stands in its way lets some through.
-    Vec3 transmittance(Ray ray, int passed) const {
+    Vec3 transmittance(Ray ray, RayState state) const {
         Vec3 left{1, 1, 1};
         while (!is_black(left)) {
             Hit hit = scene_.closest(ray, SHADOW);
             if (!hit) return left;
             Interaction point = scene_.interaction(ray, hit);
             const Material& made_of = material(point);
-            if (!made_of.is_transparent() || !made_of.transparent_shadow || ++passed > most_passed_) return {};
-            left *= made_of.bsdf(scene_.shading(point, ray.direction, {SHADOW})).transparency();
+            if (!made_of.is_transparent() || !made_of.transparent_shadow || state.passed >= most_passed_) return {};
+            state.length = hit.t * length(ray.direction);
+            left *= made_of.bsdf(scene_.shading(point, ray.direction, state)).transparency();
+            state.passed++;
             ray.t_min = hit.t;
         }
         return left;
@@ -235,7 +238,7 @@ class PathIntegrator {
             Path& path = block.paths[met];  // the rest is known when it is scattered
             path.sample = i, path.from = met;
             path.category = COLOR, path.kind = CAMERA, path.last = path.diffuse = false, path.pdf = INFINITE, path.passed = 0;
-            path.scattered[0] = path.scattered[1] = path.scattered[2] = 0;
+            path.scattered = {};
             path.weight = {1, 1, 1};
             meet_lamps(path, rays[i], hits[i], 0, block);
             if (!hits[i]) {
@@ -333,8 +336,8 @@ class PathIntegrator {
         if (is_black(light.diffuse) && is_black(light.other)) return;
         int place = block.lit[choice.slot]++;
         bool traced = choice.light->casts_shadow;
-        block.shadowed[choice.slot][place] = {path.sample, after(path.category, true, depth), traced, path.passed, light.diffuse * path.weight / choice.chance,
-                                              light.other * path.weight / choice.chance};
+        block.shadowed[choice.slot][place] = {path.sample, after(path.category, true, depth), traced, {SHADOW, false, false, depth, path.passed, path.scattered},
+                                              light.diffuse * path.weight / choice.chance, light.other * path.weight / choice.chance};
         if (traced) block.shadow_rays[choice.slot][place] = shadow_ray(point, sample);
     }
 
@@ -355,7 +358,7 @@ class PathIntegrator {
                     light.add(shadowed[i].category, shadowed[i].light);
                     light.add(OTHER, shadowed[i].other);
                 } else if (transparent_) {
-                    Vec3 left = transmittance(rays[i], shadowed[i].passed);
+                    Vec3 left = transmittance(rays[i], shadowed[i].ray);
                     light.add(shadowed[i].category, shadowed[i].light * left);
                     light.add(OTHER, shadowed[i].other * left);
                 }

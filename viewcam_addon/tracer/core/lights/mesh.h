@@ -82,7 +82,7 @@ class MeshLight {
         const Material& made_of = scene_->illumination.materials[material];
         if (made_of.shines_evenly()) return made_of.mean_emission();
         Hit hit{1, object_, triangle};
-        return made_of.emission(scene_->shading(scene_->interaction(Ray{from.position, to}, hit), ahead, {NO_RAY}));
+        return made_of.emission(scene_->shading(scene_->interaction(Ray{from.position, to}, hit), ahead, {.kind = NO_RAY, .length = length(to)}));
     }
 
     const Scene* scene_;

@@ -21,6 +21,44 @@ inline Vec3 rgb_of_hsv(Vec3 hsv) {
     return {channel(hue < 3 ? smaller(hue, 1) : larger(hue, 5)), channel(smaller(larger(hue, 1), 3)), channel(smaller(larger(hue, 3), 5))};
 }
 
+// Hue, saturation and lightness.
+inline Vec3 hsl_of(Vec3 rgb) {
+    double most = max_component(rgb), least = smaller(rgb.x, smaller(rgb.y, rgb.z)), light = smaller((most + least) / 2, 1), range = most - least;
+    if (!(range > 0)) return {0, 0, light};
+    return {hsv_of(rgb).x, safe::divide(range, light > 0.5 ? 2 - most - least : most + least), light};
+}
+inline Vec3 rgb_of_hsl(Vec3 hsl) {
+    double turns = 6 * hsl.x, range = (1 - std::fabs(2 * hsl.z - 1)) * hsl.y;
+    Vec3 pure = unit_range(Vec3{std::fabs(turns - 3) - 1, 2 - std::fabs(turns - 2), 2 - std::fabs(turns - 4)});
+    return (pure - grey(0.5)) * range + grey(hsl.z);
+}
+
+// A colour's red, green and blue, or what another way of writing colours has in their place; and the other way round.
+enum class ColorMode { RGB, HSV, HSL };
+inline ColorMode color_mode_of(const std::string& name) { return name == "hsv" ? ColorMode::HSV : name == "hsl" ? ColorMode::HSL : ColorMode::RGB; }
+
+struct SeparateColorNode : SeparateNode {
+    static constexpr const char* NAME = "separate_color";
+    ColorMode mode;
+
+    explicit SeparateColorNode(const Inputs& in) : SeparateNode(in), mode(color_mode_of(in.choice("mode"))) {}
+    Vec3 eval(const ShadingPoint& at) const {
+        Vec3 rgb = at.value(given);
+        return grey((mode == ColorMode::HSV ? hsv_of(rgb) : mode == ColorMode::HSL ? hsl_of(rgb) : rgb)[axis]);
+    }
+};
+struct CombineColorNode : CombineNode {
+    static constexpr const char* NAME = "combine_color";
+    static constexpr Gives GIVES = Gives::COLOR;
+    ColorMode mode;
+
+    explicit CombineColorNode(const Inputs& in) : CombineNode(in), mode(color_mode_of(in.choice("mode"))) {}
+    Vec3 eval(const ShadingPoint& at) const {
+        Vec3 three = CombineNode::eval(at);
+        return mode == ColorMode::HSV ? rgb_of_hsv(three) : mode == ColorMode::HSL ? rgb_of_hsl(three) : three;
+    }
+};
+
 // A factor from one to the other, by one of the ways of mixing.
 struct MixColorNode {
     static constexpr const char* NAME = "mix_color";
@@ -120,6 +158,28 @@ struct MixNumberNode {
         double t = at.number(factor);
         return grey(mix(at.number(a), at.number(b), clamp_factor ? unit_range(t) : t));
     }
+};
+
+struct MixVectorNode {
+    static constexpr const char* NAME = "mix_vector";
+    static constexpr Gives GIVES = Gives::VECTOR;
+    Color factor, a, b;
+    bool clamp_factor;
+
+    explicit MixVectorNode(const Inputs& in) : factor(in["factor"]), a(in["a"]), b(in["b"]), clamp_factor(in.flag("clamp_factor")) {}
+    Vec3 eval(const ShadingPoint& at) const { return mixed(at, grey(at.number(factor))); }
+
+   protected:
+    Vec3 mixed(const ShadingPoint& at, Vec3 t) const {
+        Vec3 first = at.value(a);
+        return first + (at.value(b) - first) * (clamp_factor ? unit_range(t) : t);
+    }
+};
+// With a factor for each component.
+struct MixComponentsNode : MixVectorNode {
+    static constexpr const char* NAME = "mix_components";
+    using MixVectorNode::MixVectorNode;
+    Vec3 eval(const ShadingPoint& at) const { return mixed(at, at.value(factor)); }
 };
 
 struct GammaNode {

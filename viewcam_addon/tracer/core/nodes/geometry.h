@@ -53,7 +53,22 @@ struct AttributeNode {
     }
 };
 
-// A vector that is scaled, turned about x, then y, then z, and moved; as a texture, point, vector or normal is.
+// In the plane of two axes.
+inline void turn(double& x, double& y, double angle) {
+    double s = safe::sine(angle), c = safe::cosine(angle), along = c * x - s * y;
+    y = s * x + c * y, x = along;
+}
+// About x, then y, then z; and back.
+inline Vec3 turned(Vec3 v, Vec3 angles) {
+    turn(v.y, v.z, angles.x), turn(v.z, v.x, angles.y), turn(v.x, v.y, angles.z);
+    return v;
+}
+inline Vec3 turned_back(Vec3 v, Vec3 angles) {
+    turn(v.x, v.y, -angles.z), turn(v.z, v.x, -angles.y), turn(v.y, v.z, -angles.x);
+    return v;
+}
+
+// A vector that is scaled, turned and moved; as a texture, point, vector or normal is.
 struct MappingNode {
     static constexpr const char* NAME = "mapping";
     static constexpr Gives GIVES = Gives::VECTOR;
@@ -77,18 +92,61 @@ struct MappingNode {
     static decltype(kind) kind_of(const std::string& name) {
         return name == "point" ? POINT : name == "texture" ? TEXTURE : name == "vector" ? DIRECTION : NORMAL;
     }
-    // In the plane of two axes.
-    static void turn(double& x, double& y, double angle) {
-        double s = safe::sine(angle), c = safe::cosine(angle), along = c * x - s * y;
-        y = s * x + c * y, x = along;
+};
+
+// A vector that is turned about a place: by three angles, or by one about an axis.
+struct VectorRotateNode {
+    static constexpr const char* NAME = "vector_rotate";
+    static constexpr Gives GIVES = Gives::VECTOR;
+    Color vector, center, axis, angle, rotation;
+    std::string kind;
+    bool back;
+
+    explicit VectorRotateNode(const Inputs& in)
+        : vector(in["vector"]), center(in["center"]), axis(in["axis"]), angle(in["angle"]), rotation(in["rotation"]), kind(in.choice("kind")),
+          back(in.flag("invert")) {}
+    Vec3 eval(const ShadingPoint& at) const {
+        Vec3 about = at.value(center), v = at.value(vector) - about;
+        if (kind == "euler_xyz") return about + (back ? turned_back : turned)(v, at.value(rotation));
+        Vec3 n = kind == "x_axis" ? Vec3{1, 0, 0} : kind == "y_axis" ? Vec3{0, 1, 0} : kind == "z_axis" ? Vec3{0, 0, 1} : safe::normalized(at.value(axis));
+        if (is_black(n)) return about + v;
+        double by = at.number(angle) * (back ? -1 : 1), c = safe::cosine(by);
+        return about + v * c + cross(n, v) * safe::sine(by) + n * (dot(n, v) * (1 - c));  // Rodrigues
     }
-    static Vec3 turned(Vec3 v, Vec3 angles) {
-        turn(v.y, v.z, angles.x), turn(v.z, v.x, angles.y), turn(v.x, v.y, angles.z);
-        return v;
+};
+
+// A place, a direction or a normal of one space in another. A surface without an object is in the world's.
+struct VectorTransformNode {
+    static constexpr const char* NAME = "vector_transform";
+    static constexpr Gives GIVES = Gives::VECTOR;
+    static constexpr bool VARIES = true;
+    Color vector;
+    enum Space { WORLD, OBJECT, CAMERA } from, to;
+    bool is_point, is_normal;
+
+    explicit VectorTransformNode(const Inputs& in)
+        : vector(in["vector"]), from(space_of(in.choice("from"))), to(space_of(in.choice("to"))), is_point(in.choice("kind") == "point"),
+          is_normal(in.choice("kind") == "normal") {}
+    Vec3 eval(const ShadingPoint& at) const {
+        Vec3 v = at.value(vector);
+        if (from == to) return v;
+        v = out_of(to, at, into_world(at, v));
+        return is_normal ? safe::normalized(v) : v;
     }
-    static Vec3 turned_back(Vec3 v, Vec3 angles) {
-        turn(v.x, v.y, -angles.z), turn(v.z, v.x, -angles.y), turn(v.y, v.z, -angles.x);
-        return v;
+
+   private:
+    static Space space_of(const std::string& name) { return name == "object" ? OBJECT : name == "camera" ? CAMERA : WORLD; }
+    Vec3 into_world(const ShadingPoint& at, Vec3 v) const {
+        if (from == CAMERA) return at.from_camera(v) + (is_point ? at.camera_eye() : Vec3{});
+        if (from == WORLD || !at.object) return v;
+        if (is_normal) return safe::normalized(transposed_product(at.object->inverse, v));
+        return at.object->to_world.vector(v) + (is_point ? at.object->to_world.translation() + at.origin : Vec3{});
+    }
+    Vec3 out_of(Space space, const ShadingPoint& at, Vec3 v) const {
+        if (space == CAMERA) return at.to_camera(is_point ? v - at.camera_eye() : v);
+        if (space == WORLD || !at.object) return v;
+        if (is_normal) return at.object->to_world.transposed(v);
+        return at.object->to_object(is_point ? v - at.origin - at.object->to_world.translation() : v);
     }
 };
 
@@ -96,7 +154,7 @@ struct GeometryNode {
     static constexpr const char* NAME = "geometry";
     static constexpr Gives GIVES = Gives::VECTOR;
     static constexpr bool VARIES = true;
-    enum { POSITION, NORMAL, TRUE_NORMAL, INCOMING, BACKFACING } output;
+    enum { POSITION, NORMAL, TRUE_NORMAL, INCOMING, BACKFACING, TANGENT, PARAMETRIC } output;
 
     explicit GeometryNode(const Inputs& in) : output(output_of(in.choice("output"))) {}
     Vec3 eval(const ShadingPoint& at) const {
@@ -105,16 +163,26 @@ struct GeometryNode {
             case NORMAL: return at.point.shading;
             case TRUE_NORMAL: return at.point.normal;
             case INCOMING: return -at.incoming;
+            case TANGENT: return tangent(at);
+            case PARAMETRIC: return {1 - at.point.barycentric.x - at.point.barycentric.y, at.point.barycentric.x, 0};
             default: return grey(at.point.backside);
         }
     }
 
    private:
+    // Round the z axis of the generated coordinates' middle.
+    static Vec3 tangent(const ShadingPoint& at) {
+        Vec3 place = at.generated(), round{0.5 - place.y, place.x - 0.5, 0}, normal = at.point.shading;
+        if (at.object) round = safe::normalized(transposed_product(at.object->inverse, round));
+        return cross(normal, safe::normalized(cross(round, normal)));
+    }
     static decltype(output) output_of(const std::string& name) {
         return name == "position"      ? POSITION
                : name == "normal"      ? NORMAL
                : name == "true_normal" ? TRUE_NORMAL
                : name == "incoming"    ? INCOMING
+               : name == "tangent"     ? TANGENT
+               : name == "parametric"  ? PARAMETRIC
                                        : BACKFACING;
     }
 };

@@ -96,6 +96,13 @@ inline constexpr NamedOperation OPERATIONS[] = {
     {"arccosine", [](double a, double, double) { return acos(smaller(larger(a, -1.0), 1.0)); }},
     {"arctangent", [](double a, double, double) { return atan2(a, 1); }},
     {"arctan2", [](double a, double b, double) { return atan2(a, b); }},
+    {"sinh", [](double a, double, double) { return (safe::exponential(a) - safe::exponential(-a)) / 2; }},
+    {"cosh", [](double a, double, double) { return (safe::exponential(a) + safe::exponential(-a)) / 2; }},
+    {"tanh",
+     [](double a, double, double) {
+         double rest = safe::exponential(-2 * std::fabs(a));
+         return std::copysign((1 - rest) / (1 + rest), a);
+     }},
     {"radians", [](double a, double, double) { return a * (PI / 180); }},
     {"degrees", [](double a, double, double) { return a * (180 / PI); }},
 };
@@ -132,7 +139,8 @@ struct VectorMathNode {
 
     explicit VectorMathNode(const Inputs& in)
         : a(in["a"]), b(in["b"]), c(in["c"]), scale(in["scale"]), name(in.choice("operation")), operation(operation_of(name)) {
-        for (const char* own : {"cross_product", "project", "reflect", "dot_product", "distance", "length", "scale", "normalize"})
+        for (const char* own : {"cross_product", "project", "reflect", "refract", "faceforward", "dot_product", "distance", "length", "scale",
+                                "normalize"})
             if (name == own) return;
         if (!operation) throw std::invalid_argument("no operation is called " + name);
     }
@@ -150,34 +158,58 @@ struct VectorMathNode {
             Vec3 normal = safe::normalized(b);
             return a - normal * (2 * dot(a, normal));
         }
+        if (name == "refract") {
+            Vec3 normal = safe::normalized(b);
+            double ratio = at.number(scale), cosine = dot(a, normal), left = 1 - ratio * ratio * (1 - cosine * cosine);
+            return left < 0 ? Vec3{} : a * ratio - normal * (ratio * cosine + std::sqrt(left));
+        }
+        if (name == "faceforward") return dot(at.value(c), b) < 0 ? a : -a;
         return safe::each(operation, a, b, at.value(c));
     }
 };
 
-struct MapRangeNode {
-    static constexpr const char* NAME = "map_range";
-    static constexpr Gives GIVES = Gives::NUMBER;
+// From one range to another. A range without extent makes 0 of a number; of a vector's components, where the other begins.
+struct MapRange {
     Color given, from_min, from_max, to_min, to_max, steps;
     std::string interpolation;
     bool clamp;
 
-    explicit MapRangeNode(const Inputs& in)
+    explicit MapRange(const Inputs& in)
         : given(in["value"]), from_min(in["from_min"]), from_max(in["from_max"]), to_min(in["to_min"]), to_max(in["to_max"]), steps(in["steps"]),
           interpolation(in.choice("interpolation")), clamp(in.flag("clamp")) {}
-    Vec3 eval(const ShadingPoint& at) const {
-        double first = at.number(from_min), last = at.number(from_max), low = at.number(to_min), high = at.number(to_max);
-        if (first == last) return grey(0);
-        double x = (at.number(given) - first) / (last - first);
+
+   protected:
+    double mapped(double value, double first, double last, double low, double high, double count) const {
+        double x = safe::divide(value - first, last - first);
         if (interpolation == "stepped") {
-            double count = at.number(steps);
             x = count > 0 ? std::floor(x * (count + 1)) / count : 0;
         } else if (interpolation == "smoothstep") {
             x = unit_range(x), x = x * x * (3 - 2 * x);
         } else if (interpolation == "smootherstep") {
             x = unit_range(x), x = x * x * x * (x * (x * 6 - 15) + 10);
         }
-        double value = low + x * (high - low);
-        return grey(clamp ? larger(smaller(value, larger(low, high)), smaller(low, high)) : value);
+        value = low + x * (high - low);
+        return clamp ? larger(smaller(value, larger(low, high)), smaller(low, high)) : value;
+    }
+};
+struct MapRangeNode : MapRange {
+    static constexpr const char* NAME = "map_range";
+    static constexpr Gives GIVES = Gives::NUMBER;
+    using MapRange::MapRange;
+    Vec3 eval(const ShadingPoint& at) const {
+        double first = at.number(from_min), last = at.number(from_max);
+        return grey(first == last ? 0 : mapped(at.number(given), first, last, at.number(to_min), at.number(to_max), at.number(steps)));
+    }
+};
+struct MapRangeVectorNode : MapRange {
+    static constexpr const char* NAME = "map_range_vector";
+    static constexpr Gives GIVES = Gives::VECTOR;
+    using MapRange::MapRange;
+    Vec3 eval(const ShadingPoint& at) const {
+        Vec3 value = at.value(given), first = at.value(from_min), last = at.value(from_max), low = at.value(to_min), high = at.value(to_max),
+             count = at.value(steps);
+        return {mapped(value.x, first.x, last.x, low.x, high.x, count.x), mapped(value.y, first.y, last.y, low.y, high.y, count.y),
+                mapped(value.z, first.z, last.z, low.z, high.z, count.z)};
     }
 };
 
@@ -185,9 +217,14 @@ struct ClampNode {
     static constexpr const char* NAME = "clamp";
     static constexpr Gives GIVES = Gives::NUMBER;
     Color given, least, most;
+    bool either_way;  // whether the two ends may be swapped
 
-    explicit ClampNode(const Inputs& in) : given(in["value"]), least(in["min"]), most(in["max"]) {}
-    Vec3 eval(const ShadingPoint& at) const { return grey(smaller(larger(at.number(given), at.number(least)), at.number(most))); }
+    explicit ClampNode(const Inputs& in) : given(in["value"]), least(in["min"]), most(in["max"]), either_way(in.choice("kind") == "range") {}
+    Vec3 eval(const ShadingPoint& at) const {
+        double low = at.number(least), high = at.number(most);
+        if (either_way && low > high) std::swap(low, high);
+        return grey(smaller(larger(at.number(given), low), high));
+    }
 };
 
 // A component, or three to one.
@@ -209,11 +246,6 @@ struct CombineNode {
 struct CombineXYZNode : CombineNode {
     static constexpr const char* NAME = "combine_xyz";
     static constexpr Gives GIVES = Gives::VECTOR;
-    using CombineNode::CombineNode;
-};
-struct CombineColorNode : CombineNode {
-    static constexpr const char* NAME = "combine_color";
-    static constexpr Gives GIVES = Gives::COLOR;
     using CombineNode::CombineNode;
 };
 

@@ -42,6 +42,14 @@ template <class... Numbers> inline double hashed(Numbers... numbers) {
 
 template <size_t N> using Place = std::array<double, N>;
 
+// Three numbers from 0 to 1 of a place.
+inline Vec3 hashed_color(const Place<1>& p) { return {hashed(p[0]), hashed(p[0], 1), hashed(p[0], 2)}; }
+inline Vec3 hashed_color(const Place<2>& p) { return {hashed(p[0], p[1]), hashed(p[0], p[1], 1), hashed(p[0], p[1], 2)}; }
+inline Vec3 hashed_color(const Place<3>& p) { return {hashed(p[0], p[1], p[2]), hashed(p[0], p[1], p[2], 1), hashed(p[0], p[1], p[2], 2)}; }
+inline Vec3 hashed_color(const Place<4>& p) {
+    return {hashed(p[0], p[1], p[2], p[3]), hashed(p[2], p[0], p[3], p[1]), hashed(p[3], p[2], p[1], p[0])};
+}
+
 // Of a lattice's corner: how noise rises from there.
 inline double gradient(uint32_t hash, const Place<1>& p) {
     hash &= 15;

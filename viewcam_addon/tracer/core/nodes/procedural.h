@@ -68,17 +68,9 @@ struct WhiteNoiseNode {
     explicit WhiteNoiseNode(const Inputs& in)
         : vector(in["vector"]), w(in["w"]), dimensions(in.choice("dimensions")), color(in.choice("output") == "color") {}
     Vec3 eval(const ShadingPoint& at) const {
-        return in_dimensions(dimensions, at.value(vector), at.number(w), [&](const auto& p) { return of(p); });
+        Vec3 three = in_dimensions(dimensions, at.value(vector), at.number(w), [](const auto& p) { return hashed_color(p); });
+        return color ? three : grey(three.x);
     }
-
-   private:
-    Vec3 of(const Place<1>& p) const { return shown(hashed(p[0]), hashed(p[0], 1), hashed(p[0], 2)); }
-    Vec3 of(const Place<2>& p) const { return shown(hashed(p[0], p[1]), hashed(p[0], p[1], 1), hashed(p[0], p[1], 2)); }
-    Vec3 of(const Place<3>& p) const { return shown(hashed(p[0], p[1], p[2]), hashed(p[0], p[1], p[2], 1), hashed(p[0], p[1], p[2], 2)); }
-    Vec3 of(const Place<4>& p) const {
-        return shown(hashed(p[0], p[1], p[2], p[3]), hashed(p[2], p[0], p[3], p[1]), hashed(p[3], p[2], p[1], p[0]));
-    }
-    Vec3 shown(double value, double second, double third) const { return color ? Vec3{value, second, third} : grey(value); }
 };
 
 struct CheckerNode {

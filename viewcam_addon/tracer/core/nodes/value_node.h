@@ -7,9 +7,13 @@
 #include <variant>
 
 #include "color.h"
+#include "curves.h"
 #include "geometry.h"
 #include "image.h"
+#include "light_path.h"
 #include "procedural.h"
+#include "spectrum.h"
+#include "voronoi.h"
 
 namespace viewcam::VIEWCAM_ISA {
 
@@ -22,10 +26,12 @@ struct ConstantNode {
 
 // One line a node. Each has a NAME, by which a scene asks for it, what it GIVES, by which it becomes a number, and `eval`; VARIES
 // where it depends on more than its inputs; `gives` where the node itself knows what it gives.
-using ValueNode = std::variant<ConstantNode, ImageNode, TextureCoordinateNode, AttributeNode, MappingNode, GeometryNode, ObjectInfoNode, FresnelNode, LayerWeightNode,
-                               MathNode, VectorMathNode, MapRangeNode, ClampNode, SeparateNode, CombineXYZNode, CombineColorNode, MixColorNode, MixNumberNode, GammaNode,
+using ValueNode = std::variant<ConstantNode, ImageNode, TextureCoordinateNode, AttributeNode, MappingNode, VectorRotateNode, VectorTransformNode, GeometryNode,
+                               ObjectInfoNode, LightPathNode, FresnelNode, LayerWeightNode, MathNode, VectorMathNode, MapRangeNode, MapRangeVectorNode, ClampNode,
+                               SeparateNode, CombineXYZNode, SeparateColorNode, CombineColorNode, MixColorNode, MixNumberNode, MixVectorNode, MixComponentsNode,
+                               RGBCurvesNode, VectorCurvesNode, FloatCurveNode, BlackbodyNode, WavelengthNode, GammaNode,
                                BrightContrastNode, HueSaturationNode, InvertNode, LuminanceNode, NoiseNode, WhiteNoiseNode, CheckerNode,
-                               GradientNode, WaveNode, MagicNode, BrickNode>;
+                               GradientNode, WaveNode, MagicNode, BrickNode, VoronoiNode>;
 
 // A number of a value that is of some sort: a colour's luminance, a vector's mean.
 inline double number_of(Vec3 value, Gives sort) {
