@@ -216,7 +216,7 @@ def _draw_axes(chart: Chart, axes: Axes) -> None:
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
     if chart.log_x:
-        axes.set_xscale("log")
+        _make_x_logarithmic(axes)
     elif all(float(x).is_integer() for curve in chart.curves for x in curve.x):
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     if chart.log_y:
@@ -237,9 +237,8 @@ def _draw_rows(chart: Chart, axes: Axes) -> None:
     axes.grid(axis="x", color=_GRID, linewidth=0.8)
     axes.set_axisbelow(True)
     axes.spines[["top", "right", "left"]].set_visible(False)
-    axes.set_xscale("log" if chart.log_x else "linear")
     if chart.log_x:
-        axes.xaxis.set_minor_locator(LogLocator(subs=(2, 5)))  # 3 × 10⁻¹ would meet 4 × 10⁻¹
+        _make_x_logarithmic(axes)
     axes.set_ylim(-0.6, len(curves) - 0.4)
     axes.set_yticks(range(len(curves)), [curve.name for curve in curves])
     axes.tick_params(axis="y", length=0)
@@ -255,6 +254,11 @@ def _draw_rows(chart: Chart, axes: Axes) -> None:
     axes.annotate(textwrap.fill(chart.y_label, 20), (1.02, 1.01), xycoords="axes fraction", va="bottom", color=_FAINT)
     told = "   ".join(f"{mark} {what}" for mark, what in zip("●○", chart.rows, strict=False))
     axes.annotate(told, (0, 1.02), xycoords="axes fraction", va="bottom", color=_FAINT)
+
+
+def _make_x_logarithmic(axes: Axes) -> None:
+    axes.set_xscale("log")
+    axes.xaxis.set_minor_locator(LogLocator(subs=(2, 5)))  # 3 × 10⁻¹ would meet 4 × 10⁻¹
 
 
 def _decades(chart: Chart) -> tuple[float, float]:
