@@ -240,6 +240,11 @@ def test_every_key_of_light_is_documented():
             ["material 'wall'", "'glossy'", "makes values"],
         ),
         (["materials", "wall"], {"surface": {"type": "math"}}, ["material 'wall'", "'math'", "shader"]),
+        (
+            ["materials", "wall"],
+            {"surface": {"type": "diffuse", "color": {"type": "rgb_curves"}}},
+            ["material 'wall'", "'rgb_curves'", "no table"],
+        ),
         (["materials", "wall"], {"surface": {"type": "glossy", "roughness": -1}}, ["material 'wall'", "roughness", "0 to"]),
         (["materials", "wall"], {"surface": {"type": "glossy", "color": {"image": "no"}}}, ["material 'wall'", "'no'"]),
         (["images", "checks", "pixels"], None, ["image 'checks'", "'pixels'"]),

@@ -116,6 +116,8 @@ class Node:
                     f"a {what} {self.type!r} has no input {checks.shown(name)}: give one of {', '.join(known) or 'none'}"
                 )
             values[name] = _checked(f"{name} of a {what} {self.type!r}", value, known[name], self.is_value)
+        if "table" in known and "table" not in values:
+            raise InputError(f"a {what} {self.type!r} has no table: give the name of an image of one row")
         ordered = ((name, values[name]) for name in known if name in values and values[name] != self._default(name))
         object.__setattr__(self, "inputs", tuple(ordered))
         size = 1 + sum(value.size for _, value in self.inputs if isinstance(value, Node) and value.is_value)
