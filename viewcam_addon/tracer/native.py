@@ -28,6 +28,7 @@ from .scene.lamps import RAYS, Area, Lamp, Point, Spot, Sun
 from .scene.materials import PLAIN, Colour, Material
 from .scene.sameness import same_things
 from .scene.shader_nodes import KINDS, Closure, Node
+from .scene.value_nodes import NORMAL
 from .tiles import Passes
 
 GEOMETRY = ("Depth", "Position", "Normal", "UV", "Object Index", "Material Index", "Magnitude", "Facing")
@@ -540,13 +541,15 @@ def _color(value: Colour | Node | tuple[float, ...], images: Mapping[str, int], 
 
 def _described_node(node: Node, images: Mapping[str, int], nodes: Mapping[Node, int]) -> _Node:
     inputs = []
-    for name in KINDS[node.type].inputs:
+    for name, default in KINDS[node.type].inputs.items():
         value = node[name]
         if isinstance(value, str | bool):
             word = value if isinstance(value, str) else str(value).lower()
             inputs.append(_Input(name.encode(), word.encode(), _color(WHITE, images, nodes)))
         elif value is not None:
             inputs.append(_Input(name.encode(), None, _color(value, images, nodes)))
+        elif default is NORMAL:
+            inputs.append(_Input(name.encode(), None, _Color(image=-1, node=-1)))
     return _Node(node.type.encode(), (_Input * len(inputs))(*inputs), len(inputs))
 
 

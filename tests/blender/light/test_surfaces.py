@@ -143,7 +143,7 @@ def bumpy(material):
     tree.links.new(bump.outputs[0], tree.nodes["Shader"].inputs["Normal"])
 
 
-STAND_INS = {toon: "not modelled", noisy: "not modelled", bumpy: "turns"}
+STAND_INS = {toon: "not modelled", noisy: "not modelled", bumpy: "'Bump' that is not modelled"}
 
 
 @pytest.mark.parametrize("change", STAND_INS, ids=lambda change: change.__name__)

@@ -57,10 +57,18 @@ def approximately(material, *words):
     return reading.material
 
 
+NORMAL = node("geometry", output="normal")
+CHECKS = node("image", image=Colour((1.0, 1.0, 1.0), "Checks"), extension="mirror", interpolation="cubic")
 TEXTURED = node(
     "mix",
     factor=Colour((1.0, 1.0, 1.0), "Checks"),
-    first=node("principled", base_color=Colour(RED, "Checks", closest=True), roughness=0.25, coat_weight=0.5),
+    first=node(
+        "principled",
+        base_color=Colour(RED, "Checks", closest=True),
+        roughness=0.25,
+        coat_weight=0.5,
+        normal=node("normal_map", color=CHECKS),
+    ),
     second=node(
         "add",
         first=node(
@@ -71,8 +79,6 @@ TEXTURED = node(
 )
 
 
-NORMAL = node("geometry", output="normal")
-CHECKS = node("image", image=Colour((1.0, 1.0, 1.0), "Checks"), extension="mirror", interpolation="cubic")
 VALUES = [
     CHECKS,
     node(
@@ -106,6 +112,7 @@ VALUES = [
     node("map_range_vector", value=node("vector_transform", **{"from": "camera"}), interpolation="smoothstep"),
     node("voronoi", vector=node("geometry", output="parametric"), feature="smooth_f1", metric="chebychev", output="position"),
     node("math", a=node("blackbody", temperature=node("wavelength", wavelength=450.0)), operation="tanh"),
+    node("layer_weight", normal=node("normal_map", color=CHECKS, strength=0.5, space="blender_object", uv="Second")),
     node("hue_saturation", color=node("gamma", color=node("bright_contrast", color=node("invert", color=CHECKS)), gamma=0.5)),
 ]
 

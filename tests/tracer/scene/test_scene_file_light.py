@@ -89,7 +89,9 @@ values = st.recursive(
 nodes = st.builds(partial(node, "separate"), color=values)
 shaders = st.recursive(
     st.one_of(
-        st.builds(partial(node, "principled"), base_color=colours | nodes, roughness=amounts, coat_weight=colours),
+        st.builds(
+            partial(node, "principled"), base_color=colours | nodes, roughness=amounts, coat_weight=colours, coat_normal=nodes
+        ),
         st.builds(partial(node, "glossy"), color=rgb, roughness=colours, distribution=st.sampled_from(DISTRIBUTIONS)),
         st.builds(partial(node, "emission"), color=colours, strength=amounts),
     ),
@@ -218,6 +220,11 @@ def test_every_key_of_light_is_documented():
             ["materials", "wall"],
             {"surface": {"type": "glossy", "roughness": {"type": "math", "operation": "guess"}}},
             ["'roughness' of 'surface' of material 'wall'", "operation", "'guess'", "multiply"],
+        ),
+        (
+            ["materials", "wall"],
+            {"surface": {"type": "glossy", "normal": 1.0}},
+            ["'surface' of material 'wall'", "normal of a shader 'glossy'", "normal_map"],
         ),
         (
             ["materials", "wall"],

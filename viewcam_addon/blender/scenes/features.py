@@ -130,9 +130,13 @@ def note_object(
             ledger.call_for_cycles(material.original, materials.keep_normals)
         reasons = materials.departures(material, lit=shading is not None)
         if shading:
-            reasons += shading.reading(material).reasons
+            reading = shading.reading(material)
+            reasons += reading.reasons
             for missing in images.missing(versions.node_tree(material)):
                 ledger.note(name, "exported", f"material {material.name!r} {missing}")
+            if reading.is_bumped and not material.cycles.use_bump_map_correction:
+                ledger.note(name, "approximated", f"material {material.name!r} has its bumped normals corrected on both sides")
+                ledger.set_for_cycles(material.original.cycles, "use_bump_map_correction", True)
         for reason in reasons:
             ledger.note(name, "approximated", f"material {material.name!r} {reason}, and a plain one stands in")
         if reasons and shading:

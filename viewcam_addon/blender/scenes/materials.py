@@ -14,7 +14,7 @@ import bpy
 from ...errors import InputError
 from ...tracer.scene.materials import PLAIN, Colour
 from ...tracer.scene.shader_nodes import KINDS, Node
-from ...tracer.scene.value_nodes import GENERATED, UV
+from ...tracer.scene.value_nodes import GENERATED, NORMAL, UV
 from .. import versions
 from ..temporary_settings import Overrides
 from . import images, nodes, shaders, value_nodes
@@ -53,7 +53,7 @@ def departures(material: bpy.types.Material, lit: bool = False) -> list[str]:
     all_nodes = list(nodes.all_of(tree))
     if not lit and any(node.type in _TRANSPARENT or _sees_through(node) for node in all_nodes):
         reasons.append("is transparent")
-    if any(node.type in _TURNING or _is_turned(node) for node in all_nodes):
+    if not lit and any(node.type in _TURNING or _is_turned(node) for node in all_nodes):
         reasons.append("turns the normals")
     if any(node.type in _UNKNOWN for node in all_nodes):
         reasons.append("runs a script")
@@ -118,6 +118,8 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
         for name, wanted in value.fixed.items():
             setattr(added, name, wanted)
         for name, theirs in value.words.items():
+            if node[name] == KINDS[node.type].inputs[name][0] and not hasattr(added, theirs):
+                continue  # what an older version does
             _choose(added, theirs, value_nodes.word_of(node.type, node[name]))
         for name, theirs in (value.flags | value.names).items():
             setattr(added, theirs, node[name])
@@ -129,7 +131,7 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
             table, ends = reading.images[node["table"].image], (node["least"][0], node["most"][0])
             value_nodes.draw_curves(added.mapping, table, *ends, node["extrapolate"])
         for name, theirs in value.inputs.items():
-            if KINDS[node.type].inputs[name] not in (UV, GENERATED) or name in dict(node.inputs):
+            if KINDS[node.type].inputs[name] not in (UV, GENERATED, NORMAL) or name in dict(node.inputs):
                 _colour(adder, value_nodes.input_of(added, theirs), node[name], reading)
     word = dict(node.inputs).get("output", node["output"] if "output" in KINDS[node.type].inputs else None)
     found = [socket for socket in added.outputs if value.outputs.get(socket.identifier, "") == word]
@@ -139,7 +141,7 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
 def _choose(node: bpy.types.Node, name: str, word: str) -> None:
     try:
         setattr(node, name, word)
-    except TypeError as error:  # vectors' powers came with 4.3
+    except (AttributeError, TypeError) as error:  # vectors' powers came with 4.3, DirectX's green with 5.2
         raise InputError(f"this Blender has no {node.bl_label} that is {word}: open the scene in a newer one") from error
 
 

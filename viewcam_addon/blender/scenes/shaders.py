@@ -19,7 +19,7 @@ import numpy as np
 
 from ...tracer.scene.materials import LARGEST_RADIANCE, PLAIN, Colour, Material, Picture
 from ...tracer.scene.shader_nodes import KINDS, Node
-from ...tracer.scene.value_nodes import GENERATED, UV
+from ...tracer.scene.value_nodes import GENERATED, NORMAL, UV
 from .. import versions
 from . import images, nodes, value_nodes
 from .nodes import Input, Output
@@ -61,35 +61,37 @@ class Shader:
 
 
 _DISTRIBUTION = {"distribution": "distribution"}
+_NORMAL = {"normal": "Normal"}
 _THICKNESS = {"Thin Film Thickness": 0.0}
 SHADERS = {
-    "diffuse": Shader("BSDF_DIFFUSE", "ShaderNodeBsdfDiffuse", {"color": "Color", "roughness": "Roughness"}),
-    "translucent": Shader("BSDF_TRANSLUCENT", "ShaderNodeBsdfTranslucent", {"color": "Color"}),
+    "diffuse": Shader("BSDF_DIFFUSE", "ShaderNodeBsdfDiffuse", {"color": "Color", "roughness": "Roughness"} | _NORMAL),
+    "translucent": Shader("BSDF_TRANSLUCENT", "ShaderNodeBsdfTranslucent", {"color": "Color"} | _NORMAL),
     "glossy": Shader(
         "BSDF_GLOSSY",
         "ShaderNodeBsdfGlossy",
-        {"color": "Color", "roughness": "Roughness"},
+        {"color": "Color", "roughness": "Roughness"} | _NORMAL,
         _DISTRIBUTION,
         {"Anisotropy": 0.0},
     ),
     "metallic": Shader(
         "BSDF_METALLIC",
         "ShaderNodeBsdfMetallic",
-        {"color": "Base Color", "edge_tint": "Edge Tint", "ior": "IOR", "extinction": "Extinction", "roughness": "Roughness"},
+        {"color": "Base Color", "edge_tint": "Edge Tint", "ior": "IOR", "extinction": "Extinction", "roughness": "Roughness"}
+        | _NORMAL,
         _DISTRIBUTION | {"fresnel": "fresnel_type"},
         _THICKNESS | {"Anisotropy": 0.0},
     ),
     "glass": Shader(
         "BSDF_GLASS",
         "ShaderNodeBsdfGlass",
-        {"color": "Color", "roughness": "Roughness", "ior": "IOR"},
+        {"color": "Color", "roughness": "Roughness", "ior": "IOR"} | _NORMAL,
         _DISTRIBUTION,
         _THICKNESS,
     ),
     "refraction": Shader(
         "BSDF_REFRACTION",
         "ShaderNodeBsdfRefraction",
-        {"color": "Color", "roughness": "Roughness", "ior": "IOR"},
+        {"color": "Color", "roughness": "Roughness", "ior": "IOR"} | _NORMAL,
         _DISTRIBUTION,
     ),
     "transparent": Shader("BSDF_TRANSPARENT", "ShaderNodeBsdfTransparent", {"color": "Color"}),
@@ -113,7 +115,9 @@ SHADERS = {
             "emission_color": "Emission Color",
             "emission_strength": "Emission Strength",
             "alpha": "Alpha",
-        },
+            "coat_normal": "Coat Normal",
+        }
+        | _NORMAL,
         _DISTRIBUTION,
         _THICKNESS | {"Anisotropic": 0.0, "Subsurface Weight": 0.0, "Sheen Weight": 0.0, "Thin Wall": 0.0},
     ),
@@ -143,6 +147,13 @@ class Reading:
     alphas: set[str] = field(default_factory=set)
     tables: dict[str, Picture] = field(default_factory=dict)
     reasons: list[str] = field(default_factory=list)
+
+    @property
+    def is_bumped(self) -> bool:
+        """Whether a shader has a normal of its own."""
+        return any(
+            KINDS[each.node.type].inputs[name] is NORMAL for each in self.material.closures for name, _ in each.node.inputs
+        )
 
 
 def read(material: bpy.types.Material) -> Reading:
@@ -298,6 +309,9 @@ class _Components(_Reader):
         source = of and nodes.source(of)
         if not isinstance(source, Output):
             return {}
+        for socket in source.node.inputs:
+            if "Normal" in socket.name and isinstance(nodes.source(Input(socket, source.groups)), Output):
+                self._reason(source, f"has a {socket.name} of its own")
         read = {
             "EMISSION": self._emission,
             "BSDF_DIFFUSE": self._diffuse,
@@ -402,7 +416,9 @@ class _Tree(_Reader):
         known = KINDS[ours].inputs
         given: dict[str, object] = {}
         for name, theirs in shader.inputs.items():
-            if known[name] is not None and source.input(theirs) is not None:
+            if known[name] is NORMAL:
+                given |= self._normal(source, name, theirs)
+            elif known[name] is not None and source.input(theirs) is not None:
                 given[name] = self._input(source, theirs, known[name] if isinstance(known[name], float) else None)
         for name in (name for name, default in known.items() if default is None):
             if (
@@ -412,6 +428,16 @@ class _Tree(_Reader):
             ):
                 given[name] = self.surface(source.input(shader.inputs[name]))
         return Node(ours, tuple((given | self._words(source, ours)).items()))
+
+    def _normal(self, output: Output, name: str, theirs: str) -> dict[str, Node]:
+        """The node that makes a normal, where one does and is modelled."""
+        of = output.input(theirs)
+        source = of and nodes.source(of)
+        if isinstance(source, Output) and name == "coat_normal" and not versions.COATS_BEND_NORMALS:
+            self._reason(output, "has a Coat Normal, which is modelled from 5.0 on")
+            return {}
+        made = self._value(source) if isinstance(source, Output) else None
+        return {name: made} if isinstance(made, Node) else {}
 
     def _words(self, output: Output, ours: str) -> dict[str, str]:
         found = {}
@@ -481,6 +507,9 @@ class _Tree(_Reader):
         if "table" in KINDS[ours].inputs:
             given |= self._curves(output)
         for name, theirs in value.inputs.items():
+            if KINDS[ours].inputs[name] is NORMAL:
+                given |= self._normal(output, name, theirs)
+                continue
             read = self._value_input(Input(value_nodes.input_of(node, theirs), output.groups), KINDS[ours].inputs[name])
             if read is None:
                 return None
@@ -506,8 +535,6 @@ class _Tree(_Reader):
     def _departure(self, output: Output, ours: str) -> str | None:
         """Why a node that we know is another here, one clause."""
         node = output.node
-        if ours in ("fresnel", "layer_weight") and isinstance(nodes.source(output.input("Normal")), Output):
-            return "has a Normal that is not modelled"
         if hasattr(node, "texture_mapping") and not maps_plainly(node):
             return "has a mapping of its own"
         if ours == "texture_coordinate" and node.from_instancer and output.socket.name in ("UV", "Generated"):

@@ -135,8 +135,19 @@ VALUES: tuple[tuple[str, Value], ...] = (
         ),
     ),
     ("object_info", Value("OBJECT_INFO", "ShaderNodeObjectInfo", {}, _words("Location", "Object Index"))),
-    ("fresnel", Value("FRESNEL", "ShaderNodeFresnel", {"ior": "IOR"}, {"Fac": None})),
-    ("layer_weight", Value("LAYER_WEIGHT", "ShaderNodeLayerWeight", {"blend": "Blend"}, _words("Fresnel", "Facing"))),
+    (
+        "normal_map",
+        Value(
+            "NORMAL_MAP",
+            "ShaderNodeNormalMap",
+            _same("Color", "Strength"),
+            {"Normal": None},
+            {"space": "space", "convention": "convention"},
+            names={"uv": "uv_map"},
+        ),
+    ),
+    ("fresnel", Value("FRESNEL", "ShaderNodeFresnel", {"ior": "IOR", "normal": "Normal"}, {"Fac": None})),
+    ("layer_weight", Value("LAYER_WEIGHT", "ShaderNodeLayerWeight", _same("Blend", "Normal"), _words("Fresnel", "Facing"))),
     (
         "math",
         Value(
@@ -426,7 +437,9 @@ def given_words(output: Output, ours: str, value: Value) -> dict[str, object] | 
     found |= {name: getattr(output.node, theirs) for name, theirs in value.names.items()}
     found |= {name: (float(getattr(output.node, theirs)),) * 3 for name, theirs in value.numbers.items()}
     for name, theirs in value.words.items():
-        word = getattr(output.node, theirs)
+        word = getattr(output.node, theirs, None)
+        if word is None:  # an older version, in which it is what is the default here
+            continue
         if (ours, word) == ("image", "Smart"):
             word = "Cubic"
         choices = KINDS[ours].inputs[name]

@@ -63,6 +63,7 @@ inline void set_film(Scene& scene, const ViewcamFilm& given) {
     world.prepare(light.textures);
     light.film = {bool(given.transparent), given.exposure};
     light.filter_width = given.filter_width, light.version = given.version;
+    scene.make_tangents();
 }
 inline void clear_light(Scene& scene) { scene.illumination = {}; }
 
@@ -112,7 +113,7 @@ inline void specular(double ratio, size_t count, const double* given, double* ou
         Interaction point;
         Vec3 incoming = vector(given + 9 * i);
         point.normal = vector(given + 9 * i + 3), point.shading = vector(given + 9 * i + 6);
-        Vec3 normal = specular_normal(incoming, point), found[3] = {normal, reflected(incoming, normal), refracted(incoming, normal, ratio)};
+        Vec3 normal = specular_normal(incoming, point.normal, point.shading), found[3] = {normal, reflected(incoming, normal), refracted(incoming, normal, ratio)};
         for (int k = 0; k < 3; k++)
             for (int axis = 0; axis < 3; axis++) out[9 * i + 3 * k + axis] = found[k][axis];
     }

@@ -52,6 +52,8 @@ struct Material {
     bool emits() const { return !is_black(mean_emission_); }
     // Whether it may let light straight through.
     bool is_transparent() const { return transparent_; }
+    // Whether it has normals of its own.
+    bool is_bumped() const { return bumped_; }
     // About what it gives off, black only where it gives off nothing; and whether that is what it gives off everywhere.
     Vec3 mean_emission() const { return mean_emission_; }
     bool shines_evenly() const { return shines_evenly_; }
@@ -66,6 +68,8 @@ struct Material {
                     kinds_ |= kinds;
                     if constexpr (requires { closure.is_rough(); })
                         if (closure.is_rough()) rough_kinds_ |= kinds & ~DIFFUSE;
+                    if constexpr (requires { closure.normal; }) bumped_ |= VIEWCAM_ISA::is_bumped(closure.normal);
+                    if constexpr (requires { closure.coat_normal; }) bumped_ |= VIEWCAM_ISA::is_bumped(closure.coat_normal);
                     if constexpr (requires { closure.lets_through(); }) transparent_ |= closure.lets_through();
                     if constexpr (requires { closure.mean_emission(textures); }) {
                         mean_emission_ += closure.mean_emission(textures) * mean_weight(one, textures);
@@ -77,6 +81,7 @@ struct Material {
 
     BSDF bsdf(const ShadingPoint& at) const {
         BSDF bsdf;
+        if (bumped_) bsdf.bump({at.point.shading, at.version >= CYCLES_4_3, at.version >= CYCLES_5_0});
         for (const WeightedClosure& one : closures) add(one, at, bsdf);
         return bsdf;
     }
@@ -119,7 +124,7 @@ struct Material {
 
     uint32_t kinds_ = 0, rough_kinds_ = 0;
     Vec3 mean_emission_;
-    bool shines_evenly_ = true, transparent_ = false;
+    bool shines_evenly_ = true, transparent_ = false, bumped_ = false;
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

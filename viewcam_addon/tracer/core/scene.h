@@ -17,6 +17,7 @@
 #include "camera.h"
 #include "illumination.h"
 #include "shapes/sphere.h"
+#include "shapes/tangents.h"
 #include "shapes/triangle_mesh.h"
 
 namespace viewcam::VIEWCAM_ISA {
@@ -136,6 +137,21 @@ class Scene {
     // What a material is told of a point that a path reaches.
     ShadingPoint shading(const Interaction& point, Vec3 incoming, RayState ray) const {
         return {point, incoming, illumination.textures, illumination.version, &illumination.nodes, &objects[point.object], origin, this, ray};
+    }
+
+    // Makes the tangents that normal maps ask for, of meshes that have such materials.
+    void make_tangents() {
+        for (const ValueNode& node : illumination.nodes.all) {
+            auto map = std::get_if<NormalMapNode>(&node);
+            if (!map || map->space != NormalMapNode::TANGENT) continue;
+            for (const Object& object : objects) {
+                auto mesh = std::get_if<TriangleMesh>(&geometries[object.geometry]);
+                if (!mesh || !mesh->uvs(map->uv) || mesh->tangents.contains(map->uv)) continue;
+                auto first = slots.begin() + object.first_slot, last = first + material_counts[object.geometry];
+                if (std::any_of(first, last, [&](const Slot& slot) { return illumination.materials[slot.material].is_bumped(); }))
+                    mesh->tangents[map->uv] = TangentsOfMesh::of(*mesh, mesh->uvs(map->uv));
+            }
+        }
     }
 
     // What lights need. triangle_count: 0 of spheres. material: of a triangle, an index into illumination.materials. corners: in
@@ -350,6 +366,26 @@ inline ShadingPoint::Values ShadingPoint::attribute(const std::string& name) con
     }
     return {};
 }
+inline ShadingPoint::TangentFrame ShadingPoint::tangent_frame(const std::string& uv) const {
+    auto mesh = scene && object && !object->flat ? std::get_if<TriangleMesh>(&scene->geometries[object->geometry]) : nullptr;
+    if (!mesh) return {};
+    auto found = mesh->tangents.find(uv);
+    if (found == mesh->tangents.end()) return {};
+    const float* tangents = found->second.data() + 12 * size_t(point.primitive);
+    double b1 = point.barycentric.x, b2 = point.barycentric.y, b0 = 1 - b1 - b2;
+    auto between = [&](auto&& at) { return at(0) * b0 + at(1) * b1 + at(2) * b2; };
+    TangentFrame frame;
+    frame.tangent = between([&](int c) { return Vec3{tangents[4 * c], tangents[4 * c + 1], tangents[4 * c + 2]}; });
+    frame.side = between([&](int c) { return double(tangents[4 * c + 3]); });
+    if (mesh->corner_normals)
+        frame.normal = between([&](int c) { return TriangleMesh::corner_value(mesh->corner_normals, point.primitive, c); });
+    else
+        frame.normal = object->to_world.transposed(point.backside ? -point.normal : point.normal);
+    double size = length(frame.normal);
+    if (size > 0 && (!mesh->corner_normals || version >= CYCLES_5_1)) frame.normal = frame.normal / size;
+    return frame;
+}
+inline Vec3 ShadingPoint::to_world_normal(Vec3 normal) const { return object && !object->flat ? transposed_product(object->inverse, normal) : normal; }
 inline Vec3 ShadingPoint::in_camera() const { return scene ? scene->camera.to_camera(point.position) : Vec3{}; }
 inline Vec3 ShadingPoint::camera_eye() const { return scene ? scene->camera.eye + origin : Vec3{}; }
 inline Vec3 ShadingPoint::to_camera(Vec3 direction) const { return scene ? scene->camera.to_camera(scene->camera.eye + direction) : direction; }

@@ -36,9 +36,9 @@ class Kind:
 
 
 KINDS: dict[str, Kind] = {
-    "diffuse": Kind({"color": GREY, "roughness": 0.0}, ("diffuse",)),
-    "translucent": Kind({"color": GREY}, ("transmission",)),
-    "glossy": Kind({"color": GREY, "roughness": 0.5, "distribution": DISTRIBUTIONS}, ("glossy",)),
+    "diffuse": Kind({"color": GREY, "roughness": 0.0, "normal": value_nodes.NORMAL}, ("diffuse",)),
+    "translucent": Kind({"color": GREY, "normal": value_nodes.NORMAL}, ("transmission",)),
+    "glossy": Kind({"color": GREY, "roughness": 0.5, "distribution": DISTRIBUTIONS, "normal": value_nodes.NORMAL}, ("glossy",)),
     "metallic": Kind(
         {
             "color": (0.617, 0.577, 0.54),
@@ -48,15 +48,16 @@ KINDS: dict[str, Kind] = {
             "roughness": 0.5,
             "fresnel": ("f82", "physical_conductor"),
             "distribution": DISTRIBUTIONS,
+            "normal": value_nodes.NORMAL,
         },
         ("glossy",),
     ),
     "glass": Kind(
-        {"color": WHITE, "roughness": 0.0, "ior": 1.5, "distribution": DISTRIBUTIONS},
+        {"color": WHITE, "roughness": 0.0, "ior": 1.5, "distribution": DISTRIBUTIONS, "normal": value_nodes.NORMAL},
         ("glossy", "transmission"),
     ),
     "refraction": Kind(
-        {"color": WHITE, "roughness": 0.0, "ior": 1.45, "distribution": ("beckmann", "ggx")},
+        {"color": WHITE, "roughness": 0.0, "ior": 1.45, "distribution": ("beckmann", "ggx"), "normal": value_nodes.NORMAL},
         ("transmission",),
     ),
     "emission": Kind({"color": WHITE, "strength": 1.0}),
@@ -79,6 +80,8 @@ KINDS: dict[str, Kind] = {
             "emission_strength": 0.0,
             "alpha": 1.0,
             "distribution": DISTRIBUTIONS[:2],
+            "normal": value_nodes.NORMAL,
+            "coat_normal": value_nodes.NORMAL,
         },
         ("diffuse", "glossy", "transmission"),
     ),
@@ -135,7 +138,7 @@ class Node:
             return Node("texture_coordinate")
         if default is value_nodes.GENERATED:
             return Node("texture_coordinate", (("output", "generated"),))
-        if default is None or default is value_nodes.IMAGE:
+        if default is None or default in (value_nodes.IMAGE, value_nodes.NORMAL):
             return None
         if default is value_nodes.NAME:
             return ""
@@ -249,6 +252,8 @@ def _checked(name: str, value: Any, known: Any, of_value: bool) -> Any:
         return value
     if isinstance(value, Node):
         return value
+    if known is value_nodes.NORMAL:
+        raise InputError(f"{name} is no node: give one that makes a normal, as normal_map")
     try:
         return _number_or_colour(value, of_value)
     except (InputError, TypeError, ValueError) as error:

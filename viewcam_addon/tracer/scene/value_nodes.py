@@ -16,6 +16,9 @@ NAME = "a name"
 UV = "uv"
 """The default of a vector that is the mesh's UV where nothing else is given."""
 
+NORMAL = "normal"
+"""The default of a normal that is the surface's own, smooth one where nothing else is given."""
+
 GENERATED = "generated"
 """The default of a vector that is the place in the mesh's texture space where nothing else is given."""
 
@@ -46,7 +49,8 @@ LIGHT_PATH = (
     "ray_depth diffuse_depth glossy_depth transparent_depth transmission_depth"
 )
 
-# Input → its default: a number, three, words to choose from (the first is the default), whether something holds, IMAGE or UV.
+# Input → its default: a number, three, words to choose from (the first is the default), whether something holds, or one of
+# those above.
 KINDS: dict[str, Mapping[str, Default]] = {
     "image": {
         "image": IMAGE,
@@ -83,8 +87,15 @@ KINDS: dict[str, Mapping[str, Default]] = {
     "geometry": {"output": ("position", "normal", "true_normal", "incoming", "backfacing", "tangent", "parametric")},
     "object_info": {"output": ("location", "object_index")},
     "light_path": {"output": tuple(LIGHT_PATH.split())},
-    "fresnel": {"ior": 1.5},
-    "layer_weight": {"blend": 0.5, "output": ("fresnel", "facing")},
+    "fresnel": {"ior": 1.5, "normal": NORMAL},
+    "layer_weight": {"blend": 0.5, "normal": NORMAL, "output": ("fresnel", "facing")},
+    "normal_map": {
+        "color": (0.5, 0.5, 1.0),
+        "strength": 1.0,
+        "space": ("tangent", "object", "world", "blender_object", "blender_world"),
+        "uv": NAME,
+        "convention": ("opengl", "directx"),
+    },
     "math": {"operation": tuple(MATH.split()), "a": 0.5, "b": 0.5, "c": 0.5, "clamp": False},
     "vector_math": {"operation": tuple(VECTOR_MATH.split()), "a": BLACK, "b": BLACK, "c": BLACK, "scale": 1.0},
     "map_range": {
@@ -214,5 +225,7 @@ def attributes_of(kind: str, value_of: Callable[[str], Any]) -> Iterator[str]:
     """What a node asks meshes for by name. kind : its type. value_of : input → its value."""
     if kind == "attribute":
         yield value_of("name")
+    if kind == "normal_map" and value_of("space") == "tangent" and value_of("uv"):
+        yield value_of("uv")
     if kind in ("texture_coordinate", "geometry") and value_of("output") in ("generated", "tangent"):
         yield "generated"

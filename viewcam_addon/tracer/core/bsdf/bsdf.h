@@ -11,6 +11,7 @@
 #include "lambert.h"
 #include "microfacet.h"
 #include "oren_nayar.h"
+#include "shadow_terminator.h"
 #include "specular.h"
 #include "translucent.h"
 
@@ -40,6 +41,8 @@ class BSDF {
         if (!Kind::DELTA) spread_ |= Kind::KIND;
     }
     void emit(Vec3 radiance) { emission_ += radiance; }
+    // Its lobes have bumped normals, and light ends on them so.
+    void bump(const ShadowTerminator& terminator) { bumped_ = true, terminator_ = terminator; }
     void let_through(Vec3 transparency) { transparency_ += transparency; }
 
     bool is_black() const { return count_ == 0; }
@@ -69,6 +72,7 @@ class BSDF {
                 [&](const auto& lobe) {
                     if (lobe.DELTA || !(lobe.KIND & kinds)) return;
                     Vec3 light = lobe.eval(to_light);
+                    if (bumped_) light *= terminator_.left(normal_of(lobe), lobe.IS_DIFFUSE, to_light);
                     if (viewcam::VIEWCAM_ISA::is_black(light)) return;
                     (lobe.IS_DIFFUSE ? sum.diffuse : sum.other) += light * weight(lobe.KIND, [&] { return share(i) * lobe.pdf(to_light); });
                 },
@@ -89,6 +93,7 @@ class BSDF {
             [&](const auto& lobe) {
                 static_cast<LobeSample&>(sample) = lobe.sample(lobe.DELTA ? Vec2{} : direction());
                 sample.kind = lobe.KIND, sample.is_diffuse = lobe.IS_DIFFUSE;
+                if (bumped_ && lobe.IS_DIFFUSE) sample.weight *= terminator_.left(normal_of(lobe), true, sample.direction);
             },
             lobe(chosen));
         sample.weight = sample.weight / share(chosen);
@@ -106,6 +111,12 @@ class BSDF {
         else
             return lobe.color.x + lobe.color.y + lobe.color.z;
     }
+    template <class Kind> static Vec3 normal_of(const Kind& lobe) {
+        if constexpr (requires { lobe.frame; })
+            return lobe.frame.n;
+        else
+            return lobe.normal;
+    }
     double share(int lobe) const { return count_ == 1 ? 1 : shares_[lobe] / total_; }
 
     static_assert(std::is_trivially_destructible_v<Lobe>);
@@ -118,6 +129,8 @@ class BSDF {
     double shares_[MOST_LOBES], total_ = 0;
     int count_ = 0;
     uint32_t kinds_ = 0, spread_ = 0;
+    bool bumped_ = false;
+    ShadowTerminator terminator_;
     Vec3 emission_, transparency_;
 };
 

@@ -8,15 +8,14 @@ namespace viewcam::VIEWCAM_ISA {
 // Where a mirror sends a ray that comes along `incoming`.
 inline Vec3 reflected(Vec3 incoming, Vec3 normal) { return incoming - normal * (2 * dot(incoming, normal)); }
 
-// The smooth normal of a mirror or of glass, bent towards the true one where its mirror's ray would go below the surface.
+// The smooth, or bumped, normal of a mirror or of glass, bent towards the true one where its mirror's ray would go below the surface.
 //
 // As in Cycles, a mirror's ray rises by a hundredth above the surface or, where the ray that comes is flatter still, by nine
 // tenths of that one's rise, and the normal stays in the plane of the two. There the way back to the eye has the length r and
 // the angle φ from the true normal, counted towards the smooth one, and a mirror whose normal is turned by α sends the ray off
 // at 2α − φ. Its rise, r cos(2α − φ), is the least where α = (φ + arccos(rise / r)) / 2.
-inline Vec3 specular_normal(Vec3 incoming, const Interaction& point) {
+inline Vec3 specular_normal(Vec3 incoming, Vec3 normal, Vec3 shading) {
     constexpr double LEAST_RISE = 0.01, RISE_SHARE = 0.9;
-    Vec3 normal = point.normal, shading = point.shading;
     double rise = smaller(RISE_SHARE * larger(-dot(incoming, normal), 0.0), LEAST_RISE);
     if (dot(reflected(incoming, shading), normal) >= rise) return shading;
     Vec3 back = -incoming, aside = shading - normal * dot(shading, normal);

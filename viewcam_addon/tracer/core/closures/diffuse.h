@@ -6,34 +6,36 @@
 namespace viewcam::VIEWCAM_ISA {
 
 // albedo: as of OrenNayar.
-inline void add_diffuse(BSDF& bsdf, const ShadingPoint& at, Vec3 color, double roughness, Vec3 albedo) {
+inline void add_diffuse(BSDF& bsdf, const ShadingPoint& at, Vec3 color, Vec3 normal, double roughness, Vec3 albedo) {
     constexpr double SMOOTH = 1e-5;
     if (roughness < SMOOTH)
-        bsdf.add(Lambert{color, at.point.shading});
+        bsdf.add(Lambert{color, normal});
     else
-        bsdf.add(OrenNayar(color, at.point.shading, -at.incoming, unit_range(roughness), albedo, at.version >= CYCLES_4_3));
+        bsdf.add(OrenNayar(color, normal, -at.incoming, unit_range(roughness), albedo, at.version >= CYCLES_4_3));
 }
 
 struct DiffuseClosure {
     static constexpr const char* NAME = "diffuse";
     static constexpr uint32_t KINDS = DIFFUSE;  // the kinds of rays that its lobes scatter
-    Color color, roughness;
+    Color color, roughness, normal;
 
-    explicit DiffuseClosure(const Inputs& in) : color(in["color"]), roughness(in["roughness"]) {}
+    explicit DiffuseClosure(const Inputs& in) : color(in["color"]), roughness(in["roughness"]), normal(in["normal"]) {}
     void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
         Vec3 rgb = at.color(color);
-        add_diffuse(bsdf, at, rgb * weight, at.number(roughness), rgb);
+        add_diffuse(bsdf, at, rgb * weight, at.normal(normal), at.number(roughness), rgb);
     }
 };
 
 struct TranslucentClosure {
     static constexpr const char* NAME = "translucent";
     static constexpr uint32_t KINDS = TRANSMISSION;
-    Color color;
+    Color color, normal;
 
-    explicit TranslucentClosure(const Inputs& in) : color(in["color"]) {}
+    explicit TranslucentClosure(const Inputs& in) : color(in["color"]), normal(in["normal"]) {}
     bool is_rough() const { return true; }
-    void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const { bsdf.add(Translucent{at.color(color) * weight, at.normal()}); }
+    void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
+        bsdf.add(Translucent{at.color(color) * weight, at.specular_normal(normal)});
+    }
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

@@ -6,9 +6,8 @@ namespace viewcam::VIEWCAM_ISA {
 
 // f0: what is reflected straight back; where it is that of the index of refraction itself, Fresnel's equations hold as they are.
 // mean_color: of light that is scattered more than once.
-inline void add_glass(BSDF& bsdf, const ShadingPoint& at, Vec3 weight, const Microfacets& facets, double ratio, const Fresnel& fresnel,
+inline void add_glass(BSDF& bsdf, const ShadingPoint& at, Vec3 weight, Vec3 normal, const Microfacets& facets, double ratio, const Fresnel& fresnel,
                       Vec3 reflected, Vec3 transmitted, bool multiple) {
-    Vec3 normal = at.normal();
     if (multiple && !at.is_smooth(facets)) {
         Albedo single = glass_albedo(roughness_of(facets), -dot(normal, at.incoming), ratio);
         MultipleScattering more = MultipleScattering::of(single, unit_range(transmitted));
@@ -21,16 +20,17 @@ inline void add_glass(BSDF& bsdf, const ShadingPoint& at, Vec3 weight, const Mic
 struct GlassClosure {
     static constexpr const char* NAME = "glass";
     static constexpr uint32_t KINDS = GLOSSY | TRANSMISSION;
-    Color color, ior, roughness;
+    Color color, ior, roughness, normal;
     Distribution distribution;
 
     explicit GlassClosure(const Inputs& in)
-        : color(in["color"]), ior(in["ior"]), roughness(in["roughness"]), distribution(in.choice("distribution")) {}
+        : color(in["color"]), ior(in["ior"]), roughness(in["roughness"]), normal(in["normal"]), distribution(in.choice("distribution")) {}
     bool is_rough() const { return roughness.varies() || roughness.rgb.x > 0; }
     void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
         Vec3 rgb = at.color(color);
         double ratio = at.ratio(larger(at.number(ior), LEAST_IOR));
-        add_glass(bsdf, at, weight, distribution.facets(at.number(roughness)), ratio, DielectricFresnel{ratio}, rgb, rgb, distribution.multiple);
+        add_glass(bsdf, at, weight, at.specular_normal(normal), distribution.facets(at.number(roughness)), ratio, DielectricFresnel{ratio}, rgb, rgb,
+                  distribution.multiple);
     }
 
    private:
@@ -41,15 +41,16 @@ struct GlassClosure {
 struct RefractionClosure {
     static constexpr const char* NAME = "refraction";
     static constexpr uint32_t KINDS = TRANSMISSION;
-    Color color, ior, roughness;
+    Color color, ior, roughness, normal;
     Distribution distribution;
 
     explicit RefractionClosure(const Inputs& in)
-        : color(in["color"]), ior(in["ior"]), roughness(in["roughness"]), distribution(in.choice("distribution")) {}
+        : color(in["color"]), ior(in["ior"]), roughness(in["roughness"]), normal(in["normal"]), distribution(in.choice("distribution")) {}
     bool is_rough() const { return roughness.varies() || roughness.rgb.x > 0; }
     void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
         double ratio = at.ratio(larger(at.number(ior), LEAST_IOR));
-        add_refraction(bsdf, at, at.color(color) * weight, at.normal(), distribution.facets(at.number(roughness)), TotalReflection{ratio}, ratio);
+        add_refraction(bsdf, at, at.color(color) * weight, at.specular_normal(normal), distribution.facets(at.number(roughness)), TotalReflection{ratio},
+                       ratio);
     }
 
    private:

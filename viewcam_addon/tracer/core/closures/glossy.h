@@ -7,14 +7,14 @@ namespace viewcam::VIEWCAM_ISA {
 struct GlossyClosure {
     static constexpr const char* NAME = "glossy";
     static constexpr uint32_t KINDS = GLOSSY;
-    Color color, roughness;
+    Color color, roughness, normal;
     Distribution distribution;
 
     explicit GlossyClosure(const Inputs& in)
-        : color(in["color"]), roughness(in["roughness"]), distribution(in.choice("distribution")) {}
+        : color(in["color"]), roughness(in["roughness"]), normal(in["normal"]), distribution(in.choice("distribution")) {}
     bool is_rough() const { return roughness.varies() || roughness.rgb.x > 0; }
     void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
-        Vec3 rgb = at.color(color), normal = at.normal();
+        Vec3 rgb = at.color(color), normal = at.specular_normal(this->normal);
         Microfacets facets = distribution.facets(at.number(roughness));
         weight = weight * rgb;
         if (distribution.multiple) {

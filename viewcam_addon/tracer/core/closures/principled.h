@@ -12,7 +12,7 @@ struct PrincipledClosure {
     static constexpr const char* NAME = "principled";
     static constexpr uint32_t KINDS = DIFFUSE | GLOSSY | TRANSMISSION;
     Color base_color, metallic, roughness, ior, diffuse_roughness, specular_level, specular_tint, transmission, coat_weight, coat_roughness, coat_ior,
-        coat_tint, emission_color, emission_strength, alpha;
+        coat_tint, emission_color, emission_strength, alpha, normal, coat_normal;
     Distribution distribution;
 
     explicit PrincipledClosure(const Inputs& in)
@@ -20,7 +20,7 @@ struct PrincipledClosure {
           diffuse_roughness(in["diffuse_roughness"]), specular_level(in["specular_ior_level"]), specular_tint(in["specular_tint"]),
           transmission(in["transmission_weight"]), coat_weight(in["coat_weight"]), coat_roughness(in["coat_roughness"]),
           coat_ior(in["coat_ior"]), coat_tint(in["coat_tint"]), emission_color(in["emission_color"]),
-          emission_strength(in["emission_strength"]), alpha(in["alpha"]), distribution(in.choice("distribution")) {}
+          emission_strength(in["emission_strength"]), alpha(in["alpha"]), normal(in["normal"]), coat_normal(in["coat_normal"]), distribution(in.choice("distribution")) {}
 
     uint32_t kinds() const { return transmission.is_black() ? DIFFUSE | GLOSSY : KINDS; }
     bool is_rough() const { return true; }
@@ -33,7 +33,7 @@ struct PrincipledClosure {
 
     void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
         Vec3 base = not_negative(at.color(base_color)), tint = not_negative(at.color(specular_tint)), clamped = unit_range(base);
-        Vec3 normal = at.normal();
+        Vec3 normal = at.specular_normal(this->normal);
         double cosine = -dot(normal, at.incoming), index = larger(at.number(ior), LEAST_IOR);
         Microfacets facets = distribution.facets(at.number(roughness));
 
@@ -52,7 +52,7 @@ struct PrincipledClosure {
             Vec3 through{std::sqrt(clamped.x), std::sqrt(clamped.y), std::sqrt(clamped.z)};  // it is gone through twice
             double ratio = at.ratio(index);
             ScaledDielectric fresnel{ratio, unit_range(tint * f0_of(index))};
-            add_glass(bsdf, at, weight * share, facets, ratio, fresnel, grey(1), through, distribution.multiple);
+            add_glass(bsdf, at, weight * share, normal, facets, ratio, fresnel, grey(1), through, distribution.multiple);
             weight *= 1 - share;
         }
         double level = larger(at.number(specular_level), 0.0), f0 = f0_of(index), eta = index;
@@ -67,7 +67,7 @@ struct PrincipledClosure {
             Vec3 albedo = mix(fresnel.f0, grey(1), fresnel_progress_seen(eta, roughness_of(facets), cosine));
             weight = below(weight, weight * scattered.albedo * albedo);
         }
-        add_diffuse(bsdf, at, weight * base, at.number(diffuse_roughness), base);
+        add_diffuse(bsdf, at, weight * base, at.normal(this->normal), at.number(diffuse_roughness), base);
     }
 
    private:
@@ -89,7 +89,7 @@ struct PrincipledClosure {
     Vec3 below_coat(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
         double share = larger(at.number(coat_weight), 0.0);
         if (!(share > NEGLIGIBLE)) return weight;
-        Vec3 normal = at.version < CYCLES_5_0 ? at.point.shading : at.normal();
+        Vec3 normal = at.version < CYCLES_5_0 ? at.normal(coat_normal) : at.specular_normal(coat_normal);  // not the base's where it has none
         double cosine = -dot(normal, at.incoming), eta = larger(at.number(coat_ior), 1.0);
         Microfacets facets = facets_of(at.number(coat_roughness));
         Scattering scattered;

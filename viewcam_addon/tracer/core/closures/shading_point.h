@@ -12,7 +12,7 @@
 namespace viewcam::VIEWCAM_ISA {
 
 // The versions of Blender whose Cycles computes materials in ways of its own: what is meant is the newest that is not newer.
-enum CyclesVersion { CYCLES_4_2 = 402, CYCLES_4_3 = 403, CYCLES_5_0 = 500, CYCLES_5_2 = 502 };
+enum CyclesVersion { CYCLES_4_2 = 402, CYCLES_4_3 = 403, CYCLES_5_0 = 500, CYCLES_5_1 = 501, CYCLES_5_2 = 502 };
 
 // What values are: as a number, a colour counts by its luminance and a vector by its mean.
 enum class Gives { NUMBER, COLOR, VECTOR };
@@ -50,8 +50,14 @@ struct ShadingPoint {
     }
     // The index of refraction beyond the surface over that before it. ior: inside over outside.
     double ratio(double ior) const { return point.backside ? 1 / ior : ior; }
-    // The smooth normal, bent so that a mirror's ray rises above the surface.
-    Vec3 normal() const { return specular_normal(incoming, point); }
+    // The normal that an input asks for, unit: the smooth one where it asks for none.
+    Vec3 normal(const Color& given) const {
+        Vec3 asked = given.node == NONE ? given.rgb : value_of_node(given.node);
+        double size = length(asked);
+        return size > 0 && size < INFINITE ? asked / size : point.shading;
+    }
+    // The same, bent so that a mirror's ray rises above the surface.
+    Vec3 specular_normal(const Color& given) const { return VIEWCAM_ISA::specular_normal(incoming, point.normal, normal(given)); }
     // Whether facets are so small that they are a mirror.
     bool is_smooth(const Microfacets& facets) const {
         return facets.alpha_x * facets.alpha_y <= (version < CYCLES_4_3 ? 5e-7 : 2e-10);
@@ -64,6 +70,15 @@ struct ShadingPoint {
         int width = 0;
     };
     Values attribute(const std::string& name) const;
+    // What a normal map stands on, in the object's space, interpolated and not of unit length. side: of the map, 0 where the mesh
+    // has no UV map of that name. Defined in scene.h.
+    struct TangentFrame {
+        Vec3 normal, tangent;
+        double side = 0;
+    };
+    TangentFrame tangent_frame(const std::string& uv) const;
+    // A normal of the object's space, of any length.
+    Vec3 to_world_normal(Vec3 normal) const;
     // Where this is in the box round the mesh's vertices, from 0 to 1; ½ along what has no extent.
     Vec3 generated() const;
     // As Camera has it: to the right, up and ahead; and in the picture, from 0 to 1.
@@ -87,6 +102,8 @@ struct Input {
     std::string name, choice;
     Color color;
 };
+inline bool is_bumped(const Color& normal) { return normal.node != NONE || !is_black(normal.rgb); }
+
 class Inputs {
    public:
     explicit Inputs(std::vector<Input> inputs) : inputs_(std::move(inputs)) {}

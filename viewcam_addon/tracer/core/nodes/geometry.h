@@ -204,11 +204,11 @@ struct FresnelNode {
     static constexpr const char* NAME = "fresnel";
     static constexpr Gives GIVES = Gives::NUMBER;
     static constexpr bool VARIES = true;
-    Color ior;
+    Color ior, normal;
 
-    explicit FresnelNode(const Inputs& in) : ior(in["ior"]) {}
+    explicit FresnelNode(const Inputs& in) : ior(in["ior"]), normal(in["normal"]) {}
     Vec3 eval(const ShadingPoint& at) const {
-        return grey(fresnel(std::fabs(dot(at.incoming, at.point.shading)), at.ratio(larger(at.number(ior), 1e-5))));
+        return grey(fresnel(std::fabs(dot(at.incoming, at.normal(normal))), at.ratio(larger(at.number(ior), 1e-5))));
     }
 };
 
@@ -216,12 +216,12 @@ struct LayerWeightNode {
     static constexpr const char* NAME = "layer_weight";
     static constexpr Gives GIVES = Gives::NUMBER;
     static constexpr bool VARIES = true;
-    Color blend;
+    Color blend, normal;
     bool facing;
 
-    explicit LayerWeightNode(const Inputs& in) : blend(in["blend"]), facing(in.choice("output") == "facing") {}
+    explicit LayerWeightNode(const Inputs& in) : blend(in["blend"]), normal(in["normal"]), facing(in.choice("output") == "facing") {}
     Vec3 eval(const ShadingPoint& at) const {
-        double cosine = std::fabs(dot(at.incoming, at.point.shading)), blended = at.number(blend);
+        double cosine = std::fabs(dot(at.incoming, at.normal(normal))), blended = at.number(blend);
         if (!facing) {
             double left = larger(1 - blended, 1e-5);
             return grey(fresnel(cosine, at.point.backside ? left : 1 / left));

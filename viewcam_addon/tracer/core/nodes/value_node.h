@@ -11,6 +11,7 @@
 #include "geometry.h"
 #include "image.h"
 #include "light_path.h"
+#include "normal_map.h"
 #include "procedural.h"
 #include "spectrum.h"
 #include "voronoi.h"
@@ -26,7 +27,7 @@ struct ConstantNode {
 
 // One line a node. Each has a NAME, by which a scene asks for it, what it GIVES, by which it becomes a number, and `eval`; VARIES
 // where it depends on more than its inputs; `gives` where the node itself knows what it gives.
-using ValueNode = std::variant<ConstantNode, ImageNode, TextureCoordinateNode, AttributeNode, MappingNode, VectorRotateNode, VectorTransformNode, GeometryNode,
+using ValueNode = std::variant<ConstantNode, ImageNode, TextureCoordinateNode, AttributeNode, MappingNode, VectorRotateNode, VectorTransformNode, GeometryNode, NormalMapNode,
                                ObjectInfoNode, LightPathNode, FresnelNode, LayerWeightNode, MathNode, VectorMathNode, MapRangeNode, MapRangeVectorNode, ClampNode,
                                SeparateNode, CombineXYZNode, SeparateColorNode, CombineColorNode, MixColorNode, MixNumberNode, MixVectorNode, MixComponentsNode,
                                RGBCurvesNode, VectorCurvesNode, FloatCurveNode, BlackbodyNode, WavelengthNode, GammaNode,

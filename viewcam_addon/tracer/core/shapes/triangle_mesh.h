@@ -9,6 +9,7 @@
 // longer.
 #pragma once
 #include <bit>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -34,11 +35,19 @@ struct TriangleMesh {
     const float* corner_uvs = nullptr;       // (count, 3, 2), or nothing
     const float* corner_colors = nullptr;    // (count, 3, 3), linear, or nothing
     std::vector<Attribute> attributes;
+    std::map<std::string, std::vector<float>> tangents;  // (count, 3, 4), by the UV map's name, of those that normal maps ask for
     Bounds bounds;                           // of the vertices
 
     Vec3 corner(size_t triangle, int i) const {
         const double* v = vertices + 3 * size_t(triangles[3 * triangle + i]);
         return {v[0], v[1], v[2]};
+    }
+    // (count, 3, 2): the UV map of this name, "" the mesh's own; or nothing.
+    const float* uvs(const std::string& name) const {
+        if (name.empty()) return corner_uvs;
+        for (const Attribute& one : attributes)
+            if (one.name == name && one.width == 2) return one.values;
+        return nullptr;
     }
     static Vec3 corner_value(const float* values, size_t triangle, int i) {
         const float* v = values + 9 * triangle + 3 * i;

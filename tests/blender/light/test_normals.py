@@ -1,0 +1,200 @@
+"""Normal maps, without noise: patches of every shader, and a smooth body with a picture of normals, under a sun without a size.
+
+Errors are relative to what the brightest pixel shows: bumps make light end anywhere, and there nothing is left to relate to.
+"""
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from viewcam_addon.blender import versions
+from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.scenes import shaders as shaders_read
+from viewcam_addon.tracer import render
+
+COLOUR = (0.8, 0.5, 0.2, 1.0)
+SPACES = ("TANGENT", "OBJECT", "WORLD", "BLENDER_OBJECT", "BLENDER_WORLD")
+DIFFUSE, GLOSSY, PRINCIPLED = "ShaderNodeBsdfDiffuse", "ShaderNodeBsdfGlossy", "ShaderNodeBsdfPrincipled"
+
+
+def shaders():
+    """(class, inputs, properties, which normals are mapped)."""
+    yield DIFFUSE, {"Color": COLOUR}, {}, ("Normal",)
+    yield DIFFUSE, {"Color": COLOUR, "Roughness": 0.7}, {}, ("Normal",)
+    yield GLOSSY, {"Color": COLOUR, "Roughness": 0.5}, {"distribution": "GGX"}, ("Normal",)
+    yield "ShaderNodeBsdfGlass", {"Color": COLOUR, "Roughness": 0.6}, {"distribution": "GGX"}, ("Normal",)
+    yield PRINCIPLED, {"Base Color": COLOUR}, {}, ("Normal",)
+    yield PRINCIPLED, {"Base Color": COLOUR, "Metallic": 1.0}, {}, ("Normal",)
+    coat = {"Base Color": COLOUR, "Coat Weight": 0.8, "Coat Roughness": 0.4}
+    own = [("Coat Normal",), ("Normal", "Coat Normal")] if versions.COATS_BEND_NORMALS else []
+    for mapped in (("Normal",), *own):
+        yield PRINCIPLED, coat, {}, mapped
+    if bpy.app.version >= (4, 3):
+        yield "ShaderNodeBsdfMetallic", {"Roughness": 0.5}, {}, ("Normal",)
+
+
+def map_normals(material, mapped, color, strength=1.0, space="TANGENT", image=None, uv=""):
+    tree = material.node_tree
+    for name in mapped:
+        node = tree.nodes.new("ShaderNodeNormalMap")
+        node.space, node.uv_map = space, uv
+        node.inputs["Color"].default_value, node.inputs["Strength"].default_value = (*color, 1.0), strength
+        if image:
+            texture = tree.nodes.new("ShaderNodeTexImage")
+            texture.image = image
+            tree.links.new(texture.outputs["Color"], node.inputs["Color"])
+        tree.links.new(node.outputs[0], tree.nodes["Shader"].inputs[name])
+
+
+@pytest.fixture
+def shown(scene, camera, add_lamp, set_world, read_passes, tmp_path):
+    """shown(size) → ours, theirs: (height, width, 3), and the number of the object that each pixel shows."""
+    from mathutils import Vector
+
+    set_world((0, 0, 0), 0.0)
+    sun = add_lamp("SUN", angle=0.0)
+    sun.data.energy, sun.rotation_mode = np.pi, "QUATERNION"
+    sun.rotation_quaternion = Vector((0.6, 0.3, 0.75)).to_track_quat("Z", "Y")
+
+    def show(size):
+        scene.render.resolution_x = scene.render.resolution_y = size
+        path = tmp_path / "normals.exr"
+        exported = job.export_and_render(job.Request(threads=2, level="direct", samples=1), [path])
+        assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
+        (theirs,) = read_passes([path])
+        ours = render.render(exported, "direct", 1, threads=2)
+        one, other = (each["Combined"][..., :3].astype(np.float64) for each in (ours, theirs))
+        return one, other, ours["Object Index"][..., 0]
+
+    return show
+
+
+@pytest.fixture
+def patches(shown, camera, add, make_material):
+    """patches(cases) → errors of each case's pixels. A case: a shader as above, and what `map_normals` is given."""
+
+    def show(cases):
+        camera.location, camera.rotation_euler, camera.data.lens = (0.013, 0.029, 1.0), (0, 0, 0), 9.0
+        side, cells = 4.0 / 24, 24
+        rng = np.random.default_rng(3)
+        for number, ((kind, inputs, properties, mapped), given) in enumerate(cases):
+            material = make_material(f"M{number}", kind)
+            shader = material.node_tree.nodes["Shader"]
+            for name, value in inputs.items():
+                if name in shader.inputs:
+                    shader.inputs[name].default_value = value
+            for name, value in properties.items():
+                setattr(shader, name, value)
+            map_normals(material, mapped, **given)
+            places = [place for place in range(cells * cells) if place % len(cases) == number]
+            corners = [((p % cells - cells / 2) * side, ((7 * p // cells) % cells - cells / 2) * side) for p in places]
+            around = ((0, 0), (side, 0), (side, side), (0, side))
+            vertices = [(x + dx, y + dy, 0.0) for x, y in corners for dx, dy in around]
+            mesh = bpy.data.meshes.new(f"P{number}")
+            # Some are seen from behind.
+            mesh.from_pydata(vertices, [], [range(4 * i, 4 * i + 4)[:: -1 if i % 5 == 4 else 1] for i in range(len(corners))])
+            for layer in ("UVMap", "Second"):  # turned, mirrored and sheared, each patch in its own way
+                maps = rng.uniform(-1, 1, (len(corners), 2, 2))
+                mesh.uv_layers.new(name=layer)
+                uvs = np.einsum("pij,pcj->pci", maps, np.array(vertices)[:, :2].reshape(-1, 4, 2)).reshape(-1, 2)
+                loops = np.empty(len(mesh.loops), np.int32)
+                mesh.loops.foreach_get("vertex_index", loops)
+                mesh.uv_layers[layer].data.foreach_set("uv", uvs[loops].ravel())
+            mesh.materials.append(material)
+            add(mesh, f"P{number}", pass_index=number + 1)
+        ours, theirs, numbers = shown(144)
+        found = []
+        for number in range(1, len(cases) + 1):
+            here = numbers == number
+            assert here.sum() > 60 and theirs[here].max() > 0.01, (cases[number - 1], here.sum(), theirs[here].max())
+            found.append(np.abs(ours - theirs)[here].max(axis=1) / theirs[here].max())
+        return found
+
+    return show
+
+
+def check(found, cases, p50=2e-6, p99=1e-4):
+    told = [
+        f"{case}: p50 {np.median(each):.1e}, p99 {np.quantile(each, 0.99):.1e}, most {each.max():.1e}"
+        for each, case in zip(found, cases, strict=True)
+        if not (np.median(each) <= p50 and np.quantile(each, 0.99) <= p99)
+    ]
+    assert not told, "\n".join(told)
+
+
+def test_every_shader_is_bumped_as_in_cycles(patches):
+    cases = [(shader, {"color": (0.7, 0.4, 0.9)}) for shader in shaders()]
+    check(patches(cases), cases, p50=3e-5)  # the tables' own differences, as in test_closures.py
+
+
+def test_every_space_and_strength_is_cycles(patches):
+    lambert = (DIFFUSE, {"Color": COLOUR}, {}, ("Normal",))
+    cases = [
+        (lambert, {"color": (0.7, 0.4, 0.9) if space in SPACES[:3] else (0.7, 0.4, 0.1), "strength": strength, "space": space})
+        for space in SPACES
+        for strength in (1.0, 0.4, 1.7)
+    ]
+    cases += [(lambert, {"color": (0.95, 0.4, 0.6)}), (lambert, {"color": (0.7, 0.4, 0.9), "uv": "Second"})]
+    check(patches(cases), cases)
+
+
+def test_a_coats_own_normal_is_named_where_it_is_not_modelled(make_material):
+    material = make_material("Coated", PRINCIPLED, Coat_Weight=0.5)
+    map_normals(material, ("Coat Normal",), (0.7, 0.4, 0.9))
+    told = ["has a Coat Normal" in reason for reason in shaders_read.read(material).reasons]
+    assert told == ([] if versions.COATS_BEND_NORMALS else [True])
+
+
+@pytest.fixture
+def body(camera, add, mesh_from, make_material):
+    """A smooth monkey, stretched, whose UV map crosses its seams, with a picture of normals."""
+    mesh = mesh_from("monkey")
+    for polygon in mesh.polygons:
+        polygon.use_smooth = True
+    layer = mesh.uv_layers.new(name="UVMap")
+    for loop in mesh.loops:
+        x, y, z = mesh.vertices[loop.vertex_index].co
+        layer.data[loop.index].uv = (abs(x) + 0.2 * y, z + 0.1 * x * y)
+    image = bpy.data.images.new("Normals", 4, 4, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"
+    pixels = np.random.default_rng(1).uniform(0.3, 0.7, (16, 4)).astype(np.float32)
+    pixels[:, 2:] = 0.9, 1.0
+    image.pixels.foreach_set(pixels.ravel())
+    image.update()
+    material = make_material("Skin", PRINCIPLED, Base_Color=COLOUR)
+    map_normals(material, ("Normal",), (0, 0, 0), image=image)
+    mesh.materials.append(material)
+    monkey = add(mesh, "Monkey", pass_index=1)
+    monkey.scale, monkey.rotation_euler = (1.2, 0.8, 1.0), (0.2, 0.1, 0.4)
+    camera.location, camera.rotation_euler, camera.data.lens = (0.2, -4.0, 0.3), (1.5, 0.0, 0.05), 50.0
+    return material
+
+
+def test_a_smooth_body_has_the_tangents_of_mikktspace(shown, body):
+    ours, theirs, numbers = shown(96)
+    here = (numbers == 1) & (theirs.max(axis=-1) > 0) & (ours.max(axis=-1) > 0)
+    apart = np.abs(ours - theirs)[here].max(axis=1) / theirs.max()
+    told = here.sum(), *np.percentile(apart, (50, 90, 99, 100))
+    packed = bpy.app.version >= (5, 1)  # normals as two numbers of 16 bits
+    assert here.sum() > 500 and told[1] < (1e-4 if packed else 1e-5) and told[3] < 2e-3, told
+
+
+@pytest.mark.parametrize("wrong", ["strength", "convention", "uv"])
+def test_a_normal_that_is_a_little_wrong_is_found(patches, monkeypatch, wrong):
+    """The tests above must be able to fail."""
+    from viewcam_addon.tracer import native
+
+    right, changes = native._described_node, {"strength": (1.001,) * 3, "convention": "directx", "uv": "Second"}
+
+    def described(node, *numbers):
+        if node.type == "normal_map":
+            node = native.Node(node.type, (*node.inputs, (wrong, changes[wrong])))
+        return right(node, *numbers)
+
+    cases = [((DIFFUSE, {"Color": COLOUR}, {}, ("Normal",)), {"color": (0.7, 0.4, 0.9)})]
+    if wrong == "uv":
+        cases.append(((DIFFUSE, {"Color": COLOUR}, {}, ("Normal",)), {"color": (0.7, 0.4, 0.9), "uv": "Second"}))
+    monkeypatch.setattr(native, "_described_node", described)
+    with pytest.raises(AssertionError, match="p50"):
+        check(patches(cases), cases)
