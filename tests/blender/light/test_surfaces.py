@@ -10,6 +10,8 @@ from viewcam_addon.blender.scenes import materials
 # Of the light that the brightest texture reflects. A cosine's rounding is 2e-7 at the 99th percentile (test_delta_lights.py); a
 # texture adds what its UV is off: 1e-5 of the picture's width at most, in textures of a few pixels.
 FLAT, TEXTURED = 4e-7, 1e-4
+# Cycles has points as float32, and looks up how much they reflect in a table.
+POINTS = 1e-4
 # What 5.2 rounds the bytes of corners to, once decoded: it is off by as much as half floats are (they pass exactly before).
 HALF = 2.0**-12
 
@@ -79,6 +81,20 @@ def test_no_material_is_a_plain_one(pictures):
     check(sides, FLAT)
     assert not told(sides)
     assert np.unique(sides[0].traced["Diffuse Color"]).tolist() == pytest.approx([0, 0.8])
+
+
+def test_points_that_no_material_came_along_with_are_cycles_own_default(pictures, node_group):
+    tree, start, end = node_group("Points")
+    points = tree.nodes.new("GeometryNodeMeshToPoints")
+    points.inputs["Radius"].default_value = 0.1
+    tree.links.new(start.outputs[0], points.inputs["Mesh"])
+    tree.links.new(points.outputs[0], end.inputs[0])
+    bpy.data.objects["Monkey"].modifiers.new("Points", "NODES").node_group = tree
+    sides = pictures(scenes=1)
+    check(sides, POINTS)
+    assert not told(sides)
+    shown = sides[0].traced["Diffuse Color"][..., 0]
+    assert (len(np.unique(shown)) > 100) == (bpy.app.version >= (5, 0))  # since then some light is reflected, by the angle
 
 
 @pytest.mark.parametrize("interpolation", ["Linear", "Closest"])

@@ -116,6 +116,11 @@ films = st.builds(
 bounces = st.builds(Bounces, *[st.integers(0, 1024)] * 4)
 
 
+def test_a_constant_colour_that_a_value_is_made_from_is_three_numbers_and_the_default_none():
+    assert dict(node("separate", color=Colour((1.0, 0.5, 0.0))).inputs) == {"color": (1.0, 0.5, 0.0)}
+    assert node("separate", color=Colour((0.0, 0.0, 0.0))) == node("separate")
+
+
 @settings(max_examples=30)
 @given(data=st.data())
 def test_light_that_is_written_is_read_back_to_the_last_bit(make_scene, make_mesh, random_scene, tmp_path_factory, data):

@@ -149,7 +149,7 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
             geometry = _geometry(source, ledger, shading)
             names[source.key] = _free_name(source.data.name, geometries)
             geometries[names[source.key]] = geometry
-        materials = shading.names(source.slots) if shading else ()
+        materials = shading.names(source.slots, isinstance(source.data, bpy.types.PointCloud)) if shading else ()
         placed = (source.object_index, source.materials, materials, source.hidden_from)
         matrix = matrices if len(matrices) > 1 else matrices[0]
         objects.append(Object(source.name, names[source.key], matrix, *placed))

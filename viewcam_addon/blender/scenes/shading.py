@@ -3,7 +3,12 @@
 import bpy
 
 from ...tracer.scene.materials import Material, Picture
+from ...tracer.scene.shader_nodes import Node
+from .. import versions
 from . import images, shaders
+
+_DEFAULT = "Cycles' default surface"
+"""What is without material since 5.0 (intern/cycles/scene/shader.cpp, add_default)."""
 
 
 class Shading:
@@ -33,11 +38,15 @@ class Shading:
                     found[key] = images.picture_of(image, key in alphas)
         return found
 
-    def names(self, slots: tuple[bpy.types.Material | None, ...]) -> tuple[str, ...]:
-        """Keys in `materials`; "" is none."""
+    def names(self, slots: tuple[bpy.types.Material | None, ...], are_points: bool = False) -> tuple[str, ...]:
+        """Keys in `materials`; "" is none, but of points what Cycles gives those that have none."""
         for material in filter(None, slots):
             self.reading(material)
-        return tuple(material.original.name_full if material else "" for material in slots)
+        names = tuple(material.original.name_full if material else "" for material in slots)
+        if not (are_points and versions.DEFAULT_SURFACE_BENDS_NORMALS) or any(names[:1]):
+            return names
+        self._readings[_DEFAULT] = shaders.Reading(Material(surface=Node("principled")))
+        return (_DEFAULT,)
 
     def attributes(self, slots: tuple[bpy.types.Material | None, ...]) -> set[str]:
         """What a mesh of these materials is asked for by name, as `Mesh.attributes` has it."""

@@ -216,6 +216,8 @@ def closures(shader: Node | None, factors: tuple[tuple[Colour, bool], ...] = ())
 
 
 def _number_or_colour(value: Any, may_be_negative: bool) -> Any:
+    if may_be_negative and isinstance(value, Colour) and not value.varies:
+        value = value.rgb
     if isinstance(value, bool | Colour):
         return value
     three = (float(value),) * 3 if isinstance(value, int | float) else value
