@@ -9,6 +9,8 @@ of the same point. Rejected: labels made of the passes that a renderer writes (f
 occlusion).
 """
 
+from collections.abc import Collection
+
 from ..image import COVERAGE_PASSES
 
 PASSES = {
@@ -23,3 +25,21 @@ PASSES = {
 """The labels, and the passes of each: of flow those of a direction that has another frame; of coverage the first of them."""
 
 KINDS = tuple(PASSES)
+
+DEPTH_STEPS = 1000.0
+"""Of a 16-bit depth, in a scene unit: millimetres, where the unit is a metre."""
+
+FILES = {
+    "depth.png": "Depth",
+    "instances.png": "Instance",
+    "forward.flo": "Forward Flow",
+    "forward_hidden.png": "Forward Hidden",
+    "backward.flo": "Backward Flow",
+    "backward_hidden.png": "Backward Hidden",
+}
+"""Beside the EXR and the JSON, and the pass that each shows."""
+
+
+def endings(passes: Collection[str]) -> list[str]:
+    """Of the files that are written of labels with these passes, in order."""
+    return [*["labels.exr"][: len(passes)], *(each for each, name in FILES.items() if name in passes), "labels.json"]

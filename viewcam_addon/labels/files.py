@@ -6,7 +6,7 @@ Each appears whole, and the JSON last: where it stands, so do the others. An old
 import contextlib
 import json
 import struct
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -20,31 +20,13 @@ from ..errors import InputError
 from ..files import check_writable, is_replaced, read_bytes, written_whole
 from ..image import BACKGROUND_DEPTH
 from ..png import encoded
+from . import DEPTH_STEPS, FILES, endings
 from .scene_labels import Labels
 
 _FORMAT, _VERSION = "virtual-pinhole-labels", 1
 
-DEPTH_STEPS = 1000.0
-"""Of a 16-bit depth, in a scene unit: millimetres, where the unit is a metre."""
-
 _UNKNOWN_FLOW = 1e10
 """What Middlebury's format has where no flow is known; everything above 1e9 counts as that."""
-
-
-_FILES = {
-    "depth.png": "Depth",
-    "instances.png": "Instance",
-    "forward.flo": "Forward Flow",
-    "forward_hidden.png": "Forward Hidden",
-    "backward.flo": "Backward Flow",
-    "backward_hidden.png": "Backward Hidden",
-}
-"""Beside the EXR and the JSON, and the pass that each shows."""
-
-
-def endings(passes: Collection[str]) -> list[str]:
-    """Of the files that are written of labels with these passes, in order."""
-    return [*["labels.exr"][: len(passes)], *(each for each, name in _FILES.items() if name in passes), "labels.json"]
 
 
 def of_picture(path: Path, ending: str) -> Path:
@@ -77,7 +59,7 @@ def write(path: Path, labels: Labels, depth_steps: float = DEPTH_STEPS) -> list[
             image.write(each, labels.image)
             continue
         ending = each.name.removeprefix(f"{path.stem}.")
-        content = _content(ending, passes[_FILES[ending]][::-1], depth_steps)
+        content = _content(ending, passes[FILES[ending]][::-1], depth_steps)
         with written_whole(each) as temporary:
             temporary.write_bytes(content)
     with written_whole(told_in) as temporary:
@@ -87,7 +69,7 @@ def write(path: Path, labels: Labels, depth_steps: float = DEPTH_STEPS) -> list[
 
 
 def _content(ending: str, values: NDArray[np.float32], depth_steps: float) -> bytes:
-    """Of one of `_FILES`. values : of its pass, rows from the top."""
+    """Of one of `FILES`. values : of its pass, rows from the top."""
     if ending == "depth.png":
         return encoded(depth_levels(values[..., 0], depth_steps))
     if ending == "instances.png":

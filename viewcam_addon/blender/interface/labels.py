@@ -14,7 +14,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ...errors import InputError
-from ...labels import KINDS, PASSES, files
+from ...labels import DEPTH_STEPS, KINDS, PASSES, endings
 from ...shots.names import made_fit
 from .. import datablocks
 from . import readouts
@@ -61,7 +61,7 @@ class LabelSettings(bpy.types.PropertyGroup):
     depth_steps: bpy.props.FloatProperty(
         name="Depth Steps",
         description="Steps of the PNG's depth in a scene unit: 1000 are millimetres of metres. Beyond 65535 of them it is 0",
-        default=files.DEPTH_STEPS,
+        default=DEPTH_STEPS,
         min=1e-6,
         soft_min=1.0,
         soft_max=10000.0,
@@ -87,7 +87,7 @@ def file_names(camera_object: bpy.types.Object, kinds: list[str]) -> list[str]:
     """Of what a click writes, but for the batch's own: the camera first."""
     name = made_fit(camera_object.name)
     passes = [each for kind in kinds for each in PASSES[kind]]
-    return [f"{name}.json", *(f"{name}.{ending}" for ending in files.endings(passes))]
+    return [f"{name}.json", *(f"{name}.{ending}" for ending in endings(passes))]
 
 
 class Writing(BackgroundBatch):

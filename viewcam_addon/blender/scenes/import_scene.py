@@ -159,7 +159,7 @@ class _SceneImport:
 
     def _surfaces(self) -> None:
         """Every object, those of one geometry sharing its data."""
-        paints = import_light.Paints(self._made, self._overrides, self._ledger)
+        paints, is_lit = import_light.Paints(self._made, self._overrides, self._ledger), import_light.has_light(self._made)
         data: dict[str, list[tuple[int, bpy.types.Mesh | bpy.types.PointCloud]]] = {}
         for placed in self._made.objects:
             if placed.geometry not in data:
@@ -169,7 +169,9 @@ class _SceneImport:
                 for i, index in enumerate(placed.material_indices)
             ]
             for first, block in data[placed.geometry]:
-                shown = [slots[first]] if isinstance(block, bpy.types.PointCloud) else slots
+                shown = slots
+                if isinstance(block, bpy.types.PointCloud):
+                    shown = [slots[first] or (paints.plain() if is_lit else None)]  # Cycles' default is another since 5.0
                 for matrix in placed.matrices:
                     self._surface(dataclasses.replace(placed, matrix=matrix), block, shown, paints)
             self._ledger.placed(placed.name, len(placed.matrices))
