@@ -49,6 +49,25 @@ def test_the_same_light_is_the_same_within_noise(same):
     assert same.lines()[-1] == same.sentence
 
 
+def test_noise_in_another_pass_alone_is_noise():
+    """A white furnace: what is seen is as bright everywhere, and what of a pixel is surface and what is world is a draw."""
+
+    def drawn(rng, samples, share, attribute="samples"):
+        world = rng.binomial(samples, share, (HEIGHT, WIDTH, 1)) / samples * np.ones(3)
+        image = picture(rng, samples, attribute=attribute, Environment=world, Variance=np.zeros((HEIGHT, WIDTH, 3)))
+        image.passes["Combined"][:] = 1.0
+        return image
+
+    def compared(share):
+        rng = np.random.default_rng(3)
+        tests = [drawn(rng, SAMPLES // SEEDS, share, "cycles.ViewLayer.samples") for _ in range(SEEDS)]
+        return radiance.compare(drawn(rng, SAMPLES, 0.5), tests, PINHOLE)
+
+    assert compared(0.5).passed and compared(0.5).is_noisy, "\n".join(compared(0.5).lines())
+    # 64 × 48 pixels of 256 draws have a standard error of 0.11 %, on both sides: a hundredth is six of their difference.
+    assert not compared(0.505).passed and "Environment" in compared(0.505).sentence
+
+
 def test_the_mean_is_told_in_as_many_digits_as_its_error_has():
     """Never "differs by −0.000 % ± 0.000 %"."""
 

@@ -49,7 +49,8 @@ def compare(reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_sam
     unequal = [sides for sides in found if sides.name not in equal]
     samples, seeds = (samples_of(reference), test_samples or samples_of(tests[0])), len(tests)
     is_noisy = not quiet(combined.reference, combined.variance).all()
-    is_noisy |= seeds > 1 and not quiet(combined.test, combined.spread).all()
+    # Where things shine as brightly as what is behind them, only the other passes have any.
+    is_noisy |= seeds > 1 and any(not quiet(sides.test, sides.spread).all() for sides in (combined, *unequal))
     freedom = (max(min(samples[0] or 2, VARIANCE_BATCHES) - 1, 1), max(seeds - 1, 1))
     rounding = noise_free.Rounding(pinhole, reference, tests[0], max(filter(None, samples), default=1))
 
