@@ -11,7 +11,7 @@
 #   make artist-pictures  docs/images/artists anew, by a tour in that Blender's window
 #   make scenes        sample_scenes/*.blend anew, by Blender 4.2
 #   make charts        docs/charts anew: every method up to where it fails
-#   make bench         all benchmarks of speed, scaling and poses, some with charts in docs/charts; fails where a target is missed
+#   make bench         all benchmarks of speed, labels, scaling and poses, some with charts in docs/charts; fails where a target is missed
 #   make bench-guard   whether the tracer has become slower than it was, as a share of bare Embree's speed; a minute or two
 #   make clean         removes all that these made, but for ~/.cache/virtual-pinhole
 
@@ -152,7 +152,7 @@ charts: .venv/test
 
 bench: .venv/test
 	status=0; \
-	for name in geometry_level light_levels; do .venv/bin/python -m benchmarks.$$name || status=1; done; \
+	for name in geometry_level light_levels labels; do .venv/bin/python -m benchmarks.$$name || status=1; done; \
 	for name in speed scaling poses; do .venv/bin/viewcam chart $$name --json docs/charts/$$name.json || status=1; done; \
 	exit $$status
 

@@ -1,0 +1,209 @@
+"""Labels beside pictures that Blender writes: shots of the studio still, labelled by the tracer and by Cycles' own passes.
+
+    python -m benchmarks.labels [--shots 1000] [--size 640x480]
+
+Ours is `viewcam batch --labels depth,normals,position,masks --labels-only`, as a process of its own, from its start to its end.
+
+The other way is BlenderProc's (enable_depth_output, enable_normals_output and enable_segmentation_output, with the settings of
+render_segmap): each object has a pass index of its own, the camera's poses are keyframes, and one animation of Cycles writes
+the passes, at a sample a pixel, with persistent data, a static BVH and no denoising. It is spared what costs it most: one EXR
+has all passes, in place of one each through the compositor; and what it makes of them in loops of Python, our own code makes,
+the same 16-bit depths, ids, boxes and run lengths. What it can't tell is not asked: instances of one object apart, which share
+its index.
+
+Then both are read again, and every pixel of every shot compared. Two rays through the middle of one pixel that differ by a
+rounding may meet two things where an edge passes, so it is told which share of the pixels differs by more than a tolerance.
+Exit status 1 if that is more than edges explain, or if ours is the slower.
+
+Needs bpy and OpenEXR, and 24 GB on the disk for 1,000 shots.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks import race
+from benchmarks.batch import STILL, STUDIO
+from viewcam_addon import image
+from viewcam_addon.files import written_whole
+from viewcam_addon.labels import DEPTH_STEPS, files, masks
+from viewcam_addon.png import encoded
+from viewcam_addon.shots import Shot, orbit
+
+KINDS = "depth,normals,position,masks"
+PASSES = ("Depth", "Normal", "Position", "Object Index", "Material Index")
+# Calibrated: of the studio a pixel in a thousand differs by a quarter of these. Depth and place as shares of the depth.
+TOLERANCES = {"Object Index": 0.0, "Material Index": 0.0, "Depth": 1e-4, "Position": 1e-4, "Normal": 0.01}
+ON_EDGES = 1e-3
+"""Of all pixels: more may not differ in any pass. Calibrated: the studio has a tenth of it, and more the larger its pixels."""
+
+# BlenderProc's: RendererUtility.render_init, and of render_segmap set_light_bounces, samples, noise threshold and denoiser.
+_CYCLES = {
+    "samples": 1,
+    "use_adaptive_sampling": False,
+    "use_denoising": False,
+    "debug_bvh_type": "STATIC_BVH",
+    "debug_use_spatial_splits": True,
+    "max_bounces": 1,
+    "diffuse_bounces": 1,
+    "glossy_bounces": 0,
+    "ao_bounces_render": 0,
+    "transmission_bounces": 0,
+    "transparent_max_bounces": 8,
+    "volume_bounces": 0,
+}
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="benchmarks.labels", description=__doc__.splitlines()[0])
+    parser.add_argument("--shots", type=int, default=1000)
+    parser.add_argument("--size", default="640x480", help="pixels, WIDTHxHEIGHT")
+    options = parser.parse_args()
+    shots = orbit(STILL.resized(*map(int, options.size.split("x"))), options.shots)
+    with tempfile.TemporaryDirectory(prefix="viewcam-labels-") as name:
+        folder = Path(name)
+        seconds = measured(shots, folder)
+        for line in table(seconds, len(shots)):
+            print(line)
+        differing = compared(shots, folder)
+    print("\nof all pixels differ:", ", ".join(f"{name} {share:.4%}" for name, share in differing.items()))
+    return 0 if judged(seconds, differing) else 1
+
+
+def judged(seconds: Mapping[str, float], differing: Mapping[str, float]) -> bool:
+    """Whether the labels are the same, and ours are not the slower."""
+    theirs = seconds["passes"] + seconds["made of them"]
+    return seconds["ours"] <= theirs and max(differing.values()) <= ON_EDGES
+
+
+def measured(shots: Sequence[Shot], folder: Path) -> dict[str, float]:
+    """Seconds of ours, of Cycles' passes, and of what is made of them; all files are in the folder."""
+    with race.Contestant(prepare_passes, folder / "indexed.blend", list(shots), folder / "passes") as blender:
+        ours = labelled(folder / "indexed.blend", shots, folder / "ours")
+        passes = blender.runners()["passes"]()
+    start = time.perf_counter()
+    for number in range(1, len(shots) + 1):
+        of_passes(folder / "passes" / f"{number:04d}.exr", folder / "theirs")
+    return {"ours": ours, "passes": passes, "made of them": time.perf_counter() - start}
+
+
+def labelled(blend: Path, shots: Sequence[Shot], folder: Path) -> float:
+    """Seconds of `viewcam batch`; SystemExit if it fails."""
+    rows = [{key: value for key, value in vars(shot).items() if value is not None} for shot in shots]
+    listed = blend.with_name("shots.json")
+    listed.write_text(json.dumps(rows), encoding="utf-8")
+    words = ["batch", blend, listed, "--labels", KINDS, "--labels-only", "--out", folder]
+    start = time.perf_counter()
+    process = subprocess.run([sys.executable, "-m", "viewcam_addon", *map(str, words)], capture_output=True, text=True)
+    if process.returncode:
+        sys.exit(process.stdout + process.stderr)
+    return time.perf_counter() - start
+
+
+def prepare_passes(blend: Path, shots: Sequence[Shot], folder: Path) -> dict[str, race.Runner]:
+    """In Blender's process: the still with an index for each object and material, for both; and what renders its passes."""
+    import bpy
+
+    import viewcam_addon
+    from viewcam_addon.blender import camera, opening, versions
+    from viewcam_addon.blender.rendering.cycles import override_all
+    from viewcam_addon.blender.temporary_settings import overridden
+    from viewcam_addon.pinhole import Pinhole
+
+    viewcam_addon.register()
+    opening.open_blend(STUDIO)
+    for things in (bpy.data.objects, bpy.data.materials):
+        for number, each in enumerate(things, 1):
+            each.pass_index = number
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+
+    def passes() -> None:
+        opening.open_blend(blend)
+        scene, (layer, *_) = bpy.context.scene, bpy.context.scene.view_layers
+        render, first = scene.render, shots[0]
+        render.engine, render.use_persistent_data, render.use_compositing = "CYCLES", True, False
+        render.resolution_x, render.resolution_y, render.resolution_percentage = first.width, first.height, 100
+        with overridden() as overrides:
+            override_all(overrides, scene.cycles, _CYCLES)
+            for name in ("z", "normal", "position", "object_index", "material_index"):
+                setattr(layer, f"use_pass_{name}", True)
+            versions.set_multilayer_file(render.image_settings)
+            render.filepath, scene.frame_start, scene.frame_end = f"{folder}/", 1, len(shots)
+            data = bpy.data.cameras.new("poses")
+            data.clip_start, data.clip_end = scene.camera.data.clip_start, scene.camera.data.clip_end
+            scene.camera = bpy.data.objects.new("poses", data)
+            scene.collection.objects.link(scene.camera)
+            for frame, shot in enumerate(shots, 1):
+                pinhole = Pinhole(shot.eye, shot.look_at, shot.up, shot.d, shot.width, shot.height)
+                camera.place(scene.camera, pinhole, scene)
+                for path in ("location", "rotation_euler"):
+                    scene.camera.keyframe_insert(path, frame=frame)
+            bpy.ops.render.render(animation=True)
+
+    return {"passes": race.timed(passes)}
+
+
+def of_passes(path: Path, folder: Path) -> None:
+    """What a picture's passes tell, beside them: depths and ids as PNG, boxes and run lengths of each index as JSON."""
+    folder.mkdir(exist_ok=True)
+    passes = image.read(path, ("Depth", "Object Index")).passes
+    index = passes["Object Index"][..., 0].astype(np.int64)
+    levels = files.depth_levels(passes["Depth"][::-1, :, 0], DEPTH_STEPS)
+    found = masks.of_picture(np.where(index > 0, index, -1), int(index.max()) + 1)
+    told = [{"object_index": number, "visible": each} for number, each in enumerate(found) if each]
+    for ending, content in (
+        ("depth.png", encoded(levels)),
+        ("instances.png", encoded(files.id_colours(index[::-1]))),
+        ("json", json.dumps(told).encode()),
+    ):
+        with written_whole(folder / f"{path.stem}.{ending}") as temporary:
+            temporary.write_bytes(content)
+
+
+def table(seconds: dict[str, float], count: int) -> Iterator[str]:
+    ours, passes = seconds["ours"], seconds["passes"]
+    theirs = passes + seconds["made of them"]
+    yield f"| {count} shots | seconds | shots a second | of our throughput |"
+    yield "|---|---|---|---|"
+    for name, each in (("viewcam batch --labels", ours), ("Cycles' passes", passes), ("… and labels made of them", theirs)):
+        yield f"| {name} | {each:.1f} | {count / each:.2f} | {ours / each:.0%} |"
+
+
+def compared(shots: Sequence[Shot], folder: Path) -> dict[str, float]:
+    """Of each pass the share of all pixels that differ."""
+    shares = [
+        differences(_ours(folder / "ours", shot), image.read(folder / "passes" / f"{number:04d}.exr", tuple(TOLERANCES)).passes)
+        for number, shot in enumerate(shots, 1)
+    ]
+    return {name: float(np.mean([each[name] for each in shares])) for name in TOLERANCES}
+
+
+def _ours(folder: Path, shot: Shot) -> dict[str, NDArray]:
+    """Our passes, with the index of each instance's object."""
+    path = folder / f"{shot.name}.labels.json"
+    indices = {each["id"]: each["object_index"] for each in files.read(path)["instances"]}
+    passes = image.read(path.with_suffix(".exr")).passes
+    ids, places = np.unique(passes["Instance"], return_inverse=True)
+    of_ids = np.array([indices.get(int(number), 0) for number in ids])
+    return {**passes, "Object Index": of_ids[places].reshape(passes["Instance"].shape)}
+
+
+def differences(ours: Mapping[str, NDArray], theirs: Mapping[str, NDArray]) -> dict[str, float]:
+    """Of each pass the share of one picture's pixels that differ. What is no number differs."""
+    depth, found = ours["Depth"].astype(float), {}
+    for name, tolerance in TOLERANCES.items():
+        allowed = tolerance * depth if name in ("Depth", "Position") else tolerance
+        found[name] = float((~(np.abs(ours[name].astype(float) - theirs[name]) <= allowed)).any(axis=-1).mean())
+    return found
+
+
+if __name__ == "__main__":
+    sys.exit(main())
