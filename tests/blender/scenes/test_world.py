@@ -6,6 +6,9 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.scenes.ledger import Ledger
+from viewcam_addon.blender.scenes.world import world_of
+from viewcam_addon.blender.temporary_settings import overridden
 from viewcam_addon.tracer.scene.film import Bounces, Film
 from viewcam_addon.tracer.scene.lamps import World
 
@@ -120,6 +123,21 @@ def test_an_image_that_is_missing_is_the_magenta_that_cycles_shows(set_world, ex
     assert exported.world.radiance == (2.0, 0.0, 2.0) and exported.world.image is None and not told
     (said,) = (entry.reason for entry in exported.ledger if entry.object == world.name)
     assert said.startswith("the world ") and said.endswith("magenta, as Cycles has it")
+
+
+def test_cycles_is_shown_a_constant_world_where_the_image_is_missing(set_world):
+    """Where it sampled it as light, it had some that scattered rays lose."""
+    world = set_world(strength=2.0)
+    texture = world.node_tree.nodes.new("ShaderNodeTexEnvironment")
+    world.node_tree.links.new(texture.outputs["Color"], background_of(world).inputs["Color"])
+    ledger = Ledger()
+    world_of(world, ledger)
+    with overridden() as overrides:
+        for remedy in ledger.remedies.values():
+            remedy(overrides)
+        surface = world.node_tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node
+        assert not surface.inputs["Color"].is_linked and tuple(surface.inputs["Color"].default_value) == (2.0, 0.0, 2.0, 1.0)
+    assert background_of(world).inputs["Color"].is_linked
 
 
 def test_other_worlds_are_their_colour_in_the_viewport(set_world, export):

@@ -26,11 +26,13 @@ def world_of(world: bpy.types.World | None, ledger: Ledger, pictures: dict[str, 
     if world is None:
         return World()
     radiance, wrapped, reasons = _read(world)
-    for missing in images.missing(versions.node_tree(world)):
-        ledger.note(world.name, "exported", f"the world {missing}")
+    missing = images.missing(versions.node_tree(world))
+    for each in missing:
+        ledger.note(world.name, "exported", f"the world {each}")
     for reason in reasons:
         ledger.note(world.name, "approximated", f"the world {reason}, and a constant one stands in")
-    if reasons:
+    # Of an image, even of one that is missing, Cycles samples light, which no constant world needs.
+    if reasons or (missing and wrapped is None):
         ledger.call_for_cycles(world.original, _make_constant, radiance)
     original = world.original
     for owner, name, value in (

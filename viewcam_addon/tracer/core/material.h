@@ -81,7 +81,8 @@ struct Material {
 
     BSDF bsdf(const ShadingPoint& at) const {
         BSDF bsdf;
-        if (bumped_) bsdf.bump({at.point.shading, at.version >= CYCLES_4_3, at.version >= CYCLES_5_0});
+        // What is no plain diffuse surface has its smooth normals bent, too (specular_normal).
+        if (bumped_ || (kinds_ != DIFFUSE && !is_black(at.point.shading - at.point.normal))) bsdf.bump({at.point.shading, at.version >= CYCLES_4_3, at.version >= CYCLES_5_0});
         for (const WeightedClosure& one : closures) add(one, at, bsdf);
         return bsdf;
     }

@@ -326,11 +326,14 @@ class PathIntegrator {
     void ask(const LightSampler::Choice& choice, const Interaction& point, Vec2 u, const Path& path, int depth, const BSDF& bsdf,
              Block& block) const {
         LightSample sample = choice.light->sample_li(point, choice.rest, u);
-        uint32_t kinds = dot(point.normal, sample.direction) > 0 ? DIFFUSE | GLOSSY : TRANSMISSION;
+        // Light that the smooth surface has before it and the true one behind it counts, less what scattered rays would have found:
+        // these are lost, as in Cycles.
+        bool behind = !(dot(point.normal, sample.direction) > 0);
         auto weight = [&](RayKind kind, auto&& pdf) {
-            return choice.light->is_found_by(kind) ? power_heuristic(sample.pdf * choice.chance, pdf()) : 1;
+            bool is_lost = behind != (kind == TRANSMISSION);
+            return is_lost || choice.light->is_found_by(kind) ? power_heuristic(sample.pdf * choice.chance, pdf()) : 1;
         };
-        ScatteredLight light = bsdf.eval(sample.direction, kinds & ~choice.light->hidden_from, weight);
+        ScatteredLight light = bsdf.eval(sample.direction, ~choice.light->hidden_from, weight);
         if (depth > 1) light.diffuse += light.other, light.other = {};
         light.diffuse = light.diffuse * sample.weight, light.other = light.other * sample.weight;
         if (is_black(light.diffuse) && is_black(light.other)) return;

@@ -178,8 +178,13 @@ class LightSampler {
 
     // What a light may bring to a point.
     double estimate(uint32_t light, const Interaction& point, bool through) const {
-        double before = lights_[light].estimate(point.position, point.normal);
-        return through ? before + lights_[light].estimate(point.position, -point.normal) : before;
+        double before = estimate(light, point, point.shading, point.normal);
+        return through ? before + estimate(light, point, -point.shading, -point.normal) : before;
+    }
+    // The same on one side. normal: the true one, for what the smooth one turns its back on.
+    double estimate(uint32_t light, const Interaction& point, Vec3 shading, Vec3 normal) const {
+        double brought = lights_[light].estimate(point.position, shading);
+        return brought > 0 || is_black(shading - normal) ? brought : lights_[light].estimate(point.position, normal);
     }
 
     double chance(const Interaction& point, uint32_t light, bool seen, bool through) const {
