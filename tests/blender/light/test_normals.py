@@ -1,4 +1,4 @@
-"""Normal maps, without noise: patches of every shader, and a smooth body with a picture of normals, under a sun without a size.
+"""Normal maps and bumps, without noise: patches of every shader, and a smooth body, under a sun without a size.
 
 Errors are relative to what the brightest pixel shows: bumps make light end anywhere, and there nothing is left to relate to.
 """
@@ -49,9 +49,53 @@ def map_normals(material, mapped, color, strength=1.0, space="TANGENT", image=No
         tree.links.new(node.outputs[0], tree.nodes["Shader"].inputs[name])
 
 
+def hills(tree, vector):
+    """A smooth height of a vector's three numbers."""
+    add = tree.nodes.new("ShaderNodeMath")
+    separate = tree.nodes.new("ShaderNodeSeparateXYZ")
+    tree.links.new(vector, separate.inputs[0])
+    for number, operation in enumerate(("SINE", "COSINE")):
+        wave, wider = tree.nodes.new("ShaderNodeMath"), tree.nodes.new("ShaderNodeMath")
+        wave.operation, wider.operation, wider.inputs[1].default_value = operation, "MULTIPLY", 3.0
+        tree.links.new(separate.outputs[number], wider.inputs[0])
+        tree.links.new(wider.outputs[0], wave.inputs[0])
+        tree.links.new(wave.outputs[0], add.inputs[number])
+    return add.outputs[0]
+
+
+OBJECT = "ShaderNodeTexCoord", "Object"
+
+
+def bump(material, mapped, vector=OBJECT, filter_width=1.0, invert=False, first=None, texture=None, **inputs):
+    """first : of a normal map before. texture : (class, its properties), which makes the height instead of hills."""
+    tree = material.node_tree
+    source = tree.nodes.new(vector[0])
+    if vector[0] == "ShaderNodeVertexColor":
+        source.layer_name = "Shades"
+    node = tree.nodes.new("ShaderNodeBump")
+    node.invert = invert
+    for name, value in {"Distance": 0.2, "Filter Width": filter_width, **inputs}.items():
+        if name in node.inputs:
+            node.inputs[name].default_value = value
+    if texture:
+        made = tree.nodes.new(texture[0])
+        for name, value in texture[1].items():
+            setattr(made, name, value)
+        tree.links.new(source.outputs[vector[1]], made.inputs["Vector"])
+        tree.links.new(made.outputs[0], node.inputs["Height"])
+    else:
+        tree.links.new(hills(tree, source.outputs[vector[1]]), node.inputs["Height"])
+    if first:
+        turned = tree.nodes.new("ShaderNodeNormalMap")
+        turned.inputs["Color"].default_value = (*first, 1.0)
+        tree.links.new(turned.outputs[0], node.inputs["Normal"])
+    for name in mapped:
+        tree.links.new(node.outputs[0], tree.nodes["Shader"].inputs[name])
+
+
 @pytest.fixture
 def shown(scene, camera, add_lamp, set_world, read_passes, tmp_path):
-    """shown(size) → ours, theirs: (height, width, 3), and the number of the object that each pixel shows."""
+    """shown(size, level) → ours, theirs: (height, width, 3), and the number of the object that each pixel shows."""
     from mathutils import Vector
 
     set_world((0, 0, 0), 0.0)
@@ -59,13 +103,13 @@ def shown(scene, camera, add_lamp, set_world, read_passes, tmp_path):
     sun.data.energy, sun.rotation_mode = np.pi, "QUATERNION"
     sun.rotation_quaternion = Vector((0.6, 0.3, 0.75)).to_track_quat("Z", "Y")
 
-    def show(size):
+    def show(size, level="direct"):
         scene.render.resolution_x = scene.render.resolution_y = size
         path = tmp_path / "normals.exr"
-        exported = job.export_and_render(job.Request(threads=2, level="direct", samples=1), [path])
+        exported = job.export_and_render(job.Request(threads=2, level=level, samples=1), [path])
         assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
         (theirs,) = read_passes([path])
-        ours = render.render(exported, "direct", 1, threads=2)
+        ours = render.render(exported, level, 1, threads=2)
         one, other = (each["Combined"][..., :3].astype(np.float64) for each in (ours, theirs))
         return one, other, ours["Object Index"][..., 0]
 
@@ -74,9 +118,9 @@ def shown(scene, camera, add_lamp, set_world, read_passes, tmp_path):
 
 @pytest.fixture
 def patches(shown, camera, add, make_material):
-    """patches(cases) → errors of each case's pixels. A case: a shader as above, and what `map_normals` is given."""
+    """patches(cases, turn) → errors of each case's pixels. A case: a shader as above, and what `turn` is given."""
 
-    def show(cases):
+    def show(cases, turn=map_normals):
         camera.location, camera.rotation_euler, camera.data.lens = (0.013, 0.029, 1.0), (0, 0, 0), 9.0
         side, cells = 4.0 / 24, 24
         rng = np.random.default_rng(3)
@@ -88,7 +132,7 @@ def patches(shown, camera, add, make_material):
                     shader.inputs[name].default_value = value
             for name, value in properties.items():
                 setattr(shader, name, value)
-            map_normals(material, mapped, **given)
+            turn(material, mapped, **given)
             places = [place for place in range(cells * cells) if place % len(cases) == number]
             corners = [((p % cells - cells / 2) * side, ((7 * p // cells) % cells - cells / 2) * side) for p in places]
             around = ((0, 0), (side, 0), (side, side), (0, side))
@@ -103,6 +147,8 @@ def patches(shown, camera, add, make_material):
                 loops = np.empty(len(mesh.loops), np.int32)
                 mesh.loops.foreach_get("vertex_index", loops)
                 mesh.uv_layers[layer].data.foreach_set("uv", uvs[loops].ravel())
+            shades = mesh.color_attributes.new("Shades", "FLOAT_COLOR", "CORNER")
+            shades.data.foreach_set("color", rng.uniform(0, 1, 4 * len(mesh.loops)))
             mesh.materials.append(material)
             add(mesh, f"P{number}", pass_index=number + 1)
         ours, theirs, numbers = shown(144)
@@ -148,6 +194,38 @@ def test_a_coats_own_normal_is_named_where_it_is_not_modelled(make_material):
     assert told == ([] if versions.COATS_BEND_NORMALS else [True])
 
 
+def test_every_shader_is_bumped_by_heights_as_in_cycles(patches):
+    cases = [(shader, {}) for shader in shaders()]
+    check(patches(cases, bump), cases, p50=3e-5)
+
+
+def test_heights_of_all_that_varies_and_all_ways_to_bump_are_cycles(patches):
+    lambert = (DIFFUSE, {"Color": COLOUR}, {}, ("Normal",))
+    vectors = [("ShaderNodeTexCoord", output) for output in ("Object", "Generated", "UV", "Camera")]
+    vectors += [("ShaderNodeNewGeometry", "Position"), ("ShaderNodeUVMap", "UV"), ("ShaderNodeVertexColor", "Color")]
+    cases = [(lambert, {"vector": vector}) for vector in vectors]
+    cases += [(lambert, {name: value}) for name, value in (("Strength", 0.3), ("Strength", 1.6), ("Distance", -0.4))]
+    cases += [(lambert, {"invert": True}), (lambert, {"first": (0.7, 0.4, 0.9)})]
+    check(patches(cases, bump), cases)
+
+
+def test_a_narrow_filter_shows_what_float32_leaves_of_it(patches):
+    """Cycles' heights are rounded by 2⁻²⁴ of up to 2; places a tenth of a pixel of 1/36 away make 4e-5 of that in a slope."""
+    lambert = (DIFFUSE, {"Color": COLOUR}, {}, ("Normal",))
+    cases = [(lambert, {"filter_width": width}) for width in (0.1, 10.0)]
+    check(patches(cases, bump), cases, p50=2e-5, p99=2e-4)
+
+
+def test_textures_make_heights(patches):
+    lambert = (DIFFUSE, {"Color": COLOUR}, {}, ("Normal",))
+    noise = ("ShaderNodeTexNoise", {"noise_dimensions": "2D"})
+    cases = [
+        (lambert, {"texture": texture, "Distance": 0.05})
+        for texture in (noise, ("ShaderNodeTexWave", {}), ("ShaderNodeTexGradient", {}))
+    ]
+    check(patches(cases, bump), cases, p50=2e-5, p99=5e-4)
+
+
 @pytest.fixture
 def body(camera, add, mesh_from, make_material):
     """A smooth monkey, stretched, whose UV map crosses its seams, with a picture of normals."""
@@ -165,21 +243,47 @@ def body(camera, add, mesh_from, make_material):
     image.pixels.foreach_set(pixels.ravel())
     image.update()
     material = make_material("Skin", PRINCIPLED, Base_Color=COLOUR)
-    map_normals(material, ("Normal",), (0, 0, 0), image=image)
     mesh.materials.append(material)
     monkey = add(mesh, "Monkey", pass_index=1)
     monkey.scale, monkey.rotation_euler = (1.2, 0.8, 1.0), (0.2, 0.1, 0.4)
     camera.location, camera.rotation_euler, camera.data.lens = (0.2, -4.0, 0.3), (1.5, 0.0, 0.05), 50.0
-    return material
+    return material, image
 
 
-def test_a_smooth_body_has_the_tangents_of_mikktspace(shown, body):
+@pytest.mark.parametrize("turned_by", ["a map", "heights", "heights on a map"])
+def test_a_smooth_body_has_normals_of_its_own(shown, body, turned_by):
+    """The map's stand on the tangents of MikkTSpace."""
+    material, image = body
+    if turned_by == "a map":
+        map_normals(material, ("Normal",), (0, 0, 0), image=image)
+    else:
+        bump(material, ("Normal",), first=(0.6, 0.4, 0.9) if "map" in turned_by else None, Distance=0.1)
     ours, theirs, numbers = shown(96)
     here = (numbers == 1) & (theirs.max(axis=-1) > 0) & (ours.max(axis=-1) > 0)
     apart = np.abs(ours - theirs)[here].max(axis=1) / theirs.max()
     told = here.sum(), *np.percentile(apart, (50, 90, 99, 100))
     packed = bpy.app.version >= (5, 1)  # normals as two numbers of 16 bits
-    assert here.sum() > 500 and told[1] < (1e-4 if packed else 1e-5) and told[3] < 2e-3, told
+    assert here.sum() > 300 and told[1] < (1e-4 if packed else 1e-5) and told[3] < 2e-3, told
+
+
+def test_a_pixel_seen_in_mirrors_is_as_wide_as_its_way_is_long(scene, shown, camera, add, make_material):
+    floor, mirror = make_material("Floor", DIFFUSE, Color=COLOUR), make_material("Mirror", GLOSSY, Roughness=0.0)
+    bump(floor, ("Normal",), Distance=0.3)
+    for name, material, corners in (
+        ("Floor", floor, [(-6, -6, 0), (6, -6, 0), (6, 6, 0), (-6, 6, 0)]),
+        ("Mirror", mirror, [(-3, 4, 0.1), (3, 4, 0.1), (3, 3, 4), (-3, 3, 4)]),
+    ):
+        mesh = bpy.data.meshes.new(name)
+        mesh.from_pydata(corners, [], [range(4)])
+        mesh.materials.append(material)
+        add(mesh, name, pass_index=1 if name == "Floor" else 2)
+    camera.location, camera.rotation_euler, camera.data.lens = (0.1, -3.0, 2.0), (1.5, 0.0, 0.0), 50.0
+    scene.cycles.max_bounces = scene.cycles.glossy_bounces = 2
+    ours, theirs, numbers = shown(48, "path")
+    here = (numbers == 2) & (theirs.max(axis=-1) > 0)
+    apart = np.abs(ours - theirs)[here].max(axis=1) / theirs.max()
+    told = here.sum(), *np.percentile(apart, (50, 99))
+    assert here.sum() > 200 and told[1] < 5e-6 and told[2] < 1e-4, told
 
 
 def test_light_that_the_smooth_surface_has_before_it_counts_where_the_true_one_has_it_behind(
@@ -273,3 +377,24 @@ def test_a_normal_that_is_a_little_wrong_is_found(patches, monkeypatch, wrong):
     monkeypatch.setattr(native, "_described_node", described)
     with pytest.raises(AssertionError, match="p50"):
         check(patches(cases), cases)
+
+
+WRONG = {"strength": 0.999, "distance": 0.2002, "filter_width": 1.01, "invert": True}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_bump_that_is_a_little_wrong_is_found(patches, monkeypatch, name):
+    """The tests above must be able to fail."""
+    from viewcam_addon.tracer import native
+
+    right = native._described_node
+
+    def described(node, *numbers):
+        if node.type == "bump":
+            node = native.Node(node.type, (*node.inputs, (name, True if name == "invert" else (WRONG[name],) * 3)))
+        return right(node, *numbers)
+
+    cases = [((DIFFUSE, {"Color": COLOUR}, {}, ("Normal",)), {})]
+    monkeypatch.setattr(native, "_described_node", described)
+    with pytest.raises(AssertionError, match="p50"):
+        check(patches(cases, bump), cases)

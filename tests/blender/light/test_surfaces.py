@@ -155,11 +155,12 @@ def noisy(material):
 def bumpy(material):
     tree = material.node_tree
     bump = tree.nodes.new("ShaderNodeBump")
-    tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs[0], bump.inputs["Height"])
+    bump.inputs["Distance"].default_value = 5.0
+    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Window"], bump.inputs["Height"])
     tree.links.new(bump.outputs[0], tree.nodes["Shader"].inputs["Normal"])
 
 
-STAND_INS = {toon: "not modelled", noisy: "not modelled", bumpy: "'Bump' that is not modelled"}
+STAND_INS = {toon: "not modelled", noisy: "not modelled", bumpy: "'Texture Coordinate' that makes a height"}
 
 
 @pytest.mark.parametrize("change", STAND_INS, ids=lambda change: change.__name__)

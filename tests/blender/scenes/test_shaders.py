@@ -113,6 +113,10 @@ VALUES = [
     node("voronoi", vector=node("geometry", output="parametric"), feature="smooth_f1", metric="chebychev", output="position"),
     node("math", a=node("blackbody", temperature=node("wavelength", wavelength=450.0)), operation="tanh"),
     node("layer_weight", normal=node("normal_map", color=CHECKS, strength=0.5, space="blender_object", uv="Second")),
+    node(
+        "layer_weight",
+        normal=node("bump", height=CHECKS, strength=0.5, distance=0.25, filter_width=1.0, invert=True, normal=NORMAL),
+    ),
     node("hue_saturation", color=node("gamma", color=node("bright_contrast", color=node("invert", color=CHECKS)), gamma=0.5)),
 ]
 

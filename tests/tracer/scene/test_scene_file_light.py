@@ -87,10 +87,15 @@ values = st.recursive(
     max_leaves=4,
 )
 nodes = st.builds(partial(node, "separate"), color=values)
+bumps = st.builds(partial(node, "bump"), height=nodes, distance=st.floats(-9, 9), invert=st.booleans(), normal=nodes)
 shaders = st.recursive(
     st.one_of(
         st.builds(
-            partial(node, "principled"), base_color=colours | nodes, roughness=amounts, coat_weight=colours, coat_normal=nodes
+            partial(node, "principled"),
+            base_color=colours | nodes,
+            roughness=amounts,
+            coat_weight=colours,
+            coat_normal=bumps,
         ),
         st.builds(partial(node, "glossy"), color=rgb, roughness=colours, distribution=st.sampled_from(DISTRIBUTIONS)),
         st.builds(partial(node, "emission"), color=colours, strength=amounts),

@@ -131,8 +131,11 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
             table, ends = reading.images[node["table"].image], (node["least"][0], node["most"][0])
             value_nodes.draw_curves(added.mapping, table, *ends, node["extrapolate"])
         for name, theirs in value.inputs.items():
-            if KINDS[node.type].inputs[name] not in (UV, GENERATED, NORMAL) or name in dict(node.inputs):
-                _colour(adder, value_nodes.input_of(added, theirs), node[name], reading)
+            socket = value_nodes.input_of(added, theirs)
+            if socket is None:
+                _want_as_before(added, theirs, node[name], value.before[name])
+            elif KINDS[node.type].inputs[name] not in (UV, GENERATED, NORMAL) or name in dict(node.inputs):
+                _colour(adder, socket, node[name], reading)
     word = dict(node.inputs).get("output", node["output"] if "output" in KINDS[node.type].inputs else None)
     found = [socket for socket in added.outputs if value.outputs.get(socket.identifier, "") == word]
     return next((socket for socket in found if socket.enabled), found[0])
@@ -143,6 +146,11 @@ def _choose(node: bpy.types.Node, name: str, word: str) -> None:
         setattr(node, name, word)
     except (AttributeError, TypeError) as error:  # vectors' powers came with 4.3, DirectX's green with 5.2
         raise InputError(f"this Blender has no {node.bl_label} that is {word}: open the scene in a newer one") from error
+
+
+def _want_as_before(node: bpy.types.Node, name: str, value: object, before: float) -> None:
+    if value != (before,) * 3:
+        raise InputError(f"this Blender has no {node.bl_label} with a {name} but {before:g}: open the scene in a newer one")
 
 
 def _colour(

@@ -42,6 +42,13 @@ _RAMP = 256  # Cycles looks ramps up in a table of one more
 _BESIDE = 1e-6  # of a pixel: where a step lies is the pixel's that it leads to
 # What Light Path says alike of rays that meet a light and of those that are sent to it.
 _SURE_OF_PATHS = ("Is Camera Ray", "Is Shadow Ray", "Ray Length")
+# What Cycles does not ask for a little beside a point, or in each version in another way.
+_FIXED = {
+    *("CAMERA", "NORMAL_MAP", "BUMP"),
+    *(("TEX_COORD", output) for output in ("Normal", "Reflection", "Window")),
+    *(("NEW_GEOMETRY", output) for output in ("Incoming", "Tangent")),
+    ("LIGHT_PATH", "Ray Length"),
+}
 _LUMINANCE = (0.2126390, 0.7151687, 0.0721923)
 
 
@@ -399,6 +406,7 @@ class _Tree(_Reader):
     def __init__(self, viewport: Colour, shines: bool) -> None:
         super().__init__(viewport)
         self._shines = shines
+        self._is_beside = False  # whether values are asked for a little beside, too, as heights are
 
     def surface(self, of: Input | None) -> Node | None:
         """The tracer's node, or None where there is no surface."""
@@ -436,6 +444,8 @@ class _Tree(_Reader):
         if isinstance(source, Output) and name == "coat_normal" and not versions.COATS_BEND_NORMALS:
             self._reason(output, "has a Coat Normal, which is modelled from 5.0 on")
             return {}
+        if isinstance(source, Output) and source.node.type == "BUMP" and _constant(source.input("Height")) is not None:
+            return self._normal(source, name, "Normal")
         made = self._value(source) if isinstance(source, Output) else None
         return {name: made} if isinstance(made, Node) else {}
 
@@ -470,6 +480,9 @@ class _Tree(_Reader):
     def _value(self, output: Output) -> Colour | Node | None:
         """The nodes that make a value; None where a reason says that it is not modelled."""
         node = output.node
+        if self._is_beside and {node.type, (node.type, output.socket.name)} & _FIXED:
+            self._reason(output, "makes a height of what it says here alone")
+            return None
         if node.type == "VERTEX_COLOR" and output.socket.name == "Color" and self._is_first(node.layer_name):
             return self._vertex(output)
         if node.type == "UVMAP" and self._is_uv(output):
@@ -510,7 +523,13 @@ class _Tree(_Reader):
             if KINDS[ours].inputs[name] is NORMAL:
                 given |= self._normal(output, name, theirs)
                 continue
-            read = self._value_input(Input(value_nodes.input_of(node, theirs), output.groups), KINDS[ours].inputs[name])
+            socket = value_nodes.input_of(node, theirs)
+            if socket is None:
+                given[name] = (value.before[name],) * 3
+                continue
+            is_beside, self._is_beside = self._is_beside, self._is_beside or name == "height"
+            read = self._value_input(Input(socket, output.groups), KINDS[ours].inputs[name])
+            self._is_beside = is_beside
             if read is None:
                 return None
             if KINDS[ours].inputs[name] not in (UV, GENERATED) or isinstance(read, Colour | Node):
@@ -539,6 +558,8 @@ class _Tree(_Reader):
             return "has a mapping of its own"
         if ours == "texture_coordinate" and node.from_instancer and output.socket.name in ("UV", "Generated"):
             return "has its instancer's coordinates"
+        if ours == "bump" and output.node.inputs.get("Filter Width") and constant_number(output, "Filter Width") is None:
+            return "has a Filter Width that varies"
         if ours == "light_path" and self._shines and output.socket.identifier not in _SURE_OF_PATHS:
             return f"says the {output.socket.name} of light"
         if ours == "attribute" and node.type == "VERTEX_COLOR" and not node.layer_name:

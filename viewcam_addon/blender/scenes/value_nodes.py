@@ -16,7 +16,7 @@ class Value:
 
     kind : its type; class_name : its class. inputs : ours → the identifier of theirs. words, flags, names, numbers : ours → the
     property. outputs : the identifier of theirs → our word for it, None where we have one output. fixed : property → what it
-    must be.
+    must be. before : of inputs that older versions lack, what these compute with.
     """
 
     kind: str
@@ -28,6 +28,7 @@ class Value:
     fixed: dict[str, str | bool] = field(default_factory=dict)
     names: dict[str, str] = field(default_factory=dict)
     numbers: dict[str, str] = field(default_factory=dict)
+    before: dict[str, float] = field(default_factory=dict)
 
 
 def _same(*names: str) -> dict[str, str]:
@@ -144,6 +145,17 @@ VALUES: tuple[tuple[str, Value], ...] = (
             {"Normal": None},
             {"space": "space", "convention": "convention"},
             names={"uv": "uv_map"},
+        ),
+    ),
+    (
+        "bump",
+        Value(
+            "BUMP",
+            "ShaderNodeBump",
+            _same("Height", "Strength", "Distance", "Filter Width", "Normal"),
+            {"Normal": None},
+            flags={"invert": "invert"},
+            before={"filter_width": 1.0},
         ),
     ),
     ("fresnel", Value("FRESNEL", "ShaderNodeFresnel", {"ior": "IOR", "normal": "Normal"}, {"Fac": None})),
@@ -493,5 +505,6 @@ def draw_curves(mapping: bpy.types.CurveMapping, table: bpy.types.Image, least: 
     mapping.update()
 
 
-def input_of(node: bpy.types.Node, identifier: str) -> bpy.types.NodeSocket:
-    return next(socket for socket in node.inputs if socket.identifier == identifier)
+def input_of(node: bpy.types.Node, identifier: str) -> bpy.types.NodeSocket | None:
+    """An input by its identifier, or None where this version has none."""
+    return next((socket for socket in node.inputs if socket.identifier == identifier), None)

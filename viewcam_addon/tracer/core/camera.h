@@ -21,6 +21,14 @@ struct Camera {
         Vec3 at = to_camera(point);
         return {(at.x / at.z * distance.x + principal_point.x) / width, (at.y / at.z * distance.y + principal_point.y) / height};
     }
+    // What each length of a ray in a direction adds to the width of its pixel: how far the unit directions of the next pixels, to the
+    // right and above, are from its own, as Cycles has it (kernel/camera/camera.h).
+    double spread(Vec3 direction) const {
+        Vec3 ahead{dot(direction, right), dot(direction, up), dot(direction, forward)};
+        ahead = ahead / ahead.z;
+        Vec3 here = normalize(ahead), beside = normalize(ahead + Vec3{1 / distance.x, 0, 0}), above = normalize(ahead + Vec3{0, 1 / distance.y, 0});
+        return (length(beside - here) + length(above - here)) / 2;
+    }
 
     // Through a place in the picture, in pixels from its lower left corner, as pinhole.py's view_plane has it.
     Ray ray(double column, double row) const {

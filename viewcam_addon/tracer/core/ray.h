@@ -18,13 +18,14 @@ enum RayKind : uint32_t { NO_RAY = 0, CAMERA = 1, DIFFUSE = 2, GLOSSY = 4, TRANS
 
 // What a material may ask of the ray that has come to it. kind: of its last scattering; diffuse, singular: what scattered it;
 // depth: scatterings so far; scattered: those that were diffuse, glossy and transmission; passed: surfaces that it has gone straight
-// through; length: how far it has come, of rays that are not from the eye.
+// through; length: how far it has come, width: how wide its pixel was where it started, and spread: what each length adds to that,
+// of rays that are not from the eye.
 struct RayState {
     RayKind kind = CAMERA;
     bool diffuse = false, singular = false;
     int depth = 0, passed = 0;
     std::array<uint16_t, 3> scattered = {};
-    double length = 0;
+    double length = 0, width = 0, spread = 0;
 };
 
 // A ray in rendering space (scene.h). direction: of any length; t counts in it. What is met must lie in t_min < t < t_max.

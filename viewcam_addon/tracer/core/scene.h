@@ -395,6 +395,36 @@ inline double ShadingPoint::ray_length() const {
     double ahead = in_camera().z;
     return length(point.position - scene->camera.eye) * (1 - (ahead > 0 ? scene->camera.t_min / ahead : 0));
 }
+inline double ShadingPoint::footprint() const {
+    if (ray.kind != CAMERA || !scene) return ray.width + ray.spread * ray.length;
+    Vec3 seen = point.position - scene->camera.eye;
+    return length(seen) * scene->camera.spread(seen);
+}
+inline double ShadingPoint::height_beside(const Color& height, Vec3 away) const {
+    Interaction beside = point;
+    beside.position = point.position + away;
+    auto mesh = scene && object ? std::get_if<TriangleMesh>(&scene->geometries[object->geometry]) : nullptr;
+    if (mesh) {
+        Vec3 corner[3];
+        scene->corners(point.object, point.primitive, corner);
+        Vec3 first = corner[1] - corner[0], second = corner[2] - corner[0], normal = exact_cross(first, second);
+        double squared = dot(normal, normal), b1 = 0, b2 = 0;
+        // Met from behind, what corners have is asked for on the other side, as in Cycles, whose ∂P/∂u points backwards there.
+        Vec3 moved = point.backside ? -away : away;
+        if (squared > 0) b1 = dot(cross(moved, second), normal) / squared, b2 = dot(cross(first, moved), normal) / squared;
+        beside.barycentric = {point.barycentric.x + b1, point.barycentric.y + b2};
+        if (mesh->corner_uvs) {
+            const float* uv = mesh->corner_uvs + 6 * size_t(point.primitive);
+            beside.uv.x += b1 * (double(uv[2]) - uv[0]) + b2 * (double(uv[4]) - uv[0]);
+            beside.uv.y += b1 * (double(uv[3]) - uv[1]) + b2 * (double(uv[5]) - uv[1]);
+        }
+        if (mesh->corner_colors) {
+            auto color = [&](int c) { return TriangleMesh::corner_value(mesh->corner_colors, point.primitive, c); };
+            beside.vertex_color += (color(1) - color(0)) * b1 + (color(2) - color(0)) * b2;
+        }
+    }
+    return ShadingPoint{beside, incoming, textures, version, nodes, object, origin, scene, ray}.number(height);
+}
 inline Vec3 ShadingPoint::in_window() const {
     if (!scene) return {};
     Vec2 place = scene->camera.window(point.position);
@@ -404,7 +434,9 @@ inline Vec3 ShadingPoint::generated() const {
     if (Values given = attribute("generated"); given.width == 3) return given.first;
     auto mesh = scene && object ? std::get_if<TriangleMesh>(&scene->geometries[object->geometry]) : nullptr;
     if (!mesh) return {};
-    Vec3 place = object->to_object(point.position - object->to_world.translation()) - mesh->bounds.low, size = mesh->bounds.high - mesh->bounds.low;
+    double b1 = point.barycentric.x, b2 = point.barycentric.y;
+    auto corner = [&](int c) { return mesh->corner(point.primitive, c); };
+    Vec3 place = corner(0) * (1 - b1 - b2) + corner(1) * b1 + corner(2) * b2 - mesh->bounds.low, size = mesh->bounds.high - mesh->bounds.low;
     auto along = [](double from, double size) { return size > 0 ? from / size : 0.5; };
     return {along(place.x, size.x), along(place.y, size.y), along(place.z, size.z)};
 }

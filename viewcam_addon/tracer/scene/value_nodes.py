@@ -96,6 +96,14 @@ KINDS: dict[str, Mapping[str, Default]] = {
         "uv": NAME,
         "convention": ("opengl", "directx"),
     },
+    "bump": {
+        "height": 1.0,
+        "strength": 1.0,
+        "distance": 0.001,
+        "filter_width": 0.1,
+        "normal": NORMAL,
+        "invert": False,
+    },
     "math": {"operation": tuple(MATH.split()), "a": 0.5, "b": 0.5, "c": 0.5, "clamp": False},
     "vector_math": {"operation": tuple(VECTOR_MATH.split()), "a": BLACK, "b": BLACK, "c": BLACK, "scale": 1.0},
     "map_range": {

@@ -90,6 +90,10 @@ struct ShadingPoint {
     Vec3 from_camera(Vec3 direction) const;
     // How long the ray is that has come along: from where it left a surface, or from the camera's clip start.
     double ray_length() const;
+    // How wide the pixel is here that the path belongs to, world units.
+    double footprint() const;
+    // What a number would be a little beside, in the surface's own plane. away: in rendering space. Defined in scene.h.
+    double height_beside(const Color& height, Vec3 away) const;
 
    private:
     Vec3 value_of_node(uint32_t node) const;

@@ -66,6 +66,7 @@ class PathIntegrator {
             meets_[kind] = shines || lights_.environment().lights(kind) || lights_.meets_lamps(kind);
             only_sky_[kind] = !shines && !transparent_ && !lights_.meets_lamps(kind) && !scene.hides_anything();
         }
+        for (const ValueNode& node : scene.illumination.nodes.all) has_pixels_ |= std::holds_alternative<BumpNode>(node);
         lit_ = !scene.illumination.lamps.empty() || shines || !is_black(lights_.environment().radiance);
     }
 
@@ -108,6 +109,7 @@ class PathIntegrator {
         bool last = false, through = false;  // through: whether light from behind counts where it leaves
         bool diffuse = false;                // what its ray was scattered by
         int passed = 0;                      // surfaces that it has gone straight through
+        double width = 0, spread = 0;        // of its pixel, as RayState has it, where materials ask for that
         std::array<uint16_t, 3> scattered = {};  // diffuse, glossy, transmission
         Vec3 weight{1, 1, 1};
         Ray ray;
@@ -142,7 +144,7 @@ class PathIntegrator {
     // Where a path has come to along its ray. depth: scatterings before.
     ShadingPoint shading(const Interaction& point, const Path& path, Vec3 incoming, int depth) const {
         bool singular = path.kind != CAMERA && path.pdf == INFINITE;
-        return scene_.shading(point, incoming, {path.kind, path.diffuse, singular, depth, path.passed, path.scattered, point.t});
+        return scene_.shading(point, incoming, {path.kind, path.diffuse, singular, depth, path.passed, path.scattered, point.t, path.width, path.spread});
     }
 
     bool has_ended(const Path& path) const { return path.passed > 0 && path.passed >= ended_after_; }
@@ -264,7 +266,8 @@ class PathIntegrator {
         for (int i = 0; i < block.live; i++) {
             const Path& path = block.paths[i];
             const Interaction& point = block.points[path.from];
-            BSDF bsdf = material(point).bsdf(shading(point, path, path.ray.direction, depth - 1));
+            ShadingPoint at = shading(point, path, path.ray.direction, depth - 1);
+            BSDF bsdf = material(point).bsdf(at);
             if (bsdf.is_black()) continue;
             const CameraSample& sample = samples[path.sample];
             uint32_t key = sampler_.key(sample.pixel);
@@ -281,7 +284,7 @@ class PathIntegrator {
                 double u = lights_.is_random() ? number(SobolSampler::LIGHT) : 0;
                 int chosen = lights_.choose(point, u, depth == 1, through, choices, brightest);
                 Vec2 u_light = chosen && lights_.is_random() ? pair(SobolSampler::LIGHT_POINT) : Vec2{};
-                for (int k = 0; k < chosen; k++) ask(choices[k], point, u_light, path, depth, bsdf, block);
+                for (int k = 0; k < chosen; k++) ask(choices[k], at, u_light, path, depth, bsdf, block);
             }
 
             bool total_used = depth >= most_;
@@ -316,6 +319,7 @@ class PathIntegrator {
                 next.weight = next.weight / survival;
             }
             next.pdf = sampled.pdf;
+            if (has_pixels_) next.width = at.footprint(), next.spread = path.kind == CAMERA ? scene_.camera.spread(path.ray.direction) : path.spread;
             next.ray = {point.ray_origin(sampled.direction), sampled.direction, 0, INFINITE};
             onwards++;
         }
@@ -323,8 +327,9 @@ class PathIntegrator {
     }
 
     // Notes what a light brings to a point if nothing hides it.
-    void ask(const LightSampler::Choice& choice, const Interaction& point, Vec2 u, const Path& path, int depth, const BSDF& bsdf,
+    void ask(const LightSampler::Choice& choice, const ShadingPoint& at, Vec2 u, const Path& path, int depth, const BSDF& bsdf,
              Block& block) const {
+        const Interaction& point = at.point;
         LightSample sample = choice.light->sample_li(point, choice.rest, u);
         // Light that the smooth surface has before it and the true one behind it counts, less what scattered rays would have found:
         // these are lost, as in Cycles.
@@ -341,6 +346,7 @@ class PathIntegrator {
         bool traced = choice.light->casts_shadow;
         block.shadowed[choice.slot][place] = {path.sample, after(path.category, true, depth), traced, {SHADOW, false, false, depth, path.passed, path.scattered},
                                               light.diffuse * path.weight / choice.chance, light.other * path.weight / choice.chance};
+        if (has_pixels_) block.shadowed[choice.slot][place].ray.width = at.footprint();
         if (traced) block.shadow_rays[choice.slot][place] = shadow_ray(point, sample);
     }
 
@@ -408,6 +414,7 @@ class PathIntegrator {
     int most_, most_of_[TRANSMISSION + 1] = {};
     bool meets_[TRANSMISSION + 1] = {}, only_sky_[TRANSMISSION + 1] = {};
     bool lit_, transparent_ = false, mixed_ = false;  // whether materials let anything straight through, and beside that scatter
+    bool has_pixels_ = false;                         // whether materials ask how wide pixels are
     int most_passed_, ended_after_;                   // surfaces that shadow rays, and paths, go straight through
     uint32_t kinds_ = 0, spread_ = 0;  // of rays that any material scatters, and all over
 };

@@ -6,6 +6,7 @@
 #pragma once
 #include <variant>
 
+#include "bump.h"
 #include "color.h"
 #include "curves.h"
 #include "geometry.h"
@@ -27,7 +28,7 @@ struct ConstantNode {
 
 // One line a node. Each has a NAME, by which a scene asks for it, what it GIVES, by which it becomes a number, and `eval`; VARIES
 // where it depends on more than its inputs; `gives` where the node itself knows what it gives.
-using ValueNode = std::variant<ConstantNode, ImageNode, TextureCoordinateNode, AttributeNode, MappingNode, VectorRotateNode, VectorTransformNode, GeometryNode, NormalMapNode,
+using ValueNode = std::variant<ConstantNode, ImageNode, TextureCoordinateNode, AttributeNode, MappingNode, VectorRotateNode, VectorTransformNode, GeometryNode, NormalMapNode, BumpNode,
                                ObjectInfoNode, LightPathNode, FresnelNode, LayerWeightNode, MathNode, VectorMathNode, MapRangeNode, MapRangeVectorNode, ClampNode,
                                SeparateNode, CombineXYZNode, SeparateColorNode, CombineColorNode, MixColorNode, MixNumberNode, MixVectorNode, MixComponentsNode,
                                RGBCurvesNode, VectorCurvesNode, FloatCurveNode, BlackbodyNode, WavelengthNode, GammaNode,
