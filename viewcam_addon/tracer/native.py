@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from .scene import Mesh, Object, Scene, Spheres, placing
 from .scene.colours import WHITE
-from .scene.lamps import RAYS, Area, Lamp, Point, Spot, Sun
+from .scene.lamps import RAYS, Area, Lamp, Point, Spot, Sun, World
 from .scene.materials import PLAIN, Colour, Material
 from .scene.sameness import same_things
 from .scene.shader_nodes import KINDS, Closure, Node
@@ -119,12 +119,16 @@ class _Lamp(Structure):
     ]
 
 
+class _World(Structure):
+    _fields_ = [("radiance", c_double * 3), ("image", c_int32), ("closest", c_int32), ("to_image", c_double * 12)]
+
+
 class _Film(Structure):
     _fields_ = [
-        ("radiance", c_double * 3),
+        ("world", _World),
+        ("backdrop", _World),
         ("hidden_from", c_uint32),
-        *((name, c_int32) for name in ("transparent", "version", "image", "closest")),
-        ("to_image", c_double * 12),
+        *((name, c_int32) for name in ("transparent", "version", "has_backdrop")),
         ("filter_width", c_double),
         ("exposure", c_double),
     ]
@@ -351,13 +355,13 @@ class CoreScene:
         film, world = scene.film, scene.world
         described = _Film(hidden_from=kinds(world.hidden_from), transparent=film.transparent, exposure=film.exposure)
         described.version = 100 * scene.cycles[0] + scene.cycles[1]
-        described.radiance[:] = world.radiance
         described.filter_width = 0.0 if film.filter == "BOX" else film.filter_width
-        if world.image is not None and world.image not in images:
-            images[world.image] = len(images)
-            self._add_texture(scene, world.image)
-        described.image, described.closest = images.get(world.image, -1), world.closest
-        described.to_image[:] = tuple(np.column_stack([placing.rotated(world.rotation), np.zeros(3)]).ravel())
+        for image in world.images:
+            if image not in images:
+                images[image] = len(images)
+                self._add_texture(scene, image)
+        described.world, described.has_backdrop = _described_world(world, images), world.backdrop is not None
+        described.backdrop = _described_world(world.backdrop or world, images)
         self.check(self.core.set_film(self.handle, described))
         self._light = scene
 
@@ -502,6 +506,13 @@ def sobol(seed: int, samples: int, pixels: NDArray, numbers: NDArray, first: int
 def kinds(names: frozenset[str]) -> int:
     """Kinds of rays as the core's bits."""
     return sum(_KINDS[name] for name in names)
+
+
+def _described_world(world: World, images: Mapping[str, int]) -> _World:
+    described = _World(image=-1 if world.image is None else images[world.image], closest=world.closest)
+    described.radiance[:] = world.radiance
+    described.to_image[:] = tuple(np.column_stack([placing.rotated(world.rotation), np.zeros(3)]).ravel())
+    return described
 
 
 def described_lamp(lamp: Lamp) -> _Lamp:

@@ -3,10 +3,14 @@
 The pictures are small and of few samples: what is random averages out over their pixels, and what is wrong does not.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 bpy = pytest.importorskip("bpy")
+
+from viewcam_addon.tracer import render
 
 # Cycles' pictures of a scene, for their spread tells Cycles' noise, and the samples of each.
 SCENES, COUNT, SAMPLES = 4, 2, 16
@@ -137,6 +141,29 @@ def test_an_image_around_the_world(take, make_material, set_world, kind):
         world.node_tree.links.new(texture.outputs[0], background.inputs["Color"])
 
     check(take(arrange=wrap))
+
+
+def look_into_another_world(world):
+    tree = world.node_tree
+    background = next(node for node in tree.nodes if node.type == "BACKGROUND")
+    other, mix, path = (tree.nodes.new(f"ShaderNode{name}") for name in ("Background", "MixShader", "LightPath"))
+    other.inputs["Color"].default_value, other.inputs["Strength"].default_value = (1.0, 0.2, 0.1, 1.0), 3.0
+    for number, socket in enumerate((path.outputs["Is Camera Ray"], background.outputs[0], other.outputs[0])):
+        tree.links.new(socket, mix.inputs[number])
+    output = next(node for node in tree.nodes if node.type == "OUTPUT_WORLD")
+    tree.links.new(mix.outputs[0], output.inputs["Surface"])
+
+
+def test_the_camera_may_see_another_world_than_what_lights(take, make_material):
+    """Through what is transparent, too, but not in mirrors nor through glass."""
+    replace_monkey(make_material, "ShaderNodeBsdfGlass", Roughness=0.0)
+    bpy.data.objects["Floor"].data.materials[0] = make_material("Veil", "ShaderNodeBsdfTransparent", Color=(0.5, 0.8, 0.5, 1))
+    sides = take(arrange=lambda _: look_into_another_world(bpy.context.scene.world))
+    check(sides)
+    assert deviation(sides, "Environment")[1] == pytest.approx(0.0, abs=0.01)
+    worlds = [replace(each.exported, world=replace(each.exported.world, backdrop=None)) for each in sides]
+    wrong = [replace(each, traced=render.render(world, "path", 4)) for each, world in zip(sides, worlds, strict=True)]
+    assert abs(deviation(wrong, "Environment")[1]) > 0.1
 
 
 @pytest.mark.parametrize("ray", ["diffuse", "glossy", "transmission", "shadow"])

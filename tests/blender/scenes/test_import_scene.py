@@ -323,7 +323,11 @@ def scenes(draw):
         materials=materials,
         images=images,
         lamps=tuple(lamps),
-        world=World(draw(colours()).rgb, frozenset(draw(st.sets(st.sampled_from(RAYS))))),
+        world=World(
+            draw(colours()).rgb,
+            frozenset(draw(st.sets(st.sampled_from(RAYS)))),
+            backdrop=draw(st.none() | st.just(World((0.25, 0.5, 3.0)))),
+        ),
         film=Film(draw(st.sampled_from(["BOX", "BLACKMAN_HARRIS"])), draw(st.floats(0.01, 10)), draw(st.booleans()), 2.0),
         bounces=Bounces(*draw(st.tuples(*[st.integers(0, 1024)] * 4))),
     )

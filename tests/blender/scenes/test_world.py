@@ -95,6 +95,55 @@ def test_a_mapping_turns_the_image(sky, export):
     assert exported.world == World((2.0, 2.0, 2.0), image="Sky", closest=True, rotation=(0.25, 0.5, 1.0)) and not told
 
 
+def ask_for_camera(tree, kind, name, *sides):
+    """A mixture that is its last side to the camera. sides : sockets or values."""
+    mix = tree.nodes.new(kind)
+    if kind == "ShaderNodeMix":
+        mix.data_type = "RGBA" if "Color" in name else "FLOAT"
+    tree.links.new(tree.nodes.new("ShaderNodeLightPath").outputs["Is Camera Ray"], mix.inputs[0])
+    inputs = [socket for socket in mix.inputs if socket.enabled][-2:]
+    for socket, side in zip(inputs, sides, strict=True):
+        if isinstance(side, bpy.types.NodeSocket):
+            tree.links.new(side, socket)
+        else:
+            socket.default_value = side
+    return next(socket for socket in mix.outputs if socket.enabled)
+
+
+def test_what_the_camera_sees_may_be_another_world_than_what_lights(sky, export):
+    world, _, _ = sky
+    tree, background = world.node_tree, background_of(world)
+    other = tree.nodes.new("ShaderNodeBackground")
+    other.inputs["Color"].default_value = (1.0, 0.5, 0.25, 1.0)
+    output = next(node for node in tree.nodes if node.type == "OUTPUT_WORLD")
+    shown = ask_for_camera(tree, "ShaderNodeMixShader", "Shader", background.outputs[0], other.outputs[0])
+    tree.links.new(shown, output.inputs["Surface"])
+    exported, told = export()
+    assert exported.world == World((2.0, 2.0, 2.0), image="Sky", backdrop=World((1.0, 0.5, 0.25))) and not told
+
+
+@pytest.mark.parametrize("kind", ["ShaderNodeMix", "ShaderNodeMixRGB"])
+def test_so_may_its_colour_and_its_strength(set_world, export, kind):
+    world = set_world()
+    tree, background = world.node_tree, background_of(world)
+    color = ask_for_camera(tree, kind, "Color", (1.0, 0.5, 0.25, 1.0), (0.0, 0.0, 1.0, 1.0))
+    tree.links.new(color, background.inputs["Color"])
+    if kind == "ShaderNodeMix":
+        tree.links.new(ask_for_camera(tree, kind, "Strength", 4.0, 2.0), background.inputs["Strength"])
+    exported, told = export()
+    lit, seen = (4.0, 2.0) if kind == "ShaderNodeMix" else (1.0, 1.0)
+    assert exported.world == World((lit, lit / 2, lit / 4), backdrop=World((0.0, 0.0, seen))) and not told
+
+
+def test_a_mixture_that_is_both_sides_to_the_camera_is_named(set_world, export):
+    world = set_world()
+    tree = world.node_tree
+    color = ask_for_camera(tree, "ShaderNodeMixRGB", "Color", (1.0, 0.5, 0.25, 1.0), (0.0, 0.0, 1.0, 1.0))
+    color.node.blend_type = "ADD"
+    tree.links.new(color, background_of(world).inputs["Color"])
+    assert "varies" in export()[1]["World"]
+
+
 @pytest.mark.parametrize("change", ["mirror ball", "cubic", "scale", "another coordinate"])
 def test_an_image_that_is_used_otherwise_is_its_mean_over_the_sphere(sky, export, change):
     _, texture, feed = sky

@@ -32,6 +32,7 @@ EYE = np.eye(4)
         (lambda: Area("key", matrix=EYE, size=(1, 2, 3)), "size of light 'key'"),
         (lambda: World((1, 2)), "radiance of the world"),
         (lambda: World((1, 2, 3), hidden_from={"eye"}), "the world"),
+        (lambda: World(backdrop=World(hidden_from={"camera"})), "backdrop of the world"),
     ],
 )
 def test_a_lamp_that_cannot_be_is_refused_by_name(make, culprit):

@@ -50,6 +50,7 @@ def test_without_light_there_is_only_geometry(scene, changes):
         ({"lamps": (Area("Panel", matrix=np.eye(4)),)}, "the lamp 'Panel'"),
         ({"material": Material(emission=WHITE, diffuse=WHITE)}, "the surface of 'object 1'"),
         ({"world": World((0.0, 0.5, 0.0))}, "the world"),
+        ({"world": World(backdrop=World((0.0, 0.5, 0.0)))}, "the world"),
     ],
 )
 def test_light_on_a_surface_that_reflects_needs_paths(scene, changes, words):

@@ -149,7 +149,15 @@ def test_light_that_is_written_is_read_back_to_the_last_bit(make_scene, make_mes
         materials=chosen,
         lamps=tuple(data.draw(st.lists(lamps, max_size=3))),
         world=data.draw(
-            st.builds(World, rgb, rays, st.sampled_from([None, "small"]), st.booleans(), st.tuples(*[st.floats(-9, 9)] * 3))
+            st.builds(
+                World,
+                rgb,
+                rays,
+                st.sampled_from([None, "small"]),
+                st.booleans(),
+                st.tuples(*[st.floats(-9, 9)] * 3),
+                st.none() | st.builds(World, rgb, image=st.sampled_from([None, "large"]), closest=st.booleans()),
+            )
         ),
         film=data.draw(films),
         bounces=data.draw(bounces),
@@ -300,6 +308,8 @@ def test_every_key_of_light_is_documented():
         (["lamps", 2, "casts_shadow"], "no", ["'casts_shadow' of lamp 'panel'", "true or false"]),
         (["world"], [1, 1, 1], ["'world'", "object"]),
         (["world", "radiance"], [1, 1, -1], ["'world'", "radiance"]),
+        (["world", "backdrop"], {"radiance": [1, -1, 1]}, ["'backdrop' of 'world'", "radiance"]),
+        (["world", "backdrop"], {"backdrop": {}}, ["'backdrop' of 'world'", "unknown key 'backdrop'"]),
         (["film", "filter"], "GAUSSIAN", ["'film'", "GAUSSIAN", "BLACKMAN_HARRIS"]),
         (["film", "filter_width"], 0, ["'film'", "filter_width"]),
         (["film", "transparent"], 1, ["'transparent' of 'film'", "true or false"]),

@@ -173,13 +173,19 @@ def set_surroundings(scene: bpy.types.Scene, made: Scene, name: str, overrides: 
     world.node_tree.nodes.clear()
     adder = nodes.Adder(world.node_tree)
     output = adder.add("ShaderNodeOutputWorld")
-    background = adder.add("ShaderNodeBackground", Color=(*made.world.radiance, 1.0), Strength=1.0)
-    if made.world.image is not None:
-        background.inputs["Color"].default_value, background.inputs["Strength"].default_value = (1.0, 1.0, 1.0, 1.0), 1.0
-        add_environment(
-            adder, background, made.world, image_from(made.images[made.world.image], made.world.image, overrides, ledger)
-        )
-    adder.link(background.outputs[0], output.inputs["Surface"])
+    backgrounds = []
+    for each in filter(None, (made.world, made.world.backdrop)):
+        background = adder.add("ShaderNodeBackground", Color=(*each.radiance, 1.0), Strength=1.0)
+        if each.image is not None:
+            background.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+            add_environment(adder, background, each, image_from(made.images[each.image], each.image, overrides, ledger))
+        backgrounds.append(background.outputs[0])
+    shown = backgrounds[0]
+    if made.world.backdrop:
+        shown = adder.add(
+            "ShaderNodeMixShader", adder.add("ShaderNodeLightPath").outputs["Is Camera Ray"], *backgrounds
+        ).outputs[0]
+    adder.link(shown, output.inputs["Surface"])
     _arrange(output, 0, {})
     overrides.set(scene, "world", world)
     overrides.set(scene.render, "film_transparent", made.film.transparent)

@@ -688,7 +688,12 @@ def constant_number_of(of: Input) -> float | None:
 def constant_colour(output: Output, name: str | int) -> RGB | None:
     """The same for a colour."""
     of = output.input(name)
-    value = of and _constant(of)
+    return of and constant_colour_of(of)
+
+
+def constant_colour_of(of: Input) -> RGB | None:
+    """The same of an input."""
+    value = _constant(of)
     return None if value is None else _rgb(value)
 
 

@@ -1,5 +1,6 @@
 """Blender's world as the tracer's: one colour, an equirectangular image, or the mean of what is not modelled and why."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import bpy
@@ -8,7 +9,7 @@ from ...tracer.scene.lamps import World
 from ...tracer.scene.materials import Picture
 from .. import versions
 from ..temporary_settings import Overrides
-from . import images, nodes, shaders
+from . import images, nodes, shaders, value_nodes
 from .ledger import Ledger
 from .nodes import Input, Output
 from .shaders import RGB
@@ -25,7 +26,9 @@ def world_of(world: bpy.types.World | None, ledger: Ledger, pictures: dict[str, 
     """The tracer's world. What it approximates, Cycles is shown likewise. pictures : receives its image."""
     if world is None:
         return World()
-    radiance, wrapped, reasons = _read(world)
+    radiance, wrapped, reasons = _read(world, camera=False)
+    backdrop, wrapped_there, reasons_there = _read(world, camera=True)
+    reasons += [reason for reason in reasons_there if reason not in reasons]
     missing = images.missing(versions.node_tree(world))
     for each in missing:
         ledger.note(world.name, "exported", f"the world {each}")
@@ -43,11 +46,18 @@ def world_of(world: bpy.types.World | None, ledger: Ledger, pictures: dict[str, 
         if hasattr(owner, name):  # versions know fewer of them
             ledger.set_for_cycles(owner, name, value)
     hidden_from = frozenset(ray for ray in _RAYS if not getattr(world.cycles_visibility, ray))
-    if wrapped is None:
+    if reasons:
         return World(radiance, hidden_from)
+    seen = None if (radiance, wrapped) == (backdrop, wrapped_there) else _made(backdrop, wrapped_there, pictures)
+    return replace(_made(radiance, wrapped, pictures), hidden_from=hidden_from, backdrop=seen)
+
+
+def _made(radiance: RGB, wrapped: "_Wrapped | None", pictures: dict[str, Picture] | None) -> World:
+    if wrapped is None:
+        return World(radiance)
     if pictures is not None and wrapped.image.name_full not in pictures:
         pictures[wrapped.image.name_full] = images.picture_of(wrapped.image)
-    return World(radiance, hidden_from, wrapped.image.name_full, wrapped.closest, wrapped.rotation)
+    return World(radiance, image=wrapped.image.name_full, closest=wrapped.closest, rotation=wrapped.rotation)
 
 
 class _Wrapped(NamedTuple):
@@ -64,8 +74,35 @@ def _make_constant(overrides: Overrides, world: bpy.types.World, radiance: RGB) 
     adder.link(background.outputs[0], output.inputs["Surface"])
 
 
-def _read(world: bpy.types.World) -> tuple[RGB, _Wrapped | None, list[str]]:
-    """The radiance, the image that it is multiplied by, and why it is only a mean."""
+# A node that mixes, and what of it must be so → its factor and both sides.
+_MIXES = (
+    ("MIX_SHADER", {}, ("Fac", "Shader", "Shader_001")),
+    ("MIX_RGB", {"blend_type": "MIX", "use_clamp": False}, ("Fac", "Color1", "Color2")),
+    ("MIX", {"data_type": "RGBA", "blend_type": "MIX", "clamp_result": False}, ("Factor_Float", "A_Color", "B_Color")),
+    ("MIX", {"data_type": "FLOAT"}, ("Factor_Float", "A_Float", "B_Float")),
+)
+
+
+def _unmixed(of: Input, camera: bool) -> Input:
+    """An input or, where a mixture feeds it that is but one side of it to the camera, or to other rays, that side."""
+    source = nodes.source(of)
+    if not isinstance(source, Output):
+        return of
+    for kind, wanted, names in _MIXES:
+        if source.node.type != kind or any(getattr(source.node, name) != value for name, value in wanted.items()):
+            continue
+        factor, *sides = (Input(value_nodes.input_of(source.node, name), source.groups) for name in names)
+        asked = nodes.source(factor)
+        share = shaders.constant_number_of(factor)
+        if isinstance(asked, Output) and (asked.node.type, asked.socket.name) == ("LIGHT_PATH", "Is Camera Ray"):
+            share = float(camera)
+        if share in (0.0, 1.0):
+            return _unmixed(sides[share == 1.0], camera)
+    return of
+
+
+def _read(world: bpy.types.World, camera: bool) -> tuple[RGB, _Wrapped | None, list[str]]:
+    """The radiance, the image that it is multiplied by, and why it is only a mean. camera : to the camera, or to other rays."""
     tree = versions.node_tree(world)
     if tree is None:
         return tuple(world.color), None, []
@@ -73,18 +110,19 @@ def _read(world: bpy.types.World) -> tuple[RGB, _Wrapped | None, list[str]]:
     if output is None:
         return (0.0, 0.0, 0.0), None, []
     reasons = ["has a volume"] if output.inputs["Volume"].is_linked else []
-    surface = nodes.source(Input(output.inputs["Surface"]))
+    surface = nodes.source(_unmixed(Input(output.inputs["Surface"]), camera))
     if not isinstance(surface, Output):
         return (0.0, 0.0, 0.0), None, reasons
     if surface.node.type not in ("BACKGROUND", "EMISSION"):
         return tuple(world.color), None, [*reasons, f"has a node {surface.node.name!r} that is not modelled"]
-    rgb = shaders.constant_colour(surface, "Color")
-    strength = shaders.constant_number(surface, "Strength")
+    color = _unmixed(surface.input("Color"), camera)
+    rgb = shaders.constant_colour_of(color)
+    strength = shaders.constant_number_of(_unmixed(surface.input("Strength"), camera))
     wrapped = None
     if rgb is None:
-        source, factor = _factored(nodes.source(surface.input("Color")))
+        source, factor = _factored(nodes.source(color))
         wrapped = _wrapped(source)
-        rgb, reason = (factor, None) if wrapped else _mean(surface, world)
+        rgb, reason = (factor, None) if wrapped else _mean(nodes.source(color), world)
         reasons += [reason] if reason else []
     if strength is None:
         strength = 1.0
@@ -143,9 +181,8 @@ def _rotation(vector: Output | Input) -> tuple[float, float, float] | None:
     return given[-2]
 
 
-def _mean(surface: Output, world: bpy.types.World) -> tuple[RGB, str]:
+def _mean(source: Output, world: bpy.types.World) -> tuple[RGB, str]:
     """What stands in for a colour that varies, and what varies."""
-    source = nodes.source(surface.input("Color"))
     reason = f"has a node {source.node.name!r} that varies"
     if source.node.type == "TEX_ENVIRONMENT" and images.obstacle(source.node.image) is None:
         return images.mean(source.node.image), reason

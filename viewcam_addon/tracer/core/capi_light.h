@@ -40,12 +40,18 @@ typedef struct {
     double matrix[12], color[3], radius, angle, blend, size[2];
 } ViewcamLamp;
 
-/* image: of the world, a number of viewcam_add_texture, or −1; to_image: (3, 4), directions of the world to its. filter_width: 0 is a box. version: of Blender, 100 times the first number and the second, whose materials are meant. */
+/* image: a number of viewcam_add_texture, or −1; to_image: (3, 4), directions of the world to its. */
 typedef struct {
     double radiance[3];
-    uint32_t hidden_from;
-    int32_t transparent, version, image, closest;
+    int32_t image, closest;
     double to_image[12];
+} ViewcamWorld;
+
+/* backdrop: what the camera sees instead of the world, where it has one. filter_width: 0 is a box. version: of Blender, 100 times the first number and the second, whose materials are meant. */
+typedef struct {
+    ViewcamWorld world, backdrop;
+    uint32_t hidden_from;
+    int32_t transparent, version, has_backdrop;
     double filter_width, exposure;
 } ViewcamFilm;
 

@@ -88,9 +88,11 @@ inline void lamp(const ViewcamLamp& given) {
     for (double value : {given.radius, given.angle, given.blend}) that(value >= 0 && value <= LARGEST, "a lamp has a size that is no number");
 }
 inline void film(const ViewcamFilm& given) {
-    that(all_finite(given.radiance, 3), "the world's light is no number");
+    for (const ViewcamWorld& world : {given.world, given.backdrop}) {
+        that(all_finite(world.radiance, 3), "the world's light is no number");
+        that(all_finite(world.to_image, 12), "the world is turned by what is no number");
+    }
     that(given.filter_width >= 0 && given.filter_width <= LARGEST && std::isfinite(given.exposure), "the film's numbers are none");
-    that(all_finite(given.to_image, 12), "the world is turned by what is no number");
 }
 inline void light(const Scene& scene, const ViewcamLightSettings& given) {
     for (const Scene::Slot& slot : scene.slots)

@@ -1,5 +1,6 @@
 // All of a scene that gives or scatters light, as it was described: images, materials, lights, the world and the film.
 #pragma once
+#include <optional>
 #include <vector>
 
 #include "film/film.h"
@@ -33,6 +34,7 @@ struct Illumination {
     std::vector<Material> materials;
     std::vector<Lamp> lamps;
     Environment environment;
+    std::optional<Environment> backdrop;  // what the camera sees instead
     FilmSettings film;
     double filter_width = 0;  // of BLACKMAN_HARRIS, 0 is BOX
     Bounces bounces;

@@ -52,15 +52,20 @@ inline Lamp lamp_of(const ViewcamLamp& given) {
 }
 inline void add_lamp(Scene& scene, const ViewcamLamp& given) { scene.illumination.lamps.push_back(lamp_of(given)); }
 
-inline void set_film(Scene& scene, const ViewcamFilm& given) {
-    Illumination& light = scene.illumination;
-    Environment& world = light.environment;
-    world = {};
-    world.radiance = {given.radiance[0], given.radiance[1], given.radiance[2]}, world.hidden_from = given.hidden_from;
+inline Environment environment_of(const ViewcamWorld& given, uint32_t hidden_from, const std::vector<Texture>& textures) {
+    Environment world;
+    world.radiance = {given.radiance[0], given.radiance[1], given.radiance[2]}, world.hidden_from = hidden_from;
     world.image = given.image < 0 ? NONE : uint32_t(given.image), world.closest = given.closest;
     for (int i = 0; i < 12; i++) world.to_image.m[i / 4][i % 4] = given.to_image[i];
-    if (world.image != NONE && world.image >= light.textures.size()) throw std::invalid_argument("the world has an image that the scene does not have");
-    world.prepare(light.textures);
+    if (world.image != NONE && world.image >= textures.size()) throw std::invalid_argument("the world has an image that the scene does not have");
+    world.prepare(textures);
+    return world;
+}
+inline void set_film(Scene& scene, const ViewcamFilm& given) {
+    Illumination& light = scene.illumination;
+    light.environment = environment_of(given.world, given.hidden_from, light.textures);
+    light.backdrop.reset();
+    if (given.has_backdrop) light.backdrop = environment_of(given.backdrop, given.hidden_from, light.textures);
     light.film = {bool(given.transparent), given.exposure};
     light.filter_width = given.filter_width, light.version = given.version;
     scene.make_tangents();

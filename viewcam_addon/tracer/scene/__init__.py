@@ -197,8 +197,9 @@ class Scene:
                     raise InputError(
                         f"object {shown(placed.name)} names the material {shown(name)}, which the scene does not have"
                     )
-        if self.world.image is not None and self.world.image not in self.images:
-            raise InputError(f"the world names the image {shown(self.world.image)}, which the scene does not have")
+        for image in self.world.images:
+            if image not in self.images:
+                raise InputError(f"the world names the image {shown(image)}, which the scene does not have")
         for name, material in self.materials.items():
             for component, colour in material.inputs:
                 if colour.image is not None and colour.image not in self.images:

@@ -195,7 +195,8 @@ class World:
     image : key in `Scene.images` of what the radiance is multiplied by, equirectangular: its rows go from straight down to
     straight up, its middle shows what lies along x, and its left half what lies along y; or None. closest : the nearest pixel
     instead of a linear interpolation between four. rotation : of directions before they are looked up there, radians about x,
-    then y, then z, as in Blender's Mapping node.
+    then y, then z, as in Blender's Mapping node. backdrop : what the camera sees instead, hidden as this one
+    is, or None.
     """
 
     radiance: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -203,11 +204,24 @@ class World:
     image: str | None = None
     closest: bool = False
     rotation: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    backdrop: "World | None" = None
 
     def __post_init__(self) -> None:
+        if self.backdrop and (self.backdrop.backdrop or self.backdrop.hidden_from):
+            raise InputError("the backdrop of the world has a backdrop or is hidden: leave both to the world")
         object.__setattr__(self, "radiance", radiance("radiance of the world", self.radiance))
         object.__setattr__(self, "hidden_from", hidden_from("the world", self.hidden_from))
         object.__setattr__(self, "rotation", checks.vector("rotation of the world", self.rotation, 3))
+
+    @property
+    def images(self) -> tuple[str, ...]:
+        """Its image, and that of its backdrop, where they have one."""
+        return tuple(each.image for each in (self, self.backdrop) if each and each.image is not None)
+
+    @property
+    def is_black(self) -> bool:
+        """Whether neither it nor its backdrop shows anything."""
+        return not any(self.radiance) and (self.backdrop is None or self.backdrop.is_black)
 
 
 def hidden_from(name: str, rays: Collection[str]) -> frozenset[str]:

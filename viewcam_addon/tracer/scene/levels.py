@@ -48,7 +48,7 @@ def _light(lamps: Sequence[Lamp], world: World, shown: Sequence[tuple[str, Mater
     for name, material in shown:
         if any(closure.node.is_shining for closure in material.closures):
             return f"the surface of {name!r}"
-    return "the world" if world.radiance != World().radiance else None
+    return None if world.is_black else "the world"
 
 
 def _materials(scene: Scene, placed: Object) -> list[Material]:

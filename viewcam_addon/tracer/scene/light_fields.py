@@ -34,6 +34,7 @@ _READERS: dict[str, Callable[[Field], Any]] = {
     **dict.fromkeys(("filter", "image"), Field.text),
     "size": lambda field: field.vector(2),
     "hidden_from": lambda field: hidden_from(field),
+    "backdrop": lambda field: _simple(World, field, without=("hidden_from", "backdrop")),
 }
 """How the values are read that are called the same as in Lamp, World and Film."""
 
@@ -94,6 +95,8 @@ def _changed(owner: Lamp | World | Film | Bounces) -> dict[str, Any]:
         value = getattr(owner, each.name)
         if each.name == "matrix":
             changed["matrix"] = value.tolist()
+        elif isinstance(value, World):
+            changed[each.name] = _changed(value)
         elif each.name != "name" and value != each.default:
             changed[each.name] = sorted(value) if isinstance(value, frozenset) else value
     return changed
@@ -220,9 +223,9 @@ def _lamp(field: Field) -> Lamp:
         field.hand_on(error)
 
 
-def _simple(kind: type, field: Field) -> Any:
+def _simple(kind: type, field: Field, without: tuple[str, ...] = ()) -> Any:
     """A World, Film or Bounces."""
-    keys = field.fields((), tuple(each.name for each in dataclasses.fields(kind)))
+    keys = field.fields((), tuple(each.name for each in dataclasses.fields(kind) if each.name not in without))
     values = {name: each.whole(0) if kind is Bounces else _READERS[name](each) for name, each in keys.items()}
     try:
         return kind(**values)

@@ -207,7 +207,8 @@ class PathIntegrator {
     void leave(const Path& path, const Ray& ray, int depth, Block& block) const {
         PathLight& light = block.light[path.sample];
         if (path.kind == CAMERA) {
-            light.add(ENVIRONMENT, path.weight * lights_.environment().le(normalize(ray.direction), CAMERA));
+            const auto& backdrop = scene_.illumination.backdrop;
+            light.add(ENVIRONMENT, path.weight * (backdrop ? *backdrop : lights_.environment()).le(normalize(ray.direction), CAMERA));
             light.covered = 1 - mean(path.weight);
         } else {
             light.add(path.category, path.weight * lights_.environment_le(ray.direction, path.kind, block.points[path.from], path.pdf, depth == 1, path.through));
