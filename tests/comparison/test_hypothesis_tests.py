@@ -178,6 +178,37 @@ def test_a_wrong_tile_is_found_and_named(size):
     assert test.failing[0, 0]
 
 
+STRIPES = np.where(columns // 4 % 2, 0.3, 0.6)[..., None] * np.ones(3)
+
+
+def striped(rng, blur):
+    """Both sides of stripes of four pixels, the test with so much of each pixel in the two beside it; noise of 1/16."""
+    blurred = STRIPES + blur * (np.roll(STRIPES, 1, axis=1) + np.roll(STRIPES, -1, axis=1) - 2 * STRIPES)
+    reference, test = (truth * (1 + rng.normal(0, 1 / 16, (HEIGHT, WIDTH, 1))) for truth in (STRIPES, blurred))
+    variance = (STRIPES / 16) ** 2
+    return Sides("Combined", reference, test, variance, variance, np.zeros((HEIGHT, WIDTH), bool))
+
+
+@pytest.mark.parametrize(("blur", "sign"), [(0.1, -1), (-0.1, 1)])
+def test_what_is_softer_or_sharper_is_told_along_contours_where_no_tile_tells_it(blur, sign):
+    """A tenth of the contrast is 0.7 of a pixel's noise; half of √500 pixels are at contours: eight standard errors."""
+    for seed in range(10):
+        asked = {test.name: test for test in run(striped(np.random.default_rng(seed), blur), 256, 8)}
+        contours = asked.pop("contours")
+        assert not contours.ok and all(test.ok for test in asked.values())
+        assert np.sign(contours.worst.errors) == sign and contours.worst.columns == (0, WIDTH - 1)
+        assert all(test.ok for test in run(striped(np.random.default_rng(seed), 0.0), 256, 8))
+
+
+def test_a_pixels_own_noise_is_not_in_its_weight():
+    """Else what is noise alone would look softer than its reference: by a standard error for each of √960 pixels, near 30."""
+    rng = np.random.default_rng(10)
+    found = [run(sides_of(grey, rng, 256, 32, 8), 256, 8)[3].errors[0, 0, 0] for _ in range(100)]
+    assert abs(np.mean(found)) < 0.4 and 0.5 < np.std(found) < 1.2  # of 100 draws the mean is off by 0.1, times four
+    sides = sides_of(grey, rng, 256, 32, 8)
+    assert run(replace(sides, shared=sides.variance), 256, 8)[3].is_open, "neighbours that share noise have no such weights"
+
+
 def test_a_pixel_without_noise_may_differ_by_rounding_and_by_no_more():
     """20 roundings of 1e-8 are allowed where there is no contrast, and then nothing, since there is no noise."""
     none, reference = np.zeros((HEIGHT, WIDTH, 3)), np.full((HEIGHT, WIDTH, 3), 0.5)
@@ -207,7 +238,7 @@ def test_a_row_of_the_result_is_plain_json():
         {**entry, "worst": {**entry["worst"], **{name: list(entry["worst"][name]) for name in ("columns", "rows")}}}
         for entry in told
     ]
-    assert [entry["name"] for entry in told] == ["pixels", "tiles of 8 × 8", "tiles of 32 × 32", "whole picture"]
+    assert [entry["name"] for entry in told] == ["pixels", "tiles of 8 × 8", "tiles of 32 × 32", "contours", "whole picture"]
 
 
 def test_a_shift_of_the_picture_is_no_excuse_for_a_bias_of_noisy_light():

@@ -137,10 +137,18 @@ def test_one_pixel_that_is_no_number_fails():
     assert comparison.sentence == "Different here: Combined has 1 pixel without a number."
 
 
+def test_a_softer_picture_is_said_to_be_softer():
+    stripes = np.where(columns // 4 % 2, 0.3, 0.6)[..., None] * np.ones(3)
+    blurred = 0.8 * stripes + 0.1 * (np.roll(stripes, 1, axis=1) + np.roll(stripes, -1, axis=1))
+    _, tests = both(blurred)
+    sentence = radiance.compare(picture(np.random.default_rng(1), SAMPLES, stripes), tests, PINHOLE).sentence
+    assert re.match(r"Different here: along the contours Combined \(\w+\) is softer, ", sentence), sentence
+
+
 def test_the_json_is_plain_and_says_what_the_sentence_says(same):
     told = json.loads(json.dumps(same.to_json(), allow_nan=False))
     assert told["passed"] is True and told["sentence"] == same.sentence
-    assert told["quantities"][0]["name"] == "Combined" and len(told["quantities"][0]["questions"]) == 4
+    assert told["quantities"][0]["name"] == "Combined" and len(told["quantities"][0]["questions"]) == 5
     assert told["samples"] == {"reference": 256, "test": 256} and told["equal"] == ["Alpha"]
 
 

@@ -128,6 +128,8 @@ SCENE_FAULTS = {
     "smooth normals with two axes swapped": ("direct", 64, lambda s: with_normals(s, lambda n: n[..., [1, 0, 2]].copy())),
     "a filter 0.1 px to the right": ("direct", 256, lambda s: shifted(s, 0.1, 0.0)),
     "a filter 0.25 px up": ("direct", 64, lambda s: shifted(s, 0.0, 0.25)),
+    "a filter a quarter wider": ("direct", 64, lambda s: replace(s, film=replace(s.film, filter_width=1.875))),
+    "a box in place of the filter": ("direct", 64, lambda s: replace(s, film=replace(s.film, filter="BOX"))),
 }
 
 

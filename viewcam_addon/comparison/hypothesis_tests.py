@@ -1,4 +1,4 @@
-"""Hypothesis tests of noisy light: is a difference more than chance, in each pixel, each tile, the whole picture?
+"""Hypothesis tests of noisy light: is a difference more than chance, in each pixel, each tile, along contours, in the whole?
 
 The noise that a difference is held against is the larger of what a pixel or tile shows itself and what its 3 × 3 neighbourhood
 shows in the mean. By itself, a place that rare light has missed so far looks both darker and quieter than it is, and an edge
@@ -10,9 +10,16 @@ percentile of each pixel, since a mean of rounding errors can't exceed what near
 table of the Blackman-Harris filter does (core/film/filter.h): it shifts the picture by 4.9e-4 px to the right and up, and
 changes a pixel by 0.21 % of the contrast around it at most. A shift changes only what passes a tile's border, so that its
 effect is the sum of the slopes, in which noise cancels.
+
+Contours: what blurs or sharpens a picture, as another filter does, takes as much from one side of each contour as it gives to
+the other, and no tile tells. So the differences are summed with the picture's bend as weights: the mean of a pixel's four
+neighbours less that of the eight a knight's move away, minus the Laplacian. All of these are squares of the other colour of a
+chessboard, so that a pixel's own noise is not in its weight, and given the black pixels the white ones' terms are independent.
+The two colours share noise among them: the mean of their standard errors is beyond a limit only where one of them is.
+Where neighbours share their light even that does not hold, and nothing is asked.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -24,9 +31,9 @@ from .noise_free import Allowance
 from .sides import CHANNEL_NAMES, Sides
 from .tolerances import Array
 
-PIXELS, WHOLE = 1, 0
-SIZES = (PIXELS, 8, 32, WHOLE)
-"""Sides of the tiles, in pixels; 0 is one tile over all."""
+PIXELS, CONTOURS, WHOLE = 1, -1, 0
+SIZES = (PIXELS, 8, 32, CONTOURS, WHOLE)
+"""Sides of the tiles, in pixels; 0 is one tile over all, and so is −1, of what is along contours."""
 
 _NEARLY_ALL = tolerances.ROUNDINGS[tolerances.PERCENTILES.index(99.0)]
 # Of the default filter width of 1.5 px; twice the shift, for what the table does beside shifting.
@@ -34,6 +41,8 @@ _FILTER_SHIFT, _FILTER_CONTRAST = 2 * 4.9e-4, 0.0021
 # Standard errors of what has no noise at all: beyond any limit, and a number still.
 _CERTAIN = 1e6
 _TINY = np.finfo(float).tiny
+_BESIDE = ((0, 1), (1, 0), (0, -1), (-1, 0))
+_KNIGHTS_MOVES = tuple((i, j) for i in (-2, -1, 1, 2) for j in (-2, -1, 1, 2) if abs(i) != abs(j))
 
 
 @dataclass(frozen=True)
@@ -56,7 +65,8 @@ class Place:
 class HypothesisTest:
     """One size of tiles, asked in one quantity.
 
-    size : one of SIZES. errors : (rows, columns, channels), each tile's difference in standard errors, signed.
+    size : one of SIZES. errors : (rows, columns, channels), each tile's difference in standard errors, signed; of contours
+    negative where the test is softer.
     allowed : (rows, columns, channels) what chance allows. limit : that at the worst place.
     worst : the place that is farthest beyond it, or closest to it.
     """
@@ -69,11 +79,13 @@ class HypothesisTest:
 
     @property
     def name(self) -> str:
-        return {WHOLE: "whole picture", PIXELS: "pixels"}.get(self.size, f"tiles of {self.size} × {self.size}")
+        return {WHOLE: "whole picture", PIXELS: "pixels", CONTOURS: "contours"}.get(
+            self.size, f"tiles of {self.size} × {self.size}"
+        )
 
     @property
     def is_open(self) -> bool:
-        """Whether nobody knows an answer: of pixels whose noise is not known, or that do not differ."""
+        """Whether nobody knows an answer: of pixels whose noise is not known, that share it, or that do not differ."""
         return not self.errors.any()
 
     @property
@@ -133,6 +145,11 @@ def _statistics(sides: Sides, allowed: Allowance, freedom: tuple[int, int], leve
     shift = _FILTER_SHIFT + _NEARLY_ALL * float(allowed.shift.max())
     across = [np.gradient(sides.reference, axis=axis) for axis in (0, 1) if sides.reference.shape[axis] > 1]
     for size in SIZES[1:]:
+        if size == CONTOURS:
+            most = rounding + _FILTER_CONTRAST * contrast(sides.reference)
+            errors = _contour_errors(sides, most, shift, across)
+            yield size, errors, np.full(errors.shape, noise.sign_critical(noise.sidak(level, 2 * errors.size)))
+            continue
         total, square, allowance = (noise.tile_sums(values, size) for values in (difference, difference**2, rounding))
         allowance = allowance + shift * sum(np.abs(noise.tile_sums(slope, size)) for slope in across)
         square = np.maximum(square, noise.mean_around(square))
@@ -151,6 +168,29 @@ def _pixel_errors(sides: Sides, rounding: Array, freedom: tuple[int, int]) -> tu
     return _errors(_beyond(sides.difference, rounding), total), both
 
 
+def _contour_errors(sides: Sides, rounding: Array, shift: float, across: Sequence[Array]) -> Array:
+    """(1, 1, channels): how much sharper the test is, in standard errors; 0 where nobody knows."""
+    height, width, channels = sides.reference.shape
+    if min(height, width) < 5 or np.any(sides.shared):
+        return np.zeros((1, 1, channels))
+    bend = _mean_at(sides.reference, _BESIDE) - _mean_at(sides.reference, _KNIGHTS_MOVES)
+    inner = (slice(2, -2), slice(2, -2))
+    terms, allowances = bend * sides.difference[inner], np.abs(bend) * rounding[inner]
+    is_white = np.add.outer(np.arange(height - 4), np.arange(width - 4)) % 2 == 1
+    errors = []
+    for colour in (is_white, ~is_white):
+        allowance = allowances[colour].sum(axis=0)
+        allowance = allowance + shift * sum(np.abs((bend * slope[inner])[colour].sum(axis=0)) for slope in across)
+        errors.append(_errors(_beyond(terms[colour].sum(axis=0), allowance), (terms[colour] ** 2).sum(axis=0)))
+    return np.mean(errors, axis=0)[None, None]
+
+
+def _mean_at(values: Array, places: Sequence[tuple[int, int]]) -> Array:
+    """(height − 4, width − 4, channels): of each inner pixel, the mean of the values at so many rows and columns from it."""
+    height, width = values.shape[:2]
+    return sum(values[2 + i : height - 2 + i, 2 + j : width - 2 + j] for i, j in places) / len(places)
+
+
 def _errors(differences: Array, variances: Array) -> Array:
     errors = differences / np.sqrt(np.maximum(variances, _TINY))
     return np.clip(errors, -_CERTAIN, _CERTAIN)
@@ -165,7 +205,7 @@ def _hypothesis_test(sides: Sides, size: int, errors: Array, allowed: Array) -> 
     index = np.unravel_index(np.argmax(np.abs(errors) / allowed), errors.shape)
     row, column, channel = (int(i) for i in index)
     (bottom, top), (left, right) = (
-        _extent(length, size, i) for length, i in zip(sides.reference.shape[:2], (row, column), strict=True)
+        _extent(length, max(size, WHOLE), i) for length, i in zip(sides.reference.shape[:2], (row, column), strict=True)
     )
     there = (slice(bottom, top + 1), slice(left, right + 1), channel)
     means = (float(side[there].mean()) for side in (sides.reference, sides.test))

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..image import Image
 from . import charts, difference, page, pictures
-from .hypothesis_tests import WHOLE, HypothesisTest
+from .hypothesis_tests import CONTOURS, WHOLE, HypothesisTest
 from .light_verdict import change_words, edge_words, place_words, samples_words
 from .radiance import LightRow, RadianceComparison
 from .tolerances import ROUNDINGS
@@ -96,7 +96,7 @@ def _maker(image: Image) -> str:
 
 def _crops(comparison: RadianceComparison, shown: tuple) -> list[page.Crop]:
     asked = [(row, test) for row in comparison.rows for test in row.hypothesis_tests]
-    failed = [(row, test) for row, test in asked if not test.ok and test.size != WHOLE]
+    failed = [(row, test) for row, test in asked if not test.ok and test.size not in (CONTOURS, WHOLE)]
     return [_crop(comparison, shown, row, test) for row, test in failed[:_MOST_CROPS]]
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..pinhole import Pinhole
-from .hypothesis_tests import PIXELS, WHOLE, HypothesisTest, Place
+from .hypothesis_tests import CONTOURS, PIXELS, WHOLE, HypothesisTest, Place
 from .noise_free import Edges
 from .perception import Appearance
 from .statistics import PassErrors, percentile_name, plain
@@ -158,6 +158,8 @@ def place_words(place: Place, size: int) -> str:
     """Where: in columns 32 to 63, rows 0 to 31."""
     if size == WHOLE:
         return "over the whole picture"
+    if size == CONTOURS:
+        return "along the contours"
     (left, right), (bottom, top) = place.columns, place.rows
     return f"in column {left}, row {bottom}" if size == PIXELS else f"in columns {left} to {right}, rows {bottom} to {top}"
 
@@ -172,12 +174,19 @@ def change_words(reference: float, test: float) -> str:
     return f"{abs(ratio - 1.0):.2%} {'brighter' if ratio > 1.0 else 'darker'}".replace("%", " %")
 
 
+def differs_words(test: HypothesisTest) -> str:
+    """By how much, at the worst place: 4.1 % darker; or softer, along contours."""
+    if test.size == CONTOURS:
+        return "sharper" if test.worst.errors > 0.0 else "softer"
+    return change_words(test.worst.reference, test.worst.test)
+
+
 def worst_test(row: LightRow) -> HypothesisTest | None:
     """Of those that fail, the one that tells where: the smallest tiles, or the whole picture where half of them differ."""
     failing = [test for test in row.hypothesis_tests if not test.ok]
     if not failing:
         return None
-    tiles = [test for test in failing if test.size not in (PIXELS, WHOLE)] or failing
+    tiles = [test for test in failing if test.size not in (PIXELS, CONTOURS, WHOLE)] or failing
     whole = failing[-1] if failing[-1].size == WHOLE else None
     return whole if whole and (row.factor is not None or tiles[0].is_everywhere) else tiles[0]
 
@@ -231,7 +240,7 @@ def _difference(row: LightRow) -> str:
     many = f" and {failing - 1:,} more of {of:,}" if failing > 1 else ""
     channel = f" ({place.channel})" if place.channel else ""
     return (
-        f"{place_words(place, test.size)}{many} {row.name}{channel} is {change_words(place.reference, place.test)}, "
+        f"{place_words(place, test.size)}{many} {row.name}{channel} is {differs_words(test)}, "
         f"{abs(place.errors):.3g} standard errors where chance allows {test.limit:.3g}"
     )
 
