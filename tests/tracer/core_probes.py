@@ -9,7 +9,7 @@ from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer import native
 from viewcam_addon.tracer.scene import Mesh, Object, Scene
 from viewcam_addon.tracer.scene.colours import WHITE, Colour
-from viewcam_addon.tracer.scene.film import Film
+from viewcam_addon.tracer.scene.film import FILTERS, Film
 from viewcam_addon.tracer.scene.lamps import Lamp
 from viewcam_addon.tracer.scene.materials import Material, Picture
 from viewcam_addon.tracer.scene.shader_nodes import Closure, Node, node
@@ -39,8 +39,8 @@ def offsets(film: Film, u):
     """(2, n): pixels from a pixel's lower left corner, of (2, n) numbers."""
     given = np.ascontiguousarray(np.asarray(u, np.float64).T)
     out = np.empty_like(given)
-    width = 0.0 if film.filter == "BOX" else film.filter_width
-    assert not native.core().probe_filter(width, len(given), _at(given), _at(out))
+    shape = FILTERS.index(film.filter)
+    assert not native.core().probe_filter(shape, film.filter_width, len(given), _at(given), _at(out))
     return out.T
 
 

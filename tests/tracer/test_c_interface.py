@@ -120,8 +120,11 @@ def light_up(draw, calls):
         field[:] = [draw(NUMBER) for _ in field]
     lamp.radius, lamp.angle, lamp.blend = draw(LENGTH), draw(LENGTH), draw(LENGTH)
     calls("add_lamp", calls.scene, lamp)
-    film = native._Film(filter_width=draw(LENGTH), exposure=draw(NUMBER), image=draw(mostly(st.just(-1), WHOLE)))
-    film.radiance[:] = [draw(NUMBER) for _ in range(3)]
+    film = native._Film(filter=draw(mostly(st.integers(0, 2), WHOLE)), filter_width=draw(LENGTH), exposure=draw(NUMBER))
+    film.has_backdrop = draw(st.booleans())
+    for world in (film.world, film.backdrop):
+        world.image = draw(mostly(st.just(-1), WHOLE))
+        world.radiance[:] = [draw(NUMBER) for _ in range(3)]
     calls("set_film", calls.scene, film)
     width, height = draw(st.integers(-1, 3)), draw(st.integers(-1, 3))
     pixels = calls.at(np.ones(4 * max(width * height, 1)), np.float32)

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from .scene import Mesh, Object, Scene, Spheres, placing
 from .scene.colours import WHITE
+from .scene.film import FILTERS
 from .scene.lamps import RAYS, Area, Lamp, Point, Spot, Sun, World
 from .scene.materials import PLAIN, Colour, Material
 from .scene.sameness import same_things
@@ -128,7 +129,7 @@ class _Film(Structure):
         ("world", _World),
         ("backdrop", _World),
         ("hidden_from", c_uint32),
-        *((name, c_int32) for name in ("transparent", "version", "has_backdrop")),
+        *((name, c_int32) for name in ("transparent", "version", "has_backdrop", "filter")),
         ("filter_width", c_double),
         ("exposure", c_double),
     ]
@@ -177,7 +178,7 @@ class _Core(Structure):
             "probe_sobol",
             _function(c_int, c_uint32, c_uint32, c_int, c_size_t, c_void_p, c_void_p, c_int, c_int, c_void_p),
         ),
-        ("probe_filter", _function(c_int, c_double, c_size_t, c_void_p, c_void_p)),
+        ("probe_filter", _function(c_int, c_int, c_double, c_size_t, c_void_p, c_void_p)),
         ("probe_function", _function(c_int, c_int, c_size_t, c_void_p, c_void_p, c_void_p)),
         ("probe_specular", _function(c_int, c_double, c_size_t, c_void_p, c_void_p)),
         ("probe_sample_light", _function(c_int, POINTER(_Lamp), c_size_t, c_void_p, c_void_p)),
@@ -355,7 +356,7 @@ class CoreScene:
         film, world = scene.film, scene.world
         described = _Film(hidden_from=kinds(world.hidden_from), transparent=film.transparent, exposure=film.exposure)
         described.version = 100 * scene.cycles[0] + scene.cycles[1]
-        described.filter_width = 0.0 if film.filter == "BOX" else film.filter_width
+        described.filter, described.filter_width = FILTERS.index(film.filter), film.filter_width
         for image in world.images:
             if image not in images:
                 images[image] = len(images)

@@ -192,8 +192,9 @@ def test_few_bounces_of_each_kind_are_counted_alike(take, make_material, scene):
     check(take())
 
 
-def test_a_see_through_film_with_its_own_exposure_and_filter(take, scene):
-    scene.render.film_transparent, scene.cycles.film_exposure, scene.cycles.pixel_filter_type = True, 1.7, "BOX"
+@pytest.mark.parametrize("shape", ["BOX", "GAUSSIAN"])
+def test_a_see_through_film_with_its_own_exposure_and_filter(take, scene, shape):
+    scene.render.film_transparent, scene.cycles.film_exposure, scene.cycles.pixel_filter_type = True, 1.7, shape
     bpy.data.objects["Floor"].hide_render = True
     sides = take()
     check(sides)

@@ -310,7 +310,7 @@ def test_every_key_of_light_is_documented():
         (["world", "radiance"], [1, 1, -1], ["'world'", "radiance"]),
         (["world", "backdrop"], {"radiance": [1, -1, 1]}, ["'backdrop' of 'world'", "radiance"]),
         (["world", "backdrop"], {"backdrop": {}}, ["'backdrop' of 'world'", "unknown key 'backdrop'"]),
-        (["film", "filter"], "GAUSSIAN", ["'film'", "GAUSSIAN", "BLACKMAN_HARRIS"]),
+        (["film", "filter"], "TENT", ["'film'", "TENT", "BLACKMAN_HARRIS", "GAUSSIAN"]),
         (["film", "filter_width"], 0, ["'film'", "filter_width"]),
         (["film", "transparent"], 1, ["'transparent' of 'film'", "true or false"]),
         (["bounces", "total"], 1.5, ["'total' of 'bounces'", "whole"]),

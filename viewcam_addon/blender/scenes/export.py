@@ -133,7 +133,7 @@ def light_in(depsgraph: bpy.types.Depsgraph, ledger: Ledger, images: dict[str, P
     return Lighting(
         lamps=tuple(lamps.lamps_in(depsgraph, bounces, ledger)),
         world=world.world_of(world.shown_world(scene, depsgraph.view_layer_eval), ledger, images),
-        film=film.film_of(scene, ledger),
+        film=film.film_of(scene),
         bounces=bounces,
     )
 

@@ -2,7 +2,7 @@
 
 import bpy
 
-from ...tracer.scene.film import FILTERS, Bounces, Film
+from ...tracer.scene.film import Bounces, Film
 from .ledger import Ledger
 
 # Those of Bounces → those of `scene.cycles`.
@@ -19,17 +19,13 @@ CYCLES_SETTINGS = ("pixel_filter_type", "filter_width", "film_exposure", *BOUNCE
 """Those of `scene.cycles` that are read here."""
 
 
-def film_of(scene: bpy.types.Scene, ledger: Ledger) -> Film:
+def film_of(scene: bpy.types.Scene) -> Film:
     """The scene's film; that of Blender's factory settings where Cycles is disabled."""
     transparent = scene.render.film_transparent
     cycles = getattr(scene, "cycles", None)
     if cycles is None:
         return Film(transparent=transparent)
-    kind = cycles.pixel_filter_type
-    if kind not in FILTERS:
-        ledger.note(scene.name, "approximated", f"the pixel filter {kind} is BLACKMAN_HARRIS on both sides")
-        kind = "BLACKMAN_HARRIS"
-    return Film(kind, cycles.filter_width, transparent, cycles.film_exposure)
+    return Film(cycles.pixel_filter_type, cycles.filter_width, transparent, cycles.film_exposure)
 
 
 def bounces_of(scene: bpy.types.Scene, ledger: Ledger) -> Bounces:

@@ -103,7 +103,7 @@ typedef struct {
 
     /* For tests: light_functions.h says what they are given and return. */
     int (*probe_sobol)(uint32_t seed, uint32_t samples, int scatterings, size_t, const uint32_t*, const uint32_t*, int first, int dimensions, double*);
-    int (*probe_filter)(double width, size_t, const double*, double*);
+    int (*probe_filter)(int shape, double width, size_t, const double*, double*);
     int (*probe_function)(int which, size_t, const double*, const double*, double*);
     int (*probe_specular)(double ratio, size_t, const double*, double*);
     int (*probe_sample_light)(const ViewcamLamp*, size_t, const double*, double*);

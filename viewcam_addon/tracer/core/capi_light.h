@@ -32,6 +32,7 @@ typedef struct {
     int32_t factor_count;
 } ViewcamClosure;
 
+enum ViewcamFilter { VIEWCAM_BOX, VIEWCAM_BLACKMAN_HARRIS, VIEWCAM_GAUSSIAN };
 enum ViewcamLampKind { VIEWCAM_SUN, VIEWCAM_POINT, VIEWCAM_SPOT, VIEWCAM_RECTANGLE, VIEWCAM_ELLIPSE };
 /* matrix: (3, 4), the lamp's space to the world's; a sun is seen towards its z. color: irradiance of a sun, power of others. */
 typedef struct {
@@ -47,11 +48,11 @@ typedef struct {
     double to_image[12];
 } ViewcamWorld;
 
-/* backdrop: what the camera sees instead of the world, where it has one. filter_width: 0 is a box. version: of Blender, 100 times the first number and the second, whose materials are meant. */
+/* backdrop: what the camera sees instead of the world, where it has one. version: of Blender, 100 times the first number and the second, whose materials are meant. */
 typedef struct {
     ViewcamWorld world, backdrop;
     uint32_t hidden_from;
-    int32_t transparent, version, has_backdrop;
+    int32_t transparent, version, has_backdrop, filter;
     double filter_width, exposure;
 } ViewcamFilm;
 

@@ -92,6 +92,7 @@ inline void film(const ViewcamFilm& given) {
         that(all_finite(world.radiance, 3), "the world's light is no number");
         that(all_finite(world.to_image, 12), "the world is turned by what is no number");
     }
+    that(given.filter >= VIEWCAM_BOX && given.filter <= VIEWCAM_GAUSSIAN, "the film's filter is of no shape");
     that(given.filter_width >= 0 && given.filter_width <= LARGEST && std::isfinite(given.exposure), "the film's numbers are none");
 }
 inline void light(const Scene& scene, const ViewcamLightSettings& given) {

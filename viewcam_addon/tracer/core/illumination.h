@@ -36,7 +36,8 @@ struct Illumination {
     Environment environment;
     std::optional<Environment> backdrop;  // what the camera sees instead
     FilmSettings film;
-    double filter_width = 0;  // of BLACKMAN_HARRIS, 0 is BOX
+    FilterShape filter = BOX;
+    double filter_width = 1;  // pixels
     Bounces bounces;
     int version = CYCLES_5_2;  // whose Cycles computes materials so
 };

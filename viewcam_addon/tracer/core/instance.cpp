@@ -224,7 +224,7 @@ const ViewcamCore core = {
                       int dimensions, double* out) {
         return guarded([&] { probe::sobol(seed, samples, scatterings, count, pixels, numbers, first, dimensions, out); });
     },
-    .probe_filter = [](double width, size_t count, const double* u, double* out) { return guarded([&] { probe::filter(width, count, u, out); }); },
+    .probe_filter = [](int shape, double width, size_t count, const double* u, double* out) { return guarded([&] { probe::filter(shape, width, count, u, out); }); },
     .probe_function = [](int which, size_t count, const double* a, const double* b,
                          double* out) { return guarded([&] { probe::function(which, count, a, b, out); }); },
     .probe_specular = [](double ratio, size_t count, const double* given,

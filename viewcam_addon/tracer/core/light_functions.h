@@ -67,7 +67,7 @@ inline void set_film(Scene& scene, const ViewcamFilm& given) {
     light.backdrop.reset();
     if (given.has_backdrop) light.backdrop = environment_of(given.backdrop, given.hidden_from, light.textures);
     light.film = {bool(given.transparent), given.exposure};
-    light.filter_width = given.filter_width, light.version = given.version;
+    light.filter = FilterShape(given.filter), light.filter_width = given.filter_width, light.version = given.version;
     scene.make_tangents();
 }
 inline void clear_light(Scene& scene) { scene.illumination = {}; }
@@ -91,8 +91,8 @@ inline void sobol(uint32_t seed, uint32_t samples, int scatterings, size_t count
         for (int d = 0; d < dimensions; d++) out[i * size_t(dimensions) + d] = sampler.number(sampler.key(pixels[i]), numbers[i], first + d);
 }
 // u, out: (count, 2).
-inline void filter(double width, size_t count, const double* u, double* out) {
-    Filter filter(width);
+inline void filter(int shape, double width, size_t count, const double* u, double* out) {
+    Filter filter(FilterShape(shape), width);
     for (size_t i = 0; i < count; i++) {
         Vec2 offset = filter.offset({u[2 * i], u[2 * i + 1]});
         out[2 * i] = offset.x, out[2 * i + 1] = offset.y;

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from ... import checks
 from ...errors import InputError
 
-FILTERS = ("BOX", "BLACKMAN_HARRIS")
+FILTERS = ("BOX", "BLACKMAN_HARRIS", "GAUSSIAN")
 
 LEVELS = ("geometry", "direct", "path")
 """How much is modelled, the least first."""
@@ -30,7 +30,8 @@ def seeds(level: str, samples: int) -> int:
 
 @dataclass(frozen=True)
 class Film:
-    """filter : over which pixels spread their samples. filter_width : pixels, of BLACKMAN_HARRIS; BOX is one pixel wide.
+    """filter : over which pixels spread their samples. filter_width : pixels, as Cycles counts
+    them; BOX is one pixel wide.
 
     transparent : whether the world behind the scene leaves pixels see-through. exposure : factor on all light.
     """

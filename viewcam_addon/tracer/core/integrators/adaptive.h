@@ -33,7 +33,7 @@ class TileSampler {
     // samples: of each pixel, at most. error: the standard error that is wanted of each pixel's Combined, scene-linear: the root
     // of the mean of its channels' variances; 0 for the same number of samples everywhere.
     TileSampler(const Scene& scene, const Bounces& bounces, uint32_t seed, uint32_t samples, double error)
-        : integrator_(scene, bounces, seed, int(samples)), filter_(scene.illumination.filter_width), film_(scene.illumination.film),
+        : integrator_(scene, bounces, seed, int(samples)), filter_(scene.illumination.filter, scene.illumination.filter_width), film_(scene.illumination.film),
           samples_(samples), error_(error), camera_(scene.camera) {}
 
     const Camera& camera() const { return camera_; }
