@@ -1,4 +1,5 @@
-"""Runs inside a real Blender with a window: Compare with Cycles by mouse and keys, to its verdict and to every other end.
+"""Runs inside a real Blender with a window: Compare with Cycles by mouse and keys, to its verdict and to every other end; and
+Write Labels, to its files.
 
 blender --enable-event-simulate -p 0 0 1600 1000 --addons … --python proof_in_a_window.py -- FILE FOLDER [PICTURES]
 
@@ -23,7 +24,7 @@ from tour_hands import SIDEBAR, look, photograph
 
 FILE, FOLDER, *PICTURES = map(Path, sys.argv[sys.argv.index("--") + 1 :])
 ADDON = "bl_ext.user_default.virtual_pinhole"
-PROOF = f"{ADDON}.viewcam_addon.blender.interface.proof"
+PROOF, LABELS = (f"{ADDON}.viewcam_addon.blender.interface.{name}" for name in ("proof", "labels"))
 ROW = 12  # pixels between two looks for a button, less than its height
 PATIENCE = 60  # seconds that one comparison may take on a busy machine
 LEFT, MIDDLE, RIGHT, CANCEL = 0.3, 0.5, 0.7, 0.83  # shares of the sidebar's width
@@ -251,6 +252,22 @@ def turn_the_add_on_off_while_it_runs():
     yield
 
 
+def write_the_labels():
+    """By the operator, since the panel is folded: Blender's timer looks after what it began, until the files are there."""
+    labels = importlib.import_module(LABELS)
+    settings = bpy.context.window_manager.virtual_pinhole_labels
+    settings.folder = str(FOLDER)
+    with bpy.context.temp_override(window=window()):
+        bpy.ops.viewcam.write_labels(camera=bpy.context.scene.camera.name)
+    ends = time.monotonic() + PATIENCE
+    while labels.latest() is None and time.monotonic() < ends:
+        yield
+    folder, sentence = labels.latest() or (None, "nothing came of it")
+    assert folder and folder.parent == FOLDER and sentence == f"Written to {folder}", sentence
+    missing = {*labels.file_names(bpy.context.scene.camera, settings.chosen())} - {path.name for path in folder.iterdir()}
+    assert not missing, missing
+
+
 def quit_while_it_runs():
     comparison, _ = yield from begin_and_stop()
     (FOLDER / "last.txt").write_text(str(comparison.folder))
@@ -274,6 +291,7 @@ def steps():
         open_the_panel,
         turn_the_add_on_off_while_it_runs,
         open_the_panel,
+        write_the_labels,
         quit_while_it_runs,
     ):
         yield from part()

@@ -127,7 +127,7 @@ def test_compare_with_cycles_comes_to_a_verdict_and_ends_in_every_other_way_with
         if outcome.returncode == 0:
             break
     said = outcome.stdout + outcome.stderr
-    assert outcome.returncode == 0 and "done: quit_while_it_runs" in said, said
+    assert outcome.returncode == 0 and "done: write_the_labels" in said and "done: quit_while_it_runs" in said, said
     assert "Traceback" not in said, said
     folder = (tmp_path / "last.txt").read_text()
     assert not Path(folder).exists()
