@@ -1,19 +1,22 @@
 """Which light a point is lit by: whatever the choice, the mean is the sum of all lights. Pictures of a floor, from above."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.tracer.render import render
+from viewcam_addon.tracer.render import Tracer, render
 from viewcam_addon.tracer.scene.film import Film
-from viewcam_addon.tracer.scene.lamps import Area, Point, Sun, World
+from viewcam_addon.tracer.scene.lamps import Area, Point, Spot, Sun, World
 from viewcam_addon.tracer.scene.materials import Colour, Material
 
 # Looks at a square metre of floor, so far off that its pixels are alike; lamps stand beside its view.
 CAMERA = Pinhole((0, 0, 100), (0, 0, 0), (0, 1, 0), 6400, 64, 64)
-WHITE = Material(diffuse=Colour((1.0, 1.0, 1.0)))
+WHITE, MIRROR = Material(diffuse=Colour((1.0, 1.0, 1.0))), Material(mirror=Colour((1.0, 1.0, 1.0)))
 
 
 @pytest.fixture(scope="module")
@@ -103,3 +106,62 @@ def test_a_lamp_without_a_shadow_shines_through_things(lit, make_mesh):
     free, shut = lit(lamp)[0], lit(lamp, things=((roof, WHITE),))[0]
     through = lit(replace(lamp, casts_shadow=False), things=((roof, WHITE),))[0]
     assert free > 0 and shut == 0 and through == free
+
+
+def met(rng, random_matrix, number):
+    """A lamp of any kind that has a size, anywhere before or round the eye, and some at infinity."""
+    kind, name = rng.integers(5), f"lamp {number}"
+    power = (10.0 ** rng.uniform(0, 2),) * 3
+    matrix, radius, soft = random_matrix(rng, spread=4), 10.0 ** rng.uniform(-2, 0.5), bool(rng.integers(2))
+    if kind == 0:
+        return Sun(name, towards=rng.normal(size=3), irradiance=power, angle=rng.uniform(0, 2))
+    if kind == 1:
+        return Point(name, position=rng.normal(size=3) * 4, power=power, radius=radius, soft_falloff=soft)
+    if kind == 2:
+        return Spot(name, matrix=matrix, power=power, radius=radius, soft_falloff=soft, angle=rng.uniform(0.1, 3))
+    return Area(name, matrix=matrix, size=rng.uniform(0.1, 3, 2), power=power, ellipse=bool(kind == 3))
+
+
+@settings(max_examples=10)
+@given(seed=st.integers(0, 2**32 - 1), count=st.sampled_from([1, 2, 9, 60]))
+def test_the_eye_sees_of_many_lamps_the_sum_of_what_it_sees_of_each(make_lit, random_matrix, seed, count):
+    """Whichever of them a ray is asked about: no more than the rounding of a sum of so many floats."""
+    rng = np.random.default_rng(seed)
+    lamps = [met(rng, random_matrix, number) for number in range(count)]
+
+    def seen(*lamps):
+        return render(make_lit(Pinhole((0, 0, 6), (0, 0, 0), (0, 1, 0), 40, 48, 32), lamps=lamps), "direct", 4, 1)["Combined"][
+            ..., :3
+        ]
+
+    expected = np.sum([seen(lamp).astype(float) for lamp in lamps], axis=0)
+    assert np.any(expected > 0) or count < 60, "that would tell nothing"
+    np.testing.assert_allclose(seen(*lamps), expected, rtol=(count + 2) * 2.0**-24)
+
+
+def test_a_ray_asks_few_of_many_lamps(make_lit, floor):
+    """A hundred times as many squares over a mirror take less than four times as long: each ray would ask them all."""
+
+    def took(count):
+        side = int(count**0.5)
+        places = [(x, y) for x in np.linspace(-3, 3, side) for y in np.linspace(-3, 3, side)]
+        lamps = [
+            Area(
+                f"{i}",
+                matrix=np.array([[1, 0, 0, x], [0, 1, 0, y], [0, 0, 1, 2], [0, 0, 0, 1.0]]),
+                size=(0.01, 0.01),
+                power=(1, 1, 1),
+            )
+            for i, (x, y) in enumerate(places)
+        ]
+        tracer = Tracer(make_lit(CAMERA, (floor, MIRROR), lamps=lamps), threads=1)
+        tracer.render_light("direct", 1, 0)
+        times = []
+        for _ in range(3):
+            started = time.process_time()
+            tracer.render_light("direct", 16, 0)
+            times.append(time.process_time() - started)
+        return min(times)
+
+    few, many = took(36), took(3600)
+    assert many < 4 * few, f"36 lamps take {few:.3f} s, 3600 {many:.3f} s"

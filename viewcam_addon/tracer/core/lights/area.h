@@ -117,6 +117,10 @@ class Area {
         return light * (mean(power_) / PI / (farthest * farthest * (squared + reach_ * reach_ / 2)));
     }
     double power(double) const { return mean(power_); }
+    Bounds bounds() const {
+        Vec3 reach = abs(first_) * lengths_[0] + abs(second_) * lengths_[1];
+        return box_around(center_, reach);
+    }
 
    private:
     // FAR: how many times its longer half axis a light is away where cos/distance² varies less over it than an ellipse's dark

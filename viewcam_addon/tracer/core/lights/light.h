@@ -59,6 +59,17 @@ class Light {
     double power(double extent) const {
         return std::visit([&](const auto& light) { return light.power(extent); }, kind_);
     }
+    // Of a lamp at infinity, of the world and of a mesh, which is met as a surface, the box is infinite.
+    Bounds bounds() const {
+        return std::visit(
+            [](const auto& light) {
+                if constexpr (requires { light.bounds(); })
+                    return light.bounds();
+                else
+                    return Bounds{{-INFINITE, -INFINITE, -INFINITE}, {INFINITE, INFINITE, INFINITE}};
+            },
+            kind_);
+    }
     bool is_sized() const {
         return std::visit([](const auto& light) { return light.is_sized(); }, kind_);
     }

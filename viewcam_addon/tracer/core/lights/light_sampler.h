@@ -11,6 +11,7 @@
 // Lamps are sampled by solid angle, which is bounded, so that rays scattered by diffuse surfaces need not look for them.
 // Surfaces that shine are found both ways, weighted by Veach's power heuristic.
 #pragma once
+#include "../accel/traverse.h"
 #include "light.h"
 
 namespace viewcam::VIEWCAM_ISA {
@@ -60,8 +61,8 @@ class LightSampler {
         lights_.insert(lights_.end(), unlit.begin(), unlit.end());
         for (size_t i = 0; i < lights_.size(); i++)
             if ((i < lamps_ || i >= meshes) && i != sky_ && lights_[i].is_sized())
-                for (RayKind kind : {CAMERA, GLOSSY, TRANSMISSION})
-                    if (!(lights_[i].hidden_from & kind)) met_[kind].push_back(uint32_t(i));
+                (is_finite(lights_[i].bounds()) ? placed_ : boundless_).push_back(uint32_t(i)), met_by_ |= (CAMERA | GLOSSY | TRANSMISSION) & ~lights_[i].hidden_from;
+        hierarchy_ = build_bvh(placed_.size(), [&](size_t i) { return lights_[placed_[i]].bounds(); }, 1, 1);
         count_ = int(meshes);
         random_ = count_ > 1 || (count_ == 1 && lights_[0].is_sized());
         if (count_ > FEW) {
@@ -87,12 +88,10 @@ class LightSampler {
     // through: as in `choose`.
     Vec3 le(const LightRay& ray, RayKind kind, const Interaction& from, double pdf, bool seen, bool through) const {
         Vec3 sum;
-        for (uint32_t light : met_[kind]) {
-            Vec3 radiance = lights_[light].le(ray);
-            if (is_black(radiance)) continue;
+        each_met(ray, kind, [&](uint32_t light, Vec3 radiance) {
             double other = int(light) < count_ ? lights_[light].pdf_li(from, ray.direction) * chance(from, light, seen, through) : 0;
             sum += radiance * power_heuristic(pdf, other);
-        }
+        });
         return sum;
     }
 
@@ -101,13 +100,12 @@ class LightSampler {
     bool has_meshes() const { return size_t(count_) > lamps_; }
     bool is_random() const { return random_; }
     // Whether rays of a kind run into lamps.
-    bool meets_lamps(RayKind kind) const { return kind <= TRANSMISSION && !met_[kind].empty(); }
+    bool meets_lamps(RayKind kind) const { return met_by_ & kind; }
 
     // The radiance of all lamps that a ray of a kind runs through.
     Vec3 le(const LightRay& ray, RayKind kind) const {
         Vec3 sum;
-        if (kind <= TRANSMISSION)
-            for (uint32_t light : met_[kind]) sum += lights_[light].le(ray);
+        each_met(ray, kind, [&](uint32_t, Vec3 radiance) { sum += radiance; });
         return sum;
     }
 
@@ -187,6 +185,22 @@ class LightSampler {
         return brought > 0 || is_black(shading - normal) ? brought : lights_[light].estimate(point.position, normal);
     }
 
+    static bool is_finite(const Bounds& box) { return max_component(box.high - box.low) < INFINITE; }
+
+    // Calls visit(light, radiance) for the lamps that a ray runs through.
+    template <class Visit> void each_met(const LightRay& ray, RayKind kind, const Visit& visit) const {
+        auto meet = [&](uint32_t light) {
+            if (lights_[light].hidden_from & kind) return;
+            Vec3 radiance = lights_[light].le(ray);
+            if (!is_black(radiance)) visit(light, radiance);
+        };
+        for (uint32_t light : boundless_) meet(light);
+        traverse(hierarchy_, Ray{ray.origin, ray.direction, ray.nearest, ray.farthest}, [&](uint32_t leaf, BoxRay&) {
+            meet(placed_[hierarchy_.leaves[leaf]]);
+            return false;
+        });
+    }
+
     double chance(const Interaction& point, uint32_t light, bool seen, bool through) const {
         if (asks_each() && seen) {
             double brightest = 0;
@@ -209,7 +223,9 @@ class LightSampler {
     int count_;
     bool random_;
     std::vector<uint32_t> owners_;                // of each object, which light it is
-    std::vector<uint32_t> met_[TRANSMISSION + 1];  // by kind of ray, lamps that have a size
+    std::vector<uint32_t> placed_, boundless_;    // lamps that have a size: in the hierarchy, and at infinity
+    Bvh hierarchy_;
+    uint32_t met_by_ = 0;  // the kinds of rays that run into any of these
     std::vector<double> chances_, reached_;       // of many lights
     const Environment* environment_;
     uint32_t sky_ = NONE;  // which light the world's image is

@@ -78,6 +78,7 @@ class Point {
         return mean(power_) / (4 * PI * close * close) * risen(dot(normal, way), distance, radius_);
     }
     double power(double) const { return mean(power_); }
+    Bounds bounds() const { return box_around(center_, {radius_, radius_, radius_}); }
 
     Vec3 center() const { return center_; }
     double radius() const { return radius_; }

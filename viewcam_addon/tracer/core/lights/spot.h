@@ -49,6 +49,7 @@ class Spot {
         return point_.estimate(position, normal) * larger(seen, is_sized() ? LEAST_OF_A_WIDE_SPOT : 0);
     }
     double power(double extent) const { return point_.power(extent); }
+    Bounds bounds() const { return point_.bounds(); }
 
    private:
     static constexpr double UNKNOWN = 2;  // more than any sphere fills
