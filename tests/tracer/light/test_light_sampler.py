@@ -13,6 +13,7 @@ from viewcam_addon.tracer.render import Tracer, render
 from viewcam_addon.tracer.scene.film import Film
 from viewcam_addon.tracer.scene.lamps import Area, Point, Spot, Sun, World
 from viewcam_addon.tracer.scene.materials import Colour, Material
+from viewcam_addon.tracer.scene.shader_nodes import node
 
 # Looks at a square metre of floor, so far off that its pixels are alike; lamps stand beside its view.
 CAMERA = Pinhole((0, 0, 100), (0, 0, 0), (0, 1, 0), 6400, 64, 64)
@@ -48,13 +49,62 @@ def beside(number, radius=0.0):
 @pytest.mark.parametrize("count", [2, 4, 5, 32, 33, 100])
 @pytest.mark.parametrize("radius", [0.0, 0.3])
 def test_many_lamps_give_the_sum_of_what_each_gives(lit, count, radius):
-    """One by one up to 4, by what each may bring up to 32, by fixed chances beyond."""
+    """One by one up to 4, by what each may bring up to 32, by a tree beyond."""
     lamps = [beside(number, radius) for number in range(count)]
     alone = [lit(lamp, samples=4) for lamp in lamps]
     expected, known = sum(mean for mean, _ in alone), np.sqrt(sum(error**2 for _, error in alone))
     mean, error = lit(*lamps)
     assert error < 0.05 * expected, "that would tell nothing"
     assert abs(mean - expected) <= 4 * np.hypot(error, known) + 1e-6 * expected, f"{mean:.6g} for {expected:.6g} ± {error:.2g}"
+
+
+def above(number, random_matrix):
+    """A lamp of any kind that lights the floor or doesn't: points, spots, squares, ellipses, suns, anyhow turned."""
+    rng = np.random.default_rng(number)
+    name, power, place = f"lamp {number}", (10.0 ** rng.uniform(-1, 3),) * 3, rng.uniform((2, -3, 0.5), (6, 3, 6))
+    matrix = random_matrix(rng)
+    matrix[:3, 3] = place
+    kind = number % 5
+    if kind == 0:
+        return Sun(name, towards=rng.normal(size=3), irradiance=(rng.uniform(0, 2),) * 3, angle=rng.uniform(0, 1))
+    if kind == 1:
+        return beside(number, rng.choice([0.0, 0.3]))
+    if kind == 2:
+        return Spot(
+            name, matrix=matrix, power=power, radius=rng.choice([0.0, 0.5]), angle=rng.uniform(0.1, 3), blend=rng.uniform()
+        )
+    return Area(name, matrix=matrix, size=rng.uniform(0.1, 2, 2), power=power, ellipse=bool(kind == 3))
+
+
+@pytest.mark.parametrize("shader", [node("diffuse"), node("glossy", roughness=0.3, distribution="ggx"), node("translucent")])
+def test_many_lamps_of_all_kinds_give_the_sum_of_what_each_gives(make_lit, floor, make_mesh, random_matrix, shader):
+    """Whichever half of a tree is asked, from before and behind, and weighted against scattered rays where these find lamps."""
+    square = make_mesh([(2, -1, 1), (2, 1, 1), (2, 1, 3), (2, -1, 3)], [(0, 2, 1), (0, 3, 2)])
+    shining, dark = (square, Material(emission=Colour((2.0,) * 3))), (square, Material(diffuse=Colour((0.0,) * 3)))
+    lamps = [above(number, random_matrix) for number in range(60)]
+
+    def measure(*lamps, samples, thing=dark):
+        scene = make_lit(CAMERA, (floor, Material(surface=shader)), thing, lamps=lamps, film=Film(filter="BOX"))
+        passes = {name: values.astype(float) for name, values in render(scene, "direct", samples, 3).items()}
+        pixels = passes["Combined"][..., 0]
+        return pixels.mean(), np.sqrt(passes["Variance"][..., 0].sum()) / pixels.size
+
+    alone = [measure(lamp, samples=4) for lamp in lamps] + [measure(samples=16, thing=shining)]
+    expected, known = sum(mean for mean, _ in alone), np.sqrt(sum(error**2 for _, error in alone))
+    mean, error = measure(*lamps, samples=64, thing=shining)
+    assert error < 0.02 * expected, "that would tell nothing"
+    assert abs(mean - expected) <= 4 * np.hypot(error, known), f"{mean:.6g} for {expected:.6g} ± {np.hypot(error, known):.2g}"
+
+
+def test_the_one_of_many_lamps_that_is_near_is_asked_by_what_it_brings(lit):
+    """Of 64 lamps all but one are 100 m away: asked one time in 64, the noise of the near one would be 8
+    times the mean; it is 0.67 of it."""
+    far = [Point(f"far {i}", position=(100 * np.cos(i), 100 * np.sin(i), 10), power=(10.0,) * 3) for i in range(63)]
+    mean, error = lit(*far, Point("near", position=(3, 0, 3), power=(10.0,) * 3), samples=16)
+    alone, _ = lit(Point("near", position=(3, 0, 3), power=(10.0,) * 3))
+    assert 1 < mean / alone < 1.02, "that would tell nothing"
+    of_a_sample = error / mean * np.sqrt(64 * 64 * 16)
+    assert of_a_sample < 1, f"the noise of a sample is {of_a_sample:.3g} of the mean"
 
 
 def test_a_sky_beside_lamps_gives_its_whole_light(lit):

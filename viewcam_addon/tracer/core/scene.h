@@ -155,7 +155,7 @@ class Scene {
     }
 
     // What lights need. triangle_count: 0 of spheres. material: of a triangle, an index into illumination.materials. corners: in
-    // rendering space. extent: half the diagonal of a box round the boxes of all surfaces, 1 without any.
+    // rendering space.
     uint32_t triangle_count(uint32_t object) const {
         auto mesh = std::get_if<TriangleMesh>(&geometries[objects[object].geometry]);
         return mesh ? uint32_t(mesh->count) : 0;
@@ -167,24 +167,6 @@ class Scene {
     void corners(uint32_t object, uint32_t triangle, Vec3 (&corners)[3]) const {
         const TriangleMesh& mesh = std::get<TriangleMesh>(geometries[objects[object].geometry]);
         for (int c = 0; c < 3; c++) corners[c] = objects[object].to_world.point(mesh.corner(triangle, c));
-    }
-    double extent() const {
-        std::vector<Bounds> boxes(geometries.size());  // of meshes, in their own space
-        for (size_t i = 0; i < geometries.size(); i++)
-            if (auto mesh = std::get_if<TriangleMesh>(&geometries[i]))
-                for (size_t triangle = 0; triangle < mesh->count; triangle++)
-                    for (int c = 0; c < 3; c++) boxes[i].add(mesh->corner(triangle, c));
-        Bounds box;
-        for (const Object& object : objects) {
-            const Bounds& own = boxes[object.geometry];
-            if (std::holds_alternative<Spheres>(geometries[object.geometry]))
-                box.add(world_bounds(object));
-            else if (!own.is_empty())
-                for (int i = 0; i < 8; i++)
-                    box.add(object.to_world.point({i & 1 ? own.high.x : own.low.x, i & 2 ? own.high.y : own.low.y, i & 4 ? own.high.z : own.low.z}));
-        }
-        double size = length(box.high - box.low) / 2;
-        return size > 0 && size < INFINITE ? size : 1;
     }
     // Whether an object is hidden from any kind of ray.
     bool hides_anything() const {

@@ -116,10 +116,8 @@ class Area {
         double light = larger(dot(normal, way) + reach_, 0.0) * (before + reach_);  // two cosines, as of `risen`
         return light * (mean(power_) / PI / (farthest * farthest * (squared + reach_ * reach_ / 2)));
     }
-    double power(double) const { return mean(power_); }
-    Bounds bounds() const {
-        Vec3 reach = abs(first_) * lengths_[0] + abs(second_) * lengths_[1];
-        return box_around(center_, reach);
+    LightBounds bounds() const {
+        return {box_around(center_, abs(first_) * lengths_[0] + abs(second_) * lengths_[1]), mean(power_) / PI, normal_, 1, 0};
     }
 
    private:

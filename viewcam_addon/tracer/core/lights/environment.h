@@ -120,8 +120,8 @@ class EnvironmentLight {
     bool is_sized() const { return true; }
     LightSample sample_li(const Interaction&, Vec2 u) const { return environment_->sample_li(u); }
     double pdf_li(const Interaction&, Vec3 direction) const { return environment_->pdf_li(direction); }
-    double estimate(Vec3, Vec3) const { return PI * mean(environment_->mean_radiance()); }
-    double power(double extent) const { return 4 * PI * PI * mean(environment_->mean_radiance()) * extent * extent; }
+    double estimate(Vec3, Vec3) const { return irradiance(); }
+    double irradiance() const { return PI * mean(environment_->mean_radiance()); }
 
    private:
     const Environment* environment_;

@@ -1,5 +1,6 @@
 // A light of any kind: one line a kind in the variant.
 #pragma once
+#include <optional>
 #include <variant>
 
 #include "area.h"
@@ -56,17 +57,24 @@ class Light {
     double estimate(Vec3 position, Vec3 normal) const {
         return std::visit([&](const auto& light) { return light.estimate(position, normal); }, kind_);
     }
-    double power(double extent) const {
-        return std::visit([&](const auto& light) { return light.power(extent); }, kind_);
-    }
-    // Of a lamp at infinity, of the world and of a mesh, which is met as a surface, the box is infinite.
-    Bounds bounds() const {
+    double irradiance() const {
         return std::visit(
             [](const auto& light) {
+                if constexpr (requires { light.irradiance(); })
+                    return light.irradiance();
+                else
+                    return 0.0;
+            },
+            kind_);
+    }
+    // None of what lies at infinity.
+    std::optional<LightBounds> bounds() const {
+        return std::visit(
+            [](const auto& light) -> std::optional<LightBounds> {
                 if constexpr (requires { light.bounds(); })
                     return light.bounds();
                 else
-                    return Bounds{{-INFINITE, -INFINITE, -INFINITE}, {INFINITE, INFINITE, INFINITE}};
+                    return {};
             },
             kind_);
     }

@@ -8,16 +8,16 @@
 // - `pdf_li`: the density with which `sample_li` chooses a direction that does see the light.
 // - `le`: what a ray sees that runs into the light. Lamps block no ray, as in Cycles: a ray sees all that it runs through.
 // - `estimate`: how much the light brings to a point, roughly, and 0 only where it brings nothing.
-// - `power`: about all that it gives; of a sun, what falls on a scene of so large an extent.
+// - `irradiance`: of what lies at infinity, the most that a surface receives.
 // - `is_sized`: whether rays can run into it.
-// - `bounds`: of lamps that have a place, the box in which rays run into them.
+// - `bounds`: of what has a place, where it shines, and where to.
 //
 // Rejected: sampling spheres and rectangles by their area, whose samples near a point have the inverse square of their distance,
 // and multiple importance sampling of lamps at diffuse surfaces, which that needs, and which costs a second ray.
 #pragma once
-#include "../accel/bvh.h"
 #include "../bsdf/sampling.h"
 #include "../ray.h"
+#include "light_bounds.h"
 
 namespace viewcam::VIEWCAM_ISA {
 
@@ -43,15 +43,6 @@ inline double mean(Vec3 rgb) { return (rgb.x + rgb.y + rgb.z) / 3; }
 inline double power_heuristic(double pdf, double other) {
     double ratio = other / pdf;
     return ratio > 0 ? 1 / (1 + ratio * ratio) : 1;
-}
-// Wider than it is by more than what the place of a hit on its edge is rounded by.
-inline Bounds box_around(Vec3 center, Vec3 reach) {
-    constexpr double ROUNDINGS = 64 * 0x1p-53;
-    Vec3 rounding = (abs(center) + reach) * ROUNDINGS;
-    Bounds box;
-    box.add(center - reach - rounding);
-    box.add(center + reach + rounding);
-    return box;
 }
 // Sizes as they are, but 0 where their squares are nothing that float64 can divide by.
 inline double not_tiny(double size) { return size > 1e-100 ? size : 0; }

@@ -1,8 +1,8 @@
 // All that gives light in a scene, and which of it a point is lit by.
 //
 // A point gets the light of one light, chosen at random, divided by the chance that it had. Of a few lights the chance is in
-// proportion to what each may bring to that point; of many it is the same everywhere, half of it by power and half alike for
-// all, so that what is weak but near gets its share.
+// proportion to what each may bring to that point; of many those that have a place stand in a tree (light_tree.h), beside which
+// those at infinity have chances of their own, half of them by their light and half alike for all.
 //
 // Where the eye sees points in the light of very few lamps, that choice is most of the noise: there each lamp is asked by
 // itself, the brightest at every sample, and others as often as what they may bring is worth it. The sky, too, is then asked no
@@ -13,6 +13,7 @@
 #pragma once
 #include "../accel/traverse.h"
 #include "light.h"
+#include "light_tree.h"
 
 namespace viewcam::VIEWCAM_ISA {
 
@@ -61,20 +62,12 @@ class LightSampler {
         lights_.insert(lights_.end(), unlit.begin(), unlit.end());
         for (size_t i = 0; i < lights_.size(); i++)
             if ((i < lamps_ || i >= meshes) && i != sky_ && lights_[i].is_sized())
-                (is_finite(lights_[i].bounds()) ? placed_ : boundless_).push_back(uint32_t(i)), met_by_ |= (CAMERA | GLOSSY | TRANSMISSION) & ~lights_[i].hidden_from;
-        hierarchy_ = build_bvh(placed_.size(), [&](size_t i) { return lights_[placed_[i]].bounds(); }, 1, 1);
+                (lights_[i].bounds() ? placed_ : boundless_).push_back(uint32_t(i)),
+                    met_by_ |= (CAMERA | GLOSSY | TRANSMISSION) & ~lights_[i].hidden_from;
+        hierarchy_ = build_bvh(placed_.size(), [&](size_t i) { return lights_[placed_[i]].bounds()->box; }, 1, 1);
         count_ = int(meshes);
         random_ = count_ > 1 || (count_ == 1 && lights_[0].is_sized());
-        if (count_ > FEW) {
-            double total = 0, extent = scene.extent();
-            for (int i = 0; i < count_; i++) total += lights_[i].power(extent);
-            double reached = 0;
-            for (int i = 0; i < count_; i++) {
-                chances_.push_back(0.5 * lights_[i].power(extent) / total + 0.5 / count_);
-                reached_.push_back(reached += chances_.back());
-            }
-            reached_.back() = 1;
-        }
+        if (count_ > FEW) plant();
     }
 
     const Environment& environment() const { return *environment_; }
@@ -129,10 +122,19 @@ class LightSampler {
             choices[0] = {&lights_[0], 1, u};
             return 1;
         }
-        if (!chances_.empty()) {
-            size_t which = std::min<size_t>(std::upper_bound(reached_.begin(), reached_.end(), u) - reached_.begin(), count_ - 1);
-            double before = which ? reached_[which - 1] : 0;
-            choices[0] = {&lights_[which], chances_[which], std::clamp((u - before) / chances_[which], 0.0, BELOW_1)};
+        if (count_ > FEW) {
+            double apart = chance_apart(point, through);
+            if (u < apart) {
+                u /= apart;
+                size_t which = std::min<size_t>(std::upper_bound(reached_.begin(), reached_.end(), u) - reached_.begin(), apart_.size() - 1);
+                double before = which ? reached_[which - 1] : 0, share = reached_[which] - before;
+                choices[0] = {&lights_[apart_[which]], apart * share, std::clamp((u - before) / share, 0.0, BELOW_1)};
+                return 1;
+            }
+            LightTree::Choice found = tree_.choose(point, through, smaller((u - apart) / (1 - apart), BELOW_1));
+            double chance = (1 - apart) * found.chance;
+            if (!(chance > SMALLEST_CHANCE)) return 0;
+            choices[0] = {&lights_[found.light], chance, found.rest};
             return 1;
         }
         double estimates[FEW], total = 0, reached = 0;
@@ -185,7 +187,27 @@ class LightSampler {
         return brought > 0 || is_black(shading - normal) ? brought : lights_[light].estimate(point.position, normal);
     }
 
-    static bool is_finite(const Bounds& box) { return max_component(box.high - box.low) < INFINITE; }
+    void plant() {
+        constexpr double LEAST = 1e-100, MOST = 1e100;  // of which sums and quotients are numbers
+        std::vector<LightTree::Leaf> leaves;
+        for (uint32_t i = 0; i < uint32_t(count_); i++) {
+            if (std::optional<LightBounds> bounds = lights_[i].bounds())
+                leaves.push_back({i, *bounds});
+            else
+                apart_.push_back(i), irradiance_ += smaller(lights_[i].irradiance(), MOST);
+        }
+        tree_ = LightTree(std::move(leaves), count_);
+        double reached = 0, total = larger(irradiance_, LEAST);
+        for (uint32_t i : apart_)
+            reached_.push_back(reached += 0.5 * smaller(lights_[i].irradiance(), MOST) / total + 0.5 / double(apart_.size()));
+        if (!reached_.empty()) reached_.back() = 1;
+    }
+    // That of many lights one at infinity is picked: between a quarter and three, but where there is nothing else to pick.
+    double chance_apart(const Interaction& point, bool through) const {
+        if (apart_.empty()) return 0;
+        double placed = tree_.importance(point, through);
+        return placed > 0 ? 0.25 + 0.5 * irradiance_ / (irradiance_ + placed) : 1;
+    }
 
     // Calls visit(light, radiance) for the lamps that a ray runs through.
     template <class Visit> void each_met(const LightRay& ray, RayKind kind, const Visit& visit) const {
@@ -208,7 +230,12 @@ class LightSampler {
             return smaller(estimate(light, point, through) / (brightest * WORTH), 1.0);
         }
         if (count_ == 1) return 1;
-        if (!chances_.empty()) return chances_[light];
+        if (count_ > FEW) {
+            double apart = chance_apart(point, through);
+            if (tree_.has(light)) return (1 - apart) * tree_.chance(point, through, light);
+            size_t which = std::lower_bound(apart_.begin(), apart_.end(), light) - apart_.begin();
+            return apart * (reached_[which] - (which ? reached_[which - 1] : 0));
+        }
         double total = 0, own = 0;
         for (int i = 0; i < count_; i++) {
             double brought = estimate(i, point, through);
@@ -226,7 +253,10 @@ class LightSampler {
     std::vector<uint32_t> placed_, boundless_;    // lamps that have a size: in the hierarchy, and at infinity
     Bvh hierarchy_;
     uint32_t met_by_ = 0;  // the kinds of rays that run into any of these
-    std::vector<double> chances_, reached_;       // of many lights
+    LightTree tree_;                              // of many lights those that have a place
+    std::vector<uint32_t> apart_;                 // and the others
+    std::vector<double> reached_;                 // the sums of their chances
+    double irradiance_ = 0;                       // what they give together
     const Environment* environment_;
     uint32_t sky_ = NONE;  // which light the world's image is
 };

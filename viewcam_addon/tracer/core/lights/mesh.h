@@ -18,7 +18,6 @@ class MeshLight {
     // emissions: the mean of each of the scene's materials.
     MeshLight(const Scene& scene, uint32_t object, const std::vector<Vec3>& emissions) : scene_(&scene), object_(object) {
         uint32_t count = scene.triangle_count(object);
-        Vec3 least{INFINITE, INFINITE, INFINITE}, greatest = -least;
         double total = 0;
         for (uint32_t triangle = 0; triangle < count; triangle++) {
             Vec3 corners[3];
@@ -26,12 +25,8 @@ class MeshLight {
             if (emission > 0) {
                 scene.corners(object, triangle, corners);
                 total += length(cross(corners[1] - corners[0], corners[2] - corners[0])) / 2 * emission;
-                for (Vec3 corner : corners) {
-                    least = {smaller(least.x, corner.x), smaller(least.y, corner.y), smaller(least.z, corner.z)};
-                    greatest = {larger(greatest.x, corner.x), larger(greatest.y, corner.y), larger(greatest.z, corner.z)};
-                    triangles_.push_back(triangle);
-                }
-                triangles_.resize(triangles_.size() - 2);
+                for (Vec3 corner : corners) box_.add(corner);
+                triangles_.push_back(triangle);
                 reached_.push_back(total);
             }
         }
@@ -39,7 +34,7 @@ class MeshLight {
         densities_.reserve(emissions.size());
         for (Vec3 emission : emissions) densities_.push_back(total > 0 ? mean(emission) / total : 0);
         if (triangles_.empty()) return;
-        center_ = (least + greatest) / 2, reach_ = length(greatest - least) / 2;
+        center_ = (box_.low + box_.high) / 2, reach_ = length(box_.high - box_.low) / 2;
     }
 
     bool is_sized() const { return true; }
@@ -73,7 +68,7 @@ class MeshLight {
         double squared = dot(way, way), risen = larger(dot(normal, way) + reach_, 0.0);
         return risen * (brightness_ / ((squared + reach_ * reach_ / 2) * (std::sqrt(squared) + reach_)));
     }
-    double power(double) const { return 2 * PI * brightness_; }  // of both sides
+    LightBounds bounds() const { return {box_, brightness_}; }
 
    private:
     static constexpr double LEAST_DENSITY = 1e-100;  // less has what a point sees of itself only
@@ -90,6 +85,7 @@ class MeshLight {
     std::vector<uint32_t> triangles_;  // those that shine
     std::vector<double> reached_;      // their areas times mean emissions, summed up
     std::vector<double> densities_;    // by area, of the triangles of each material
+    Bounds box_;
     Vec3 center_;
     double reach_ = 0, brightness_ = 0;  // brightness: radiance times area
 };

@@ -77,8 +77,7 @@ class Point {
         if (!(distance + radius_ > 0)) return 0;
         return mean(power_) / (4 * PI * close * close) * risen(dot(normal, way), distance, radius_);
     }
-    double power(double) const { return mean(power_); }
-    Bounds bounds() const { return box_around(center_, {radius_, radius_, radius_}); }
+    LightBounds bounds() const { return {box_around(center_, {radius_, radius_, radius_}), mean(power_) / (4 * PI)}; }
 
     Vec3 center() const { return center_; }
     double radius() const { return radius_; }

@@ -48,8 +48,11 @@ class Spot {
         double distance = length(way), seen = distance > 0 ? attenuation(way / distance) : 0;
         return point_.estimate(position, normal) * larger(seen, is_sized() ? LEAST_OF_A_WIDE_SPOT : 0);
     }
-    double power(double extent) const { return point_.power(extent); }
-    Bounds bounds() const { return point_.bounds(); }
+    LightBounds bounds() const {
+        LightBounds bounds = point_.bounds();
+        bounds.axis = -axis_, bounds.cos_normals = larger(1 - spread_, -1.0);
+        return bounds;
+    }
 
    private:
     static constexpr double UNKNOWN = 2;  // more than any sphere fills

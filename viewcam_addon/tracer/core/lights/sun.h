@@ -31,7 +31,7 @@ class Sun {
     double estimate(Vec3, Vec3 normal) const {
         return risen(dot(normal, towards_), 1, std::sqrt(spread_ * (2 - spread_))) * mean(irradiance_);
     }
-    double power(double extent) const { return mean(irradiance_) * 4 * PI * extent * extent; }
+    double irradiance() const { return mean(irradiance_); }
 
    private:
     double pdf_li() const { return spread_ > 0 ? 1 / (2 * PI * spread_) : INFINITE; }
