@@ -189,6 +189,23 @@ def test_cycles_is_shown_a_constant_world_where_the_image_is_missing(set_world):
     assert background_of(world).inputs["Color"].is_linked
 
 
+def test_cycles_is_shown_no_constant_world_where_the_camera_sees_another(set_world):
+    world = set_world(strength=2.0)
+    tree, lights = world.node_tree, background_of(world)
+    seen, mixed = tree.nodes.new("ShaderNodeBackground"), tree.nodes.new("ShaderNodeMixShader")
+    tree.links.new(tree.nodes.new("ShaderNodeTexEnvironment").outputs["Color"], lights.inputs["Color"])
+    tree.links.new(tree.nodes.new("ShaderNodeLightPath").outputs["Is Camera Ray"], mixed.inputs[0])
+    tree.links.new(lights.outputs[0], mixed.inputs[1])
+    tree.links.new(seen.outputs[0], mixed.inputs[2])
+    tree.links.new(mixed.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+    ledger = Ledger()
+    assert world_of(world, ledger).backdrop is not None
+    with overridden() as overrides:
+        for remedy in ledger.remedies.values():
+            remedy(overrides)
+        assert tree.get_output_node("CYCLES").inputs["Surface"].links[0].from_node == mixed
+
+
 def test_other_worlds_are_their_colour_in_the_viewport(set_world, export):
     world = set_world()
     world.color = (0.25, 0.5, 1.0)

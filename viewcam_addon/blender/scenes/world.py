@@ -35,7 +35,8 @@ def world_of(world: bpy.types.World | None, ledger: Ledger, pictures: dict[str, 
     for reason in reasons:
         ledger.note(world.name, "approximated", f"the world {reason}, and a constant one stands in")
     # Of an image, even of one that is missing, Cycles samples light, which no constant world needs.
-    if reasons or (missing and wrapped is None):
+    is_constant = wrapped is None and (backdrop, wrapped_there) == (radiance, None)
+    if reasons or (missing and is_constant):
         ledger.call_for_cycles(world.original, _make_constant, radiance)
     original = world.original
     for owner, name, value in (
