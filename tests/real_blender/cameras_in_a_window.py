@@ -17,10 +17,9 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).parent))
 from panel_in_a_window import NOWHERE, click, open_the_panels, press, region, start, window
-from tour_hands import VIEWPORT, call, find, photograph, push_undo, redo, undo
+from tour_hands import VIEWPORT, call, find, photograph, push_undo, redo, settle, undo, until
 
 FOLDER, *PICTURES = map(Path, sys.argv[sys.argv.index("--") + 1 :])
-PATIENCE = 200  # steps
 PBRT = """Film "rgb" "integer xresolution" [960] "integer yresolution" [540]
 LookAt 7 -6 4  0 0 1  0 0 1
 Camera "perspective" "float fov" 30
@@ -36,20 +35,6 @@ def state():
         lens = (block.data.lens, block.data.shift_x, block.data.shift_y, block.data.sensor_width)
         found[block.name] = (tuple(number for row in block.matrix_basis for number in row), lens, block.virtual_pinhole.enabled)
     return found
-
-
-def until(is_so, what):
-    """Steps until something has happened: none is counted on to take a time."""
-    for _ in range(PATIENCE):
-        if is_so():
-            return
-        yield
-    raise AssertionError(f"{what} does not happen")
-
-
-def settle():
-    for _ in range(6):
-        yield
 
 
 def once_undone_and_redone(before, what):

@@ -79,6 +79,20 @@ def test_handles_drag_eye_look_at_and_up_and_the_diagram_is_drawn_where_it_belon
     assert "Traceback" not in said, said  # what fails in a drawing or a handle is only printed
 
 
+def test_what_an_artist_tries_on_the_first_day_goes_as_with_blenders_own_cameras(real_blender, tmp_path):
+    """VIEWCAM_PICTURES : a folder for pictures of the window; without it none are taken."""
+    folder = [each for each in [os.environ.get("VIEWCAM_PICTURES")] if each]
+    for attempt in range(ATTEMPTS):
+        (tmp_path / str(attempt)).mkdir()
+        script = Path(__file__).with_name("artist_in_a_window.py")
+        outcome = run_in_a_window(real_blender, script, tmp_path / str(attempt), *folder)
+        if outcome.returncode == 0:
+            break
+    said = outcome.stdout + outcome.stderr
+    assert outcome.returncode == 0 and "done: add_a_camera_where_there_is_none" in said, said
+    assert "Traceback" not in said, said
+
+
 def test_a_photo_of_a_known_camera_is_matched_by_dragging_along_its_edges(real_blender, tmp_path):
     for _ in range(ATTEMPTS):
         outcome = run_in_a_window(real_blender, Path(__file__).with_name("photo_in_a_window.py"), tmp_path)

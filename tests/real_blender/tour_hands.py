@@ -18,6 +18,7 @@ SIDEBAR, PROPERTIES, VIEWPORT = ("VIEW_3D", "UI"), ("PROPERTIES", "WINDOW"), ("V
 SCREEN_HEIGHT = 2000
 _HEADER = 60  # pixels from the panel's top within which its checkbox stands
 _PATIENCE = 4  # looks
+_STEPS = 200  # that something may take to happen
 _ROW = 14  # pixels between two looks, less than a button's height
 # Where in a row its buttons are looked for, as shares of the panel's width; of operators there are many in a row.
 _MIDDLE, _CHECKBOX, _OPERATORS = 0.5, 0.13, (0.31, 0.38, 0.46, 0.53, 0.6, 0.72, 0.85)
@@ -225,6 +226,20 @@ def call(operator, where=VIEWPORT, **properties):
     area, part = region(*where)
     with bpy.context.temp_override(window=window(), area=area, region=part):
         return operator("INVOKE_DEFAULT", True, **properties)  # with its undo step
+
+
+def until(is_so, what, steps=_STEPS):
+    """Steps until something has happened: none is counted on to take a time."""
+    for _ in range(steps):
+        if is_so():
+            return
+        yield
+    raise AssertionError(f"{what} does not happen")
+
+
+def settle():
+    for _ in range(6):
+        yield
 
 
 def lowest_button(where=SIDEBAR):

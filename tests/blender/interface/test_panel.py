@@ -211,6 +211,74 @@ def test_every_value_has_its_row_and_the_roll_is_the_one_that_counts(posed_camer
     assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "held_roll", "hold_within", "pole"]
 
 
+BLENDERS = {
+    "eye": (bpy.types.Object, "location"),
+    "look_at": (bpy.types.Object, "location"),
+    "focal_length": (bpy.types.Camera, "lens"),
+    "field_of_view": (bpy.types.Camera, "angle"),
+    "roll": (bpy.types.Object, "rotation_euler"),
+    "held_roll": (bpy.types.Object, "rotation_euler"),
+}
+
+
+def fields():
+    return bpy.types.Object.bl_rna.properties["virtual_pinhole"].fixed_type.properties
+
+
+@pytest.mark.parametrize("name", BLENDERS)
+def test_a_field_is_dragged_and_shown_as_blenders_own_of_its_kind(fresh_blender, name):
+    """A drag goes by the step, and the digits are the precision: as in the field beside which an artist learned it."""
+    owner, theirs = BLENDERS[name]
+    ours, theirs = fields()[name], owner.bl_rna.properties[theirs]
+    assert (ours.step, ours.precision, ours.unit) == (theirs.step, theirs.precision, theirs.unit)
+
+
+def test_the_lens_in_pixels_is_dragged_about_as_far_as_in_millimeters(fresh_blender):
+    """Of a picture of 1920 on a sensor of 36 mm. A pixel of the mouse is a hundredth of the step."""
+    sensor = bpy.types.Camera.bl_rna.properties["sensor_width"].default
+    pixels, millimeters = fields()["distance"].step, fields()["focal_length"].step
+    assert pixels / millimeters == pytest.approx(1920 / sensor, rel=0.1)
+
+
+def test_no_label_of_the_panel_reads_as_the_subjects_distance(posed_camera):
+    """The lens is one, whatever its unit; a distance, to an artist, is that of what he looks at."""
+    said = []
+    for unit in [item.identifier for item in fields()["lens_unit"].enum_items]:
+        posed_camera.virtual_pinhole.lens_unit = unit
+        for kind, name, look, *_ in [*drawn(panel.VIEWCAM_PT_sidebar), *drawn(panel.VIEWCAM_PT_sidebar_move)]:
+            said.append(look.get("text") or name)
+            if kind == "prop" and name in fields():
+                said += [fields()[name].name, *(item.name for item in getattr(fields()[name], "enum_items", ()))]
+    assert {"Lens", "mm", "px", "Resize Keeps", "Lens in Pixels", "Selection"} <= set(said)
+    assert "Distance" not in said
+
+
+def test_the_box_does_not_tick_where_the_camera_is_no_pinhole(posed_camera):
+    def is_offered():
+        layout = Layout()
+        panel.VIEWCAM_PT_sidebar.draw_header(SimpleNamespace(layout=layout), bpy.context)
+        ((_, name, _, row, _),) = layout.drawn
+        return name == "enabled" and row.is_all("enabled")
+
+    group = posed_camera.virtual_pinhole
+    cases = ("PERSP", False, True), ("ORTHO", False, False), ("PANO", False, False), ("ORTHO", True, True)
+    for kind, ticked, offered in cases:
+        posed_camera.data.type, group.enabled = kind, ticked
+        assert is_offered() == offered, f"{kind}, ticked: {ticked}"
+
+
+def test_in_a_narrow_sidebar_the_lens_has_a_row_of_its_own(posed_camera):
+    """Beside its unit "50 mm" would be cut to "5"."""
+
+    def rows(width):
+        return {name: layout for kind, name, _, layout, _ in drawn(panel.VIEWCAM_PT_sidebar, width) if kind == "prop"}
+
+    wide, narrow = rows(300), rows(200)
+    assert list(narrow) == list(wide)
+    assert wide["focal_length"] is not wide["zoom"], "beside its unit"
+    assert narrow["focal_length"] is narrow["lens_unit"] is narrow["zoom"]
+
+
 def test_what_is_not_enabled_is_greyed_and_can_be_edited(posed_camera):
     posed_camera.virtual_pinhole.enabled = False
     for name, layout in properties_drawn(panel.VIEWCAM_PT_sidebar).items():

@@ -9,6 +9,8 @@ of undo, and a keyframe where a value has a curve and auto keying is on.
 A viewport that looks through the camera has the look-at point's handle alone, smaller and without snapping: dragging it pans.
 Eye and up would carry the view along, and what the mouse points at; these are dragged in another viewport.
 
+Behind each handle lies a wider dark one that the mouse does not take: a halo, with which it reads on light and on dark.
+
 Rejected: custom gizmos (Python's do not react to the mouse), `eye` itself as the gizmo's property (cancelling would leave the
 camera where the values put it, not where it was), `Gizmo.use_undo` (from 5.2 on alone), and watching `is_modal` when the
 viewport is drawn (a quick drag is over before it is drawn, and in a quad view each view has its own handles).
@@ -34,6 +36,8 @@ _LOOKED_AT = 0.01  # seconds between two looks at whether a drag has ended
 _LABELS = {"eye": "Eye", "look_at": "Look-At", "up": "Up"}
 # Which handle the mouse takes where they cover each other: seen from above, up's tip is over the eye.
 _PRIORITY = {"eye": 2000, "look_at": 1000, "up": 0}
+_WIDTH, _HALO_WIDTH = 1.5, 4.5  # pixels
+_DRAWN = [(name, is_halo) for is_halo in (True, False) for name in _LABELS]  # in this order
 
 
 @dataclass(frozen=True)
@@ -157,21 +161,25 @@ class VIEWCAM_GGT_handles(bpy.types.GizmoGroup):
         return context.space_data.show_gizmo_context and camera_in(context) is not None
 
     def setup(self, context: bpy.types.Context) -> None:
-        for name in _LABELS:
+        for name, is_halo in _DRAWN:
             handle = self.gizmos.new("GIZMO_GT_move_3d")
             handle.target_set_prop("offset", context.window_manager.virtual_pinhole_handles, name)
             handle.draw_style = "CROSS_2D" if name == "look_at" else "RING_2D"
             handle.draw_options = {"ALIGN_VIEW", "FILL_SELECT"}
             handle.use_tooltip = handle.use_draw_modal = True
+            handle.hide_select, handle.line_width = is_halo, _HALO_WIDTH if is_halo else _WIDTH
             handle.select_bias = _PRIORITY[name]
 
     def draw_prepare(self, context: bpy.types.Context) -> None:
         camera_object, theme = camera_in(context), context.preferences.themes[0].user_interface
         is_through = camera_object is not None and overlay.looked_through(context) == camera_object
-        for handle, name in zip(self.gizmos, _LABELS, strict=True):
+        for handle, (name, is_halo) in zip(self.gizmos, _DRAWN, strict=True):
             handle.hide = camera_object is None or place(camera_object, name) is None or (is_through and name != "look_at")
             handle.scale_basis = 0.06 if is_through else 0.12
             handle.use_snap = name != "up" and not is_through
+            if is_halo:
+                handle.color, handle.alpha = overlay.HALO[:3], overlay.HALO[3]
+                continue
             handle.color, handle.alpha = theme.gizmo_secondary if name == "up" else theme.gizmo_primary, 1.0
             handle.color_highlight, handle.alpha_highlight = theme.gizmo_hi, 1.0
 

@@ -273,13 +273,13 @@ class VIEWCAM_OT_frame_selection(_SelectionMove, bpy.types.Operator):
         description="What changes until the selection fills the picture",
         items=(
             ("EYE", "Eye", "The eye moves along the view, and the perspective changes"),
-            ("DISTANCE", "Distance", "The view-plane distance d changes: the camera zooms, and the perspective stays"),
+            ("DISTANCE", "Lens", "The view-plane distance d changes: the camera zooms, and the perspective stays"),
         ),
     )
     center: bpy.props.BoolProperty(
         name="Center",
         description="Bring the selection into the middle: by the eye, the camera moves sideways and keeps its direction; by "
-        "the distance, it turns where it stands. Where the look-at point follows an object the view stays with that",
+        "the lens, it turns where it stands. Where the look-at point follows an object the view stays with that",
         default=True,
     )
     margin: bpy.props.FloatProperty(

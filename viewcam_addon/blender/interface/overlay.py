@@ -29,7 +29,7 @@ _LETTER_SIZE = 14  # points
 _LETTER_AT = 1.1  # of the axis, beyond its tip
 _BESIDE = 0.8  # of a letter's size, to the right and below the eye or the look-at point
 _FAINT = 0.35  # of a line's opacity, for the grid
-_HALO, _HALO_WIDTH = (0.0, 0.0, 0.0, 0.45), 2.5  # its colour, and by how many pixels it is wider than its line
+HALO, _HALO_WIDTH = (0.0, 0.0, 0.0, 0.45), 2.5  # its colour, and by how many pixels it is wider than its line
 _MARK = (4.0, 9.0)  # pixels from the look-at point at which each of the mark's four strokes begins and ends
 
 _handlers = []
@@ -122,7 +122,7 @@ def _draw_lines() -> None:
     faint = (*line[:3], _FAINT * line[3])
     pens = {"grid": (faint, 1.0), "pyramid": (line, 1.0), "view": (line, 1.0), "frame": (line, 2.0), "up": (line, 2.0)}
     pens |= {name: (color, 2.5) for name, color in _axis_colors(context).items()}
-    halos = {name: (_HALO, width + _HALO_WIDTH) for name, (_, width) in pens.items() if name != "grid"}
+    halos = {name: (HALO, width + _HALO_WIDTH) for name, (_, width) in pens.items() if name != "grid"}
     lines, flat = (gpu.shader.from_builtin(name) for name in ("POLYLINE_UNIFORM_COLOR", "UNIFORM_COLOR"))
     state = gpu.state
     before = state.blend_get(), state.depth_test_get(), state.depth_mask_get()
@@ -160,7 +160,7 @@ def _draw_letters() -> None:
     beside = Vector((_BESIDE * size, -_BESIDE * size))
     blf.size(font, size)
     blf.enable(font, blf.SHADOW)
-    blf.shadow(font, 5, *_HALO[:3], 1.0)
+    blf.shadow(font, 5, *HALO[:3], 1.0)
     for pinhole, up, share in figures:
         figure = _diagram(pinhole, up, share)
         eye = _pixel(pinhole.eye, context)
@@ -204,7 +204,7 @@ def _draw_mark(context: bpy.types.Context) -> None:
     batch = batch_for_shader(lines, "LINES", {"pos": strokes})
     before = gpu.state.blend_get()
     gpu.state.blend_set("ALPHA")
-    for color, width in ((_HALO, 1.0 + _HALO_WIDTH), (tuple(preferences.get().line_color), 1.0)):
+    for color, width in ((HALO, 1.0 + _HALO_WIDTH), (tuple(preferences.get().line_color), 1.0)):
         lines.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
         lines.uniform_float("lineWidth", width * pixel)
         lines.uniform_float("color", color)

@@ -35,6 +35,10 @@ class Notice:
         return findings.APPLY_AGAIN in self.sentence
 
 
+_NARROW = 250  # pixels, of a panel in which a row has no room for two things
+_BESIDE_TEXT = 60  # pixels, of what stands left and right of a notice
+
+
 class _MainPanel(CameraPanel):
     bl_label = "Virtual Pinhole"
 
@@ -56,17 +60,18 @@ class _MainPanel(CameraPanel):
             return
         scene_cameras.draw_header(layout, camera_object, context)
         layout.use_property_split = layout.use_property_decorate = True
-        _draw_values(layout.column(), camera_object.virtual_pinhole)
+        width = context.region.width / context.preferences.system.ui_scale
+        _draw_values(layout.column(), camera_object.virtual_pinhole, width < _NARROW)
         found = notices(camera_object, context.scene)
         clipboard.draw(layout, camera_object)
         baking.draw(layout, camera_object)
-        _draw_setting(layout.row(align=True), camera_object, any(notice.is_mended_by_applying for notice in found))
-        width = context.region.width / context.preferences.system.ui_scale - 60
+        buttons = layout.column(align=True) if width < _NARROW else layout.row(align=True)
+        _draw_setting(buttons, camera_object, any(notice.is_mended_by_applying for notice in found))
         for notice in found:
-            _draw_notice(layout.column(align=True), notice, camera_object, width)
+            _draw_notice(layout.column(align=True), notice, camera_object, width - _BESIDE_TEXT)
 
 
-def _draw_values(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
+def _draw_values(column: bpy.types.UILayout, group: bpy.types.PropertyGroup, is_narrow: bool) -> None:
     column.active = group.enabled
     for point in targets.POINTS:
         row = column.row()
@@ -80,7 +85,7 @@ def _draw_values(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> 
             column.prop_search(group, f"{point}_group", target, "vertex_groups", text="Group")
     column.prop(group, "up")
     column.separator()
-    _draw_lens(column.row(align=True), group)
+    _draw_lens(column, group, is_narrow)
     for name in ("zoom", "keeps"):
         column.prop(group, name)
     column.separator()
@@ -90,10 +95,19 @@ def _draw_values(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> 
     column.prop(group, "pole")
 
 
-def _draw_lens(row: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
-    """One field and its unit, no wider than its words. The dot keys d, and Blender wants d's own field beside it."""
+def _draw_lens(column: bpy.types.UILayout, group: bpy.types.PropertyGroup, is_narrow: bool) -> None:
+    """One field and its unit, no wider than its words, or below it where both would be cut.
+
+    The dot keys d, and Blender wants d's own field beside it.
+    """
+    field = {"MILLIMETERS": "focal_length", "PIXELS": "distance"}.get(group.lens_unit, "field_of_view")
+    if is_narrow:
+        column.prop(group, field)
+        column.prop(group, "lens_unit", text="Unit")
+        return
+    row = column.row(align=True)
     row.use_property_decorate = False
-    row.prop(group, {"MILLIMETERS": "focal_length", "PIXELS": "distance"}.get(group.lens_unit, "field_of_view"))
+    row.prop(group, field)
     unit = row.row(align=True)
     unit.use_property_split = False
     unit.ui_units_x = 2.4 if group.lens_unit in ("MILLIMETERS", "PIXELS") else 9.0
@@ -150,7 +164,7 @@ _MOVES = {
     ),
     "Frame by": (
         ("viewcam.frame_selection", {"text": "Eye"}, {"by": "EYE"}),
-        ("viewcam.frame_selection", {"text": "Distance"}, {"by": "DISTANCE"}),
+        ("viewcam.frame_selection", {"text": "Lens"}, {"by": "DISTANCE"}),
     ),
     "Orbit": (
         ("viewcam.orbit_camera", {"text": "", "icon": "TRIA_LEFT"}, {"around": -_STEP}),

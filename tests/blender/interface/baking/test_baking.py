@@ -240,6 +240,7 @@ def test_turned_on_again_after_a_bake_one_warning_names_the_keyframes_and_its_bu
     assert notice.sentence.startswith(
         "Keyframes set the location, rotation and focal length of 'Camera', and in a render they win"
     )
+    assert notice.remedy == ("viewcam.delete_keyframes", "Delete These Keyframes")
     assert bpy.ops.viewcam.delete_keyframes() == {"FINISHED"}
     bpy.context.view_layer.update()
     assert everything(over_the_target)[3].keys() == before[3].keys()
