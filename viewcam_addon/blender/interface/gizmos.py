@@ -36,7 +36,7 @@ _LOOKED_AT = 0.01  # seconds between two looks at whether a drag has ended
 _LABELS = {"eye": "Eye", "look_at": "Look-At", "up": "Up"}
 # Which handle the mouse takes where they cover each other: seen from above, up's tip is over the eye.
 _PRIORITY = {"eye": 2000, "look_at": 1000, "up": 0}
-_WIDTH, _HALO_WIDTH = 1.5, 4.5  # pixels
+_HALO_WIDTH = 4.0  # pixels
 _DRAWN = [(name, is_halo) for is_halo in (True, False) for name in _LABELS]  # in this order
 
 
@@ -167,7 +167,8 @@ class VIEWCAM_GGT_handles(bpy.types.GizmoGroup):
             handle.draw_style = "CROSS_2D" if name == "look_at" else "RING_2D"
             handle.draw_options = {"ALIGN_VIEW", "FILL_SELECT"}
             handle.use_tooltip = handle.use_draw_modal = True
-            handle.hide_select, handle.line_width = is_halo, _HALO_WIDTH if is_halo else _WIDTH
+            if is_halo:  # what the mouse takes keeps its width, or it would take what lies behind
+                handle.hide_select, handle.line_width = True, _HALO_WIDTH
             handle.select_bias = _PRIORITY[name]
 
     def draw_prepare(self, context: bpy.types.Context) -> None:
