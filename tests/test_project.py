@@ -401,6 +401,11 @@ def test_the_version_stands_in_one_place():
     assert found == [tomllib.loads(manifest)["version"]]
 
 
+def test_the_manifest_asks_for_files_and_the_clipboard_and_no_more():
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
+    assert set(manifest["permissions"]) == {"files", "clipboard"}
+
+
 def test_blender_accepts_the_manifest():
     bpy = pytest.importorskip("bpy")
     tool = Path(bpy.utils.system_resource("SCRIPTS"), "addons_core", "bl_pkg", "cli", "blender_ext.py")
