@@ -107,6 +107,18 @@ def test_the_one_of_many_lamps_that_is_near_is_asked_by_what_it_brings(lit):
     assert of_a_sample < 1, f"the noise of a sample is {of_a_sample:.3g} of the mean"
 
 
+def test_of_many_lamps_those_count_that_only_a_smooth_surface_has_before_it(make_lit, make_mesh):
+    """Forty lamps in one place are one of forty times the power, also where they are behind the true floor."""
+    tilted = np.broadcast_to(np.array([1, 0, 1]) / np.sqrt(2), (2, 3, 3))
+    floor = make_mesh([(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [(0, 1, 2), (0, 2, 3)], corner_normals=tilted)
+
+    def light(count, power):
+        lamps = [Point(f"{i}", position=(3, 0, -1), power=(power,) * 3) for i in range(count)]
+        return render(make_lit(CAMERA, (floor, WHITE), lamps=lamps), "direct", 4)["Combined"][..., 0].mean()
+
+    assert light(40, 10.0) == pytest.approx(light(1, 400.0), rel=1e-6) and light(1, 400.0) > 0
+
+
 def test_a_sky_beside_lamps_gives_its_whole_light(lit):
     """The sky of 1 gives a white floor a radiance of 1, however seldom it is asked."""
     for power in (1.0, 1e2, 1e5):

@@ -19,8 +19,8 @@ struct LightBounds {
         Vec3 way = center() - position, half = (box.high - box.low) * 0.5;
         return dot(way, way) <= dot(half, half);
     }
-    // About what a surface with a normal receives, 0 only where it is nothing. through: from behind as well.
-    double importance(Vec3 position, Vec3 normal, bool through) const {
+    // About what a surface receives, 0 only where it is nothing. shading: its smooth normal. through: from behind as well.
+    double importance(Vec3 position, Vec3 normal, Vec3 shading, bool through) const {
         constexpr double ROUNDING = 1e-12, MOST = 1e100;
         Vec3 way = center() - position, half = (box.high - box.low) * 0.5;
         double squared = dot(way, way), reach = dot(half, half) * (1 + ROUNDING);
@@ -29,8 +29,9 @@ struct LightBounds {
         double off_axis = cosine_of_rest(-dot(axis, way) / distance, cos_normals, sine(cos_normals));
         double off_normal = cosine_of_rest(off_axis, cos_box, sin_box);
         if (off_normal < cos_emission - ROUNDING) return 0;
-        double risen = dot(normal, way) / distance;
-        double facing = cosine_of_rest(through ? std::fabs(risen) : risen, cos_box, sin_box);
+        double above = dot(normal, way), smooth = dot(shading, way);  // light behind the true surface counts before the smooth one
+        double risen = (through ? larger(std::fabs(above), std::fabs(smooth)) : larger(above, smooth)) / distance;
+        double facing = cosine_of_rest(risen, cos_box, sin_box);
         return smaller(intensity / squared, MOST) * larger(off_normal, 0.0) * larger(facing, 0.0);
     }
     // How much a split costs that leaves these lights together: what they give, over the directions and from the places they may.

@@ -81,7 +81,7 @@ class LightTree {
     double importance(uint32_t node, const Interaction& point, bool through, int further = FURTHER) const {
         const Node& here = nodes_[node];
         if (further == 0 || here.light != NONE || !here.bounds.is_around(point.position))
-            return here.bounds.importance(point.position, point.normal, through);
+            return here.bounds.importance(point.position, point.normal, point.shading, through);
         return importance(node + 1, point, through, further - 1) + importance(here.second, point, through, further - 1);
     }
 
