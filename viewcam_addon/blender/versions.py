@@ -17,8 +17,6 @@ _LINEAR = 1  # an enum's number, as foreach_set takes it
 DEFAULT_SURFACE_BENDS_NORMALS = bpy.app.version >= (5, 0)
 # How Cycles reads a mesh in which flat faces stand beside smooth ones (export_geometry.py). Measured: 4.2, 4.5, 5.0 and 5.2.
 CYCLES_KEEPS_FLAT_FACES = bpy.app.version < (5, 1)
-# Whether coats have their normals bent as other lobes have them. Measured: 4.2, 5.0 and 5.2.
-COATS_BEND_NORMALS = bpy.app.version >= (5, 0)
 # Whether meshes can keep custom normals as they are given; before, as two angles of 16 bits. Measured: 4.2, 4.5, 5.0 and 5.2.
 MESHES_KEEP_NORMALS = bpy.app.version >= (4, 5)
 

@@ -8,9 +8,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import versions
 from viewcam_addon.blender.rendering import job
-from viewcam_addon.blender.scenes import shaders as shaders_read
 from viewcam_addon.tracer import render
 
 COLOUR = (0.8, 0.5, 0.2, 1.0)
@@ -29,8 +27,7 @@ def shaders():
     yield PRINCIPLED, {"Base Color": COLOUR}, {}, ("Normal",)
     yield PRINCIPLED, {"Base Color": COLOUR, "Metallic": 1.0}, {}, ("Normal",)
     coat = {"Base Color": COLOUR, "Coat Weight": 0.8, "Coat Roughness": 0.4}
-    own = [("Coat Normal",), ("Normal", "Coat Normal")] if versions.COATS_BEND_NORMALS else []
-    for mapped in (("Normal",), *own):
+    for mapped in (("Normal",), ("Coat Normal",), ("Normal", "Coat Normal")):
         yield PRINCIPLED, coat, {}, mapped
     if bpy.app.version >= (4, 3):
         yield "ShaderNodeBsdfMetallic", {"Roughness": 0.5}, {}, ("Normal",)
@@ -187,13 +184,6 @@ def test_every_space_and_strength_is_cycles(patches):
     check(patches(cases), cases)
 
 
-def test_a_coats_own_normal_is_named_where_it_is_not_modelled(make_material):
-    material = make_material("Coated", PRINCIPLED, Coat_Weight=0.5)
-    map_normals(material, ("Coat Normal",), (0.7, 0.4, 0.9))
-    told = ["has a Coat Normal" in reason for reason in shaders_read.read(material).reasons]
-    assert told == ([] if versions.COATS_BEND_NORMALS else [True])
-
-
 def test_every_shader_is_bumped_by_heights_as_in_cycles(patches):
     cases = [(shader, {}) for shader in shaders()]
     check(patches(cases, bump), cases, p50=3e-5)
@@ -318,7 +308,16 @@ def tilted(shown, camera, add, make_material):
         (DIFFUSE, rough, {}),
         ("ShaderNodeBsdfTranslucent", {}, {}),
         *((f"ShaderNodeBsdf{kind}", rough, {"distribution": "GGX"}) for kind in ("Glossy", "Glass", "Refraction")),
-        *((PRINCIPLED, inputs, {}) for inputs in (bare, {}, {"Metallic": 1.0}, {"Transmission Weight": 0.7})),
+        *(
+            (PRINCIPLED, inputs, {})
+            for inputs in (
+                bare,
+                {},
+                {"Metallic": 1.0},
+                {"Transmission Weight": 0.7},
+                {"Coat Weight": 0.8, "Coat Roughness": 0.4},
+            )
+        ),
     ]
 
     def show():

@@ -441,9 +441,6 @@ class _Tree(_Reader):
         """The node that makes a normal, where one does and is modelled."""
         of = output.input(theirs)
         source = of and nodes.source(of)
-        if isinstance(source, Output) and name == "coat_normal" and not versions.COATS_BEND_NORMALS:
-            self._reason(output, "has a Coat Normal, which is modelled from 5.0 on")
-            return {}
         if isinstance(source, Output) and source.node.type == "BUMP" and _constant(source.input("Height")) is not None:
             return self._normal(source, name, "Normal")
         made = self._value(source) if isinstance(source, Output) else None

@@ -89,7 +89,7 @@ struct PrincipledClosure {
     Vec3 below_coat(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
         double share = larger(at.number(coat_weight), 0.0);
         if (!(share > NEGLIGIBLE)) return weight;
-        Vec3 normal = at.version < CYCLES_5_0 ? at.normal(coat_normal) : at.specular_normal(coat_normal);  // not the base's where it has none
+        Vec3 normal = at.specular_normal(coat_normal);  // not the base's where it has none
         double cosine = -dot(normal, at.incoming), eta = larger(at.number(coat_ior), 1.0);
         Microfacets facets = facets_of(at.number(coat_roughness));
         Scattering scattered;
