@@ -67,7 +67,7 @@ class LightSampler {
         hierarchy_ = build_bvh(placed_.size(), [&](size_t i) { return lights_[placed_[i]].bounds()->box; }, 1, 1);
         count_ = int(meshes);
         random_ = count_ > 1 || (count_ == 1 && lights_[0].is_sized());
-        if (count_ > FEW) plant();
+        if (count_ > FEW) build_tree();
     }
 
     const Environment& environment() const { return *environment_; }
@@ -187,7 +187,7 @@ class LightSampler {
         return brought > 0 || is_black(shading - normal) ? brought : lights_[light].estimate(point.position, normal);
     }
 
-    void plant() {
+    void build_tree() {
         constexpr double LEAST = 1e-100, MOST = 1e100;  // of which sums and quotients are numbers
         std::vector<LightTree::Leaf> leaves;
         for (uint32_t i = 0; i < uint32_t(count_); i++) {
@@ -202,7 +202,8 @@ class LightSampler {
             reached_.push_back(reached += 0.5 * smaller(lights_[i].irradiance(), MOST) / total + 0.5 / double(apart_.size()));
         if (!reached_.empty()) reached_.back() = 1;
     }
-    // That of many lights one at infinity is picked: between a quarter and three, but where there is nothing else to pick.
+    // That of many lights one at infinity is picked: between one and three quarters, since the tree's part is only a bound, but where
+    // there is nothing else to pick.
     double chance_apart(const Interaction& point, bool through) const {
         if (apart_.empty()) return 0;
         double placed = tree_.importance(point, through);
