@@ -1,7 +1,7 @@
 """Camera presets: those that come along, and an artist's own."""
 
 import math
-from pathlib import Path
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -12,44 +12,58 @@ from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender.interface import panel, presets
 from viewcam_addon.pinhole import Pinhole
 
-NAMES = {Path(path).stem: str(path) for path in (presets.SHIPPED / "presets" / presets.FOLDER).glob("*.py")}
 LENSES = [24, 35, 50, 85]
 
 # The frames of the canonical axes as DESIGN's text has them, u, v, w; along the third axis as everywhere else.
 FRAMES = {
-    "y_up,_along_-z": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
-    "y_up,_looking_down": ((0, 0, 1), (1, 0, 0), (0, 1, 0)),
-    "y_up,_looking_up": ((1, 0, 0), (0, 0, 1), (0, -1, 0)),
-    "z_up,_along_y": ((1, 0, 0), (0, 0, 1), (0, -1, 0)),
-    "z_up,_looking_down": ((0, -1, 0), (1, 0, 0), (0, 0, 1)),
-    "z_up,_looking_up": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
+    "Y Up, Along -Z": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    "Y Up, Looking Down": ((0, 0, 1), (1, 0, 0), (0, 1, 0)),
+    "Y Up, Looking Up": ((1, 0, 0), (0, 0, 1), (0, -1, 0)),
+    "Z Up, Along Y": ((1, 0, 0), (0, 0, 1), (0, -1, 0)),
+    "Z Up, Looking Down": ((0, -1, 0), (1, 0, 0), (0, 0, 1)),
+    "Z Up, Looking Up": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
 }
 
 
 @pytest.fixture
 def own_presets(tmp_path, monkeypatch):
-    """The folder that presets are saved in and looked for, beside those that come along."""
+    """The folder that presets are saved in and looked for."""
     folder = tmp_path / "presets" / presets.FOLDER
     folder.mkdir(parents=True)
-    looked_for = bpy.utils.preset_paths
     monkeypatch.setattr(bpy.utils, "user_resource", lambda *_arguments, **_options: str(folder))
-    monkeypatch.setattr(bpy.utils, "preset_paths", lambda subdir: [str(folder), *looked_for(subdir)])
+    monkeypatch.setattr(bpy.utils, "preset_paths", lambda _subdir: [str(folder)])
     return folder
 
 
 def execute(name):
-    return bpy.ops.viewcam.execute_preset(filepath=NAMES.get(name, name))
+    return bpy.ops.viewcam.execute_preset(shipped=name)
 
 
 def values(camera_object):
     return camera_object.virtual_pinhole.numbers()
 
 
-def test_blender_finds_those_that_come_along(registered_addon):
-    assert str(presets.SHIPPED / "presets" / presets.FOLDER) in bpy.utils.preset_paths(presets.FOLDER)
-    assert NAMES.keys() == {f"Lens_{lens}_mm" for lens in LENSES} | FRAMES.keys()
-    for name in NAMES:
-        assert bpy.utils.preset_find(bpy.path.display_name(name, title_case=False), presets.FOLDER, display_name=True)
+def test_those_that_come_along_are_the_texts_views_and_four_lenses():
+    assert presets.SHIPPED.keys() == {f"Lens {lens} mm" for lens in LENSES} | FRAMES.keys()
+
+
+def listed():
+    """The texts that the list shows."""
+
+    class Shown:
+        layout = MagicMock()
+        path_menu = presets.VIEWCAM_PT_presets.path_menu
+
+    presets.VIEWCAM_PT_presets.draw(Shown(), bpy.context)
+    return [call.kwargs["text"] for call in Shown.layout.mock_calls if call.kwargs.get("text")]
+
+
+def test_the_list_shows_those_that_come_along_then_ones_own_and_misses_no_folder(posed_camera, own_presets, monkeypatch):
+    assert listed() == [*presets.SHIPPED]
+    bpy.ops.viewcam.add_preset(name="Mine")
+    assert listed() == [*presets.SHIPPED, "Mine"]
+    monkeypatch.setattr(bpy.utils, "preset_paths", lambda _subdir: [])
+    assert listed() == [*presets.SHIPPED]
 
 
 @pytest.mark.parametrize("name", FRAMES)
@@ -66,7 +80,7 @@ def test_a_view_is_the_texts_own_to_the_last_bit_and_leaves_the_lens(posed_camer
 def test_a_lens_has_its_angle_in_any_picture_and_leaves_the_view(posed_camera, scene, lens, size):
     scene.render.resolution_x, scene.render.resolution_y = size
     before = values(posed_camera)[:3]
-    execute(f"Lens_{lens}_mm")
+    execute(f"Lens {lens} mm")
     assert values(posed_camera)[:3] == before
     # An angle in degrees, its half in radians and its tangent: each is rounded once, and the tangent takes on their errors.
     assert values(posed_camera)[3] == pytest.approx(max(size) * lens / 36, rel=8 * 2.0**-53)
@@ -74,7 +88,7 @@ def test_a_lens_has_its_angle_in_any_picture_and_leaves_the_view(posed_camera, s
     assert (data.lens, data.sensor_width) == (pytest.approx(lens, rel=2.0**-23), 36)
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if "looking" in name])
+@pytest.mark.parametrize("name", [name for name in FRAMES if "Looking" in name])
 def test_no_preset_warns_of_itself(posed_camera, scene, name):
     execute(name)
     assert panel.notices(posed_camera, scene) == []
@@ -82,7 +96,7 @@ def test_no_preset_warns_of_itself(posed_camera, scene, name):
 
 def test_a_preset_enables_a_camera_that_was_set_otherwise(camera_object, scene):
     camera_object.location = (1, 2, 3)
-    execute("Lens_50_mm")
+    execute("Lens 50 mm")
     assert camera_object.virtual_pinhole.enabled and values(camera_object)[0] == (1, 2, 3)
 
 
@@ -93,17 +107,14 @@ def test_what_is_saved_comes_back_in_float64(posed_camera, own_presets, scene, a
     (saved,) = own_presets.glob("*.py")
     other = add_camera("Other")
     bpy.context.view_layer.objects.active = other
-    execute(str(saved))
+    bpy.ops.viewcam.execute_preset(filepath=str(saved))
     assert values(other) == exact
 
 
-def test_an_own_preset_can_be_removed_and_one_that_comes_along_can_not(posed_camera, own_presets, capfd):
+def test_an_own_preset_can_be_removed(posed_camera, own_presets):
     bpy.ops.viewcam.add_preset(name="Mine")
     assert bpy.ops.viewcam.add_preset(name="Mine", remove_name=True) == {"FINISHED"}
     assert list(own_presets.iterdir()) == []
-    assert bpy.ops.viewcam.add_preset(name="Lens 35 mm", remove_name=True) == {"CANCELLED"}
-    assert "comes with the add-on" in capfd.readouterr().out
-    assert Path(NAMES["Lens_35_mm"]).is_file()
 
 
 def test_errors_are_one_sentence_and_leave_no_file(camera_object, own_presets, scene, tmp_path):
@@ -112,10 +123,10 @@ def test_errors_are_one_sentence_and_leave_no_file(camera_object, own_presets, s
         bpy.ops.viewcam.add_preset(name="Mine")
     assert "Traceback" not in str(error.value) and list(own_presets.iterdir()) == []
     with pytest.raises(RuntimeError, match="is orthographic, no pinhole") as error:
-        execute("Lens_35_mm")
+        execute("Lens 35 mm")
     assert "Traceback" not in str(error.value)
     with pytest.raises(RuntimeError, match="The preset can't be read"):
-        execute(str(tmp_path / "gone.py"))
+        bpy.ops.viewcam.execute_preset(filepath=str(tmp_path / "gone.py"))
     bpy.data.objects.remove(camera_object)
     with pytest.raises(RuntimeError, match="There is no camera"):
         bpy.ops.viewcam.add_preset(name="Mine")

@@ -1,11 +1,12 @@
 """Presets of cameras, as Blender's own: a popover in the panel's header, with what comes along and what an artist has added.
 
-A preset is a Python file in a folder of that name, as all of Blender's are: it pastes a camera as text (clipboard.py), with all
-digits of float64, and may say the lens alone or the view alone. Blender's operator that runs presets leaves no undo step; ours
-does. Rejected: Blender's way to write a preset, which lists properties, in float32, and moves the camera at each of them.
+A preset pastes a camera as text (clipboard.py), with all digits of float64, and may say the lens alone or the view alone. What
+comes along is a table; what an artist adds is a Python file in a folder of that name, as all of Blender's are. Blender's
+operator that runs presets leaves no undo step; ours does. Rejected: Blender's way to write a preset, which lists properties, in
+float32, and moves the camera at each of them.
 """
 
-from pathlib import Path
+import math
 from typing import ClassVar
 
 import bpy
@@ -18,15 +19,43 @@ from .. import datablocks
 from . import clipboard
 
 FOLDER = "virtual_pinhole"
-# Where Blender looks for presets/FOLDER.
-SHIPPED = Path(__file__).resolve().parent / "scripts"
+
+
+def _lens(millimetres: float) -> str:
+    """The angle of 36 mm, the longer side of a full frame."""
+    return f"fov={math.degrees(2 * math.atan(18 / millimetres))!r} axis=larger"
+
+
+SHIPPED = {
+    "Lens 24 mm": _lens(24),
+    "Lens 35 mm": _lens(35),
+    "Lens 50 mm": _lens(50),
+    "Lens 85 mm": _lens(85),
+    "Y Up, Along -Z": "eye=(0, 0, 10) look_at=(0, 0, 0) up=(0, 1, 0)",
+    "Y Up, Looking Down": "eye=(0, 10, 0) look_at=(0, 0, 0) up=(1, 0, 0)",
+    "Y Up, Looking Up": "eye=(0, -10, 0) look_at=(0, 0, 0) up=(0, 0, 1)",
+    "Z Up, Along Y": "eye=(0, -10, 0) look_at=(0, 0, 0) up=(0, 0, 1)",
+    "Z Up, Looking Down": "eye=(0, 0, 10) look_at=(0, 0, 0) up=(1, 0, 0)",
+    "Z Up, Looking Up": "eye=(0, 0, -10) look_at=(0, 0, 0) up=(0, -1, 0)",
+}
+"""What comes along, by the name that is shown."""
 
 
 class VIEWCAM_PT_presets(PresetPanel, bpy.types.Panel):
     bl_label = "Virtual Pinhole Presets"
-    preset_subdir = FOLDER
-    preset_operator = "viewcam.execute_preset"
-    preset_add_operator = "viewcam.add_preset"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        self.layout.emboss = "PULLDOWN_MENU"
+        self.layout.operator_context = "EXEC_DEFAULT"
+        column = self.layout.column(align=True)
+        for name in SHIPPED:
+            column.operator(VIEWCAM_OT_execute_preset.bl_idname, text=name).shipped = name
+        self.path_menu(
+            iter(bpy.utils.preset_paths(FOLDER)),  # of a list of none Blender would say that paths are missing
+            VIEWCAM_OT_execute_preset.bl_idname,
+            filter_ext=lambda suffix: suffix == ".py",
+            add_operator=VIEWCAM_OT_add_preset.bl_idname,
+        )
 
 
 class VIEWCAM_OT_execute_preset(bpy.types.Operator):
@@ -36,10 +65,14 @@ class VIEWCAM_OT_execute_preset(bpy.types.Operator):
     bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO", "INTERNAL"}
 
     filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    shipped: bpy.props.EnumProperty(items=[(name, name, "") for name in SHIPPED], options={"HIDDEN", "SKIP_SAVE"})
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
         try:
-            bpy.utils.execfile(self.filepath)
+            if self.filepath:
+                bpy.utils.execfile(self.filepath)
+            else:
+                bpy.ops.viewcam.paste_camera(text=SHIPPED[self.shipped])
         except OSError as error:
             self.report({"ERROR"}, f"The preset can't be read ({error.strerror}): remove it")
             return {"CANCELLED"}
@@ -60,10 +93,6 @@ class VIEWCAM_OT_add_preset(AddPresetBase, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         if self.remove_name or self.remove_active:
-            found = bpy.utils.preset_find(self.name, FOLDER, display_name=True)
-            if found and SHIPPED in Path(found).resolve().parents:
-                self.report({"WARNING"}, "This preset comes with the add-on: only your own can be removed")
-                return {"CANCELLED"}
             return super().execute(context)
         try:
             camera_object = datablocks.camera_in(context)
@@ -82,11 +111,3 @@ class VIEWCAM_OT_add_preset(AddPresetBase, bpy.types.Operator):
 
 
 CLASSES = (VIEWCAM_PT_presets, VIEWCAM_OT_execute_preset, VIEWCAM_OT_add_preset)
-
-
-def register() -> None:
-    bpy.utils.register_preset_path(str(SHIPPED))
-
-
-def unregister() -> None:
-    bpy.utils.unregister_preset_path(str(SHIPPED))

@@ -1,4 +1,0 @@
-import bpy
-
-# The angle of 36 mm, the longer side of a full frame.
-bpy.ops.viewcam.paste_camera(text="fov=23.913168486298265 axis=larger")
