@@ -46,16 +46,13 @@ ROOMS = {
     "intrinsics": "errors checks pinhole",
     "camera_values": "errors checks pinhole roll intrinsics",
     "cameras": "errors checks files pinhole intrinsics",
-    "datasets": "files pinhole cameras",
     "comparison": "errors files html_page pinhole image png",
     "tracer": "errors checks memory files pinhole image",
     "labels": "errors files png pinhole image cameras tracer",
     "api": "errors child_process image comparison tracer labels",
     "pytest_plugin": "errors junit api",
     "shots": "errors checks files terminal pinhole moves tracer",
-    "batch": (
-        "errors checks files events html_page child_process pinhole image cameras datasets comparison tracer labels shots"
-    ),
+    "batch": ("errors checks files events html_page child_process pinhole image cameras comparison tracer labels shots"),
     "blender": (
         "errors checks files terminal html_page child_process png pinhole roll rotation moves diagram photo_match image "
         "intrinsics camera_values cameras comparison tracer labels shots batch"

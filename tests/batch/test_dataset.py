@@ -7,7 +7,7 @@ import pytest
 
 from viewcam_addon.batch import dataset
 from viewcam_addon.batch.folder import Folder, write_json
-from viewcam_addon.datasets import record
+from viewcam_addon.cameras import sidecar as record
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.shots import Shot

@@ -10,7 +10,8 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from viewcam_addon import cameras
-from viewcam_addon.datasets import View, colmap
+from viewcam_addon.cameras import colmap
+from viewcam_addon.cameras.camera import Camera
 from viewcam_addon.errors import InputError
 from viewcam_addon.files import written_whole
 from viewcam_addon.pinhole import Pinhole
@@ -18,7 +19,7 @@ from viewcam_addon.pinhole import Pinhole
 AHEAD = Pinhole((0, -5, 0), (0, 0, 0), (0, 0, 1), 1200.0, 640, 360)
 ABOVE = Pinhole((1, 2, 9), (1, 2, 0), (0, 0, 1), 1200.0, 640, 360)
 WIDE_PIXELS = Pinhole((0, -5, 0), (0, 0, 0), (0, 0, 1), (1200.0, 800.0), 640, 360, (300.0, 150.0))
-THREE = [View("a.png", AHEAD), View("below/b.png", WIDE_PIXELS), View("c.png", ABOVE)]
+THREE = [Camera("a", AHEAD), Camera("below/b", WIDE_PIXELS), Camera("c", ABOVE)]
 
 UNIT = 2.0**-53
 
@@ -71,7 +72,7 @@ triples = st.tuples(coordinates, coordinates, coordinates)
 @example((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), (0.0, -1.0, 0.0))  # half a turn about y
 def test_the_quaternion_has_length_1_and_its_first_number_that_is_not_0_is_positive(eye, look_at, up):
     assume(eye != look_at and any(up))
-    texts = colmap.texts([View("a.png", Pinhole(eye, look_at, up, 1.0, 1, 1))])
+    texts = colmap.texts([Camera("a", Pinhole(eye, look_at, up, 1.0, 1, 1))])
     quaternion = [float(text) for text in content(texts["images.txt"])[0].split(" ")[1:5]]
     excess = abs(sum(Fraction(number) ** 2 for number in quaternion) - 1)
     # Of the length: half of 4 roundings of the sum of squares, one of the root, and one of each quotient.
@@ -82,13 +83,13 @@ def test_the_quaternion_has_length_1_and_its_first_number_that_is_not_0_is_posit
 
 def test_the_numbers_have_the_digits_of_float64():
     pinhole = Pinhole((0.1, 1e-7, 1 / 3), (1e6, 2, 3), (0, 0, 1), 1e5 / 3, 640, 360, (1 / 7, 2.0**-30))
-    camera = content(colmap.texts([View("a.png", pinhole)])["cameras.txt"])[0].split(" ")[4:]
+    camera = content(colmap.texts([Camera("a", pinhole)])["cameras.txt"])[0].split(" ")[4:]
     assert [float(text) for text in camera] == [1e5 / 3, 1 / 7, 360 - 2.0**-30]
 
 
 def test_the_three_files_are_written_and_nothing_else_with_the_same_bytes_each_time(tmp_path):
     for folder in ("one", "two"):
-        colmap.write(tmp_path / folder / "sparse" / "0", THREE)
+        cameras.save(THREE, tmp_path / folder / "sparse" / "0", "colmap")
     one, two = (
         {path.name: path.read_bytes() for path in (tmp_path / folder / "sparse" / "0").iterdir()} for folder in ("one", "two")
     )
@@ -110,7 +111,7 @@ def test_where_one_can_not_be_written_it_and_the_images_stay_as_they_were(tmp_pa
 
     monkeypatch.setattr(cameras, "written_whole", on_a_full_disk)
     with pytest.raises(InputError, match=failing):
-        colmap.write(tmp_path, THREE)
+        cameras.save(THREE, tmp_path, "colmap")
     left = {path.name: path.read_text() for path in tmp_path.iterdir()}
     assert left.keys() == colmap.texts(THREE).keys(), "a temporary file stayed"
     assert left[failing] == left["images.txt"] == "older", "images.txt must not be newer than the cameras it names"
@@ -118,7 +119,7 @@ def test_where_one_can_not_be_written_it_and_the_images_stay_as_they_were(tmp_pa
 
 def test_the_translation_is_within_three_roundings_of_exact():
     pinhole = Pinhole((12345.678, -0.1, 1e-3), (1, 2, 3), (0.3, 0.1, 1), 1.0, 1, 1)
-    translation = [float(text) for text in content(colmap.texts([View("a.png", pinhole)])["images.txt"])[0].split(" ")[5:8]]
+    translation = [float(text) for text in content(colmap.texts([Camera("a", pinhole)])["images.txt"])[0].split(" ")[5:8]]
     u, v, w = pinhole.axes()
     for sign, axis, have in zip((-1, 1, 1), (u, v, w), translation, strict=True):
         exact = sign * sum(Fraction(a) * Fraction(b) for a, b in zip(axis, pinhole.eye, strict=True))

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from viewcam_addon.cameras import axes
-from viewcam_addon.datasets import record
+from viewcam_addon.cameras import sidecar as record
 from viewcam_addon.pinhole import Pinhole
 
 PAGE = Path(__file__).parents[2] / "docs" / "datasets.md"

@@ -7,7 +7,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from viewcam_addon.datasets import View, colmap, record, transforms
+from viewcam_addon.cameras import colmap, transforms
+from viewcam_addon.cameras import sidecar as record
+from viewcam_addon.cameras.camera import Camera
 from viewcam_addon.pinhole import Pinhole
 
 FILE = "images/one.png"
@@ -51,13 +53,13 @@ seeds = st.integers(0, 2**32 - 1)
 
 @given(pinholes(), seeds)
 def test_nerfstudio_sees_what_the_pinhole_sees(readers, hold_together, pinhole, seed):
-    text = json.dumps(transforms.document([View(FILE, pinhole)]))
+    text = json.dumps(transforms.document([Camera("view", pinhole, image=FILE)]))
     hold_together(readers["transforms"](text)[FILE], pinhole, points_before(pinhole, seed))
 
 
 @given(pinholes(), seeds)
 def test_colmap_sees_what_the_pinhole_sees(readers, hold_together, pinhole, seed):
-    texts = colmap.texts([View(FILE, pinhole)])
+    texts = colmap.texts([Camera("view", pinhole, image=FILE)])
     hold_together(readers["colmap"](texts)[FILE], pinhole, points_before(pinhole, seed))
 
 
@@ -72,5 +74,7 @@ def test_straight_down_and_up_are_among_the_poses(readers, hold_together, height
     pinhole = Pinhole((1, 2, height), (1, 2, 0), (0, 0, 1), 500.0, 320, 180)
     assert pinhole.is_singular
     points = points_before(pinhole, 1)
-    hold_together(readers["colmap"](colmap.texts([View(FILE, pinhole)]))[FILE], pinhole, points)
-    hold_together(readers["transforms"](json.dumps(transforms.document([View(FILE, pinhole)])))[FILE], pinhole, points)
+    hold_together(readers["colmap"](colmap.texts([Camera("view", pinhole, image=FILE)]))[FILE], pinhole, points)
+    hold_together(
+        readers["transforms"](json.dumps(transforms.document([Camera("view", pinhole, image=FILE)])))[FILE], pinhole, points
+    )

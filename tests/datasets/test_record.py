@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from viewcam_addon import cameras
-from viewcam_addon.datasets import View, record, transforms
+from viewcam_addon.cameras import sidecar as record
+from viewcam_addon.cameras import transforms
+from viewcam_addon.cameras.camera import Camera
 from viewcam_addon.intrinsics import CameraData
 from viewcam_addon.pinhole import Pinhole
 
@@ -34,7 +36,7 @@ def test_the_two_matrices_are_inverse_to_each_other_but_for_the_direction_of_y_a
     turned = np.array(document["cameraToWorld"]) @ np.diag([1.0, -1, -1, 1])
     # Four roundings of products of numbers up to |e| ≈ 10, and axes that are within 4e-16 of perpendicular.
     assert np.abs(turned @ document["worldToCamera"] - np.eye(4)).max() < 10 * (4 * 2.0**-53 + 2 * 4e-16)
-    assert document["cameraToWorld"] == transforms.document([View("a.png", PINHOLE)])["frames"][0]["transform_matrix"]
+    assert document["cameraToWorld"] == transforms.document([Camera("a", PINHOLE)])["frames"][0]["transform_matrix"]
 
 
 def test_a_mirrored_camera_has_its_x_to_the_left_and_a_negative_determinant():

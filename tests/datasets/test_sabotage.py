@@ -5,7 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from viewcam_addon.datasets import View, colmap, record, transforms
+from viewcam_addon.cameras import colmap, transforms
+from viewcam_addon.cameras import sidecar as record
+from viewcam_addon.cameras.camera import Camera
 from viewcam_addon.pinhole import Pinhole
 
 # Not symmetric in anything: pixels, principal point, roll.
@@ -60,7 +62,7 @@ def held(readers, hold_together):
 
 
 def picture_and_frame():
-    document = transforms.document([View("a.png", PINHOLE)])
+    document = transforms.document([Camera("a", PINHOLE)])
     (frame,) = document.pop("frames")
     return document, frame
 
@@ -75,7 +77,7 @@ def test_without_a_fault_all_of_them_hold(held):
     picture, frame = picture_and_frame()
     held("transforms", json.dumps(picture | {"frames": [frame]}))
     held("transforms", json.dumps(with_angles(picture) | {"frames": [frame]}))
-    held("colmap", colmap.texts([View("a.png", PINHOLE)]))
+    held("colmap", colmap.texts([Camera("a", PINHOLE)]))
     held("record", record.record(PINHOLE))
 
 
@@ -116,12 +118,12 @@ def test_a_wrong_camera_of_colmap_is_caught(held, fault):
     wrong = PICTURE[fault](picture)
     line = " ".join(["1 PINHOLE", *(repr(wrong[key]) for key in ("w", "h", "fl_x", "fl_y", "cx", "cy"))])
     with pytest.raises(AssertionError, match="pixels off"):
-        held("colmap", colmap.texts([View("a.png", PINHOLE)]) | {"cameras.txt": line + "\n"})
+        held("colmap", colmap.texts([Camera("a", PINHOLE)]) | {"cameras.txt": line + "\n"})
 
 
 @pytest.mark.parametrize("fault", LINE)
 def test_a_wrong_pose_of_colmap_is_caught(held, fault):
-    texts = colmap.texts([View("a.png", PINHOLE)])
+    texts = colmap.texts([Camera("a", PINHOLE)])
     number, *pose, camera, name = texts["images.txt"].splitlines()[-2].split(" ")
     pose = [float(text) for text in pose]
     quaternion, translation = LINE[fault](pose[:4], pose[4:])
@@ -131,7 +133,7 @@ def test_a_wrong_pose_of_colmap_is_caught(held, fault):
 
 
 def test_a_missing_line_of_image_points_is_caught(held):
-    texts = colmap.texts([View("a.png", PINHOLE), View("b.png", PINHOLE)])
+    texts = colmap.texts([Camera("a", PINHOLE), Camera("b", PINHOLE)])
     with pytest.raises(AssertionError, match="image points"):
         held("colmap", texts | {"images.txt": texts["images.txt"].replace("\n\n", "\n")})
 

@@ -7,8 +7,8 @@ dataset is of all shots of the list or there is none: programs that learn from o
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..cameras import Camera, colmap, save, transforms
 from ..cameras.naming import several
-from ..datasets import View, colmap, transforms
 from ..errors import InputError
 from ..pinhole import Pinhole
 from ..shots import Shot
@@ -41,14 +41,14 @@ def write(folder: Folder, shots: Sequence[Shot], settings: Mapping[str, str], su
     missing = [name for name, record in records.items() if record is None]
     if missing:
         return f"no dataset is written, since {len(missing)} of {len(shots)} shots are missing: {several(missing)}"
-    views = [View(f"{name}.{suffix}", _camera(folder, name, record)) for name, record in records.items()]
-    model = folder.path.joinpath(*MODEL)
-    colmap.write(model, views)
-    transforms.write(folder.path / transforms.FILE, views)
-    return f"dataset of {len(views)} pictures: {folder.path / transforms.FILE} and {model}"
+    cameras = [Camera(name, _pinhole(folder, name, record), image=f"{name}.{suffix}") for name, record in records.items()]
+    model, file = folder.path.joinpath(*MODEL), folder.path / transforms.FILE
+    save(cameras, model, "colmap")
+    save(cameras, file, "transforms")
+    return f"dataset of {len(cameras)} pictures: {file} and {model}"
 
 
-def _camera(folder: Folder, name: str, record: Mapping[str, Any]) -> Pinhole:
+def _pinhole(folder: Folder, name: str, record: Mapping[str, Any]) -> Pinhole:
     try:
         return Pinhole(**record["camera"])
     except (KeyError, TypeError, InputError) as error:

@@ -38,7 +38,7 @@ class Renderer(Protocol):
 
         Both paths are temporary, in the batch's folder: the caller renames them, and removes them after an error.
 
-        Returns what the sidecar says of it: the keys of datasets.record, and `stated`, `rendered`, `warnings`, `versions`.
+        Returns what the sidecar says of it: the keys of cameras/sidecar.py, and `stated`, `rendered`, `warnings`, `versions`.
         The same shot gives the same bytes and the same values each time.
         """
         ...
