@@ -66,6 +66,7 @@ ROOMS = {
 BLENDER_ROOMS = {
     "versions": "",
     "temporary_settings": "",
+    "another_blender": "",
     "opening": "temporary_settings",
     "picture": "temporary_settings",
     "findings": "",
@@ -83,8 +84,8 @@ BLENDER_ROOMS = {
     "dataset_cameras": "opening datablocks camera",
     "own_picture": "",
     "animation": "versions datablocks storage targets camera resolution",
-    "scenes": "versions temporary_settings picture findings datablocks pose camera",
-    "rendering": "versions temporary_settings opening datablocks resolution scenes",
+    "scenes": "versions temporary_settings another_blender picture findings datablocks pose camera",
+    "rendering": "versions temporary_settings another_blender opening datablocks resolution scenes",
     "interface": (
         "versions temporary_settings picture findings render_settings preferences datablocks storage targets hold suspects "
         "pose camera own_picture scenes rendering"

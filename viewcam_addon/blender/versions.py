@@ -31,6 +31,11 @@ def light_tree(light: bpy.types.Light) -> bpy.types.NodeTree | None:
     return light.node_tree if bpy.app.version >= (5, 2) or light.use_nodes else None
 
 
+def panorama(camera: bpy.types.Camera) -> bpy.types.bpy_struct:
+    """What has the settings of a panoramic camera. Until 4.5 they are the add-on's."""
+    return camera if hasattr(camera, "panorama_type") else camera.cycles
+
+
 def shadow_terminator(block: bpy.types.Object) -> tuple[tuple[bpy.types.bpy_struct, str], ...]:
     """The properties by which Cycles lights what lies in the shadow of its own facets. In 4.2 and 4.3 they are the add-on's."""
     if bpy.app.version >= (4, 5):

@@ -7,11 +7,8 @@ the background.
 
 import functools
 import subprocess
-import sys
 
-import bpy
-
-from ... import child_process
+from .. import another_blender
 
 _DRAW = """
 import bpy
@@ -28,16 +25,7 @@ _LONGEST = 120  # seconds
 @functools.cache
 def are_there() -> bool:
     """Whether a Blender like this one draws; asked once, which takes seconds."""
-    if bpy.app.binary_path:
-        command = [bpy.app.binary_path, "--background", "--factory-startup", "--python-exit-code", "1", "--python-expr", _DRAW]
-    else:
-        command = [sys.executable, "-c", _DRAW]
-    # There stands a bpy that only this process can import.
-    variables = child_process.environment(apart_from=bpy.utils.system_resource("SCRIPTS"))
     try:
-        # In a session of its own: a Ctrl-C that is meant for the batch would end it, and look like no GPU.
-        how = {"env": variables, "start_new_session": True, "capture_output": True, "timeout": _LONGEST}
-        outcome = subprocess.run(command, **how, check=False)
+        return another_blender.run(_DRAW, _LONGEST).returncode == 0
     except (OSError, subprocess.TimeoutExpired):
         return False
-    return outcome.returncode == 0

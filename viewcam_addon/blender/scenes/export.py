@@ -120,19 +120,23 @@ def level_needed(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera
             for source, _ in placements(depsgraph, ledger, shading)
             for slot in source.used_slots
         ]
-        light = light_in(depsgraph, ledger)
+        light = light_in(depsgraph, ledger, render=False)
         return level_of(light.lamps, light.world, light.bounces, shown)[0]
 
     return visit_still(scene, view_layer, camera_object, look)
 
 
-def light_in(depsgraph: bpy.types.Depsgraph, ledger: Ledger, images: dict[str, Picture] | None = None) -> Lighting:
-    """What gives light in a depsgraph, and how it becomes a picture. images : receives the world's."""
+def light_in(
+    depsgraph: bpy.types.Depsgraph, ledger: Ledger, images: dict[str, Picture] | None = None, render: bool = True
+) -> Lighting:
+    """What gives light in a depsgraph, and how it becomes a picture. images : receives the world's. render : as in world_of."""
     scene = depsgraph.scene
     bounces = film.bounces_of(scene, ledger)
+    shown = world.shown_world(scene, depsgraph.view_layer_eval)
+    seen, suns = world.world_of(depsgraph.scene_eval, shown, ledger, images, render)
     return Lighting(
-        lamps=tuple(lamps.lamps_in(depsgraph, bounces, ledger)),
-        world=world.world_of(world.shown_world(scene, depsgraph.view_layer_eval), ledger, images),
+        lamps=(*lamps.lamps_in(depsgraph, bounces, ledger), *suns),
+        world=seen,
         film=film.film_of(scene),
         bounces=bounces,
     )

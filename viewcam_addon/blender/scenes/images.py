@@ -80,8 +80,11 @@ def picture_of(image: bpy.types.Image, alpha: bool = False) -> Picture:
     return Picture(np.ascontiguousarray(np.nan_to_num(rgb, posinf=0.0, neginf=0.0), np.float32), srgb)
 
 
-def image_of(picture: Picture, name: str, overrides: Overrides) -> bpy.types.Image:
-    """A packed image with these pixels until the overrides end: bytes where they are encoded, floats where they are linear."""
+def image_of(picture: Picture, name: str, overrides: Overrides, packed: bool = True) -> bpy.types.Image:
+    """An image with these pixels until the overrides end: bytes where they are encoded, floats where they are linear.
+
+    packed : whether it is to be saved with the file.
+    """
     height, width, channels = picture.pixels.shape
     image = bpy.data.images.new(
         name, width, height, alpha=channels == 4, float_buffer=not picture.srgb, is_data=not picture.srgb
@@ -92,7 +95,8 @@ def image_of(picture: Picture, name: str, overrides: Overrides) -> bpy.types.Ima
     pixels = np.concatenate([picture.pixels, np.ones((height, width, 4 - channels), np.float32)], axis=2)
     image.pixels.foreach_set(pixels.ravel())
     image.update()
-    image.pack()
+    if packed:
+        image.pack()
     return image
 
 

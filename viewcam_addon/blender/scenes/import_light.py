@@ -140,7 +140,26 @@ def _facing(towards: tuple[float, ...]) -> np.ndarray:
     return matrix
 
 
-def add_environment(adder: nodes.Adder, background: bpy.types.Node, made: World, image: bpy.types.Image) -> None:
+def add_world(adder: nodes.Adder, output: bpy.types.Node, made: World, shown: dict[str, bpy.types.Image]) -> None:
+    """Let a world's output show what lights and, where that is another world, what the camera sees.
+
+    shown : `World.image` → the image.
+    """
+    backgrounds = []
+    for each in filter(None, (made, made.backdrop)):
+        background = adder.add("ShaderNodeBackground", Color=(*each.radiance, 1.0), Strength=1.0)
+        if each.image is not None:
+            background.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+            _add_environment(adder, background, each, shown[each.image])
+        backgrounds.append(background.outputs[0])
+    surface = backgrounds[0]
+    if made.backdrop:
+        is_camera = adder.add("ShaderNodeLightPath").outputs["Is Camera Ray"]
+        surface = adder.add("ShaderNodeMixShader", is_camera, *backgrounds).outputs[0]
+    adder.link(surface, output.inputs["Surface"])
+
+
+def _add_environment(adder: nodes.Adder, background: bpy.types.Node, made: World, image: bpy.types.Image) -> None:
     """Let a Background node show an image that is wrapped around the world."""
     coordinates, mapping = adder.add("ShaderNodeTexCoord"), adder.add("ShaderNodeMapping", Rotation=made.rotation)
     texture = adder.add("ShaderNodeTexEnvironment")
@@ -173,19 +192,8 @@ def set_surroundings(scene: bpy.types.Scene, made: Scene, name: str, overrides: 
     world.node_tree.nodes.clear()
     adder = nodes.Adder(world.node_tree)
     output = adder.add("ShaderNodeOutputWorld")
-    backgrounds = []
-    for each in filter(None, (made.world, made.world.backdrop)):
-        background = adder.add("ShaderNodeBackground", Color=(*each.radiance, 1.0), Strength=1.0)
-        if each.image is not None:
-            background.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
-            add_environment(adder, background, each, image_from(made.images[each.image], each.image, overrides, ledger))
-        backgrounds.append(background.outputs[0])
-    shown = backgrounds[0]
-    if made.world.backdrop:
-        shown = adder.add(
-            "ShaderNodeMixShader", adder.add("ShaderNodeLightPath").outputs["Is Camera Ray"], *backgrounds
-        ).outputs[0]
-    adder.link(shown, output.inputs["Surface"])
+    shown = {key: image_from(made.images[key], key, overrides, ledger) for key in dict.fromkeys(made.world.images)}
+    add_world(adder, output, made.world, shown)
     _arrange(output, 0, {})
     overrides.set(scene, "world", world)
     overrides.set(scene.render, "film_transparent", made.film.transparent)

@@ -159,7 +159,7 @@ def _seen(
 ) -> tuple[_View, list[_Placed], dict[bpy.types.ID, _Copy]]:
     """What of the file is rendered; geometries are copied, and the copies gone when the overrides end."""
     if lit:
-        light_in(depsgraph, ledger)  # for what the ledger tells of the file's own lamps
+        light_in(depsgraph, ledger, render=False)  # for what the ledger tells of the file's own lamps
     view = _view(depsgraph, camera_object)
     eye = np.array(view.shown.eye)
     plain = materials.plain(overrides)

@@ -1,15 +1,15 @@
-"""Blender's world as the tracer's: one colour, an equirectangular image, or the mean of what is not modelled and why."""
+"""Blender's world as the tracer's: one colour, an equirectangular image, or what stands in for what is not modelled."""
 
 from dataclasses import replace
 from typing import NamedTuple
 
 import bpy
 
-from ...tracer.scene.lamps import World
+from ...tracer.scene.lamps import Sun, World
 from ...tracer.scene.materials import Picture
 from .. import versions
 from ..temporary_settings import Overrides
-from . import images, nodes, shaders, value_nodes
+from . import images, nodes, shaders, value_nodes, world_image
 from .ledger import Ledger
 from .nodes import Input, Output
 from .shaders import RGB
@@ -22,22 +22,29 @@ def shown_world(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> bpy.
     return view_layer.world_override or scene.world
 
 
-def world_of(world: bpy.types.World | None, ledger: Ledger, pictures: dict[str, Picture] | None = None) -> World:
-    """The tracer's world. What it approximates, Cycles is shown likewise. pictures : receives its image."""
+def world_of(
+    scene: bpy.types.Scene,
+    world: bpy.types.World | None,
+    ledger: Ledger,
+    pictures: dict[str, Picture] | None = None,
+    render: bool = True,
+) -> tuple[World, tuple[Sun, ...]]:
+    """The tracer's world, and suns that are part of it. What it approximates, Cycles is shown likewise.
+
+    scene : evaluated. pictures : receives its images. render : whether it may take the seconds in which another Blender renders
+    what is not modelled; without, what is returned stands for that.
+    """
     if world is None:
-        return World()
+        return World(), ()
     radiance, wrapped, reasons = _read(world, camera=False)
     backdrop, wrapped_there, reasons_there = _read(world, camera=True)
     reasons += [reason for reason in reasons_there if reason not in reasons]
+    if _has_volume(world):
+        ledger.note(world.name, "approximated", "the world has a volume, which is left out on both sides")
+        ledger.call_for_cycles(world.original, _leave_out_volume)
     missing = images.missing(versions.node_tree(world))
     for each in missing:
         ledger.note(world.name, "exported", f"the world {each}")
-    for reason in reasons:
-        ledger.note(world.name, "approximated", f"the world {reason}, and a constant one stands in")
-    # Of an image, even of one that is missing, Cycles samples light, which no constant world needs.
-    is_constant = wrapped is None and (backdrop, wrapped_there) == (radiance, None)
-    if reasons or (missing and is_constant):
-        ledger.call_for_cycles(world.original, _make_constant, radiance)
     original = world.original
     for owner, name, value in (
         (original.cycles, "max_bounces", 1024),
@@ -47,10 +54,50 @@ def world_of(world: bpy.types.World | None, ledger: Ledger, pictures: dict[str, 
         if hasattr(owner, name):  # versions know fewer of them
             ledger.set_for_cycles(owner, name, value)
     hidden_from = frozenset(ray for ray in _RAYS if not getattr(world.cycles_visibility, ray))
+    made = _rendered(scene, world, reasons, ledger, render) if reasons else None
+    if made:
+        if pictures is not None:
+            pictures |= made.pictures
+        return replace(made.world, hidden_from=hidden_from), made.suns
+    # Of an image, even of one that is missing, Cycles samples light, which no constant world needs.
+    is_constant = wrapped is None and (backdrop, wrapped_there) == (radiance, None)
+    if reasons or (missing and is_constant):
+        ledger.call_for_cycles(original, _make_constant, radiance)
     if reasons:
-        return World(radiance, hidden_from)
+        return World(radiance, hidden_from), ()
     seen = None if (radiance, wrapped) == (backdrop, wrapped_there) else _made(backdrop, wrapped_there, pictures)
-    return replace(_made(radiance, wrapped, pictures), hidden_from=hidden_from, backdrop=seen)
+    return replace(_made(radiance, wrapped, pictures), hidden_from=hidden_from, backdrop=seen), ()
+
+
+def _rendered(
+    scene: bpy.types.Scene, world: bpy.types.World, reasons: list[str], ledger: Ledger, render: bool
+) -> world_image.Rendered | None:
+    """The image that stands in for a world that is not modelled, or None where a constant one must."""
+    obstacle = world_image.obstacle(world)
+    made = None
+    if obstacle is None:
+        made = world_image.rendered(world, scene) if render else world_image.Rendered(World((1.0, 1.0, 1.0)), (), {})
+        obstacle = None if made else "can't be rendered by another Blender"
+    if made is None:
+        for reason in dict.fromkeys((*reasons, obstacle)):
+            ledger.note(world.name, "approximated", f"the world {reason}, and a constant one stands in")
+        return None
+    width = world_image.width(world)
+    image = f"an image of {width} × {width // 2} that Cycles renders of it stands in"
+    if made.suns:
+        image += ", with lamps that shine evenly for its suns"
+    for reason in reasons:
+        ledger.note(world.name, "approximated", f"the world {reason}, and {image}")
+    if world_image.tells_rays_apart(world):
+        ledger.note(
+            world.name, "approximated", "the world tells kinds of rays apart, and all but the camera's see what diffuse ones do"
+        )
+    hidden = frozenset(ray for ray in _RAYS if not getattr(world.cycles_visibility, ray))
+    if scene.render.film_transparent:
+        hidden |= {"camera"}
+    made = replace(made, suns=tuple(replace(sun, hidden_from=sun.hidden_from | hidden) for sun in made.suns))
+    ledger.call_for_cycles(world.original, world_image.show, scene.original, made, ledger)
+    return made
 
 
 def _made(radiance: RGB, wrapped: "_Wrapped | None", pictures: dict[str, Picture] | None) -> World:
@@ -67,6 +114,19 @@ class _Wrapped(NamedTuple):
     image: bpy.types.Image
     closest: bool
     rotation: tuple[float, float, float]
+
+
+def _has_volume(world: bpy.types.World) -> bool:
+    tree = versions.node_tree(world)
+    output = tree and tree.get_output_node("CYCLES")
+    return bool(output) and output.inputs["Volume"].is_linked
+
+
+def _leave_out_volume(overrides: Overrides, world: bpy.types.World) -> None:
+    before = world.node_tree.get_output_node("CYCLES").inputs["Surface"]
+    output, adder = nodes.override_output(overrides, world.node_tree, "ShaderNodeOutputWorld")
+    for link in before.links:
+        adder.link(link.from_socket, output.inputs["Surface"])
 
 
 def _make_constant(overrides: Overrides, world: bpy.types.World, radiance: RGB) -> None:
@@ -110,7 +170,7 @@ def _read(world: bpy.types.World, camera: bool) -> tuple[RGB, _Wrapped | None, l
     output = tree.get_output_node("CYCLES")
     if output is None:
         return (0.0, 0.0, 0.0), None, []
-    reasons = ["has a volume"] if output.inputs["Volume"].is_linked else []
+    reasons = []
     surface = nodes.source(_unmixed(Input(output.inputs["Surface"]), camera))
     if not isinstance(surface, Output):
         return (0.0, 0.0, 0.0), None, reasons

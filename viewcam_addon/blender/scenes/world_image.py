@@ -1,0 +1,127 @@
+"""A world that is not modelled as it is, as an image that Cycles itself makes of it, and its suns as lamps.
+
+Another Blender renders it (panorama.py), so that nothing here changes, whatever is going on: an export runs while Blender
+renders. Both sides of a comparison are then shown the image and the lamps.
+"""
+
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...tracer.scene.colours import LARGEST_RADIANCE
+from ...tracer.scene.lamps import RAYS, Sun, World
+from ...tracer.scene.materials import Picture
+from .. import another_blender, versions
+from ..temporary_settings import Overrides
+from . import images, import_light, nodes
+from .ledger import Ledger
+from .nodes import Input, Output
+
+WIDTH = 2048
+"""Of an image that nothing in the world asks to be wider. A sky of 4096 gives surfaces the same light to 2e-5."""
+MOST_WIDTH = 4096
+_TIMEOUT = 600.0
+_ALL_RAYS = frozenset(RAYS[:-1])
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """A world without what is hidden, its suns, and what it shows: name → picture."""
+
+    world: World
+    suns: tuple[Sun, ...]
+    pictures: dict[str, Picture]
+
+
+def obstacle(world: bpy.types.World) -> str | None:
+    """Why no image can stand in for a world, one clause, or None where one can."""
+    for each in _feeding(world):
+        node, output = each.node, each.socket.name
+        image = getattr(node, "image", None)
+        if (
+            node.type in ("CAMERA", "ATTRIBUTE", "SCRIPT")
+            or (node.type == "TEX_COORD" and (output in ("Camera", "Window") or node.object))
+            or (image is not None and image.is_dirty and image.source != "VIEWER")
+        ):
+            return f"has a node {node.name!r} that more than a direction and the file decides"
+    return None
+
+
+def width(world: bpy.types.World) -> int:
+    """Of the image that stands in, pixels."""
+    wrapped = [each.node.image for each in _feeding(world) if each.node.type == "TEX_ENVIRONMENT" and each.node.image]
+    return min(max([WIDTH, *(image.size[0] for image in wrapped)]), MOST_WIDTH)
+
+
+def tells_rays_apart(world: bpy.types.World) -> bool:
+    """Whether other rays than the camera's see different worlds."""
+    return any(each.node.type == "LIGHT_PATH" and each.socket.name != "Is Camera Ray" for each in _feeding(world))
+
+
+def _feeding(world: bpy.types.World) -> set[Output]:
+    """All outputs that a world's surface is made of."""
+    found: set[Output] = set()
+
+    def follow(of: Input) -> None:
+        source = nodes.source(of)
+        if isinstance(source, Output) and source not in found:
+            found.add(source)
+            for socket in source.node.inputs:
+                follow(Input(socket, source.groups))
+
+    follow(Input(versions.node_tree(world).get_output_node("CYCLES").inputs["Surface"]))
+    return found
+
+
+def rendered(world: bpy.types.World, scene: bpy.types.Scene) -> Rendered | None:
+    """What another Blender renders of a world without an obstacle at a scene's frame; None if it can't."""
+    with tempfile.TemporaryDirectory(prefix="viewcam-") as folder:
+        library, out = Path(folder, "world.blend"), Path(folder, "world.npz")
+        bpy.data.libraries.write(str(library), {world.original}, path_remap="ABSOLUTE", fake_user=True)
+        arguments = [str(library), world.original.name, str(out), str(width(world)), str(scene.frame_current)]
+        try:
+            another_blender.call("blender.scenes.panorama", [*arguments, repr(scene.frame_subframe)], _TIMEOUT)
+            with np.load(out) as found:
+                return _made(world.name, {name: found[name] for name in found.files})
+        except (OSError, subprocess.TimeoutExpired):
+            return None
+
+
+def _made(name: str, found: dict[str, NDArray]) -> Rendered:
+    pictures = {f"{name} (rendered)": _picture(found["light"])}
+    backdrop = None
+    if found["seen"] is not found["light"] and not np.array_equal(found["seen"], found["light"]):
+        pictures[f"{name} (seen)"] = _picture(found["seen"])
+        backdrop = World((1.0, 1.0, 1.0), image=f"{name} (seen)")
+    suns = []
+    for number, (lit, seen) in enumerate(zip(found["light_suns"], found["seen_suns"], strict=True)):
+        same = np.allclose(lit, seen, rtol=1e-6, atol=0.0)
+        sides = ((lit, frozenset()),) if same else ((lit, frozenset({"camera"})), (seen, _ALL_RAYS - {"camera"}))
+        for (x, y, z, *irradiance, angle), hidden_from in sides:
+            if any(irradiance):
+                title = f"{name} (sun{f' {number + 1}' if number else ''})"
+                suns.append(Sun(title, hidden_from, towards=(x, y, z), irradiance=tuple(irradiance), angle=angle))
+    return Rendered(World((1.0, 1.0, 1.0), image=f"{name} (rendered)", backdrop=backdrop), tuple(suns), pictures)
+
+
+def _picture(pixels: NDArray[np.float32]) -> Picture:
+    return Picture(np.nan_to_num(np.clip(pixels, 0.0, LARGEST_RADIANCE), nan=0.0))
+
+
+def show(overrides: Overrides, world: bpy.types.World, scene: bpy.types.Scene, made: Rendered, ledger: Ledger) -> None:
+    """Let Cycles see the image and the lamps in place of a world."""
+    output, adder = nodes.override_output(overrides, world.node_tree, "ShaderNodeOutputWorld")
+    shown = {name: images.image_of(picture, name, overrides, packed=False) for name, picture in made.pictures.items()}
+    import_light.add_world(adder, output, made.world, shown)
+    for sun in made.suns:
+        data, matrix = import_light.light_from(sun, overrides, ledger)
+        block = bpy.data.objects.new(sun.name, data)
+        overrides.afterwards(bpy.data.batch_remove, [block])
+        block.matrix_world = matrix.T.tolist()
+        import_light.hide(block, sun.hidden_from)
+        scene.collection.objects.link(block)
