@@ -493,3 +493,18 @@ def test_what_the_readme_says_to_make_can_be_made():
     promised = set(re.findall(r"(?m)(?:`|^ *)make ([a-z-]+)", (ROOT / "README.md").read_text(encoding="utf-8")))
     assert {"demo", "test"} <= promised, f"the README doesn't show the two commands, only {sorted(promised)}"
     assert promised <= targets, f"the Makefile can't make {sorted(promised - targets)}"
+
+
+def typed(folder: Path, program: str) -> subprocess.CompletedProcess:
+    """mypy, as strict as pyproject.toml has it, on a program that uses the package."""
+    (folder / "program.py").write_text(program, encoding="utf-8")
+    command = [sys.executable, "-m", "mypy", folder / "program.py"]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+
+
+def test_the_examples_of_the_api_are_typed_and_a_wrong_one_is_told(tmp_path):
+    page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    outcome = typed(tmp_path, "\n".join(blocks))
+    assert len(blocks) > 3 and outcome.returncode == 0, outcome.stdout
+    assert 'incompatible type "str"' in typed(tmp_path, blocks[0].replace("distance=1500", 'distance="1500"')).stdout

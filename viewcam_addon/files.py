@@ -19,6 +19,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 from .errors import FullDiskError, InputError
 
@@ -191,7 +192,7 @@ def _is_open_as(stream: int, there: os.stat_result) -> bool:
         return False
 
 
-def _opened_for_writing(path: Path) -> contextlib.AbstractContextManager:
+def _opened_for_writing(path: Path) -> contextlib.AbstractContextManager[BinaryIO]:
     """What stands there and is no file to replace, behind what is printed already if it is one of our own streams."""
     there = os.stat(path)
     for number, stream in ((1, sys.stdout), (2, sys.stderr)):

@@ -171,7 +171,7 @@ def read_channels(path: str | os.PathLike[str], named: Mapping[str, Sequence[str
     """
     found, camera, attributes = _pixels(Path(path))
 
-    def channel(wanted: str) -> NDArray:
+    def channel(wanted: str) -> NDArray[Any]:
         names = [wanted] if wanted in found else [name for name in found if name.endswith(f".{wanted}")]
         if len(names) == 1:
             return found[names[0]]
@@ -189,12 +189,13 @@ def text_attribute(path: str | os.PathLike[str], name: str) -> str:
     return value if isinstance(value, str) else ""
 
 
-def _stacked(channels: Sequence[NDArray]) -> NDArray[np.float32]:
+def _stacked(channels: Sequence[NDArray[Any]]) -> NDArray[np.float32]:
     """(height, width, channels), rows from the bottom."""
-    return np.stack([channel[::-1] for channel in channels], axis=-1).astype(np.float32, copy=False)
+    stacked: NDArray[np.float32] = np.stack([channel[::-1] for channel in channels], axis=-1).astype(np.float32, copy=False)
+    return stacked
 
 
-def _pixels(path: Path) -> tuple[dict[str, NDArray], Pinhole | None, dict[str, str]]:
+def _pixels(path: Path) -> tuple[dict[str, NDArray[Any]], Pinhole | None, dict[str, str]]:
     """The channels of a file, rows from the top, its camera and its text attributes."""
     import OpenEXR
 
@@ -205,8 +206,8 @@ def _pixels(path: Path) -> tuple[dict[str, NDArray], Pinhole | None, dict[str, s
     if camera is not None and (camera.width, camera.height) != frame.size:
         other = f"{camera.width} × {camera.height}"
         raise InputError(f"{path} has {width} × {height} pixels and its camera {other}: render it again")
-    channels = sum(len(header["channels"]) for header in headers)
-    memory.check(f"the pixels of {path}", _COPIES * 4 * channels * width * height, "render it smaller")
+    count = sum(len(header["channels"]) for header in headers)
+    memory.check(f"the pixels of {path}", _COPIES * 4 * count * width * height, "render it smaller")
     try:
         with silent_libraries():
             parts = OpenEXR.File(str(path), separate_channels=True).parts
@@ -330,9 +331,9 @@ def write(path: str | os.PathLike[str], image: Image) -> None:
             raise OSError(_first_line(error)) from error
 
 
-def _passes(channels: dict[str, NDArray]) -> dict[str, list[NDArray]]:
+def _passes(channels: dict[str, NDArray[Any]]) -> dict[str, list[NDArray[Any]]]:
     """The known passes of the first view layer, each as its channels in order."""
-    found: dict[str, dict[str, dict[str, NDArray]]] = defaultdict(lambda: defaultdict(dict))
+    found: dict[str, dict[str, dict[str, NDArray[Any]]]] = defaultdict(lambda: defaultdict(dict))
     for full_name, pixels in channels.items():
         layer, _, rest = full_name.rpartition(".")[0].rpartition(".")
         found[layer][OLDER_NAMES.get(rest, rest)][full_name.rpartition(".")[2]] = pixels
@@ -356,7 +357,7 @@ def _camera(text: str | None, path: Path) -> Pinhole | None:
         raise InputError(f"{path} has a camera attribute that can't be read ({_first_line(error)}): render it again") from error
 
 
-def _camera_attributes(camera: Pinhole) -> dict:
+def _camera_attributes(camera: Pinhole) -> dict[str, Any]:
     """The exact camera, the shape of its pixels, and its matrices unless they are beyond float32."""
     u, v, w = camera.basis()
     to_camera, to_ndc = np.eye(4), np.zeros((4, 4))

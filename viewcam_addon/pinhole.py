@@ -21,6 +21,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -58,9 +59,15 @@ class ViewPlane:
     """
 
     distance: tuple[float, float]
-    principal_point: tuple[float, float] | None
+    principal_point: tuple[float, float]
     width: int
     height: int
+
+    if TYPE_CHECKING:  # what may be given is more than what is kept
+
+        def __init__(
+            self, distance: float | Sequence[float], principal_point: Sequence[float] | None, width: int, height: int
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         checked = {name: checks.whole(name, getattr(self, name)) for name in ("width", "height")}
@@ -100,8 +107,22 @@ class Pinhole:
     distance: tuple[float, float]
     width: int
     height: int
-    principal_point: tuple[float, float] | None = None
+    principal_point: tuple[float, float] = None  # type: ignore[assignment]
     mirrored: bool = False
+
+    if TYPE_CHECKING:  # what may be given is more than what is kept
+
+        def __init__(
+            self,
+            eye: Sequence[float],
+            look_at: Sequence[float],
+            up: Sequence[float],
+            distance: float | Sequence[float],
+            width: int,
+            height: int,
+            principal_point: Sequence[float] | None = None,
+            mirrored: bool = False,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         pose = {name: checks.vector(name, getattr(self, name), 3) for name in ("eye", "look_at", "up")}

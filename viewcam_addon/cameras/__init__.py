@@ -210,7 +210,8 @@ def write(cameras: Iterable[Camera], format: str, options: Options | None = None
     cameras = [moved_back(camera, options) for camera in cameras]
     if not cameras:
         raise InputError("there is no camera to write: give one at least")
-    return _module(format, "write").write(cameras, options)
+    written: str | dict[str, str | bytes] = _module(format, "write").write(cameras, options)
+    return written
 
 
 def save(cameras: Iterable[Camera], path: str | os.PathLike[str], format: str, options: Options | None = None) -> list[Path]:

@@ -45,7 +45,7 @@ class Renderer:
     normal: float = tolerances.NORMAL_STORAGE
     near: float | None = None
 
-    def depth_storage(self, depth: NDArray) -> NDArray[np.float64] | float:
+    def depth_storage(self, depth: NDArray[np.float64]) -> NDArray[np.float64] | float:
         """Relative: of depths that are kept as 1 − near/depth."""
         return tolerances.FLOAT32 if self.near is None else DEPTH_BUFFER * tolerances.FLOAT32 * depth / self.near
 

@@ -50,7 +50,7 @@ def label(
     keepers = keepers or Keepers(threads=threads)
     needed = {"normals": "Normal", "masks": "Material Index"}
     surfaces = Surfaces(scene, threads, keepers.of(scene), [name for kind, name in needed.items() if kind in kinds])
-    passes: dict[str, NDArray] = {}
+    passes: dict[str, NDArray[Any]] = {}
     shape = surfaces.depth.shape  # traced now: of another frame with the same things the surfaces would use up this tracer
     if "depth" in kinds:
         passes |= _depths(surfaces)
@@ -83,7 +83,7 @@ def label(
     return Labels(Image(planes, scene.camera, header), told, lost)
 
 
-def _depths(surfaces: Surfaces) -> dict[str, NDArray]:
+def _depths(surfaces: Surfaces) -> dict[str, NDArray[Any]]:
     camera, hit = surfaces.camera, np.isfinite(surfaces.depth)
     x, _ = camera.view_plane(np.arange(camera.width) + 0.5, 0.5)
     _, y = camera.view_plane(0.5, np.arange(camera.height) + 0.5)
@@ -94,18 +94,18 @@ def _depths(surfaces: Surfaces) -> dict[str, NDArray]:
     }
 
 
-def _motions(name: str, found: Motion) -> dict[str, NDArray]:
+def _motions(name: str, found: Motion) -> dict[str, NDArray[Any]]:
     return {f"{name} Flow": found.flow, f"{name} Motion": found.displacement, f"{name} Hidden": found.hidden}
 
 
 def _instances(
     surfaces: Surfaces, covered: coverage.Coverage | None, with_masks: bool, with_amodal: bool
 ) -> list[dict[str, Any]]:
-    camera, all_of_them, shape = surfaces.camera, surfaces.instances, surfaces.instance.shape
+    camera, all_of_them = surfaces.camera, surfaces.instances
     if not all_of_them:
         return []
     visible = masks.of_picture(surfaces.instance, len(all_of_them))
-    amodal = masks.of_pixels(Silhouettes(surfaces).pixels(), shape) if with_amodal else visible
+    amodal = masks.of_pixels(Silhouettes(surfaces).pixels(), (camera.height, camera.width)) if with_amodal else visible
     u, v, w = camera.basis()
     to_camera = np.eye(4)
     to_camera[:3, :3] = [-u if camera.mirrored else u, v, w]
@@ -131,7 +131,7 @@ def _instances(
             figures["visible"] = seen
         if with_amodal:
             figures["amodal"] = whole
-            figures["visible_fraction"] = seen["area"] / whole["area"] if seen else 0.0
+            figures["visible_fraction"] = seen["area"] / whole["area"] if seen and whole else 0.0
         if covered:
             figures["coverage"] = share
         told.append(figures)

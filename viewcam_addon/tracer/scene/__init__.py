@@ -240,7 +240,7 @@ def _material_range(materials: NDArray[np.int32]) -> tuple[int, int]:
     return (int(materials.min()), int(materials.max())) if len(materials) else (0, 0)
 
 
-def _check_shape(name: str, array: NDArray, shape: tuple[int | None, ...]) -> None:
+def _check_shape(name: str, array: NDArray[np.generic], shape: tuple[int | None, ...]) -> None:
     if array.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, array.shape, strict=True)):
         wanted = " × ".join("n" if size is None else str(size) for size in shape)
         raise InputError(f"{name} has the shape {array.shape} and must have {wanted}: check the scene")
