@@ -174,7 +174,7 @@ class BothSides:
 
 
 @pytest.fixture
-def both_sides(fresh_blender, scene, tmp_path):
+def both_sides(fresh_blender, scene, tmp_path, read_passes):
     """A function that exports the open file (or that of the request), traces it, has Cycles render it, and compares the two."""
     scene.render.resolution_x, scene.render.resolution_y = 160, 120
 
@@ -183,40 +183,48 @@ def both_sides(fresh_blender, scene, tmp_path):
 
         exported = job.export_and_render(job.Request(threads=2, **request), [tmp_path / "cycles.exr"])
         tracer = render.Tracer(exported, 2)
-        traced, cycles = render.render(exported, threads=2), _passes_of(tmp_path / "cycles.exr")
+        traced, (cycles,) = render.render(exported, threads=2), read_passes([tmp_path / "cycles.exr"])
         comparison = geometry.compare(Image(traced), Image(cycles), exported.camera, tracer.surface_at, exported.stated_camera)
         return BothSides(exported, traced, cycles, comparison)
 
     return make
 
 
-def _passes_of(path):
-    """The passes of an EXR."""
-    return _all_passes_of([path])[0]
-
-
-def _all_passes_of(paths):
-    """The passes of EXRs, read in a process without Blender, which has an OpenEXR library of its own."""
-    program = """
+_READER = """
 import sys, numpy
 from viewcam_addon import image
-for path in sys.argv[1:]:
+for line in sys.stdin:
+    path = line.rstrip()
     numpy.savez(path + ".npz", **image.read(path).passes)
+    print("read", flush=True)
 """
+
+
+@pytest.fixture(scope="session")
+def exr_reader():
+    """A process without Blender, which has an OpenEXR library of its own: it reads the path of each line, for all tests."""
     search_path = os.pathsep.join([str(Path(viewcam_addon.__file__).parent.parent), *filter(None, sys.path)])
-    paths = [str(path) for path in paths]
-    subprocess.run([sys.executable, "-c", program, *paths], check=True, env=os.environ | {"PYTHONPATH": search_path})
-    found = []
-    for path in paths:
-        with np.load(f"{path}.npz") as archive:
-            found.append(dict(archive))
-    return found
+    command, environment = [sys.executable, "-c", _READER], os.environ | {"PYTHONPATH": search_path}
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, env=environment, cwd=Path(__file__).parent, **pipes) as process:
+        yield process
 
 
 @pytest.fixture
-def read_passes():
-    """A function that reads EXRs, all at once: paths → a dict of passes each."""
-    return _all_passes_of
+def read_passes(exr_reader):
+    """A function that reads EXRs: paths → a dict of passes each."""
+
+    def read(paths):
+        found = []
+        for path in paths:
+            exr_reader.stdin.write(f"{path}\n")
+            exr_reader.stdin.flush()
+            assert exr_reader.stdout.readline() == "read\n", f"{path} can't be read"
+            with np.load(f"{path}.npz") as archive:
+                found.append(dict(archive))
+        return found
+
+    return read
 
 
 @pytest.fixture
