@@ -274,9 +274,7 @@ class Scene {
 
     template <bool ANY> bool intersect_instances(const Ray& ray, RayKind kind, Nearest& nearest) const {
         if (instances_.root == NOTHING) return false;
-        Ray shortened = ray;
-        shortened.t_max = nearest.t;
-        return traverse(instances_, shortened, [&](uint32_t leaf, BoxRay& box) {
+        return traverse(instances_, ray, nearest.t, [&](uint32_t leaf, BoxRay& box) {
             uint32_t number = instances_.leaves[leaf];
             const Object& object = objects[number];
             if (!(object.visible & kind)) return false;

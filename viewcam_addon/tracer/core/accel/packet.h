@@ -97,7 +97,8 @@ struct alignas(64) Packet {
     }
 };
 
-// enter() of four rays at a time: `packet` of all of them, each with its key.
+// enter() of four rays at a time: `packet` of all of them, each with its key. The origin is taken from planes before the product,
+// since what all rays have in common needs it; so `error` has 2 U h.
 inline void enter(const Bvh& bvh, const Ray* rays, const Nearest* nearest, int count, Packet& packet) {
     static_assert(offsetof(Ray, t_min) == 6 * sizeof(double), "a ray's first four numbers and its next three are loaded at once");
     packet.count = count;
@@ -124,7 +125,8 @@ inline void enter(const Bvh& bvh, const Ray* rays, const Nearest* nearest, int c
         double4 start = t_min * per, end = load<double4>(packet.t + i) * per, far = splat4(0.0);
         for (int axis = 0; axis < 3; axis++) {
             unit[axis] = d[axis] * inverse;
-            reciprocal[axis] = splat4(1.0) / copysign(max(abs(unit[axis]), splat4(1e-200)), unit[axis]);
+            reciprocal[axis] = longest * (splat4(1.0) / d[axis]);
+            reciprocal[axis] = copysign(min(abs(reciprocal[axis]), splat4(1e200)), unit[axis]);
             from[axis] = (origin[axis] - splat4(bvh.centre[axis])) * splat4(bvh.scale);
             double4 edge = splat4(bvh.half[axis] * (1 + 1e-9) + 1e-300) + splat4(4e-16) * abs(from[axis]);
             double4 one = (-edge - from[axis]) * reciprocal[axis], other = (edge - from[axis]) * reciprocal[axis];

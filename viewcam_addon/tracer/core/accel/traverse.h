@@ -6,11 +6,11 @@ namespace viewcam::VIEWCAM_ISA {
 
 // Calls visit(leaf) for the leaves whose boxes the ray meets before ray.far, which `visit` may lower, until one gives true.
 template <class Visit> inline bool traverse(const Bvh& bvh, BoxRay& ray, const Visit& visit) {
-    float8 near_origin[3], far_origin[3], near_reciprocal[3], far_reciprocal[3];
+    float8 near_start[3], far_start[3], near_reciprocal[3], far_reciprocal[3];
     int near[3], far[3];
     for (int axis = 0; axis < 3; axis++) {
-        near_origin[axis] = splat8(ray.near_origin[axis]);
-        far_origin[axis] = splat8(ray.far_origin[axis]);
+        near_start[axis] = splat8(ray.near_start[axis]);
+        far_start[axis] = splat8(ray.far_start[axis]);
         near_reciprocal[axis] = splat8(ray.near_reciprocal[axis]);
         far_reciprocal[axis] = splat8(ray.far_reciprocal[axis]);
         near[axis] = 2 * axis + ray.backward[axis];
@@ -26,8 +26,8 @@ template <class Visit> inline bool traverse(const Bvh& bvh, BoxRay& ray, const V
         bool missed = false;
         while (!(current & LEAF)) {
             const Bvh::Node& node = bvh.nodes[current];
-            auto enters = [&](int a) { return (load<float8>(node.bounds[near[a]]) - near_origin[a]) * near_reciprocal[a]; };
-            auto leaves = [&](int a) { return (load<float8>(node.bounds[far[a]]) - far_origin[a]) * far_reciprocal[a]; };
+            auto enters = [&](int a) { return multiply_subtract(load<float8>(node.bounds[near[a]]), near_reciprocal[a], near_start[a]); };
+            auto leaves = [&](int a) { return multiply_subtract(load<float8>(node.bounds[far[a]]), far_reciprocal[a], far_start[a]); };
             float8 first = max(max(enters(0), enters(1)), max(enters(2), splat8(0)));
             float8 last = min(min(leaves(0), leaves(1)), min(leaves(2), splat8(ray.far)));
             unsigned met = bits(int8(first <= last));
@@ -71,10 +71,10 @@ template <class Visit> inline bool traverse(const Bvh& bvh, BoxRay& ray, const V
     }
 }
 
-// The same of a ray as it comes.
-template <class Visit> inline bool traverse(const Bvh& bvh, const Ray& ray, const Visit& visit) {
+// The same of a ray as it comes, no farther than t_max.
+template <class Visit> inline bool traverse(const Bvh& bvh, const Ray& ray, double t_max, const Visit& visit) {
     BoxRay box;
-    if (bvh.root == NOTHING || !enter(bvh, ray, box)) return false;
+    if (bvh.root == NOTHING || !enter(bvh, ray, t_max, box)) return false;
     return traverse(bvh, box, [&](uint32_t leaf) { return visit(leaf, box); });
 }
 

@@ -18,6 +18,7 @@ struct Object {
     Affine to_world;            // object space to rendering space
     double inverse[3][3] = {};  // of its linear part
     Vec3 translation_low;       // what the translation's rounding took away
+    double translation_error = 0;  // what that may be in object space, in each coordinate
 
     Vec3 to_object(Vec3 v) const { return product(inverse, v); }
     // The same ray in object space; t stays what it is.
@@ -27,7 +28,7 @@ struct Object {
         for (int row = 0; row < 3; row++)
             local.origin_error = max(local.origin_error, std::fabs(inverse[row][0]) * sizes.x + std::fabs(inverse[row][1]) * sizes.y +
                                                                    std::fabs(inverse[row][2]) * sizes.z);
-        local.origin_error *= 8 * DOUBLE_ROUNDING;
+        local.origin_error = 8 * DOUBLE_ROUNDING * local.origin_error + translation_error;
         return local;
     }
     // The largest coordinate that the linear part makes of coordinates up to `size`.
@@ -62,6 +63,7 @@ struct Object {
             for (int i = 0; i < 3; i++) inverse[row][i] = rows[row][i];
         }
         condition = largest * largest_inverse;
+        translation_error = 2 * largest_inverse * max_component(abs(translation_low));
         flat = !(condition < 0x1p50);
         if (flat) condition = 0x1p50;
         mirrored = flat ? dot(a, cross(b, c)) < 0 : determinant < 0;

@@ -49,13 +49,14 @@ struct UnitSphere {
     Vec3 center, direction;
     double tangent;  // |center|² − 1
 
-    UnitSphere(const Spheres& spheres, const Object& object, size_t i, const Ray& ray) {
-        Vec3 c = spheres.center(i), origin = object.to_object(ray.origin - object.to_world.translation());
+    // local: the ray in object space.
+    UnitSphere(const Spheres& spheres, const Object& object, size_t i, const Ray& ray, const Ray& local) {
+        Vec3 c = spheres.center(i);
         double radius = spheres.radii[i];
-        direction = object.to_object(ray.direction) / radius;
-        center = (c - origin) / radius;
+        direction = local.direction / radius;
+        center = (c - local.origin) / radius;
         tangent = dot(center, center) - 1;
-        double size = max(max_component(abs(c)), max_component(abs(origin)));
+        double size = max(max_component(abs(c)), max_component(abs(local.origin)));
         if (tangent < NEAR || size > 16 * radius * max_component(abs(center))) take_care(c, radius, object, ray);
     }
 
@@ -102,13 +103,23 @@ struct UnitSphere {
     }
 };
 
+// Whether a ray in object space runs past a sphere, or away from it, by more than all that is rounded there: the way to the centre by
+// the origin's error and the centre's own rounding, the direction, relatively, by four roundings times the matrix's condition. So
+// most spheres whose boxes are met are left without a division, and those that a ray has just left without the pairs of `take_care`.
+inline bool passes(const Ray& local, Vec3 center, double radius, double condition) {
+    Vec3 way = center - local.origin, d = local.direction, beside = cross(way, d);
+    double size = max_component(abs(center)) + radius + condition * max_component(abs(way));
+    double doubt = 2 * local.origin_error + 16 * DOUBLE_ROUNDING * size, reach = radius + doubt;
+    return dot(way, d) < -doubt * (std::fabs(d.x) + std::fabs(d.y) + std::fabs(d.z)) || dot(beside, beside) > reach * reach * dot(d, d);
+}
+
 template <bool ANY> bool intersect_spheres(const Spheres& spheres, const Object& object, const Ray& ray, uint32_t number, Nearest& nearest) {
     if (object.flat) return false;
     Ray local = object.to_object(ray);
-    local.t_max = nearest.t;
-    return traverse(spheres.bvh, local, [&](uint32_t leaf, BoxRay& box) {
+    return traverse(spheres.bvh, local, nearest.t, [&](uint32_t leaf, BoxRay& box) {
         uint32_t i = spheres.bvh.leaves[leaf];
-        double t = UnitSphere(spheres, object, i, ray).distance();
+        if (passes(local, spheres.center(i), spheres.radii[i], object.condition)) return false;
+        double t = UnitSphere(spheres, object, i, ray, local).distance();
         if (!(t > ray.t_min) || t == INFINITE || !nearest.offer(t, number, i)) return false;
         if (ANY) return true;
         box.limit(nearest.t);
@@ -119,7 +130,7 @@ template <bool ANY> bool intersect_spheres(const Spheres& spheres, const Object&
 // The surface of a sphere where a ray hits it. As in Cycles, the normal of an ellipsoid too is the direction from its centre;
 // `cosine` is that of the true one. The point lies inside by what its rounding may be, from where nothing of the sphere is seen.
 inline Interaction sphere_interaction(const Spheres& spheres, const Object& object, const Ray& ray, size_t i) {
-    UnitSphere sphere(spheres, object, i, ray);
+    UnitSphere sphere(spheres, object, i, ray, object.to_object(ray));
     Interaction found;
     found.t = sphere.distance();
     Vec3 unit = normalize(sphere.direction * found.t - sphere.center), c = spheres.center(i);

@@ -107,7 +107,7 @@ class TriangleBvh {
     // object: whose the triangles are, NONE where the blocks tell.
     template <bool ANY> bool intersect(const Ray& ray, uint32_t object, Nearest& nearest) const {
         BoxRay box;
-        if (bvh.root == NOTHING || !enter(bvh, Ray{ray.origin, ray.direction, ray.t_min, nearest.t}, box)) return false;
+        if (bvh.root == NOTHING || !enter(bvh, ray, nearest.t, box)) return false;
         Shear shear(ray.direction, box);
         const double* origin = &ray.origin.x;
         double4 x = splat4(origin[shear.x]), y = splat4(origin[shear.y]), z = splat4(origin[shear.z]);
