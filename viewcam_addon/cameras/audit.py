@@ -348,59 +348,39 @@ def _mistakes() -> list[Mistake]:
             True,
         ),
     ]
-    for text, s in _SIZES.items():
-        fine.append(
-            Mistake(
-                "size",
-                f"focal lengths and principal points are of another size, or resolution percentage: times {text} is right",
-                lambda v, s=s: _scaled(v, s, s),
-            )
-        )
-    for text, s in _HALVES.items():
-        fine.append(
-            Mistake(
-                "focal_of_another_size",
-                f"the focal lengths are of a picture of another size: times {text} is right",
-                lambda v, s=s: _scaled(v, s),
-            )
-        )
-    for text, s in _SIZES.items():
-        fine.append(
-            Mistake(
-                "center_of_another_size",
-                f"the principal points are of a picture of another size: times {text} is right",
-                lambda v, s=s: _scaled(v, 1, s),
-            )
-        )
-    for text, a in _ASPECTS.items():
-        fine.append(
-            Mistake(
-                "aspect", f"the pixels are not square: fl_y should be {text} times what it is", lambda v, a=a: _stretched(v, a)
-            )
-        )
-    fine.append(
-        Mistake(
+    by_factors = [
+        (
+            "size",
+            "focal lengths and principal points are of another size, or resolution percentage: times {} is right",
+            _SIZES,
+            lambda v, s: _scaled(v, s, s),
+        ),
+        ("focal_of_another_size", "the focal lengths are of a picture of another size: times {} is right", _HALVES, _scaled),
+        (
+            "center_of_another_size",
+            "the principal points are of a picture of another size: times {} is right",
+            _SIZES,
+            lambda v, s: _scaled(v, 1, s),
+        ),
+        ("aspect", "the pixels are not square: fl_y should be {} times what it is", _ASPECTS, _stretched),
+        (
             "aspect",
-            "fl_y is that of a square picture: it should be width / height times what it is",
-            lambda v: _stretched(v, v.size[:, 0] / v.size[:, 1]),
-        )
-    )
-    fine.append(
-        Mistake(
-            "aspect",
-            "fl_y is that of a square picture: it should be height / width times what it is",
-            lambda v: _stretched(v, v.size[:, 1] / v.size[:, 0]),
-        )
-    )
-    for text, s in _UNITS.items():
-        fine.append(
-            Mistake(
-                "unit",
-                f"the cameras' places are in another unit than the scene: times {text} is right",
-                lambda v, s=s: replace(v, eye=v.eye * s),
-            )
-        )
-    return fine
+            "fl_y is that of a square picture: it should be {} times what it is",
+            {"width / height": 0, "height / width": 1},
+            lambda v, across: _stretched(v, v.size[:, across] / v.size[:, 1 - across]),
+        ),
+        (
+            "unit",
+            "the cameras' places are in another unit than the scene: times {} is right",
+            _UNITS,
+            lambda v, s: replace(v, eye=v.eye * s),
+        ),
+    ]
+    return fine + [
+        Mistake(kind, sentence.format(said), lambda v, undone=undone, factor=factor: undone(v, factor))
+        for kind, sentence, factors, undone in by_factors
+        for said, factor in factors.items()
+    ]
 
 
 MISTAKES = _mistakes()
@@ -449,6 +429,8 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
     error, error_as_is = _usual(found, evidence), _usual(as_is, evidence)
     certainty = float(costs[0] - costs[best])
     shown = {"error": error, "error_as_is": error_as_is, "certainty": certainty, "observations": len(as_is)}
+    sentence = f"something is wrong, in no way that is known: the evidence is off by {error_as_is:.3g} {evidence.unit}"
+    unknown = Verdict("unknown", sentence, **shown)
     if certainty < _SURE:
         if error_as_is <= evidence.plausible:
             sentence = f"nothing is wrong with the cameras: the evidence fits to {error_as_is:.2g} {evidence.unit}"
@@ -461,17 +443,9 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
             if possible:
                 sentence += f"; it is too little to exclude: {', '.join(possible)}"
             return Verdict("none", sentence, possible, **shown | {"certainty": min(over)[0] if over else 0.0})
-        return Verdict(
-            "unknown",
-            f"something is wrong, in no way that is known: the evidence is off by {error_as_is:.3g} {evidence.unit}",
-            **shown,
-        )
+        return unknown
     if error > evidence.plausible:
-        return Verdict(
-            "unknown",
-            f"something is wrong, in no way that is known: the evidence is off by {error_as_is:.3g} {evidence.unit}",
-            **shown,
-        )
+        return unknown
     mistake = tried[best - 1]
     tied = [tried[i - 1] for i in np.flatnonzero(costs - costs[best] < _TIED) if i and tried[i - 1] is not mistake]
     first = min([mistake, *tied], key=tried.index)

@@ -85,68 +85,30 @@ _GENERIC = {
     "width": "width",
     "height": "height",
 }
-_LOOK_AT = {"lookat", "glulookat", "lookatrh", "lookatlh", "createlookat", "xmmatrixlookatrh", "xmmatrixlookatlh", "makelookat"}
-_LOOK_AT |= {
-    "d3dxmatrixlookatlh",
-    "d3dxmatrixlookatrh",
-    "matrixlookatlh",
-    "setlookat",
-    "matrix4lookat",
-    "createlookatlh",
+_LOOK_AT = {
+    "lookat", "glulookat", "lookatrh", "lookatlh", "setlookat", "makelookat", "createlookat", "createlookatlh",
+    "matrixlookatlh", "matrix4lookat", "xmmatrixlookatrh", "xmmatrixlookatlh", "d3dxmatrixlookatlh", "d3dxmatrixlookatrh",
     "targetto",
-}
+}  # fmt: skip
 _PERSPECTIVE = {
-    "gluperspective",
-    "perspective",
-    "perspectivecamera",
-    "perspectiverh",
-    "perspectivelh",
-    "perspectivefov",
-    "makeperspective",
-}
+    "gluperspective", "perspective", "perspectivecamera", "perspectiverh", "perspectivelh", "makeperspective",
+    "perspectiveprojection", "createperspectiveprojectionmatrix",
+}  # fmt: skip
 _PERSPECTIVE |= {
     f"{name}{hand}"
     for name in ("xmmatrixperspectivefov", "d3dxmatrixperspectivefov", "createperspectivefieldofview", "perspectivefov")
     for hand in ("lh", "rh", "")
 }
-_PERSPECTIVE |= {"perspectiveprojection", "createperspectiveprojectionmatrix"}
 _FRUSTUM = {"glfrustum", "frustum", "makefrustum"}
 _ORTHOGRAPHIC = {
-    "glortho",
-    "ortho",
-    "orthographiccamera",
-    "gluortho2d",
-    "xmmatrixorthographiclh",
-    "enableparallelprojection",
+    "glortho", "ortho", "orthographiccamera", "gluortho2d", "xmmatrixorthographiclh", "enableparallelprojection",
     "parallelprojectionon",
-}
+}  # fmt: skip
 _MOVES = {
-    "rotatex",
-    "rotatey",
-    "rotatez",
-    "rotateonaxis",
-    "translatex",
-    "translatey",
-    "translatez",
-    "azimuth",
-    "elevation",
-    "dolly",
-}
-_MOVES |= {
-    "roll",
-    "yaw",
-    "pitch",
-    "setroll",
-    "orthogonalizeviewup",
-    "applymatrix4",
-    "setviewoffset",
-    "setfocallength",
-    "filmoffset",
-    "quaternion",
-    "rotation",
-    "flyto",
-    "setview",
-}
+    "rotatex", "rotatey", "rotatez", "rotateonaxis", "translatex", "translatey", "translatez", "azimuth", "elevation",
+    "dolly", "roll", "yaw", "pitch", "setroll", "orthogonalizeviewup", "applymatrix4", "setviewoffset", "setfocallength",
+    "filmoffset", "quaternion", "rotation", "flyto", "setview",
+}  # fmt: skip
 _TURNED = {"rotation", "quaternion", "matrix", "matrixworld", "rotate"}
 # Where they are made they turn the camera to their target, whatever it looked at before.
 _CONTROLS = re.compile(r"\bnew\s++(?:[A-Za-z]++\s*+\.\s*+)?+((?:Orbit|Trackball|Map|Arcball)Controls)\b")

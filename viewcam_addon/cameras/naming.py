@@ -11,22 +11,9 @@ from .camera import Camera
 
 _NAMED = 3  # files in a sentence
 _PICTURES = (
-    ".png",
-    ".jpg",
-    ".jpeg",
-    ".exr",
-    ".tif",
-    ".tiff",
-    ".webp",
-    ".bmp",
-    ".hdr",
-    ".tga",
-    ".ppm",
-    ".pgm",
-    ".heic",
-    ".dng",
+    ".png", ".jpg", ".jpeg", ".exr", ".tif", ".tiff", ".webp", ".bmp", ".hdr", ".tga", ".ppm", ".pgm", ".heic", ".dng",
     ".avif",
-)
+)  # fmt: skip
 
 
 def stem(path: str) -> str:
