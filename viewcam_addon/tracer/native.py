@@ -29,7 +29,7 @@ from .scene.lamps import RAYS, Area, Lamp, Point, Spot, Sun, World
 from .scene.materials import PLAIN, Colour, Material
 from .scene.sameness import same_things
 from .scene.shader_nodes import KINDS, Closure, Node
-from .scene.value_nodes import NORMAL
+from .scene.value_nodes import OWN
 from .tiles import Passes
 
 GEOMETRY = ("Depth", "Position", "Normal", "UV", "Object Index", "Material Index", "Magnitude", "Facing")
@@ -560,7 +560,7 @@ def _described_node(node: Node, images: Mapping[str, int], nodes: Mapping[Node, 
             inputs.append(_Input(name.encode(), word.encode(), _color(WHITE, images, nodes)))
         elif value is not None:
             inputs.append(_Input(name.encode(), None, _color(value, images, nodes)))
-        elif default is NORMAL:
+        elif default in OWN:
             inputs.append(_Input(name.encode(), None, _Color(image=-1, node=-1)))
     return _Node(node.type.encode(), (_Input * len(inputs))(*inputs), len(inputs))
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+bpy = pytest.importorskip("bpy")
+
 from viewcam_addon.tracer import render
 from viewcam_addon.tracer.scene import Scene
 
@@ -68,5 +70,61 @@ def pictures(stage, read_passes, tmp_path):
             Sides(each, render.render(each, level, samples * count, threads=2), [next(passes) for _ in range(count)])
             for each in exported
         ]
+
+    return make
+
+
+@pytest.fixture
+def painted(make_material):
+    """painted(class, inputs, properties) → a material of one shader. An input that is a dict is a Tangent node's properties."""
+
+    def make(kind, inputs, properties=None):
+        material = make_material(kind, kind)
+        tree = material.node_tree
+        shader = tree.nodes["Shader"]
+        for name, value in inputs.items():
+            if isinstance(value, dict) and name in shader.inputs:
+                node = tree.nodes.new("ShaderNodeTangent")
+                for property, word in value.items():
+                    setattr(node, property, word)
+                tree.links.new(node.outputs[0], shader.inputs[name])
+            elif name in shader.inputs:
+                shader.inputs[name].default_value = value
+        for name, value in (properties or {}).items():
+            setattr(shader, name, value)
+        return material
+
+    return make
+
+
+@pytest.fixture
+def strewn(camera, add):
+    """strewn(materials, …) → objects, one a material, numbered from 1: a floor of square patches below the camera, strewn so
+    that it sees every material at all angles.
+
+    cells : across the floor; width : of it, one unit below the camera. backwards : whether patch i is seen from behind. UV maps
+    are turned, mirrored and sheared, on each patch in its own way.
+    """
+
+    def make(materials, cells=24, width=4.0, backwards=lambda i: False):
+        camera.location, camera.rotation_euler, camera.data.lens = (0.013, 0.029, 1.0), (0, 0, 0), 36.0 / width
+        side, rng, blocks = width / cells, np.random.default_rng(3), []
+        for number, material in enumerate(materials):
+            places = range(number, cells * cells, len(materials))
+            corners = [((p % cells - cells / 2) * side, ((7 * p // cells) % cells - cells / 2) * side) for p in places]
+            around = ((0, 0), (side, 0), (side, side), (0, side))
+            vertices = [(x + dx, y + dy, 0.0) for x, y in corners for dx, dy in around]
+            mesh = bpy.data.meshes.new(f"P{number}")
+            faces = [range(4 * i, 4 * i + 4)[:: -1 if backwards(i) else 1] for i in range(len(corners))]
+            mesh.from_pydata(vertices, [], faces)
+            loops = np.empty(len(mesh.loops), np.int32)
+            mesh.loops.foreach_get("vertex_index", loops)
+            for layer in ("UVMap", "Second"):
+                maps = rng.uniform(-1, 1, (len(corners), 2, 2))
+                uvs = np.einsum("pij,pcj->pci", maps, np.array(vertices)[:, :2].reshape(-1, 4, 2)).reshape(-1, 2)
+                mesh.uv_layers.new(name=layer).data.foreach_set("uv", uvs[loops].ravel())
+            mesh.materials.append(material)
+            blocks.append(add(mesh, f"P{number}", pass_index=number + 1))
+        return blocks
 
     return make

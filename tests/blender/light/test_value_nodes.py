@@ -263,37 +263,30 @@ def voronoi(place):
 
 
 @pytest.fixture
-def floor(scene, camera, add, make_material, set_world, read_passes, tmp_path):
+def floor(scene, strewn, make_material, set_world, read_passes, tmp_path):
     """floor(graphs) → name → (what the tracer shows of it, what Cycles shows), each (pixels, 3)."""
 
     def show(graphs):
         scene.render.resolution_x = scene.render.resolution_y = 144
         set_world((0, 0, 0), 0.0)
-        camera.location, camera.rotation_euler, camera.data.lens = (0.013, 0.029, 1.0), (0, 0, 0), 12.0
-        cells = 30
-        side = 3.0 / cells
-        rng = np.random.default_rng(1)
-        for number, (name, graph) in enumerate(graphs.items()):
-            material = make_material(name, "ShaderNodeEmission")
-            tree = material.node_tree
+        materials = []
+        for name, graph in graphs.items():
+            materials.append(make_material(name, "ShaderNodeEmission"))
+            tree = materials[-1].node_tree
             shown = graph
             for operation, *by in (("MINIMUM", 3), ("MAXIMUM", -3), ("MULTIPLY_ADD", 0.1, 0.5)):
                 inputs = {"Vector": shown} | {f"Vector_00{i}": (value,) * 3 for i, value in enumerate(by, start=1)}
                 shown = N("VectorMath", inputs, operation=operation)
             tree.links.new(shown.add(tree), tree.nodes["Shader"].inputs["Color"])
-            places = [place for place in range(cells * cells) if place % len(graphs) == number]
-            corners = [((p % cells - cells / 2) * side, ((7 * p // cells) % cells - cells / 2) * side) for p in places]
-            vertices = [(x + dx, y + dy, 0.0) for x, y in corners for dx, dy in ((0, 0), (side, 0), (side, side), (0, side))]
-            mesh = bpy.data.meshes.new(name)
-            faces = [range(4 * i, 4 * i + 4)[:: 1 if i % 2 else -1] for i in range(len(corners))]
-            mesh.from_pydata(vertices, [], faces)
+        rng = np.random.default_rng(1)
+        blocks = strewn(materials, cells=30, width=3.0, backwards=lambda i: i % 2 == 0)
+        for name, block in zip(graphs, blocks, strict=True):
+            mesh = block.data
             for layer in ("UVMap", "Second"):
-                mesh.uv_layers.new(name=layer).data.foreach_set("uv", rng.uniform(-0.7, 1.6, 8 * len(corners)))
+                mesh.uv_layers[layer].data.foreach_set("uv", rng.uniform(-0.7, 1.6, 2 * len(mesh.loops)))
             for attribute, kind, domain, field, width in ATTRIBUTES:
                 values = mesh.attributes.new(attribute, kind, domain).data
                 values.foreach_set(field, rng.uniform(0, 1, width * len(values)))
-            mesh.materials.append(material)
-            block = add(mesh, name, pass_index=number + 1)
             if name.startswith("vector transform"):  # the others stand in the world as they are in themselves
                 block.location, block.rotation_euler, block.scale = (0.3, -0.2, 0.1), (0.5, 0.2, -0.4), (1.2, 0.7, -0.9)
                 bpy.context.view_layer.update()

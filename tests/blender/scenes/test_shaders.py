@@ -74,7 +74,11 @@ TEXTURED = node(
         first=node(
             "glossy", color=Colour(GREEN, vertex=True), roughness=Colour((1.0, 1.0, 1.0), "Checks"), distribution="beckmann"
         ),
-        second=node("emission", color=RED, strength=3.0),
+        second=node(
+            "mix",
+            first=node("sheen", color=RED, roughness=0.75, distribution="ashikhmin"),
+            second=node("glossy", anisotropy=0.5, rotation=0.25, tangent=node("tangent", axis="x")),
+        ),
     ),
 )
 
@@ -107,6 +111,7 @@ VALUES = [
     node("combine_xyz", y=node("clamp", value=node("geometry"), max=0.5)),
     node("separate_color", color=node("combine_color", y=0.5, mode="hsl"), mode="hsv", output="y"),
     node("clamp", value=node("light_path"), kind="range"),
+    node("mix_vector", a=node("tangent", axis="y"), b=node("tangent", kind="uv_map", uv="Second")),
     node("mix_vector", a=node("geometry", output="tangent"), b=node("vector_rotate", angle=0.5, invert=True)),
     node("mix_components", factor=node("vector_rotate", rotation=(1.0, 2.0, 0.5), kind="euler_xyz"), b=(0.25, -1.0, 2.0)),
     node("map_range_vector", value=node("vector_transform", **{"from": "camera"}), interpolation="smoothstep"),
@@ -237,6 +242,10 @@ PRINCIPLED = {
     "transmission_weight",
     "coat_weight",
     "coat_ior",
+    "sheen_weight",
+    "sheen_roughness",
+    "anisotropic",
+    "anisotropic_rotation",
     "roughness",
 }
 
@@ -255,7 +264,7 @@ def test_a_principled_surface_is_read_with_what_it_is_given(make_material, name)
     assert (read[name], read["base_color"]) == (expected[name], expected["base_color"])
 
 
-@pytest.mark.parametrize("socket", ["Subsurface Weight", "Sheen Weight", "Thin Film Thickness", "Anisotropic"])
+@pytest.mark.parametrize("socket", ["Subsurface Weight", "Thin Film Thickness"])
 def test_what_a_principled_surface_is_beyond_that_is_named_and_left_out(make_material, socket):
     material = make_material("p", "ShaderNodeBsdfPrincipled", Base_Color=colour(RED))
     plain = exactly(material)
@@ -268,6 +277,27 @@ def test_rough_shaders_are_read_as_shaders(make_material, kind):
     material = make_material("rough", shaders.SHADERS[kind].class_name, Color=colour(RED), Roughness=0.25)
     read = exactly(material).surface
     assert read.type == kind and read["color"] == Colour(RED) and read["roughness"] == Colour((0.25,) * 3)
+
+
+def test_what_is_stretched_across_a_tangent_is_stretched_along_one_a_quarter_further(make_material):
+    material = make_material("g", "ShaderNodeBsdfGlossy", Roughness=0.25, Anisotropy=-0.5, Rotation=0.875)
+    read = exactly(material).surface
+    assert (read["anisotropy"].rgb[0], read["rotation"].rgb[0], read["tangent"]) == (0.5, 0.125, None)
+
+
+def test_a_tangent_counts_only_where_something_is_stretched_along_it(make_material):
+    material = make_material("g", "ShaderNodeBsdfGlossy", Roughness=0.25)
+    tree = material.node_tree
+    tangent = tree.nodes.new("ShaderNodeTangent")
+    tangent.direction_type, tangent.uv_map = "UV_MAP", "Second"
+    tree.links.new(tangent.outputs[0], tree.nodes["Shader"].inputs["Tangent"])
+    assert exactly(material).surface["tangent"] is None and not exactly(material).attributes
+    tree.nodes["Shader"].inputs["Anisotropy"].default_value = 0.5
+    assert exactly(material).surface["tangent"] == node("tangent", kind="uv_map", uv="Second")
+    assert exactly(material).attributes == {"Second"}
+    tree.links.clear()
+    tree.links.new(tree.nodes["Shader"].outputs[0], tree.nodes["Output"].inputs["Surface"])
+    assert exactly(material).attributes == {"generated"}
 
 
 @pytest.mark.parametrize("word", ["GGX", "BECKMANN", "MULTI_GGX", "ASHIKHMIN_SHIRLEY"])

@@ -16,11 +16,15 @@ ROUGH = {
     "ggx": node("glossy", color=WHITE, roughness=0.5, distribution="ggx"),
     "beckmann": node("glossy", color=WHITE, roughness=0.5, distribution="beckmann"),
     "multiscatter": node("glossy", color=WHITE, roughness=0.8),
+    "stretched": node("glossy", color=WHITE, roughness=0.5, anisotropy=0.6, rotation=0.1, distribution="ggx"),
+    "sheen": node("sheen", color=WHITE, roughness=0.6),
+    "velvet": node("sheen", color=WHITE, roughness=0.6, distribution="ashikhmin"),
     "metal": node("metallic", color=(0.9, 0.6, 0.3), roughness=0.5),
     "conductor": node("metallic", fresnel="physical_conductor", roughness=0.5),
     "glass": node("glass", **GLASSY),
     "refraction": node("refraction", **GLASSY, distribution="ggx"),  # of what is 0, as Beckmann's tails, no density is told
     "principled": node("principled", base_color=WHITE),
+    "cloth": node("principled", base_color=WHITE, sheen_weight=0.8, anisotropic=0.7, coat_weight=0.2, coat_roughness=0.5),
     "coated": node("principled", base_color=WHITE, coat_weight=0.7, coat_roughness=0.4, metallic=0.3),
     "clear": node("principled", base_color=WHITE, transmission_weight=0.6, roughness=0.6),
 }
@@ -111,7 +115,7 @@ def test_a_white_furnace_stays_white(name, roughness, degrees, behind):
     assert -lost - 5 * error < weights.mean() - 1 < 2e-3 + 5 * error, weights.mean()
 
 
-@pytest.mark.parametrize("name", ["ggx", "beckmann", "metal", "conductor", "lambert", "oren-nayar"])
+@pytest.mark.parametrize("name", ["ggx", "stretched", "velvet", "beckmann", "metal", "conductor", "lambert", "oren-nayar"])
 def test_light_goes_both_ways_alike(name):
     """Of what is scattered more than once it does not, as in Cycles."""
     shader = ROUGH[name]

@@ -14,7 +14,7 @@ import bpy
 from ...errors import InputError
 from ...tracer.scene.materials import PLAIN, Colour
 from ...tracer.scene.shader_nodes import KINDS, Node
-from ...tracer.scene.value_nodes import GENERATED, NORMAL, UV
+from ...tracer.scene.value_nodes import GENERATED, OWN, UV
 from .. import versions
 from ..temporary_settings import Overrides
 from . import images, nodes, shaders, value_nodes
@@ -134,7 +134,7 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
             socket = value_nodes.input_of(added, theirs)
             if socket is None:
                 _want_as_before(added, theirs, node[name], value.before[name])
-            elif KINDS[node.type].inputs[name] not in (UV, GENERATED, NORMAL) or name in dict(node.inputs):
+            elif KINDS[node.type].inputs[name] not in (UV, GENERATED, *OWN) or name in dict(node.inputs):
                 _colour(adder, socket, node[name], reading)
     word = dict(node.inputs).get("output", node["output"] if "output" in KINDS[node.type].inputs else None)
     found = [socket for socket in added.outputs if value.outputs.get(socket.identifier, "") == word]

@@ -19,7 +19,7 @@ import numpy as np
 
 from ...tracer.scene.materials import LARGEST_RADIANCE, PLAIN, Colour, Material, Picture
 from ...tracer.scene.shader_nodes import KINDS, Node
-from ...tracer.scene.value_nodes import GENERATED, NORMAL, UV
+from ...tracer.scene.value_nodes import GENERATED, NORMAL, OWN, TANGENT, UV
 from .. import versions
 from . import images, nodes, value_nodes
 from .nodes import Input, Output
@@ -44,7 +44,7 @@ _BESIDE = 1e-6  # of a pixel: where a step lies is the pixel's that it leads to
 _SURE_OF_PATHS = ("Is Camera Ray", "Is Shadow Ray", "Ray Length")
 # What Cycles does not ask for a little beside a point, or in each version in another way.
 _FIXED = {
-    *("CAMERA", "NORMAL_MAP", "BUMP"),
+    *("CAMERA", "NORMAL_MAP", "BUMP", "TANGENT"),
     *(("TEX_COORD", output) for output in ("Normal", "Reflection", "Window")),
     *(("NEW_GEOMETRY", output) for output in ("Incoming", "Tangent")),
     ("LIGHT_PATH", "Ray Length"),
@@ -69,6 +69,7 @@ class Shader:
 
 _DISTRIBUTION = {"distribution": "distribution"}
 _NORMAL = {"normal": "Normal"}
+_ANISOTROPY = {"anisotropy": "Anisotropy", "rotation": "Rotation", "tangent": "Tangent"}
 _THICKNESS = {"Thin Film Thickness": 0.0}
 SHADERS = {
     "diffuse": Shader("BSDF_DIFFUSE", "ShaderNodeBsdfDiffuse", {"color": "Color", "roughness": "Roughness"} | _NORMAL),
@@ -76,17 +77,18 @@ SHADERS = {
     "glossy": Shader(
         "BSDF_GLOSSY",
         "ShaderNodeBsdfGlossy",
-        {"color": "Color", "roughness": "Roughness"} | _NORMAL,
+        {"color": "Color", "roughness": "Roughness"} | _ANISOTROPY | _NORMAL,
         _DISTRIBUTION,
-        {"Anisotropy": 0.0},
     ),
+    "sheen": Shader("BSDF_SHEEN", "ShaderNodeBsdfSheen", {"color": "Color", "roughness": "Roughness"} | _NORMAL, _DISTRIBUTION),
     "metallic": Shader(
         "BSDF_METALLIC",
         "ShaderNodeBsdfMetallic",
         {"color": "Base Color", "edge_tint": "Edge Tint", "ior": "IOR", "extinction": "Extinction", "roughness": "Roughness"}
+        | _ANISOTROPY
         | _NORMAL,
         _DISTRIBUTION | {"fresnel": "fresnel_type"},
-        _THICKNESS | {"Anisotropy": 0.0},
+        _THICKNESS,
     ),
     "glass": Shader(
         "BSDF_GLASS",
@@ -114,11 +116,17 @@ SHADERS = {
             "diffuse_roughness": "Diffuse Roughness",
             "specular_ior_level": "Specular IOR Level",
             "specular_tint": "Specular Tint",
+            "anisotropic": "Anisotropic",
+            "anisotropic_rotation": "Anisotropic Rotation",
+            "tangent": "Tangent",
             "transmission_weight": "Transmission Weight",
             "coat_weight": "Coat Weight",
             "coat_roughness": "Coat Roughness",
             "coat_ior": "Coat IOR",
             "coat_tint": "Coat Tint",
+            "sheen_weight": "Sheen Weight",
+            "sheen_roughness": "Sheen Roughness",
+            "sheen_tint": "Sheen Tint",
             "emission_color": "Emission Color",
             "emission_strength": "Emission Strength",
             "alpha": "Alpha",
@@ -126,7 +134,7 @@ SHADERS = {
         }
         | _NORMAL,
         _DISTRIBUTION,
-        _THICKNESS | {"Anisotropic": 0.0, "Subsurface Weight": 0.0, "Sheen Weight": 0.0, "Thin Wall": 0.0},
+        _THICKNESS | {"Subsurface Weight": 0.0, "Thin Wall": 0.0},
     ),
     "mix": Shader("MIX_SHADER", "ShaderNodeMixShader", {"factor": 0, "first": 1, "second": 2}),
     "add": Shader("ADD_SHADER", "ShaderNodeAddShader", {"first": 0, "second": 1}),
@@ -424,10 +432,14 @@ class _Tree(_Reader):
         known = KINDS[ours].inputs
         given: dict[str, object] = {}
         for name, theirs in shader.inputs.items():
-            if known[name] is NORMAL:
+            if known[name] is TANGENT and not Node(ours, tuple(given.items())).is_stretched:
+                continue
+            if known[name] in OWN:
                 given |= self._normal(source, name, theirs)
             elif known[name] is not None and source.input(theirs) is not None:
                 given[name] = self._input(source, theirs, known[name] if isinstance(known[name], float) else None)
+        if ours == "glossy" and (constant_number(source, "Anisotropy") or 0.0) < 0.0:
+            given["rotation"] = _quarter_further(given["rotation"])
         for name in (name for name, default in known.items() if default is None):
             if (
                 ours == "add"
@@ -468,6 +480,10 @@ class _Tree(_Reader):
             if made is not None and len(self.reading.reasons) == known:
                 return made
             return self.viewport if otherwise is None else Colour((otherwise,) * 3)
+        if isinstance(name, str) and name.endswith("Rotation"):
+            value %= 1.0
+        if name == "Anisotropy":
+            value = abs(value)  # which way, _Tree.surface asks
         most = 1.0 if isinstance(name, int) else LARGEST_RADIANCE
         if not math.isfinite(value) or value > LARGEST_RADIANCE or (value < 0 and name == "Strength"):
             self._reason(output, f"has a {output.node.inputs[name].name} of {value:g}")
@@ -517,7 +533,7 @@ class _Tree(_Reader):
         if "table" in KINDS[ours].inputs:
             given |= self._curves(output)
         for name, theirs in value.inputs.items():
-            if KINDS[ours].inputs[name] is NORMAL:
+            if KINDS[ours].inputs[name] in OWN:
                 given |= self._normal(output, name, theirs)
                 continue
             socket = value_nodes.input_of(node, theirs)
@@ -621,6 +637,13 @@ class _Tree(_Reader):
 
 def _node(type: str, **inputs: object) -> Node:
     return Node(type, tuple(inputs.items()))
+
+
+def _quarter_further(rotation: Colour | Node) -> Colour | Node:
+    """A rotation in turns and a quarter, as stretched across a tangent is along another."""
+    if rotation.varies:
+        return _node("math", operation="add", a=rotation, b=(0.25,) * 3)
+    return Colour(((rotation.rgb[0] + 0.25) % 1.0,) * 3)
 
 
 def _in_space_of(block: bpy.types.Object) -> Node:

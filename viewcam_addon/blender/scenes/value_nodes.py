@@ -137,6 +137,17 @@ VALUES: tuple[tuple[str, Value], ...] = (
     ),
     ("object_info", Value("OBJECT_INFO", "ShaderNodeObjectInfo", {}, _words("Location", "Object Index"))),
     (
+        "tangent",
+        Value(
+            "TANGENT",
+            "ShaderNodeTangent",
+            {},
+            {"Tangent": None},
+            {"kind": "direction_type", "axis": "axis"},
+            names={"uv": "uv_map"},
+        ),
+    ),
+    (
         "normal_map",
         Value(
             "NORMAL_MAP",

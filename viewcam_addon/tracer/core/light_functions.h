@@ -30,8 +30,12 @@ inline void add_node(Scene& scene, const ViewcamNode& given) {
     light.nodes.add(given.name, inputs_of(given, light.nodes), light.textures);
 }
 inline WeightedClosure closure_of(const ViewcamClosure& given, const ValueNodes& nodes) {
-    WeightedClosure made{closure_of(given.node.name, inputs_of(given.node, nodes)), {}};
-    for (int i = 0; i < given.factor_count; i++) made.factors.push_back({color_of(given.factors[i].value, nodes), bool(given.factors[i].rest)});
+    Inputs inputs = inputs_of(given.node, nodes);
+    WeightedClosure made{closure_of(given.node.name, inputs), {}, nodes.need_tangents(inputs)};
+    for (int i = 0; i < given.factor_count; i++) {
+        made.factors.push_back({color_of(given.factors[i].value, nodes), bool(given.factors[i].rest)});
+        made.on_tangents |= nodes.need_tangents(Inputs({{"", "", made.factors.back().value}}));
+    }
     return made;
 }
 inline void add_material(Scene& scene, const ViewcamClosure* closures, int count, bool transparent_shadow) {

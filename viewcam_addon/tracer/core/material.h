@@ -10,6 +10,7 @@
 #include "closures/glossy.h"
 #include "closures/metallic.h"
 #include "closures/principled.h"
+#include "closures/sheen.h"
 #include "closures/transparent.h"
 
 namespace viewcam::VIEWCAM_ISA {
@@ -18,7 +19,7 @@ namespace viewcam::VIEWCAM_ISA {
 // `kinds` where its inputs leave some of them out, `is_rough` where it may spread light otherwise than diffuse surfaces do,
 // `mean_emission` and `shines_evenly` where it shines, `lets_through` where light may go straight through it.
 using Closure = std::variant<DiffuseClosure, GlossyClosure, GlassClosure, RefractionClosure, EmissionClosure, TranslucentClosure, MetallicClosure,
-                             PrincipledClosure, TransparentClosure>;
+                             PrincipledClosure, SheenClosure, TransparentClosure>;
 
 // A factor of a closure's weight, from 0 to 1: a mixture's, or what it leaves to the other side.
 struct MixFactor {
@@ -28,6 +29,7 @@ struct MixFactor {
 struct WeightedClosure {
     Closure closure;
     std::vector<MixFactor> factors;
+    bool on_tangents = false;  // whether its inputs ask for the tangents of a UV map
 };
 
 // The closure of this name; std::invalid_argument if there is none.
@@ -54,6 +56,10 @@ struct Material {
     bool is_transparent() const { return transparent_; }
     // Whether it has normals of its own.
     bool is_bumped() const { return bumped_; }
+    // Whether it asks for the tangents of a UV map.
+    bool needs_tangents() const {
+        return std::any_of(closures.begin(), closures.end(), [](const WeightedClosure& one) { return one.on_tangents; });
+    }
     // About what it gives off, black only where it gives off nothing; and whether that is what it gives off everywhere.
     Vec3 mean_emission() const { return mean_emission_; }
     bool shines_evenly() const { return shines_evenly_; }

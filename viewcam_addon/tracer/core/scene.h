@@ -139,17 +139,17 @@ class Scene {
         return {point, incoming, illumination.textures, illumination.version, &illumination.nodes, &objects[point.object], origin, this, ray};
     }
 
-    // Makes the tangents that normal maps ask for, of meshes that have such materials.
+    // Makes the tangents that nodes ask for, of meshes that have such materials.
     void make_tangents() {
         for (const ValueNode& node : illumination.nodes.all) {
-            auto map = std::get_if<NormalMapNode>(&node);
-            if (!map || map->space != NormalMapNode::TANGENT) continue;
+            const std::string* uv = ValueNodes::tangents_asked(node);
+            if (!uv) continue;
             for (const Object& object : objects) {
                 auto mesh = std::get_if<TriangleMesh>(&geometries[object.geometry]);
-                if (!mesh || !mesh->uvs(map->uv) || mesh->tangents.contains(map->uv)) continue;
+                if (!mesh || !mesh->uvs(*uv) || mesh->tangents.contains(*uv)) continue;
                 auto first = slots.begin() + object.first_slot, last = first + material_counts[object.geometry];
-                if (std::any_of(first, last, [&](const Slot& slot) { return illumination.materials[slot.material].is_bumped(); }))
-                    mesh->tangents[map->uv] = TangentsOfMesh::of(*mesh, mesh->uvs(map->uv));
+                if (std::any_of(first, last, [&](const Slot& slot) { return illumination.materials[slot.material].needs_tangents(); }))
+                    mesh->tangents[*uv] = TangentsOfMesh::of(*mesh, mesh->uvs(*uv));
             }
         }
     }
@@ -364,6 +364,18 @@ inline ShadingPoint::TangentFrame ShadingPoint::tangent_frame(const std::string&
     double size = length(frame.normal);
     if (size > 0 && (!mesh->corner_normals || version >= CYCLES_5_1)) frame.normal = frame.normal / size;
     return frame;
+}
+inline Vec3 tangent_within(const ShadingPoint& at, Vec3 direction) {
+    Vec3 normal = at.point.shading;
+    return cross(normal, safe::normalized(cross(at.to_world_normal(direction), normal)));
+}
+inline Vec3 ShadingPoint::tangent_round(int axis) const {
+    Vec3 out = generated() - grey(0.5);
+    return tangent_within(*this, axis == 0 ? Vec3{0, -out.z, out.y} : axis == 1 ? Vec3{-out.z, 0, out.x} : Vec3{-out.y, out.x, 0});
+}
+inline Vec3 ShadingPoint::tangent_along(const std::string& uv) const {
+    TangentFrame frame = tangent_frame(uv);
+    return frame.side == 0 ? Vec3{} : tangent_within(*this, frame.tangent);
 }
 inline Vec3 ShadingPoint::to_world_normal(Vec3 normal) const { return object && !object->flat ? transposed_product(object->inverse, normal) : normal; }
 inline Vec3 ShadingPoint::in_camera() const { return scene ? scene->camera.to_camera(point.position) : Vec3{}; }

@@ -78,12 +78,8 @@ class Material:
     @property
     def attributes(self) -> set[str]:
         """What its nodes ask meshes for, by name."""
-        values = [
-            value
-            for closure in self.closures
-            for _, value in (*closure.node.inputs, *(("", each) for each, _ in closure.factors))
-        ]
-        return {name for value in values if isinstance(value, Node) for name in value.attributes}
+        makers = [maker for each in self.closures for maker in (each.node, *(factor for factor, _ in each.factors))]
+        return {name for maker in makers if isinstance(maker, Node) for name in maker.attributes}
 
 
 PLAIN = Material(diffuse=Colour((0.8, 0.8, 0.8)))

@@ -17,6 +17,8 @@ from .colours import LARGEST_RADIANCE, WHITE, Colour
 RGB = tuple[float, float, float]
 
 GREY = (0.8, 0.8, 0.8)
+# How facets are stretched along a tangent.
+ANISOTROPY = {"anisotropy": 0.0, "rotation": 0.0, "tangent": value_nodes.TANGENT}
 DISTRIBUTIONS = ("multiscatter_ggx", "ggx", "beckmann")
 
 
@@ -38,7 +40,14 @@ class Kind:
 KINDS: dict[str, Kind] = {
     "diffuse": Kind({"color": GREY, "roughness": 0.0, "normal": value_nodes.NORMAL}, ("diffuse",)),
     "translucent": Kind({"color": GREY, "normal": value_nodes.NORMAL}, ("transmission",)),
-    "glossy": Kind({"color": GREY, "roughness": 0.5, "distribution": DISTRIBUTIONS, "normal": value_nodes.NORMAL}, ("glossy",)),
+    "glossy": Kind(
+        {"color": GREY, "roughness": 0.5, **ANISOTROPY, "distribution": DISTRIBUTIONS, "normal": value_nodes.NORMAL},
+        ("glossy",),
+    ),
+    "sheen": Kind(
+        {"color": GREY, "roughness": 0.5, "distribution": ("microfiber", "ashikhmin"), "normal": value_nodes.NORMAL},
+        ("diffuse", "glossy"),
+    ),
     "metallic": Kind(
         {
             "color": (0.617, 0.577, 0.54),
@@ -46,6 +55,7 @@ KINDS: dict[str, Kind] = {
             "ior": (2.757, 2.513, 2.231),
             "extinction": (3.867, 3.404, 3.009),
             "roughness": 0.5,
+            **ANISOTROPY,
             "fresnel": ("f82", "physical_conductor"),
             "distribution": DISTRIBUTIONS,
             "normal": value_nodes.NORMAL,
@@ -71,11 +81,17 @@ KINDS: dict[str, Kind] = {
             "diffuse_roughness": 0.0,
             "specular_ior_level": 0.5,
             "specular_tint": WHITE,
+            "anisotropic": 0.0,
+            "anisotropic_rotation": 0.0,
+            "tangent": value_nodes.TANGENT,
             "transmission_weight": 0.0,
             "coat_weight": 0.0,
             "coat_roughness": 0.03,
             "coat_ior": 1.5,
             "coat_tint": WHITE,
+            "sheen_weight": 0.0,
+            "sheen_roughness": 0.5,
+            "sheen_tint": WHITE,
             "emission_color": WHITE,
             "emission_strength": 0.0,
             "alpha": 1.0,
@@ -138,7 +154,7 @@ class Node:
             return Node("texture_coordinate")
         if default is value_nodes.GENERATED:
             return Node("texture_coordinate", (("output", "generated"),))
-        if default is None or default in (value_nodes.IMAGE, value_nodes.NORMAL):
+        if default is None or default in (value_nodes.IMAGE, *value_nodes.OWN):
             return None
         if default is value_nodes.NAME:
             return ""
@@ -176,6 +192,13 @@ class Node:
         for name in KINDS[self.type].inputs:
             if isinstance(value := self[name], Node):
                 yield from value.attributes
+        if self.is_stretched and self["tangent"] is None:
+            yield "generated"
+
+    @property
+    def is_stretched(self) -> bool:
+        """Whether it is a shader whose facets are stretched along a tangent."""
+        return any(not self[name].is_black for name in ("anisotropy", "anisotropic") if name in KINDS[self.type].inputs)
 
     @property
     def is_shining(self) -> bool:
@@ -254,8 +277,8 @@ def _checked(name: str, value: Any, known: Any, of_value: bool) -> Any:
         return value
     if isinstance(value, Node):
         return value
-    if known is value_nodes.NORMAL:
-        raise InputError(f"{name} is no node: give one that makes a normal, as normal_map")
+    if known in value_nodes.OWN:
+        raise InputError(f"{name} is no node: give one that makes a {known}, as {'normal_map' if known == 'normal' else known}")
     try:
         return _number_or_colour(value, of_value)
     except (InputError, TypeError, ValueError) as error:

@@ -19,6 +19,12 @@ UV = "uv"
 NORMAL = "normal"
 """The default of a normal that is the surface's own, smooth one where nothing else is given."""
 
+TANGENT = "tangent"
+"""The default of a tangent that runs round the z axis of the generated coordinates where nothing else is given."""
+
+OWN = (NORMAL, TANGENT)
+"""What surfaces have of themselves where no node makes another."""
+
 GENERATED = "generated"
 """The default of a vector that is the place in the mesh's texture space where nothing else is given."""
 
@@ -85,6 +91,7 @@ KINDS: dict[str, Mapping[str, Default]] = {
         "to": ("object", "world", "camera"),
     },
     "geometry": {"output": ("position", "normal", "true_normal", "incoming", "backfacing", "tangent", "parametric")},
+    "tangent": {"kind": ("radial", "uv_map"), "axis": ("z", "x", "y"), "uv": NAME},
     "object_info": {"output": ("location", "object_index")},
     "light_path": {"output": tuple(LIGHT_PATH.split())},
     "fresnel": {"ior": 1.5, "normal": NORMAL},
@@ -235,5 +242,7 @@ def attributes_of(kind: str, value_of: Callable[[str], Any]) -> Iterator[str]:
         yield value_of("name")
     if kind == "normal_map" and value_of("space") == "tangent" and value_of("uv"):
         yield value_of("uv")
+    if kind == "tangent":
+        yield value_of("uv") if value_of("kind") == "uv_map" else "generated"
     if kind in ("texture_coordinate", "geometry") and value_of("output") in ("generated", "tangent"):
         yield "generated"

@@ -12,6 +12,7 @@
 #include "microfacet.h"
 #include "oren_nayar.h"
 #include "shadow_terminator.h"
+#include "sheen.h"
 #include "specular.h"
 #include "translucent.h"
 
@@ -20,7 +21,7 @@ namespace viewcam::VIEWCAM_ISA {
 // One line a kind of lobe. Each has a colour (the most that it sends on), KIND (by which objects and lights hide and by which
 // bounces are counted), DELTA (whether its direction is no matter of chance), IS_DIFFUSE (whether passes count it so), eval, pdf
 // and sample; `importance` where what it scatters is not its colour.
-using Lobe = std::variant<Lambert, SpecularReflection, SpecularTransmission, OrenNayar, Translucent, MicrofacetReflection, MicrofacetTransmission>;
+using Lobe = std::variant<Lambert, SpecularReflection, SpecularTransmission, OrenNayar, Translucent, MicrofacetReflection, MicrofacetTransmission, SheenLobe, VelvetLobe>;
 
 // Light that lobes send on, by the passes that count it.
 struct ScatteredLight {

@@ -6,7 +6,7 @@ namespace viewcam::VIEWCAM_ISA {
 
 // f0: what is reflected straight back; where it is that of the index of refraction itself, Fresnel's equations hold as they are.
 // mean_color: of light that is scattered more than once.
-inline void add_glass(BSDF& bsdf, const ShadingPoint& at, Vec3 weight, Vec3 normal, const Microfacets& facets, double ratio, const Fresnel& fresnel,
+inline void add_glass(BSDF& bsdf, const ShadingPoint& at, Vec3 weight, Vec3 normal, const Facets& facets, double ratio, const Fresnel& fresnel,
                       Vec3 reflected, Vec3 transmitted, bool multiple) {
     if (multiple && !at.is_smooth(facets)) {
         Albedo single = glass_albedo(roughness_of(facets), -dot(normal, at.incoming), ratio);

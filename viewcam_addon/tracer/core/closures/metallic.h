@@ -8,16 +8,17 @@ struct MetallicClosure {
     static constexpr const char* NAME = "metallic";
     static constexpr uint32_t KINDS = GLOSSY;
     Color color, edge_tint, ior, extinction, roughness, normal;
+    Anisotropy anisotropy;
     Distribution distribution;
     bool physical;  // by index of refraction and extinction instead of two colours
 
     explicit MetallicClosure(const Inputs& in)
         : color(in["color"]), edge_tint(in["edge_tint"]), ior(in["ior"]), extinction(in["extinction"]), roughness(in["roughness"]), normal(in["normal"]),
-          distribution(in.choice("distribution")), physical(in.choice("fresnel") == "physical_conductor") {}
+          anisotropy{in["anisotropy"], in["rotation"], in["tangent"]}, distribution(in.choice("distribution")), physical(in.choice("fresnel") == "physical_conductor") {}
     bool is_rough() const { return roughness.varies() || roughness.rgb.x > 0; }
     void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
         Vec3 normal = at.specular_normal(this->normal);
-        Microfacets facets = distribution.facets(at.number(roughness));
+        Facets facets = anisotropy.of(at, at.normal(this->normal), distribution.facets(at.number(roughness)));
         auto add = [&](const auto& fresnel) {
             if (distribution.multiple) {
                 MultipleScattering more = multiple_reflection(at, normal, facets, fresnel.mean());

@@ -1,7 +1,7 @@
-// The principled surface: as much of it as its alpha tells, in layers, from the top a coat, then emission, metal, glass, a specular reflection and what is diffuse.
+// The principled surface: as much of it as its alpha tells, in layers, from the top sheen, a coat, then emission, metal, glass, a specular reflection and what is diffuse.
 //
 // A layer leaves to those below it what its albedo does not take. As in Cycles (measured with 4.2, 4.5, 5.0 and 5.2 under a sun
-// without a size). Sheen, subsurface scattering and thin films have no lobes here.
+// without a size). Subsurface scattering and thin films have no lobes here.
 #pragma once
 #include "diffuse.h"
 #include "glass.h"
@@ -12,15 +12,18 @@ struct PrincipledClosure {
     static constexpr const char* NAME = "principled";
     static constexpr uint32_t KINDS = DIFFUSE | GLOSSY | TRANSMISSION;
     Color base_color, metallic, roughness, ior, diffuse_roughness, specular_level, specular_tint, transmission, coat_weight, coat_roughness, coat_ior,
-        coat_tint, emission_color, emission_strength, alpha, normal, coat_normal;
+        coat_tint, sheen_weight, sheen_roughness, sheen_tint, emission_color, emission_strength, alpha, normal, coat_normal;
+    Anisotropy anisotropy;
     Distribution distribution;
 
     explicit PrincipledClosure(const Inputs& in)
         : base_color(in["base_color"]), metallic(in["metallic"]), roughness(in["roughness"]), ior(in["ior"]),
           diffuse_roughness(in["diffuse_roughness"]), specular_level(in["specular_ior_level"]), specular_tint(in["specular_tint"]),
           transmission(in["transmission_weight"]), coat_weight(in["coat_weight"]), coat_roughness(in["coat_roughness"]),
-          coat_ior(in["coat_ior"]), coat_tint(in["coat_tint"]), emission_color(in["emission_color"]),
-          emission_strength(in["emission_strength"]), alpha(in["alpha"]), normal(in["normal"]), coat_normal(in["coat_normal"]), distribution(in.choice("distribution")) {}
+          coat_ior(in["coat_ior"]), coat_tint(in["coat_tint"]), sheen_weight(in["sheen_weight"]),
+          sheen_roughness(in["sheen_roughness"]), sheen_tint(in["sheen_tint"]), emission_color(in["emission_color"]),
+          emission_strength(in["emission_strength"]), alpha(in["alpha"]), normal(in["normal"]), coat_normal(in["coat_normal"]),
+          anisotropy{in["anisotropic"], in["anisotropic_rotation"], in["tangent"]}, distribution(in.choice("distribution")) {}
 
     uint32_t kinds() const { return transmission.is_black() ? DIFFUSE | GLOSSY : KINDS; }
     bool is_rough() const { return true; }
@@ -35,13 +38,13 @@ struct PrincipledClosure {
         Vec3 base = not_negative(at.color(base_color)), tint = not_negative(at.color(specular_tint)), clamped = unit_range(base);
         Vec3 normal = at.specular_normal(this->normal);
         double cosine = -dot(normal, at.incoming), index = larger(at.number(ior), LEAST_IOR);
-        Microfacets facets = distribution.facets(at.number(roughness));
+        Facets round = distribution.facets(at.number(roughness)), facets = anisotropy.of(at, at.normal(this->normal), round);
 
         if (double share = unit_range(at.number(alpha)); share < 1) {
             bsdf.let_through(weight * (1 - share));
             weight *= share;
         }
-        weight = below_coat(bsdf, at, weight);
+        weight = below_coat(bsdf, at, below_sheen(bsdf, at, weight));
         bsdf.emit(weight * at.color(emission_color) * at.number(emission_strength));
         if (double share = unit_range(at.number(metallic)); share > NEGLIGIBLE) {
             F82 fresnel = F82::of(clamped, unit_range(tint));
@@ -52,7 +55,7 @@ struct PrincipledClosure {
             Vec3 through{std::sqrt(clamped.x), std::sqrt(clamped.y), std::sqrt(clamped.z)};  // it is gone through twice
             double ratio = at.ratio(index);
             ScaledDielectric fresnel{ratio, unit_range(tint * f0_of(index))};
-            add_glass(bsdf, at, weight * share, normal, facets, ratio, fresnel, grey(1), through, distribution.multiple);
+            add_glass(bsdf, at, weight * share, normal, round, ratio, fresnel, grey(1), through, distribution.multiple);
             weight *= 1 - share;
         }
         double level = larger(at.number(specular_level), 0.0), f0 = f0_of(index), eta = index;
@@ -85,13 +88,24 @@ struct PrincipledClosure {
     static Vec3 not_negative(Vec3 rgb) { return {larger(rgb.x, 0), larger(rgb.y, 0), larger(rgb.z, 0)}; }
     static bool is_negligible(Vec3 weight) { return weight.x + weight.y + weight.z < 3 * NEGLIGIBLE; }
 
+    // Adds the sheen, which stands on the coat where there is one; what it leaves to the layers below.
+    Vec3 below_sheen(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
+        double share = larger(at.number(sheen_weight), 0.0);
+        if (!(share > NEGLIGIBLE)) return weight;
+        Vec3 mixed = mix(at.normal(this->normal), at.normal(coat_normal), unit_range(at.number(coat_weight)));
+        double size = length(mixed);
+        SheenLobe lobe(not_negative(at.color(sheen_tint)) * weight * share, size > 0 ? mixed / size : at.point.shading, -at.incoming,
+                       unit_range(at.number(sheen_roughness)));
+        bsdf.add(lobe);
+        return below(weight, lobe.color);
+    }
     // Adds the coat; what it leaves to the layers below.
     Vec3 below_coat(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
         double share = larger(at.number(coat_weight), 0.0);
         if (!(share > NEGLIGIBLE)) return weight;
         Vec3 normal = at.specular_normal(coat_normal);  // not the base's where it has none
         double cosine = -dot(normal, at.incoming), eta = larger(at.number(coat_ior), 1.0);
-        Microfacets facets = facets_of(at.number(coat_roughness));
+        Facets facets = facets_of(at.number(coat_roughness));
         Scattering scattered;
         double reflected = fresnel(cosine, eta);
         if (at.version >= CYCLES_4_3) {

@@ -77,6 +77,12 @@ struct ShadingPoint {
         double side = 0;
     };
     TangentFrame tangent_frame(const std::string& uv) const;
+    // Directions in the smooth surface, unit: round an axis (0 x, 1 y, 2 z) through the middle of the generated coordinates; in which
+    // the u of a UV map grows, 0 where the mesh has none of that name. Defined in scene.h.
+    Vec3 tangent_round(int axis) const;
+    Vec3 tangent_along(const std::string& uv) const;
+    // That which an input asks for: round z where it asks for none.
+    Vec3 tangent(const Color& given) const { return given.node == NONE ? tangent_round(2) : value_of_node(given.node); }
     // A normal of the object's space, of any length.
     Vec3 to_world_normal(Vec3 normal) const;
     // Where this is in the box round the mesh's vertices, from 0 to 1; ½ along what has no extent.
@@ -114,6 +120,10 @@ class Inputs {
     const Color& operator[](std::string_view name) const { return find(name).color; }
     const std::string& choice(std::string_view name) const { return find(name).choice; }
     bool flag(std::string_view name) const { return choice(name) == "true"; }
+    // Whether any is made by a node of which that holds.
+    template <class Holds> bool any_node(Holds&& holds) const {
+        return std::any_of(inputs_.begin(), inputs_.end(), [&](const Input& input) { return input.color.node != NONE && holds(input.color.node); });
+    }
     bool all_constant() const {
         return std::none_of(inputs_.begin(), inputs_.end(), [](const Input& input) { return input.color.varies(); });
     }

@@ -46,6 +46,8 @@ inline SinCos sincos_of_turns(double turns) {
     double across = quarter & 1 ? cos : sin, along = quarter & 1 ? sin : cos;
     return {quarter & 2 ? -across : across, quarter == 1 || quarter == 2 ? -along : along};
 }
+// A vector that is turned about a unit axis (Rodrigues).
+inline Vec3 turned_about(Vec3 axis, Vec3 v, SinCos angle) { return v * angle.cos + cross(axis, v) * angle.sin + axis * (dot(axis, v) * (1 - angle.cos)); }
 inline double sin(double angle) { return sincos_of_turns(angle * (0.5 / PI)).sin; }
 inline double cos(double angle) { return sincos_of_turns(angle * (0.5 / PI)).cos; }
 

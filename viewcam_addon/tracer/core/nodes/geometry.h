@@ -110,8 +110,8 @@ struct VectorRotateNode {
         if (kind == "euler_xyz") return about + (back ? turned_back : turned)(v, at.value(rotation));
         Vec3 n = kind == "x_axis" ? Vec3{1, 0, 0} : kind == "y_axis" ? Vec3{0, 1, 0} : kind == "z_axis" ? Vec3{0, 0, 1} : safe::normalized(at.value(axis));
         if (is_black(n)) return about + v;
-        double by = at.number(angle) * (back ? -1 : 1), c = safe::cosine(by);
-        return about + v * c + cross(n, v) * safe::sine(by) + n * (dot(n, v) * (1 - c));  // Rodrigues
+        double by = at.number(angle) * (back ? -1 : 1);
+        return about + turned_about(n, v, {safe::sine(by), safe::cosine(by)});
     }
 };
 
@@ -163,19 +163,13 @@ struct GeometryNode {
             case NORMAL: return at.point.shading;
             case TRUE_NORMAL: return at.point.normal;
             case INCOMING: return -at.incoming;
-            case TANGENT: return tangent(at);
+            case TANGENT: return at.tangent_round(2);
             case PARAMETRIC: return {1 - at.point.barycentric.x - at.point.barycentric.y, at.point.barycentric.x, 0};
             default: return grey(at.point.backside);
         }
     }
 
    private:
-    // Round the z axis of the generated coordinates' middle.
-    static Vec3 tangent(const ShadingPoint& at) {
-        Vec3 place = at.generated(), round{0.5 - place.y, place.x - 0.5, 0}, normal = at.point.shading;
-        if (at.object) round = safe::normalized(transposed_product(at.object->inverse, round));
-        return cross(normal, safe::normalized(cross(round, normal)));
-    }
     static decltype(output) output_of(const std::string& name) {
         return name == "position"      ? POSITION
                : name == "normal"      ? NORMAL
@@ -185,6 +179,20 @@ struct GeometryNode {
                : name == "parametric"  ? PARAMETRIC
                                        : BACKFACING;
     }
+};
+
+// A direction in the surface, of which rough closures are stretched: round an axis, or in which the u of a UV map grows.
+struct TangentNode {
+    static constexpr const char* NAME = "tangent";
+    static constexpr Gives GIVES = Gives::VECTOR;
+    static constexpr bool VARIES = true;
+    bool radial;
+    int axis;
+    std::string uv;  // "" the mesh's own
+
+    explicit TangentNode(const Inputs& in)
+        : radial(in.choice("kind") == "radial"), axis(in.choice("axis")[0] - 'x'), uv(in.choice("uv")) {}
+    Vec3 eval(const ShadingPoint& at) const { return radial ? at.tangent_round(axis) : at.tangent_along(uv); }
 };
 
 struct ObjectInfoNode {

@@ -29,7 +29,7 @@ struct ConstantNode {
 // One line a node. Each has a NAME, by which a scene asks for it, what it GIVES, by which it becomes a number, and `eval`; VARIES
 // where it depends on more than its inputs; `gives` where the node itself knows what it gives.
 using ValueNode = std::variant<ConstantNode, ImageNode, TextureCoordinateNode, AttributeNode, MappingNode, VectorRotateNode, VectorTransformNode, GeometryNode, NormalMapNode, BumpNode,
-                               ObjectInfoNode, LightPathNode, FresnelNode, LayerWeightNode, MathNode, VectorMathNode, MapRangeNode, MapRangeVectorNode, ClampNode,
+                               TangentNode, ObjectInfoNode, LightPathNode, FresnelNode, LayerWeightNode, MathNode, VectorMathNode, MapRangeNode, MapRangeVectorNode, ClampNode,
                                SeparateNode, CombineXYZNode, SeparateColorNode, CombineColorNode, MixColorNode, MixNumberNode, MixVectorNode, MixComponentsNode,
                                RGBCurvesNode, VectorCurvesNode, FloatCurveNode, BlackbodyNode, WavelengthNode, GammaNode,
                                BrightContrastNode, HueSaturationNode, InvertNode, LuminanceNode, NoiseNode, WhiteNoiseNode, CheckerNode,
@@ -51,7 +51,19 @@ struct ValueNodes {
     }
 
     // Adds the node of this name; std::invalid_argument if there is none.
-    void add(std::string_view name, const Inputs& inputs, const std::vector<Texture>& textures) { all.push_back(made(name, inputs, textures)); }
+    void add(std::string_view name, const Inputs& inputs, const std::vector<Texture>& textures) {
+        all.push_back(made(name, inputs, textures));
+        on_tangents_.push_back(tangents_asked(all.back()) != nullptr || need_tangents(inputs));
+    }
+    // Whether what makes any of these asks for the tangents of a UV map; and the name of that which a node itself asks for.
+    bool need_tangents(const Inputs& inputs) const {
+        return inputs.any_node([&](uint32_t node) { return on_tangents_[node]; });
+    }
+    static const std::string* tangents_asked(const ValueNode& node) {
+        if (auto map = std::get_if<NormalMapNode>(&node); map && map->space == NormalMapNode::TANGENT) return &map->uv;
+        if (auto tangent = std::get_if<TangentNode>(&node); tangent && !tangent->radial) return &tangent->uv;
+        return nullptr;
+    }
     // The same, or the constant that a node has turned out to be.
     Color resolved(Color color) const {
         if (color.node == NONE) return color;
@@ -61,6 +73,7 @@ struct ValueNodes {
     }
 
    private:
+    std::vector<bool> on_tangents_;
     static constexpr double LARGEST = 1e18;
 
     template <class Kind> static Gives gives(const Kind& kind) {

@@ -1,4 +1,4 @@
-// Tangents of a UV map, on which normal maps stand: those of MikkTSpace (Mikkelsen, Simulation of Wrinkled Surfaces Revisited, 2008),
+// Tangents of a UV map, on which normal maps and stretched facets stand: those of MikkTSpace (Mikkelsen, Simulation of Wrinkled Surfaces Revisited, 2008),
 // which bakers and renderers share.
 //
 // Corners of the same place, normal and UV are one vertex. Of the triangles round it, those that follow each other side by side and

@@ -35,7 +35,7 @@ struct TriangleMesh {
     const float* corner_uvs = nullptr;       // (count, 3, 2), or nothing
     const float* corner_colors = nullptr;    // (count, 3, 3), linear, or nothing
     std::vector<Attribute> attributes;
-    std::map<std::string, std::vector<float>> tangents;  // (count, 3, 4), by the UV map's name, of those that normal maps ask for
+    std::map<std::string, std::vector<float>> tangents;  // (count, 3, 4), by the UV map's name, of those that nodes ask for
     Bounds bounds;                           // of the vertices
 
     Vec3 corner(size_t triangle, int i) const {
