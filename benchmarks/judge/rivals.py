@@ -20,7 +20,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from viewcam_addon.comparison import geometry, pictures, radiance
+from viewcam_addon.comparison import geometry, perception, pictures, radiance
 from viewcam_addon.image import Image
 
 Array = NDArray[np.float64]
@@ -28,22 +28,25 @@ Array = NDArray[np.float64]
 OURS = "ours"
 
 
-def of_comparisons(
-    reference: Image, test: Image, lit_reference: Image, lit_tests: Sequence[Image], surface_at: Callable
-) -> dict[str, float]:
-    """Ours: the largest share of what is allowed, of geometry and of light. And FLIP, which a comparison of light tells."""
+def of_geometry(reference: Image, test: Image, surface_at: Callable) -> float:
+    """Ours, of geometry: the largest share of what is allowed."""
     found = geometry.compare(reference, test, reference.camera, surface_at)
     shares = [share for row in found.rows for share in row.shares]
     if found.systematic:
         shares.append(found.systematic.mean / found.systematic.tolerance)
     if not (found.mismatches_ok and shares):
         shares.append(np.inf)
-    light = radiance.compare(lit_reference, lit_tests, reference.camera)
-    for row in light.rows:
+    return max(shares)
+
+
+def of_light(reference: Image, tests: Sequence[Image]) -> float:
+    """Ours, of light: the largest share of what is allowed."""
+    shares = []
+    for row in radiance.judge(reference, tests, reference.camera).rows:
         if row.broken or (row.noise_free and not row.noise_free.ok):
             shares.append(np.inf)
         shares += [float(np.nanmax(np.abs(test.errors) / test.allowed)) for test in row.hypothesis_tests]
-    return {OURS: max(shares), "FLIP": light.appearance.flip / 0.05}
+    return max(shares)
 
 
 def idiff(reference: Array, test: Array, _: Array, __: int) -> float:
@@ -60,6 +63,10 @@ def ssim(reference: Array, test: Array, _: Array, __: int) -> float:
     return float(1 - (numerator / denominator).mean()) / 0.03
 
 
+def flip(reference: Array, test: Array, _: Array, __: int) -> float:
+    return perception.flip(reference, np.nan_to_num(test))[0] / 0.05
+
+
 def z_test(reference: Array, test: Array, variance: Array, samples: int) -> float:
     """variance : of one sample. samples : of the test."""
     z = np.abs(test - reference) * np.sqrt(samples / np.maximum(variance, 1e-4))
@@ -67,7 +74,7 @@ def z_test(reference: Array, test: Array, variance: Array, samples: int) -> floa
     return float(np.percentile(np.nan_to_num(z, nan=np.inf), 99.75)) / NormalDist().inv_cdf(1 - alpha / 2)
 
 
-RIVALS = {"idiff": idiff, "SSIM": ssim, "z-test": z_test}
+RIVALS = {"FLIP": flip, "idiff": idiff, "SSIM": ssim, "z-test": z_test}
 
 
 def _screen(colour: Array) -> Array:

@@ -6,12 +6,11 @@ import pytest
 pytest.importorskip("flip_evaluator")
 
 from benchmarks.judge import detection, faults
-from viewcam_addon.tracer.render import Tracer
 
 
 @pytest.fixture(scope="module")
-def bench():
-    return detection.Bench()
+def block():
+    return detection.Block(detection.Bench(), 0)
 
 
 def test_there_are_sixty_faults_of_four_families_each_with_a_name_of_its_own():
@@ -23,20 +22,31 @@ def test_there_are_sixty_faults_of_four_families_each_with_a_name_of_its_own():
 
 
 @pytest.mark.exhaustive
-def test_a_good_picture_passes_and_a_fault_of_each_family_is_found(bench):
-    good = [bench.trial(Tracer(bench.scene), None, seed) for seed in range(3)]
-    assert all(said["ours"] < 1 for said in good), good
+def test_good_pictures_pass_and_a_fault_of_each_family_is_found_in_each(block):
+    good = block.good()
+    assert len(good) == detection.SIDE**2 and all(said["ours"] < 1 for said in good), good
+    assert len({said["ours"] for said in good}) == len(good), "no pair is another's"
     for name in ("shifted by 0.01 px upwards", "the ball moved by 0.001", "the lamp 3.0% dimmer", "a firefly"):
         (fault,) = (fault for fault in faults.FAULTS if fault.name == name)
-        said = bench.trial(Tracer(detection._scene(faults.changed(fault))), fault, 7)
-        assert said["ours"] > 1, (fault.name, said)
+        said = block.faulty(fault)
+        assert len(said) == detection.SIDE and all(each["ours"] > 1 for each in said), (name, said)
+        assert set(said[0]) == {"ours", "FLIP", "idiff", "SSIM", "z-test"}
+    assert block.good() == good, "a fault of the picture is put into a copy"
 
 
-def test_a_chart_counts_what_is_missed_at_how_many_false_alarms():
-    clean = {"ours": np.arange(100.0) / 100, "SSIM": np.arange(100.0)}
-    scores = [{"ours": np.array([2.0, 0.5]), "SSIM": np.array([98.5, 20.0])}]
-    chart = detection._chart("all", scores, clean, 2, 100)
-    ours, other = chart.curves
-    assert list(ours.x) == [1e-2, 3e-2, 0.1, 0.3]
-    assert list(ours.y) == [0.5, 0.5, 0.5, 0.5] and list(other.y) == [0.5, 0.5, 0.5, 0.5]
+def test_a_chart_counts_what_is_missed_at_how_few_false_alarms():
+    clean = {"ours": np.arange(100.0) / 100, "SSIM": np.arange(10.0), "FLIP": np.zeros(10)}
+    found = {faults.FAULTS[0]: {"ours": np.array([2.0, 0.5]), "SSIM": np.array([8.5]), "FLIP": np.zeros(1)}}
+    chart = detection._chart("all", found, clean)
+    ours, ssim, _ = chart.curves
+    assert list(ours.x) == [1e-2, 3e-2, 0.1, 0.3] and list(ours.y) == [0.5] * 4
+    assert list(ssim.x) == [0.1, 0.3] and list(ssim.y) == [0.0, 0.0]
     assert ours.ours and "ours 50.0% at 0.00%" in chart.reading
+
+
+def test_alarms_that_come_together_are_counted():
+    side = detection.SIDE
+    scores = np.zeros((4, side, side))
+    assert detection.together(scores.ravel() + np.arange(4 * side**2), 0.01) == 0.0
+    scores[1, 2] = 1.0  # one picture against all references
+    assert detection.together(scores.ravel(), 0.05) == 0.5

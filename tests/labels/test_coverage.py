@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 import viewcam_addon as vp
 from viewcam_addon import image
 from viewcam_addon.labels import coverage, files
+from viewcam_addon.labels.surfaces import Surfaces
 from viewcam_addon.tracer.scene import Object, Scene
 
 from .conftest import CAMERA, mesh, moved, room
@@ -92,6 +93,15 @@ def test_shares_add_up_and_hold_the_masks_at_the_centres():
     layers = [name for name in found.image.passes if name.startswith("Crypto")]
     ranks = np.concatenate([found.image[name][..., 1::2] for name in layers], axis=-1)
     assert (np.diff(ranks, axis=-1) <= 0).all() and ranks[..., -2:].any(), "the largest first, and no layer for nothing"
+
+
+def test_another_place_in_the_pixels_is_the_camera_shifted_and_leaves_the_centres_as_they_were(scene):
+    surfaces = Surfaces(scene)
+    there = surfaces.instances_at((0.2, 0.9))
+    aside = replace(scene, camera=CAMERA.cropped(-0.3, 0.4, CAMERA.width, CAMERA.height))
+    np.testing.assert_array_equal(there, Surfaces(aside).instance)
+    np.testing.assert_array_equal(surfaces.instance, Surfaces(scene).instance)
+    assert (there != surfaces.instance).any()
 
 
 def test_an_object_behind_another_or_smaller_than_a_pixel_counts_for_what_is_seen_of_it():

@@ -31,7 +31,7 @@ class Appearance:
 
 def appearance(combined: Sides) -> tuple[Appearance, NDArray[np.float32] | None]:
     """The figures, and FLIP's map (height, width)."""
-    mean, by_pixel = _flip(combined)
+    mean, by_pixel = flip(combined.reference, combined.test)
     noise = combined.variance + combined.spread
     expected = _relative(noise, combined.reference) if np.isfinite(noise).all() else None
     return Appearance(_relative(combined.difference**2, combined.reference), expected, mean), by_pixel
@@ -42,12 +42,13 @@ def _relative(squares: Array, reference: Array) -> float:
     return float((squares / np.maximum(power + 0.01 * power.mean(), np.finfo(float).tiny)).mean())
 
 
-def _flip(combined: Sides) -> tuple[float | None, NDArray[np.float32] | None]:
+def flip(reference: Array, test: Array) -> tuple[float | None, NDArray[np.float32] | None]:
+    """FLIP of light (height, width, 3): its mean, and its map (height, width)."""
     try:
         import flip_evaluator
     except ImportError:
         return None, None
-    bright = pictures.brightness(combined.reference)
-    shown = [pictures.on_screen(side, bright).astype(np.float32) for side in (combined.reference, combined.test)]
+    bright = pictures.brightness(reference)
+    shown = [pictures.on_screen(side, bright).astype(np.float32) for side in (reference, test)]
     by_pixel, mean, _ = flip_evaluator.evaluate(*shown, "LDR", applyMagma=False)
     return float(mean), by_pixel[..., 0]

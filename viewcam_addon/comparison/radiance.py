@@ -10,9 +10,10 @@ any threshold is right for one picture; they are told, and judge nothing.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..image import LIGHT_PASSES, Image
 from ..pinhole import Pinhole
@@ -44,6 +45,37 @@ def compare(reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_sam
     InputError
         if the sizes differ, a pass is missing, or there is no test picture.
     """
+    judged = judge(reference, tests, pinhole, test_samples)
+    maps = dict(judged.maps)
+    appearance, flip = perception.appearance(judged.combined)
+    if flip is not None:
+        maps["FLIP"] = flip
+    samples, seeds = judged.samples, len(tests)
+    together = (samples[0], samples[1] and samples[1] * seeds)
+    return RadianceComparison(
+        pinhole, together, seeds, judged.is_noisy, judged.rows, judged.equal, appearance, judged.combined.test, maps
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """What the verdict stands on.
+
+    combined : both sides of it. samples : of the reference, and of each test picture. rows, equal, maps : as in
+    RadianceComparison, but no map of what an eye sees.
+    """
+
+    combined: Sides
+    samples: tuple[int | None, int | None]
+    is_noisy: bool
+    rows: tuple[LightRow, ...]
+    equal: tuple[str, ...]
+    maps: dict[str, NDArray[np.float32]]
+
+
+@np.errstate(all="ignore")
+def judge(reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_samples: int | None = None) -> Judged:
+    """`compare` without what judges nothing."""
     found = list(all_sides(reference, tests))
     combined, equal = found[0], tuple(sides.name for sides in found[1:] if sides.are_equal)
     unequal = [sides for sides in found if sides.name not in equal]
@@ -63,11 +95,7 @@ def compare(reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_sam
         rows.append(row)
         if sides.name == "Combined" or not row.ok:
             maps |= {f"{sides.name}: {name}": in_float32(values) for name, values in drawn.items()}
-    appearance, flip = perception.appearance(combined)
-    if flip is not None:
-        maps["FLIP"] = flip
-    together = (samples[0], samples[1] and samples[1] * seeds)
-    return RadianceComparison(pinhole, together, seeds, is_noisy, tuple(rows), equal, appearance, combined.test, maps)
+    return Judged(combined, samples, is_noisy, tuple(rows), equal, maps)
 
 
 def _noise_free(sides: Sides, rounding: noise_free.Rounding) -> tuple[LightRow, dict[str, Array]]:

@@ -8,9 +8,9 @@ want more than that), and a grid of rows and columns, which an upright edge cros
 Layout, hash and header: the Cryptomatte specification 1.2 (Psyop). The hash: MurmurHash3_x86_32 (Appleby, public domain).
 """
 
+import functools
 import json
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -40,16 +40,18 @@ class Coverage:
 
 
 def coverage(surfaces: Surfaces) -> Coverage:
-    """Of all instances. The tracer that the surfaces have can't trace for them any more."""
+    """Of all instances."""
     names = _names(surfaces.instances)
     marks = np.array([_mark(name) for name in names], np.float32)
     shape = surfaces.instance.shape
-    at_samples = np.stack(list(_at_samples(surfaces)), axis=1)
+    at_samples = np.empty((SAMPLES, surfaces.instance.size), np.int32)
+    for there, place in zip(at_samples, _places(), strict=True):
+        there[:] = surfaces.instances_at(place).ravel()
     pixels, owners, counts = _counted(at_samples)
     first = np.flatnonzero(np.diff(pixels, prepend=-1))
     ranks = np.arange(len(pixels)) - np.repeat(first, np.diff(first, append=len(pixels)))
     layers = max(int(ranks.max(initial=0)) // 2 + 1, 1)
-    found = np.zeros((len(at_samples), layers, 4), np.float32)
+    found = np.zeros((at_samples.shape[1], layers, 4), np.float32)
     found[pixels, ranks // 2, ranks % 2 * 2] = marks[owners]
     found[pixels, ranks // 2, ranks % 2 * 2 + 1] = counts / SAMPLES
     passes = {name: found[:, i].reshape(*shape, 4) for i, name in enumerate(COVERAGE_PASSES[:layers])}
@@ -73,22 +75,21 @@ def told(found: Coverage, number: int) -> dict[str, Any] | None:
     return {"name": found.names[number], "area": float(found.areas[number])} if found.areas[number] else None
 
 
-def _at_samples(surfaces: Surfaces) -> Iterator[NDArray[np.int32]]:
-    """(pixels,) for each place in them: the instance there, −1 for none."""
-    camera = surfaces.camera
-    for i in range(SAMPLES):
-        x, y = (i + 0.5) / SAMPLES, (i * _STEP % SAMPLES + 0.5) / SAMPLES
-        there = camera.cropped(x - 0.5, y - 0.5, camera.width, camera.height)
-        yield Surfaces(replace(surfaces.scene, camera=there), None, surfaces.keeper).instance.ravel().astype(np.int32)
+def _places() -> list[tuple[float, float]]:
+    """In a pixel, from its lower left corner."""
+    return [((i + 0.5) / SAMPLES, (i * _STEP % SAMPLES + 0.5) / SAMPLES) for i in range(SAMPLES)]
 
 
 def _counted(at_samples: NDArray[np.int32]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """Pixels, their instances and at how many of their places these are: by pixels, then the most first, then by number."""
-    first = at_samples[:, 0]
-    is_one = (at_samples == first[:, None]).all(axis=1)
+    """Pixels, their instances and at how many of their places these are: by pixels, then the most first, then by number.
+
+    at_samples : (SAMPLES, pixels), −1 for none.
+    """
+    first = at_samples[0]
+    is_one = (at_samples == first).all(axis=0)
     whole = np.flatnonzero(is_one & (first >= 0))
     mixed = np.flatnonzero(~is_one)
-    several = np.sort(at_samples[mixed], axis=1)
+    several = np.sort(at_samples[:, mixed].T, axis=1)
     starts = np.flatnonzero(np.diff(several, axis=1, prepend=-2))
     counts = np.diff(starts, append=several.size)
     owners, pixels = several.ravel()[starts], mixed[starts // SAMPLES]
@@ -125,6 +126,7 @@ def _hex(mark: np.float32) -> str:
     return f"{int(np.float32(mark).view(np.uint32)):08x}"
 
 
+@functools.lru_cache(maxsize=2**16)
 def _mark(name: str) -> np.float32:
     return _as_float(murmur3(name.encode("utf-8", "surrogatepass")))
 

@@ -67,6 +67,7 @@ def label(
     if "masks" in kinds:
         ids = np.array([*(instance.id for instance in surfaces.instances), 0])  # the last is that of −1
         passes |= {"Instance": ids[surfaces.instance], "Material Index": surfaces.passes["Material Index"]}
+    covered = coverage.coverage(surfaces) if "coverage" in kinds else None
     lost = {}
     if "flow" in kinds:
         for name, other in others.items():
@@ -74,7 +75,6 @@ def label(
                 found = motion(surfaces, Surfaces(other, threads, keepers.of(other)))
                 passes |= _motions(name, found)
                 lost[name.lower()] = list(found.lost)
-    covered = coverage.coverage(surfaces) if "coverage" in kinds else None  # the last who traces: see there
     if covered:
         passes |= covered.passes
     planes = {name: np.asarray(values, np.float32).reshape(*shape, -1) for name, values in passes.items()}

@@ -139,6 +139,10 @@ class Surfaces:
     def _hits(self) -> tuple[Array, NDArray[np.int64], NDArray[np.int64], Passes]:
         return self._tracer.hits(self._names)
 
+    def instances_at(self, place: tuple[float, float]) -> NDArray[np.int64]:
+        """As `instance`, at another place in the pixels than their centres."""
+        return self._tracer.hits(place=place)[1]
+
     @property
     def depth(self) -> Array:
         return self._hits[0]

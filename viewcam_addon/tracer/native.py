@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..pinhole import Pinhole
 from .scene import Mesh, Object, Scene, Spheres, placing
 from .scene.colours import WHITE
 from .scene.film import FILTERS
@@ -258,7 +259,7 @@ class CoreScene:
         )
         self.check(self.core.commit(self.handle, _address(matrices), _address(self.origin), threads))
         self._light: Scene | None = None
-        self.look(scene)
+        self.look(scene.camera, scene.clip)
 
     def __del__(self) -> None:
         if getattr(self, "handle", None):
@@ -317,12 +318,11 @@ class CoreScene:
             and same_things(scene, self._scene)
         )
 
-    def look(self, scene: Scene) -> None:
-        """Put the camera of a scene with the same objects in the place of the one before."""
-        camera = scene.camera
+    def look(self, camera: Pinhole, clip: tuple[float, float]) -> None:
+        """Put a camera and its clip range in the place of the one before."""
         u, v, w = camera.basis()
         # What lies at the ends of the clip range is visible, and what lies at the ends of a ray is not.
-        nearest, farthest = math.nextafter(scene.clip[0], 0.0), math.nextafter(scene.clip[1], math.inf)
+        nearest, farthest = math.nextafter(clip[0], 0.0), math.nextafter(clip[1], math.inf)
         described = _Camera(t_min=nearest, t_max=farthest, width=camera.width, height=camera.height)
         described.eye[:] = tuple(np.array(camera.eye) - self.origin)
         described.right[:], described.up[:], described.forward[:] = tuple(-u if camera.mirrored else u), tuple(v), tuple(-w)

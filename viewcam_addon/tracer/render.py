@@ -50,7 +50,7 @@ class Tracer:
         former = None if kept is None else kept._used_up()
         if former is not None and former[1].serves(scene):
             self._core = former[1]
-            self._core.look(scene)
+            self._core.look(scene.camera, scene.clip)
         else:
             former = None
             self._core = CoreScene(scene, self._threads)
@@ -105,10 +105,12 @@ class Tracer:
                 watcher.tile(passes, range(row, min(row + native.TILE, height)))
         return passes
 
-    def hits(self, names: Collection[str] = ()) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], Passes]:
-        """What the pixels' centres show, each (height, width), rows from the bottom: the planar depth, inf where nothing is;
-        which instance, counting through the objects and the places of each; and which of its geometry's primitives, −1 where
-        none is. And of these same points the passes that `names` are, as `render` has them.
+    def hits(
+        self, names: Collection[str] = (), place: tuple[float, float] = (0.5, 0.5)
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], Passes]:
+        """What the pixels' centres show, or another place in each of them, each (height, width), rows from the bottom: the
+        planar depth, inf where nothing is; which instance, counting through the objects and the places of each; and which of
+        its geometry's primitives, −1 where none is. And of these same points the passes that `names` are, as `render` has them.
         """
         shape = self._camera.height, self._camera.width
         depth, objects, primitives = np.empty(shape), np.empty(shape, np.uint32), np.empty(shape, np.uint32)
@@ -117,8 +119,11 @@ class Tracer:
         def trace(rows: range, stop: int) -> None:
             self._core.render_hits(passes, (depth, objects, primitives), rows, stop)
 
+        aside = self._camera.cropped(place[0] - 0.5, place[1] - 0.5, self._camera.width, self._camera.height)
+        self._core.look(aside, self._scene.clip)
         for _ in self._in_threads(trace, self._bands(), None):
             pass
+        self._core.look(self._camera, self._scene.clip)
         # −1 is what NO_HIT is as a number with a sign; no scene has 2³¹ of either.
         return depth, objects.view(np.int32).astype(np.int64), primitives.view(np.int32).astype(np.int64), passes
 

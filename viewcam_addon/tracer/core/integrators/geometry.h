@@ -18,6 +18,9 @@ struct GeometryPasses {
         ((to[at] = float(values), at += stride), ...);
     }
     void write(ViewcamPass pass, size_t pixel, Vec3 v) const { write(pass, pixel, v.x, v.y, v.z); }
+    bool any() const {
+        return std::any_of(plane, plane + VIEWCAM_PASSES, [](const float* each) { return each; });
+    }
 };
 
 // Where, and on what, the rays of the pixels end, in float64; null is not wanted. Where nothing is: infinity and NO_HIT twice.
@@ -68,6 +71,7 @@ inline void render_geometry(
 ) {
     constexpr uint32_t WIDTH = 16, HEIGHT = 4;
     const Camera& camera = scene.camera;
+    const bool has_passes = passes.any();
     Ray rays[WIDTH * HEIGHT];
     Hit hits[WIDTH * HEIGHT];
     size_t pixels[WIDTH * HEIGHT];
@@ -81,7 +85,7 @@ inline void render_geometry(
                     rays[count++] = camera.ray(column + 0.5, row + 0.5);
                 }
             scene.closest(rays, count, CAMERA, hits);
-            write_geometry(scene, rays, hits, count, passes, pixels);
+            if (has_passes) write_geometry(scene, rays, hits, count, passes, pixels);
             for (int i = 0; ends.depth && i < count; i++)
                 ends.depth[pixels[i]] = hits[i].t, ends.object[pixels[i]] = hits[i].object, ends.primitive[pixels[i]] = hits[i].primitive;
         }
