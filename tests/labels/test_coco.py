@@ -9,6 +9,7 @@ import pytest
 import viewcam_addon as vp
 from viewcam_addon.cli import main
 from viewcam_addon.labels import coco, files
+from viewcam_addon.png import encoded
 
 from .conftest import CAMERA, moved, room
 
@@ -70,6 +71,16 @@ def test_segments_are_those_of_the_colours_of_the_pictures(pictures, tmp_path):
         assert segments == {n: area for n, area in zip(numbers.tolist(), areas.tolist(), strict=True) if n}
     colours = [tuple(each["color"]) for each in told["categories"]]
     assert len(set(colours)) == len(colours) and all(each["isthing"] == 1 for each in told["categories"])
+
+
+@pytest.mark.parametrize("kind", ["instances", "panoptic"])
+def test_a_picture_beside_its_labels_is_the_one_that_is_named(tmp_path, kind):
+    for name in ("a", "b"):
+        files.write(tmp_path / f"{name}.exr", vp.label(room(), ("masks",)))
+    (tmp_path / "b.png").write_bytes(encoded(np.zeros((48, 64, 3), np.uint8)))
+    assert run(tmp_path, tmp_path / "all.json", "--to", kind) == 0
+    told = json.loads((tmp_path / "all.json").read_text())
+    assert [each["file_name"] for each in told["images"]] == ["a.exr", "b.png"]
 
 
 def test_an_instance_has_one_id_in_all_pictures(pictures, tmp_path):

@@ -90,8 +90,13 @@ def with_mask(kind: str, path: Path, told: Document) -> Sequence[Document]:
 
 def _images(pictures: list[tuple[Path, Document]]) -> list[Document]:
     return [
-        {"id": number, "width": told["camera"]["width"], "height": told["camera"]["height"], "file_name": told["picture"]}
-        for number, (_, told) in enumerate(pictures, start=1)
+        {
+            "id": number,
+            "width": told["camera"]["width"],
+            "height": told["camera"]["height"],
+            "file_name": files.picture(path, told),
+        }
+        for number, (path, told) in enumerate(pictures, start=1)
     ]
 
 

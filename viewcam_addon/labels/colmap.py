@@ -74,7 +74,7 @@ def write(folder: Path, output: Path, points: int = POINTS) -> dict[str, int]:
         views, pieces = [], []
         for number, (path, told) in enumerate(pictures):
             with files.understood(path):
-                name = (files.photograph(path, told) or Path(told["picture"])).name
+                name = files.picture(path, told)
                 views.append(cameras.Camera(name, Pinhole(**told["camera"]), image=name))
                 pieces.append(_sampled(number, views[-1].pinhole, *_planes(path, told, states), points))
         sampled = _Sampled(*map(np.concatenate, zip(*pieces, strict=True)))

@@ -133,6 +133,11 @@ def photograph(path: Path, told: dict[str, Any]) -> Path | None:
     return None
 
 
+def picture(path: Path, told: dict[str, Any]) -> str:
+    """The name of the picture that a label file tells of: of the PNG or JPEG beside it, or else of the EXR."""
+    return (photograph(path, told) or Path(told["picture"])).name
+
+
 def passes(path: Path, told: dict[str, Any], wanted: Sequence[str]) -> dict[str, NDArray[np.float32]]:
     """Those passes of a label file's EXR that it has: (height, width, channels), rows from the **top**.
 
