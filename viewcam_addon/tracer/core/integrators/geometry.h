@@ -11,13 +11,18 @@ struct GeometryPasses {
     float* const* plane;
     size_t stride;
 
-    template <class... Values> void write(ViewcamPass pass, size_t pixel, Values... values) const {
+    // The pass of some pixels, value_of(i) → a number or a Vec3 each.
+    template <class ValueOf> void write(ViewcamPass pass, const size_t* pixels, int count, const ValueOf& value_of) const {
         float* to = plane[pass];
-        if (!to) return;
-        size_t at = pixel;
-        ((to[at] = float(values), at += stride), ...);
+        for (int i = 0; to && i < count; i++) {
+            if constexpr (std::is_same_v<decltype(value_of(0)), Vec3>) {
+                Vec3 value = value_of(i);
+                to[pixels[i]] = float(value.x), to[stride + pixels[i]] = float(value.y), to[2 * stride + pixels[i]] = float(value.z);
+            } else {
+                to[pixels[i]] = float(value_of(i));
+            }
+        }
     }
-    void write(ViewcamPass pass, size_t pixel, Vec3 v) const { write(pass, pixel, v.x, v.y, v.z); }
     bool any() const {
         return std::any_of(plane, plane + VIEWCAM_PASSES, [](const float* each) { return each; });
     }
@@ -34,34 +39,31 @@ inline void write_geometry(const Scene& scene, const Ray* rays, const Hit* hits,
     constexpr double BACKGROUND_DEPTH = 1e10;
     const Ray* met_by[PACKET];
     Hit met[PACKET];
-    size_t to[PACKET];
+    size_t at[PACKET], beside[PACKET];
     Interaction found[PACKET];
     double magnitudes[PACKET];
-    int some = 0;
+    int some = 0, none = 0;
     for (int i = 0; i < count; i++) {
-        if (hits[i]) {
-            met_by[some] = &rays[i], met[some] = hits[i], to[some++] = pixels[i];
-            continue;
-        }
-        passes.write(VIEWCAM_DEPTH, pixels[i], BACKGROUND_DEPTH);
-        for (ViewcamPass pass : {VIEWCAM_POSITION, VIEWCAM_NORMAL, VIEWCAM_UV}) passes.write(pass, pixels[i], 0, 0, 0);
-        for (ViewcamPass pass : {VIEWCAM_OBJECT_INDEX, VIEWCAM_MATERIAL_INDEX, VIEWCAM_MAGNITUDE, VIEWCAM_FACING})
-            passes.write(pass, pixels[i], 0);
+        if (hits[i])
+            met_by[some] = &rays[i], met[some] = hits[i], at[some++] = pixels[i];
+        else
+            beside[none++] = pixels[i];
     }
+    passes.write(VIEWCAM_DEPTH, beside, none, [](int) { return BACKGROUND_DEPTH; });
+    for (ViewcamPass pass : {VIEWCAM_POSITION, VIEWCAM_NORMAL, VIEWCAM_UV}) passes.write(pass, beside, none, [](int) { return Vec3{}; });
+    for (ViewcamPass pass : {VIEWCAM_OBJECT_INDEX, VIEWCAM_MATERIAL_INDEX, VIEWCAM_MAGNITUDE, VIEWCAM_FACING})
+        passes.write(pass, beside, none, [](int) { return 0.0; });
+    if (!some) return;
+
     scene.interactions(met_by, met, some, found, passes.plane[VIEWCAM_MAGNITUDE] ? magnitudes : nullptr);
-    for (int i = 0; i < some; i++) {
-        const Interaction& at = found[i];
-        const Ray& ray = *met_by[i];
-        passes.write(VIEWCAM_DEPTH, to[i], at.t);
-        passes.write(VIEWCAM_POSITION, to[i], ray.direction * at.t + (scene.origin + ray.origin));
-        passes.write(VIEWCAM_NORMAL, to[i], at.shading);
-        passes.write(VIEWCAM_UV, to[i], at.uv.x, at.uv.y, at.has_uv ? 1 : 0);
-        passes.write(VIEWCAM_OBJECT_INDEX, to[i], scene.objects[at.object].index);
-        passes.write(VIEWCAM_MATERIAL_INDEX, to[i], scene.slots[at.slot].index);
-        passes.write(VIEWCAM_FACING, to[i], max(0.0, min(at.cosine, 1.0)));
-        if (passes.plane[VIEWCAM_MAGNITUDE])
-            passes.write(VIEWCAM_MAGNITUDE, to[i], max(max_component(abs(scene.origin + ray.origin)), magnitudes[i]));
-    }
+    passes.write(VIEWCAM_DEPTH, at, some, [&](int i) { return found[i].t; });
+    passes.write(VIEWCAM_POSITION, at, some, [&](int i) { return met_by[i]->direction * found[i].t + (scene.origin + met_by[i]->origin); });
+    passes.write(VIEWCAM_NORMAL, at, some, [&](int i) { return found[i].shading; });
+    passes.write(VIEWCAM_UV, at, some, [&](int i) { return Vec3{found[i].uv.x, found[i].uv.y, found[i].has_uv ? 1.0 : 0.0}; });
+    passes.write(VIEWCAM_OBJECT_INDEX, at, some, [&](int i) { return scene.objects[found[i].object].index; });
+    passes.write(VIEWCAM_MATERIAL_INDEX, at, some, [&](int i) { return scene.slots[found[i].slot].index; });
+    passes.write(VIEWCAM_FACING, at, some, [&](int i) { return max(0.0, min(found[i].cosine, 1.0)); });
+    passes.write(VIEWCAM_MAGNITUDE, at, some, [&](int i) { return max(max_component(abs(scene.origin + met_by[i]->origin)), magnitudes[i]); });
 }
 
 // The pixel centres of some rows, from the bottom, in blocks of 16 × 4, as many columns as fill the cache lines of the passes;
