@@ -8,10 +8,12 @@ Drawn with matplotlib, the ecosystem's usual choice. The report of a check draws
 no matplotlib.
 """
 
+import dataclasses
 import functools
 import importlib
 import importlib.metadata
 import itertools
+import json
 import math
 import os
 import platform
@@ -31,8 +33,8 @@ from viewcam_addon.errors import InputError
 from viewcam_addon.files import written_whole
 from viewcam_addon.terminal import silent_libraries
 
-# matplotlib's own colours for categories, without the grey that the grid has and the blue of the method in use.
-_COLOURS = ("tab:orange", "tab:green", "tab:red", "tab:purple", "tab:brown", "tab:pink", "tab:olive", "tab:cyan")
+# matplotlib's categories, as dark as paper needs them, without the grey of the grid and the blue of the method in use.
+_COLOURS = ("#d2620a", "#248c24", "#d62728", "#9467bd", "#8c564b", "#c9519f", "#85860f", "#0e8a99")
 _MARKERS = "osv^Dd<>"
 _OURS = "#0b3d91"
 _OURS_STYLES = tuple((_OURS, marker, line) for marker, line in zip("osD^", ("-", "--", "-.", ":"), strict=True))
@@ -40,6 +42,9 @@ _INK, _PAPER, _FAINT, _GRID = "#1f2328", "#ffffff", "#656d76", "#e5e8eb"
 # What these are where pages are dark. A picture on a page knows what its reader prefers, and not the page's own colours: so it
 # brings its paper along.
 _IN_THE_DARK = {_INK: "#e6edf3", _PAPER: "#0d1117", _FAINT: "#9198a1", _GRID: "#30363d", _OURS: "#58a6ff"}
+_LIGHTER = ("#ff9a3c", "#4cc24c", "#ff7b72", "#bc8cff", "#c69083", "#f19cd2", "#cfd03a", "#39cfe0")
+_IN_THE_DARK |= dict(zip(_COLOURS, _LIGHTER, strict=True))
+_FEW = 300  # times the least x, up to which the greatest leaves room for numbers between the powers of ten
 # What a measurement stands on, as far as it is installed.
 _PACKAGES = ("numpy", "embreex", "bpy", "mitsuba")
 
@@ -122,10 +127,30 @@ class Chart:
         return []
 
     def figures(self) -> dict[str, Any]:
-        """What the chart shows, for JSON: null where a method has no answer."""
-        return {
-            curve.name: {axis: [_or_none(value) for value in getattr(curve, axis)] for axis in "xy"} for curve in self.curves
-        }
+        """All that it is drawn from, for JSON, but for what is left at its default: null where a method has no answer."""
+        curves = [_stated(curve, dataclasses.fields(Curve)) for curve in self.curves]
+        return {**_stated(self, dataclasses.fields(Chart)), "curves": curves}
+
+    @staticmethod
+    def of_figures(figures: Mapping[str, Any]) -> "Chart":
+        """The chart that these figures are of."""
+        known = {field.name: figures[field.name] for field in dataclasses.fields(Chart) if field.name in figures}
+        curves = [curve | {"y": [math.nan if y is None else y for y in curve["y"]]} for curve in figures["curves"]]
+        return Chart(**known | {"curves": tuple(Curve(**curve) for curve in curves), "tie": figures.get("tie") or math.inf})
+
+
+def _stated(record: Chart | Curve, fields: Sequence[dataclasses.Field[Any]]) -> dict[str, Any]:
+    values = ((field, _plain(getattr(record, field.name))) for field in fields if field.name != "curves")
+    return {field.name: value for field, value in values if value != _plain(field.default)}
+
+
+def _plain(value: Any) -> Any:
+    """As JSON has it; None where a number is not finite."""
+    if isinstance(value, str | bool | None) or value is dataclasses.MISSING:
+        return value
+    if isinstance(value, Iterable):
+        return [_plain(each) for each in value]
+    return float(value) if math.isfinite(value) else None
 
 
 def _errors_at(x: float, curves: Sequence[Curve]) -> list[tuple[float, str]]:
@@ -135,10 +160,6 @@ def _errors_at(x: float, curves: Sequence[Curve]) -> list[tuple[float, str]]:
         for where, y in zip(curve.x, curve.y, strict=True)
         if where == x and math.isfinite(y)
     ]
-
-
-def _or_none(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
 
 
 def machine() -> str:
@@ -160,10 +181,10 @@ def _processor() -> str:
         return platform.processor() or platform.machine()
 
 
-def draw(chart: Chart, path: Path, command: str) -> None:
+def draw(chart: Chart, path: Path, command: str, measured_on: str = "") -> None:
     """Write the chart as SVG, whole or not at all.
 
-    command : what draws it again, for the caption.
+    command : what measures it again, for the caption. measured_on : the machine and versions, those here if it is empty.
 
     Raises
     ------
@@ -177,11 +198,15 @@ def draw(chart: Chart, path: Path, command: str) -> None:
     reading = textwrap.wrap(chart.reading, 132)
     caption = 1.05 + 0.17 * max(len(reading), 3)  # inches
     with matplotlib.rc_context(settings), written_whole(path) as temporary:
-        figure = Figure(figsize=(9, 4.8 + caption))
+        tall, above = (
+            (0.5 + 0.4 * len(chart.curves), 0.96) if chart.rows else (4.2, 0.46)
+        )  # rows have heads above their columns
+        figure = Figure(figsize=(9, above + tall + 0.14 + caption))
         up = 1 / figure.get_figheight()
-        axes = figure.add_axes((0.085, (caption + 0.14) * up, 0.655, 4.2 * up))
+        axes = figure.add_axes((0.085, (caption + 0.14) * up, 0.655, tall * up))
         if chart.rows:
-            axes.set_position((0.27, (caption + 0.14) * up, 0.54, 3.7 * up))  # with room for what heads the columns
+            axes.set_position((0.27, (caption + 0.14) * up, 0.54, tall * up))
+            figure.text(0.03, 1 - 0.28 * up, chart.title, fontsize=12, fontweight="bold")
             _draw_rows(chart, axes)
         else:
             _draw_axes(chart, axes)
@@ -192,7 +217,7 @@ def draw(chart: Chart, path: Path, command: str) -> None:
             look = {"frameon": False, "labelspacing": 0.8, "handlelength": 3, "fontsize": 8.5}
             axes.legend(handles=lines, loc="upper left", bbox_to_anchor=(1.01, 1), **look)
         figure.text(0.03, (caption - 0.5) * up, "\n".join(reading), va="top", linespacing=1.35)
-        figure.text(0.03, 0.16 * up, f"{command}\n{machine()}", color=_FAINT, fontsize=7.5, linespacing=1.4)
+        figure.text(0.03, 0.16 * up, f"{command}\n{measured_on or machine()}", color=_FAINT, fontsize=7.5, linespacing=1.4)
         figure.savefig(temporary, format="svg", metadata={"Date": None, "Title": chart.title, "Description": chart.reading})
         text = temporary.read_text(encoding="utf-8")
         temporary.write_text(text.replace("</style>", f"{_dark_rules()}</style>", 1), encoding="utf-8")
@@ -232,7 +257,6 @@ def _draw_axes(chart: Chart, axes: Axes) -> None:
 def _draw_rows(chart: Chart, axes: Axes) -> None:
     """The best on top: by y, then by the first x. A line says how far a row's measurements spread."""
     curves = sorted(chart.curves, key=lambda curve: (not math.isfinite(curve.y[0]), curve.y[0], min(curve.x)), reverse=True)
-    axes.figure.text(0.03, 0.955, chart.title, fontsize=12, fontweight="bold")
     axes.set_xlabel(chart.x_label)
     axes.grid(axis="x", color=_GRID, linewidth=0.8)
     axes.set_axisbelow(True)
@@ -251,14 +275,25 @@ def _draw_rows(chart: Chart, axes: Axes) -> None:
             axes.plot(x, place, "o", markersize=8, markeredgewidth=2, markeredgecolor=colour, markerfacecolor=fill)
         answer = f"{curve.y[0]:.2g}" if math.isfinite(curve.y[0]) else "no answer"
         axes.annotate(answer, (1.02, place), xycoords=("axes fraction", "data"), va="center")
-    axes.annotate(textwrap.fill(chart.y_label, 20), (1.02, 1.01), xycoords="axes fraction", va="bottom", color=_FAINT)
+    axes.annotate(textwrap.fill(chart.y_label, 23), (1.02, 1.01), xycoords="axes fraction", va="bottom", color=_FAINT)
     told = "   ".join(f"{mark} {what}" for mark, what in zip("●○", chart.rows, strict=False))
     axes.annotate(told, (0, 1.02), xycoords="axes fraction", va="bottom", color=_FAINT)
 
 
 def _make_x_logarithmic(axes: Axes) -> None:
+    """Numbers up to 100,000 are written out. 2 and 5 have ticks, and numbers where few decades are shown."""
     axes.set_xscale("log")
-    axes.xaxis.set_minor_locator(LogLocator(subs=(2, 5)))  # 3 × 10⁻¹ would meet 4 × 10⁻¹
+    axes.xaxis.set_minor_locator(LogLocator(subs=(2, 5)))  # 0.3 would meet 0.4
+    powers = axes.xaxis.get_major_formatter()
+
+    def written(x: float, is_minor: bool) -> str:
+        low, high = sorted(axes.get_xlim())
+        if is_minor and high > _FEW * low:
+            return ""
+        return f"{x:,.6g}" if low > 1e-4 and high < 1e6 else powers(x)
+
+    axes.xaxis.set_major_formatter(lambda x, _: written(x, False))
+    axes.xaxis.set_minor_formatter(lambda x, _: written(x, True))
 
 
 def _decades(chart: Chart) -> tuple[float, float]:
@@ -340,10 +375,33 @@ def run_all(
     for sweep in only or sweeps:
         for chart in sweeps[sweep](quick):
             name = f"{subject}-{chart.name}"
-            draw(chart, folder / f"{name}.svg", f"viewcam chart {subject} --only {sweep}{' --quick' if quick else ''}")
+            command = f"viewcam chart {subject} --only {sweep}{' --quick' if quick else ''}"
+            draw(chart, folder / f"{name}.svg", command)
             print(f"{name}: {chart.reading}", *chart.lines(), sep="\n", flush=True)
-            measured[name] = chart.figures()
+            measured[name] = {"command": command, "machine": machine(), **chart.figures()}
             behind += chart.behind()
     for sentence in behind:
         print(sentence)
-    return (1 if behind else 0), {"machine": machine(), "behind": behind, "charts": measured}
+    return (1 if behind else 0), {"behind": behind, "charts": measured}
+
+
+def redraw(figures: Path, folder: Path) -> tuple[int, dict[str, Any]]:
+    """Draw charts into `folder` from the figures of an earlier run, without measuring anything.
+
+    figures : the JSON that the run wrote.
+
+    Returns 0 and these figures.
+
+    Raises
+    ------
+    InputError
+        if the file can't be read or has no figures of charts, or the folder can't be written to.
+    """
+    try:
+        told = json.loads(figures.read_text(encoding="utf-8"))
+        drawn = {name: (Chart.of_figures(each), each["command"], each["machine"]) for name, each in told["charts"].items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(f"{figures} has no figures of charts: give what `viewcam chart SUBJECT --json` wrote") from error
+    for name, (chart, command, measured_on) in drawn.items():
+        draw(chart, folder / f"{name}.svg", command, measured_on)
+    return 0, {"behind": told["behind"], "charts": told["charts"]}

@@ -318,6 +318,12 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         )
         added.add_argument("--only", metavar="NAME", nargs="+", default=[], help="these sweeps and no others")
         added.add_argument("--quick", action="store_true", help="few trials: seconds instead of minutes")
+        added.add_argument(
+            "--figures",
+            metavar="FILE",
+            type=Path,
+            help="draw what an earlier run has measured, from its JSON, anew",
+        )
 
     def add_serve(hidden: argparse.ArgumentParser) -> None:
         from .commands import batch

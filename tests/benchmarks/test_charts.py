@@ -1,8 +1,10 @@
 import dataclasses
+import json
 import math
 import re
 import xml.etree.ElementTree as ElementTree
 
+import matplotlib
 import numpy as np
 import pytest
 
@@ -83,9 +85,34 @@ def test_a_chart_in_a_place_that_is_none_is_an_error_in_one_sentence(tmp_path):
         charts.draw(chart_of(Curve("ours", X, X, ours=True)), tmp_path / "file" / "chart.svg", "viewcam chart something")
 
 
-def test_figures_are_plain_numbers_and_null():
+def test_figures_are_plain_numbers_and_null_and_what_is_not_left_at_its_default():
     figures = chart_of(Curve("ours", np.array(X), (1.0, math.nan, math.inf), ours=True)).figures()
-    assert figures == {"ours": {"x": [1.0, 0.1, 0.01], "y": [1.0, None, None]}}
+    assert figures.pop("curves") == [{"name": "ours", "x": [1.0, 0.1, 0.01], "y": [1.0, None, None], "ours": True}]
+    words = {"name": "name", "title": "A title", "x_label": "x", "y_label": "y", "reading": "Read this."}
+    assert figures == {**words, "tie": 1e-16, "reverse": True}
+
+
+SPREAD = tuple((0.9 * x, 1.2 * x) for x in X)
+EVERY_KIND = (
+    chart_of(Curve("ours", X, (1e-9, 0, math.nan), ours=True), Curve("most", X, X, limit=True, league="a"), levels=(1e-3,)),
+    chart_of(Curve("other", np.array(X), X, spread=SPREAD), Curve("far", X, X, minor=True), tie=math.inf, log_x=False),
+    chart_of(Curve("ours", X[:2], X[:2], ours=True, tie=1e-3, spread=SPREAD[:2]), rows=("at once", "one by one"), log_y=False),
+)
+
+
+@pytest.mark.parametrize("chart", EVERY_KIND)
+def test_a_chart_is_drawn_from_its_figures_as_it_was_drawn_when_it_was_measured(chart, tmp_path, capsys):
+    status, told = charts.run_all("subject", {"sweep": lambda quick: [chart]}, tmp_path)
+    (tmp_path / "figures.json").write_text(json.dumps({"exit_status": status, **told}, allow_nan=False), encoding="utf-8")
+    assert charts.redraw(tmp_path / "figures.json", tmp_path / "again") == (0, told)
+    assert (tmp_path / "again" / "subject-name.svg").read_bytes() == (tmp_path / "subject-name.svg").read_bytes()
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"charts": {"a": {"title": "A"}}}', '{"behind": []}'])
+def test_a_file_without_figures_of_charts_is_an_error_in_one_sentence(text, tmp_path):
+    (tmp_path / "figures.json").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=r"has no figures of charts: give what"):
+        charts.redraw(tmp_path / "figures.json", tmp_path)
 
 
 def test_a_chart_brings_its_paper_along_and_turns_dark_where_the_reader_prefers_that(tmp_path):
@@ -94,8 +121,25 @@ def test_a_chart_brings_its_paper_along_and_turns_dark_where_the_reader_prefers_
     dark = text.partition("prefers-color-scheme: dark")[2].partition("</style>")[0]
     drawn = text.partition("</style>")[0].partition("<style")[0] + text.partition("</style>")[2]
     for colour in charts._IN_THE_DARK:
-        assert f"fill: {colour}" in drawn or f"stroke: {colour}" in drawn, f"nothing is {colour}: the rule for it does nothing"
         assert f'[style*="fill: {colour}"]' in dark and f'[style*="stroke: {colour}"]' in dark
+    for colour in (charts._INK, charts._PAPER, charts._FAINT, charts._GRID, charts._OURS):
+        assert f"fill: {colour}" in drawn or f"stroke: {colour}" in drawn, f"nothing is {colour}: the rule for it does nothing"
+
+
+def test_every_colour_of_a_chart_can_be_read_on_a_light_and_on_a_dark_page():
+    """3 to 1, which WCAG 2.1 asks of what graphics are made of; of the grid nobody asks it."""
+
+    def luminance(colour):
+        shares = np.array(matplotlib.colors.to_rgb(colour))
+        return np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4) @ (0.2126, 0.7152, 0.0722)
+
+    def contrast(*colours):
+        dark, light = sorted(map(luminance, colours))
+        return (light + 0.05) / (dark + 0.05)
+
+    for colour in (charts._INK, charts._FAINT, charts._OURS, *charts._COLOURS):
+        at_night = contrast(charts._IN_THE_DARK[colour], charts._IN_THE_DARK[charts._PAPER])
+        assert contrast(colour, charts._PAPER) >= 3 <= at_night, f"{colour} can't be read"
 
 
 def test_how_far_measurements_spread_is_drawn(tmp_path):

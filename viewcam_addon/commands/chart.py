@@ -19,4 +19,6 @@ def run(options: argparse.Namespace) -> Result:
         if importlib.util.find_spec(package) is None:
             raise InputError(f"this needs {package}: pip install {package}")
     sys.path.append(str(PROJECT))
+    if options.figures:
+        return importlib.import_module("benchmarks.charts").redraw(options.figures, options.output)
     return importlib.import_module(f"benchmarks.{options.subject}").run(options.output, options.only, options.quick)
