@@ -79,6 +79,47 @@ def test_a_cancelled_move_gives_every_bit_back(posed_camera, scene):
     assert cameras.stated(posed_camera, scene) == pinhole
 
 
+def test_a_turn_that_is_cancelled_after_a_move_that_was_not_gives_every_bit_back(posed_camera, scene):
+    """Blender updates what a move has ended with once more. Many moves, and one of many steps."""
+    posed_camera.rotation_euler = (1.1, 0.2, 0.7)
+    update()
+    for step in range(20):
+        posed_camera.location.x += 1
+        update()
+        posed_camera.update_tag()
+        update()
+        before, stood, turned = (
+            cameras.stated(posed_camera, scene),
+            tuple(posed_camera.rotation_euler),
+            range(100 if step == 7 else 3),
+        )
+        for _ in turned:
+            posed_camera.rotation_euler.z += 0.1
+            update()
+        assert cameras.stated(posed_camera, scene) != before
+        posed_camera.rotation_euler = stood
+        update()
+        assert cameras.stated(posed_camera, scene) == before, f"after {step + 1} moves"
+        posed_camera.update_tag()
+        update()
+
+
+def test_values_edited_between_two_moves_are_not_forgotten(posed_camera, scene):
+    posed_camera.location.x += 1
+    update()
+    posed_camera.location.x -= 1
+    update()
+    group = posed_camera.virtual_pinhole
+    group.look_at = tuple(2 * l - e for e, l in zip(group.eye, group.look_at, strict=True))  # farther: the camera stays
+    update()
+    before = cameras.stated(posed_camera, scene)
+    posed_camera.location.x += 1
+    update()
+    posed_camera.location.x -= 1
+    update()
+    assert cameras.stated(posed_camera, scene) == before
+
+
 def test_a_parent_moved_by_hand_carries_the_values_along(posed_camera, scene, empty):
     posed_camera.parent = parent = empty("Parent")
     update()

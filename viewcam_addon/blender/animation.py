@@ -47,7 +47,11 @@ def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     for block in [update.id.original for update in depsgraph.updates]:
         if _is_camera(block):
             is_driven = bool(block.animation_data) and _is_driven(block)
-            is_moved = not cameras.is_untouched(block, by_values=is_driven) and _adopt_move(block, scene, depsgraph)
+            is_moved = False
+            if cameras.is_untouched(block, by_values=is_driven):
+                cameras.end_move(block)
+            else:
+                is_moved = _adopt_move(block, scene, depsgraph)
             if is_driven and not is_moved:
                 _follow(block, scene, depsgraph)
 

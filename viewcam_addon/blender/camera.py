@@ -54,14 +54,17 @@ ALL = frozenset({"eye", "look_at", "up", "distance", "held_roll"})
 class _Agreement:
     """A camera's state (`_state_of`) and stored values as they were last seen to agree.
 
-    before_moves : both before Blender began to move it: a move that is cancelled gives the values back to the bit.
+    rests : both as they were before each of the last moves since the values were edited: a move that is canceled gives the
+        values back to the bit. is_moving : whether the last update that Blender made of the camera has moved it.
     """
 
     state: tuple
     values: CameraValues
-    before_moves: tuple[tuple, CameraValues] | None
+    rests: tuple[tuple[tuple, CameraValues], ...] = ()
+    is_moving: bool = False
 
 
+_MOST_RESTS = 16
 _agreed: dict[int, _Agreement] = {}  # by the camera's session_uid
 _being_set: list[int] = []  # session_uid of cameras whose values were edited, until they stand there: neither has been moved
 
@@ -403,9 +406,10 @@ def adopt_move(
     if not moved:
         agree(camera_object)
         return False
-    before = None if since or last is None else last.before_moves or (last.state, last.values)
-    if before and before[0] == state and not bound and not is_carried:  # the move was cancelled
-        said = before[1]
+    rests = _rests(last) if last and not since else ()
+    canceled = () if bound or is_carried else [rested for where, rested in rests if where == state]
+    if canceled:
+        said = canceled[-1]
     else:
         said = base.moved_to(found, moved, bound, preferences.up_axis(), findings.LARGEST_TURN)
         if findings.DISTANCE in moved:
@@ -426,8 +430,20 @@ def adopt_move(
     if bound:
         level = said.pinhole(found.plane, frame, camera_object.data.sensor_fit, found.mirrored)
         place(camera_object, rolls.turned(level, hold.roll(evaluated, said, scene)), scene, depsgraph)
-    agree(camera_object, before)
+    agree(camera_object, rests, is_moving=True)
     return True
+
+
+def end_move(camera_object: bpy.types.Object) -> None:
+    """Take note that Blender has made an update of a camera and not moved it: what moves it next is another move."""
+    last = _agreed.get(camera_object.session_uid)
+    if last and last.is_moving:
+        _agreed[camera_object.session_uid] = replace(last, is_moving=False)
+
+
+def _rests(last: _Agreement) -> tuple[tuple[tuple, CameraValues], ...]:
+    """Those of a camera that is moved from where it was last seen."""
+    return last.rests if last.is_moving else (*last.rests, (last.state, last.values))[-_MOST_RESTS:]
 
 
 def _moved(camera_object: bpy.types.Object, wanted: Pinhole, found: Pinhole, depsgraph: bpy.types.Depsgraph) -> set[str]:
@@ -439,11 +455,11 @@ def _moved(camera_object: bpy.types.Object, wanted: Pinhole, found: Pinhole, dep
     return moved - suspects.held(camera_object) if moved else moved
 
 
-def agree(camera_object: bpy.types.Object, before_moves: tuple[tuple, CameraValues] | None = None) -> None:
-    """Take note that the camera is where its values say. before_moves : state and values before Blender began to move it."""
+def agree(camera_object: bpy.types.Object, rests: tuple[tuple[tuple, CameraValues], ...] = (), is_moving: bool = False) -> None:
+    """Take note that the camera is where its values say. rests, is_moving : as an _Agreement has them."""
     if len(_agreed) >= _MOST_IN_PLACE:
         _agreed.clear()
-    _agreed[camera_object.session_uid] = _Agreement(_state_of(camera_object), storage.load(camera_object), before_moves)
+    _agreed[camera_object.session_uid] = _Agreement(_state_of(camera_object), storage.load(camera_object), rests, is_moving)
 
 
 def forget(camera_object: bpy.types.Object | None = None) -> None:
