@@ -47,7 +47,7 @@ class VIEWCAM_preferences(bpy.types.AddonPreferences):
     )
     default_level: bpy.props.EnumProperty(
         name="Default Level",
-        description="How much of the scene is modelled when it is compared with Cycles, unless it is said there",
+        description="How much of the scene is modeled when it is compared with Cycles, unless it is said there",
         items=LEVELS,
         default=_DEFAULTS.default_level,
     )

@@ -23,7 +23,7 @@ def _update_passes(_group: "ReferenceSettings", context: bpy.types.Context) -> N
 class ReferenceSettings(bpy.types.PropertyGroup):
     level: bpy.props.EnumProperty(
         name="Level",
-        description="How much of the scene is modelled",
+        description="How much of the scene is modeled",
         items=LEVELS,
     )
     samples: bpy.props.IntProperty(

@@ -1,3 +1,4 @@
+import re
 from types import SimpleNamespace
 
 import pytest
@@ -399,3 +400,29 @@ def test_every_property_and_operator_has_a_tooltip_without_the_dot_that_blender_
     for each in described:
         text = each.description
         assert len(text) > 20 and text[0].isupper() and not text.endswith("."), f"{each.identifier}: {text!r}"
+
+
+BRITISH = re.compile(
+    r"(colour|centre|grey|metre|ise\b|ising|isation|modell|labell|cancell|travell|favour|behaviour)", re.IGNORECASE
+)
+AMERICAN_TOO = ("raise", "otherwise", "precise", "noise", "exercise", "advise", "promise")
+
+
+def test_everything_that_blender_shows_is_spelled_as_blender_spells():
+    """Labels and tooltips of all operators, panels and properties, and those of what may be chosen."""
+    found = {}
+    for name in dir(bpy.types):
+        kind = getattr(bpy.types, name, None)
+        if not getattr(kind, "__module__", "").startswith("viewcam_addon"):
+            continue
+        said = [getattr(kind, key, "") for key in ("bl_label", "bl_description")]
+        for each in kind.bl_rna.properties:
+            said += [each.name, each.description]
+            said += [text for item in getattr(each, "enum_items", ()) for text in (item.name, item.description)]
+        words = {word for text in said for word in re.findall(r"\w+", text or "") if BRITISH.search(word)}
+        found |= {name: wrong} if (wrong := {word for word in words if word.lower() not in AMERICAN_TOO}) else {}
+    assert found == {}
+
+
+def test_a_british_word_would_be_found():
+    assert all(BRITISH.search(word) for word in ("Colours", "modelled", "millimetres", "Normalise", "cancelled"))

@@ -60,7 +60,7 @@ class LabelSettings(bpy.types.PropertyGroup):
     )
     depth_steps: bpy.props.FloatProperty(
         name="Depth Steps",
-        description="Steps of the PNG's depth in a scene unit: 1000 are millimetres of metres. Beyond 65535 of them it is 0",
+        description="Steps of the PNG's depth in a scene unit: 1000 are millimeters of meters. Beyond 65535 of them it is 0",
         default=DEPTH_STEPS,
         min=1e-6,
         soft_min=1.0,

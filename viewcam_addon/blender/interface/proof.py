@@ -100,7 +100,7 @@ class ProofSettings(bpy.types.PropertyGroup):
         soft_max=4096,
     )
     clay: bpy.props.BoolProperty(
-        name="Clay", description="The same matte material on everything, on both sides: for scenes whose own are not modelled"
+        name="Clay", description="The same matte material on everything, on both sides: for scenes whose own are not modeled"
     )
     folder: bpy.props.StringProperty(
         name="Report",
@@ -157,7 +157,7 @@ class VIEWCAM_OT_compare_with_cycles(NamesCamera, bpy.types.Operator):
         elif event.type != "TIMER":
             return {"PASS_THROUGH"}
         if _running is None:
-            self.report({"INFO"}, "The comparison is cancelled")
+            self.report({"INFO"}, "The comparison is canceled")
             self._leave(context)
             return {"CANCELLED"}
         outcome = _look()
