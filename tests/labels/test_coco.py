@@ -73,7 +73,7 @@ def test_segments_are_those_of_the_colours_of_the_pictures(pictures, tmp_path):
     assert len(set(colours)) == len(colours) and all(each["isthing"] == 1 for each in told["categories"])
 
 
-@pytest.mark.parametrize("kind", ["instances", "panoptic"])
+@pytest.mark.parametrize("kind", ["coco", "panoptic"])
 def test_a_picture_beside_its_labels_is_the_one_that_is_named(tmp_path, kind):
     for name in ("a", "b"):
         files.write(tmp_path / f"{name}.exr", vp.label(room(), ("masks",)))
