@@ -134,3 +134,12 @@ def test_add_camera_stands_in_blender_s_menu_and_goes_with_the_add_on(registered
         assert not hasattr(bpy.types.WindowManager, "virtual_pinhole_camera")
     finally:
         registered_addon.register()
+
+
+def test_an_added_camera_shows_the_same_in_a_larger_picture(scene):
+    bpy.ops.viewcam.add_camera()
+    added, render = bpy.context.object, scene.render
+    before = added.data.lens
+    render.resolution_x, render.resolution_y = 2 * render.resolution_x, 2 * render.resolution_y
+    bpy.context.view_layer.update()
+    assert added.virtual_pinhole.keeps == "FIELD_OF_VIEW" and added.data.lens == pytest.approx(before, rel=2.0**-21)

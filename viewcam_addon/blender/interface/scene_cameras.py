@@ -11,7 +11,7 @@ import bpy
 from ... import pinhole as text
 from ...errors import InputError
 from .. import camera as cameras
-from .. import datablocks, own_picture, preferences
+from .. import datablocks, own_picture, preferences, storage
 from . import file_menu, viewport
 from .panel_places import BelowProperties, BelowSidebar, SubPanel
 
@@ -103,6 +103,7 @@ class VIEWCAM_OT_add_camera(_SceneOperator, bpy.types.Operator):
             wanted = text.Pinhole(
                 eye, cursor, preferences.up_axis(), like.distance, like.width, like.height, like.principal_point
             )
+            storage.begin(added)
             cameras.apply(added, viewport.pinhole_of(area, wanted, scene) if area else wanted, scene)
         except InputError:
             bpy.data.cameras.remove(added.data)  # and the object with it
