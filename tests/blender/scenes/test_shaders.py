@@ -88,6 +88,9 @@ VALUES = [
     node(
         "image", image=Colour((1.0, 1.0, 1.0), "Checks"), vector=node("mapping", vector=node("texture_coordinate"), scale=2.0)
     ),
+    node("image", image=Colour((1.0, 1.0, 1.0), "Checks"), projection="box", blend=0.25, vector=node("geometry")),
+    node("environment", image=Colour((1.0, 1.0, 1.0), "Checks"), projection="mirror_ball", interpolation="cubic"),
+    node("math", a=node("object_info", output="material_index")),
     node("math", a=CHECKS, b=-2.0, operation="smooth_max", clamp=True),
     node("vector_math", a=node("geometry", output="true_normal"), b=(0.5, -1.0, 2.0), operation="dot_product"),
     node("vector_math", a=CHECKS, operation="fract"),
@@ -407,7 +410,6 @@ def test_an_image_and_the_meshs_colours_are_factors(diffuse, image):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda node: setattr(node, "projection", "BOX"), "is not projected flat"),
         (lambda node: setattr(node.texture_mapping, "scale", (2, 1, 1)), "mapping of its own"),
         (lambda node: setattr(node.color_mapping, "brightness", 0.5), "mapping of its own"),
         (lambda node: setattr(node.image, "source", "TILED"), "no single still image"),

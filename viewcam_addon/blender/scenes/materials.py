@@ -14,7 +14,7 @@ import bpy
 from ...errors import InputError
 from ...tracer.scene.materials import PLAIN, Colour
 from ...tracer.scene.shader_nodes import KINDS, Node
-from ...tracer.scene.value_nodes import GENERATED, OWN, UV
+from ...tracer.scene.value_nodes import GENERATED, OWN, POSITION, UV
 from .. import versions
 from ..temporary_settings import Overrides
 from . import images, nodes, shaders, value_nodes
@@ -125,7 +125,7 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
             setattr(added, theirs, node[name])
         for name, theirs in value.numbers.items():
             setattr(added, theirs, type(getattr(added, theirs))(node[name][0]))
-        if node.type == "image" and node["image"] is not None:
+        if "image" in KINDS[node.type].inputs and node["image"] is not None:
             added.image = reading.images[node["image"].image]
         if "table" in KINDS[node.type].inputs:
             table, ends = reading.images[node["table"].image], (node["least"][0], node["most"][0])
@@ -134,7 +134,7 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
             socket = value_nodes.input_of(added, theirs)
             if socket is None:
                 _want_as_before(added, theirs, node[name], value.before[name])
-            elif KINDS[node.type].inputs[name] not in (UV, GENERATED, *OWN) or name in dict(node.inputs):
+            elif KINDS[node.type].inputs[name] not in (UV, GENERATED, POSITION, *OWN) or name in dict(node.inputs):
                 _colour(adder, socket, node[name], reading)
     word = dict(node.inputs).get("output", node["output"] if "output" in KINDS[node.type].inputs else None)
     found = [socket for socket in added.outputs if value.outputs.get(socket.identifier, "") == word]

@@ -19,7 +19,7 @@ import numpy as np
 
 from ...tracer.scene.materials import LARGEST_RADIANCE, PLAIN, Colour, Material, Picture
 from ...tracer.scene.shader_nodes import KINDS, Node
-from ...tracer.scene.value_nodes import GENERATED, NORMAL, OWN, TANGENT, UV
+from ...tracer.scene.value_nodes import GENERATED, NORMAL, OWN, POSITION, TANGENT, UV
 from .. import versions
 from . import images, nodes, value_nodes
 from .nodes import Input, Output
@@ -252,6 +252,8 @@ class _Reader:
         node = output.node
         if node.extension != "REPEAT":
             self._reason(output, f"does not repeat ({node.extension.lower()})")
+        if node.projection != "FLAT":
+            self._reason(output, "is not projected flat")
         if node.interpolation not in ("Linear", "Closest"):
             self._reason(output, f"interpolates {node.interpolation.lower()}")
         if not self._shows(output):
@@ -269,8 +271,6 @@ class _Reader:
         if why:
             self._reason(output, why)
             return False
-        if node.projection != "FLAT":
-            self._reason(output, "is not projected flat")
         if not maps_plainly(node):
             self._reason(output, "has a mapping of its own")
         self.reading.images[image.name_full] = image
@@ -519,12 +519,12 @@ class _Tree(_Reader):
             self._reason(output, why)
             return None
         given = dict(words)
-        if ours == "image":
+        if "image" in KINDS[ours].inputs:
             if not self._shows(output):
                 return None
             image = node.image.original
             given["image"] = Colour(_WHITE, image.name_full)
-            if node.outputs["Alpha"].is_linked:
+            if ours == "image" and node.outputs["Alpha"].is_linked:
                 if why := images.alpha_obstacle(image):
                     self._reason(output, why)
                     return None
@@ -545,7 +545,7 @@ class _Tree(_Reader):
             self._is_beside = is_beside
             if read is None:
                 return None
-            if KINDS[ours].inputs[name] not in (UV, GENERATED) or isinstance(read, Colour | Node):
+            if KINDS[ours].inputs[name] not in (UV, GENERATED, POSITION) or isinstance(read, Colour | Node):
                 given[name] = read
         made = Node(ours, tuple(given.items()))
         plain = Node("image", tuple((name, made[name]) for name in ("image", "interpolation"))) if ours == "image" else None

@@ -49,7 +49,18 @@ VALUES: tuple[tuple[str, Value], ...] = (
             "ShaderNodeTexImage",
             {"vector": "Vector"},
             _words("Color", "Alpha"),
-            {"interpolation": "interpolation", "extension": "extension"},
+            {"interpolation": "interpolation", "extension": "extension", "projection": "projection"},
+            numbers={"blend": "projection_blend"},
+        ),
+    ),
+    (
+        "environment",
+        Value(
+            "TEX_ENVIRONMENT",
+            "ShaderNodeTexEnvironment",
+            {"vector": "Vector"},
+            _COLOR,
+            {"interpolation": "interpolation", "projection": "projection"},
         ),
     ),
     (
@@ -135,7 +146,7 @@ VALUES: tuple[tuple[str, Value], ...] = (
             _words(*(name.replace("_", " ").title() for name in LIGHT_PATH.split())),
         ),
     ),
-    ("object_info", Value("OBJECT_INFO", "ShaderNodeObjectInfo", {}, _words("Location", "Object Index"))),
+    ("object_info", Value("OBJECT_INFO", "ShaderNodeObjectInfo", {}, _words("Location", "Object Index", "Material Index"))),
     (
         "tangent",
         Value(
@@ -433,9 +444,7 @@ VALUES: tuple[tuple[str, Value], ...] = (
 
 # Blender's words, where they are others than ours in capitals.
 _WORDS = {
-    ("image", "linear"): "Linear",
-    ("image", "closest"): "Closest",
-    ("image", "cubic"): "Cubic",
+    **{(ours, word): word.title() for ours in ("image", "environment") for word in ("linear", "closest", "cubic")},
     ("vector_math", "fract"): "FRACTION",
 }
 
@@ -463,7 +472,7 @@ def given_words(output: Output, ours: str, value: Value) -> dict[str, object] | 
         word = getattr(output.node, theirs, None)
         if word is None:  # an older version, in which it is what is the default here
             continue
-        if (ours, word) == ("image", "Smart"):
+        if name == "interpolation" and word == "Smart":
             word = "Cubic"
         choices = KINDS[ours].inputs[name]
         known = next((each for each in choices if word_of(ours, each) == word), None)

@@ -382,6 +382,7 @@ inline Vec3 ShadingPoint::in_camera() const { return scene ? scene->camera.to_ca
 inline Vec3 ShadingPoint::camera_eye() const { return scene ? scene->camera.eye + origin : Vec3{}; }
 inline Vec3 ShadingPoint::to_camera(Vec3 direction) const { return scene ? scene->camera.to_camera(scene->camera.eye + direction) : direction; }
 inline Vec3 ShadingPoint::from_camera(Vec3 direction) const { return scene ? scene->camera.from_camera(direction) : direction; }
+inline double ShadingPoint::material_index() const { return scene ? scene->slots[point.slot].index : 0; }
 inline double ShadingPoint::ray_length() const {
     if (ray.kind != CAMERA || !scene) return ray.length;
     double ahead = in_camera().z;

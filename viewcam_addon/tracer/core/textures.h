@@ -14,6 +14,17 @@
 
 namespace viewcam::VIEWCAM_ISA {
 
+// Where images of directions have a direction: wrapped around a sphere by degrees of longitude and latitude, or seen in a ball of
+// chrome along y.
+inline Vec2 equirectangular(Vec3 direction) {
+    return {0.5 - atan2(direction.y, direction.x) / (2 * PI), 1 - acos(direction.z / length(direction)) / PI};
+}
+inline Vec2 mirror_ball(Vec3 direction) {
+    Vec3 half = direction / length(direction) - Vec3{0, 1, 0};
+    double size = 2 * std::sqrt(larger(-half.y / 2, 0.0));
+    return size > 0 ? Vec2{(half.x / size + 1) / 2, (half.z / size + 1) / 2} : Vec2{0.5, 0.5};
+}
+
 // How an image is looked up. straight: whether colours are divided by the alpha that they were multiplied by.
 struct Lookup {
     enum Interpolation { LINEAR, CLOSEST, CUBIC } interpolation = LINEAR;

@@ -154,6 +154,8 @@ class Node:
             return Node("texture_coordinate")
         if default is value_nodes.GENERATED:
             return Node("texture_coordinate", (("output", "generated"),))
+        if default is value_nodes.POSITION:
+            return Node("geometry")
         if default is None or default in (value_nodes.IMAGE, *value_nodes.OWN):
             return None
         if default is value_nodes.NAME:

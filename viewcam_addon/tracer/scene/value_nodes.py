@@ -16,6 +16,9 @@ NAME = "a name"
 UV = "uv"
 """The default of a vector that is the mesh's UV where nothing else is given."""
 
+POSITION = "position"
+"""The default of a vector that is the place in the world where nothing else is given."""
+
 NORMAL = "normal"
 """The default of a normal that is the surface's own, smooth one where nothing else is given."""
 
@@ -63,8 +66,16 @@ KINDS: dict[str, Mapping[str, Default]] = {
         "vector": UV,
         "interpolation": ("linear", "closest", "cubic"),
         "extension": ("repeat", "extend", "clip", "mirror"),
+        "projection": ("flat", "sphere", "tube", "box"),
+        "blend": 0.0,
         "straight": False,
         "output": ("color", "alpha"),
+    },
+    "environment": {
+        "image": IMAGE,
+        "vector": POSITION,
+        "interpolation": ("linear", "closest", "cubic"),
+        "projection": ("equirectangular", "mirror_ball"),
     },
     "texture_coordinate": {"output": ("uv", "generated", "object", "normal", "reflection", "camera", "window")},
     "attribute": {"name": NAME, "output": ("color", "vector", "number", "alpha")},
@@ -92,7 +103,7 @@ KINDS: dict[str, Mapping[str, Default]] = {
     },
     "geometry": {"output": ("position", "normal", "true_normal", "incoming", "backfacing", "tangent", "parametric")},
     "tangent": {"kind": ("radial", "uv_map"), "axis": ("z", "x", "y"), "uv": NAME},
-    "object_info": {"output": ("location", "object_index")},
+    "object_info": {"output": ("location", "object_index", "material_index")},
     "light_path": {"output": tuple(LIGHT_PATH.split())},
     "fresnel": {"ior": 1.5, "normal": NORMAL},
     "layer_weight": {"blend": 0.5, "normal": NORMAL, "output": ("fresnel", "facing")},

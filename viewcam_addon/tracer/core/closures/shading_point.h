@@ -94,6 +94,8 @@ struct ShadingPoint {
     Vec3 camera_eye() const;
     Vec3 to_camera(Vec3 direction) const;
     Vec3 from_camera(Vec3 direction) const;
+    // The index of the surface's material, which passes show. Defined in scene.h.
+    double material_index() const;
     // How long the ray is that has come along: from where it left a surface, or from the camera's clip start.
     double ray_length() const;
     // How wide the pixel is here that the path belongs to, world units.

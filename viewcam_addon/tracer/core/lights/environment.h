@@ -84,9 +84,7 @@ class Environment {
     static constexpr int MOST_COLUMNS = 2048;
 
     static double mix(double a, double b, double t) { return a + (b - a) * t; }
-    static Vec2 place(Vec3 direction) {
-        return {0.5 - atan2(direction.y, direction.x) / (2 * PI), 1 - acos(direction.z / length(direction)) / PI};
-    }
+    static Vec2 place(Vec3 direction) { return equirectangular(direction); }
     // The height of the lower edge of a row of cells on the unit sphere.
     double cosine_below(int row) const { return row == 0 ? -1 : row == rows_ ? 1 : sin(PI * (double(row) / rows_ - 0.5)); }
     // What the cells of a row give in the mean over their pixels, and all of them together.

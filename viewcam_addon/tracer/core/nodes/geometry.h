@@ -199,12 +199,14 @@ struct ObjectInfoNode {
     static constexpr const char* NAME = "object_info";
     static constexpr Gives GIVES = Gives::VECTOR;
     static constexpr bool VARIES = true;
-    bool location;  // or the index that passes have
+    enum { LOCATION, OBJECT_INDEX, MATERIAL_INDEX } output;
 
-    explicit ObjectInfoNode(const Inputs& in) : location(in.choice("output") == "location") {}
+    explicit ObjectInfoNode(const Inputs& in)
+        : output(in.choice("output") == "location" ? LOCATION : in.choice("output") == "object_index" ? OBJECT_INDEX : MATERIAL_INDEX) {}
     Vec3 eval(const ShadingPoint& at) const {
         if (!at.object) return {};
-        return location ? at.object->to_world.translation() + at.origin : grey(at.object->index);
+        if (output == LOCATION) return at.object->to_world.translation() + at.origin;
+        return grey(output == OBJECT_INDEX ? at.object->index : at.material_index());
     }
 };
 

@@ -27,8 +27,8 @@ struct ConstantNode {
 };
 
 // One line a node. Each has a NAME, by which a scene asks for it, what it GIVES, by which it becomes a number, and `eval`; VARIES
-// where it depends on more than its inputs; `gives` where the node itself knows what it gives.
-using ValueNode = std::variant<ConstantNode, ImageNode, TextureCoordinateNode, AttributeNode, MappingNode, VectorRotateNode, VectorTransformNode, GeometryNode, NormalMapNode, BumpNode,
+// or `varies` where it depends on more than its inputs; `gives` where the node itself knows what it gives.
+using ValueNode = std::variant<ConstantNode, ImageNode, EnvironmentImageNode, TextureCoordinateNode, AttributeNode, MappingNode, VectorRotateNode, VectorTransformNode, GeometryNode, NormalMapNode, BumpNode,
                                TangentNode, ObjectInfoNode, LightPathNode, FresnelNode, LayerWeightNode, MathNode, VectorMathNode, MapRangeNode, MapRangeVectorNode, ClampNode,
                                SeparateNode, CombineXYZNode, SeparateColorNode, CombineColorNode, MixColorNode, MixNumberNode, MixVectorNode, MixComponentsNode,
                                RGBCurvesNode, VectorCurvesNode, FloatCurveNode, BlackbodyNode, WavelengthNode, GammaNode,
@@ -82,6 +82,13 @@ struct ValueNodes {
         else
             return kind.GIVES;
     }
+    // Whether the node itself knows that it depends on more than its inputs.
+    template <class Kind> static bool varies(const Kind& kind) {
+        if constexpr (requires { kind.varies(); })
+            return kind.varies();
+        else
+            return false;
+    }
     static double finite(double x) { return x < LARGEST ? larger(x, -LARGEST) : x > 0 ? LARGEST : 0; }
     static Vec3 finite(Vec3 v) { return {finite(v.x), finite(v.y), finite(v.z)}; }
 
@@ -93,7 +100,7 @@ struct ValueNodes {
             if (name != Kind::NAME) return made<I + 1>(name, inputs, textures);
             Kind node(inputs);
             if constexpr (!requires { Kind::VARIES; })
-                if (inputs.all_constant()) {
+                if (inputs.all_constant() && !varies(node)) {
                     Interaction nowhere;
                     Vec3 value = finite(node.eval({nowhere, {0, 0, -1}, textures}));
                     // As a number a vector is its mean, and a constant its luminance.
