@@ -12,8 +12,8 @@ import importlib.util
 import math
 import os
 import sys
-from collections.abc import Mapping, Sequence
-from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int, c_int32, c_size_t, c_uint32, c_void_p
+from collections.abc import Iterable, Mapping, Sequence
+from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int, c_int32, c_size_t, c_uint32, c_uint64, c_void_p
 from dataclasses import astuple
 from pathlib import Path
 from typing import Any
@@ -51,6 +51,7 @@ TILE = 32
 """Pixels, the side of the tiles in which light is traced."""
 
 _KINDS = {kind: 1 << number for number, kind in enumerate(RAYS)}
+_ALL = 2**64 - 1
 # Rendering space's origin is the eye, snapped to a grid so much coarser than the scene that it stays where it is while a camera
 # moves about things: hierarchies then serve frame after frame, and coordinates are no larger than the grid.
 _GRID = 16.0
@@ -78,6 +79,7 @@ class _Object(Structure):
         *((name, c_uint32) for name in ("geometry", "visible", "slot_count", "count")),
         ("index", c_float),
         *((name, c_void_p) for name in ("slot_indices", "slot_materials")),
+        ("lit_by", c_uint64),
     ]
 
 
@@ -118,6 +120,8 @@ class _Lamp(Structure):
         ("color", c_double * 3),
         *((name, c_double) for name in ("radius", "angle", "blend")),
         ("size", c_double * 2),
+        ("receivers", c_uint64),
+        ("shadow_rays", c_uint32),
     ]
 
 
@@ -235,6 +239,37 @@ def array(values: object, dtype: type, shape: Sequence[int | None]) -> NDArray:
     return laid_out
 
 
+class _Links:
+    """Which objects lamps light, and which cast their shadows, as bits: one for each set of objects that some lamp has."""
+
+    def __init__(self, lamps: Iterable[Lamp] = ()) -> None:
+        lamps = tuple(lamps)
+        self._receivers = list(dict.fromkeys(lamp.receivers for lamp in lamps if lamp.receivers is not None))
+        self._blockers = list(dict.fromkeys(lamp.blockers for lamp in lamps if lamp.blockers is not None))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Links) and vars(self) == vars(other)
+
+    __hash__ = None
+
+    def receiving(self, name: str) -> int:
+        """`Object::lit_by` of an object."""
+        return sum(1 << bit for bit, some in enumerate(self._receivers) if name in some)
+
+    def blocking(self, name: str) -> int:
+        """Bits of `visible` above those of _KINDS."""
+        return sum(2 * _KINDS["shadow"] << bit for bit, some in enumerate(self._blockers) if name in some)
+
+    def receivers(self, lamp: Lamp) -> int:
+        return _ALL if lamp.receivers is None else 1 << self._receivers.index(lamp.receivers)
+
+    def shadow_rays(self, lamp: Lamp) -> int:
+        return _KINDS["shadow"] if lamp.blockers is None else 2 * _KINDS["shadow"] << self._blockers.index(lamp.blockers)
+
+
+_UNLINKED = _Links()
+
+
 class CoreScene:
     """A scene in the core: its hierarchies, and what gives and scatters light."""
 
@@ -245,6 +280,7 @@ class CoreScene:
         if not self.handle:
             raise MemoryError
         self._kept: list[NDArray] = []  # what the core reads in place
+        self._links = _Links(scene.lamps)
         self.origin = _origin(scene)
         numbers = {name: number for number, name in enumerate(scene.geometries)}
         materials = {"": 0, **{name: number for number, name in enumerate(scene.materials, start=1)}}
@@ -307,14 +343,18 @@ class CoreScene:
         indices = array(placed.material_indices, np.float32, (slots,))
         numbers = array([materials[name] for name in names], np.uint32, (slots,))
         visible = sum(_KINDS.values()) & ~kinds(placed.hidden_from)
+        if "shadow" not in placed.hidden_from:
+            visible |= self._links.blocking(placed.name)
         shared = geometry, visible, slots, len(placed.matrices), placed.object_index
-        self.check(self.core.add_objects(self.handle, _Object(*shared, _address(indices), _address(numbers))))
+        lit_by = self._links.receiving(placed.name)
+        self.check(self.core.add_objects(self.handle, _Object(*shared, _address(indices), _address(numbers), lit_by)))
 
     def serves(self, scene: Scene) -> bool:
         """Whether its hierarchies are those of another scene: the same things in the same places, near the same origin."""
         return (
             list(scene.materials) == list(self._scene.materials)  # objects name them by their numbers
             and np.array_equal(self.origin, _origin(scene))
+            and _Links(scene.lamps) == self._links
             and same_things(scene, self._scene)
         )
 
@@ -352,7 +392,7 @@ class CoreScene:
             self.check(self.core.add_material(self.handle, described, len(closures), material.transparent_shadow))
         for lamp in scene.lamps:
             if not lamp.is_dark:
-                self.check(self.core.add_lamp(self.handle, described_lamp(lamp)))
+                self.check(self.core.add_lamp(self.handle, described_lamp(lamp, self._links)))
         film, world = scene.film, scene.world
         described = _Film(hidden_from=kinds(world.hidden_from), transparent=film.transparent, exposure=film.exposure)
         described.version = 100 * scene.cycles[0] + scene.cycles[1]
@@ -516,9 +556,10 @@ def _described_world(world: World, images: Mapping[str, int]) -> _World:
     return described
 
 
-def described_lamp(lamp: Lamp) -> _Lamp:
-    """A lamp as the core takes it."""
+def described_lamp(lamp: Lamp, links: _Links = _UNLINKED) -> _Lamp:
+    """A lamp as the core takes it. links : of all the scene's lamps, where this one has such."""
     described = _Lamp(hidden_from=kinds(lamp.hidden_from), casts_shadow=lamp.casts_shadow)
+    described.receivers, described.shadow_rays = links.receivers(lamp), links.shadow_rays(lamp)
     matrix = np.eye(4)
     if isinstance(lamp, Sun):
         described.kind, described.angle, described.color[:] = 0, lamp.angle, lamp.irradiance

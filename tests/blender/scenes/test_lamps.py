@@ -161,16 +161,11 @@ def attach_falloff(block):
     tree.links.new(tree.nodes.new("ShaderNodeLightFalloff").outputs["Linear"], emission.inputs["Strength"])
 
 
-def link_light(block):
-    block.light_linking.receiver_collection = bpy.data.collections.new("Receivers")
-
-
 APPROXIMATED = {
     "nodes": (attach_falloff, "nodes are not modelled"),
     "spread": (lambda block: setattr(block.data, "spread", 1.0), "spread"),
     "bounces": (lambda block: setattr(block.data.cycles, "max_bounces", 1), "bounces are limited"),
     "sampling": (lambda block: setattr(block.data.cycles, "use_multiple_importance_sampling", False), "importance"),
-    "linking": (link_light, "light linking is off"),
     "shadows": (lambda block: setattr(block.data, "use_shadow", False), "casts no shadow"),
 }
 

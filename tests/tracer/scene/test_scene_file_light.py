@@ -57,7 +57,8 @@ rays = st.frozensets(st.sampled_from(RAYS))
 matrices = st.lists(st.floats(-1e6, 1e6), min_size=12, max_size=12).map(
     lambda numbers: np.vstack([np.reshape(numbers, (3, 4)), (0.0, 0.0, 0.0, 1.0)])
 )
-common = {"name": names, "hidden_from": rays, "casts_shadow": st.booleans()}
+links = st.none() | st.just(frozenset())
+common = {"name": names, "hidden_from": rays, "casts_shadow": st.booleans(), "receivers": links, "blockers": links}
 round_lamps = common | {"power": rgb, "radius": st.floats(0, 1e6), "soft_falloff": st.booleans()}
 lamps = st.one_of(
     st.builds(Sun, **common, towards=vectors.filter(any), irradiance=rgb, angle=st.floats(0, math.pi)),
@@ -301,6 +302,9 @@ def test_every_key_of_light_is_documented():
         (["lamps", 1, "hidden_from"], ["x-ray"], ["lamp 'lamp'", "'x-ray'", "camera"]),
         (["lamps", 1, "hidden_from"], "camera", ["'hidden_from' of lamp 'lamp'", "list"]),
         (["lamps", 1, "hidden_from"], [[]], ["'hidden_from' of lamp 'lamp'", "text"]),
+        (["lamps", 1, "receivers"], ["absent"], ["receivers", "'lamp'", "'absent'"]),
+        (["lamps", 1, "receivers"], "floor", ["'receivers' of lamp 'lamp'", "list"]),
+        (["lamps", 1, "blockers"], [1], ["'blockers' of lamp 'lamp'", "text"]),
         (["lamps", 1, "location"], [0, 0, 1], ["lamp 'lamp'", "unknown key 'location'"]),
         (["lamps", 2, "matrix"], [[1, 0, 0, 0]] * 4, ["lamp 'panel'", "matrix beside"]),
         (["lamps", 2, "size"], [1, -1], ["lamp 'panel'", "size"]),

@@ -25,7 +25,7 @@ from ...tracer.scene.levels import level_of
 from ...tracer.scene.materials import PLAIN, Picture
 from .. import camera as cameras
 from .. import versions
-from . import export_geometry, features, film, lamps, world
+from . import export_geometry, features, film, lamps, linking, world
 from .depsgraph import visit_still
 from .ledger import Ledger
 from .shading import Shading
@@ -161,15 +161,17 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
         **_view_in(depsgraph, camera_object),
         geometries=geometries,
         objects=tuple(objects),
-        **(_shown_by_light(depsgraph, ledger, shading) if shading else {}),
+        **(_shown_by_light(depsgraph, ledger, shading, {placed.name for placed in objects}) if shading else {}),
         ledger=ledger.entries(),
     )
 
 
-def _shown_by_light(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading) -> dict[str, object]:
-    """What of a Scene makes its light, and what shows it."""
+def _shown_by_light(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading, surfaces: set[str]) -> dict[str, object]:
+    """What of a Scene makes its light, and what shows it. surfaces : the names of its objects."""
     images = shading.pictures()
-    return vars(light_in(depsgraph, ledger, images)) | {"materials": shading.materials, "images": images}
+    light = light_in(depsgraph, ledger, images)
+    linked = tuple(replace(lamp, **linking.among(lamp, surfaces)) for lamp in light.lamps)
+    return vars(light) | {"lamps": linked, "materials": shading.materials, "images": images}
 
 
 def seen_from(scene: Scene, depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) -> Scene:

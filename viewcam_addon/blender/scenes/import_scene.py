@@ -28,7 +28,7 @@ from ...tracer.scene.depths import visible_depths
 from .. import camera as cameras
 from .. import datablocks, findings, picture
 from ..temporary_settings import LARGEST_INDEX, Overrides
-from . import import_geometry, import_light
+from . import import_geometry, import_light, linking
 from .ledger import Ledger
 
 Array = NDArray[np.float64]
@@ -73,6 +73,7 @@ class _SceneImport:
         self._made, self._name, self._scene, self._overrides = made, name, scene, overrides
         self._ledger = Ledger()
         self._objects: list[bpy.types.Object] = []
+        self._surfaces_named: dict[str, list[bpy.types.Object]] = {}
         self._root: bpy.types.Object | None = None
         self._collection = bpy.data.collections.new(name)
         overrides.afterwards(bpy.data.batch_remove, [self._collection])
@@ -86,7 +87,9 @@ class _SceneImport:
         self._surfaces()
         for lamp in made.lamps:
             data, matrix = import_light.light_from(lamp, self._overrides, ledger)
-            import_light.hide(self._placed(lamp.name, data, matrix), lamp.hidden_from)
+            block = self._placed(lamp.name, data, matrix)
+            import_light.hide(block, lamp.hidden_from)
+            linking.link(block, lamp, self._surfaces_named, self._overrides)
             ledger.placed(lamp.name)
         if import_light.has_light(made):
             if set_surroundings:
@@ -205,6 +208,7 @@ class _SceneImport:
             reason = f"its index is {placed.object_index}, and Blender's end at {LARGEST_INDEX}"
             self._ledger.note(placed.name, "approximated", reason)
         import_light.hide(block, placed.hidden_from)
+        self._surfaces_named.setdefault(placed.name, []).append(block)
 
     def _placed(self, name: str, data: bpy.types.ID, matrix: Array) -> bpy.types.Object:
         """A new object that stands by a matrix, rounded to float32."""

@@ -7,6 +7,7 @@ The position and the angles are the matrix's, the radius is not scaled with it.
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -15,7 +16,7 @@ from ...tracer.scene.film import Bounces
 from ...tracer.scene.lamps import Area, Lamp, Point, Spot, Sun
 from .. import versions
 from ..temporary_settings import Overrides
-from . import features, nodes, shaders
+from . import features, linking, nodes, shaders
 from .ledger import Ledger
 from .nodes import Input
 from .shaders import RGB
@@ -27,6 +28,7 @@ _SHEAR = 1e-5
 
 def lamps_in(depsgraph: bpy.types.Depsgraph, bounces: Bounces, ledger: Ledger) -> Iterator[Lamp]:
     """The lamps that a render of this depsgraph shows, and their remedies for Cycles."""
+    links = linking.Links(depsgraph)
     for instance in depsgraph.object_instances:
         if instance.object.type == "LIGHT" and instance.show_self:
             placed = features.placed_by(instance)
@@ -34,11 +36,11 @@ def lamps_in(depsgraph: bpy.types.Depsgraph, bounces: Bounces, ledger: Ledger) -
             ledger.note(name, "exported", "a light")
             hidden_from = features.hidden_from(placed, depsgraph.view_layer_eval) - {"shadow"}
             matrix = np.array(instance.matrix_world, dtype=np.float64)
-            features.note_linking(placed, ledger)
             _note(name, light, bounces, ledger)
             lamp = _lamp(name, light, matrix, hidden_from, _strength(name, light, ledger), ledger)
             if lamp is not None:
-                yield lamp
+                receivers, blockers = links.of(placed, ledger)
+                yield replace(lamp, receivers=receivers, blockers=blockers)
 
 
 def _lamp(

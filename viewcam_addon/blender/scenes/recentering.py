@@ -178,7 +178,7 @@ def _seen(
         copy = copies[source.key]
         matrix[:3, 3] += matrix[:3, :3] @ copy.anchor
         placed.append(_Placed(source.name, copy.data, matrix, source.object_index, source.hidden_from))
-    return view, [*placed, *_lights(depsgraph, eye)], {copy.data: copy for copy in copies.values()}
+    return view, [*placed, *_lights(depsgraph, eye, ledger)], {copy.data: copy for copy in copies.values()}
 
 
 def _remove_keys_but(keys: set[bpy.types.Key]) -> None:
@@ -186,13 +186,15 @@ def _remove_keys_but(keys: set[bpy.types.Key]) -> None:
     bpy.data.batch_remove([key for key in bpy.data.shape_keys if key not in keys])
 
 
-def _lights(depsgraph: bpy.types.Depsgraph, eye: Array) -> Iterator[_Placed]:
+def _lights(depsgraph: bpy.types.Depsgraph, eye: Array, ledger: Ledger) -> Iterator[_Placed]:
     """They leave no mark in the passes of geometry, and make the picture one that can be looked at."""
     for instance in depsgraph.object_instances:
         if instance.object.type == "LIGHT" and instance.show_self:
             matrix = np.array(instance.matrix_world, dtype=np.float64)
             matrix[:3, 3] -= eye
-            hidden_from = features.hidden_from(features.placed_by(instance), depsgraph.view_layer_eval)
+            placed = features.placed_by(instance)
+            hidden_from = features.hidden_from(placed, depsgraph.view_layer_eval)
+            features.note_linking(placed, ledger)  # which does not come along
             yield _Placed(instance.object.original.name, instance.object.data.original, matrix, hidden_from=hidden_from)
 
 

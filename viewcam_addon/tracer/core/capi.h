@@ -47,13 +47,15 @@ typedef struct {
     const int32_t* materials;
 } ViewcamSpheres;
 
-/* So many objects that differ by their matrices alone. geometry: its number, as they were added. visible: to which kinds of rays.
+/* So many objects that differ by their matrices alone. geometry: its number, as they were added. visible: to which kinds of rays,
+ * and above them to the shadow rays of which lamps with blockers of their own. lit_by: which lamps' receivers it is among.
  * slots: for each material of the geometry, what the Material Index pass shows and the number of a material. */
 typedef struct {
     uint32_t geometry, visible, slot_count, count;
     float index;
     const float* slot_indices;
     const uint32_t* slot_materials;
+    uint64_t lit_by;
 } ViewcamObject;
 
 /* In rendering space. t_min, t_max: planar depths. */

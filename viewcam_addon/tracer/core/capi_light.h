@@ -34,11 +34,14 @@ typedef struct {
 
 enum ViewcamFilter { VIEWCAM_BOX, VIEWCAM_BLACKMAN_HARRIS, VIEWCAM_GAUSSIAN };
 enum ViewcamLampKind { VIEWCAM_SUN, VIEWCAM_POINT, VIEWCAM_SPOT, VIEWCAM_RECTANGLE, VIEWCAM_ELLIPSE };
-/* matrix: (3, 4), the lamp's space to the world's; a sun is seen towards its z. color: irradiance of a sun, power of others. */
+/* matrix: (3, 4), the lamp's space to the world's; a sun is seen towards its z. color: irradiance of a sun, power of others.
+ * receivers: a bit of ViewcamObject's lit_by, or all. shadow_rays: of which kind, a bit of `visible`. */
 typedef struct {
     int32_t kind, soft, casts_shadow;
     uint32_t hidden_from;
     double matrix[12], color[3], radius, angle, blend, size[2];
+    uint64_t receivers;
+    uint32_t shadow_rays;
 } ViewcamLamp;
 
 /* image: a number of viewcam_add_texture, or −1; to_image: (3, 4), directions of the world to its. */

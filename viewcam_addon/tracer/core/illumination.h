@@ -20,6 +20,8 @@ struct Lamp {
     Vec2 size;
     bool soft = false, casts_shadow = true;
     uint32_t hidden_from = 0;
+    uint64_t receivers = ~0ull;    // which of the sets that objects are in it lights
+    RayKind shadow_rays = SHADOW;  // of its own blockers, where it has such
 };
 
 // How often light is scattered before it must reach a light: in all, and by each kind of surface; and how often it may go straight

@@ -83,7 +83,7 @@ const ViewcamCore core = {
                 Scene& to = scene_of(scene);
                 check::objects(to, *given);
                 Object object;
-                object.geometry = given->geometry, object.visible = given->visible, object.index = given->index;
+                object.geometry = given->geometry, object.visible = given->visible, object.index = given->index, object.lit_by = given->lit_by;
                 object.first_slot = uint32_t(to.slots.size());
                 to.objects.insert(to.objects.end(), given->count, object);
                 for (uint32_t i = 0; i < given->slot_count; i++) to.slots.push_back({given->slot_indices[i], given->slot_materials[i]});

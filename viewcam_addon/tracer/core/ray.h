@@ -14,6 +14,7 @@ constexpr double DOUBLE_ROUNDING = 0x1p-53;
 
 // The kinds of rays that objects and lights may be hidden from, as bits; tracer/native.py numbers scene/lamps.py RAYS so.
 // NO_RAY: what a light is sampled for.
+// Above SHADOW there is a bit for the shadow rays of each set of blockers that lamps have.
 enum RayKind : uint32_t { NO_RAY = 0, CAMERA = 1, DIFFUSE = 2, GLOSSY = 4, TRANSMISSION = 8, SHADOW = 16 };
 
 // What a material may ask of the ray that has come to it. kind: of its last scattering; diffuse, singular: what scattered it;

@@ -66,12 +66,12 @@ class Scene {
         intersect_instances<false>(ray, kind, nearest);
         return hit(nearest, ray);
     }
-    // Whether anything stands in t_min < t < t_max.
-    bool occluded(const Ray& ray) const {
+    // Whether anything that a kind of ray sees stands in t_min < t < t_max.
+    bool occluded(const Ray& ray, RayKind kind = SHADOW) const {
         Nearest nearest{ray.t_max};
         for (const Merged& some : merged_)
-            if (some.visible & SHADOW && some.triangles.intersect<true>(ray, NONE, nearest)) return true;
-        return intersect_instances<true>(ray, SHADOW, nearest);
+            if (some.visible & kind && some.triangles.intersect<true>(ray, NONE, nearest)) return true;
+        return intersect_instances<true>(ray, kind, nearest);
     }
     // The same for up to 64 rays, as packets where enough of them go the same way.
     void closest(const Ray* rays, int count, RayKind kind, Hit* hits) const {

@@ -15,7 +15,7 @@ from ...checks import shown
 from ...errors import InputError
 from ...pinhole import Pinhole
 from .film import Bounces, Film
-from .lamps import Lamp, World, hidden_from
+from .lamps import MOST_LINKS, Lamp, World, hidden_from
 from .materials import Material, Picture
 
 # Visibility is found in float32, which holds the square of nothing larger.
@@ -197,6 +197,7 @@ class Scene:
                     raise InputError(
                         f"object {shown(placed.name)} names the material {shown(name)}, which the scene does not have"
                     )
+        _check_links(self.lamps, {placed.name for placed in self.objects})
         for image in self.world.images:
             if image not in self.images:
                 raise InputError(f"the world names the image {shown(image)}, which the scene does not have")
@@ -207,6 +208,19 @@ class Scene:
                         f"{component} of material {shown(name)} names the image {shown(colour.image)}, "
                         "which the scene does not have"
                     )
+
+
+def _check_links(lamps: tuple[Lamp, ...], names: set[str]) -> None:
+    for what, most in MOST_LINKS.items():
+        sets = {getattr(lamp, what) for lamp in lamps} - {None}
+        if len(sets) > most:
+            raise InputError(f"lamps have {len(sets)} different sets of {what}: give at most {most}")
+        for lamp in lamps:
+            unknown = sorted((getattr(lamp, what) or frozenset()) - names)
+            if unknown:
+                raise InputError(
+                    f"{what} of light {shown(lamp.name)} names the object {shown(unknown[0])}, which the scene does not have"
+                )
 
 
 def _check_camera(camera: Pinhole) -> None:

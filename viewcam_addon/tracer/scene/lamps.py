@@ -25,22 +25,34 @@ from .materials import radiance
 RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
 """The kinds of rays that things may be hidden from; lamps have no shadow."""
 
+MOST_LINKS = {"receivers": 64, "blockers": 27}
+"""How many different sets of objects the lamps of a scene may have: bits of the core's numbers. Blender's own limit is 64."""
+
 # Of coordinates and sizes: as of scenes, products of a few of them are float64's.
 LARGEST = 1e18
 
 
 @dataclass(frozen=True, eq=False)
 class Lamp:
-    """What all lamps have. casts_shadow : whether objects can stand in its light."""
+    """What all lamps have.
+
+    casts_shadow : whether objects can stand in its light. receivers : names of the objects that it lights; blockers : of those
+    that can stand in its light; None is all objects. The eye sees a lamp whatever it lights.
+    """
 
     name: str
     hidden_from: frozenset[str] = frozenset()
     casts_shadow: bool = True
+    receivers: frozenset[str] | None = None
+    blockers: frozenset[str] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "hidden_from", hidden_from(f"light {shown(self.name)}", self.hidden_from))
         truth = checks.truth(f"casts_shadow of light {shown(self.name)}", self.casts_shadow)
         object.__setattr__(self, "casts_shadow", truth)
+        for what in ("receivers", "blockers"):
+            if getattr(self, what) is not None:
+                object.__setattr__(self, what, frozenset(getattr(self, what)))
 
     @property
     def is_dark(self) -> bool:

@@ -34,6 +34,7 @@ _READERS: dict[str, Callable[[Field], Any]] = {
     **dict.fromkeys(("filter", "image"), Field.text),
     "size": lambda field: field.vector(2),
     "hidden_from": lambda field: hidden_from(field),
+    **dict.fromkeys(("receivers", "blockers"), lambda field: frozenset(name.text() for name in field.items("object's name"))),
     "backdrop": lambda field: _simple(World, field, without=("hidden_from", "backdrop")),
 }
 """How the values are read that are called the same as in Lamp, World and Film."""

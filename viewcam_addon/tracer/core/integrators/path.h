@@ -120,6 +120,7 @@ class PathIntegrator {
         int sample;
         Category category;
         bool traced;
+        RayKind shadow_rays;
         RayState ray;
         Vec3 light, other;  // other: of what is not diffuse where the eye sees it
     };
@@ -199,8 +200,8 @@ class PathIntegrator {
         if (!lights_.meets_lamps(path.kind)) return;
         double size = path.kind == CAMERA ? length(ray.direction) : 1;
         LightRay seen{ray.origin, ray.direction / size, ray.t_min * size, smaller(ray.t_max, hit.t) * size, !hit};
-        Vec3 radiance = path.pdf == INFINITE ? lights_.le(seen, path.kind)
-                                             : lights_.le(seen, path.kind, block.points[path.from], path.pdf, depth == 1, path.through);
+        Vec3 radiance = path.kind == CAMERA ? lights_.le(seen, CAMERA)
+                                            : lights_.le(seen, path.kind, block.points[path.from], path.pdf, depth == 1, path.through);
         block.light[path.sample].add(path.kind == CAMERA ? EMISSION : path.category, path.weight * radiance);
     }
     // Adds what the world brings to a path that leaves the scene.
@@ -215,10 +216,10 @@ class PathIntegrator {
         }
     }
     // What of light comes along a shadow ray that meets something: none but where all that stands in its way lets some through.
-    Vec3 transmittance(Ray ray, RayState state) const {
+    Vec3 transmittance(Ray ray, RayKind kind, RayState state) const {
         Vec3 left{1, 1, 1};
         while (!is_black(left)) {
-            Hit hit = scene_.closest(ray, SHADOW);
+            Hit hit = scene_.closest(ray, kind);
             if (!hit) return left;
             Interaction point = scene_.interaction(ray, hit);
             const Material& made_of = material(point);
@@ -331,6 +332,7 @@ class PathIntegrator {
     void ask(const LightSampler::Choice& choice, const ShadingPoint& at, Vec2 u, const Path& path, int depth, const BSDF& bsdf,
              Block& block) const {
         const Interaction& point = at.point;
+        if (!lights_.reaches(*choice.light, point)) return;
         LightSample sample = choice.light->sample_li(point, choice.rest, u);
         // Light that the smooth surface has before it and the true one behind it counts, less what scattered rays would have found:
         // these are lost, as in Cycles.
@@ -345,7 +347,7 @@ class PathIntegrator {
         if (is_black(light.diffuse) && is_black(light.other)) return;
         int place = block.lit[choice.slot]++;
         bool traced = choice.light->casts_shadow;
-        block.shadowed[choice.slot][place] = {path.sample, after(path.category, true, depth), traced, {SHADOW, false, false, depth, path.passed, path.scattered},
+        block.shadowed[choice.slot][place] = {path.sample, after(path.category, true, depth), traced, choice.light->shadow_rays, {SHADOW, false, false, depth, path.passed, path.scattered},
                                               light.diffuse * path.weight / choice.chance, light.other * path.weight / choice.chance};
         if (has_pixels_) block.shadowed[choice.slot][place].ray.width = at.footprint();
         if (traced) block.shadow_rays[choice.slot][place] = shadow_ray(point, sample);
@@ -358,17 +360,18 @@ class PathIntegrator {
             bool hidden[MOST];
             const Ray* rays = block.shadow_rays[slot];
             const Shadowed* shadowed = block.shadowed[slot];
-            if (count > 0 && depth == 1 && std::all_of(shadowed, shadowed + count, [](const Shadowed& one) { return one.traced; }))
+            auto is_plain = [](const Shadowed& one) { return one.traced && one.shadow_rays == SHADOW; };
+            if (count > 0 && depth == 1 && std::all_of(shadowed, shadowed + count, is_plain))
                 scene_.occluded(rays, count, hidden);
             else
-                for (int i = 0; i < count; i++) hidden[i] = shadowed[i].traced && scene_.occluded(rays[i]);
+                for (int i = 0; i < count; i++) hidden[i] = shadowed[i].traced && scene_.occluded(rays[i], shadowed[i].shadow_rays);
             for (int i = 0; i < count; i++) {
                 PathLight& light = block.light[shadowed[i].sample];
                 if (!hidden[i]) {
                     light.add(shadowed[i].category, shadowed[i].light);
                     light.add(OTHER, shadowed[i].other);
                 } else if (transparent_) {
-                    Vec3 left = transmittance(rays[i], shadowed[i].ray);
+                    Vec3 left = transmittance(rays[i], shadowed[i].shadow_rays, shadowed[i].ray);
                     light.add(shadowed[i].category, shadowed[i].light * left);
                     light.add(OTHER, shadowed[i].other * left);
                 }

@@ -16,11 +16,15 @@ class Light {
    public:
     using Kind = std::variant<Sun, Point, Spot, Area, MeshLight, EnvironmentLight>;
 
-    // hidden_from: the kinds of rays that don't see it; what a light hides from, it does not light.
-    Light(Kind kind, uint32_t hidden_from, bool casts_shadow) : hidden_from(hidden_from), casts_shadow(casts_shadow), kind_(std::move(kind)) {}
+    // hidden_from: the kinds of rays that don't see it; what a light hides from, it does not light. receivers: a bit that objects have
+    // which it lights, Object::lit_by. shadow_rays: the kind of those that are sent to it.
+    Light(Kind kind, uint32_t hidden_from, bool casts_shadow, uint64_t receivers = ~0ull, RayKind shadow_rays = SHADOW)
+        : hidden_from(hidden_from), casts_shadow(casts_shadow), receivers(receivers), shadow_rays(shadow_rays), kind_(std::move(kind)) {}
 
     uint32_t hidden_from;
     bool casts_shadow;
+    uint64_t receivers;
+    RayKind shadow_rays;
 
     // part: one number more in [0, 1), of those that have parts.
     LightSample sample_li(const Interaction& from, double part, Vec2 u) const {
@@ -102,7 +106,7 @@ inline Light light_of(const Lamp& lamp, Vec3 origin) {
             default: return Area(placed, lamp.color, lamp.size, lamp.kind == Lamp::ELLIPSE);
         }
     };
-    return {kind(), lamp.hidden_from, lamp.casts_shadow};
+    return {kind(), lamp.hidden_from, lamp.casts_shadow, lamp.receivers, lamp.shadow_rays};
 }
 
 }  // namespace viewcam::VIEWCAM_ISA

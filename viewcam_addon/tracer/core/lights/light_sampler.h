@@ -30,12 +30,13 @@ class LightSampler {
         int slot = 0;
     };
 
-    explicit LightSampler(const Scene& scene) : environment_(&scene.illumination.environment) {
+    explicit LightSampler(const Scene& scene) : objects_(&scene.objects), environment_(&scene.illumination.environment) {
         const Illumination& given = scene.illumination;
         uint32_t lit = DIFFUSE;  // the kinds of rays that surfaces scatter light into from any one direction
         for (const Material& material : given.materials) lit |= material.rough_kinds();
         std::vector<Light> unlit;
         for (const Lamp& lamp : given.lamps) {
+            linked_ |= lamp.receivers != ~0ull;
             Light light = light_of(lamp, scene.origin);
             (lit & ~lamp.hidden_from ? lights_ : unlit).push_back(light);
         }
@@ -82,10 +83,16 @@ class LightSampler {
     Vec3 le(const LightRay& ray, RayKind kind, const Interaction& from, double pdf, bool seen, bool through) const {
         Vec3 sum;
         each_met(ray, kind, [&](uint32_t light, Vec3 radiance) {
-            double other = int(light) < count_ ? lights_[light].pdf_li(from, ray.direction) * chance(from, light, seen, through) : 0;
+            if (!reaches(lights_[light], from)) return;
+            double other = pdf < INFINITE && int(light) < count_ ? lights_[light].pdf_li(from, ray.direction) * chance(from, light, seen, through) : 0;
             sum += radiance * power_heuristic(pdf, other);
         });
         return sum;
+    }
+
+    // Whether a light's receivers are all, or what a point is of is one of them.
+    bool reaches(const Light& light, const Interaction& point) const {
+        return !linked_ || point.object == NONE || light.receivers & (*objects_)[point.object].lit_by;
     }
 
     // How many lights surfaces can be lit by, and whether what they get depends on chance.
@@ -178,6 +185,7 @@ class LightSampler {
 
     // What a light may bring to a point.
     double estimate(uint32_t light, const Interaction& point, bool through) const {
+        if (!reaches(lights_[light], point)) return 0;
         double before = estimate(light, point, point.shading, point.normal);
         return through ? before + estimate(light, point, -point.shading, -point.normal) : before;
     }
@@ -246,6 +254,8 @@ class LightSampler {
         return total > 0 ? own / total : 0;
     }
 
+    const std::vector<Object>* objects_;
+    bool linked_ = false;        // whether any lamp has receivers of its own
     std::vector<Light> lights_;  // lamps that light diffuse surfaces, meshes, lamps that don't
     size_t lamps_;
     int count_;

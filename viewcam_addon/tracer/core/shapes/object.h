@@ -9,6 +9,7 @@ namespace viewcam::VIEWCAM_ISA {
 struct Object {
     uint32_t geometry = 0;
     uint32_t visible = 0;       // to which kinds of rays, RayKind's bits
+    uint64_t lit_by = ~0ull;    // a bit for each set of receivers that it is in
     uint32_t first_slot = 0;    // of Scene::slots, one for each of the geometry's materials
     float index = 0;            // what the Object Index pass shows
     bool shared = false;        // whether other objects place the same geometry
