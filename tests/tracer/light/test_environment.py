@@ -109,3 +109,18 @@ def test_an_image_that_is_white_is_a_white_world(make_lit, make_mesh):
 def test_a_world_without_its_image_is_refused(make_lit):
     with pytest.raises(InputError, match="the world names the image 'sky'"):
         make_lit(DOWN, world=World(WHITE, image="sky"))
+
+
+def test_an_encoded_image_of_bytes_is_sampled_as_one_whose_pixels_are_beside_bytes(make_lit, make_mesh):
+    """Bytes are decoded by a table where their light is added up, all else by the formula."""
+    levels = np.random.default_rng(0).integers(0, 90, (16, 32, 3))
+    levels[10:12, 20:22] = 255, 200, 150
+    surface, world = node("diffuse", color=WHITE), World(WHITE, image="room")
+    of_bytes, beside = (
+        light_of(make_lit, make_mesh, surface, world, Picture(((levels + off) / 255).astype(np.float32), srgb=True))
+        for off in (0.0, 2.0**-9)
+    )
+    # Of an encoded level k of 255 the light changes by 2.4/k of a level's change, and at most by 1/12.92 of it for dark ones.
+    np.testing.assert_allclose(of_bytes["Combined"], beside["Combined"], rtol=0.02)
+    found = of_bytes["Combined"][..., :3].reshape(-1, 3)
+    assert (found.std(axis=0) < 0.1 * found.mean(axis=0)).all(), "the window is found"

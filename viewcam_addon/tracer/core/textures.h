@@ -6,6 +6,7 @@
 //
 // Rejected: decoding images when they are loaded (not what Cycles does), and mip maps, which it has not.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -61,12 +62,12 @@ struct Texture {
     }
 
     Vec3 mean() const { return mean(0, width, 0, height); }
-    // Over the pixels of some columns and rows.
+    // Over the pixels of some columns and rows, to 1e-6.
     Vec3 mean(int left, int right, int first, int last) const {
         Vec3 sum;
         for (int row = first; row < last; row++) {
             Vec3 of_row;
-            for (int column = left; column < right; column++) of_row += decoded(pixel(column, row));
+            for (int column = left; column < right; column++) of_row += srgb ? decoded_bytes(pixel(column, row)) : pixel(column, row);
             sum += of_row;
         }
         return sum / (double(right - left) * (last - first));
@@ -128,6 +129,19 @@ struct Texture {
     }
     static constexpr double FARTHEST = 1e4, LARGEST = 1 - 0x1p-53;
 
+    // The linear colour of what is nearly always made of bytes: looked up, which takes a twentieth of the time.
+    static Vec3 decoded_bytes(Vec3 rgb) {
+        static const std::array<double, 256> LINEAR = [] {
+            std::array<double, 256> table;
+            for (size_t i = 0; i < table.size(); i++) table[i] = linear(double(i) / 255);
+            return table;
+        }();
+        auto of = [](double encoded) {
+            double level = encoded * 255, nearest = std::rint(level);
+            return std::fabs(level - nearest) < 0x1p-14 && nearest >= 0 && nearest <= 255 ? LINEAR[size_t(nearest)] : linear(encoded);
+        };
+        return {of(rgb.x), of(rgb.y), of(rgb.z)};
+    }
     Vec3 decoded(Vec3 rgb) const { return srgb ? Vec3{linear(rgb.x), linear(rgb.y), linear(rgb.z)} : rgb; }
     // sRGB (IEC 61966-2-1).
     static double linear(double encoded) { return encoded <= 0.04045 ? encoded / 12.92 : pow((encoded + 0.055) / 1.055, 2.4); }

@@ -40,11 +40,12 @@ class Picture:
     def __post_init__(self) -> None:
         if self.pixels.ndim != 3 or self.pixels.shape[2] not in (3, 4) or not self.pixels.size:
             raise InputError(f"an image has the shape {self.pixels.shape} and must have height × width × 3 or 4: check it")
-        if not np.isfinite(self.pixels).all():
+        ends = float(self.pixels.min()), float(self.pixels.max())  # without a copy of what may be gigabytes
+        if not np.isfinite(ends).all():
             raise InputError("an image holds a number that is not finite: check it")
         # What is encoded as sRGB is raised to the power of 2.4.
         most = LARGEST_RADIANCE ** (1 / 2.4) if self.srgb else LARGEST_RADIANCE
-        largest = float(np.abs(self.pixels).max())
+        largest = max(map(abs, ends))
         if largest > most:
             raise InputError(
                 f"an image holds {largest:.3g}: give numbers up to {most:.3g}, so that its light can be computed with"
