@@ -309,6 +309,19 @@ def test_what_is_off_is_told(fresh_blender, tmp_path):
         job.export(job.Request(blend, strict=True))
 
 
+def test_a_file_that_blender_reads_but_for_something_is_open_and_that_is_told(fresh_blender, scene, camera_object, tmp_path):
+    """A strip in a channel that Blender has no more: it says "Error", and goes on."""
+    strips = scene.sequence_editor_create()
+    strips = strips.strips if hasattr(strips, "strips") else strips.sequences
+    length = "length" if bpy.app.version >= (5, 0) else "frame_end"
+    strips.new_effect("Strip", "COLOR", channel=113, frame_start=1, **{length: 20})
+    blend = tmp_path / "strip.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend), compress=False)
+    blend.write_bytes(blend.read_bytes().replace((113).to_bytes(4, "little"), (200).to_bytes(4, "little")))
+    (entry,) = job.export(job.Request(blend)).ledger
+    assert entry.status == "approximated" and "channel larger than 128" in entry.reason and "--trust" not in entry.reason
+
+
 @pytest.mark.parametrize("way", [driver, registered_text])
 def test_python_that_did_not_run_is_told(fresh_blender, tmp_path, way):
     blend, _ = hostile_file(way, tmp_path / "hostile")

@@ -32,8 +32,7 @@ def of_pictures(names: Iterable[str], blend: str | os.PathLike[str], trust: bool
         if there is none for any, or one that stands still for pictures of several frames; as `opened` and `read` do.
     """
     names = list(dict.fromkeys(names))
-    with opened(blend, trust) as (_, off):
-        notes = tuple(f"{sentence} (without --trust)" for sentence in off)
+    with opened(blend, trust) as (_, notes):
         scene = bpy.context.scene
         objects = {each.name: each for each in scene.objects if each.type == "CAMERA"}
         if called := [name for name in names if name in objects]:

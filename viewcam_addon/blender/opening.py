@@ -42,12 +42,12 @@ def opened(blend: str | os.PathLike[str] | None, trust: bool = False) -> Iterato
     trust : whether what is in it may run and write. A file that is open was opened by Blender, by its own `--enable-autoexec`
     or preference; here only the rest is decided.
 
-    Gives a Overrides, and a sentence for each thing that is off and might be seen.
+    Gives a Overrides, and a sentence for each thing that is off and might be seen, or that Blender could not read.
 
     Raises
     ------
     InputError
-        if there is no such file, if Blender can't read it, if a pipe or a device stands where it reads a file, or if it is
+        if there is no such file, if Blender can't read it at all, if a pipe or a device stands where it reads a file, or if it is
         trusted and was opened without its scripts.
     """
     ensure_registered()
@@ -58,7 +58,7 @@ def opened(blend: str | os.PathLike[str] | None, trust: bool = False) -> Iterato
             return
         _check_files()
         if not trust:
-            off = (*_disarmed(overrides.set), *_unrun())
+            off = _told(*_disarmed(overrides.set), *_unrun())
         elif any(_unrun()):
             raise InputError(
                 "Blender has opened the file without running what is in it: write --enable-autoexec before the file, or leave "
@@ -70,7 +70,7 @@ def opened(blend: str | os.PathLike[str] | None, trust: bool = False) -> Iterato
 
 
 def open_blend(path: str | os.PathLike[str], trust: bool = False) -> tuple[str, ...]:
-    """Open a .blend; a sentence for each thing that is off and might be seen. Raises as `opened` does."""
+    """Open a .blend; a sentence for each thing that is off or was not read and might be seen. Raises as `opened` does."""
     path = Path(path).absolute()
     if not path.is_file():
         raise InputError(f"{path} does not exist: check the name of the .blend file")
@@ -82,19 +82,30 @@ def open_blend(path: str | os.PathLike[str], trust: bool = False) -> tuple[str, 
     if not start.startswith(_MAGIC):
         raise InputError(f"{path} is not a .blend file: give a file that Blender has saved")
     off: list[str] = []
+    is_read = False
 
     def read() -> None:
+        nonlocal is_read
+        is_read = True
         _check_files()
         if not trust:
-            off.extend(_disarmed(setattr))
+            off.extend(_told(*_disarmed(setattr)))
 
     with _not_kept_waiting(), _after_reading(read):
         try:
             bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=trust)
         except RuntimeError as error:
             reason = str(error).strip().splitlines()[0].removeprefix("Error: ").rstrip(".")
-            raise InputError(f"{path} can't be opened by Blender {bpy.app.version_string} ({reason}): save it again") from error
-    return (*off, *_unrun())
+            if not is_read:
+                raise InputError(
+                    f"{path} can't be opened by Blender {bpy.app.version_string} ({reason}): save it again"
+                ) from error
+            off.append(f"Blender {bpy.app.version_string} has read the file but for something: {reason}")
+    return (*off, *_told(*_unrun()))
+
+
+def _told(*sentences: str) -> tuple[str, ...]:
+    return tuple(f"{sentence} (without --trust)" for sentence in sentences)
 
 
 @contextlib.contextmanager

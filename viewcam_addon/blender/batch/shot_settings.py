@@ -40,7 +40,7 @@ class ShotSettings:
         self, overrides: Overrides, scene: bpy.types.Scene, threads: int | None, seed: int | None, off: Iterable[str] = ()
     ) -> None:
         self._scene = scene
-        self.warnings = (*_warnings(scene), *(f"{sentence[:1].upper()}{sentence[1:]}, without --trust" for sentence in off))
+        self.warnings = (*_warnings(scene), *(f"{sentence[:1].upper()}{sentence[1:]}" for sentence in off))
         render = scene.render
         cameras_unbound(overrides, scene)
         for name in ("use_multiview", "use_sequencer", "use_stamp"):

@@ -183,7 +183,7 @@ def _stage(request: Request) -> Iterator[_Stage]:
         level = level_needed(scene, layer, camera) if request.level == AUTO else request.level
         ledger = Ledger()
         for sentence in off:
-            ledger.note(Path(bpy.data.filepath).name, "approximated", f"{sentence} (without --trust)")
+            ledger.note(Path(bpy.data.filepath).name, "approximated", sentence)
         yield _Stage(scene, layer, camera, level, ledger)
 
 
