@@ -16,7 +16,8 @@ from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import Mesh, Object, Scene
 from viewcam_addon.tracer.scene.film import Bounces
 from viewcam_addon.tracer.scene.lamps import Area, Sun, World
-from viewcam_addon.tracer.scene.materials import Colour, Material
+from viewcam_addon.tracer.scene.materials import Colour, Material, Picture
+from viewcam_addon.tracer.scene.shader_nodes import node
 
 CAMERA = Pinhole((4.5, -5.0, 3.0), (0.0, 0.6, 0.8), (0.0, 0.0, 1.0), 60.0, 64, 48)
 SEEDS = 8
@@ -159,3 +160,48 @@ def test_a_fault_of_the_lamps_is_found(reference, fault):
     wrong = replace(scene, lamps=tuple(LAMP_FAULTS[fault](lamp) for lamp in scene.lamps))
     comparison = compared(reference("direct", 64), wrong, "direct", 64)
     assert not comparison.passed, f"{fault}: {comparison.sentence}"
+
+
+PAINT = {"base_color": (0.7, 0.35, 0.25), "metallic": 0.6, "roughness": 0.25, "specular_tint": (1.0, 0.6, 0.4)}
+GLASS = {"color": (0.95, 1.0, 0.97), "roughness": 0.0, "ior": 1.45}
+
+
+def build_artists(paint=PAINT, glass=GLASS, turn=0.0):
+    """A ball of tinted paint and one of glass amid a room of windows, an image wrapped around all.
+
+    turn : of the room about the vertical, degrees.
+    """
+    room = np.full((32, 64, 3), 0.15, np.float32)
+    room[10:26, ::4], room[18:22, 22:26] = (0.5, 0.6, 0.9), (6.0, 5.0, 4.0)
+    return Scene(
+        camera=CAMERA,
+        geometries={"ball": ball((-1.6, -0.7, 0.8), 2.0, 32), "bead": ball((1.6, 1.9, 0.8), 2.0, 32)},
+        objects=tuple(Object(name, name, np.eye(4), i, materials=(name,)) for i, name in enumerate(("ball", "bead"), start=1)),
+        materials={
+            "ball": Material(surface=node("principled", **paint)),
+            "bead": Material(surface=node("glass", **glass)),
+        },
+        world=World((1.0, 1.0, 1.0), image="room", rotation=(0.0, 0.0, np.radians(turn))),
+        images={"room": Picture(room)},
+        bounces=Bounces(6, 3, 3, 6),
+    )
+
+
+# fault → what build_artists is given. The picture shows all of them at 256 samples.
+ARTISTS_FAULTS = {
+    "IOR off by 0.02": {"glass": GLASS | {"ior": 1.47}},
+    "roughness off by 0.01": {"paint": PAINT | {"roughness": 0.26}},
+    "tint dropped": {"paint": PAINT | {"specular_tint": (1.0, 1.0, 1.0)}},
+    "environment turned by a degree": {"turn": 1.0},
+}
+
+
+@pytest.fixture(scope="module")
+def artists_reference():
+    return picture(build_artists(), "path", 256, 0)
+
+
+@pytest.mark.parametrize("fault", [None, *ARTISTS_FAULTS])
+def test_a_fault_of_artists_materials_is_found(artists_reference, fault):
+    comparison = compared(artists_reference, build_artists(**ARTISTS_FAULTS.get(fault, {})), "path", 256)
+    assert comparison.passed == (fault is None), f"{fault}: {comparison.sentence}"

@@ -4,7 +4,10 @@ Errors are relative to a patch's own light. Where lobes are tabulated (multiple 
 they are those of the tables: core/bsdf/make_albedo_tables.cpp computes them by quadrature, and Cycles' own have six digits.
 """
 
+import ctypes
 import itertools
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +15,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender.rendering import job
-from viewcam_addon.tracer import render
+from viewcam_addon.tracer import native, render
 
 COLOUR = (0.8, 0.5, 0.2, 1.0)
 GLOSSY, GLASS, PRINCIPLED = "ShaderNodeBsdfGlossy", "ShaderNodeBsdfGlass", "ShaderNodeBsdfPrincipled"
@@ -203,17 +206,18 @@ def test_what_shines_below_a_coat_is_cycles(patches):
     check(patches(shaders, energy=0.0), shaders, TABLES)
 
 
+TINTED = {"Base Color": COLOUR, "Roughness": 0.4, "Specular Tint": (0.9, 0.5, 0.7, 1), "Coat Weight": 0.3, "Coat Tint": COLOUR}
+WHITE = (1.0, 1.0, 1.0)
+
+
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"roughness": 0.41},
-        {"base_color": (0.81, 0.5, 0.2)},
-        {"ior": 1.52},
-        {"anisotropic": 0.01},
-        {"sheen_weight": 0.01},
+        *({"roughness": 0.41}, {"base_color": (0.81, 0.5, 0.2)}, {"ior": 1.52}),
+        *({"anisotropic": 0.01}, {"sheen_weight": 0.01}, {"specular_tint": WHITE}, {"coat_tint": WHITE}),
     ],
 )
-def test_a_little_more_of_an_input_is_found(patches, monkeypatch, wrong):
+def test_a_little_more_of_an_input_or_a_tint_dropped_is_found(patches, monkeypatch, wrong):
     """The tests above must be able to fail."""
     from viewcam_addon.tracer.scene import materials
     from viewcam_addon.tracer.scene.shader_nodes import Closure, node
@@ -224,6 +228,33 @@ def test_a_little_more_of_an_input_is_found(patches, monkeypatch, wrong):
         return tuple(Closure(node(each.node.type, **dict(each.node.inputs) | wrong)) for each in right(material))
 
     monkeypatch.setattr(materials.Material, "closures", property(changed))
+    shaders = [(PRINCIPLED, TINTED, {})]
+    with pytest.raises(AssertionError, match="p50"):
+        check(patches(shaders), shaders, TABLES)
+
+
+def tables():
+    """name → the albedos that a table of the core has, float32, roughness last."""
+    source = Path(native.__file__).parent / "core/bsdf/albedo_tables.h"
+    found = re.findall(r"float (\w+)\[\] = \{([^}]*)\}", source.read_text(encoding="utf-8"))
+    return {name: np.array(re.findall(r"[\d.]+(?=f)", numbers), np.float32) for name, numbers in found}
+
+
+@pytest.mark.parametrize("name", ["GGX", "FRESNEL"])
+def test_a_table_that_is_looked_up_a_quarter_of_a_step_beside_is_found(patches, monkeypatch, tmp_path, name):
+    """In a copy of the core, whose table has what lies a quarter of a step further on, as if pixels' centres were its nodes."""
+    library = Path(native._library()._name)
+    right = tables()[name]
+    rows = right.reshape(-1, 32 if name == "GGX" else 16)
+    wrong = (0.75 * rows + 0.25 * np.roll(rows, -1, axis=1)).astype(np.float32)
+    wrong[:, -1] = rows[:, -1]
+    code = library.read_bytes()
+    assert right.tobytes() in code
+    copy = tmp_path / library.name
+    copy.write_bytes(code.replace(right.tobytes(), wrong.tobytes()))
+    entry = ctypes.CDLL(str(copy)).viewcam_core
+    entry.restype, entry.argtypes = ctypes.POINTER(native._Core), [ctypes.c_char_p]
+    monkeypatch.setattr(native, "core", lambda name=None: entry(None).contents)
     shaders = [(PRINCIPLED, {"Base Color": COLOUR, "Roughness": 0.4}, {})]
     with pytest.raises(AssertionError, match="p50"):
         check(patches(shaders), shaders, TABLES)
