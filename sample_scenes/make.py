@@ -1,7 +1,8 @@
 """Make the sample scenes: python sample_scenes/make.py [NAME …] [--folder DIR] [--pictures SAMPLES]
 
 Each scene is a module here with a build(), whose docstring goes into the file as a note. `make scenes` runs this with
-bpy 4.2, so that all later Blenders open the files. --pictures also renders each with Cycles, beside its file.
+bpy 4.2, so that all later Blenders open the files. --pictures also renders each with Cycles, beside its file. Those of
+materials.py are made where they are named.
 """
 
 import argparse
@@ -9,6 +10,7 @@ import importlib
 from pathlib import Path
 
 import bpy
+import materials
 import staging
 
 import viewcam_addon
@@ -22,9 +24,10 @@ def main() -> None:
     options.add_argument("--folder", type=Path, default=Path(__file__).parent, help="where the files go; here by default")
     options.add_argument("--pictures", metavar="SAMPLES", type=int, help="also render each scene to a PNG")
     given = options.parse_args()
-    unknown = set(given.names) - set(SCENES)
+    known = (*SCENES, *materials.BUILDERS)
+    unknown = set(given.names) - set(known)
     if unknown:
-        options.error(f"there is no scene {', '.join(sorted(unknown))}; the scenes are {', '.join(SCENES)}")
+        options.error(f"there is no scene {', '.join(sorted(unknown))}; the scenes are {', '.join(known)}")
     viewcam_addon.register()
     try:
         for name in given.names or SCENES:
@@ -35,8 +38,9 @@ def main() -> None:
 
 def make(name: str, folder: Path, picture_samples: int | None) -> None:
     """Build one scene, save it, and render it if it is wanted."""
-    module = importlib.import_module(name)
-    scene = module.build()
+    build = materials.BUILDERS.get(name)
+    module = build or importlib.import_module(name)
+    scene = (build or module.build)()
     path = folder / f"{name}.blend"
     staging.save(scene, module.__doc__, path)
     print(f"{path.name}: {path.stat().st_size / 1000:.0f} kB")

@@ -14,6 +14,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+sys.path.insert(0, str(Path(__file__).parent.parent / "sample_scenes"))
+import materials
+
 from viewcam_addon.blender import camera
 from viewcam_addon.pinhole import Pinhole
 
@@ -47,6 +50,15 @@ def test_sample_scene_is_the_same_within_noise(name, size, level, tmp_path):
 @pytest.mark.parametrize("name", EVERYDAY)
 def test_everyday_scene_of_clay_is_the_same_within_noise(name, tmp_path):
     check(SCENES / f"{name}.blend", tmp_path, "--level", "path", "--clay", "--size", EVERYDAY[name])
+
+
+@pytest.mark.parametrize("name", materials.BUILDERS)
+def test_scene_of_artists_materials_is_exported_whole_and_the_same_within_noise(name, fresh_blender, tmp_path):
+    materials.BUILDERS[name]()
+    blend = tmp_path / f"{name}.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    found = check(blend, tmp_path, "--level", "path", "--size", "48x27")
+    assert not [entry for entry in found["ledger"] if entry["status"] != "exported"], found["ledger"]
 
 
 @pytest.mark.parametrize("name", ["spot", "teapot", "stanford-bunny"])

@@ -1,6 +1,8 @@
 """Cycles as a contestant, in a process with Blender in it."""
 
 import contextlib
+import importlib
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,14 +32,17 @@ def prepare(
 ) -> dict[str, race.Runner]:
     """In Blender's process: write the scene, and offer renders.
 
-    scene_name : of a sample scene, "suzannes" for six of them or "three suzannes". path : where the tracer's scene goes.
+    scene_name : of a sample scene or of one of its materials.py, "suzannes" for six or "three suzannes". path : where the tracer's scene goes.
     for_mitsuba : through a box filter and without materials, which is what mitsuba3.py translates.
     """
     viewcam_addon.register()
     if scene_name in _SUZANNES:
         _SUZANNES[scene_name](*size)
+    elif (blend := SCENES / f"{scene_name}.blend").exists():
+        opening.open_blend(blend)
     else:
-        opening.open_blend(SCENES / f"{scene_name}.blend")
+        sys.path.insert(0, str(SCENES))
+        importlib.import_module("materials").BUILDERS[scene_name]()
     scene, ledger = bpy.context.scene, Ledger()
     view_layer, camera_object = scene.view_layers[0], scene.camera
     camera_object.virtual_pinhole.enabled = False  # else its lens would follow the resolution

@@ -1,4 +1,5 @@
-"""Pictures of light beside Cycles: six Suzannes, the studio still, the sphere field and the Cornell box.
+"""Pictures of light beside Cycles: six Suzannes, the studio still, in plain colours and in artists' materials, the sphere field
+and the Cornell box.
 
 Ours renders with a wanted error, and with a number of samples for all pixels; Cycles with a number of samples, and with its own
 adaptive sampling. All make the same passes.
@@ -26,6 +27,9 @@ _SOFT = {0.003: (6, 6), 0.001: (6, 6)}
 STILLS = (
     Still("suzannes", "Six Suzannes, one sun", "direct", (640, 360), _SUN, {OURS: 2048, CYCLES: 256}),
     Still("studio", "Studio still", "direct", (160, 90), _SOFT, {OURS: 4096, CYCLES: 1024}),
+    Still(
+        "dressed_studio", "Studio still in artists' materials", "path", (160, 90), {0.01: (3, 3)}, {OURS: 2048, CYCLES: 2048}
+    ),
     Still("spheres", "Sphere field", "direct", (160, 90), _SOFT, {OURS: 4096, CYCLES: 4096}),
     Still("cornell", "Cornell box", "path", (120, 120), {0.01: (4, 4)}, {OURS: 2048, CYCLES: 2048}),
 )

@@ -47,8 +47,8 @@ def opened(blend: str | os.PathLike[str] | None, trust: bool = False) -> Iterato
     Raises
     ------
     InputError
-        if there is no such file, if Blender can't read it at all, if a pipe or a device stands where it reads a file, or if it is
-        trusted and was opened without its scripts.
+        if there is no such file, if Blender can't read it at all, if a pipe or a device stands where it reads a file, or if it
+        is trusted and was opened without its scripts.
     """
     ensure_registered()
     with overridden() as overrides:
