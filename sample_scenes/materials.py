@@ -7,6 +7,7 @@ have every lobe and most nodes that the reference tracer models.
 """
 
 import math
+from pathlib import Path
 
 import bmesh
 import bpy
@@ -52,7 +53,7 @@ def _globe(name: str, radius: float, material, location, rotation=(0, 0, 0)):
 
 
 def brushed_metal(name: str = "Brushed metal", code: str = "c9c4bc"):
-    """Metal whose roughness and height are noise drawn out along one axis."""
+    """Metal whose roughness and height are noise drawn out along one axis, and whose facets are stretched."""
 
     def shade(s):
         grain = s.add("TexNoise", {"Vector": s.place((2.0, 2.0, 60.0)), "Scale": 1.0, "Detail": 2.0}, "Fac")
@@ -60,6 +61,7 @@ def brushed_metal(name: str = "Brushed metal", code: str = "c9c4bc"):
             Base_Color=code,
             Metallic=1.0,
             Roughness=s.range(grain, 0.22, 0.42),
+            Anisotropic=0.6,
             Normal=s.bump(grain, 0.15, 0.01),
         )
 
@@ -146,9 +148,8 @@ def bricks(name: str, scale: float, rotation=(0.0, 0.0, 0.0)):
 
 def dressed_studio():
     """The studio still, with glass letters, a bust of coated paint on brushed metal, and an HDRI in place of its sky."""
-    import studio
-
-    scene = studio.build()
+    bpy.ops.wm.open_mainfile(filepath=str(Path(__file__).with_name("studio.blend")))
+    scene = bpy.context.scene
     scene.name = "dressed_studio"
     scene.cycles.use_denoising = False
     metal, paint = brushed_metal(), coated_paint()
@@ -440,8 +441,12 @@ def glassware():
             },
         ),
     )
+
+    def cloth(s):
+        return s.principled(Base_Color="b8b0a4", Roughness=0.9, Sheen_Weight=0.6, Sheen_Roughness=0.4, Sheen_Tint="ffe8d0")
+
     _sheet("Wall", 8, 4, stripes, (0, 1.8, 2.0), (90, 0, 0))
-    _sheet("Table", 8, 6, b.matte("Cloth", "b8b0a4"), (0, 0, 0))
+    _sheet("Table", 8, 6, shading.material("Cloth", cloth), (0, 0, 0))
     nodes = {
         "Clear": lambda s: s.add("BsdfGlass", {"Color": "ffffff", "Roughness": 0.0, "IOR": 1.5}),
         "Frosted": lambda s: s.add("BsdfGlass", {"Color": "e8fff4", "Roughness": 0.3, "IOR": 1.45}, distribution="MULTI_GGX"),
