@@ -128,6 +128,27 @@ def test_a_sky_beside_lamps_gives_its_whole_light(lit):
         assert abs(mean - alone - 1) <= 4 * error + 1e-6 * mean, f"{mean - alone:.4f} ± {error:.2g}"
 
 
+def test_a_coated_surface_beside_a_lamp_and_a_sky_has_the_sum_of_both(make_lit, floor):
+    """Its lobes are chosen otherwise than under either alone: rays that find the dim sky only are fewer."""
+    lamp, coated = (
+        Point("lamp", position=(1, 0, 2), power=(200.0,) * 3, radius=0.5),
+        Material(surface=node("principled", roughness=0.5)),
+    )
+
+    def measure(lamps, world, samples):
+        scene = make_lit(CAMERA, (floor, coated), lamps=lamps, world=world, film=Film(filter="BOX"))
+        passes = render(scene, "direct", samples, 3)
+        pixels = passes["Combined"][..., 0].astype(float)
+        return pixels.mean(), np.sqrt(passes["Variance"][..., 0].sum(dtype=float)) / pixels.size
+
+    sky = World((0.3,) * 3)
+    (one, one_error), (other, other_error) = measure((lamp,), World(), 64), measure((), sky, 64)
+    mean, error = measure((lamp,), sky, 64)
+    assert error < 0.002 * mean and other > 0.02 * mean, "that would tell nothing"
+    off = mean - one - other
+    assert abs(off) <= 4 * np.sqrt(error**2 + one_error**2 + other_error**2), f"{mean:.6g} for {one + other:.6g} ± {error:.2g}"
+
+
 def test_shining_surfaces_beside_lamps_are_found_as_often_as_it_takes(lit, make_mesh):
     """Both ways of finding them, weighted, and the choice among them and a lamp."""
     square = make_mesh([(2, -1, 1), (2, 1, 1), (2, 1, 3), (2, -1, 3)], [(0, 2, 1), (0, 3, 2)])

@@ -54,6 +54,11 @@ class BSDF {
         double through = transparency_.x + transparency_.y + transparency_.z;
         return through > 0 ? through / (through + total_) : 0;
     }
+    // Makes `sample` choose lobes of a kind so much less often.
+    void thin(RayKind kind, double factor) {
+        total_ = 0;
+        for (int i = 0; i < count_; i++) total_ += shares_[i] *= std::visit([&](const auto& lobe) { return lobe.KIND == kind ? factor : 1; }, lobe(i));
+    }
     // The kinds of rays that light from any one direction is scattered into all over: what lights can be sampled for.
     uint32_t spread_kinds() const { return spread_; }
     // The albedo of what is diffuse, which a pass of its own shows.
@@ -86,7 +91,7 @@ class BSDF {
         int chosen = 0;
         double reached = 0;
         for (int i = 0; i < count_; i++) {  // the last is taken even where the sum is rounded to less than u
-            if (u_lobe >= reached) chosen = i;
+            if (u_lobe >= reached && shares_[i] > 0) chosen = i;
             reached += share(i);
         }
         BSDFSample sample;

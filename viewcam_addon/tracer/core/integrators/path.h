@@ -67,6 +67,7 @@ class PathIntegrator {
             only_sky_[kind] = !shines && !transparent_ && !lights_.meets_lamps(kind) && !scene.hides_anything();
         }
         for (const ValueNode& node : scene.illumination.nodes.all) has_pixels_ |= std::holds_alternative<BumpNode>(node);
+        dark_ = !shines && !transparent_;
         lit_ = !scene.illumination.lamps.empty() || shines || !is_black(lights_.environment().radiance);
     }
 
@@ -279,16 +280,6 @@ class PathIntegrator {
             auto pair = [&](SobolSampler::Purpose purpose) {
                 return sampler_.pair(key, sample.number, SobolSampler::dimension(depth, purpose));
             };
-            double brightest = 0;
-            bool through = bsdf.spread_kinds() & TRANSMISSION;
-            if (bsdf.spread_kinds() && lights_.count() > 0) {
-                LightSampler::Choice choices[LightSampler::ASKED];
-                double u = lights_.is_random() ? number(SobolSampler::LIGHT) : 0;
-                int chosen = lights_.choose(point, u, depth == 1, through, choices, brightest);
-                Vec2 u_light = chosen && lights_.is_random() ? pair(SobolSampler::LIGHT_POINT) : Vec2{};
-                for (int k = 0; k < chosen; k++) ask(choices[k], at, u_light, path, depth, bsdf, block);
-            }
-
             bool total_used = depth >= most_;
             uint32_t leading = 0, last = 0;  // kinds of rays that can bring anything, and those on which the path ends
             for (RayKind kind : {DIFFUSE, GLOSSY, TRANSMISSION}) {
@@ -296,6 +287,21 @@ class PathIntegrator {
                 if (ends) last |= kind;
                 if (!ends || meets_[kind]) leading |= kind;
             }
+            double brightest = 0, sky = 1;  // sky: how often a diffuse ray is worth it that finds the sky alone
+            bool through = bsdf.spread_kinds() & TRANSMISSION;
+            LightSampler::Choice choices[LightSampler::ASKED];
+            int chosen = 0;
+            if (bsdf.spread_kinds() && lights_.count() > 0)
+                chosen = lights_.choose(point, lights_.is_random() ? number(SobolSampler::LIGHT) : 0, depth == 1, through, choices, brightest);
+            if (brightest > 0 && last & DIFFUSE) {
+                if (bsdf.kinds() & leading & ~DIFFUSE)  // lobes that may show lamps take its place
+                    bsdf.thin(DIFFUSE, smaller(lights_.sky_share(brightest, DIFFUSE), 1.0));
+                else
+                    sky = lights_.sky_chance(brightest, DIFFUSE);
+            }
+            Vec2 u_light = chosen && lights_.is_random() ? pair(SobolSampler::LIGHT_POINT) : Vec2{};
+            for (int k = 0; k < chosen; k++) ask(choices[k], at, u_light, path, depth, bsdf, block);
+
             if (!(bsdf.kinds() & leading)) continue;
             BSDFSample sampled =
                 bsdf.sample(bsdf.needs_choice() ? number(SobolSampler::LOBE) : 0, [&] { return pair(SobolSampler::DIRECTION); });
@@ -312,8 +318,8 @@ class PathIntegrator {
             next.category = after(path.category, sampled.is_diffuse, depth);
             next.weight = min(path.weight * sampled.weight, MOST_WEIGHT);
             double survival = 1;
-            if (sampled.kind == DIFFUSE && brightest > 0 && next.last)
-                survival = lights_.sky_chance(brightest, DIFFUSE);
+            if (sampled.kind == DIFFUSE && next.last)
+                survival = sky;
             else if (depth > CERTAIN && !next.last)
                 survival = smaller(std::sqrt(max_component(next.weight)), 1.0);
             if (survival < 1) {
@@ -392,6 +398,7 @@ class PathIntegrator {
             }
             Hit hit = scene_.closest(path.ray, path.kind);
             meet_lamps(path, path.ray, hit, depth, block);
+            if (hit && path.last && dark_) continue;
             if (hit)
                 arrived[met] = i, met_by[met] = &path.ray, hits[met++] = hit;
             else
@@ -418,6 +425,7 @@ class PathIntegrator {
     int most_, most_of_[TRANSMISSION + 1] = {};
     bool meets_[TRANSMISSION + 1] = {}, only_sky_[TRANSMISSION + 1] = {};
     bool lit_, transparent_ = false, mixed_ = false;  // whether materials let anything straight through, and beside that scatter
+    bool dark_;                                       // whether nothing shines but lamps and the sky, and nothing lets light through
     bool has_pixels_ = false;                         // whether materials ask how wide pixels are
     int most_passed_, ended_after_;                   // surfaces that shadow rays, and paths, go straight through
     uint32_t kinds_ = 0, spread_ = 0;  // of rays that any material scatters, and all over
