@@ -162,9 +162,14 @@ def test_where_no_other_blender_renders_it_a_constant_world_stands_in(tree, expo
     assert exported.world.image is None and "can't be rendered by another Blender" in told and "constant" in told
 
 
-@pytest.mark.parametrize("obstacle", ["a coordinate of the camera", "painted pixels"])
-def test_what_an_image_cannot_stand_in_for_is_named(tree, export, obstacle):
-    if obstacle == "painted pixels":
+@pytest.mark.parametrize("obstacle", ["a coordinate of the camera", "painted pixels", "a script"])
+def test_what_an_image_cannot_stand_in_for_is_named(tree, export, obstacle, monkeypatch):
+    monkeypatch.setattr(another_blender, "call", lambda *_: pytest.fail("another Blender was asked to render it"))
+    if obstacle == "a script":
+        node = tree.add("ShaderNodeScript", script=bpy.data.texts.new("shader.osl"))
+        node.outputs.new("NodeSocketColor", "Color")
+        tree.colour(node.outputs[0])
+    elif obstacle == "painted pixels":
         node = tree.add("ShaderNodeTexEnvironment", projection="MIRROR_BALL")
         node.image = bpy.data.images.new("Painted", 4, 2)
         node.image.pixels[0] = 0.5
