@@ -419,7 +419,7 @@ def test_everything_that_blender_shows_is_spelled_as_blender_spells():
         for each in kind.bl_rna.properties:
             said += [each.name, each.description]
             said += [text for item in getattr(each, "enum_items", ()) for text in (item.name, item.description)]
-        words = {word for text in said for word in re.findall(r"\w+", text or "") if BRITISH.search(word)}
+        words = {word for text in said for word in re.findall(r"[^\W_]+", text or "") if BRITISH.search(word)}
         found |= {name: wrong} if (wrong := {word for word in words if word.lower() not in AMERICAN_TOO}) else {}
     assert found == {}
 
