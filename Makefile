@@ -101,14 +101,15 @@ test-matrix: $(MATRIX:%=test-wheel-%)
 	@$(if $(filter 5.2,$(WHEELS)),,echo "NOT TESTED: the wheel of Blender 5.2, since there is no Python 3.13 on the PATH or in pyenv")
 
 # What a version can change: what touches Blender; with the oldest and the newest, which have NumPys of their own, the quick ones;
-# with the newest, which has a Python of its own, processes. Between
-# the oldest and the newest, batches and lights are left out of 4.5: 5.0, make test, has them, and test-light what Cycles shades.
+# with the newest, which has a Python of its own, processes. Of the newest, tests/blender runs inside the real one, but for lights
+# (test-blender). Between the oldest and the newest, batches and lights are left out of 4.5: 5.0, make test, has them, and
+# test-light what Cycles shades.
 TOUCHING_BLENDER = tests/blender tests/test_crashes.py \
 	$(shell grep -lE 'importorskip\("bpy"\)' tests/test_*.py tests/commands/test_*.py tests/comparison/test_*.py | grep -v test_project)
 tests-4.5 = $(TOUCHING_BLENDER) --ignore=tests/blender/batch --ignore=tests/blender/light
 tests-5.0 = $(TOUCHING_BLENDER)
 tests-4.2 = $(TOUCHING_BLENDER) $(QUICK)
-tests-5.2 = $(TOUCHING_BLENDER) $(QUICK) tests/batch
+tests-5.2 = tests/blender/light tests/blender/test_light_by_light.py $(filter-out tests/blender,$(TOUCHING_BLENDER)) $(QUICK) tests/batch
 
 # Few examples of each property: make test has the many, and what a version changes, it changes for most of them.
 test-wheel-%: .venvs/%/ready
@@ -116,12 +117,12 @@ test-wheel-%: .venvs/%/ready
 
 test-light: $(WHEELS:%=test-light-%)
 
-# The oldest and the newest share the scenes of artists' materials out, the newest having those that take long; of the versions
-# between them a few tell whether Cycles shades otherwise.
-light-4.2 = -k "not (interior or street or foliage or toys or dressed_studio)"
-light-5.2 = -k "not (roadster or fairground or gallery or glassware or backdrop)"
-light-4.5 = -k "sample_scene or perfume"
-light-5.0 = -k "sample_scene or metals"
+# The oldest and the newest share the scenes out, the newest having those that take long; of the versions between them one or two
+# tell whether Cycles shades otherwise.
+light-4.2 = -k "not (interior or street or foliage or toys or dressed_studio or wide or flight or spheres or bunny)"
+light-5.2 = -k "not (roadster or fairground or gallery or glassware or backdrop or portrait or straight_down or spot or teapot)"
+light-4.5 = -k "cornell or perfume"
+light-5.0 = -k "studio and sample_scene or metals"
 
 test-light-%: .venvs/%/ready
 	$(call PYTEST,.venvs/$*) tests/test_light_against_cycles.py -m light $(light-$*)
