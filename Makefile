@@ -1,8 +1,8 @@
 # Each command sets up what it needs, and is quick the second time.
 #   make demo          the sample scene rendered by Cycles and by the tracer, compared; ends with the report
 #   make quick         lint and the tests that need neither Blender nor processes nor many samples; under a minute
-#   make test          lint and the tests, with the newest bpy wheel for the Python found
-#   make test-exhaustive  the tests that take minutes: 10⁸ rays, a million hostile numbers
+#   make test          lint and the tests that are quick to run, with the newest bpy wheel for the Python found; below five minutes
+#   make test-exhaustive  the rest of them: whole pictures, whole clusters, and what takes minutes: 10⁸ rays, a million hostile numbers
 #   make test-sanitizers  the core compiled with sanitizers, and what its tests find of addresses, undefined behaviour and threads
 #   make test-matrix   the tests with Blender 4.2 (and 5.2 where there is a Python 3.13) as wheels; those of Blender with 4.5 and 5.0
 #   make test-light    whole pictures of light, 1024 samples a pixel, against Cycles of each of these
@@ -45,7 +45,7 @@ test: lint
 	$(call PARALLEL,.venv)
 
 test-exhaustive: .venv/test
-	$(call PARALLEL,.venv) --dist=worksteal -m exhaustive
+	$(call PARALLEL,.venv) --dist=worksteal -m "slow or exhaustive"
 
 # GCC's sanitizers, which come with it: preloaded, since Python itself is compiled without them.
 sanitizers-address = address,undefined
@@ -113,7 +113,7 @@ tests-5.2 = tests/blender/light tests/blender/test_light_by_light.py $(filter-ou
 
 # Few examples of each property: make test has the many, and what a version changes, it changes for most of them.
 test-wheel-%: .venvs/%/ready
-	$(call PARALLEL,.venvs/$*) --hypothesis-profile=quick $(tests-$*)
+	$(call PARALLEL,.venvs/$*) --hypothesis-profile=quick -m "not exhaustive and not light and not speed" $(tests-$*)
 
 test-light: $(WHEELS:%=test-light-%)
 

@@ -14,6 +14,8 @@ from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender.rendering import job
 from viewcam_addon.tracer.scene import Spheres
 
+pytestmark = pytest.mark.slow
+
 FOLDER = Path(__file__).parent.parent / "sample_scenes"
 SCENES = {
     "studio": "320x180",

@@ -22,6 +22,8 @@ from viewcam_addon.batch.render_client import ServedRenderer
 from viewcam_addon.errors import InputError
 from viewcam_addon.shots import Shot
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("distributed")
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -18,6 +18,8 @@ from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres, scene_file
 
+pytestmark = pytest.mark.slow
+
 CAMERA = Pinhole((3, -6, 2.5), (0.2, 0, 0.4), (0, 0, 1), 110.0, 96, 54, (46.0, 28.0))
 OTHER = replace(CAMERA, eye=(-4.0, -5.0, 1.5), distance=140.0)
 CLIP = (0.1, 100.0)

@@ -14,6 +14,8 @@ bpy = pytest.importorskip("bpy")
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import datablocks
 
+pytestmark = pytest.mark.slow
+
 SIZES = [(1920, 1080), (1080, 1920), (1001, 777), (333, 778), (512, 512)]
 FITS = ["AUTO", "HORIZONTAL", "VERTICAL"]
 ASPECTS = [(1.0, 1.0), (2.0, 1.0), (1.0, 1.5)]

@@ -13,6 +13,8 @@ from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import datablocks, findings, hold, targets
 from viewcam_addon.blender.interface import panel
 
+pytestmark = pytest.mark.slow
+
 TURN = findings.LARGEST_TURN  # what float32 storage makes of a rotation
 
 

@@ -16,6 +16,8 @@ from viewcam_addon.comparison import radiance
 from viewcam_addon.image import Image
 from viewcam_addon.tracer.render import render
 
+pytestmark = pytest.mark.slow
+
 FLOAT32 = 2.0**-24
 SCENES = 10
 

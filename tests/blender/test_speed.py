@@ -17,6 +17,8 @@ bpy = pytest.importorskip("bpy")
 from viewcam_addon.blender import animation, findings, storage
 from viewcam_addon.blender import camera as cameras
 
+pytestmark = pytest.mark.slow
+
 
 def update():
     bpy.context.view_layer.update()

@@ -13,6 +13,8 @@ sys.path.append(str(ROOT / "tests" / "real_blender"))
 import tour
 import tour_step
 
+pytestmark = pytest.mark.slow
+
 PAGE = ROOT / "docs" / "artists.md"
 
 

@@ -14,6 +14,8 @@ from viewcam_addon.cameras import Camera
 from viewcam_addon.cameras.audit import MISTAKES, Depths, Tracks, Views, _audited, audit, tracks_through, views_of
 from viewcam_addon.pinhole import Pinhole
 
+pytestmark = pytest.mark.slow
+
 OPENCV = np.array([1.0, -1, -1])
 Y_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 SIZES = [(640, 360), (800, 600), (1080, 1920), (1920, 1080), (1200, 900)]

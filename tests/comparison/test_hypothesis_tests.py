@@ -15,6 +15,8 @@ from viewcam_addon.comparison.noise_free import Allowance
 from viewcam_addon.comparison.radiance import VARIANCE_BATCHES
 from viewcam_addon.comparison.sides import Sides
 
+pytestmark = pytest.mark.slow
+
 LEVEL = 0.01
 HEIGHT, WIDTH = 32, 40
 # Trials that fail with a probability of 0.01 each have more failures than these once in a thousand (binomial distribution).

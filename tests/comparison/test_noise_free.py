@@ -9,6 +9,8 @@ from viewcam_addon.comparison import tolerances
 from viewcam_addon.comparison.radiance import compare
 from viewcam_addon.image import Image
 
+pytestmark = pytest.mark.slow
+
 SUN = np.array([0.4, -0.5, 0.75]) / np.linalg.norm([0.4, -0.5, 0.75])
 COLOURS = np.array([(0.0, 0.0, 0.0), (0.6, 0.6, 0.5), (0.8, 0.3, 0.2), (0.2, 0.6, 0.7), (0.5, 0.4, 0.8)])
 

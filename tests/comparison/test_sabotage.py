@@ -7,6 +7,8 @@ import pytest
 
 from viewcam_addon.comparison.geometry import compare
 
+pytestmark = pytest.mark.slow
+
 PASSES = ("Depth", "Position", "Normal", "UV", "Object Index", "Material Index")
 
 

@@ -19,6 +19,8 @@ from viewcam_addon.image import Image
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import Tracer
 
+pytestmark = pytest.mark.slow
+
 STATED = Pinhole((6.0, -7.5, 4.5), (0.2, 0.1, 0.8), (0.0, 0.0, 1.0), 150.0, 120, 75)
 
 

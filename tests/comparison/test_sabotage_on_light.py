@@ -19,6 +19,8 @@ from viewcam_addon.tracer.scene.lamps import Area, Sun, World
 from viewcam_addon.tracer.scene.materials import Colour, Material, Picture
 from viewcam_addon.tracer.scene.shader_nodes import node
 
+pytestmark = pytest.mark.slow
+
 CAMERA = Pinhole((4.5, -5.0, 3.0), (0.0, 0.6, 0.8), (0.0, 0.0, 1.0), 60.0, 64, 48)
 SEEDS = 8
 

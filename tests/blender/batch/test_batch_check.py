@@ -18,6 +18,8 @@ from viewcam_addon.blender.batch.renderer import BlenderRenderer
 from viewcam_addon.errors import InputError
 from viewcam_addon.shots import Shot
 
+pytestmark = pytest.mark.slow
+
 LEFT = Shot("left", eye=(-3.0, -6.0, 2.5), look_at=(0.0, 0.0, 0.5), up=(0.0, 0.0, 1.0), d=90.0)
 RIGHT = replace(LEFT, name="right", eye=(3.0, -5.0, 2.0), d=110.0)
 SIZE = (96, 54)

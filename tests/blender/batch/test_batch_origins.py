@@ -11,6 +11,8 @@ from viewcam_addon.blender.batch import origins
 from viewcam_addon.blender.batch.renderer import BlenderRenderer
 from viewcam_addon.errors import InputError
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def picture(fresh_blender):

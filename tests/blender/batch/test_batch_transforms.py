@@ -17,6 +17,8 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon import child_process, cli
 
+pytestmark = pytest.mark.slow
+
 RADIUS = 0.09
 BALLS = {
     (1, 0, 0): (1.1, 0.1, 0.3),

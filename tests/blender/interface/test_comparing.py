@@ -17,6 +17,8 @@ bpy = pytest.importorskip("bpy")
 from viewcam_addon.blender.interface import comparing, proof, proof_image
 from viewcam_addon.errors import InputError
 
+pytestmark = pytest.mark.slow
+
 # What `viewcam check` tells and leaves behind, in place of it: a process that does so step by step, when it is told to.
 STAND_IN = """
 import json, pathlib, sys, time

@@ -12,6 +12,8 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.tracer import render
 
+pytestmark = pytest.mark.slow
+
 # Cycles' pictures of a scene, for their spread tells Cycles' noise, and the samples of each.
 SCENES, COUNT, SAMPLES = 4, 2, 16
 # Standard errors. One set of random numbers in a hundred goes beyond by chance somewhere in 64 comparisons, with four Blenders.

@@ -11,6 +11,8 @@ bpy = pytest.importorskip("bpy")
 from tests.tracer.core_probes import reflected, refracted, specular_normal
 from viewcam_addon.blender.rendering import cycles
 
+pytestmark = pytest.mark.slow
+
 
 def dot(a, b):
     return (a * b).sum(axis=0)

@@ -21,6 +21,8 @@ from viewcam_addon.tracer.scene.film import Bounces, Film
 from viewcam_addon.tracer.scene.lamps import RAYS, Area, Point, Spot, Sun, World
 from viewcam_addon.tracer.scene.materials import PLAIN, Colour, Material, Picture
 
+pytestmark = pytest.mark.slow
+
 SAMPLES = Path(__file__).resolve().parents[3] / "sample_scenes"
 
 # A number that is float32's is stored as it is. A colour times a strength is rounded once, and read back as a product of two

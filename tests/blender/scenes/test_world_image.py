@@ -13,6 +13,8 @@ from viewcam_addon.blender.rendering import job
 from viewcam_addon.blender.scenes import world_image
 from viewcam_addon.tracer import render
 
+pytestmark = pytest.mark.slow
+
 NEWER = bpy.app.version >= (5, 0)
 WITH_SUN = "SINGLE_SCATTERING" if NEWER else "NISHITA"
 

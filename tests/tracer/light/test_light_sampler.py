@@ -15,6 +15,8 @@ from viewcam_addon.tracer.scene.lamps import Area, Point, Spot, Sun, World
 from viewcam_addon.tracer.scene.materials import Colour, Material
 from viewcam_addon.tracer.scene.shader_nodes import node
 
+pytestmark = pytest.mark.slow
+
 # Looks at a square metre of floor, so far off that its pixels are alike; lamps stand beside its view.
 CAMERA = Pinhole((0, 0, 100), (0, 0, 0), (0, 1, 0), 6400, 64, 64)
 WHITE, MIRROR = Material(diffuse=Colour((1.0, 1.0, 1.0))), Material(mirror=Colour((1.0, 1.0, 1.0)))

@@ -6,6 +6,8 @@ from core_probes import FILM, SCATTERING, Sampler
 from hypothesis import given
 from hypothesis import strategies as st
 
+pytestmark = pytest.mark.slow
+
 SEEDS = st.integers(0, 2**63)
 # Of the film, and of each scattering: where on a lamp, and which way.
 PAIRS = [0, *(FILM + SCATTERING * scattering + within for scattering in (0, 1, 7) for within in (1, 3))]

@@ -12,6 +12,8 @@ from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import versions
 from viewcam_addon.blender.interface import baking, panel
 
+pytestmark = pytest.mark.slow
+
 MODES = ("XYZ", "ZYX", "QUATERNION", "AXIS_ANGLE")
 
 

@@ -17,6 +17,8 @@ from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.scene import scene_file
 
+pytestmark = pytest.mark.slow
+
 UTM = (448262.25, 5411932.5, 42.0)
 ECEF = (4200952.5, 780362.0, 4720030.0)
 

@@ -8,6 +8,8 @@ from viewcam_addon.tracer.scene.film import Bounces
 from viewcam_addon.tracer.scene.lamps import Area
 from viewcam_addon.tracer.scene.materials import Colour, Material
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def mirrored(make_lit, floor, make_spheres, soft):

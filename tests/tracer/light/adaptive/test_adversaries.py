@@ -12,6 +12,8 @@ from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene.lamps import Spot
 from viewcam_addon.tracer.scene.materials import Colour, Material
 
+pytestmark = pytest.mark.slow
+
 WANTED = 0.02
 MOST = 12 * WANTED
 WHITE = Material(diffuse=Colour((0.9,) * 3))
