@@ -15,6 +15,8 @@ from viewcam_addon.batch.render_client import ServedRenderer
 from viewcam_addon.errors import FullDiskError, InputError
 from viewcam_addon.shots import Shot
 
+pytestmark = pytest.mark.slow
+
 
 def shot(name, eye=(0.1, -6.0, 1e-300)):
     return Shot(name, eye, (0, 0, 1), (0, 0, 1), 400.0, None, 64, 36)

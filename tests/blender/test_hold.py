@@ -12,6 +12,8 @@ from viewcam_addon.blender import findings
 from viewcam_addon.blender.interface import panel
 from viewcam_addon.pinhole import Pinhole
 
+pytestmark = pytest.mark.slow
+
 TURN = findings.LARGEST_TURN  # what float32 storage makes of a rotation
 UP = (0.0, 0.0, 1.0)
 

@@ -17,6 +17,8 @@ from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender.interface import panel
 from viewcam_addon.errors import InputError
 
+pytestmark = pytest.mark.slow
+
 HOSTILE = (math.nan, math.inf, -math.inf, 3.4e38, -3.4e38, 1e20, 1e-38, 1e-45, 0.0)
 TEXTS = (
     *("", "x", "[]", "null", "1", "{}", '"NaN"', "[1, 2, 3]", "[1, 2, [3]]", '{"a": 1}', "[" * 5000, "1" * 5000, "é\n"),

@@ -21,6 +21,8 @@ from viewcam_addon.blender.rendering import job
 from viewcam_addon.errors import InputError, NotModelledError
 from viewcam_addon.shots import Shot
 
+pytestmark = pytest.mark.slow
+
 
 def shots(**more):
     def render(blend, out, trust):

@@ -20,6 +20,8 @@ from viewcam_addon.errors import InputError
 from . import test_read_only_formats as files
 from .conftest import camera
 
+pytestmark = pytest.mark.slow
+
 SETTINGS = settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 GIVEN = Options(size=(64, 36), base=camera("plain").pinhole)
 

@@ -13,6 +13,8 @@ from viewcam_addon.errors import InputError
 from viewcam_addon.image import BACKGROUND_DEPTH, Image
 from viewcam_addon.pinhole import Pinhole
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(autouse=True)
 def no_warnings_but_what_underflows(no_warnings):

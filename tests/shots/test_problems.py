@@ -14,6 +14,8 @@ from viewcam_addon.shots import ShotsError, rows
 from viewcam_addon.shots.problems import MOST_SHOWN
 from viewcam_addon.shots.rows import COLUMNS
 
+pytestmark = pytest.mark.slow
+
 HEADER = "name,camera,eye_x,eye_y,eye_z,look_at,up,d,width,height,frame,engine,samples,level"
 GOOD = {
     "name": "shot{line}",

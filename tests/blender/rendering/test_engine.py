@@ -16,6 +16,8 @@ from viewcam_addon.blender.rendering import engine, job, tracing
 from viewcam_addon.tracer import render as renders
 from viewcam_addon.tracer.render import render
 
+pytestmark = pytest.mark.slow
+
 LEVELS = ("geometry", "direct", "path")
 SAMPLES, SEED = 3, 5
 
