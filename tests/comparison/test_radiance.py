@@ -72,7 +72,7 @@ def test_the_mean_is_told_in_as_many_digits_as_its_error_has():
     """Never "differs by −0.000 % ± 0.000 %"."""
 
     def told(difference, error):
-        return light_verdict._mean_words(light_verdict.LightRow("Combined", 1.0, 1.0 + difference, error, 2 * error, 0))
+        return light_verdict._mean_text(light_verdict.LightRow("Combined", 1.0, 1.0 + difference, error, 2 * error, 0))
 
     assert told(-2.5e-7, 4.4e-7).startswith("the mean differs by −0.000025 %, with an error of ± 0.000044 %, and ")
     assert told(-2.5e-9, 4.4e-7).startswith("the mean is the same within ± 0.000044 %, and a difference of 0.000088 % would")

@@ -32,11 +32,11 @@ class Interruption:
 
     def __enter__(self) -> "Interruption":
         if self._listens:
-            self._ear, self._mouth = socket.socketpair()
-            self._mouth.setblocking(False)
+            self._receiver, self._sender = socket.socketpair()
+            self._sender.setblocking(False)
             self._meant = {**{number: number for number in _SIGNALS}, **self._passed_on}
             self._before = [(number, signal.signal(number, _do_nothing)) for number in self._meant]
-            self._wakeup_before = signal.set_wakeup_fd(self._mouth.fileno(), warn_on_full_buffer=False)
+            self._wakeup_before = signal.set_wakeup_fd(self._sender.fileno(), warn_on_full_buffer=False)
             self._thread = threading.Thread(target=self._listen, daemon=True)
             self._thread.start()
         return self
@@ -47,13 +47,13 @@ class Interruption:
             for number, answer in self._before:  # None is an answer that was not Python's, and can't be put back
                 after = signal.SIG_IGN if number in self._passed_on else answer
                 signal.signal(number, signal.SIG_DFL if after is None else after)
-            self._mouth.close()
+            self._sender.close()
             self._thread.join()
-            self._ear.close()
+            self._receiver.close()
 
     def _listen(self) -> None:
         came: Counter[bool] = Counter()  # to this process, and passed on to it
-        while number := int.from_bytes(self._ear.recv(1), "big"):  # none when the mouth is closed
+        while number := int.from_bytes(self._receiver.recv(1), "big"):  # none when the sender is closed
             if number not in self._meant:
                 continue
             came[number in self._passed_on] += 1

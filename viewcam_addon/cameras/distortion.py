@@ -38,12 +38,12 @@ def opencv(k: Mapping[str, float]) -> Lens:
     return lens
 
 
-def radial(law: Callable[[float], float]) -> Lens:
-    """A lens that moves a point at the radius r to the radius `law(r)`."""
+def radial(profile: Callable[[float], float]) -> Lens:
+    """A lens that moves a point at the radius r to the radius `profile(r)`."""
 
     def lens(x: float, y: float) -> Point:
         r = math.hypot(x, y)
-        factor = law(r) / r if r else 1.0
+        factor = profile(r) / r if r else 1.0
         return x * factor, y * factor
 
     return lens

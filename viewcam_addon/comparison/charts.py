@@ -90,13 +90,13 @@ def marks(mismatches: Mismatches, size: tuple[int, int]) -> str:
     if len(mismatches.kinds) > _MOST_MARKED:
         return html_page.filled("comparison/marks.html", stain=pictures.png_uri(pictures.stain(mismatches, size)))
     places = [
-        (mismatches.columns[i] + 0.5, height - mismatches.rows[i] - 0.5, mismatches.explained[i], mismatch_words(mismatches, i))
+        (mismatches.columns[i] + 0.5, height - mismatches.rows[i] - 0.5, mismatches.explained[i], mismatch_text(mismatches, i))
         for i in range(len(mismatches.kinds))
     ]
     return html_page.filled("comparison/marks.html", stain=None, width=width, height=height, places=places)
 
 
-def mismatch_words(mismatches: Mismatches, i: int) -> str:
+def mismatch_text(mismatches: Mismatches, i: int) -> str:
     """One mismatch in a line."""
     where = f"column {mismatches.columns[i]}, row {mismatches.rows[i]}: {KINDS[mismatches.kinds[i]]}"
     if mismatches.explained[i]:

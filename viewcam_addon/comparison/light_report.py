@@ -11,7 +11,7 @@ import numpy as np
 from ..image import Image
 from . import charts, difference, page, pictures
 from .hypothesis_tests import CONTOURS, WHOLE, HypothesisTest
-from .light_verdict import change_words, edge_words, place_words, samples_words
+from .light_verdict import change_text, edge_text, place_text, samples_text
 from .radiance import LightRow, RadianceComparison
 from .tolerances import ROUNDINGS
 
@@ -52,9 +52,9 @@ def write_report(
         "views": [combined, *(_view(comparison, name, values) for name, values in comparison.maps.items())],
         "worst": max(asked, key=lambda test: abs(test.worst.errors) / test.limit, default=None),
         "makers": (_maker(reference), _maker(tests[0])),
-        "edge_words": edge_words,
-        "place_words": place_words,
-        "samples_words": samples_words,
+        "edge_text": edge_text,
+        "place_text": place_text,
+        "samples_text": samples_text,
         "chart": chart,
         "crops": _crops(comparison, shown),
     }
@@ -104,7 +104,7 @@ def _crop(comparison: RadianceComparison, shown: tuple, row: LightRow, test: Hyp
     place, size = test.worst, (comparison.pinhole.width, comparison.pinhole.height)
     column, line = (sum(ends) // 2 for ends in (place.columns, place.rows))
     words = (
-        f"{row.name}{f' ({place.channel})' if place.channel else ''} {place_words(place, test.size)}: "
-        f"{change_words(place.reference, place.test)}, {abs(place.errors):.1f} standard errors of {test.limit:.1f} allowed"
+        f"{row.name}{f' ({place.channel})' if place.channel else ''} {place_text(place, test.size)}: "
+        f"{change_text(place.reference, place.test)}, {abs(place.errors):.1f} standard errors of {test.limit:.1f} allowed"
     )
     return page.crop(shown, size, column, line, words, max(15, 2 * test.size + 1))

@@ -115,8 +115,8 @@ class RadianceComparison:
                 f"{_edges(combined)}."
             )
         return (
-            f"The same within noise at {samples_words(self)}: no pixel and no tile differs by more than chance; "
-            f"{_mean_words(combined)}."
+            f"The same within noise at {samples_text(self)}: no pixel and no tile differs by more than chance; "
+            f"{_mean_text(combined)}."
         )
 
     def lines(self) -> list[str]:
@@ -146,7 +146,7 @@ class RadianceComparison:
         }
 
 
-def samples_words(comparison: RadianceComparison) -> str:
+def samples_text(comparison: RadianceComparison) -> str:
     """At how many samples: 1,024 samples; or 1,024 and 512 samples."""
     reference, test = comparison.samples
     if reference is None or test is None:
@@ -154,7 +154,7 @@ def samples_words(comparison: RadianceComparison) -> str:
     return f"{reference:,} samples" if reference == test else f"{reference:,} and {test:,} samples"
 
 
-def place_words(place: Place, size: int) -> str:
+def place_text(place: Place, size: int) -> str:
     """Where: in columns 32 to 63, rows 0 to 31."""
     if size == WHOLE:
         return "over the whole picture"
@@ -164,7 +164,7 @@ def place_words(place: Place, size: int) -> str:
     return f"in column {left}, row {bottom}" if size == PIXELS else f"in columns {left} to {right}, rows {bottom} to {top}"
 
 
-def change_words(reference: float, test: float) -> str:
+def change_text(reference: float, test: float) -> str:
     """4.1 % darker; 3.1 times as bright; 0.12 instead of 0."""
     if reference <= 0.0 or test <= 0.0:
         return f"{test:.3g} instead of {reference:.3g}"
@@ -174,11 +174,11 @@ def change_words(reference: float, test: float) -> str:
     return f"{abs(ratio - 1.0):.2%} {'brighter' if ratio > 1.0 else 'darker'}".replace("%", " %")
 
 
-def differs_words(test: HypothesisTest) -> str:
+def differs_text(test: HypothesisTest) -> str:
     """By how much, at the worst place: 4.1 % darker; or softer, along contours."""
     if test.size == CONTOURS:
         return "sharper" if test.worst.errors > 0.0 else "softer"
-    return change_words(test.worst.reference, test.worst.test)
+    return change_text(test.worst.reference, test.worst.test)
 
 
 def worst_test(row: LightRow) -> HypothesisTest | None:
@@ -215,14 +215,14 @@ def _noise_free_lines(comparison: RadianceComparison) -> list[str]:
     return table
 
 
-def edge_words(edges: Edges) -> str:
+def edge_text(edges: Edges) -> str:
     """12 pixels differ at edges (63 may) and 1 elsewhere (2 may)."""
     at_edges = f"{edges.count:,} pixels differ at edges ({edges.allowed:,} may)"
     return f"{at_edges} and {edges.leaks:,} elsewhere ({edges.allowed_leaks:,} may)"
 
 
 def _edges(row: LightRow) -> str:
-    return f"; {edge_words(row.edges)}" if row.edges.count or row.edges.leaks else ""
+    return f"; {edge_text(row.edges)}" if row.edges.count or row.edges.leaks else ""
 
 
 def _difference(row: LightRow) -> str:
@@ -232,7 +232,7 @@ def _difference(row: LightRow) -> str:
     if test is None:
         noise_free, edges = row.noise_free, row.edges
         if not edges.ok:
-            return f"{row.name} differs by more than float32 allows: {edge_words(edges)}"
+            return f"{row.name} differs by more than float32 allows: {edge_text(edges)}"
         percentile, share = noise_free.worst
         return f"{row.name} is off by {share:.3g} times its tolerance at {percentile_name(percentile)}"
     place = test.worst
@@ -240,7 +240,7 @@ def _difference(row: LightRow) -> str:
     many = f" and {failing - 1:,} more of {of:,}" if failing > 1 else ""
     channel = f" ({place.channel})" if place.channel else ""
     return (
-        f"{place_words(place, test.size)}{many} {row.name}{channel} is {differs_words(test)}, "
+        f"{place_text(place, test.size)}{many} {row.name}{channel} is {differs_text(test)}, "
         f"{abs(place.errors):.3g} standard errors where chance allows {test.limit:.3g}"
     )
 
@@ -254,7 +254,7 @@ def _hint(row: LightRow) -> str:
     return f" (all of it is a factor of {row.factor:.5g}{error}{f', which is {known}' if known else ''})"
 
 
-def _mean_words(row: LightRow) -> str:
+def _mean_text(row: LightRow) -> str:
     if not row.reference:
         return "both are black in the mean"
     error = 100.0 * row.ratio_error

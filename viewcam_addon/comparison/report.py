@@ -79,6 +79,6 @@ def _crops(comparison: GeometryComparison, shades: tuple) -> list[page.Crop]:
     size = (comparison.pinhole.width, comparison.pinhole.height)
     crops = []
     for i in chosen:
-        words = charts.mismatch_words(mismatches, int(i))
+        words = charts.mismatch_text(mismatches, int(i))
         crops.append(page.crop(shades, size, mismatches.columns[i], mismatches.rows[i], words[:1].upper() + words[1:]))
     return crops

@@ -129,7 +129,7 @@ class PathIntegrator {
         PathLight* light;
         int live = 0, lit[LightSampler::ASKED] = {};
         Path paths[MOST], onwards[MOST];
-        Interaction tables[2][MOST], *points = tables[0], *arrivals = tables[1];
+        Interaction tables[2][MOST], *points = tables[0], *next_points = tables[1];
         Shadowed shadowed[LightSampler::ASKED][MOST];  // by the light that was asked
         Ray shadow_rays[LightSampler::ASKED][MOST];
     };
@@ -404,17 +404,17 @@ class PathIntegrator {
             else
                 leave(path, path.ray, depth, block);
         }
-        scene_.interactions(met_by, hits, met, block.arrivals);
+        scene_.interactions(met_by, hits, met, block.next_points);
         int live = 0;
         for (int k = 0; k < met; k++) {
             Path& path = block.onwards[arrived[k]];
-            if (!follow(path, path.ray, hits[k], block.arrivals[k], samples[path.sample], depth, block)) continue;
+            if (!follow(path, path.ray, hits[k], block.next_points[k], samples[path.sample], depth, block)) continue;
             block.paths[live] = path;
             block.paths[live].from = k;
             live++;
         }
         block.live = live;
-        std::swap(block.points, block.arrivals);
+        std::swap(block.points, block.next_points);
     }
 
     static Vec3 min(Vec3 rgb, double most) { return {smaller(rgb.x, most), smaller(rgb.y, most), smaller(rgb.z, most)}; }
