@@ -13,11 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from viewcam_addon import image
+from viewcam_addon import cameras, image
 from viewcam_addon.batch.folder import Folder
 from viewcam_addon.cli import main
 from viewcam_addon.commands import batch, chart, verification
 from viewcam_addon.commands.verification import DEMO_SCENE
+from viewcam_addon.pinhole import Pinhole
 
 CAMERA = {"eye": [0, -5, 0], "look_at": [0, 0, 0], "up": [0, 0, 1], "distance": 100, "width": 64, "height": 48}
 SCENE = {
@@ -423,6 +424,30 @@ def test_a_picture_made_elsewhere_is_judged_by_the_channels_that_are_named(tmp_p
     assert "names no pass" in fails(capfd, *compare[:-1], "--channels", "depht=far")
     assert "position has 3 channels" in fails(capfd, *compare[:-1], "--channels", "position=far")
     assert "name depth, distance or position" in fails(capfd, *compare[:-1], "--channels", "object-index=id")
+
+
+def test_a_picture_by_mitsuba_of_the_same_scene_is_the_same_and_one_of_a_moved_ball_is_not(tmp_path):
+    import OpenEXR
+
+    mitsuba = pytest.importorskip("mitsuba")
+    mitsuba.set_variant("scalar_rgb")
+    scene, traced, made, camera = (tmp_path / name for name in ("scene.json", "traced.exr", "made.exr", "camera.xml"))
+    scene.write_text(json.dumps(SCENE))
+    assert main(["render", str(scene), str(traced)]) == 0
+    cameras.save([cameras.Camera("camera", Pinhole(**CAMERA))], camera, "mitsuba")
+    # One sample, through each pixel's center.
+    number, flag = "<integer name='sample_count' value='1'/>", "<boolean name='jitter' value='false'/>"
+    one = f"<rfilter type='box'/></film><sampler type='stratified'>{number}{flag}</sampler>"
+    text = camera.read_text().replace("</film>", one)
+    (sensor,) = mitsuba.load_string(text).sensors()
+    for x, status in ((0, 0), (0.002, 1)):
+        ball = {"type": "sphere", "center": [x, 0, 0]}
+        document = {"type": "scene", "integrator": {"type": "aov", "aovs": "P:position"}, "ball": ball}
+        pixels = np.array(mitsuba.render(mitsuba.load_dict(document), sensor=sensor))
+        channels = {f"P.{letter}": np.ascontiguousarray(pixels[..., i], np.float32) for i, letter in enumerate("XYZ")}
+        OpenEXR.File({}, channels).write(str(made))
+        stated = ["--scene", str(scene), "--channels", "position=P.X,P.Y,P.Z"]
+        assert main(["compare", str(traced), str(made), *stated]) == status
 
 
 def test_another_engine_is_checked_by_its_geometry_alone(capfd):

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
+# zlib's fastest: of depths, ids and masks a third more bytes than its usual 6, in a quarter to a third of the time.
+_LEVEL = 1
 _TEXTS = (b"tEXt", b"zTXt", b"iTXt", b"tIME")
 
 
@@ -33,7 +35,7 @@ def encoded(pixels: NDArray[np.uint8] | NDArray[np.uint16], palette: bytes | Non
         kind, filtered, chunks = 3, 0, ((b"PLTE", palette), (b"tRNS", b"\0"))
     rows = np.column_stack([np.full(height, filtered, np.uint8), lines])
     header = struct.pack(">IIBBBBB", width, height, 8 * pixels.dtype.itemsize, kind, 0, 0, 0)
-    chunks = ((b"IHDR", header), *chunks, (b"IDAT", zlib.compress(rows.tobytes(), 6)), (b"IEND", b""))
+    chunks = ((b"IHDR", header), *chunks, (b"IDAT", zlib.compress(rows.tobytes(), _LEVEL)), (b"IEND", b""))
     return _SIGNATURE + b"".join(
         struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data)) for name, data in chunks
     )

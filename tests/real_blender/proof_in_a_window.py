@@ -91,14 +91,18 @@ def ended(comparison):
     assert comparison._process.status() is not None
 
 
+def unfold(panel):
+    """Register a panel anew, open; under a name of its own, since Blender remembers by its name that one was closed."""
+    bpy.utils.unregister_class(panel)
+    panel.bl_options, panel.bl_idname = set(), f"{panel.__name__}_open"
+    bpy.utils.register_class(panel)
+
+
 def open_the_panel():
     """The file, the sidebar's tab, and the sub-panel unfolded from the start."""
     bpy.ops.wm.open_mainfile(filepath=str(FILE), load_ui=False)
     yield
-    panel = proof.VIEWCAM_PT_sidebar_proof
-    bpy.utils.unregister_class(panel)
-    panel.bl_options = set()
-    bpy.utils.register_class(panel)
+    unfold(proof.VIEWCAM_PT_sidebar_proof)
     view, sidebar = region(*SIDEBAR)
     view.spaces.active.show_region_ui = True
     window().view_layer.objects.active = bpy.context.scene.camera
@@ -253,12 +257,13 @@ def turn_the_add_on_off_while_it_runs():
 
 
 def write_the_labels():
-    """By the operator, since the panel is folded: Blender's timer looks after what it began, until the files are there."""
+    """By its button: Blender's timer looks after what that began, until the files are there, and the panel says where."""
     labels = importlib.import_module(LABELS)
+    unfold(labels.VIEWCAM_PT_sidebar_labels)
     settings = bpy.context.window_manager.virtual_pinhole_labels
     settings.folder = str(FOLDER)
-    with bpy.context.temp_override(window=window()):
-        bpy.ops.viewcam.write_labels(camera=bpy.context.scene.camera.name)
+    yield
+    yield from push("viewcam.write_labels")
     ends = time.monotonic() + PATIENCE
     while labels.latest() is None and time.monotonic() < ends:
         yield
@@ -266,6 +271,10 @@ def write_the_labels():
     assert folder and folder.parent == FOLDER and sentence == f"Written to {folder}", sentence
     missing = {*labels.file_names(bpy.context.scene.camera, settings.chosen())} - {path.name for path in folder.iterdir()}
     assert not missing, missing
+    yield
+    yield
+    yield from button("wm.path_open")
+    picture("labels.png")
 
 
 def quit_while_it_runs():
