@@ -291,33 +291,6 @@ def use_another_up():
     yield
 
 
-def grab():
-    """G X 1 moves the eye and not only the camera; under a target the view stays on it, and Escape gives back every bit."""
-    values().eye, values().look_at, values().up = (4, -6, 3.5), (0.5, 0.2, 1), (0, 0, 1)
-    for each in window().view_layer.objects:
-        each.select_set(each == camera())
-    for target in (None, bpy.data.objects["Cube"]):
-        values().look_at_target = target
-        yield
-        yield
-        before = state()
-        for key in ("ESC", "RET"):
-            yield from strike("gx1")
-            press(key, *NOWHERE)
-            yield
-            yield
-            assert key != "ESC" or same(state(), before), f"Escape leaves {state()} of {before}"
-        moved = np.subtract(state()[0][0], before[0][0])
-        np.testing.assert_allclose(moved, (1, 0, 0), atol=1e-5, err_msg="the values are not where G has put the camera")
-        is_at_its_values()
-        if target:
-            assert values().numbers()[1] == (0, 0, 0), "the view has left the target"
-    values().look_at_target = None
-    values().eye[2] += 1
-    is_at_its_values()
-    np.testing.assert_allclose(values().numbers()[0], (6, -6, 4.5), atol=1e-5, err_msg="an edit has thrown the moves away")
-
-
 def strike(text):
     """Steps: one key after another over the viewport."""
     move(*NOWHERE)
@@ -327,66 +300,6 @@ def strike(text):
         window().event_simulate(type=key, value="PRESS", unicode=character, x=NOWHERE[0], y=NOWHERE[1])
         window().event_simulate(type=key, value="RELEASE", x=NOWHERE[0], y=NOWHERE[1])
         yield
-
-
-def orbit_and_walk_in_the_cameras_view():
-    """*Lock Camera to View* by a drag of the middle mouse button, and walk navigation by W: the values go along."""
-    area, part = region("VIEW_3D", "WINDOW")
-    view = area.spaces.active
-    shown = view.region_3d.view_rotation.copy(), view.region_3d.view_location.copy(), view.region_3d.view_distance
-    view.lock_camera, view.region_3d.view_perspective = True, "CAMERA"
-    move(*NOWHERE)
-    yield
-    yield
-    before = state()
-    window().event_simulate(type="MIDDLEMOUSE", value="PRESS", x=NOWHERE[0], y=NOWHERE[1])
-    for by in (20, 40, 60):
-        yield
-        move(NOWHERE[0] + by, NOWHERE[1] + by / 2)
-    yield
-    window().event_simulate(type="MIDDLEMOUSE", value="RELEASE", x=NOWHERE[0] + 60, y=NOWHERE[1] + 30)
-    yield
-    yield
-    after = state()
-    assert np.linalg.norm(np.subtract(after[0][0], before[0][0])) > 0.5, f"orbited, and the eye went from {before} to {after}"
-    is_at_its_values()
-    view.lock_camera = False
-    with bpy.context.temp_override(window=window(), area=area, region=part):
-        assert bpy.ops.view3d.walk("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
-    yield
-    window().event_simulate(type="W", value="PRESS", x=NOWHERE[0], y=NOWHERE[1])
-    for _ in range(6):
-        yield
-    window().event_simulate(type="W", value="RELEASE", x=NOWHERE[0], y=NOWHERE[1])
-    yield
-    press("RET", *NOWHERE)
-    yield
-    yield
-    walked = np.subtract(state()[0][0], after[0][0])
-    assert np.linalg.norm(walked) > 0.01, "walked, and the eye is where it was"
-    is_at_its_values()
-    view.region_3d.view_perspective = "PERSP"
-    view.region_3d.view_rotation, view.region_3d.view_location, view.region_3d.view_distance = shown
-    yield
-
-
-def tick_an_orthographic_camera():
-    """The box does not tick where there is no pinhole, and can be unticked."""
-    x, y = yield from find("enabled", -1, across=0.13)
-    for kind, ticks in (("ORTHO", False), ("PERSP", True)):
-        values().enabled, camera().data.type = False, kind
-        yield
-        yield
-        yield from click(x, y)
-        assert values().enabled == ticks, f"clicked where the camera is {kind}, and the box is {values().enabled}"
-    camera().data.type = "ORTHO"
-    yield
-    yield
-    yield from click(x, y)
-    assert not values().enabled, "the box of an orthographic camera can't be unticked"
-    camera().data.type = "PERSP"
-    values().enabled = True
-    yield
 
 
 def play_keyframes():
@@ -439,9 +352,6 @@ def steps():
         press_the_buttons,
         take_the_view_of_the_viewport,
         use_another_up,
-        grab,
-        orbit_and_walk_in_the_cameras_view,
-        tick_an_orthographic_camera,
         play_keyframes,
         draw_a_warning,
         look_into_the_properties_editor,

@@ -198,21 +198,6 @@ def press_escape():
     assert proof.latest().passed, "the verdict before is forgotten"
 
 
-def press_escape_during_playback():
-    """Escape ends the playback; the next one the comparison."""
-    comparison, _ = yield from begin_and_stop()
-    with bpy.context.temp_override(window=window()):
-        bpy.ops.screen.animation_play()
-    yield
-    assert window().screen.is_animation_playing
-    press("ESC", *NOWHERE)
-    yield
-    yield
-    assert not window().screen.is_animation_playing and proof.running() is comparison
-    press("ESC", *NOWHERE)
-    yield from ended(comparison)
-
-
 def press_cancel():
     comparison, y = yield from begin_and_stop()
     yield
@@ -293,7 +278,6 @@ def steps():
         open_the_report,
         take_the_edit_back_and_show_the_difference_again,
         press_escape,
-        press_escape_during_playback,
         press_cancel,
         undo_while_it_runs,
         open_a_file_while_it_runs,

@@ -25,9 +25,6 @@ PARTS = (
     "press_the_buttons",
     "take_the_view_of_the_viewport",
     "use_another_up",
-    "grab",
-    "orbit_and_walk_in_the_cameras_view",
-    "tick_an_orthographic_camera",
     "play_keyframes",
     "draw_a_warning",
     "look_into_the_properties_editor",
@@ -89,17 +86,7 @@ def test_what_an_artist_tries_on_the_first_day_goes_as_with_blenders_own_cameras
         if outcome.returncode == 0:
             break
     said = outcome.stdout + outcome.stderr
-    assert outcome.returncode == 0 and "done: add_a_camera_where_there_is_none" in said, said
-    assert "Traceback" not in said, said
-
-
-def test_a_photo_of_a_known_camera_is_matched_by_dragging_along_its_edges(real_blender, tmp_path):
-    for _ in range(ATTEMPTS):
-        outcome = run_in_a_window(real_blender, Path(__file__).with_name("photo_in_a_window.py"), tmp_path)
-        if outcome.returncode == 0:
-            break
-    said = outcome.stdout + outcome.stderr
-    assert outcome.returncode == 0 and "done: escape" in said and "done: match the photo" in said, said
+    assert outcome.returncode == 0 and "done: the day" in said, said
     assert "Traceback" not in said, said
 
 
