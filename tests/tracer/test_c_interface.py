@@ -6,7 +6,7 @@ test-sanitizers` runs this on a core that stops at whatever is read or written o
 
 import ctypes
 import os
-from ctypes import byref, c_void_p
+from ctypes import byref, c_int, c_void_p
 
 import numpy as np
 import pytest
@@ -90,7 +90,8 @@ def add_spheres(draw, calls):
 def add_objects(draw, calls):
     geometry, slots, count = draw(mostly(st.integers(0, 3), [2**32 - 1])), draw(st.integers(1, 3)), draw(st.integers(0, 5))
     given = calls.at(np.zeros(slots), np.float32), calls.at(np.full(slots, draw(mostly(st.just(0), [1, 2**32 - 1]))), np.uint32)
-    calls("add_objects", calls.scene, native._Object(geometry, draw(st.integers(0, 63)), slots, count, 1.0, *given))
+    info = calls.at(numbers(draw, 5 * max(count, 1)), np.float32) if draw(st.booleans()) else None
+    calls("add_objects", calls.scene, native._Object(geometry, draw(st.integers(0, 63)), slots, count, 1.0, *given, info=info))
     return count
 
 
@@ -146,6 +147,7 @@ def make_nodes(draw, calls):
         if calls("add_node", calls.scene, given):
             rows, values = calls.at(numbers(draw, 6 * 5), np.float64), np.empty((5, 4))
             calls("probe_nodes", calls.scene, 5, rows, values.ctypes.data)
+            calls("constant_node", calls.scene, values.ctypes.data, byref(c_int()))
 
 
 def trace(draw, calls):

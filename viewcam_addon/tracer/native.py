@@ -80,6 +80,7 @@ class _Object(Structure):
         ("index", c_float),
         *((name, c_void_p) for name in ("slot_indices", "slot_materials")),
         ("lit_by", c_uint64),
+        ("info", c_void_p),
     ]
 
 
@@ -173,6 +174,7 @@ class _Core(Structure):
         ("clear_light", _function(c_int, c_void_p)),
         ("add_texture", _function(c_int, c_void_p, c_int, c_int, c_int, c_int, c_void_p)),
         ("add_node", _function(c_int, c_void_p, POINTER(_Node))),
+        ("constant_node", _function(c_int, c_void_p, c_void_p, POINTER(c_int))),
         ("add_material", _function(c_int, c_void_p, c_void_p, c_int, c_int)),
         ("add_lamp", _function(c_int, c_void_p, POINTER(_Lamp))),
         ("set_film", _function(c_int, c_void_p, POINTER(_Film))),
@@ -268,6 +270,7 @@ class _Links:
 
 
 _UNLINKED = _Links()
+_NOWHERE = Scene(Pinhole((0, 0, 0), (0, 0, -1), (0, 1, 0), 1, 1, 1), {}, ())
 
 
 class CoreScene:
@@ -347,7 +350,12 @@ class CoreScene:
             visible |= self._links.blocking(placed.name)
         shared = geometry, visible, slots, len(placed.matrices), placed.object_index
         lit_by = self._links.receiving(placed.name)
-        self.check(self.core.add_objects(self.handle, _Object(*shared, _address(indices), _address(numbers), lit_by)))
+        info = None
+        if placed.random is not None or placed.color != (1.0,) * 4:
+            info = np.empty((len(placed.matrices), 5), np.float32)
+            info[:, :4], info[:, 4] = placed.color, 0.0 if placed.random is None else placed.random
+        given = _Object(*shared, _address(indices), _address(numbers), lit_by, self._keep(info, np.float32, (None, 5)))
+        self.check(self.core.add_objects(self.handle, given))
 
     def serves(self, scene: Scene) -> bool:
         """Whether its hierarchies are those of another scene: the same things in the same places, near the same origin."""
@@ -386,7 +394,7 @@ class CoreScene:
             for closure in material.closures:
                 for value in (*dict(closure.node.inputs).values(), *(factor for factor, _ in closure.factors)):
                     if isinstance(value, Node):
-                        self._add_nodes(value, images, nodes)
+                        self.add_nodes(value, images, nodes)
             closures = [described_closure(closure, images, nodes) for closure in material.closures]
             described = (_Closure * len(closures))(*closures)
             self.check(self.core.add_material(self.handle, described, len(closures), material.transparent_shadow))
@@ -412,13 +420,13 @@ class CoreScene:
         pixels = array(picture.pixels, np.float32, (height, width, channels))
         self.check(self.core.add_texture(self.handle, width, height, channels, picture.srgb, _address(pixels)))
 
-    def _add_nodes(self, node: Node, images: Mapping[str, int], nodes: dict[Node, int]) -> None:
+    def add_nodes(self, node: Node, images: Mapping[str, int], nodes: dict[Node, int]) -> None:
         """Add a node that makes values after those that feed it. nodes : the numbers of those that are there."""
         if node in nodes:
             return
         for name in KINDS[node.type].inputs:
             if isinstance(value := node[name], Node):
-                self._add_nodes(value, images, nodes)
+                self.add_nodes(value, images, nodes)
         self.check(self.core.add_node(self.handle, _described_node(node, images, nodes)))
         nodes[node] = len(nodes)
 
@@ -502,6 +510,18 @@ class CoreScene:
         return self.core.bytes(self.handle)
 
 
+def constant_value(node: Node) -> tuple[tuple[float, float, float], float] | None:
+    """What a node that makes values is everywhere, and that as a number; None where it varies or shows an image."""
+    if any(colour.image is not None for colour in node.colours):
+        return None
+    scene = CoreScene(_NOWHERE, 1)
+    scene.add_nodes(node, {}, {})
+    value, is_constant = np.empty(4), c_int()
+    scene.check(scene.core.constant_node(scene.handle, _address(value), ctypes.byref(is_constant)))
+    red, green, blue, number = value.tolist()
+    return ((red, green, blue), number) if is_constant.value else None
+
+
 class CoreLight:
     """Light in a scene of the core, which must not change before it is traced. The rest as in render.render."""
 
@@ -566,6 +586,7 @@ def described_lamp(lamp: Lamp, links: _Links = _UNLINKED) -> _Lamp:
         matrix[:3, 2] = lamp.towards
     elif isinstance(lamp, Area):
         described.kind, described.size[:], described.color[:] = 4 if lamp.ellipse else 3, lamp.size, lamp.power
+        described.angle = lamp.spread
         matrix = lamp.matrix
     elif isinstance(lamp, Point | Spot):
         described.kind, described.radius, described.color[:] = 1, lamp.radius, lamp.power

@@ -15,6 +15,8 @@ from viewcam_addon.tracer.render import render
 # tracer measured on other scenes with 4.2 to 5.2 (a sun's 99th percentile was 1.9e-7 there; here it is 2.3e-7 in 4.2). For a
 # spot there was only the 50th; the 99th is 1.25 times what is measured here.
 SUN, POINT, SPOT = (7e-8, 2.4e-7), (2.4e-7, 9e-7), (1.2e-6, 1.8e-6)
+# Calibrated: what its size leaves, and Cycles' tangent of an angle in float32.
+SPREAD = 3e-6, 1.5e-5
 # Smooth normals of Cycles, in radians at the 99th percentile: 2.5e-4°, and 2e-3° since 5.1.
 SMOOTH = 2e-3 if bpy.app.version >= (5, 1) else 2.5e-4
 
@@ -83,6 +85,35 @@ def test_spots_of_any_size_blend_and_scale(pictures, add_lamp):
         lamp.data.spot_size, lamp.data.spot_blend = rng.uniform(1, 2.5), rng.uniform(0.15, 1)
 
     check(pictures(arrange), SPOT)
+
+
+@pytest.mark.parametrize("shape", ["DISK", "ELLIPSE"])
+def test_area_lamps_of_any_spread(pictures, add_lamp, shape):
+    """So small that its size, one part in 10⁵ of its distance, is no noise; of what a surface gets straight below.
+
+    Of so small a rectangle Cycles' float32 loses some samples.
+    """
+    lamp = add_lamp("AREA", shape=shape, size=3e-5, size_y=3e-5)
+
+    def arrange(rng):
+        lamp.location, lamp.data.energy = (*rng.uniform(-1, 1, 2), rng.uniform(3, 6)), rng.uniform(1, 900)
+        lamp.rotation_euler, lamp.data.spread = rng.uniform(-0.3, 0.3, 3), rng.uniform(0.7, 3)
+
+    told = []
+    for each in pictures(arrange, scenes=4):
+        (area,) = each.exported.lamps
+        ways = render(each.exported, threads=2)["Position"].astype(np.float64) - area.matrix[:3, 3]
+        squared = (ways**2).sum(axis=-1, keepdims=True)
+        half = area.spread / 2
+        below = area.power[0] / np.pi**2 / squared * np.tan(half) / (np.tan(half) - half)
+        ours, theirs = (passes["Combined"][..., :3].astype(np.float64) for passes in (each.traced, each.cycles[0]))
+        full = below * each.traced["Diffuse Color"]
+        assert ((ours > 0) != (theirs > 0)).mean() < 1e-3
+        lit = (ours > 0) & (theirs > 0)
+        assert lit.sum() > 300, "that would tell nothing"
+        told.append(np.abs(ours - theirs)[lit] / full[lit])
+    p50, p99 = np.percentile(np.concatenate(told), [50, 99])
+    assert p50 <= SPREAD[0] and p99 <= SPREAD[1], (p50, p99)
 
 
 def test_smooth_surfaces_shade_smoothly_and_cast_the_shadows_of_their_facets(pictures, sun):

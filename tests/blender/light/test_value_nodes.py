@@ -137,7 +137,7 @@ def graphs(image, straight):
     found["tangent round z"] = N("Tangent", direction_type="RADIAL")
     for layer in ("", "Second"):
         found[f"tangent along {layer}"] = N("Tangent", direction_type="UV_MAP", uv_map=layer)
-    for word in ("Location", "Object Index", "Material Index"):
+    for word in ("Location", "Color", "Alpha", "Object Index", "Material Index", "Random"):
         found[f"object {word}"] = N("ObjectInfo", output=word)
     found["fresnel"] = N("Fresnel", {"IOR": 1.45})
     for word in ("Fresnel", "Facing"):
@@ -294,7 +294,7 @@ def floor(scene, strewn, make_material, set_world, read_passes, tmp_path):
         blocks = strewn(materials, cells=30, width=3.0, backwards=lambda i: i % 2 == 0)
         for name, block in zip(graphs, blocks, strict=True):
             mesh = block.data
-            block.active_material.pass_index = 3
+            block.active_material.pass_index, block.color = 3, (0.2, 1.4, 0.6, 0.7)
             for layer in ("UVMap", "Second"):
                 mesh.uv_layers[layer].data.foreach_set("uv", rng.uniform(-0.7, 1.6, 2 * len(mesh.loops)))
             for attribute, kind, domain, field, width in ATTRIBUTES:
@@ -490,6 +490,35 @@ def test_a_blend_between_axes_that_is_a_little_wrong_is_found(thrown, monkeypatc
 
     monkeypatch.setattr(native, "_described_node", described)
     assert np.percentile(thrown(0.7), 97) > THROWN[1]
+
+
+def test_each_instance_has_a_random_number_and_the_color_of_what_places_it(
+    scene, camera, add, mesh_from, make_material, set_world, read_passes, tmp_path
+):
+    scene.render.resolution_x = scene.render.resolution_y = 48
+    set_world((0, 0, 0), 0.0)
+    material = make_material("Random", "ShaderNodeEmission")
+    tree = material.node_tree
+    tree.links.new(N("ObjectInfo", output="Random").add(tree), tree.nodes["Shader"].inputs["Strength"])
+    tree.links.new(N("ObjectInfo", output="Color").add(tree), tree.nodes["Shader"].inputs["Color"])
+    grid = mesh_from("grid", x_subdivisions=5, y_subdivisions=5, size=4)
+    parent = add(grid, "Grid", color=(0.3, 0.9, 0.6, 1))
+    plate = add(mesh_from("plane", size=0.5), "Plate", color=(0.7, 0.1, 0.2, 1))
+    plate.parent, parent.instance_type, parent.show_instancer_for_render = parent, "VERTS", False
+    alone = add(plate.data, "Plätze", location=(1, 1, 0.5), color=(1, 0.5, 0.2, 1))
+    for block in (plate, alone):
+        block.data.materials.clear()
+        block.data.materials.append(material)
+    camera.location, camera.rotation_euler, camera.data.lens = (0, 0, 5), (0, 0, 0), 36
+    path = tmp_path / "instances.exr"
+    exported = job.export_and_render(job.Request(threads=2, level="direct", samples=1), [path])
+    assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
+    (theirs,) = read_passes([path])
+    ours = render.render(exported, "direct", 1, threads=2)
+    apart = np.abs(ours["Combined"] - theirs["Combined"])[..., :3].max(axis=-1)
+    assert apart.max() < 1e-6
+    drawn = np.unique(np.round(theirs["Combined"][..., 0].astype(np.float64), 6))
+    assert len(drawn) > 30, drawn  # 36 instances, the one alone, and nothing
 
 
 def test_generated_coordinates_of_a_point_cloud_are_named_since_they_do_not_come_along(

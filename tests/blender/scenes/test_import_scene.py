@@ -316,7 +316,15 @@ def scenes(draw):
             lamps.append(Spot(name, matrix=draw(matrices()), power=power, angle=1.5, blend=0.5, soft_falloff=False, **common))
         else:
             lamps.append(
-                Area(name, matrix=draw(matrices()), size=(0.5, 2.0), power=power, ellipse=draw(st.booleans()), **common)
+                Area(
+                    name,
+                    matrix=draw(matrices()),
+                    size=(0.5, 2.0),
+                    power=power,
+                    ellipse=draw(st.booleans()),
+                    spread=draw(st.sampled_from([1.5, np.pi])),
+                    **common,
+                )
             )
     return scene_of(
         objects,

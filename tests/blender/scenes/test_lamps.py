@@ -8,7 +8,9 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender.rendering import job
+from viewcam_addon.tracer.native import constant_value
 from viewcam_addon.tracer.scene.lamps import Area, Point, Spot, Sun
+from viewcam_addon.tracer.scene.shader_nodes import node
 
 
 @pytest.fixture(autouse=True)
@@ -151,8 +153,46 @@ def test_emissions_are_mixed_and_added_and_fall_off_as_light_does(add_lamp, expo
     tree.links.new(mixed.outputs[0], next(node for node in tree.nodes if node.type == "OUTPUT_LIGHT").inputs["Surface"])
     ((point,), told) = export()
     assert point.power == close((30.0, 32.5, 30.0)) and not told
+    twice = tree.nodes.new("ShaderNodeMath")
+    twice.operation, twice.inputs[0].default_value, twice.inputs[1].default_value = "MULTIPLY", 2.0, 4.0
+    tree.links.new(twice.outputs[0], falloff.inputs["Strength"])
+    assert export()[0][0].power == close((60.0, 62.5, 60.0))
     falloff.inputs["Smooth"].default_value = 1.0
-    assert "nodes are not modelled" in export()[1]["Lamp"]
+    assert "'Light Falloff' that is not modelled" in export()[1]["Lamp"]
+
+
+def test_whatever_nodes_make_the_same_everywhere_colours_a_lamp(add_lamp, export):
+    tree = use_nodes(add_lamp("POINT", energy=10.0).data)
+    emission = next(node for node in tree.nodes if node.type == "EMISSION")
+    warm, half = tree.nodes.new("ShaderNodeBlackbody"), tree.nodes.new("ShaderNodeGamma")
+    warm.inputs[0].default_value, half.inputs["Gamma"].default_value = 2000.0, 0.5
+    tree.links.new(warm.outputs[0], half.inputs["Color"])
+    tree.links.new(half.outputs[0], emission.inputs["Color"])
+    ((point,), told) = export()
+    red, green, blue = (power / 10 for power in point.power)
+    assert not told and red > green > blue > 0
+    shown = constant_value(node("blackbody", temperature=2000.0))[0]
+    assert (red**2, green**2, blue**2) == pytest.approx(shown, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("kind", "output", "words"),
+    [
+        ("TexIES", "Fac", "'IES Texture' that is not modelled"),
+        ("TexImage", "Color", "do not shine alike"),
+        ("TexChecker", "Color", "do not shine alike"),
+        ("LightPath", "Is Camera Ray", "do not shine alike"),
+    ],
+)
+def test_what_makes_a_lamp_uneven_is_named(add_lamp, export, kind, output, words):
+    tree = use_nodes(add_lamp("POINT").data)
+    emission = next(node for node in tree.nodes if node.type == "EMISSION")
+    made = tree.nodes.new(f"ShaderNode{kind}")
+    if kind == "TexImage":
+        made.image = bpy.data.images.new("Gobo", 2, 2)
+    tree.links.new(made.outputs[output], emission.inputs["Strength"])
+    told = export()[1]["Lamp"]
+    assert words in told and "plain light" in told
 
 
 def attach_falloff(block):
@@ -162,8 +202,8 @@ def attach_falloff(block):
 
 
 APPROXIMATED = {
-    "nodes": (attach_falloff, "nodes are not modelled"),
-    "spread": (lambda block: setattr(block.data, "spread", 1.0), "spread"),
+    "nodes": (attach_falloff, "'Light Falloff' that is not modelled"),
+    "spread": (lambda block: setattr(block.data, "spread", 0.0), "spread"),
     "bounces": (lambda block: setattr(block.data.cycles, "max_bounces", 1), "bounces are limited"),
     "sampling": (lambda block: setattr(block.data.cycles, "use_multiple_importance_sampling", False), "importance"),
     "shadows": (lambda block: setattr(block.data, "use_shadow", False), "casts no shadow"),

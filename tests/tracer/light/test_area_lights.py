@@ -109,6 +109,32 @@ def test_every_sample_looks_where_rays_run_into_the_lamp(make_lighting, ellipse,
     assert seen[0] == pytest.approx(np.ones(inner.sum()), rel=1e-12)
 
 
+@pytest.mark.parametrize("spread", [0.08, 1.0, 2.5])
+@pytest.mark.parametrize(("size", "ellipse", "height"), [((2, 3), False, 0.5), ((2, 3), True, 0.5), ((1e-3, 1e-3), False, 1.0)])
+def test_a_spread_is_a_grid_of_slats_that_costs_no_light(make_lighting, spread, size, ellipse, height):
+    """What leaves at an angle a falls as tan of half the spread less tan a, and all of it is what it would be without."""
+    lamp = down(height, size=size, ellipse=ellipse, spread=spread)
+    lighting = make_lighting(lamp)
+    cosine = np.cos(spread / 2 * np.linspace(0.01, 1.2, 40))
+    cosine = cosine[cosine > 0]
+    straight = np.stack([np.sqrt(1 - cosine**2), 0 * cosine, cosine])
+    start = np.array([[0.0], [0.0], [height]]) - straight * (height / cosine)
+    seen = np.array([lighting.seen(start[:, [i]], straight[:, [i]])[0, 0] for i in range(cosine.size)])
+    slope = np.maximum(np.tan(spread / 2) - np.sqrt(1 - cosine**2) / cosine, 0)
+    assert seen == pytest.approx(seen[0] * slope / slope[0], rel=1e-9, abs=1e-12)
+    angle = np.linspace(0, spread / 2, 20001)
+    flux = (np.maximum(np.tan(spread / 2) - np.tan(angle), 0) * np.cos(angle) * np.sin(angle)).mean() * spread / 2
+    assert 2 * np.pi * seen[0] / slope[0] * flux == pytest.approx(
+        np.pi, rel=2e-3
+    )  # Cycles' series for small ones is off by 1e-3
+    aimed, _ = lighting.aimed((0.2 * size[0], 0.1 * size[1], 0), (0, 0, 1), 2000)
+    back = lighting.seen(np.tile([[0.2 * size[0]], [0.1 * size[1]], [0.0]], 2000), aimed.direction)[0]
+    lit = aimed.light[0] > 0
+    assert ((back > 0) == lit).mean() > 0.999 and lit.any()
+    assert aimed.light[0, lit] * aimed.pdf[lit] == pytest.approx(back[lit], rel=1e-6)
+    assert (aimed.estimate > 0).all()
+
+
 def on_rectangle(x, y, depth, u):
     """Places on a rectangle that are spread over the solid angle it fills, seen from the origin, and that angle of each."""
     matrix = np.diag([1.0, -1.0, -1.0, 1.0])  # shines up

@@ -75,7 +75,8 @@ def above(number, random_matrix):
         return Spot(
             name, matrix=matrix, power=power, radius=rng.choice([0.0, 0.5]), angle=rng.uniform(0.1, 3), blend=rng.uniform()
         )
-    return Area(name, matrix=matrix, size=rng.uniform(0.1, 2, 2), power=power, ellipse=bool(kind == 3))
+    spread = rng.choice([np.pi, 1.5])
+    return Area(name, matrix=matrix, size=rng.uniform(0.1, 2, 2), power=power, ellipse=bool(kind == 3), spread=spread)
 
 
 @pytest.mark.parametrize("shader", [node("diffuse"), node("glossy", roughness=0.3, distribution="ggx"), node("translucent")])

@@ -30,6 +30,8 @@ EYE = np.eye(4)
         (lambda: Area("key", matrix=EYE * 1e19), "matrix of light 'key'"),
         (lambda: Area("key", matrix=EYE, size=(1, -1)), "size of light 'key'"),
         (lambda: Area("key", matrix=EYE, size=(1, 2, 3)), "size of light 'key'"),
+        (lambda: Area("key", matrix=EYE, spread=0), "spread of light 'key'"),
+        (lambda: Area("key", matrix=EYE, spread=3.2), "spread of light 'key'"),
         (lambda: World((1, 2)), "radiance of the world"),
         (lambda: World((1, 2, 3), hidden_from={"eye"}), "the world"),
         (lambda: World(backdrop=World(hidden_from={"camera"})), "backdrop of the world"),

@@ -45,7 +45,8 @@ def assert_same_scene(first, second):
                 assert one.dtype == again.dtype and np.array_equal(one, again), f"{field} of {name}"
     for placed, other in zip(first.objects, second.objects, strict=True):
         assert np.array_equal(placed.matrix, other.matrix)
-        assert replace(placed, matrix=np.eye(4)).name == other.name
+        assert (placed.name, placed.color) == (other.name, other.color)
+        assert np.array_equal(placed.random, other.random)
         assert (placed.geometry, placed.object_index, placed.material_indices) == (
             other.geometry,
             other.object_index,
@@ -103,12 +104,23 @@ def test_an_object_stands_as_often_as_it_has_matrices(example, read_document):
     example["objects"] = [{"name": "beads", "geometry": "beads", "matrices": [np.eye(4).tolist(), there]}]
     (placed,) = read_document(example).objects
     assert np.array_equal(placed.matrices, [np.eye(4), there])
+    assert placed.color == (1.0,) * 4 and placed.random is None
+    example["objects"][0] |= {"color": [0.5, 2, 0, 1], "random": [0.25, 1]}
+    (placed,) = read_document(example).objects
+    assert placed.color == (0.5, 2.0, 0.0, 1.0) and placed.random.tolist() == [0.25, 1.0]
+    for random, words in (([0.5], "must have"), ([0.5, 1.5], "from 0 to 1")):
+        example["objects"][0]["random"] = random
+        with pytest.raises(InputError, match=words):
+            read_document(example)
 
 
 def test_many_instances_are_one_array_beside_the_scene(make_scene, ball, random_matrix, random_scene, tmp_path):
     rng = np.random.default_rng(1)
     matrices = np.array([random_matrix(rng) for _ in range(20)])
     scene = make_scene(random_scene(0).camera, (ball(3), matrices))
+    *others, placed = scene.objects
+    placed = replace(placed, color=(0.5, 0.25, 2.0, 1.0), random=rng.random(20, np.float32))
+    scene = replace(scene, objects=(*others, placed))
     scene_file.write(scene, tmp_path / "many.json")
     with np.load(tmp_path / "many.npz") as arrays:
         assert [array.shape for array in arrays.values()].count((20, 4, 4)) == 1

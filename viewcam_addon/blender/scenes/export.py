@@ -13,6 +13,7 @@ What has no counterpart is noted in the ledger, with the remedy that takes it ou
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -38,7 +39,7 @@ class Surface:
     """A visible surface that stands in the world once or many times; two that are equal are one.
 
     data : evaluated. key : the same for all that share a geometry in Cycles. slots : the materials, evaluated, at least 1.
-    hidden_from : the kinds of rays that don't see it.
+    hidden_from : the kinds of rays that don't see it. color : with its alpha; of instances that of what places them.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Surface:
     object_index: int
     slots: tuple[bpy.types.Material | None, ...]
     hidden_from: frozenset[str]
+    color: tuple[float, float, float, float]
 
     @property
     def materials(self) -> tuple[int, ...]:
@@ -117,7 +119,7 @@ def level_needed(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera
         ledger, shading = Ledger(), Shading()
         shown = [
             (source.name, shading.reading(slot).material if slot else PLAIN)
-            for source, _ in placements(depsgraph, ledger, shading)
+            for source, *_ in placements(depsgraph, ledger, shading)
             for slot in source.used_slots
         ]
         light = light_in(depsgraph, ledger, render=False)
@@ -148,13 +150,13 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
     names: dict[tuple[int, int], str] = {}
     geometries: dict[str, Mesh | Spheres] = {}
     objects = []
-    for source, matrices in placements(depsgraph, ledger, shading):
+    for source, matrices, random in placements(depsgraph, ledger, shading):
         if source.key not in names:
             geometry = _geometry(source, ledger, shading)
             names[source.key] = _free_name(source.data.name, geometries)
             geometries[names[source.key]] = geometry
         materials = shading.names(source.slots, isinstance(source.data, bpy.types.PointCloud)) if shading else ()
-        placed = (source.object_index, source.materials, materials, source.hidden_from)
+        placed = (source.object_index, source.materials, materials, source.hidden_from, source.color, random)
         matrix = matrices if len(matrices) > 1 else matrices[0]
         objects.append(Object(source.name, names[source.key], matrix, *placed))
     return Scene(
@@ -189,8 +191,19 @@ def _view_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) ->
     }
 
 
-def placements(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading | None = None) -> list[tuple[Surface, Matrix]]:
-    """Each surface that the camera may see, and its matrices to world space, (n, 4, 4), one for each instance that is drawn.
+class Placement(NamedTuple):
+    """Where a surface is drawn.
+
+    matrices : (n, 4, 4), to world space, one for each instance. random : (n,), or None where no material asks for it.
+    """
+
+    source: Surface
+    matrices: Matrix
+    random: NDArray[np.float32] | None
+
+
+def placements(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading | None = None) -> list[Placement]:
+    """Each surface that the camera may see.
 
     shading : reads the materials, where there shall be light; then other rays than the camera's may see a surface.
     """
@@ -211,22 +224,57 @@ def placements(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading 
         known[identity].append(number)
     for source, numbers in found.items():
         ledger.placed(source.name, len(numbers))
-    return list(_drawn([(source, _by_rows(matrices[numbers])) for source, numbers in found.items()], ledger))
+    draws = _draws(depsgraph) if shading and any(shading.asks_for_random(source.slots) for source in found) else None
+    placed = []
+    for source, numbers in found.items():
+        random = None
+        if draws and shading.asks_for_random(source.slots):
+            draw = np.where(draws[0][numbers], draws[1][numbers], random_number(source.name))
+            random = (draw / float(0xFFFFFFFF)).astype(np.float32)
+        placed.append(Placement(source, _by_rows(matrices[numbers]), random))
+    return list(_drawn(placed, ledger))
 
 
-def _drawn(placed: list[tuple[Surface, Matrix]], ledger: Ledger) -> Iterator[tuple[Surface, Matrix]]:
+def _draws(depsgraph: bpy.types.Depsgraph) -> tuple[NDArray[np.bool_], NDArray[np.uint32]]:
+    """Whether what the depsgraph shows is an instance, and what Cycles draws for it then."""
+    instances = depsgraph.object_instances
+    return export_geometry.read(instances, "is_instance", bool), export_geometry.read(instances, "random_id", np.int32).view(
+        "u4"
+    )
+
+
+def random_number(name: str) -> int:
+    """The 32 bits that Cycles draws for an object of this name (hash_string and hash_uint2 of intern/cycles/util/hash.h)."""
+    whole = 0xFFFFFFFF
+    key = 0
+    for byte in name.encode():
+        key = (37 * key + byte) & whole
+
+    def mixed(x: int, y: int, bits: int) -> int:
+        return ((x ^ y) - (y << bits | y >> 32 - bits)) & whole
+
+    b = c = 0xDEADBEEF + 8 + 13
+    a = (b + key) & whole
+    for i, j, k in ((14, 11, 25), (16, 4, 14)):
+        c = mixed(c, b, i)
+        a = mixed(a, c, j)
+        b = mixed(b, a, k)
+    return mixed(c, b, 24)
+
+
+def _drawn(placed: list[Placement], ledger: Ledger) -> Iterator[Placement]:
     """Those that no scale of 0 flattens, of which Cycles draws only meshes that no other object uses."""
     users: Counter[tuple[int, int]] = Counter()
-    for source, matrices in placed:
+    for source, matrices, _ in placed:
         users[source.key] += len(matrices)
-    for source, matrices in placed:
+    for source, matrices, random in placed:
         with np.errstate(invalid="ignore"):  # what is not finite is not flat
             drawn = np.linalg.det(matrices[:, :3, :3]) != 0
         if not drawn.all() and (users[source.key] > 1 or not isinstance(source.data, bpy.types.Mesh)):
             ledger.note(source.name, "exported", "flattened by its scale, and Cycles does not draw it")
-            matrices = matrices[drawn]
+            matrices, random = matrices[drawn], random if random is None else random[drawn]
         if len(matrices):
-            yield source, matrices
+            yield Placement(source, matrices, random)
 
 
 def _by_rows(matrices: NDArray[np.float32]) -> Matrix:
@@ -266,6 +314,7 @@ def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Led
         object_index=shown.pass_index,
         slots=tuple(slots),
         hidden_from=hidden_from if shading else frozenset(),
+        color=tuple(placed.parent.color) if shading else Object.color,
     )
 
 

@@ -120,6 +120,7 @@ def light_from(lamp: Lamp, overrides: Overrides, ledger: Ledger) -> tuple[bpy.ty
         data.shape = "ELLIPSE" if lamp.ellipse else "RECTANGLE"
         for name, value in zip(("size", "size_y"), lamp.size, strict=True):
             store(data, name, value, lamp.name, ledger)
+        store(data, "spread", lamp.spread, lamp.name, ledger)
         return data, lamp.matrix
     store(data, "shadow_soft_size", lamp.radius, lamp.name, ledger)
     data.use_soft_falloff = lamp.soft_falloff

@@ -176,7 +176,9 @@ class _SceneImport:
                 if isinstance(block, bpy.types.PointCloud):
                     shown = [slots[first] or (paints.plain() if is_lit else None)]  # Cycles' default is another since 5.0
                 for matrix in placed.matrices:
-                    self._surface(dataclasses.replace(placed, matrix=matrix), block, shown, paints)
+                    self._surface(dataclasses.replace(placed, matrix=matrix, random=None), block, shown, paints)
+            if placed.random is not None:
+                self._ledger.note(placed.name, "approximated", "its random numbers are Blender's own")
             self._ledger.placed(placed.name, len(placed.matrices))
 
     def _data(self, name: str) -> list[tuple[int, bpy.types.Mesh | bpy.types.PointCloud]]:
@@ -207,6 +209,7 @@ class _SceneImport:
         if placed.object_index > LARGEST_INDEX:
             reason = f"its index is {placed.object_index}, and Blender's end at {LARGEST_INDEX}"
             self._ledger.note(placed.name, "approximated", reason)
+        block.color = placed.color
         import_light.hide(block, placed.hidden_from)
         self._surfaces_named.setdefault(placed.name, []).append(block)
 

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from ...tracer.scene.film import Bounces
-from ...tracer.scene.lamps import Area, Lamp, Point, Spot, Sun
+from ...tracer.scene.lamps import LEAST_SPREAD, Area, Lamp, Point, Spot, Sun
 from .. import versions
 from ..temporary_settings import Overrides
 from . import features, linking, nodes, shaders
@@ -80,12 +80,13 @@ def _area(
     axes = matrix[:3, :3] / np.where(lengths > 0, lengths, 1.0)
     if np.abs(axes.T @ axes - np.diag(np.diag(axes.T @ axes))).max() > _SHEAR:
         ledger.note(name, "approximated", "is sheared, which Cycles takes for one shape here and another there")
-    if light.spread < math.pi:
-        ledger.note(name, "approximated", "has a spread, 180° on both sides")
+    spread = light.spread
+    if spread < LEAST_SPREAD:
+        ledger.note(name, "approximated", f"has a spread of {math.degrees(spread):.2g}°, 180° on both sides")
         ledger.set_for_cycles(light.original, "spread", math.pi)
-    return Area(
-        matrix=matrix, size=size, ellipse=ellipse, power=strength if is_normalised else _times(strength, area), **common
-    )
+        spread = math.pi
+    power = strength if is_normalised else _times(strength, area)
+    return Area(matrix=matrix, size=size, ellipse=ellipse, spread=spread, power=power, **common)
 
 
 def _strength(name: str, light: bpy.types.Light, ledger: Ledger) -> RGB | None:
@@ -109,9 +110,9 @@ def _emission(name: str, light: bpy.types.Light, ledger: Ledger) -> RGB:
     if not output:
         return _WHITE
     emission = shaders.plain_emission(Input(output.inputs["Surface"]))
-    if emission is not None:
+    if isinstance(emission, tuple):
         return emission
-    ledger.note(name, "approximated", "its nodes are not modelled, and plain light stands in")
+    ledger.note(name, "approximated", f"{'; '.join(emission)}: plain light stands in")
     ledger.call_for_cycles(light.original, _make_plain)
     return _WHITE
 

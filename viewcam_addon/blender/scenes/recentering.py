@@ -97,6 +97,7 @@ class _Placed:
     matrix: Array
     object_index: int = 0
     hidden_from: frozenset[str] = frozenset()
+    color: tuple[float, float, float, float] = Object.color
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,12 +147,16 @@ def as_in_file(objects: Iterable[Object], names: Mapping[str, str]) -> tuple[Obj
     """
     found: dict[tuple, list[Object]] = {}
     for placed in (replace(each, name=names[each.name]) for each in objects):
-        all_but_place = tuple(getattr(placed, each.name) for each in fields(placed) if each.name != "matrix")
+        all_but_place = tuple(getattr(placed, each.name) for each in fields(placed) if each.name not in ("matrix", "random"))
         found.setdefault(all_but_place, []).append(placed)
-    return tuple(
-        replace(same[0], matrix=np.concatenate([each.matrices for each in same])) if len(same) > 1 else same[0]
-        for same in found.values()
-    )
+
+    def together(same: list[Object]) -> Object:
+        if len(same) == 1:
+            return same[0]
+        random = None if same[0].random is None else np.concatenate([each.random for each in same])
+        return replace(same[0], matrix=np.concatenate([each.matrices for each in same]), random=random)
+
+    return tuple(map(together, found.values()))
 
 
 def _seen(
@@ -166,7 +171,7 @@ def _seen(
     copies: dict[tuple[int, int], _Copy] = {}
     placed = []
     shown = placements(depsgraph, ledger, Shading() if lit else None)
-    for source, matrix in ((source, matrix) for source, matrices in shown for matrix in matrices):
+    for source, matrix in ((source, matrix) for source, matrices, _ in shown for matrix in matrices):
         if not np.isfinite(matrix).all():
             raise InputError(f"the matrix of object {source.name!r} holds a number that is not finite: check its transform")
         matrix[:3, 3] -= eye
@@ -177,7 +182,7 @@ def _seen(
             copies[source.key] = _moved(data, matrix)
         copy = copies[source.key]
         matrix[:3, 3] += matrix[:3, :3] @ copy.anchor
-        placed.append(_Placed(source.name, copy.data, matrix, source.object_index, source.hidden_from))
+        placed.append(_Placed(source.name, copy.data, matrix, source.object_index, source.hidden_from, source.color))
     return view, [*placed, *_lights(depsgraph, eye, ledger)], {copy.data: copy for copy in copies.values()}
 
 
@@ -266,7 +271,7 @@ def _place(overrides: Overrides, temporary: bpy.types.Scene, placed: list[_Place
         objects.append(block)
         block.parent = root
         block.matrix_parent_inverse = Matrix(each.matrix)
-        block.pass_index = each.object_index
+        block.pass_index, block.color = each.object_index, each.color
         for ray in each.hidden_from:
             setattr(block, f"visible_{ray}", False)
         temporary.collection.objects.link(block)

@@ -10,6 +10,7 @@ What is not modelled is left out, and where nothing is left becomes a Lambert su
 the same for the time of a comparison (materials.stand_in): an approximation is never a difference between the two sides.
 """
 
+import functools
 import math
 import zlib
 from dataclasses import dataclass, field
@@ -17,8 +18,9 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
+from ...tracer import native
 from ...tracer.scene.materials import LARGEST_RADIANCE, PLAIN, Colour, Material, Picture
-from ...tracer.scene.shader_nodes import KINDS, Node
+from ...tracer.scene.shader_nodes import KINDS, Node, closures
 from ...tracer.scene.value_nodes import GENERATED, NORMAL, OWN, POSITION, TANGENT, UV
 from .. import versions
 from . import images, nodes, value_nodes
@@ -163,6 +165,11 @@ class Reading:
     tables: dict[str, Picture] = field(default_factory=dict)
     reasons: list[str] = field(default_factory=list)
 
+    @functools.cached_property
+    def asks_for_random(self) -> bool:
+        """Whether it is another on each instance."""
+        return any(node.type == "object_info" and node["output"] == "random" for node in self.material.nodes)
+
     @property
     def is_bumped(self) -> bool:
         """Whether a shader has a normal of its own."""
@@ -195,12 +202,33 @@ def in_the_viewport(material: bpy.types.Material) -> Reading:
     return Reading(Material(diffuse=Colour(possible(material.diffuse_color[:3]) or PLAIN.diffuse.rgb)))
 
 
-def plain_emission(of: Input) -> RGB | None:
-    """What shaders give off that do nothing else, the same everywhere; None where they do, or it varies or is not modelled."""
-    reader = _Components(Colour(_WHITE))
-    found = reader.surface(of)
-    emission = found.pop("emission", Colour((0.0, 0.0, 0.0)))
-    return None if found or reader.reading.reasons or _pattern(emission) != _pattern(Colour(_WHITE)) else emission.rgb
+def plain_emission(of: Input) -> RGB | list[str]:
+    """What shaders give off that do nothing else, the same everywhere; else why not, as in `Reading.reasons`."""
+    reader = _Tree(Colour(_WHITE), True)
+    surface = reader.surface(of)
+    if reader.reading.reasons:
+        return reader.reading.reasons
+    total = np.zeros(3)
+    for closure in closures(surface):
+        if closure.node.type != "emission":
+            return ["has nodes that scatter light"]
+        inputs = (closure.node["color"], closure.node["strength"], *(factor for factor, _ in closure.factors))
+        values = [value for value in map(_everywhere, inputs) if value]
+        if len(values) < len(inputs):
+            return ["has nodes that do not shine alike in all directions"]
+        (color, _), (_, strength), *factors = values
+        for (_, factor), (_, rest) in zip(factors, closure.factors, strict=True):
+            share = min(max(factor, 0.0), 1.0)
+            strength *= 1.0 - share if rest else share
+        total += np.maximum(color, 0.0) * strength
+    return tuple(total.tolist())
+
+
+def _everywhere(value: Colour | Node) -> tuple[RGB, float] | None:
+    """What a value is and that as a number, or None where it varies."""
+    if isinstance(value, Node):
+        return native.constant_value(value)
+    return None if value.varies else (value.rgb, value.rgb[0])
 
 
 class _Reader:
@@ -502,6 +530,8 @@ class _Tree(_Reader):
             return Node("texture_coordinate")
         if node.type == "TEX_COORD" and output.socket.name == "Object" and node.object is not None:
             return _in_space_of(node.object)
+        if node.type == "LIGHT_FALLOFF" and output.socket.name == "Quadratic" and constant_number(output, "Smooth") == 0:
+            return self._value(nodes.source(output.input("Strength")))  # as light falls off of itself
         if node.type == "CAMERA":
             return _from_camera(output.socket.name)
         if node.type == "VALTORGB":

@@ -53,6 +53,10 @@ class Shading:
         materials = [self.reading(material).material for material in filter(None, slots)]
         return {name for material in materials for name in material.attributes}
 
+    def asks_for_random(self, slots: tuple[bpy.types.Material | None, ...]) -> bool:
+        """Whether one of these materials differs from instance to instance."""
+        return any(self.reading(material).asks_for_random for material in filter(None, slots))
+
     def vertex_colours(self, slots: tuple[bpy.types.Material | None, ...]) -> str | None:
         """The colour attribute that a mesh of these materials is coloured by, "" being the active one, or None."""
         readings = (self.reading(material) for material in filter(None, slots))

@@ -146,7 +146,15 @@ VALUES: tuple[tuple[str, Value], ...] = (
             _words(*(name.replace("_", " ").title() for name in LIGHT_PATH.split())),
         ),
     ),
-    ("object_info", Value("OBJECT_INFO", "ShaderNodeObjectInfo", {}, _words("Location", "Object Index", "Material Index"))),
+    (
+        "object_info",
+        Value(
+            "OBJECT_INFO",
+            "ShaderNodeObjectInfo",
+            {},
+            _words("Location", "Object Index", "Material Index", "Color", "Alpha", "Random"),
+        ),
+    ),
     (
         "tangent",
         Value(

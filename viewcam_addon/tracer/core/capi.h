@@ -49,6 +49,7 @@ typedef struct {
 
 /* So many objects that differ by their matrices alone. geometry: its number, as they were added. visible: to which kinds of rays,
  * and above them to the shadow rays of which lamps with blockers of their own. lit_by: which lamps' receivers it is among.
+ * info: (count, 5), their colors, alphas and random numbers, or null where they are white and 0.
  * slots: for each material of the geometry, what the Material Index pass shows and the number of a material. */
 typedef struct {
     uint32_t geometry, visible, slot_count, count;
@@ -56,6 +57,7 @@ typedef struct {
     const float* slot_indices;
     const uint32_t* slot_materials;
     uint64_t lit_by;
+    const float* info;
 } ViewcamObject;
 
 /* In rendering space. t_min, t_max: planar depths. */
@@ -93,6 +95,8 @@ typedef struct {
     int (*add_texture)(ViewcamScene*, int width, int height, int channels, int srgb, const float* pixels);
     /* Of materials' inputs; it names nodes that were added before. */
     int (*add_node)(ViewcamScene*, const ViewcamNode*);
+    /* Whether the last node is the same everywhere; value: receives what it is, and that as a number. */
+    int (*constant_node)(const ViewcamScene*, double* value, int* is_constant);
     /* transparent_shadow: whether shadow rays go through it where it is transparent. */
     int (*add_material)(ViewcamScene*, const ViewcamClosure*, int count, int transparent_shadow);
     int (*add_lamp)(ViewcamScene*, const ViewcamLamp*);

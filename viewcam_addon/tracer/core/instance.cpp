@@ -85,7 +85,10 @@ const ViewcamCore core = {
                 Object object;
                 object.geometry = given->geometry, object.visible = given->visible, object.index = given->index, object.lit_by = given->lit_by;
                 object.first_slot = uint32_t(to.slots.size());
-                to.objects.insert(to.objects.end(), given->count, object);
+                for (uint32_t i = 0; i < given->count; i++) {
+                    if (given->info) object.info = given->info + 5 * size_t(i);
+                    to.objects.push_back(object);
+                }
                 for (uint32_t i = 0; i < given->slot_count; i++) to.slots.push_back({given->slot_indices[i], given->slot_materials[i]});
             });
         },
@@ -186,6 +189,18 @@ const ViewcamCore core = {
             return guarded([&] {
                 check::node(scene_of(scene), *node);
                 add_node(scene_of(scene), *node);
+            });
+        },
+    .constant_node =
+        [](const ViewcamScene* scene, double* value, int* is_constant) {
+            return guarded([&] {
+                const ValueNodes& nodes = scene_of(scene).illumination.nodes;
+                check::that(!nodes.all.empty(), "there is no node");
+                auto constant = std::get_if<ConstantNode>(&nodes.all.back());
+                *is_constant = constant != nullptr;
+                if (!constant) return;
+                double all[4] = {constant->is.x, constant->is.y, constant->is.z, number_of(constant->is, constant->GIVES)};
+                std::copy(all, all + 4, value);
             });
         },
     .add_material = [](ViewcamScene* scene, const ViewcamClosure* closures, int count,

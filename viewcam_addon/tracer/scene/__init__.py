@@ -98,6 +98,8 @@ class Object:
     material_indices : what the Material Index pass shows, for each material of the geometry; at least one.
     materials : keys in `Scene.materials`, for each material of the geometry; "", and all that are missing, are `PLAIN`.
     hidden_from : which rays don't see it (lights.RAYS).
+    color : red, green, blue and alpha, that materials may ask for. random : (n,) float32, 0 to 1, of each instance likewise, or
+        None, which is 0.
     """
 
     name: str
@@ -107,6 +109,8 @@ class Object:
     material_indices: tuple[int, ...] = (0,)
     materials: tuple[str, ...] = ()
     hidden_from: frozenset[str] = frozenset()
+    color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    random: NDArray[np.float32] | None = None
 
     def __post_init__(self) -> None:
         _check_shape(f"the matrix of object {shown(self.name)}", self.matrix, (None, 4, 4)[-max(self.matrix.ndim, 2) :])
@@ -119,6 +123,11 @@ class Object:
                 f"object {shown(self.name)} has no material_indices: give at least one, 0 where it has no material"
             )
         object.__setattr__(self, "hidden_from", hidden_from(f"object {shown(self.name)}", self.hidden_from))
+        object.__setattr__(self, "color", checks.vector(f"the color of object {shown(self.name)}", self.color, 4))
+        if self.random is not None:
+            _check_shape(f"random of object {shown(self.name)}", self.random, (len(self.matrices),))
+            if not ((self.random >= 0) & (self.random <= 1)).all():
+                raise InputError(f"random of object {shown(self.name)} holds a number that is not from 0 to 1: correct it")
 
     @property
     def matrices(self) -> NDArray[np.float64]:

@@ -31,6 +31,9 @@ MOST_LINKS = {"receivers": 64, "blockers": 27}
 # Of coordinates and sizes: as of scenes, products of a few of them are float64's.
 LARGEST = 1e18
 
+LEAST_SPREAD = 1e-3
+"""Radians; what is less spread is nearly a beam, whose light would be found by chance alone."""
+
 
 @dataclass(frozen=True, eq=False)
 class Lamp:
@@ -62,10 +65,10 @@ class Lamp:
     def _check(self, what: str, value: object, least: float = 0.0, most: float = LARGEST) -> None:
         object.__setattr__(self, what, checks.number(f"{what} of light {shown(self.name)}", value, least, most))
 
-    def _check_angle(self) -> None:
+    def _check_angle(self, what: str = "angle", least: float = 0.0) -> None:
         """At most π, as which the float32 just above it counts, Blender's 180°."""
-        self._check("angle", self.angle, 0.0, float(np.float32(np.pi)))
-        object.__setattr__(self, "angle", min(self.angle, np.pi))
+        self._check(what, getattr(self, what), least, float(np.float32(np.pi)))
+        object.__setattr__(self, what, min(getattr(self, what), np.pi))
 
     def _check_colour(self, what: str) -> None:
         object.__setattr__(self, what, radiance(f"{what} of light {shown(self.name)}", getattr(self, what)))
@@ -171,7 +174,8 @@ class Area(Lamp):
     """A rectangle or an ellipse that shines evenly to one side, towards its local −z axis; one without an area is dark.
 
     matrix : (4, 4) float64, the lamp's space to world space. size : along its local x and y axes, before the matrix. power :
-    (3,). ellipse : instead of a rectangle.
+    (3,). ellipse : instead of a rectangle. spread : the angle of the cone into which it shines as through a grid, radians; π is
+    without one, and the power is the same.
     """
 
     kind: ClassVar[str] = "area"
@@ -179,11 +183,13 @@ class Area(Lamp):
     size: tuple[float, float] = (1.0, 1.0)
     power: tuple[float, float, float] = (1.0, 1.0, 1.0)
     ellipse: bool = False
+    spread: float = np.pi
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self._check_matrix()
         self._check_colour("power")
+        self._check_angle("spread", LEAST_SPREAD)
         size = checks.vector(f"size of light {shown(self.name)}", self.size, 2)
         if not all(0 <= side <= LARGEST for side in size):
             raise InputError(f"size of light {shown(self.name)} is {shown(size)}: give two numbers from 0 to {LARGEST:g}")

@@ -4,6 +4,7 @@ A material is either a tree of shader nodes (shader_nodes.py) or, for what a han
 roughness, each with a colour: Lambert's diffuse reflection, emission, a perfect mirror, clear glass and clear refraction.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 from ... import checks
@@ -76,10 +77,17 @@ class Material:
         return tuple(found)
 
     @property
+    def nodes(self) -> Iterator[Node]:
+        """Those of its closures, and all that feed them."""
+        makers = [maker for each in self.closures for maker in (each.node, *(factor for factor, _ in each.factors))]
+        for maker in makers:
+            if isinstance(maker, Node):
+                yield from maker.all
+
+    @property
     def attributes(self) -> set[str]:
         """What its nodes ask meshes for, by name."""
-        makers = [maker for each in self.closures for maker in (each.node, *(factor for factor, _ in each.factors))]
-        return {name for maker in makers if isinstance(maker, Node) for name in maker.attributes}
+        return {name for node in self.nodes for name in node.attributes}
 
 
 PLAIN = Material(diffuse=Colour((0.8, 0.8, 0.8)))

@@ -128,6 +128,10 @@ def _object_document(placed: Object, prefix: str, arrays: dict[str, NDArray]) ->
         document["materials"] = list(placed.materials)
     if placed.hidden_from:
         document["hidden_from"] = sorted(placed.hidden_from)
+    if placed.color != Object.color:
+        document["color"] = list(placed.color)
+    if placed.random is not None:
+        document["random"] = array_document(placed.random, f"object {prefix}.random", arrays)
     return document
 
 
@@ -185,7 +189,7 @@ def _clip(field: Field) -> tuple[float, float]:
 
 
 def _object(field: Field, arrays: Arrays) -> Object:
-    optional = ("matrices", "object_index", "material_indices", "materials", "hidden_from")
+    optional = ("matrices", "object_index", "material_indices", "materials", "hidden_from", "color", "random")
     keys = field.fields(("name", "geometry"), (*placing.KEYS, *optional))
     if "matrices" not in keys:
         matrix = placing.matrix(field, keys)
@@ -203,6 +207,8 @@ def _object(field: Field, arrays: Arrays) -> Object:
             material_indices=(0,) if indices is None else tuple(index.whole(0) for index in indices),
             materials=tuple(each.text() for each in keys["materials"].items("material")) if "materials" in keys else (),
             hidden_from=light_fields.hidden_from(keys["hidden_from"]) if "hidden_from" in keys else frozenset(),
+            color=keys["color"].vector(4) if "color" in keys else Object.color,
+            random=keys["random"].array(arrays, np.float32, (None,)) if "random" in keys else None,
         )
     except InputError as error:
         field.hand_on(error)

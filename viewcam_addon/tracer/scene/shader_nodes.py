@@ -188,12 +188,17 @@ class Node:
                 yield from value.colours
 
     @property
-    def attributes(self) -> Iterator[str]:
-        """What it asks meshes for by name, and what feeds it does."""
-        yield from value_nodes.attributes_of(self.type, self.__getitem__)
+    def all(self) -> Iterator["Node"]:
+        """It, and all that feed it."""
+        yield self
         for name in KINDS[self.type].inputs:
             if isinstance(value := self[name], Node):
-                yield from value.attributes
+                yield from value.all
+
+    @property
+    def attributes(self) -> Iterator[str]:
+        """What it asks meshes for by name."""
+        yield from value_nodes.attributes_of(self.type, self.__getitem__)
         if self.is_stretched and self["tangent"] is None:
             yield "generated"
 

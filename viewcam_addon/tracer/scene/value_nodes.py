@@ -103,7 +103,7 @@ KINDS: dict[str, Mapping[str, Default]] = {
     },
     "geometry": {"output": ("position", "normal", "true_normal", "incoming", "backfacing", "tangent", "parametric")},
     "tangent": {"kind": ("radial", "uv_map"), "axis": ("z", "x", "y"), "uv": NAME},
-    "object_info": {"output": ("location", "object_index", "material_index")},
+    "object_info": {"output": ("location", "object_index", "material_index", "color", "alpha", "random")},
     "light_path": {"output": tuple(LIGHT_PATH.split())},
     "fresnel": {"ior": 1.5, "normal": NORMAL},
     "layer_weight": {"blend": 0.5, "normal": NORMAL, "output": ("fresnel", "facing")},

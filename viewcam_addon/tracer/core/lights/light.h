@@ -103,7 +103,7 @@ inline Light light_of(const Lamp& lamp, Vec3 origin) {
             case Lamp::SUN: return Sun({placed.m[0][2], placed.m[1][2], placed.m[2][2]}, lamp.color, lamp.angle);
             case Lamp::POINT: return Point(placed.translation(), lamp.color, lamp.radius, lamp.soft);
             case Lamp::SPOT: return Spot(placed, lamp.color, lamp.radius, lamp.soft, lamp.angle, lamp.blend);
-            default: return Area(placed, lamp.color, lamp.size, lamp.kind == Lamp::ELLIPSE);
+            default: return Area(placed, lamp.color, lamp.size, lamp.kind == Lamp::ELLIPSE, lamp.angle);
         }
     };
     return {kind(), lamp.hidden_from, lamp.casts_shadow, lamp.receivers, lamp.shadow_rays};

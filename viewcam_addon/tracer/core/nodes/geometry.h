@@ -199,14 +199,32 @@ struct ObjectInfoNode {
     static constexpr const char* NAME = "object_info";
     static constexpr Gives GIVES = Gives::VECTOR;
     static constexpr bool VARIES = true;
-    enum { LOCATION, OBJECT_INDEX, MATERIAL_INDEX } output;
+    enum { LOCATION, COLOR, ALPHA, OBJECT_INDEX, MATERIAL_INDEX, RANDOM } output;
 
-    explicit ObjectInfoNode(const Inputs& in)
-        : output(in.choice("output") == "location" ? LOCATION : in.choice("output") == "object_index" ? OBJECT_INDEX : MATERIAL_INDEX) {}
+    explicit ObjectInfoNode(const Inputs& in) : output(output_of(in.choice("output"))) {}
+    Gives gives() const { return output == COLOR ? Gives::COLOR : GIVES; }
     Vec3 eval(const ShadingPoint& at) const {
         if (!at.object) return {};
-        if (output == LOCATION) return at.object->to_world.translation() + at.origin;
-        return grey(output == OBJECT_INDEX ? at.object->index : at.material_index());
+        static constexpr float PLAIN[] = {1, 1, 1, 1, 0};
+        const float* info = at.object->info ? at.object->info : PLAIN;
+        switch (output) {
+            case LOCATION: return at.object->to_world.translation() + at.origin;
+            case COLOR: return {info[0], info[1], info[2]};
+            case ALPHA: return grey(info[3]);
+            case OBJECT_INDEX: return grey(at.object->index);
+            case MATERIAL_INDEX: return grey(at.material_index());
+            default: return grey(info[4]);
+        }
+    }
+
+   private:
+    static decltype(output) output_of(const std::string& name) {
+        return name == "location"         ? LOCATION
+               : name == "color"          ? COLOR
+               : name == "alpha"          ? ALPHA
+               : name == "object_index"   ? OBJECT_INDEX
+               : name == "material_index" ? MATERIAL_INDEX
+                                          : RANDOM;
     }
 };
 

@@ -12,6 +12,7 @@ struct Object {
     uint64_t lit_by = ~0ull;    // a bit for each set of receivers that it is in
     uint32_t first_slot = 0;    // of Scene::slots, one for each of the geometry's materials
     float index = 0;            // what the Object Index pass shows
+    const float* info = nullptr;  // its color, alpha and random number, where a material may ask for them
     bool shared = false;        // whether other objects place the same geometry
     bool flat = false;          // whether the matrix has no inverse to speak of
     bool mirrored = false;      // whether corners that run counter-clockwise in object space run clockwise in the world
