@@ -50,7 +50,7 @@ Judged = tuple[list[Said], list[list[Said]]]
 
 
 def charts(quick: bool = False) -> tuple[Chart, ...]:
-    blocks, with_faults = (4, 1) if quick else (160, 40)
+    blocks, with_faults = (4, 1) if quick else (170, 40)
     with ProcessPoolExecutor() as pool:
         return drawn(pool.map(judged, range(blocks), (block < with_faults for block in range(blocks))))
 
