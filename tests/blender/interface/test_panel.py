@@ -1,3 +1,4 @@
+import itertools
 import re
 from types import SimpleNamespace
 
@@ -119,13 +120,20 @@ class Layout:
     def __init__(self, drawn=None, above=None):
         self.drawn, self.above = [] if drawn is None else drawn, above
         self.active = self.enabled = True
-        self.alert = self.use_property_split = self.use_property_decorate = False
+        self.alert = self.is_row = False
+        self.use_property_split = above is not None and above.use_property_split
+        self.use_property_decorate = above is not None and above.use_property_decorate
         self.alignment = "EXPAND"
 
     def row(self, **_look):
+        below = Layout(self.drawn, self)
+        below.is_row = True
+        return below
+
+    def column(self, **_look):
         return Layout(self.drawn, self)
 
-    column = split = row
+    split = row
 
     def separator(self):
         pass
@@ -268,16 +276,34 @@ def test_the_box_does_not_tick_where_the_camera_is_no_pinhole(posed_camera):
         assert is_offered() == offered, f"{kind}, ticked: {ticked}"
 
 
-def test_in_a_narrow_sidebar_the_lens_has_a_row_of_its_own(posed_camera):
-    """Beside its unit "50 mm" would be cut to "5"."""
+NARROWEST = 202  # pixels, below which Blender hides the sidebar
 
-    def rows(width):
-        return {name: layout for kind, name, _, layout, _ in drawn(panel.VIEWCAM_PT_sidebar, width) if kind == "prop"}
 
-    wide, narrow = rows(300), rows(200)
-    assert list(narrow) == list(wide)
-    assert wide["focal_length"] is not wide["zoom"], "beside its unit"
-    assert narrow["focal_length"] is narrow["lens_unit"] is narrow["zoom"]
+@pytest.mark.parametrize("target", ["MESH", "ARMATURE"])
+def test_in_the_narrowest_sidebar_no_name_stands_beside_its_field(posed_camera, scene, target):
+    """Beside them "270.3 mm" is cut, and "Canonical Axes" and "Resize Keeps", as anything of two fifths of so little."""
+    block = bpy.data.objects.new("Target", bpy.data.meshes.new("") if target == "MESH" else bpy.data.armatures.new(""))
+    scene.collection.objects.link(block)
+    posed_camera.virtual_pinhole.look_at_target = block
+    wide, narrow = (drawn(panel.VIEWCAM_PT_sidebar, width) for width in (300, NARROWEST))
+    fields = [[each[1] for each in found if each[0].startswith("prop")] for found in (wide, narrow)]
+    assert fields[0] == fields[1], "a field is missing"
+    assert any(each[3].use_property_split for each in wide)
+    lacking = {"ENUM", "POINTER", "STRING"}  # what has no room for its name inside
+    for before, (kind, name, look, layout, _) in itertools.pairwise(narrow):
+        if not kind.startswith("prop") or name == "name":
+            continue
+        assert not layout.use_property_split, name
+        described = type(posed_camera.virtual_pinhole).bl_rna.properties[name]
+        if described.type in lacking:
+            assert look["text"] == "" and before[0] == "label" and before[1], f"{name} has no name"
+
+
+@pytest.mark.parametrize("each", [panel.VIEWCAM_PT_sidebar_move, panel.VIEWCAM_PT_sidebar_readouts])
+def test_in_the_narrowest_sidebar_no_words_stand_beside_others(posed_camera, each):
+    for width, is_beside in ((300, True), (NARROWEST, False)):
+        rows = [layout for kind, name, look, layout, _ in drawn(each, width) if look.get("text", name) and layout.is_row]
+        assert (len(rows) > len(set(map(id, rows)))) == is_beside, f"at {width} pixels"
 
 
 def test_what_is_not_enabled_is_greyed_and_can_be_edited(posed_camera):
@@ -325,7 +351,7 @@ def test_apply_again_is_not_marked_where_it_mends_nothing(posed_camera, scene):
 def test_a_notice_is_drawn_in_lines_that_fit_and_with_its_remedy_below(posed_camera):
     posed_camera.virtual_pinhole.eye = (0, 0, 5)
     found = drawn(panel.VIEWCAM_PT_sidebar, 200)
-    lines = [(name, look["icon"]) for kind, name, look, *_ in found if kind == "label" and name]
+    lines = [(name, look["icon"]) for kind, name, look, *_ in found if kind == "label" and "icon" in look]
     assert " ".join(line for line, _ in lines).startswith("The view is parallel to up")
     assert [icon for _, icon in lines] == ["ERROR"] + ["BLANK1"] * (len(lines) - 1) and len(lines) > 2
     assert found[-1][:2] == ("operator", "viewcam.choose_up") and found[-1][4].camera == "Camera"

@@ -17,7 +17,7 @@ from ...errors import InputError
 from ...labels import DEPTH_STEPS, KINDS, PASSES, endings
 from ...shots.names import made_fit
 from .. import datablocks
-from . import readouts
+from . import panel_rows
 from .background_batch import BackgroundBatch, shot
 from .operators import NamesCamera
 from .panel_places import BelowProperties, BelowSidebar, SubPanel
@@ -180,13 +180,13 @@ class _LabelsPanel(SubPanel):
             context.window_manager.virtual_pinhole_labels,
             self.layout,
         )
-        layout.use_property_split, layout.use_property_decorate = True, False
+        panel_rows.begin(layout, context)
         column = layout.column()
         column.active = _running is None
-        column.column(align=True).prop(settings, "kinds")
+        panel_rows.field(column.column(align=True), settings, "kinds")
         if "DEPTH" in settings.kinds:
             column.prop(settings, "depth_steps")
-        column.prop(settings, "folder")
+        panel_rows.field(column, settings, "folder")
         if settings.kinds:
             names = layout.column(align=True)
             names.active = False
@@ -203,10 +203,8 @@ class _LabelsPanel(SubPanel):
 
 
 def _draw_latest(layout: bpy.types.UILayout, context: bpy.types.Context, folder: Path | None, sentence: str) -> None:
-    width = context.region.width / context.preferences.system.ui_scale - 60
     column = layout.column(align=True)
-    for i, line in enumerate(readouts.wrapped(sentence, width)):
-        column.label(text=line, icon="BLANK1" if i else "CHECKMARK" if folder else "ERROR", translate=False)
+    panel_rows.sentence(column, context, sentence, "CHECKMARK" if folder else "ERROR")
     if folder:
         column.operator("wm.path_open", text="Open Folder", icon="FILE_FOLDER").filepath = str(folder)
 

@@ -22,6 +22,7 @@ from ...errors import InputError
 from ...pinhole import Pinhole, Triple
 from .. import camera as cameras
 from .. import datablocks, preferences
+from . import panel_rows
 from .panel_places import BelowProperties, BelowSidebar, SubPanel
 
 _NAMES = ("u", "v", "w")
@@ -227,7 +228,7 @@ class _ShowPanel(SubPanel):
 
     def draw(self, context: bpy.types.Context) -> None:
         group, layout = datablocks.camera_in(context).virtual_pinhole, self.layout
-        layout.use_property_split = True
+        panel_rows.begin(layout, context, decorate=True)
         column = layout.column(heading="Viewport")
         column.active = group.enabled
         column.prop(group, "show_handles")

@@ -18,7 +18,7 @@ from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import datablocks, findings, hold, suspects, targets, versions
-from . import baking, clipboard, dragging, presets, readouts, scene_cameras
+from . import baking, clipboard, dragging, panel_rows, presets, readouts, scene_cameras
 from .panel_places import BelowProperties, BelowSidebar, CameraPanel, InProperties, InSidebar, SubPanel
 
 
@@ -33,10 +33,6 @@ class Notice:
     def is_mended_by_applying(self) -> bool:
         """Whether setting the camera by its values again brings them together."""
         return findings.APPLY_AGAIN in self.sentence
-
-
-_NARROW = 250  # pixels, of a panel in which a row has no room for two things
-_BESIDE_TEXT = 60  # pixels, of what stands left and right of a notice
 
 
 class _MainPanel(CameraPanel):
@@ -59,51 +55,50 @@ class _MainPanel(CameraPanel):
             scene_cameras.draw_none(layout)
             return
         scene_cameras.draw_header(layout, camera_object, context)
-        layout.use_property_split = layout.use_property_decorate = True
-        width = context.region.width / context.preferences.system.ui_scale
-        _draw_values(layout.column(), camera_object.virtual_pinhole, width < _NARROW)
+        panel_rows.begin(layout, context, decorate=True)
+        _draw_values(layout.column(), camera_object.virtual_pinhole)
         found = notices(camera_object, context.scene)
         clipboard.draw(layout, camera_object)
         baking.draw(layout, camera_object)
-        buttons = layout.column(align=True) if width < _NARROW else layout.row(align=True)
+        buttons = panel_rows.buttons(layout, context)
         _draw_setting(buttons, camera_object, any(notice.is_mended_by_applying for notice in found))
         for notice in found:
-            _draw_notice(layout.column(align=True), notice, camera_object, width - _BESIDE_TEXT)
+            _draw_notice(layout.column(align=True), notice, camera_object, context)
 
 
-def _draw_values(column: bpy.types.UILayout, group: bpy.types.PropertyGroup, is_narrow: bool) -> None:
+def _draw_values(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
     column.active = group.enabled
     for point in targets.POINTS:
-        row = column.row()
-        row.enabled = targets.place(group.id_data, point) is None  # where the point is, its target says
-        row.prop(group, point)
-        column.prop(group, f"{point}_target", text="Object")
+        rows = column.column()
+        rows.enabled = targets.place(group.id_data, point) is None  # where the point is, its target says
+        rows.prop(group, point)
+        panel_rows.field(column, group, f"{point}_target", text="Object")
         target = targets.target_of(group.id_data, point)
         if target and target.type == "ARMATURE":
-            column.prop_search(group, f"{point}_bone", target.data, "bones", text="Bone")
+            panel_rows.field(column, group, f"{point}_bone", text="Bone", among=(target.data, "bones"))
         elif target and target.type == "MESH":
-            column.prop_search(group, f"{point}_group", target, "vertex_groups", text="Group")
+            panel_rows.field(column, group, f"{point}_group", text="Group", among=(target, "vertex_groups"))
     column.prop(group, "up")
     column.separator()
-    _draw_lens(column, group, is_narrow)
+    _draw_lens(column, group)
     for name in ("zoom", "keeps"):
-        column.prop(group, name)
+        panel_rows.field(column, group, name)
     column.separator()
     column.prop(group, "held_roll" if group.pole == "HOLD" else "roll")
     if group.pole == "HOLD":
         column.prop(group, "hold_within")
-    column.prop(group, "pole")
+    panel_rows.field(column, group, "pole")
 
 
-def _draw_lens(column: bpy.types.UILayout, group: bpy.types.PropertyGroup, is_narrow: bool) -> None:
+def _draw_lens(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
     """One field and its unit, no wider than its words, or below it where both would be cut.
 
     The dot keys d, and Blender wants d's own field beside it.
     """
     field = {"MILLIMETERS": "focal_length", "PIXELS": "distance"}.get(group.lens_unit, "field_of_view")
-    if is_narrow:
+    if not column.use_property_split:
         column.prop(group, field)
-        column.prop(group, "lens_unit", text="Unit")
+        panel_rows.field(column, group, "lens_unit", text="Unit")
         return
     row = column.row(align=True)
     row.use_property_decorate = False
@@ -126,9 +121,10 @@ def _draw_setting(row: bpy.types.UILayout, camera_object: bpy.types.Object, aler
     row.operator("viewcam.adopt_camera").camera = camera_object.name
 
 
-def _draw_notice(column: bpy.types.UILayout, notice: Notice, camera_object: bpy.types.Object, width: float) -> None:
-    for i, line in enumerate(readouts.wrapped(iface(notice.sentence), width)):
-        column.label(text=line, icon="BLANK1" if i else "ERROR", translate=False)
+def _draw_notice(
+    column: bpy.types.UILayout, notice: Notice, camera_object: bpy.types.Object, context: bpy.types.Context
+) -> None:
+    panel_rows.sentence(column, context, iface(notice.sentence), "ERROR")
     if notice.remedy:
         operator, text = notice.remedy
         column.operator(operator, text=text, translate=False).camera = camera_object.name
@@ -141,11 +137,8 @@ class _MovePanel(SubPanel):
         name = datablocks.camera_in(context).name
         column = self.layout.column()
         for label, buttons in _MOVES.items():
-            split = column.split(factor=0.25)
-            heading = split.row()
-            heading.alignment = "RIGHT"
-            heading.label(text=label)
-            row = split.row(align=True)
+            row = panel_rows.described(column, context, label, (), share=0.25)
+            row = row.row(align=True) if "icon" in buttons[0][1] else panel_rows.buttons(row, context)
             for operator, look, properties in buttons:
                 button = row.operator(operator, **look)
                 button.camera = name
@@ -188,13 +181,8 @@ class _ReadOutsPanel(SubPanel):
     def draw(self, context: bpy.types.Context) -> None:
         column = self.layout.column(align=True)
         for readout in shown(datablocks.camera_in(context), context.scene):
-            split = column.split(factor=0.4 if len(readout.shown) == 1 else 0.1)
-            name = split.row()
-            name.alignment = "RIGHT"
-            name.label(text=readout.label)
-            row = split.row()
-            for text in readout.shown:
-                row.label(text=text, translate=False)
+            share = 0.4 if len(readout.shown) == 1 else 0.1
+            row = panel_rows.described(column, context, readout.label, readout.shown, share)
             button = row.operator("viewcam.copy_readout", text="", icon="COPYDOWN", emboss=False)
             button.label, button.text = readout.label, readout.exact
 

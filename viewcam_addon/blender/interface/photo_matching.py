@@ -23,7 +23,7 @@ from ...errors import InputError
 from ...pinhole import Pair, Pinhole
 from .. import camera as cameras
 from .. import datablocks, targets
-from . import kept, overlay
+from . import kept, overlay, panel_rows
 from .operators import CameraOperator
 from .panel_places import BelowSidebar, SubPanel
 
@@ -373,12 +373,12 @@ class VIEWCAM_PT_sidebar_match(SubPanel, BelowSidebar, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, context.window_manager.virtual_pinhole_match
-        layout.use_property_split, layout.use_property_decorate = True, False
+        panel_rows.begin(layout, context)
         column = layout.column()
-        column.prop(settings, "kind")
+        panel_rows.field(column, settings, "kind")
         if settings.kind == RECTANGLE:
             column.prop(settings, "sides")
-            column.prop(settings, "axes")
+            panel_rows.field(column, settings, "axes")
         column.prop(settings, "precision")
         layout.operator("viewcam.match_photo", icon="CAMERA_DATA")
 

@@ -15,7 +15,7 @@ from ...errors import InputError
 from ...tracer.scene.film import SAMPLES
 from .. import datablocks, preferences
 from ..render_settings import LEVELS
-from . import icons, proof_image, readouts
+from . import icons, panel_rows, proof_image
 from .comparing import Outcome, RunningComparison
 from .operators import NamesCamera
 from .panel_places import BelowProperties, BelowSidebar, SubPanel
@@ -263,7 +263,7 @@ class _ProofPanel(SubPanel):
 
     def draw(self, context: bpy.types.Context) -> None:
         camera_object = datablocks.camera_in(context)
-        _draw_settings(self.layout, context.window_manager.virtual_pinhole_proof)
+        _draw_settings(self.layout, context)
         if _running:
             _draw_progress(self.layout)
         else:
@@ -282,15 +282,15 @@ class VIEWCAM_PT_sidebar_proof(_ProofPanel, BelowSidebar, bpy.types.Panel):
     pass
 
 
-def _draw_settings(layout: bpy.types.UILayout, settings: ProofSettings) -> None:
-    layout.use_property_split, layout.use_property_decorate = True, False
-    column = layout.column()
+def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    panel_rows.begin(layout, context)
+    settings, column = context.window_manager.virtual_pinhole_proof, layout.column()
     column.active = _running is None
-    column.prop(settings, "level")
+    panel_rows.field(column, settings, "level")
     if settings.level != "GEOMETRY":
         column.prop(settings, "samples")
         column.prop(settings, "clay")
-    column.prop(settings, "folder")
+    panel_rows.field(column, settings, "folder")
 
 
 def _draw_progress(layout: bpy.types.UILayout, timed: bool = True) -> None:
@@ -303,7 +303,6 @@ def _draw_progress(layout: bpy.types.UILayout, timed: bool = True) -> None:
 def _draw_outcome(
     layout: bpy.types.UILayout, outcome: Outcome, camera_object: bpy.types.Object, context: bpy.types.Context
 ) -> None:
-    width = context.region.width / context.preferences.system.ui_scale - 60
     lines = [(outcome.headline or outcome.verdict, "ERROR")]
     if outcome.passed is False:
         rest = outcome.verdict.partition(": ")[2]
@@ -320,32 +319,26 @@ def _draw_outcome(
     more = len(outcome.lacking) - _MOST_LACKING
     lines += [(f"and {more} more, in the report", "BLANK1")] if more > 0 else []
     for sentence, icon in lines:
-        for i, line in enumerate(readouts.wrapped(sentence, width)):
-            column.label(text=line, icon="BLANK1" if i else icon, translate=False)
+        panel_rows.sentence(column, context, sentence, icon)
     if outcome.report:
-        row = layout.row(align=True)
+        row = panel_rows.buttons(layout, context)
         row.operator("viewcam.show_difference", icon="IMAGE_DATA")
         row.operator("viewcam.open_report", text="Report", icon="URL")
         if proof_image.loaded():
             proof_image.draw_view(layout.row(align=True), context)
     if outcome.rows:
-        _draw_figures(layout, outcome, width)
+        _draw_figures(layout, outcome, context)
 
 
-def _draw_figures(layout: bpy.types.UILayout, outcome: Outcome, width: float) -> None:
+def _draw_figures(layout: bpy.types.UILayout, outcome: Outcome, context: bpy.types.Context) -> None:
     header, body = layout.panel("viewcam_proof_figures", default_closed=True)
     header.label(text="Figures")
     if body is None:
         return
     column = body.column(align=True)
     for label, text in outcome.rows:
-        split = column.split(factor=0.46)
-        name = split.row()
-        name.alignment = "RIGHT"
-        name.label(text=label)
-        split.label(text=text, translate=False)
-    for line in readouts.wrapped(outcome.colours, width):
-        column.label(text=line, translate=False)
+        panel_rows.described(column, context, label, (text,), share=0.46)
+    panel_rows.sentence(column, context, outcome.colours)
 
 
 def _is_playing(context: bpy.types.Context) -> bool:

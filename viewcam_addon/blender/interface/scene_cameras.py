@@ -12,7 +12,7 @@ from ... import pinhole as text
 from ...errors import InputError
 from .. import camera as cameras
 from .. import datablocks, own_picture, preferences, storage
-from . import file_menu, viewport
+from . import file_menu, panel_rows, viewport
 from .panel_places import BelowProperties, BelowSidebar, SubPanel
 
 _NAME = "Virtual Pinhole"
@@ -181,7 +181,7 @@ class VIEWCAM_UL_cameras(bpy.types.UIList):
 
 
 def draw_header(layout: bpy.types.UILayout, camera_object: bpy.types.Object, context: bpy.types.Context) -> None:
-    """Which camera it is about, the way to the others, and whether the scene renders through it."""
+    """Which camera it is about, the way to the others, and whether it is the scene's."""
     layout = layout.column()
     layout.use_property_split = layout.use_property_decorate = False
     row = layout.row(align=True)
@@ -189,12 +189,12 @@ def draw_header(layout: bpy.types.UILayout, camera_object: bpy.types.Object, con
     row.prop(camera_object, "name", text="", icon="CAMERA_DATA")
     row.operator("viewcam.step_camera", text="", icon="TRIA_RIGHT").step = 1
     row.operator("viewcam.add_camera", text="", icon="ADD")
-    row = layout.row(align=True)
     if (active := context.active_object) and active != camera_object and getattr(context, "camera", None) is None:
-        row.label(text=f"The scene's camera; {active.name} is active", icon="INFO", translate=False)
+        panel_rows.sentence(layout, context, f"The scene's camera; {active.name} is active", "INFO")
+    row = layout.row(align=True)
     if camera_object == context.scene.camera:
         if active == camera_object:
-            row.label(text="The scene renders through it", icon="RADIOBUT_ON")
+            row.label(text="The scene's camera", icon="RADIOBUT_ON")
     else:
         row.operator("viewcam.make_camera_active", icon="RADIOBUT_OFF").camera = camera_object.name
 
@@ -219,7 +219,7 @@ class _PicturePanel(SubPanel):
         own, is_active = camera_object.virtual_pinhole_picture, own_picture.owner(scene) == camera_object
         render, frames = (scene.render, scene) if is_active else (own, own)
         layout = self.layout
-        layout.use_property_split, layout.use_property_decorate = True, False
+        panel_rows.begin(layout, context)
         layout.active = own.use
         for names, group in (
             (("resolution_x", "resolution_y", "resolution_percentage"), render),
@@ -257,7 +257,7 @@ class VIEWCAM_PT_sidebar_cameras(SubPanel, BelowSidebar, bpy.types.Panel):
         layout = self.layout
         manager = context.window_manager
         layout.template_list("VIEWCAM_UL_cameras", "", context.scene, "objects", manager, "virtual_pinhole_camera", rows=_ROWS)
-        row = layout.row(align=True)
+        row = panel_rows.buttons(layout, context)
         row.operator("viewcam.add_camera", text="Add", icon="ADD")
         row.operator("viewcam.add_camera", text="From View", icon="VIEW_CAMERA").from_view = True
 

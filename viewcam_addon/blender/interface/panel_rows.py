@@ -1,0 +1,75 @@
+"""Rows of a panel: a name beside what it names, or above it where an artist has made the panel too narrow for both."""
+
+import bpy
+
+from . import readouts
+
+_NARROW = 250  # pixels
+_BESIDE_TEXT = 60  # pixels, of what stands left and right of a sentence
+
+
+def is_narrow(context: bpy.types.Context) -> bool:
+    """Whether the panel that is drawn has no room for a name beside a field."""
+    return _width(context) < _NARROW
+
+
+def begin(layout: bpy.types.UILayout, context: bpy.types.Context, decorate: bool = False) -> None:
+    """Say how the fields of a panel look: Blender's columns of names and values, or in a narrow one the names inside them."""
+    layout.use_property_split, layout.use_property_decorate = not is_narrow(context), decorate
+
+
+def field(
+    column: bpy.types.UILayout,
+    owner: bpy.types.bpy_struct,
+    name: str,
+    text: str | None = None,
+    among: tuple[bpy.types.bpy_struct, str] | None = None,
+) -> None:
+    """A property by its name. Inside a choice, an object or a path there is no room for it, so that it stands above.
+
+    among : what has the names to choose from, and its collection of them.
+    """
+    described = owner.bl_rna.properties[name]
+    text = described.name if text is None else text
+    if not column.use_property_split and described.type in ("ENUM", "POINTER", "STRING"):
+        column.label(text=text)
+        text = ""
+    if among:
+        column.prop_search(owner, name, *among, text=text)
+    else:
+        column.prop(owner, name, text=text)
+
+
+def buttons(column: bpy.types.UILayout, context: bpy.types.Context) -> bpy.types.UILayout:
+    """Where buttons with words go: beside one another, or one below the other."""
+    return column.column(align=True) if is_narrow(context) else column.row(align=True)
+
+
+def described(
+    column: bpy.types.UILayout, context: bpy.types.Context, label: str, texts: tuple[str, ...], share: float
+) -> bpy.types.UILayout:
+    """A label and what it describes, never translated; the row of these. share : of the width, the label's."""
+    if is_narrow(context):
+        column.label(text=label)
+        row = column.row()
+        where = row.column(align=True) if texts else row
+    else:
+        split = column.split(factor=share)
+        heading = split.row()
+        heading.alignment = "RIGHT"
+        heading.label(text=label)
+        where = row = split.row()
+    for text in texts:
+        where.label(text=text, translate=False)
+    return row
+
+
+def sentence(column: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:
+    """A sentence in lines that fit, never translated here."""
+    below = "NONE" if icon == "NONE" else "BLANK1"
+    for i, line in enumerate(readouts.wrapped(text, _width(context) - _BESIDE_TEXT)):
+        column.label(text=line, icon=below if i else icon, translate=False)
+
+
+def _width(context: bpy.types.Context) -> float:
+    return context.region.width / context.preferences.system.ui_scale
