@@ -19,7 +19,7 @@ SCREEN_HEIGHT = 2000
 _HEADER = 60  # pixels from the panel's top within which its checkbox stands
 _PATIENCE = 4  # looks
 _STEPS = 200  # that something may take to happen
-_ROW = 14  # pixels between two looks, less than a button's height
+_ROW = 18  # pixels between two looks, less than a button's height
 # Where in a row its buttons are looked for, as shares of the panel's width; of operators there are many in a row.
 _MIDDLE, _CHECKBOX, _OPERATORS = 0.5, 0.13, (0.31, 0.38, 0.46, 0.53, 0.6, 0.72, 0.85)
 _KEYS = {"-": "MINUS", ".": "PERIOD", " ": "SPACE", "/": "SLASH", "=": "EQUAL", ",": "COMMA"}
@@ -57,9 +57,12 @@ def under_the_mouse(where):
 
 
 def look(x, y, where):
-    """Steps that end with what stands there; Blender notices the mouse in the second."""
+    """Steps that end with what stands there: the first move leaves the button where the mouse was, the second notices this one.
+
+    Both in one step, since Blender draws the window after each, and it is drawn in software.
+    """
     move(x, y)
-    yield
+    move(x, y)
     yield
     return under_the_mouse(where)
 
@@ -78,19 +81,26 @@ def seek(button, where):
             if (yield from look(*place, where)).startswith(button):
                 return place
     print(f"looking for {button}", flush=True)
-    _, part = region(*where)
-    _map(where).clear()
-    yield from survey(part.y + part.height, part.y, where)
+    if not place and _map(where):
+        yield from survey_the_rest(where, button)
+    if not _remembered(button, where) or place:
+        _map(where).clear()
+        yield from survey(_top(where), where, button)
     return _remembered(button, where)
 
 
-def survey(top, bottom, where):
-    """Look at all rows between two heights and remember their buttons; whether there are any."""
+def survey_the_rest(where, wanted=None):
+    """Look at all rows below those that are known."""
+    return (yield from survey(min((y for _, y in _map(where).values()), default=_top(where)), where, wanted))
+
+
+def survey(top, where, wanted=None):
+    """Look at all rows from a height down, or until a wanted button is found, and remember them; whether there are any."""
     _, part = region(*where)
     before = len(_map(where))
     move(*NOWHERE)
     yield
-    for y in range(int(top) - _ROW, int(bottom), -_ROW):
+    for y in range(int(top) - _ROW, part.y, -_ROW):
         columns = [_MIDDLE]
         for share in columns:
             x = part.x + part.width * share
@@ -98,10 +108,17 @@ def survey(top, bottom, where):
             if there and there not in _map(where):
                 _map(where)[there] = (x, y)
             if share == _MIDDLE and not there:
-                columns += [_OPERATORS[0], _CHECKBOX] if y > part.y + part.height - _HEADER else [_OPERATORS[0]]
+                columns += [_OPERATORS[0], _CHECKBOX] if y > _top(where) - _HEADER else [_OPERATORS[0]]
             elif len(columns) < len(_OPERATORS) and there.startswith("viewcam."):
                 columns += sorted(set(_OPERATORS) - set(columns))
+        if wanted and _remembered(wanted, where):
+            break
     return len(_map(where)) > before
+
+
+def _top(where):
+    _, part = region(*where)
+    return part.y + part.height
 
 
 def _map(where):
@@ -125,16 +142,19 @@ def unfold(button, where=SIDEBAR):
     """
     if _remembered(button, where) and (yield from seek(button, where)):
         return
+    yield from survey_the_rest(where)
+    if _remembered(button, where):
+        return
     _, part = region(*where)
     known = dict(_map(where))
-    y = min((y for _, y in known.values()), default=part.y + part.height) - _ROW
+    y = min((y for _, y in known.values()), default=_top(where)) - _ROW
     while y > part.y:
         x = part.x + part.width * 0.35
         if (yield from look(x, y, where)):  # still the last button
             y -= _ROW / 2
             continue
         yield from click(x, y)
-        if (yield from survey(y - _ROW / 2, part.y, where)):
+        if (yield from survey(y - _ROW / 2, where)):
             if _remembered(button, where):
                 return
             yield from click(x, y)

@@ -15,7 +15,7 @@ sys.path.append(str(Path(__file__).parent))
 import tour
 import tour_step
 from panel_in_a_window import move, region, start, window
-from tour_hands import begin, lowest_button, photograph, push_undo, redo, undo
+from tour_hands import SIDEBAR, begin, lowest_button, photograph, push_undo, redo, survey_the_rest, undo
 
 FOLDER = next(map(Path, sys.argv[sys.argv.index("--") + 1 :]), None)
 MOUSE_AWAY = (200, 700)
@@ -45,6 +45,8 @@ def take(step):
     after = tour_step.state()
     step.check()
     if FOLDER and step.picture:
+        if step.shows == "sidebar":
+            yield from survey_the_rest(SIDEBAR)
         yield from step.pose_for_the_picture()
         move(*MOUSE_AWAY)
         yield from draw_finely()
