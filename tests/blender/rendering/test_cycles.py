@@ -153,7 +153,7 @@ def test_every_override_for_light_is_restored(crowded, tmp_path, request_):
     assert not (changed := list(differences(before, state(crowded)))), "\n".join(changed)
     assert all(path.stat().st_size > 1000 for path in paths) and paths[0].read_bytes() != paths[1].read_bytes()
     told = {entry.object: entry.reason for entry in exported.ledger}
-    assert "spread" in told["Lamp"] and "has a volume" in told["Fog"]
+    assert "Light Falloff" in told["Lamp"] and "has a volume" in told["Fog"]
 
 
 @pytest.fixture

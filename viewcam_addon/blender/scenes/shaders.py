@@ -18,7 +18,6 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
-from ...tracer import native
 from ...tracer.scene.materials import LARGEST_RADIANCE, PLAIN, Colour, Material, Picture
 from ...tracer.scene.shader_nodes import KINDS, Node, closures
 from ...tracer.scene.value_nodes import GENERATED, NORMAL, OWN, POSITION, TANGENT, UV
@@ -227,6 +226,8 @@ def plain_emission(of: Input) -> RGB | list[str]:
 def _everywhere(value: Colour | Node) -> tuple[RGB, float] | None:
     """What a value is and that as a number, or None where it varies."""
     if isinstance(value, Node):
+        from ...tracer import native  # here: ctypes keeps its structures, and enabling the add-on needs none
+
         return native.constant_value(value)
     return None if value.varies else (value.rgb, value.rgb[0])
 
