@@ -102,18 +102,19 @@ test-matrix: $(MATRIX:%=test-wheel-%)
 
 # What a version can change: what touches Blender; with the oldest and the newest, which have NumPys of their own, the quick ones;
 # with the newest, which has a Python of its own, processes. Of the newest, tests/blender runs inside the real one, but for lights
-# (test-blender). Between the oldest and the newest, batches and lights are left out of 4.5: 5.0, make test, has them, and
+# (test-blender). Between the oldest and the newest, batches, lights and what is slow are left out of 4.5: 5.0 has them, and
 # test-light what Cycles shades.
 TOUCHING_BLENDER = tests/blender tests/test_crashes.py \
 	$(shell grep -lE 'importorskip\("bpy"\)' tests/test_*.py tests/commands/test_*.py tests/comparison/test_*.py | grep -v test_project)
 tests-4.5 = $(TOUCHING_BLENDER) --ignore=tests/blender/batch --ignore=tests/blender/light
+without-4.5 = $(empty) and not slow
 tests-5.0 = $(TOUCHING_BLENDER)
 tests-4.2 = $(TOUCHING_BLENDER) $(QUICK)
 tests-5.2 = tests/blender/light tests/blender/test_light_by_light.py $(filter-out tests/blender,$(TOUCHING_BLENDER)) $(QUICK) tests/batch
 
 # Few examples of each property: make test has the many, and what a version changes, it changes for most of them.
 test-wheel-%: .venvs/%/ready
-	$(call PARALLEL,.venvs/$*) --hypothesis-profile=quick -m "not exhaustive and not light and not speed" $(tests-$*)
+	$(call PARALLEL,.venvs/$*) --hypothesis-profile=quick -m "not exhaustive and not light and not speed$(without-$*)" $(tests-$*)
 
 test-light: $(WHEELS:%=test-light-%)
 
