@@ -193,6 +193,11 @@ class Pinhole:
         """(u, v, w) as triples of plain floats, for code that handles one pose and wants no arrays."""
         return self._axes
 
+    def picture_axes(self) -> Array:
+        """(3, 3): the unit vectors to the right in the picture, upwards and ahead, world space."""
+        u, v, w = self._basis
+        return np.array([-u if self.mirrored else u, v, -w])
+
     @property
     def is_singular(self) -> bool:
         """Whether the view is exactly parallel to up, so that the axes are the canonical ones."""

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 import viewcam_addon as vp
 from viewcam_addon.image import BACKGROUND_DEPTH
-from viewcam_addon.labels.surfaces import Surfaces, instances
+from viewcam_addon.labels import masks
+from viewcam_addon.labels.surfaces import Silhouettes, Surfaces, instances
 from viewcam_addon.tracer.scene import Object, Scene, Spheres
 
 from .conftest import CAMERA, CUBE, moved, room
@@ -144,6 +145,42 @@ def test_what_cuts_the_eye_plane_is_whole_too():
     found = {each["name"]: each for each in vp.label(scene, ("amodal",)).instances}
     assert found["Cube"]["amodal"]["area"] == 64 * 48 and found["Cube"]["visible_fraction"] == 1
     assert found["Ball"]["amodal"]["area"] > 0 and found["Ball"]["visible_fraction"] == 0
+
+
+@settings(max_examples=50)
+@given(st.data())
+def test_run_lengths_of_a_part_of_a_picture_are_those_of_the_whole_picture(data):
+    """Of parts that touch every edge, down to no pixel at all."""
+    height, width = data.draw(st.integers(1, 7)), data.draw(st.integers(1, 7))
+    windows, pictures = [], []
+    for _ in range(data.draw(st.integers(0, 4))):
+        left, low = data.draw(st.integers(0, width)), data.draw(st.integers(0, height))
+        columns, rows = data.draw(st.integers(0, width - left)), data.draw(st.integers(0, height - low))
+        chance = np.random.default_rng(data.draw(st.integers(0, 99)))
+        covered = chance.random((rows, columns)) < data.draw(st.sampled_from([0.0, 0.5, 0.9, 1.0]))
+        pictures.append(np.zeros((height, width), bool))
+        pictures[-1][low : low + rows, left : left + columns] = covered
+        windows.append((left, low, covered))
+    for found, picture in zip(masks.of_windows(windows, (height, width)), pictures, strict=True):
+        assert (found is None) == (not picture.any())
+        if found:
+            np.testing.assert_array_equal(mask_of(found["segmentation"]), picture[::-1])
+            assert min(found["segmentation"]["counts"][1:]) > 0 and found["area"] == picture.sum()
+
+
+@settings(max_examples=25)
+@given(cameras, st.floats(0.1, 9))
+def test_a_silhouette_ends_where_the_clip_range_begins(camera, near):
+    """Of boxes that are cut by it, each pixel is found, however little of them is left."""
+    scene = replace(room(camera), clip=(near, 100.0))
+    windows = Silhouettes(Surfaces(scene)).windows()
+    for number, (instance, window) in enumerate(zip(instances(scene), windows, strict=True)):
+        alone = Surfaces(replace(scene, objects=(replace(instance.placed, matrix=instance.matrix),))).instance == 0
+        found = np.zeros_like(alone)
+        if window:
+            left, low, covered = window
+            found[low : low + covered.shape[0], left : left + covered.shape[1]] = covered
+        np.testing.assert_array_equal(found, alone, err_msg=f"instance {number}")
 
 
 def test_an_id_stays_when_others_come_and_go_and_none_is_given_twice():

@@ -112,6 +112,8 @@ def look(draw, calls):
     camera.width, camera.height = draw(st.integers(0, 40)), draw(st.integers(0, 40))
     if calls("set_camera", calls.scene, camera):
         calls.size = camera.width, camera.height
+        covered = np.full(camera.width * camera.height, 9, np.uint8)
+        assert calls("silhouette", calls.scene, camera, covered.ctypes.data) and (covered <= 1).all()
 
 
 def light_up(draw, calls):

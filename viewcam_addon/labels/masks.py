@@ -10,6 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+Window = tuple[int, int, NDArray[np.bool_]]
+"""A part of a picture: its first column and row, and which of its pixels are set, rows from the bottom."""
+
 Masks = list[dict[str, Any] | None]
 """Of each instance: area in pixels, box [x, y, width, height] and uncompressed run lengths; None where it has no pixel."""
 
@@ -25,17 +28,28 @@ def of_picture(instance: NDArray[np.int64], count: int) -> Masks:
     return _described(owners[order], starts[order], ends[order], instance.shape, count)
 
 
-def of_pixels(parts: Sequence[NDArray[np.intp]], shape: tuple[int, int]) -> Masks:
-    """Those of each instance's pixels, counted row by row from the bottom, each once. shape : height and width."""
-    height, width = shape
-    rows, columns = np.divmod(np.concatenate([np.empty(0, np.intp), *parts]), width)
-    owners = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
-    apart = height * width + 1  # so that no run goes on from one instance to the next
-    places = np.sort(owners * apart + columns * height + (height - 1 - rows))
-    is_first = np.diff(places, prepend=-2) != 1
-    owners, starts = np.divmod(places[is_first], apart)
-    ends = places[np.append(is_first[1:], True)[: len(places)]] % apart + 1
-    return _described(owners, starts, ends, shape, len(parts))
+def of_windows(windows: Sequence[Window | None], shape: tuple[int, int]) -> Masks:
+    """Those of each instance's part of the picture. shape : height and width of the picture."""
+    height = shape[0]
+    there = [(owner, *window) for owner, window in enumerate(windows) if window is not None and window[2].size]
+    # Column after column from the top, each with a pixel more before its head, not set, so that none runs on in the next.
+    begins = np.cumsum([0, *((len(covered) + 1) * covered.shape[1] for *_, covered in there)])
+    columns = np.zeros(begins[-1] + 1, np.int8)
+    for begin, end, (*_, covered) in zip(begins[:-1].tolist(), begins[1:].tolist(), there, strict=True):
+        columns[begin:end].reshape(covered.shape[1], -1)[:, 1:] = covered[::-1].T
+    changes = np.flatnonzero(np.diff(columns))
+    starts, ends = changes[::2], changes[1::2]
+    which = np.searchsorted(begins, starts, side="right") - 1
+    figures = [(owner, left, height - low - len(covered), len(covered) + 1) for owner, left, low, covered in there]
+    owners, left, top, rows = np.array(figures, np.intp).reshape(-1, 4)[which].T
+    column, row = np.divmod(starts - begins[which], rows)
+    lengths = ends - starts
+    starts = (left + column) * height + top + row
+    # A column that is set to its foot goes on at the head of the next.
+    goes_on = np.zeros(len(starts), bool)
+    goes_on[1:] = (owners[1:] == owners[:-1]) & (starts[1:] == (starts + lengths)[:-1])
+    is_last = np.append(~goes_on[1:], True)[: len(starts)]
+    return _described(owners[~goes_on], starts[~goes_on], (starts + lengths)[is_last], shape, len(windows))
 
 
 def decoded(segmentation: dict[str, Any]) -> NDArray[np.bool_]:

@@ -14,9 +14,6 @@ from . import KINDS, coverage, masks
 from .motion import Motion, motion
 from .surfaces import Keepers, Silhouettes, Surfaces
 
-_TO_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
-"""From u, v, w to x right, y down, z forward."""
-
 
 @dataclass(frozen=True, eq=False)
 class Labels:
@@ -56,9 +53,8 @@ def label(
         passes |= _depths(surfaces)
     if "normals" in kinds:
         normals = surfaces.passes["Normal"]
-        u, v, w = scene.camera.basis()
-        axes = np.stack([-u if scene.camera.mirrored else u, -v, -w], axis=1)
-        passes |= {"Normal": normals, "Camera Normal": normals @ axes}
+        right, up, forward = scene.camera.picture_axes()
+        passes |= {"Normal": normals, "Camera Normal": normals @ np.stack([right, -up, forward], axis=1)}
     if "position" in kinds:
         local = np.zeros_like(surfaces.points)
         for instance, pixels in surfaces.shown:
@@ -105,13 +101,12 @@ def _instances(
     if not all_of_them:
         return []
     visible = masks.of_picture(surfaces.instance, len(all_of_them))
-    amodal = masks.of_pixels(Silhouettes(surfaces).pixels(), (camera.height, camera.width)) if with_amodal else visible
-    u, v, w = camera.basis()
-    to_camera = np.eye(4)
-    to_camera[:3, :3] = [-u if camera.mirrored else u, v, w]
+    amodal = masks.of_windows(Silhouettes(surfaces).windows(), (camera.height, camera.width)) if with_amodal else visible
+    to_camera = np.eye(4)  # x right, y down, z forward
+    to_camera[:3, :3] = camera.picture_axes() * [[1], [-1], [1]]
     to_camera[:3, 3] = -to_camera[:3, :3] @ np.array(camera.eye)
     matrices = np.stack([each.matrix for each in all_of_them])
-    in_world, in_camera = matrices.tolist(), (_TO_OPENCV @ to_camera @ matrices).tolist()
+    in_world, in_camera = matrices.tolist(), (to_camera @ matrices).tolist()
     told = []
     for number, (instance, seen, whole) in enumerate(zip(all_of_them, visible, amodal, strict=True)):
         share = coverage.told(covered, number) if covered else None

@@ -3,7 +3,7 @@
 import hashlib
 import itertools
 import os
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,13 +16,15 @@ from ..tracer.native import CoreScene
 from ..tracer.scene import Mesh, Object, Scene, Spheres
 from ..tracer.scene.sameness import same_things
 from ..tracer.tiles import Passes, over_threads
+from .masks import Window
 
 Array = NDArray[np.float64]
 
-_MOST_RAYS = 2**18
-"""Of silhouettes that are traced at a time, 130 bytes each."""
+_AT_ONCE = 2**16
+"""Pixels of silhouettes that a thread traces at a time."""
 
-_NONE = np.empty(0, np.intp)
+_EDGES = np.array([(corner, corner | side) for corner in range(8) for side in (1, 2, 4) if not corner & side]).T
+"""Of a box, whose corners differ in x by 4, in y by 2, in z by 1: their two ends."""
 
 _MOST_IDS = 2**24 - 1
 """What float32 counts to, and three bytes of a colour hold."""
@@ -176,11 +178,11 @@ class Surfaces:
     @cached_property
     def points(self) -> Array:
         """(height, width, 3), world space; 0 where nothing is."""
-        u, v, w = self.camera.basis()
+        right, up, forward = self.camera.picture_axes()
         x, _ = self.camera.view_plane(np.arange(self.camera.width) + 0.5, 0.5)
         _, y = self.camera.view_plane(0.5, np.arange(self.camera.height) + 0.5)
         depth = np.where(np.isfinite(self.depth), self.depth, 0.0)[..., None]
-        points = (x[:, None] * (-u if self.camera.mirrored else u) - w) + (y[:, None] * v)[:, None]
+        points = (x[:, None] * right + forward) + (y[:, None] * up)[:, None]
         points *= depth
         points += np.array(self.camera.eye)
         points[depth[..., 0] == 0.0] = 0.0
@@ -215,81 +217,68 @@ class Silhouettes:
     def __init__(self, surfaces: Surfaces) -> None:
         self._surfaces, self._keeper = surfaces, surfaces.keeper
 
-    def pixels(self) -> list[NDArray[np.intp]]:
-        """Of each instance (n,), in order; what shows it among the others belongs to it in any case.
+    def windows(self) -> list[Window | None]:
+        """Of each instance, in order, the part of the picture that holds it; what shows it among the others belongs to it in
+        any case. None where it isn't in the picture.
 
-        Rays are traced in the objects' spaces, so that a geometry is made ready once for all its instances, and those of many
-        instances at a time; what is flattened is traced in the world.
+        Rays are traced in the objects' spaces, so that a geometry is made ready once for all its instances; what is flattened
+        is traced in the world.
         """
         surfaces = self._surfaces
-        shown = {number: pixels for number, pixels in surfaces.shown_numbers}
-        found = [shown.get(number, _NONE) for number in range(len(surfaces.instances))]
         if not surfaces.instances:
-            return found
-        is_flat = np.linalg.det(np.array([each.matrix[:3, :3] for each in surfaces.instances])) == 0
-        first, last = self._reaches()
-        groups: dict[tuple[str, int | None], list[int]] = {}
-        for number, instance in enumerate(surfaces.instances):
-            if (last[number] > first[number]).all() and "camera" not in instance.placed.hidden_from:
-                groups.setdefault((instance.placed.geometry, number if is_flat[number] else None), []).append(number)
-        pieces = []
-        for (name, flat), numbers in groups.items():
-            core = self._keeper.alone(name, np.eye(4) if flat is None else surfaces.instances[flat].matrix)
-            areas = (last[numbers] - first[numbers]).prod(axis=1)
-            parts = np.cumsum(areas) // _MOST_RAYS
-            pieces += [(core, np.array(numbers)[parts == part], flat is not None) for part in np.unique(parts)]
+            return []
+        camera, clip = surfaces.camera, surfaces.scene.clip
+        matrices, inverses = (np.array([getattr(each, name) for each in surfaces.instances]) for name in ("matrix", "inverse"))
+        is_flat = np.linalg.det(matrices[:, :3, :3]) == 0
+        matrices[is_flat] = inverses[is_flat] = np.eye(4)
+        eyes = (inverses[:, :3, :3] @ (np.array(camera.eye) - matrices[:, :3, 3])[..., None])[..., 0]
+        axes = camera.picture_axes() @ inverses[:, :3, :3].swapaxes(1, 2)
+        reaches = self._reaches()
+        shown = dict(surfaces.shown_numbers)
+        found: list[Window | None] = [None] * len(surfaces.instances)
 
-        def trace(piece: tuple[CoreScene, NDArray[np.intp], bool]) -> None:
-            core, numbers, is_flat = piece
-            for number, hit in self._hits(core, numbers, is_flat, first, last):
-                found[number] = np.union1d(found[number], hit) if len(found[number]) else hit
+        def trace(numbers: NDArray[np.intp]) -> None:
+            for number in numbers.tolist():
+                window = reaches[number].tolist()
+                covered = cores[number].silhouette(camera, clip, eyes[number], axes[number], window)
+                if number in shown:
+                    rows, columns = np.divmod(shown[number], camera.width)
+                    covered[rows - window[1], columns - window[0]] = True
+                found[number] = window[0], window[1], covered
 
+        seen = [number for number, each in enumerate(surfaces.instances) if "camera" not in each.placed.hidden_from]
+        areas = reaches[seen, 2:].prod(axis=1)
+        seen, areas = np.array(seen, np.intp)[areas > 0], areas[areas > 0]
+        cores = {
+            number: self._keeper.alone(each.placed.geometry, each.matrix if is_flat[number] else np.eye(4))
+            for number, each in ((number, surfaces.instances[number]) for number in seen.tolist())
+        }
+        parts = np.cumsum(areas) // _AT_ONCE
+        pieces = np.split(seen, np.flatnonzero(np.diff(parts)) + 1)
         for _ in over_threads(trace, pieces, self._keeper.threads, lambda: None, lambda: None):
             pass
         return found
 
-    def _hits(
-        self, core: CoreScene, numbers: NDArray[np.intp], is_flat: bool, first: NDArray[np.intp], last: NDArray[np.intp]
-    ) -> Iterator[tuple[int, NDArray[np.intp]]]:
-        """The pixels of some instances that rays meet in what the core has. first, last : of `_reaches`."""
-        camera, (near, far) = self._surfaces.camera, self._surfaces.scene.clip
-        eye, (u, v, w) = np.array(camera.eye), camera.basis()
-        axes = np.array([-u if camera.mirrored else u, v, -w])
-        turned, eyes = np.broadcast_to(axes, (len(numbers), 3, 3)), np.broadcast_to(eye, (len(numbers), 3))
-        if not is_flat:
-            some = [self._surfaces.instances[number] for number in numbers]
-            turned = axes @ np.array([each.inverse[:3, :3].T for each in some])
-            eyes = np.array([each.local(eye) for each in some])
-        x, y = (
-            camera.view_plane(np.arange(camera.width) + 0.5, 0.5)[0],
-            camera.view_plane(0.5, np.arange(camera.height) + 0.5)[1],
-        )
-        directions = []
-        for (left, low), (right, high), (across, up, ahead) in zip(first[numbers], last[numbers], turned, strict=True):
-            row = x[left:right, None] * across + ahead
-            directions.append((row + (y[low:high, None] * up)[:, None]).reshape(-1, 3))
-        origins = np.repeat(eyes, [len(each) for each in directions], axis=0)
-        rays = core.rays(origins, np.concatenate(directions), np.nextafter(near, 0.0), np.nextafter(far, np.inf))
-        ends = np.cumsum([len(each) for each in directions])[:-1]
-        for number, hit in zip(numbers.tolist(), np.split(core.closest(rays)[1] >= 0, ends), strict=True):
-            rows, columns = np.divmod(np.flatnonzero(hit), last[number, 0] - first[number, 0])
-            yield number, (rows + first[number, 1]) * camera.width + columns + first[number, 0]
-
-    def _reaches(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """From which column and row to before which instances are at most, by their boxes' corners: each (n, 2)."""
-        camera = self._surfaces.camera
-        size = np.array([camera.width, camera.height])
+    def _reaches(self) -> NDArray[np.intp]:
+        """(n, 4): the first column and row that instances may have, and how many, by what of their boxes the clip leaves."""
+        camera, near = self._surfaces.camera, self._surfaces.scene.clip[0]
         corners = np.stack([self._keeper.corners(each) for each in self._surfaces.instances])
-        column, row, depth = camera.project(corners)
-        places = np.stack([column, row], axis=-1)
-        is_before = (depth > 0).any(axis=1)
-        is_whole = (depth > 0).all(axis=1) & np.isfinite(places).all(axis=(1, 2))
-        places = np.where(is_whole[:, None, None], places, 0.0)
+        depth = (corners - np.array(camera.eye)) @ camera.picture_axes()[2]
+        one, other = _EDGES
+        is_beyond = depth >= near
+        is_cut = is_beyond[:, one] != is_beyond[:, other]
+        share = np.where(is_cut, near - depth[:, one], 0.0) / np.where(is_cut, depth[:, other] - depth[:, one], 1.0)
+        cut = corners[:, one] + share[..., None] * (corners[:, other] - corners[:, one])
+        places = np.stack(camera.project(np.concatenate([corners, cut], axis=1))[:2], axis=-1)
+        is_seen = np.concatenate([is_beyond, is_cut], axis=1)
+        is_known = (np.isfinite(places).all(axis=-1) | ~is_seen).all(axis=1)[:, None]
         # Half a pixel and more beyond the centres that lie within, for rounding.
-        first = np.where(is_whole[:, None], np.floor(places.min(axis=1)) - 1, 0)
-        last = np.where(is_whole[:, None], np.ceil(places.max(axis=1)) + 1, size)
-        first, last = np.clip(first, 0, size), np.where(is_before[:, None], np.clip(last, 0, size), 0)
-        return first.astype(np.intp), last.astype(np.intp)
+        size = np.array([camera.width, camera.height])
+        least = np.where(is_seen[..., None], places, np.inf).min(axis=1)
+        most = np.where(is_seen[..., None], places, -np.inf).max(axis=1)
+        first = np.where(is_known, np.clip(np.floor(least) - 1, 0, size), 0)
+        last = np.where(is_known, np.clip(np.ceil(most) + 1, 0, size), size)
+        return np.concatenate([first, np.maximum(last - first, 0)], axis=1).astype(np.intp)
 
 
 def box(geometry: Mesh | Spheres) -> tuple[Array, Array]:

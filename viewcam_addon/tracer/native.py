@@ -168,6 +168,7 @@ class _Core(Structure):
         ("bytes", _function(c_size_t, c_void_p)),
         ("render_geometry", _function(c_int, c_void_p, c_uint32, c_uint32, c_void_p, c_size_t, c_void_p)),
         ("render_hits", _function(c_int, c_void_p, c_uint32, c_uint32, c_void_p, c_size_t, *[c_void_p] * 4)),
+        ("silhouette", _function(c_int, c_void_p, POINTER(_Camera), c_void_p)),
         ("surface_at", _function(c_int, c_void_p, c_size_t, c_void_p, c_void_p, c_void_p)),
         ("closest", _function(c_int, c_void_p, c_size_t, c_void_p, c_uint32, c_int, c_void_p, c_void_p, c_void_p)),
         ("occluded", _function(c_int, c_void_p, c_size_t, c_void_p, c_int, c_void_p)),
@@ -368,14 +369,34 @@ class CoreScene:
 
     def look(self, camera: Pinhole, clip: tuple[float, float]) -> None:
         """Put a camera and its clip range in the place of the one before."""
-        u, v, w = camera.basis()
+        window = 0, 0, camera.width, camera.height
+        described = self._described_camera(camera, clip, np.array(camera.eye), camera.picture_axes(), window)
+        self.check(self.core.set_camera(self.handle, described))
+
+    def silhouette(
+        self, camera: Pinhole, clip: tuple[float, float], eye: NDArray, axes: NDArray, window: tuple[int, int, int, int]
+    ) -> NDArray[np.bool_]:
+        """Whether anything is seen through the pixels' centres of a part of a picture: (height, width), rows from the bottom.
+
+        eye, axes : (3,) and (3, 3), where the camera's eye and its right, up and forward are in the scene's world, as they may
+        be in an object's space. window : the first column, the first row, columns and rows.
+        """
+        covered = np.empty((window[3], window[2]), np.bool_)
+        described = self._described_camera(camera, clip, eye, axes, window)
+        self.check(self.core.silhouette(self.handle, described, _address(covered)))
+        return covered
+
+    def _described_camera(
+        self, camera: Pinhole, clip: tuple[float, float], eye: NDArray, axes: NDArray, window: tuple[int, int, int, int]
+    ) -> _Camera:
         # What lies at the ends of the clip range is visible, and what lies at the ends of a ray is not.
         nearest, farthest = math.nextafter(clip[0], 0.0), math.nextafter(clip[1], math.inf)
-        described = _Camera(t_min=nearest, t_max=farthest, width=camera.width, height=camera.height)
-        described.eye[:] = tuple(np.array(camera.eye) - self.origin)
-        described.right[:], described.up[:], described.forward[:] = tuple(-u if camera.mirrored else u), tuple(v), tuple(-w)
-        described.principal_point[:], described.distance[:] = camera.principal_point, camera.distance
-        self.check(self.core.set_camera(self.handle, described))
+        left, low, width, height = window
+        described = _Camera(t_min=nearest, t_max=farthest, width=width, height=height, distance=camera.distance)
+        described.principal_point[:] = camera.principal_point[0] - left, camera.principal_point[1] - low
+        described.eye[:] = (eye - self.origin).tolist()
+        described.right[:], described.up[:], described.forward[:] = axes.tolist()
+        return described
 
     def illuminate(self, scene: Scene) -> None:
         """Give the core what gives and scatters light in a scene with the same objects."""

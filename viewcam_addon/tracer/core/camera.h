@@ -6,7 +6,7 @@
 namespace viewcam::VIEWCAM_ISA {
 
 struct Camera {
-    Vec3 eye, right, up, forward;        // unit; `right` is −u where the picture is mirrored
+    Vec3 eye, right, up, forward;        // unit, but for silhouettes; `right` is −u where the picture is mirrored
     Vec2 principal_point, distance;      // pixels, along both axes
     uint32_t width = 0, height = 0;
     double t_min = 0, t_max = INFINITE;  // of the clip range, whose own ends are visible

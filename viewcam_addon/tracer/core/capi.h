@@ -85,6 +85,8 @@ typedef struct {
     int (*render_geometry)(const ViewcamScene*, uint32_t first_row, uint32_t end_row, float* const* planes, size_t stride, const volatile int* stop);
     /* The same, and of each pixel what `closest` tells of a ray as long as the camera's axis. */
     int (*render_hits)(const ViewcamScene*, uint32_t first_row, uint32_t end_row, float* const* planes, size_t stride, double* depth, uint32_t* objects, uint32_t* primitives, const volatile int* stop);
+    /* Whether anything is seen through the centres of a camera's pixels, whose axes need not have unit length: 0 or 1 each. */
+    int (*silhouette)(const ViewcamScene*, const ViewcamCamera*, uint8_t* covered);
     int (*surface_at)(const ViewcamScene*, size_t count, const double* columns, const double* rows, float* const* planes);
     /* rays: (count, 8), origin, direction, t_min, t_max, in rendering space. packets: whether they are traced as such. */
     int (*closest)(const ViewcamScene*, size_t count, const double* rays, uint32_t kind, int packets, double* t, uint32_t* objects, uint32_t* primitives);

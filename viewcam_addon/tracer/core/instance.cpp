@@ -39,6 +39,14 @@ const TileSampler& light_of(const ViewcamLight* light) { return *reinterpret_cas
 Vec3 vector(const double* v) { return {v[0], v[1], v[2]}; }
 
 Ray ray_of(const double* row) { return {vector(row), vector(row + 3), row[6], row[7]}; }
+Camera camera_of(const ViewcamCamera& given) {
+    Camera camera;
+    camera.eye = vector(given.eye), camera.right = vector(given.right), camera.up = vector(given.up), camera.forward = vector(given.forward);
+    camera.principal_point = {given.principal_point[0], given.principal_point[1]};
+    camera.distance = {given.distance[0], given.distance[1]};
+    camera.t_min = given.t_min, camera.t_max = given.t_max, camera.width = given.width, camera.height = given.height;
+    return camera;
+}
 
 }  // namespace
 
@@ -104,12 +112,7 @@ const ViewcamCore core = {
         [](ViewcamScene* scene, const ViewcamCamera* given) {
             return guarded([&] {
                 check::camera(*given);
-                Camera& camera = scene_of(scene).camera;
-                camera.eye = vector(given->eye), camera.right = vector(given->right), camera.up = vector(given->up);
-                camera.forward = vector(given->forward);
-                camera.principal_point = {given->principal_point[0], given->principal_point[1]};
-                camera.distance = {given->distance[0], given->distance[1]};
-                camera.t_min = given->t_min, camera.t_max = given->t_max, camera.width = given->width, camera.height = given->height;
+                scene_of(scene).camera = camera_of(*given);
             });
         },
     .bytes = [](const ViewcamScene* scene) { return scene_of(scene).bytes(); },
@@ -127,6 +130,13 @@ const ViewcamCore core = {
             return guarded([&] {
                 check::rows(scene_of(scene), first_row, end_row);
                 render_geometry(scene_of(scene), first_row, end_row, {planes, stride}, {depth, objects, primitives}, stop);
+            });
+        },
+    .silhouette =
+        [](const ViewcamScene* scene, const ViewcamCamera* given, uint8_t* covered) {
+            return guarded([&] {
+                check::camera(*given);
+                silhouette(scene_of(scene), camera_of(*given), covered);
             });
         },
     .surface_at =

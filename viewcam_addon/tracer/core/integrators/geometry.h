@@ -66,16 +66,12 @@ inline void write_geometry(const Scene& scene, const Ray* rays, const Hit* hits,
     passes.write(VIEWCAM_MAGNITUDE, at, some, [&](int i) { return max(max_component(abs(scene.origin + met_by[i]->origin)), magnitudes[i]); });
 }
 
-// The pixel centres of some rows, from the bottom, in blocks of 16 × 4, as many columns as fill the cache lines of the passes;
-// `*stop`, if there is one, ends it early.
-inline void render_geometry(
-    const Scene& scene, uint32_t begin, uint32_t end, const GeometryPasses& passes, const GeometryHits& ends, const volatile int* stop
-) {
+// trace(rays, pixels, count) for the pixel centres of some rows, from the bottom, in blocks of 16 × 4, as many columns as fill the
+// cache lines of the passes; `*stop`, if there is one, ends it early.
+template <class Trace> void for_pixel_centers(const Camera& camera, uint32_t begin, uint32_t end, const volatile int* stop, const Trace& trace) {
     constexpr uint32_t WIDTH = 16, HEIGHT = 4;
-    const Camera& camera = scene.camera;
-    const bool has_passes = passes.any();
+    static_assert(WIDTH * HEIGHT <= PACKET);
     Ray rays[WIDTH * HEIGHT];
-    Hit hits[WIDTH * HEIGHT];
     size_t pixels[WIDTH * HEIGHT];
     for (uint32_t first_row = begin; first_row < end; first_row += HEIGHT)
         for (uint32_t first_column = 0; first_column < camera.width; first_column += WIDTH) {
@@ -86,11 +82,30 @@ inline void render_geometry(
                     pixels[count] = size_t(row) * camera.width + column;
                     rays[count++] = camera.ray(column + 0.5, row + 0.5);
                 }
-            scene.closest(rays, count, CAMERA, hits);
-            if (has_passes) write_geometry(scene, rays, hits, count, passes, pixels);
-            for (int i = 0; ends.depth && i < count; i++)
-                ends.depth[pixels[i]] = hits[i].t, ends.object[pixels[i]] = hits[i].object, ends.primitive[pixels[i]] = hits[i].primitive;
+            trace(rays, pixels, count);
         }
+}
+
+inline void render_geometry(
+    const Scene& scene, uint32_t begin, uint32_t end, const GeometryPasses& passes, const GeometryHits& ends, const volatile int* stop
+) {
+    const bool has_passes = passes.any();
+    for_pixel_centers(scene.camera, begin, end, stop, [&](const Ray* rays, const size_t* pixels, int count) {
+        Hit hits[PACKET];
+        scene.closest(rays, count, CAMERA, hits);
+        if (has_passes) write_geometry(scene, rays, hits, count, passes, pixels);
+        for (int i = 0; ends.depth && i < count; i++)
+            ends.depth[pixels[i]] = hits[i].t, ends.object[pixels[i]] = hits[i].object, ends.primitive[pixels[i]] = hits[i].primitive;
+    });
+}
+
+// Of each pixel of a camera whether its centre shows anything at all.
+inline void silhouette(const Scene& scene, const Camera& camera, uint8_t* covered) {
+    for_pixel_centers(camera, 0, camera.height, nullptr, [&](const Ray* rays, const size_t* pixels, int count) {
+        bool found[PACKET];
+        scene.occluded(rays, count, found);
+        for (int i = 0; i < count; i++) covered[pixels[i]] = found[i];
+    });
 }
 
 }  // namespace viewcam::VIEWCAM_ISA
