@@ -157,7 +157,7 @@ charts: .venv/test
 
 bench: .venv/test
 	status=0; \
-	for name in geometry_level light_levels labels; do .venv/bin/python -m benchmarks.$$name || status=1; done; \
+	.venv/bin/python -m benchmarks.labels || status=1; \
 	for name in speed scaling poses; do .venv/bin/viewcam chart $$name --json docs/charts/$$name.json || status=1; done; \
 	exit $$status
 
