@@ -7,7 +7,6 @@ The rounds of a race are interleaved, since a machine's speed drifts, and what i
 import functools
 import multiprocessing
 import os
-import statistics
 import sys
 import time
 from collections import defaultdict
@@ -19,8 +18,6 @@ from unittest import mock
 
 from viewcam_addon.errors import InputError, bug
 from viewcam_addon.terminal import silent_libraries
-
-from . import memory
 
 Runner = Callable[..., float]
 
@@ -44,7 +41,6 @@ class Contestant:
             self._process.start()
         there.close()
         self.names: list[str] = self._answer()
-        self.peak_memory = 0.0  # megabytes, once it has ended
 
     def __enter__(self) -> "Contestant":
         return self
@@ -52,7 +48,6 @@ class Contestant:
     def __exit__(self, kind: type | None, *_: object) -> None:
         if self._process.is_alive() and kind is None:
             self._here.send(None)
-            self.peak_memory = self._here.recv()
         else:
             self._process.terminate()
         self._process.join()
@@ -96,10 +91,6 @@ def timed(work: Callable[[], object]) -> Runner:
     return runner
 
 
-def medians(times: Mapping[str, list[float]]) -> dict[str, float]:
-    return {name: statistics.median(seconds) for name, seconds in times.items()}
-
-
 def _serve(asked: Connection, prepare: Callable[..., Mapping[str, Runner]], arguments: tuple) -> None:
     """Renderers keep their progress to themselves; what goes wrong is told in a sentence."""
     with silent_libraries():
@@ -109,7 +100,6 @@ def _serve(asked: Connection, prepare: Callable[..., Mapping[str, Runner]], argu
             while (request := asked.recv()) is not None:
                 name, given = request
                 asked.send(runners[name](*given))
-            asked.send(memory.peak() / 1e6)
         except Exception as error:
             asked.send(error if isinstance(error, InputError) else InputError(f"a contestant failed: {bug(error)}"))
         asked.close()
