@@ -111,8 +111,8 @@ class SurfaceAgreement:
 
     def errors(self, expected: Seen, seen: Seen) -> dict[str, Errors]:
         """Of each pass that both sides have; tolerances are taken at `expected`. Meaningless where either side missed."""
-        names = [name for name, each in PASSES.items() if name in expected and name in seen and each.errors]
-        return {name: PASSES[name].errors(self, expected, seen) for name in names}
+        there = [(name, each.errors) for name, each in PASSES.items() if name in expected and name in seen]
+        return {name: errors(self, expected, seen) for name, errors in there if errors}
 
     def same_surface(self, expected: Seen, seen: Seen) -> NDArray[np.bool_]:
         """(n,) bool: equal indices, and every pass within tolerance; or a miss on both sides."""

@@ -47,7 +47,8 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
     # what Blender does not tell of.
     keeps_scene = False
     # Of the last picture: the level at which it was traced, and what is not modelled as it is, one sentence each.
-    level, warnings = _GEOMETRY, ()
+    level = _GEOMETRY
+    warnings: tuple[str, ...] = ()
     _keeper = None
     _read = None  # what it was read for, and the scene
 
