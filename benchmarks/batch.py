@@ -67,8 +67,8 @@ class Blender:
         self.run("--command", "extension", "install-file", "-r", "user_default", "-e", built)
 
     def start(self, *arguments: object) -> subprocess.Popen:
-        words = [self._program, *map(str, arguments)]
-        return subprocess.Popen(words, env=self._environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        command = [self._program, *map(str, arguments)]
+        return subprocess.Popen(command, env=self._environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
     def run(self, *arguments: object) -> Seconds:
         """What it took; SystemExit if it failed."""
@@ -146,8 +146,8 @@ def memory(count: int, engine: str, blender: Blender, folder: Path) -> Iterator[
     still = STILL.resized(64, 36)
     shots = [replace(shot, engine=engine, samples=1) for shot in orbit(still, count)]
     (folder / "shots.json").write_text(json.dumps([vars(shot) for shot in shots]), encoding="utf-8")
-    words = ["--command", "viewcam", "batch", folder / "shots.json", "--out", folder / "out", "--log-json"]
-    process = blender.start("-b", without_denoising(blender, folder), *words)
+    arguments = ["--command", "viewcam", "batch", folder / "shots.json", "--out", folder / "out", "--log-json"]
+    process = blender.start("-b", without_denoising(blender, folder), *arguments)
     done, started = 0, time.perf_counter()
     for line in process.stdout:
         if '"shot_done"' not in line:

@@ -38,10 +38,10 @@ _COLOURS = ("#d2620a", "#248c24", "#d62728", "#9467bd", "#8c564b", "#c9519f", "#
 _MARKERS = "osv^Dd<>"
 _OURS = "#0b3d91"
 _OURS_STYLES = tuple((_OURS, marker, line) for marker, line in zip("osD^", ("-", "--", "-.", ":"), strict=True))
-_INK, _PAPER, _FAINT, _GRID = "#1f2328", "#ffffff", "#656d76", "#e5e8eb"
+_INK, _BACKGROUND, _FAINT, _GRID = "#1f2328", "#ffffff", "#656d76", "#e5e8eb"
 # What these are where pages are dark. A picture on a page knows what its reader prefers, and not the page's own colours: so it
 # brings its paper along.
-_IN_THE_DARK = {_INK: "#e6edf3", _PAPER: "#0d1117", _FAINT: "#9198a1", _GRID: "#30363d", _OURS: "#58a6ff"}
+_IN_THE_DARK = {_INK: "#e6edf3", _BACKGROUND: "#0d1117", _FAINT: "#9198a1", _GRID: "#30363d", _OURS: "#58a6ff"}
 _LIGHTER = ("#ff9a3c", "#4cc24c", "#ff7b72", "#bc8cff", "#c69083", "#f19cd2", "#cfd03a", "#39cfe0")
 _IN_THE_DARK |= dict(zip(_COLOURS, _LIGHTER, strict=True))
 _FEW = 300  # times the least x, up to which the greatest leaves room for numbers between the powers of ten
@@ -194,7 +194,7 @@ def draw(chart: Chart, path: Path, command: str, measured_on: str = "") -> None:
     # Letters stay text. The font that matplotlib brings along is the widest of the usual ones, so that another fits as well.
     settings = {"svg.fonttype": "none", "svg.hashsalt": chart.name, "font.family": "DejaVu Sans", "font.size": 9}
     settings |= dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), _INK)
-    settings |= dict.fromkeys(("figure.facecolor", "axes.facecolor", "savefig.facecolor"), _PAPER)
+    settings |= dict.fromkeys(("figure.facecolor", "axes.facecolor", "savefig.facecolor"), _BACKGROUND)
     reading = textwrap.wrap(chart.reading, 132)
     caption = 1.05 + 0.17 * max(len(reading), 3)  # inches
     with matplotlib.rc_context(settings), written_whole(path) as temporary:
@@ -271,7 +271,7 @@ def _draw_rows(chart: Chart, axes: Axes) -> None:
         axes.axhline(place, color=_GRID, linewidth=0.8, zorder=0)
         if curve.spread:
             axes.hlines([place] * len(curve.x), *np.transpose(curve.spread), color=colour, linewidth=2.5, alpha=0.5)
-        for x, fill in zip(curve.x, (colour, _PAPER), strict=False):
+        for x, fill in zip(curve.x, (colour, _BACKGROUND), strict=False):
             axes.plot(x, place, "o", markersize=8, markeredgewidth=2, markeredgecolor=colour, markerfacecolor=fill)
         answer = f"{curve.y[0]:.2g}" if math.isfinite(curve.y[0]) else "no answer"
         axes.annotate(answer, (1.02, place), xycoords=("axes fraction", "data"), va="center")

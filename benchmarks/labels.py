@@ -120,10 +120,10 @@ def labelled(blend: Path, shots: Sequence[Shot], folder: Path) -> Spent:
     rows = [{key: value for key, value in vars(shot).items() if value is not None} for shot in shots]
     listed = blend.with_name("shots.json")
     listed.write_text(json.dumps(rows), encoding="utf-8")
-    words = ["batch", blend, listed, "--labels", KINDS, "--labels-only", "--out", folder / shots[0].name]
+    arguments = ["batch", blend, listed, "--labels", KINDS, "--labels-only", "--out", folder / shots[0].name]
 
     def run() -> None:
-        process = subprocess.run([sys.executable, "-m", "viewcam_addon", *map(str, words)], capture_output=True, text=True)
+        process = subprocess.run([sys.executable, "-m", "viewcam_addon", *map(str, arguments)], capture_output=True, text=True)
         if process.returncode:
             sys.exit(process.stdout + process.stderr)
 

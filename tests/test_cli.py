@@ -122,7 +122,7 @@ def test_a_camera_far_from_the_origin_is_told_to_recenter(tmp_path, capfd):
     picture, result = tmp_path / "out.exr", tmp_path / "result.json"
     assert main(["render", str(scene), str(picture)]) == 0
     main(["compare", str(picture), str(picture), "--scene", str(scene), "--json", str(result)])
-    far = json.loads(result.read_text())["far_from_home"]
+    far = json.loads(result.read_text())["far_from_origin"]
     assert far["error"] > 0.1 and far["away"] == pytest.approx(5e6)
     assert far["sentence"] in capfd.readouterr().out and "--recenter" in far["sentence"]
 

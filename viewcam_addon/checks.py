@@ -11,7 +11,7 @@ import operator
 import warnings
 from collections.abc import Mapping, Set
 from numbers import Real
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,6 +37,14 @@ def number(name: str, value: object, least: float = -math.inf, most: float = mat
     if not least <= result <= most:
         raise InputError(f"{name} is {shown(value)}: give a number from {least:.6g} to {most:.6g}")
     return result
+
+
+@overload
+def vector(name: str, values: object, count: Literal[2]) -> tuple[float, float]: ...
+@overload
+def vector(name: str, values: object, count: Literal[3]) -> tuple[float, float, float]: ...
+@overload
+def vector(name: str, values: object, count: int) -> tuple[float, ...]: ...
 
 
 def vector(name: str, values: object, count: int) -> tuple[float, ...]:

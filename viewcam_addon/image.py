@@ -37,29 +37,43 @@ from .files import written_whole
 from .pinhole import Pinhole
 from .terminal import silent_libraries
 
-# The channels of each pass, in the order of its last axis, as Cycles names them. Two are the tracer's own, by which
-# a tolerance can be derived: Magnitude, that float32's relative rounding applies to at a hit, in world units (its largest
-# coordinate, plus the distance times the slenderness of the triangle), and Facing, the cosine between ray and true normal.
+
+@dataclass(frozen=True)
+class _Pass:
+    """channels : in the order of the pass's last axis, as Cycles names them. setting : the property of Blender's view layers
+    that asks for it, of what is not the tracer's own; Combined is always there. older : what Blender 4 calls it in a file.
+    """
+
+    channels: str
+    setting: str | None = None
+    older: str | None = None
+
+
+# Two are the tracer's own, by which a tolerance can be derived: Magnitude, that float32's relative rounding applies to at a
+# hit, in world units (its largest coordinate, plus the distance times the slenderness of the triangle), and Facing, the cosine
+# between ray and true normal. The core (capi.h) numbers them in this order.
 _GEOMETRY = {
-    "Depth": "Z",
-    "Position": "XYZ",
-    "Normal": "XYZ",
-    "UV": "UVA",
-    "Object Index": "X",
-    "Material Index": "X",
-    "Magnitude": "X",
-    "Facing": "X",
+    "Depth": _Pass("Z", "use_pass_z"),
+    "Position": _Pass("XYZ", "use_pass_position"),
+    "Normal": _Pass("XYZ", "use_pass_normal"),
+    "UV": _Pass("UVA", "use_pass_uv"),
+    "Object Index": _Pass("X", "use_pass_object_index", "IndexOB"),
+    "Material Index": _Pass("X", "use_pass_material_index", "IndexMA"),
+    "Magnitude": _Pass("X"),
+    "Facing": _Pass("X"),
 }
-# Variance is the tracer's own: the estimated variance of Combined's colour, which is a mean of samples.
+# Variance is the tracer's own: the estimated variance of Combined's colour, which is a mean of samples. Here, too, the order is
+# the core's (capi_light.h).
 _LIGHT = {
-    "Combined": "RGBA",
-    "Emission": "RGB",
-    "Environment": "RGB",
-    "Diffuse Direct": "RGB",
-    "Diffuse Indirect": "RGB",
-    "Diffuse Color": "RGB",
-    "Variance": "RGB",
+    "Combined": _Pass("RGBA"),
+    "Emission": _Pass("RGB", "use_pass_emit", "Emit"),
+    "Environment": _Pass("RGB", "use_pass_environment", "Env"),
+    "Diffuse Direct": _Pass("RGB", "use_pass_diffuse_direct", "DiffDir"),
+    "Diffuse Indirect": _Pass("RGB", "use_pass_diffuse_indirect", "DiffInd"),
+    "Diffuse Color": _Pass("RGB", "use_pass_diffuse_color", "DiffCol"),
+    "Variance": _Pass("RGB"),
 }
+_RENDERED = _LIGHT | _GEOMETRY
 # Of a picture whose pixels have as many samples as a wanted error takes, how many.
 _OPTIONAL = {"Sample Count": "X"}
 # Labels, beside some of these: docs/labels.md says what they hold. X and Y of a flow are pixels to the right and down.
@@ -76,17 +90,11 @@ _LABELS = {
 }
 # Cryptomatte's layers: id and share of one object, and of another.
 COVERAGE_PASSES = tuple(f"CryptoObject{number:02}" for number in range(17))
-CHANNELS = _LIGHT | _OPTIONAL | _GEOMETRY | _LABELS | dict.fromkeys(COVERAGE_PASSES, "rgba")
-# What Blender 4 calls some of them in a file.
-OLDER_NAMES = {
-    "IndexOB": "Object Index",
-    "IndexMA": "Material Index",
-    "Emit": "Emission",
-    "Env": "Environment",
-    "DiffDir": "Diffuse Direct",
-    "DiffInd": "Diffuse Indirect",
-    "DiffCol": "Diffuse Color",
-}
+CHANNELS = {name: each.channels for name, each in _LIGHT.items()} | _OPTIONAL
+CHANNELS |= {name: each.channels for name, each in _GEOMETRY.items()} | _LABELS | dict.fromkeys(COVERAGE_PASSES, "rgba")
+OLDER_NAMES = {each.older: name for name, each in _RENDERED.items() if each.older}
+SETTINGS = {name: each.setting for name, each in _RENDERED.items() if each.setting}
+"""Pass name → the property of a view layer that asks Blender for it."""
 
 GEOMETRY_PASSES = tuple(_GEOMETRY)
 LIGHT_PASSES = tuple(_LIGHT)

@@ -89,7 +89,7 @@ def _by_judge(said: Iterable[Said]) -> dict[str, np.ndarray]:
 
 
 def _chart(family: str, found: dict[Fault, dict[str, np.ndarray]], clean: dict[str, np.ndarray]) -> Chart:
-    curves, at_home = [], []
+    curves, at_own_threshold = [], []
     for judge, said in clean.items():
         of_faults = np.concatenate([each[judge] for each in found.values()])
         # So many good pictures are above the threshold, and no more.
@@ -97,7 +97,7 @@ def _chart(family: str, found: dict[Fault, dict[str, np.ndarray]], clean: dict[s
         limits = [np.sort(said)[::-1][int(share * len(said))] for share in alarms]
         missed = [float(np.mean(of_faults <= limit)) for limit in limits]
         curves.append(Curve(judge, alarms, missed, ours=judge == rivals.OURS))
-        at_home.append(f"{judge} {np.mean(of_faults > 1):.1%} at {np.mean(said > 1):.2%}")
+        at_own_threshold.append(f"{judge} {np.mean(of_faults > 1):.1%} at {np.mean(said > 1):.2%}")
     share = together(clean[rivals.OURS])
     beside = f" Where a pair is in ours' highest hundredth, so are {share:.1%} of those that share a side."
     trials, seen = ([len(of[judge]) for of in (*found.values(), clean)] for judge in (rivals.OURS, "FLIP"))
@@ -111,7 +111,7 @@ def _chart(family: str, found: dict[Fault, dict[str, np.ndarray]], clean: dict[s
         tuple(curves),
         f"Read how much is missed at how few false alarms: {len(found)} faults × {trials[0]} seeds, {trials[-1]} pairs of good "
         f"pictures; of these the others judged {seen[0]} and {seen[-1]}. Found by each at its own threshold, and false alarms: "
-        f"{'; '.join(at_home)}.{beside if family == 'all' else ''}",
+        f"{'; '.join(at_own_threshold)}.{beside if family == 'all' else ''}",
         tie=0.05,
         log_y=False,
     )

@@ -39,9 +39,9 @@ def variants() -> tuple[str, ...]:
 
 
 def _runs(variant: str) -> bool:
-    words = f"import mitsuba as m; m.set_variant({variant!r}); import numpy; "
-    words += "numpy.array(m.render(m.load_dict(m.cornell_box()), spp=1))"
-    return subprocess.run([sys.executable, "-c", words], capture_output=True, check=False).returncode == 0
+    program = f"import mitsuba as m; m.set_variant({variant!r}); import numpy; "
+    program += "numpy.array(m.render(m.load_dict(m.cornell_box()), spp=1))"
+    return subprocess.run([sys.executable, "-c", program], capture_output=True, check=False).returncode == 0
 
 
 def prepare(scene_path: Path, folder: Path, variant: str, threads: int) -> dict[str, race.Runner]:
@@ -82,9 +82,9 @@ def fresh(folder: Path, variant: str, threads: int) -> race.Runner:
 
     def runner(sampling: str, parameter: float, seed: int, path: Path) -> float:
         theirs = path.with_name("mitsuba.exr")
-        words = [folder, variant, sampling, int(parameter), seed, threads, theirs]
+        arguments = [folder, variant, sampling, int(parameter), seed, threads, theirs]
         started = time.perf_counter()
-        subprocess.run([sys.executable, JOB, *map(str, words)], check=True, stdout=subprocess.DEVNULL)
+        subprocess.run([sys.executable, JOB, *map(str, arguments)], check=True, stdout=subprocess.DEVNULL)
         seconds = time.perf_counter() - started
         _as_combined(theirs, path)
         return seconds

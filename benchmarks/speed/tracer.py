@@ -46,8 +46,8 @@ def fresh(scene_path: Path, level: str, threads: int) -> race.Runner:
     modules = {"PYTHONPATH": os.pathsep.join([str(ROOT), *filter(None, sys.path)])}
 
     def runner(sampling: str, parameter: float, seed: int, path: Path) -> float:
-        words = ["--error", str(parameter)] if sampling == "error" else ["--samples", str(int(parameter))]
-        command = [sys.executable, "-m", "viewcam_addon", "render", scene_path, path, "--level", level, *words]
+        options = ["--error", str(parameter)] if sampling == "error" else ["--samples", str(int(parameter))]
+        command = [sys.executable, "-m", "viewcam_addon", "render", scene_path, path, "--level", level, *options]
         command += ["--seed", str(seed), "--threads", str(threads)]
         started = time.perf_counter()
         subprocess.run(command, env=os.environ | bytecode | modules, check=True, stdout=subprocess.DEVNULL)

@@ -12,7 +12,7 @@ from .. import charts
 SWEEPS = (
     "roll",
     "separation",
-    "far_from_home",
+    "far_from_origin",
     "field_of_view",
     "pose_storage",
     "flight",

@@ -2,7 +2,7 @@
 
 The largest error of a component of (u, v, w) against |e − l|, whose powers of ten run over nearly all of float64. Eye and
 look-at are about as far from the origin as from one another, and up points anywhere. What coordinates that are large beside
-|e − l| cost is another sweep (far_from_home.py).
+|e − l| cost is another sweep (far_from_origin.py).
 
 Candidates: the text's formula in float32 and in float64, with the root of the sum of squares (`numpy.linalg.norm` is no other);
 in float64 after a division by the largest component, the usual remedy; Blender's mathutils, which stores float32 and makes

@@ -60,7 +60,7 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
     grazing_depth, grazing = _measured(_grazed, 10.0 ** -np.arange(0.0, 18), rays, flattest=0.0)
     near, near_decisions = _measured(_from_nearby, 10.0 ** -np.arange(0.0, 17), rays)
     stretched, _ = _measured(_stretched, 10.0 ** np.arange(-6.0, 7), rays)
-    homeless, _ = _measured(_far_from_home, 10.0 ** np.arange(0.0, 13), rays)
+    far, _ = _measured(_far_from_origin, 10.0 ** np.arange(0.0, 13), rays)
     depth, share = "largest relative error of the depth", "share of rays for which hit or miss is decided wrongly"
     return (
         Chart(
@@ -137,11 +137,11 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
             tie=SLANTED_TIE,
         ),
         Chart(
-            "spheres-far-from-home",
+            "spheres-far-from-origin",
             "Spheres of a turned object far from the origin: depth",
             "distance of eye and sphere from the origin / radius",
             depth,
-            homeless,
+            far,
             "The others subtract the eye from a centre that was rounded in world space. Ours takes the eye into the object's "
             "space as a pair of float64: its depth does not know where the origin is.",
             tie=SLANTED_TIE,
@@ -178,7 +178,7 @@ def _stretched(scale: float, rays: int, random: np.random.Generator) -> Shots:
     return Shots(matrix, np.zeros((3, rays)), np.ones(rays), np.zeros(3), -x / z, -y / z)
 
 
-def _far_from_home(distance: float, rays: int, random: np.random.Generator) -> Shots:
+def _far_from_origin(distance: float, rays: int, random: np.random.Generator) -> Shots:
     matrix = np.eye(4)
     matrix[:3, :3], _ = np.linalg.qr(random.normal(size=(3, 3)))
     centers = np.repeat(random.normal(size=(3, 1)) * distance, rays, axis=1)

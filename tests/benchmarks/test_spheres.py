@@ -17,7 +17,7 @@ def test_ours_is_the_best_or_tied_everywhere(measured):
     assert [sentence for chart in measured.values() for sentence in chart.behind()] == []
 
 
-@pytest.mark.parametrize("name", ["spheres-distance", "spheres-near", "spheres-stretched", "spheres-far-from-home"])
+@pytest.mark.parametrize("name", ["spheres-distance", "spheres-near", "spheres-stretched", "spheres-far-from-origin"])
 def test_the_depth_of_ours_keeps_its_digits_over_the_whole_sweep(measured, name):
     ours = curve(measured[name], "ours")
     assert max(ours.y) <= spheres.SLANTED_TIE, f"{max(ours.y):.1e}"
@@ -38,7 +38,7 @@ def test_ours_decides_hit_or_miss_right_at_1e13_radii_1e_14_beside_the_silhouett
         ("spheres-grazing", "quadratic, near root c/q, float64", 0.1),
         ("spheres-near", "perpendicular, c/q, float64", 0.01),
         ("spheres-stretched", "textbook's quadratic, float64", 1e-9),
-        ("spheres-far-from-home", "perpendicular, c/q, float64", 1e-5),
+        ("spheres-far-from-origin", "perpendicular, c/q, float64", 1e-5),
     ],
 )
 def test_each_sweep_reaches_the_failure_of_what_was_rejected(measured, chart, method, bound):

@@ -122,7 +122,7 @@ def check_rays(pinhole, rays, places):
 PLACES = np.random.default_rng(3).uniform(0, 1, (30, 2))
 
 
-@pytest.mark.parametrize("name", [name for name in SQUARE if name not in ("far_from_home", "off_the_picture")])
+@pytest.mark.parametrize("name", [name for name in SQUARE if name not in ("far_from_origin", "off_the_picture")])
 def test_mitsuba_sees_through_what_we_write_as_we_do(mitsuba, name):
     scene = mitsuba.load_string(cameras.write([of(name)], "mitsuba"))
     (sensor,) = scene.sensors()

@@ -32,13 +32,13 @@ def test_a_camera_far_from_the_origin_is_told_what_it_costs_and_what_to_do(away,
     assert far.error == pytest.approx(0.2 * 2**-24 * 300 * away / 10, rel=1)
     assert f"the camera stands {away:.1e} from the origin: check with --recenter" in far.sentence
     assert far.sentence in comparison.lines() and comparison.lines()[-1] == comparison.sentence
-    assert comparison.to_json()["far_from_home"]["sentence"] == far.sentence
+    assert comparison.to_json()["far_from_origin"]["sentence"] == far.sentence
 
 
 @pytest.mark.parametrize("away", [0.0, 100.0, 1e4, 1e5])
 def test_near_home_nothing_is_told(away, compared):
     comparison = compared(away)
-    assert comparison.far_from_origin is None and comparison.to_json()["far_from_home"] is None
+    assert comparison.far_from_origin is None and comparison.to_json()["far_from_origin"] is None
     assert not any("--recenter" in line for line in comparison.lines())
 
 
@@ -52,7 +52,7 @@ def test_an_error_that_no_other_origin_mends_is_not_blamed_on_this_one(compared,
     assert comparison.far_from_origin is None
 
 
-def test_an_error_beyond_the_law_has_another_cause(compared):
+def test_an_error_beyond_the_tolerance_has_another_cause(compared):
     comparison = compared(1e6, roundings=10)
     assert not comparison.rows[0].ok and comparison.far_from_origin is None
 

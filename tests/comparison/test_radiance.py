@@ -148,7 +148,7 @@ def test_a_softer_picture_is_said_to_be_softer():
 def test_the_json_is_plain_and_says_what_the_sentence_says(same):
     told = json.loads(json.dumps(same.to_json(), allow_nan=False))
     assert told["passed"] is True and told["sentence"] == same.sentence
-    assert told["quantities"][0]["name"] == "Combined" and len(told["quantities"][0]["questions"]) == 5
+    assert told["quantities"][0]["name"] == "Combined" and len(told["quantities"][0]["hypothesis_tests"]) == 5
     assert told["samples"] == {"reference": 256, "test": 256} and told["equal"] == ["Alpha"]
 
 

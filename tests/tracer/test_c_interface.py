@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from viewcam_addon.image import GEOMETRY_PASSES
 from viewcam_addon.tracer import native
 from viewcam_addon.tracer.scene.value_nodes import KINDS as VALUES
 
@@ -161,7 +162,7 @@ def trace(draw, calls):
         assert calls("occluded", calls.scene, 70, rays, packets, hidden.ctypes.data)
     width, height = calls.size
     planes = np.empty((20, max(width * height, 1)), np.float32)
-    each = (c_void_p * len(native.GEOMETRY))(*(planes[2 * i :].ctypes.data for i in range(len(native.GEOMETRY))))
+    each = (c_void_p * len(GEOMETRY_PASSES))(*(planes[2 * i :].ctypes.data for i in range(len(GEOMETRY_PASSES))))
     first, end = draw(mostly(st.just(0), WHOLE[:5])), draw(mostly(st.just(height), [*WHOLE[:5], 2**32 - 1]))
     calls("render_geometry", calls.scene, first, end, each, planes.shape[1], None)
 

@@ -173,7 +173,7 @@ def test_an_eye_exactly_on_a_sphere_sees_nothing_of_it(make_spheres):
 @settings(max_examples=60)
 @given(seed=SEEDS, digits=st.integers(0, 12))
 @example(seed=0, digits=12)
-def test_a_turned_ellipsoid_far_from_the_origin_is_as_exact_as_one_at_home(make_spheres, random_matrix, seed, digits):
+def test_a_turned_ellipsoid_far_from_the_origin_is_as_exact_as_one_near_it(make_spheres, random_matrix, seed, digits):
     """Eye, centre and matrix are exact float64 numbers; only their difference is small."""
     rng = np.random.default_rng(seed)
     matrix = random_matrix(rng)

@@ -171,11 +171,11 @@ class _Flight:
     def __init__(self, cluster: Cluster, scene: dict, folder: Folder, settings: Mapping[str, str], outputs: Outputs) -> None:
         self._cluster, self._scene, self._folder = cluster, scene, folder
         self._settings, self._outputs = settings, outputs
-        self._flying: dict[str, tuple[Any, Shot]] = {}
-        self._landed: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._pending: dict[str, tuple[Any, Shot]] = {}
+        self._finished: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._suspects: list[Shot] = []
         self._unfit: dict[str, str] = {}
-        self._lonely_since: float | None = None
+        self._without_workers_since: float | None = None
         self._fruitful = False
 
     def outcomes(self, shots: Iterator[Shot | None]) -> Iterator[tuple[Shot, Outcome]]:
@@ -186,7 +186,7 @@ class _Flight:
                     continue
                 self._submit(shot)
                 # One more than there are workers, so that none waits for us between two shots.
-                while len(self._flying) > max(1, len(self._fit())):
+                while len(self._pending) > max(1, len(self._fit())):
                     yield from self._next()
             yield from self._rest()
             for shot in self._suspects:
@@ -195,7 +195,7 @@ class _Flight:
         except _LostError as lost:
             yield from self._lost(InputError(str(lost)))
         finally:
-            for future, _ in self._flying.values():
+            for future, _ in self._pending.values():
                 future.cancel()
 
     def _lost(self, error: InputError) -> Iterator[tuple[Shot, Outcome]]:
@@ -203,7 +203,7 @@ class _Flight:
 
         Raises the error if no shot ever was.
         """
-        shots = [shot for _, shot in self._flying.values()]
+        shots = [shot for _, shot in self._pending.values()]
         records = [self._record(shot) for shot in shots]
         if not self._fruitful and not any(records):
             raise error
@@ -211,7 +211,7 @@ class _Flight:
             yield shot, record or error
 
     def _rest(self) -> Iterator[tuple[Shot, Outcome]]:
-        while self._flying:
+        while self._pending:
             yield from self._next()
 
     def _submit(self, shot: Shot) -> None:
@@ -224,8 +224,8 @@ class _Flight:
             dataclasses.asdict(self._outputs),
         )
         future = self._cluster.submit(shot.name, *arguments, workers=self._fit() if self._unfit else None)
-        self._flying[future.key] = future, shot
-        future.add_done_callback(self._landed.put)
+        self._pending[future.key] = future, shot
+        future.add_done_callback(self._finished.put)
 
     def _fit(self) -> tuple[str, ...]:
         """The workers that may have a shot. Raises _LostError if there are workers, and none of them may."""
@@ -238,23 +238,23 @@ class _Flight:
     def _next(self) -> Iterator[tuple[Shot, Outcome]]:
         """The next outcome, if there is one within a moment."""
         try:
-            future = self._landed.get(timeout=_MOMENT)
+            future = self._finished.get(timeout=_MOMENT)
         except queue.Empty:
             self._look_after_workers()
             return
-        _, shot = self._flying[future.key]
+        _, shot = self._pending[future.key]
         outcome = self._outcome(future, shot)
         if outcome is not None:
             self._fruitful = True
-            del self._flying[future.key]
+            del self._pending[future.key]
             yield shot, outcome
 
     def _look_after_workers(self) -> None:
-        if self._fit() or not self._flying:
-            self._lonely_since = None
-        elif self._lonely_since is None:
-            self._lonely_since = time.monotonic()
-        elif time.monotonic() > self._lonely_since + _WORKERS_WITHIN:
+        if self._fit() or not self._pending:
+            self._without_workers_since = None
+        elif self._without_workers_since is None:
+            self._without_workers_since = time.monotonic()
+        elif time.monotonic() > self._without_workers_since + _WORKERS_WITHIN:
             raise _LostError("all workers are gone: start some, and continue with --resume")
 
     def _outcome(self, future: Any, shot: Shot) -> Outcome | None:
@@ -263,7 +263,7 @@ class _Flight:
             try:
                 said = future.result(timeout=_ANSWER_WITHIN)
             except TimeoutError:  # the worker died with the result, and another one renders the shot again
-                future.add_done_callback(self._landed.put)
+                future.add_done_callback(self._finished.put)
                 return None
             except (OSError, CancelledError):
                 raise
@@ -281,7 +281,7 @@ class _Flight:
             unfit = f"{self._folder.path} is another folder there: share the folder of the pictures among the machines"
         for address in self._cluster.where(future):
             self._unfit[address] = f"the worker {address} can't render: {unfit}"
-        del self._flying[future.key]
+        del self._pending[future.key]
         self._submit(shot)
         return None
 
@@ -293,7 +293,7 @@ class _Flight:
             return InputError(bug(error))
         if shot not in self._suspects:  # Dask means every shot that these workers had: at the end each is tried alone
             self._suspects.append(shot)
-            del self._flying[future.key]
+            del self._pending[future.key]
             return None
         return InputError("every worker that took this shot ended in it: see whether their machines have memory enough")
 

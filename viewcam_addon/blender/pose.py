@@ -69,7 +69,7 @@ def set_rotation(camera_object: bpy.types.Object, turn: Array, before: Sequence[
         errors[candidate] = rotation.largest_error(camera_object.matrix_basis, wanted)
         if errors[candidate] <= _ROUNDING:
             return
-    setattr(camera_object, name, min(errors, key=errors.get))
+    setattr(camera_object, name, min(errors, key=errors.__getitem__))
 
 
 def parent_matrix(camera_object: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Array:

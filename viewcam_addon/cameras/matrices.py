@@ -19,6 +19,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import InputError
+from ..pinhole import Pinhole
 from . import axes, own, texts
 from .camera import Camera, Options
 from .source import Source
@@ -129,7 +130,7 @@ def read(source: Source, options: Options) -> list[Camera]:
     return [texts.mirroring(camera, "The text's camera")]
 
 
-def _projected(to_pixels: np.ndarray, size: tuple[int, int]):
+def _projected(to_pixels: np.ndarray, size: tuple[int, int]) -> tuple[Pinhole, tuple[str, ...]]:
     turn = to_pixels[:, :3]
     if abs(np.linalg.det(turn)) < 1e-30:
         raise InputError("the matrices are flat: copy the camera's view and projection")

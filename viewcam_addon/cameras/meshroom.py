@@ -107,7 +107,7 @@ def _plane(intrinsic: Record, version: tuple[int, ...], options: Options) -> tup
     if version >= (1, 2, 1):
         c_x, c_y = width / 2 + c_x, height / 2 + c_y
     plane = axes.view_plane(f_x, f_y, c_x, c_y, (width, height))
-    notes = ()
+    notes: tuple[str, ...] = ()
     if height > width and "pxFocalLength" not in intrinsic:
         notes = (f"{intrinsic.place} is of upright pictures: its focal length was taken for that of the sensor's width",)
     return plane, notes + _of_lens(intrinsic, kind, plane, options)

@@ -50,7 +50,7 @@ def read(source: Source, options: Options) -> list[Camera]:
         found.append((path or f"view {view.get('id_view')}", poses[pose], *intrinsics[intrinsic]))
     if not found:
         raise InputError(f"none of the {lost} views of {source.name} has a pose: let OpenMVG reconstruct it first")
-    told = (f"{lost} views without a pose were left out",) if lost else ()
+    told: tuple[str, ...] = (f"{lost} views without a pose were left out",) if lost else ()
     if not options.pixel:
         told += ("OpenMVG does not say from where it counts pixels: the principal point was taken from the picture's corner",)
     planes: dict[int, tuple[ViewPlane, tuple[str, ...]]] = {}

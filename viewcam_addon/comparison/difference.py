@@ -17,9 +17,9 @@ from ..files import written_whole
 from ..html_page import figure
 from ..image import Image
 from . import pictures
-from .geometry import GeometryComparison
-from .radiance import RadianceComparison
+from .light_verdict import RadianceComparison
 from .statistics import PassErrors
+from .verdict import GeometryComparison
 
 # sRGB, where nothing was compared.
 _NOTHING = np.full((1, 3), 64, np.uint8)

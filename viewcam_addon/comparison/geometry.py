@@ -19,6 +19,8 @@ from .cameras import conversion_error, systematic_error
 from .far_from_origin import far_from_origin
 from .mismatches import (
     KINDS,
+    PASSES,
+    Errors,
     Mismatches,
     SurfaceAgreement,
     SurfaceAt,
@@ -33,9 +35,7 @@ from .statistics import PassErrors, measure
 from .tolerances import Array, Seen, in_float32
 from .verdict import GeometryComparison, allowed_unexplained
 
-# The passes that are compared with their channels (the third of UV is constant), and which of them both pictures must have.
-_CHANNELS = {"Depth": 1, "Position": 3, "Normal": 3, "UV": 2, "Object Index": 1, "Material Index": 1}
-_UNITS = {"Position": "px", "Position depth": "relative", "Depth": "relative", "Normal": "°", "UV": "absolute"}
+# Which of the passes both pictures must have.
 _NEEDED = ("Depth", "Position", "Object Index")
 # Pixels whose centres are traced again, to see whether the reference shows the scene.
 _ASKED_OF_THE_REFERENCE = 1000
@@ -98,7 +98,8 @@ def compare(
     depth = expected["Depth"][chosen, 0].astype(np.float64)
     systematic = None
     if "Position" in measured:
-        errors["Position depth"] = (np.abs(along[chosen] - depth) / depth, *errors["Depth"][1:])
+        along_errors = (np.abs(along[chosen] - depth) / depth, *errors["Depth"][1:])
+        errors = {"Position": errors["Position"], "Position depth": along_errors} | errors
         if len(chosen):
             off = off_x[chosen], off_y[chosen]
             systematic = systematic_error(pinhole, chosen, *off, errors["Position"][1], renderer.centre)
@@ -116,7 +117,7 @@ def compare(
     error, one_rounding, _ = errors[rows[0].name]
     roundings = error / one_rounding
     far = far_from_origin(pinhole, expected, chosen, rows[0]) if "Position" in measured else None
-    lacking = tuple(name for name in _CHANNELS if name in expected and name not in measured)
+    lacking = tuple(name for name in PASSES if name in expected and name not in measured)
     return GeometryComparison(
         pinhole, stated, hits, rows, mismatches, systematic, conversion, maps, roundings, far, origin, lacking
     )
@@ -130,7 +131,7 @@ def _passes(reference: Image, test: Image, pinhole: Pinhole, partial: bool) -> t
                 f"{image.source} has {image.size[0]} × {image.size[1]} pixels and the camera "
                 f"{pinhole.width} × {pinhole.height}: compare pictures of the same size"
             )
-    names = [name for name in _CHANNELS if name in reference.passes or name in _NEEDED]
+    names = [name for name in PASSES if name in reference.passes or name in _NEEDED]
     expected = {name: reference[name] for name in names} | {
         name: reference[name] for name in _FOR_TOLERANCES if name in reference.passes
     }
@@ -141,12 +142,13 @@ def _passes(reference: Image, test: Image, pinhole: Pinhole, partial: bool) -> t
 
 
 def _flattened(passes: Seen) -> Seen:
-    return {name: values.reshape(-1, values.shape[2])[:, : _CHANNELS.get(name)] for name, values in passes.items()}
+    channels = {name: each.channels for name, each in PASSES.items()}
+    return {name: values.reshape(-1, values.shape[2])[:, : channels.get(name)] for name, values in passes.items()}
 
 
 def _slopes(expected: Seen, hit: NDArray, size: tuple[int, int]) -> dict[str, Array]:
     belongs = np.where(hit, expected["Object Index"][:, 0], -1).reshape(size)
-    names = [name for name in ("Normal", "UV") if name in expected]
+    names = [name for name, each in PASSES.items() if each.has_slope and name in expected]
     return {name: tolerances.slopes(expected[name].reshape(*size, -1), belongs).ravel() for name in names}
 
 
@@ -216,15 +218,14 @@ def _displacement(pinhole: Pinhole, seen: Seen) -> tuple[Array, Array, Array]:
 
 
 def _measure(
-    errors: dict, chosen: NDArray, size: tuple[int, int]
+    errors: dict[str, Errors], chosen: NDArray, size: tuple[int, int]
 ) -> tuple[tuple[PassErrors, ...], dict[str, NDArray[np.float32]]]:
     """The rows and the maps of the chosen pixels."""
     rows, maps = [], {}
-    for name, unit in _UNITS.items():
-        if name not in errors:
-            continue
+    for name, of_pass in errors.items():
+        unit = PASSES[name].unit if name in PASSES else "relative"
         # Tolerances are in radians, people of degrees.
-        error, one_rounding, storage = (np.degrees(figure) if unit == "°" else figure for figure in errors[name])
+        error, one_rounding, storage = (np.degrees(figure) if unit == "°" else figure for figure in of_pass)
         rows.append(measure(name, unit, error, one_rounding, storage))
         flat = np.full(size[0] * size[1], np.nan, dtype=np.float32)
         flat[chosen] = in_float32(error)

@@ -68,8 +68,8 @@ class LightRow:
         names = ("name", "reference", "test", "ratio", "ratio_error", "visible", "broken", "factor", "ok")
         return {
             **{name: getattr(self, name) for name in names},
-            "questions": [test.to_json() for test in self.hypothesis_tests],
-            "steady": self.noise_free and self.noise_free.to_json(),
+            "hypothesis_tests": [test.to_json() for test in self.hypothesis_tests],
+            "noise_free": self.noise_free and self.noise_free.to_json(),
             "edges": self.edges and self.edges.to_json(),
         }
 

@@ -25,6 +25,9 @@ from .tolerances import Array, Seen
 # surface_at(columns, rows, px, py) -> dict of pass name to (n, channels) float32: what rays through sub-pixel positions see.
 SurfaceAt = Callable[[NDArray, NDArray, Array, Array], Seen]
 
+# Of n pixels: the error, what one rounding causes, and what storage and the filter's bias cause, which may be one number.
+Errors = tuple[Array, Array, Array | float]
+
 KINDS = ("not a number", "coverage", "object index", "material index", "surface")
 
 # One pixel in a million may stay unexplained (what was measured on 11.5 million), and none in smaller pictures.
@@ -106,29 +109,10 @@ class SurfaceAgreement:
         slopes = {name: slope[chosen] for name, slope in self.slopes.items()}
         return replace(self, across=self.across[chosen], slopes=slopes)
 
-    def errors(self, expected: Seen, seen: Seen) -> dict[str, tuple[Array, Array, Array | float]]:
-        """For each pass: (error, what one rounding causes, what storage and the filter's bias cause), each (n,).
-
-        The last may be one number. Tolerances are taken at `expected`. Meaningless where either side missed.
-        """
-        depth, centre = expected["Depth"][..., 0].astype(np.float64), self.renderer.centre
-        errors = {
-            "Position": (self.across, tolerances.position_shift(self.pinhole, expected), centre),
-            "Depth": (
-                np.abs(seen["Depth"][..., 0] - depth) / depth,
-                tolerances.depth_error(self.pinhole, expected),
-                self.renderer.depth_storage(depth) + centre * tolerances.depth_slope(self.pinhole, expected),
-            ),
-        }
-        if "Normal" in self.slopes and "Normal" in seen:
-            one_rounding = tolerances.normal_error(self.pinhole, expected, self.slopes["Normal"])
-            floor = self.renderer.normal + centre * self.slopes["Normal"]
-            errors["Normal"] = (tolerances.angle_between(expected["Normal"], seen["Normal"]), one_rounding, floor)
-        if "UV" in self.slopes and "UV" in seen:
-            apart = np.abs(expected["UV"][..., :2].astype(np.float64) - seen["UV"][..., :2]).max(axis=-1)
-            floor = tolerances.uv_storage(expected) + centre * self.slopes["UV"]
-            errors["UV"] = (apart, tolerances.uv_error(self.pinhole, expected, self.slopes["UV"]), floor)
-        return errors
+    def errors(self, expected: Seen, seen: Seen) -> dict[str, Errors]:
+        """Of each pass that both sides have; tolerances are taken at `expected`. Meaningless where either side missed."""
+        there = [(name, each.errors) for name, each in PASSES.items() if name in expected and name in seen]
+        return {name: errors(self, expected, seen) for name, errors in there if errors}
 
     def same_surface(self, expected: Seen, seen: Seen) -> NDArray[np.bool_]:
         """(n,) bool: equal indices, and every pass within tolerance; or a miss on both sides."""
@@ -145,6 +129,51 @@ class SurfaceAgreement:
             if name in expected and name in seen:
                 same &= expected[name][..., 0] == seen[name][..., 0]
         return same & _within(*self.errors(expected, seen)["Depth"])
+
+
+def _position_errors(agreement: SurfaceAgreement, expected: Seen, _seen: Seen) -> Errors:
+    return agreement.across, tolerances.position_shift(agreement.pinhole, expected), agreement.renderer.centre
+
+
+def _depth_errors(agreement: SurfaceAgreement, expected: Seen, seen: Seen) -> Errors:
+    depth, renderer = expected["Depth"][..., 0].astype(np.float64), agreement.renderer
+    floor = renderer.depth_storage(depth) + renderer.centre * tolerances.depth_slope(agreement.pinhole, expected)
+    return np.abs(seen["Depth"][..., 0] - depth) / depth, tolerances.depth_error(agreement.pinhole, expected), floor
+
+
+def _normal_errors(agreement: SurfaceAgreement, expected: Seen, seen: Seen) -> Errors:
+    slope, renderer = agreement.slopes["Normal"], agreement.renderer
+    one_rounding = tolerances.normal_error(agreement.pinhole, expected, slope)
+    return tolerances.angle_between(expected["Normal"], seen["Normal"]), one_rounding, renderer.normal + renderer.centre * slope
+
+
+def _uv_errors(agreement: SurfaceAgreement, expected: Seen, seen: Seen) -> Errors:
+    slope = agreement.slopes["UV"]
+    apart = np.abs(expected["UV"][..., :2].astype(np.float64) - seen["UV"][..., :2]).max(axis=-1)
+    floor = tolerances.uv_storage(expected) + agreement.renderer.centre * slope
+    return apart, tolerances.uv_error(agreement.pinhole, expected, slope), floor
+
+
+@dataclass(frozen=True)
+class ComparedPass:
+    """channels : the first of them. unit : of its figures. errors : as of `SurfaceAgreement`; without, they must be equal.
+    has_slope : whether its slope counts.
+    """
+
+    channels: int
+    unit: str = ""
+    errors: Callable[[SurfaceAgreement, Seen, Seen], Errors] | None = None
+    has_slope: bool = False
+
+
+PASSES = {
+    "Position": ComparedPass(3, "px", _position_errors),
+    "Depth": ComparedPass(1, "relative", _depth_errors),
+    "Normal": ComparedPass(3, "°", _normal_errors, has_slope=True),
+    "UV": ComparedPass(2, "absolute", _uv_errors, has_slope=True),  # the third channel is constant
+    "Object Index": ComparedPass(1),
+    "Material Index": ComparedPass(1),
+}
 
 
 def kinds_of(expected: Seen, seen: Seen, agreement: SurfaceAgreement) -> NDArray[np.intp]:

@@ -16,6 +16,7 @@ Rejected: SciPy, for one function, which an add-on inside Blender does not have.
 """
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
@@ -147,7 +148,7 @@ def _log_beta(a: Array) -> Array:
     return np.vectorize(lambda one: math.lgamma(one) + math.lgamma(0.5) - math.lgamma(one + 0.5))(a)
 
 
-def _bisected(too_low, low: float, high: float) -> float:
+def _bisected(too_low: Callable[[float], bool], low: float, high: float) -> float:
     for _ in range(80):
         middle = (low + high) / 2.0
         low, high = (middle, high) if too_low(middle) else (low, middle)

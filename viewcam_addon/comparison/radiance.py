@@ -86,7 +86,8 @@ def judge(reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_sampl
     freedom = (max(min(samples[0] or 2, VARIANCE_BATCHES) - 1, 1), max(seeds - 1, 1))
     rounding = noise_free.Rounding(pinhole, reference, tests[0], max(filter(None, samples), default=1))
 
-    rows, maps = [], {}
+    rows: list[LightRow] = []
+    maps: dict[str, NDArray] = {}
     for sides in unequal:
         if is_noisy:
             row, drawn = _noisy(sides, rounding, freedom, FALSE_ALARMS / len(unequal))

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..image import Image
 from . import charts, difference, page, pictures
-from .geometry import GeometryComparison
+from .verdict import GeometryComparison
 
 # Under the loupe: so many mismatches, the unexplained ones first.
 _MOST_CROPS = 8

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..image import Image
+from ..image import LIGHT_PASSES, SETTINGS, Image
 from .mismatches import largest_around
 from .tolerances import FLOAT32, Array
 
-QUANTITIES = ("Combined", "Alpha", "Emission", "Environment", "Diffuse Direct", "Diffuse Indirect", "Diffuse Color")
+QUANTITIES = ("Combined", "Alpha", *(name for name in LIGHT_PASSES if name in SETTINGS))
 _TIMES_COLOUR = ("Diffuse Direct", "Diffuse Indirect")
 CHANNEL_NAMES = ("red", "green", "blue")
 

@@ -172,9 +172,7 @@ def slopes(values: NDArray, belongs: NDArray) -> Array:
     values = values.astype(np.float64)
     slope = np.zeros(values.shape[:2])
     for axis in (0, 1):
-        here, there = (slice(None, -1), slice(1, None))
-        if axis == 1:
-            here, there = (slice(None), here), (slice(None), there)
+        here, there = ((*(slice(None),) * axis, side) for side in (slice(None, -1), slice(1, None)))
         step = np.linalg.norm(values[there] - values[here], axis=-1)
         step[(belongs[there] != belongs[here]) | (belongs[here] < 0) | ~np.isfinite(step)] = 0.0
         slope[here] = np.maximum(slope[here], step)

@@ -72,7 +72,7 @@ class GeometryComparison:
     def sentence(self) -> str:
         """The verdict in one sentence, which names the gravest fault where there is one."""
         if self.passed:
-            return _praise(self)
+            return _agreement(self)
         if self.hits == (0, 0):
             return "Nothing to compare: no pixel of either picture shows an object, point the camera at something."
         return "Not the same picture: " + "; ".join(_faults(self)[:_MOST_FAULTS]) + "."
@@ -129,7 +129,7 @@ class GeometryComparison:
             },
             "systematic": self.systematic and self.systematic.to_json(),
             "conversion": self.conversion and self.conversion.to_json(),
-            "far_from_home": self.far_from_origin and self.far_from_origin.to_json(),
+            "far_from_origin": self.far_from_origin and self.far_from_origin.to_json(),
             "origin": list(self.origin),
             "not_compared": list(self.lacking),
         }
@@ -149,7 +149,7 @@ def _row_line(row: PassErrors) -> str:
     return f"{row.name:<16}{row.count:>11,}{figures}  {row.unit:<10}{used}{mark(row.ok)}"
 
 
-def _praise(comparison: GeometryComparison) -> str:
+def _agreement(comparison: GeometryComparison) -> str:
     first = comparison.rows[0]
     count = len(comparison.mismatches.kinds)
     edges = f"; {count:,} on edges, {_explained(comparison)}" if count else ""

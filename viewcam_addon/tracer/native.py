@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..image import GEOMETRY_PASSES, LIGHT_PASSES
 from ..pinhole import Pinhole
 from .scene import Mesh, Object, Scene, Spheres, placing
 from .scene.colours import WHITE
@@ -33,18 +34,8 @@ from .scene.shader_nodes import KINDS, Closure, Node
 from .scene.value_nodes import OWN
 from .tiles import Passes
 
-GEOMETRY = ("Depth", "Position", "Normal", "UV", "Object Index", "Material Index", "Magnitude", "Facing")
-"""The passes of level `geometry`, as capi.h numbers them."""
-LIGHT = (
-    "Combined",
-    "Emission",
-    "Environment",
-    "Diffuse Direct",
-    "Diffuse Indirect",
-    "Diffuse Color",
-    "Variance",
-    "Sample Count",
-)
+LIGHT = (*LIGHT_PASSES, "Sample Count")
+"""The passes of light, as capi_light.h has them."""
 NO_HIT = 0xFFFFFFFF
 """In place of the number of what is met, where nothing is."""
 TILE = 32
@@ -452,7 +443,7 @@ class CoreScene:
         nodes[node] = len(nodes)
 
     def render_geometry(self, passes: Passes, rows: range, stop: Any = None) -> None:
-        """Write the surfaces at the centres of some rows' pixels into those of `GEOMETRY` that are asked for.
+        """Write the surfaces at the centres of some rows' pixels into those of GEOMETRY_PASSES that are asked for.
 
         passes : name → (height, width, channels) float32, of planes: each channel in one piece of memory.
         """
@@ -657,7 +648,7 @@ def described_closure(closure: Closure, images: Mapping[str, int], nodes: Mappin
 
 def _planes(passes: Passes, stride: int) -> Any:
     addresses = []
-    for name in GEOMETRY:
+    for name in GEOMETRY_PASSES:
         values = passes.get(name)
         if values is not None and values.size:
             channels = np.moveaxis(values, -1, 0).reshape(values.shape[-1], -1)
@@ -666,7 +657,7 @@ def _planes(passes: Passes, stride: int) -> Any:
             addresses.append(channels.ctypes.data)
         else:
             addresses.append(None)
-    return (c_void_p * len(GEOMETRY))(*addresses)
+    return (c_void_p * len(GEOMETRY_PASSES))(*addresses)
 
 
 def _used(scene: Scene) -> set[str]:

@@ -341,11 +341,11 @@ def test_the_sentence_is_the_childs_own_where_it_has_one(said, status, sentence)
         ),
         ({"passes": [{"name": "Position", "percentiles": {}}], "ledger": []}, [("Modelled", "0 of 0 objects")]),
         (
-            {"quantities": [{"ratio": 1.000123, "ratio_error": 3.1e-4, "steady": None}], "ledger": []},
+            {"quantities": [{"ratio": 1.000123, "ratio_error": 3.1e-4, "noise_free": None}], "ledger": []},
             [("Light, to Tracer's", "1.00012 ± 0.00031"), ("Modelled", "0 of 0 objects")],
         ),
         (
-            {"quantities": [{"steady": {"percentiles": {"p50": {"value": 0.0}, "p99.9": {"value": 2e-7}}}}], "ledger": []},
+            {"quantities": [{"noise_free": {"percentiles": {"p50": {"value": 0.0}, "p99.9": {"value": 2e-7}}}}], "ledger": []},
             [("Median", "0 of the light"), ("99.9 % within", "0.0000002 of the light"), ("Modelled", "0 of 0 objects")],
         ),
     ],

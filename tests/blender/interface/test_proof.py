@@ -139,9 +139,12 @@ def test_escape_during_playback_ends_the_playback_and_not_the_comparison(monkeyp
             "Identical to 0.0003 px",
         ),
         ({"passed": True, "passes": [{"name": "Position", "percentiles": {}}]}, "Identical"),
-        ({"passed": True, "quantities": [{"steady": None, "ratio_error": 3e-4}]}, "The same light, but for noise of 0.03 %"),
         (
-            {"passed": True, "quantities": [{"steady": {"percentiles": {"max": {"value": 2e-7}}}}]},
+            {"passed": True, "quantities": [{"noise_free": None, "ratio_error": 3e-4}]},
+            "The same light, but for noise of 0.03 %",
+        ),
+        (
+            {"passed": True, "quantities": [{"noise_free": {"percentiles": {"max": {"value": 2e-7}}}}]},
             "Identical to 0.00002 % of the light",
         ),
         ({"passed": False}, "Cycles renders another picture"),

@@ -6,7 +6,7 @@ bpy = pytest.importorskip("bpy")
 
 import viewcam_addon
 from viewcam_addon.blender.interface import render_panels
-from viewcam_addon.blender.rendering import engine
+from viewcam_addon.image import SETTINGS
 
 
 def engines_of_panels():
@@ -71,6 +71,6 @@ def test_what_the_lamps_panel_shows_is_there_and_named_once(scene, kind):
 
 def test_passes_in_the_panel_are_those_that_the_tracer_computes(scene):
     layer = scene.view_layers[0]
-    assert not [name for name in engine.ASKED_BY.values() if not hasattr(layer, name)]
+    assert not [name for name in SETTINGS.values() if not hasattr(layer, name)]
     shown = {name for names in (render_panels.GEOMETRY_PASSES, render_panels.LIGHT_PASSES) for name in names}
-    assert set(engine.ASKED_BY) <= shown
+    assert set(SETTINGS) <= shown

@@ -12,7 +12,8 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon import image
 from viewcam_addon.blender import versions
-from viewcam_addon.blender.rendering import engine, job, tracing
+from viewcam_addon.blender.rendering import job, tracing
+from viewcam_addon.image import SETTINGS
 from viewcam_addon.tracer import render as renders
 from viewcam_addon.tracer.render import render
 
@@ -79,7 +80,7 @@ def traced(level="path", samples=SAMPLES, seed=SEED):
 
 
 def ask_for_all_passes(view_layer):
-    for property_name in engine.ASKED_BY.values():
+    for property_name in SETTINGS.values():
         setattr(view_layer, property_name, True)
     bpy.context.scene.virtual_pinhole_reference.use_pass_variance = True
 
@@ -89,7 +90,7 @@ def test_every_pass_is_what_the_tracer_computes_bit_for_bit(lit, write, level):
     lit.virtual_pinhole_reference.level = level.upper()
     ask_for_all_passes(lit.view_layers[0])
     found, expected = write(), traced("geometry") | traced(level)
-    for name in ("Combined", *engine.ASKED_BY, "Variance"):
+    for name in ("Combined", *SETTINGS, "Variance"):
         values = written(name, found)
         if name in expected:
             assert np.array_equal(values, expected[name]), f"{name} differs by up to {np.abs(values - expected[name]).max()}"

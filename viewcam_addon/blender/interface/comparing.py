@@ -256,8 +256,8 @@ def headline(result: dict[str, Any]) -> str:
         if row["percentiles"]:
             return f"Identical to {plain(row['percentiles']['max']['value'])} px"
     for light in result.get("quantities", ())[:1]:  # Combined
-        if light["steady"] and light["steady"]["percentiles"]:
-            return f"Identical to {plain(100 * light['steady']['percentiles']['max']['value'])} % of the light"
+        if light["noise_free"] and light["noise_free"]["percentiles"]:
+            return f"Identical to {plain(100 * light['noise_free']['percentiles']['max']['value'])} % of the light"
         if light["ratio_error"] is not None:
             return f"The same light, but for noise of {plain(100 * light['ratio_error'])} %"
     return "Identical"
@@ -278,8 +278,8 @@ def figures(result: dict[str, Any]) -> list[tuple[str, str]]:
         count, explained = (sum(kind[name] for kind in kinds) for name in ("count", "explained"))
         rows.append(("Mismatches", f"{count:,}" + (f", {_of_all(explained, count)} explained" if count else "")))
     for light in result.get("quantities", ())[:1]:  # Combined
-        if light["steady"]:
-            rows += _percentiles(light["steady"], "of the light")
+        if light["noise_free"]:
+            rows += _percentiles(light["noise_free"], "of the light")
         else:
             ratio = "nothing" if light["ratio"] is None else f"{light['ratio']:.5f} ± {plain(light['ratio_error'])}"
             rows.append(("Light, to Tracer's", ratio))

@@ -12,8 +12,8 @@ from typing import ClassVar
 
 import bpy
 
-from ...image import GEOMETRY_PASSES, LIGHT_PASSES
-from ..rendering.engine import ASKED_BY, VIEWCAM_RenderEngine
+from ...image import GEOMETRY_PASSES, LIGHT_PASSES, SETTINGS
+from ..rendering.engine import VIEWCAM_RenderEngine
 
 ENGINE = VIEWCAM_RenderEngine.bl_idname
 
@@ -103,8 +103,8 @@ class VIEWCAM_VIEWLAYER_PT_passes(_Panel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         for heading, passes in (("Data", GEOMETRY_PASSES), ("Light", LIGHT_PASSES)):
             column = self.column(heading=heading)
-            for name in filter(ASKED_BY.get, passes):
-                column.prop(context.view_layer, ASKED_BY[name], text=name)
+            for name in filter(SETTINGS.get, passes):
+                column.prop(context.view_layer, SETTINGS[name], text=name)
         column.prop(context.scene.virtual_pinhole_reference, "use_pass_variance")
 
 

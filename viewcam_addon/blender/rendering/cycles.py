@@ -16,6 +16,7 @@ import bpy
 
 from ...errors import InputError
 from ...files import written_whole
+from ...image import GEOMETRY_PASSES, LIGHT_PASSES, SETTINGS
 from ...tracer.scene.film import Bounces, Film
 from .. import versions
 from ..scenes import film
@@ -41,9 +42,7 @@ _SAMPLING = {
     "use_camera_cull": False,
     "use_distance_cull": False,
 }
-_PASSES = ("combined", "z", "position", "normal", "uv", "object_index", "material_index")
-_PASSES_OF_LIGHT = ("combined", "emit", "environment", "diffuse_direct", "diffuse_indirect", "diffuse_color")
-_PASSES_OF_CENTRES = ("z", "object_index")
+_PASSES_OF_CENTRES = ("Depth", "Object Index")
 
 # Pixels independent of each other, and nothing left out or guessed.
 _LIGHT = {
@@ -136,11 +135,11 @@ def override_settings(
     """Everything but the file; benchmarks render without one."""
     overrides.set(scene.render, "engine", "CYCLES")
     override_all(overrides, scene.cycles, _SAMPLING)
-    passes = _PASSES
+    passes = GEOMETRY_PASSES
     if light:
         overrides.set(scene.render, "film_transparent", light.film.transparent)
         override_all(overrides, scene.cycles, _LIGHT | _settings_of(light))
-        passes = _PASSES_OF_LIGHT + (_PASSES_OF_CENTRES if light.samples == 1 else ())
+        passes = LIGHT_PASSES + (_PASSES_OF_CENTRES if light.samples == 1 else ())
     _override_passes(overrides, view_layer, passes)
 
 
@@ -176,8 +175,8 @@ def override_all(overrides: Overrides, owner: bpy.types.bpy_struct, settings: di
 
 def _override_passes(overrides: Overrides, view_layer: bpy.types.ViewLayer, passes: Iterable[str]) -> None:
     """Passes beside those that are on; surfaces, without hair and volumes."""
-    for name in passes:
-        overrides.set(view_layer, f"use_pass_{name}", True)
+    for setting in ("use_pass_combined", *(SETTINGS[name] for name in passes if name in SETTINGS)):
+        overrides.set(view_layer, setting, True)
     overrides.set(view_layer, "use_strand", False)
     overrides.set(view_layer, "use_volumes", False)
 

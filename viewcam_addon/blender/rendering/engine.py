@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ... import errors
 from ...errors import InputError
-from ...image import BACKGROUND_DEPTH, CHANNELS, GEOMETRY_PASSES
+from ...image import BACKGROUND_DEPTH, CHANNELS, GEOMETRY_PASSES, SETTINGS
 from ...terminal import plain
 from ...tracer.scene import Scene
 from ...tracer.scene.film import LEVELS
@@ -33,21 +33,6 @@ from ..scenes import export
 from ..scenes.depsgraph import only_cameras_changed
 from ..scenes.ledger import Ledger
 from . import tracing
-
-# The property of a view layer that asks for each pass. Combined is always there.
-ASKED_BY = {
-    "Depth": "use_pass_z",
-    "Position": "use_pass_position",
-    "Normal": "use_pass_normal",
-    "UV": "use_pass_uv",
-    "Object Index": "use_pass_object_index",
-    "Material Index": "use_pass_material_index",
-    "Diffuse Direct": "use_pass_diffuse_direct",
-    "Diffuse Indirect": "use_pass_diffuse_indirect",
-    "Diffuse Color": "use_pass_diffuse_color",
-    "Emission": "use_pass_emit",
-    "Environment": "use_pass_environment",
-}
 
 _GEOMETRY = LEVELS[0]
 
@@ -62,7 +47,8 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
     # what Blender does not tell of.
     keeps_scene = False
     # Of the last picture: the level at which it was traced, and what is not modelled as it is, one sentence each.
-    level, warnings = _GEOMETRY, ()
+    level = _GEOMETRY
+    warnings: tuple[str, ...] = ()
     _keeper = None
     _read = None  # what it was read for, and the scene
 
@@ -166,7 +152,7 @@ def _lit_from_the_eye(passes: Passes) -> NDArray[np.float32]:
 
 def _asked_for(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Iterator[str]:
     yield "Combined"
-    yield from (name for name, asked_by in ASKED_BY.items() if getattr(view_layer, asked_by))
+    yield from (name for name, setting in SETTINGS.items() if getattr(view_layer, setting))
     if scene.virtual_pinhole_reference.use_pass_variance:
         yield "Variance"
 

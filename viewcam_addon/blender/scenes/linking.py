@@ -40,7 +40,7 @@ class Links:
         return receivers, blockers
 
     def _named(self, collection: bpy.types.Collection) -> _Names:
-        states = {}
+        states: dict[str, str] = {}
         for child, child_link in zip(collection.children, collection.collection_children, strict=True):
             states |= dict.fromkeys((block.name for block in child.all_objects), child_link.light_linking.link_state)
         for block, link in zip(collection.objects, collection.collection_objects, strict=True):

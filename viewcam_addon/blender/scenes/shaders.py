@@ -57,89 +57,46 @@ _LUMINANCE = (0.2126390, 0.7151687, 0.0721923)
 class Shader:
     """A type of the tracer's shader nodes as Blender has it.
 
-    kind : the node's type; class_name : its class. inputs : ours → theirs. words : ours → the property that has the word.
+    kind : the node's type. inputs : ours → theirs. words : ours → the property that has the word.
     neutral : of inputs that are not modelled, the value without which a shader is only approximated.
     """
 
     kind: str
-    class_name: str
     inputs: dict[str, str | int]
-    words: dict[str, str] = field(default_factory=dict)
-    neutral: dict[str, float] = field(default_factory=dict)
+    words: dict[str, str]
+    neutral: dict[str, float]
+
+    @property
+    def class_name(self) -> str:
+        return "ShaderNode" + self.kind.title().replace("_", "")
 
 
-_DISTRIBUTION = {"distribution": "distribution"}
-_NORMAL = {"normal": "Normal"}
-_ANISOTROPY = {"anisotropy": "Anisotropy", "rotation": "Rotation", "tangent": "Tangent"}
-_THICKNESS = {"Thin Film Thickness": 0.0}
-SHADERS = {
-    "diffuse": Shader("BSDF_DIFFUSE", "ShaderNodeBsdfDiffuse", {"color": "Color", "roughness": "Roughness"} | _NORMAL),
-    "translucent": Shader("BSDF_TRANSLUCENT", "ShaderNodeBsdfTranslucent", {"color": "Color"} | _NORMAL),
-    "glossy": Shader(
-        "BSDF_GLOSSY",
-        "ShaderNodeBsdfGlossy",
-        {"color": "Color", "roughness": "Roughness"} | _ANISOTROPY | _NORMAL,
-        _DISTRIBUTION,
-    ),
-    "sheen": Shader("BSDF_SHEEN", "ShaderNodeBsdfSheen", {"color": "Color", "roughness": "Roughness"} | _NORMAL, _DISTRIBUTION),
-    "metallic": Shader(
-        "BSDF_METALLIC",
-        "ShaderNodeBsdfMetallic",
-        {"color": "Base Color", "edge_tint": "Edge Tint", "ior": "IOR", "extinction": "Extinction", "roughness": "Roughness"}
-        | _ANISOTROPY
-        | _NORMAL,
-        _DISTRIBUTION | {"fresnel": "fresnel_type"},
-        _THICKNESS,
-    ),
-    "glass": Shader(
-        "BSDF_GLASS",
-        "ShaderNodeBsdfGlass",
-        {"color": "Color", "roughness": "Roughness", "ior": "IOR"} | _NORMAL,
-        _DISTRIBUTION,
-        _THICKNESS,
-    ),
-    "refraction": Shader(
-        "BSDF_REFRACTION",
-        "ShaderNodeBsdfRefraction",
-        {"color": "Color", "roughness": "Roughness", "ior": "IOR"} | _NORMAL,
-        _DISTRIBUTION,
-    ),
-    "transparent": Shader("BSDF_TRANSPARENT", "ShaderNodeBsdfTransparent", {"color": "Color"}),
-    "emission": Shader("EMISSION", "ShaderNodeEmission", {"color": "Color", "strength": "Strength"}),
-    "principled": Shader(
-        "BSDF_PRINCIPLED",
-        "ShaderNodeBsdfPrincipled",
-        {
-            "base_color": "Base Color",
-            "metallic": "Metallic",
-            "roughness": "Roughness",
-            "ior": "IOR",
-            "diffuse_roughness": "Diffuse Roughness",
-            "specular_ior_level": "Specular IOR Level",
-            "specular_tint": "Specular Tint",
-            "anisotropic": "Anisotropic",
-            "anisotropic_rotation": "Anisotropic Rotation",
-            "tangent": "Tangent",
-            "transmission_weight": "Transmission Weight",
-            "coat_weight": "Coat Weight",
-            "coat_roughness": "Coat Roughness",
-            "coat_ior": "Coat IOR",
-            "coat_tint": "Coat Tint",
-            "sheen_weight": "Sheen Weight",
-            "sheen_roughness": "Sheen Roughness",
-            "sheen_tint": "Sheen Tint",
-            "emission_color": "Emission Color",
-            "emission_strength": "Emission Strength",
-            "alpha": "Alpha",
-            "coat_normal": "Coat Normal",
-        }
-        | _NORMAL,
-        _DISTRIBUTION,
-        _THICKNESS | {"Subsurface Weight": 0.0, "Thin Wall": 0.0},
-    ),
-    "mix": Shader("MIX_SHADER", "ShaderNodeMixShader", {"factor": 0, "first": 1, "second": 2}),
-    "add": Shader("ADD_SHADER", "ShaderNodeAddShader", {"first": 0, "second": 1}),
+# Blender's names are ours in its spelling, but for these; and what it has that is not modelled.
+_TYPES = {"emission": "EMISSION", "mix": "MIX_SHADER", "add": "ADD_SHADER"}
+_NAMES: dict[str, dict[str, str | int]] = {
+    "metallic": {"color": "Base Color"},
+    "mix": {"factor": 0, "first": 1, "second": 2},
+    "add": {"first": 0, "second": 1},
 }
+_PROPERTIES = {"fresnel": "fresnel_type"}
+_NEUTRAL = {
+    "metallic": {"Thin Film Thickness": 0.0},
+    "glass": {"Thin Film Thickness": 0.0},
+    "principled": {"Thin Film Thickness": 0.0, "Subsurface Weight": 0.0, "Thin Wall": 0.0},
+}
+
+
+def _shader(ours: str) -> Shader:
+    inputs, words = {}, {}
+    for name, default in KINDS[ours].inputs.items():
+        if isinstance(default, tuple) and isinstance(default[0], str):
+            words[name] = _PROPERTIES.get(name, name)
+        else:
+            inputs[name] = _NAMES.get(ours, {}).get(name, name.replace("_", " ").title().replace("Ior", "IOR"))
+    return Shader(_TYPES.get(ours, f"BSDF_{ours.upper()}"), inputs, words, _NEUTRAL.get(ours, {}))
+
+
+SHADERS = {ours: _shader(ours) for ours, kind in KINDS.items() if not kind.is_value}
 # Blender's words, where they are others than ours in capitals.
 _WORDS = {"multiscatter_ggx": "MULTI_GGX"}
 

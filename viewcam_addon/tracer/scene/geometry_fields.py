@@ -44,7 +44,7 @@ def geometry(field: Field, arrays: Arrays) -> Mesh | Spheres:
     if kind.text() not in readers:
         kind.fail(f"is {shown(kind.value)}: give one of {', '.join(readers)}")
     try:
-        return readers[kind.value](field, arrays)
+        return readers[kind.text()](field, arrays)
     except InputError as error:
         field.hand_on(error)
 

@@ -18,7 +18,7 @@ RGB = tuple[float, float, float]
 
 GREY = (0.8, 0.8, 0.8)
 # How facets are stretched along a tangent.
-ANISOTROPY = {"anisotropy": 0.0, "rotation": 0.0, "tangent": value_nodes.TANGENT}
+ANISOTROPY: dict[str, value_nodes.Default | None] = {"anisotropy": 0.0, "rotation": 0.0, "tangent": value_nodes.TANGENT}
 DISTRIBUTIONS = ("multiscatter_ggx", "ggx", "beckmann")
 
 

@@ -1,4 +1,4 @@
-"""Scenes far from home: a camera and maps at any place of the world, and both sides compared with the origin at the eye.
+"""Scenes far from the origin: a camera and maps at any place of the world, and both sides compared with the origin at the eye.
 
 What is rendered is compared with the plain export of the same file, less the eye in float64: whatever moves an object or a
 vertex, it must have moved along.

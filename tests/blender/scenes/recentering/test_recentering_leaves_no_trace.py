@@ -1,4 +1,4 @@
-"""Far from home: the file stays as it is, and what did not come along is named."""
+"""Far from the origin: the file stays as it is, and what did not come along is named."""
 
 import math
 

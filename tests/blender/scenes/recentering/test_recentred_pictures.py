@@ -1,4 +1,4 @@
-"""Far from home: with the origin at the eye both sides show the file's scene to a thousandth of a pixel."""
+"""Far from the origin: with the origin at the eye both sides show the file's scene to a thousandth of a pixel."""
 
 import json
 from dataclasses import replace
@@ -268,10 +268,10 @@ def test_the_command_as_its_users_type_it(look, scene, tmp_path, capfd, add_map)
     main(words)
     plain = json.loads(result.read_text())
     told = capfd.readouterr().out
-    assert plain["far_from_home"]["error"] > 0.5 and plain["far_from_home"]["sentence"] in told
+    assert plain["far_from_origin"]["error"] > 0.5 and plain["far_from_origin"]["sentence"] in told
     assert main([*words, "--recenter"]) == 0
     recentred = json.loads(result.read_text())
-    assert recentred["far_from_home"] is None and recentred["origin"] == np.add(ECEF, (6.2, -7.3, 4.123456789)).tolist()
+    assert recentred["far_from_origin"] is None and recentred["origin"] == np.add(ECEF, (6.2, -7.3, 4.123456789)).tolist()
     assert recentred["passes"][0]["percentiles"]["p99"]["value"] < 1e-3
     scene_path = tmp_path / "scene.json"
     assert main(["export", str(path), str(scene_path), "--recenter"]) == 0

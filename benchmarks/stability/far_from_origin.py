@@ -38,8 +38,8 @@ Array = NDArray[np.float64]
 WIDTH, HEIGHT, DISTANCE = 120, 90, 150
 # Picture coordinates up to 120 in float64: x and z by three products and their sums each, one quotient, d and the centre.
 ARITHMETIC = 16 * 2.0**-53 * WIDTH
-# What one rounding costs at home: 2⁻²⁴ · d · (M + t)/z with M and t of at most 30 and z of at least 5 units.
-AT_HOME = 2.0**-24 * DISTANCE * 60 / 5
+# What one rounding costs near the origin: 2⁻²⁴ · d · (M + t)/z with M and t of at most 30 and z of at least 5 units.
+NEAR_ORIGIN = 2.0**-24 * DISTANCE * 60 / 5
 
 
 def charts(quick: bool = False) -> tuple[Chart, ...]:
@@ -52,13 +52,13 @@ def charts(quick: bool = False) -> tuple[Chart, ...]:
     )
     return (
         Chart(
-            "far-from-home",
+            "far-from-origin",
             "Far from the origin",
             "coordinates of camera and scene [units]",
             "median error [px], d = 150 px, 10 units away",
             tuple(curves),
             reading,
-            AT_HOME,
+            NEAR_ORIGIN,
         ),
     )
 
