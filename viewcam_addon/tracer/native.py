@@ -25,7 +25,7 @@ from ..errors import InputError
 from ..image import GEOMETRY_PASSES, LIGHT_PASSES
 from ..pinhole import Pinhole
 from .scene import Mesh, Object, Scene, Spheres, placing
-from .scene.colours import WHITE
+from .scene.colours import TEXELS, WHITE
 from .scene.film import FILTERS
 from .scene.lamps import RAYS, Area, Lamp, Point, Spot, Sun, World
 from .scene.materials import PLAIN, Colour, Material
@@ -164,7 +164,7 @@ class _Core(Structure):
         ("closest", _function(c_int, c_void_p, c_size_t, c_void_p, c_uint32, c_int, c_void_p, c_void_p, c_void_p)),
         ("occluded", _function(c_int, c_void_p, c_size_t, c_void_p, c_int, c_void_p)),
         ("clear_light", _function(c_int, c_void_p)),
-        ("add_texture", _function(c_int, c_void_p, c_int, c_int, c_int, c_int, c_void_p)),
+        ("add_texture", _function(c_int, c_void_p, *[c_int] * 5, c_void_p)),
         ("add_node", _function(c_int, c_void_p, POINTER(_Node))),
         ("constant_node", _function(c_int, c_void_p, c_void_p, POINTER(c_int))),
         ("add_material", _function(c_int, c_void_p, c_void_p, c_int, c_int)),
@@ -429,8 +429,8 @@ class CoreScene:
     def _add_texture(self, scene: Scene, name: str) -> None:
         picture = scene.images[name]
         height, width, channels = picture.pixels.shape
-        pixels = array(picture.pixels, np.float32, (height, width, channels))
-        self.check(self.core.add_texture(self.handle, width, height, channels, picture.srgb, _address(pixels)))
+        texel = TEXELS.index(picture.pixels.dtype)  # the pixels are read in place: the scene has them
+        self.check(self.core.add_texture(self.handle, width, height, channels, picture.srgb, texel, _address(picture.pixels)))
 
     def add_nodes(self, node: Node, images: Mapping[str, int], nodes: dict[Node, int]) -> None:
         """Add a node that makes values after those that feed it. nodes : the numbers of those that are there."""

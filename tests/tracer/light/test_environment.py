@@ -24,11 +24,11 @@ def room():
     return Picture(pixels)
 
 
-def light_of(make_lit, make_mesh, surface, world, picture, level="direct", samples=64, camera=DOWN):
+def light_of(make_lit, make_mesh, surface, world, picture, level="direct", samples=64, camera=DOWN, threads=2):
     floor = make_mesh([(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [(0, 1, 2), (0, 2, 3)])
     things = [] if surface is None else [(floor, Material(surface=surface))]
     scene = make_lit(camera, *things, world=world, images={"room": picture}, film=Film("BOX"))
-    return render(scene, level, samples, threads=2)
+    return render(scene, level, samples, threads=threads)
 
 
 def above_the_floor(rows):
@@ -124,3 +124,23 @@ def test_an_encoded_image_of_bytes_is_sampled_as_one_whose_pixels_are_beside_byt
     np.testing.assert_allclose(of_bytes["Combined"], beside["Combined"], rtol=0.02)
     found = of_bytes["Combined"][..., :3].reshape(-1, 3)
     assert (found.std(axis=0) < 0.1 * found.mean(axis=0)).all(), "the window is found"
+
+
+@pytest.mark.parametrize("srgb", [False, True])
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16])
+def test_an_image_of_small_numbers_is_sampled_to_the_bit_as_its_floats_are_on_any_number_of_threads(
+    make_lit, make_mesh, dtype, srgb
+):
+    levels = np.random.default_rng(0).integers(0, 256, (64, 128, 3)).astype(dtype)
+    small = Picture(levels / np.float16(64) if dtype == np.float16 else levels, srgb)
+    surface, world = node("diffuse", color=WHITE), World(WHITE, image="room")
+    found = {
+        light_of(make_lit, make_mesh, surface, world, picture, samples=4, threads=threads)["Combined"].tobytes()
+        for picture in (small, Picture(small.values, srgb))
+        for threads in (1, 2, 5)
+    }
+    assert len(found) == 1
+    pixels = small.values.copy()
+    pixels[-9:] *= 1.5
+    other = light_of(make_lit, make_mesh, surface, world, Picture(pixels, srgb), samples=4)["Combined"].tobytes()
+    assert other not in found

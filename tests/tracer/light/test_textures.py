@@ -4,6 +4,7 @@ from core_probes import looked_up
 from hypothesis import given
 from hypothesis import strategies as st
 
+from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import Mesh, Object, Scene
@@ -65,6 +66,85 @@ def test_the_closest_pixel_changes_half_way_between_centres():
     picture = grey([[0.0, 1.0]])
     found = looked_up(picture, at([0.499999, 0.5, 0.999999, 1.0, -1e-9, -1e-20], 0.5), True)[0]
     np.testing.assert_array_equal(found, [0, 1, 1, 0, 1, 1])
+
+
+def stood_for(pixels):
+    """float32: a share is rounded as Blender and Cycles round it, times the rounded 255th."""
+    return pixels.astype(np.float32) * (np.float32(1) / np.float32({1: 255, 2: 65535}[pixels.itemsize]))
+
+
+def random_pixels(dtype, channels):
+    rng = np.random.default_rng(3)
+    if dtype == np.float16:
+        return rng.normal(0.5, 1.0, (5, 7, channels)).astype(np.float16)
+    return rng.integers(0, np.iinfo(dtype).max, (5, 7, channels), dtype, endpoint=True)
+
+
+@pytest.mark.parametrize("channels", [3, 4])
+@pytest.mark.parametrize("srgb", [False, True])
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16])
+def test_an_image_of_small_numbers_shows_the_bits_that_its_floats_show(dtype, srgb, channels):
+    pixels = random_pixels(dtype, channels)
+    floats = pixels.astype(np.float32) if dtype == np.float16 else stood_for(pixels)
+    uv = np.random.default_rng(4).uniform(-2, 2, (2, 500))
+    small, large, other = Picture(pixels, srgb), Picture(floats, srgb), Picture(np.nextafter(floats, 9), srgb)
+    assert small.pixels.dtype == dtype and small.values.tobytes() == floats.tobytes()
+    for closest in (False, True):
+        found, expected, beside = (looked_up(each, uv, closest).tobytes() for each in (small, large, other))
+        assert found == expected
+        if not (srgb and channels == 4):  # which are multiplied in whole bytes
+            assert found != beside, "a rounding is seen"
+
+
+def test_each_byte_pair_of_bytes_and_half_float_is_the_number_that_it_stands_for():
+    bits = np.arange(65536, dtype=np.uint16)
+    halves = bits.view(np.float16)
+    for each, expected in (
+        (np.arange(256, dtype=np.uint8), np.arange(256) / 255),
+        (bits, bits / 65535),
+        (halves[np.isfinite(halves)], halves[np.isfinite(halves)]),
+    ):
+        picture = Picture(np.repeat(each[None, :, None], 3, axis=2))
+        found = looked_up(picture, at((np.arange(len(each)) + 0.5) / len(each), 0.5), closest=True)[2]
+        np.testing.assert_array_equal(found, picture.values[0, :, 2])
+        np.testing.assert_allclose(found, np.float64(expected), rtol=0 if each.dtype == np.float16 else 2.0**-23)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16])
+def test_floats_are_kept_in_the_fewest_bytes_that_hold_each_of_them_to_the_bit(dtype):
+    floats = Picture(random_pixels(dtype, 3)).values
+    assert Picture.compact(floats).pixels.dtype == dtype
+    assert Picture.compact(floats).values.tobytes() == floats.tobytes()
+    beside = floats.copy()
+    beside[-1, -1, -1] = np.nextafter(np.abs(beside[-1, -1, -1]) + np.float32(2.0**-20), np.float32(9))
+    kept = Picture.compact(beside)
+    assert kept.pixels.dtype == np.float32 and kept.pixels.tobytes() == beside.tobytes()
+
+
+def test_what_a_half_float_or_a_byte_cannot_hold_stays_a_float():
+    for value in (65520.0, 2.0**-25, 1e18, -0.1, 0.3, np.nextafter(np.float32(1), np.float32(2))):
+        floats = np.full((2, 2, 3), value, np.float32)
+        assert Picture.compact(floats).pixels.dtype == np.float32
+    assert Picture.compact(np.full((2, 2, 3), -0.0, np.float32)).pixels.dtype == np.float16, "a byte has no sign"
+
+
+def test_numbers_of_other_types_are_floats():
+    for dtype in (np.float64, np.int64, ">f4"):
+        picture = Picture(np.full((1, 2, 3), 2, dtype))
+        assert picture.pixels.dtype == np.float32 and (picture.pixels == 2).all()
+    assert (Picture(np.full((1, 2, 3), 257, ">u2")).pixels == np.full((1, 2, 3), 257, np.uint16)).all()
+
+
+@pytest.mark.parametrize("dtype", [np.float16, np.float32])
+@pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan, -np.nan])
+def test_an_image_with_a_number_that_is_not_finite_is_refused(dtype, value):
+    for rest in (-1.0, 1.0):
+        pixels = np.full((1, 2, 3), rest, dtype)
+        Picture(pixels)
+        with np.errstate(invalid="ignore"):
+            pixels[0, 0, 1] = value
+        with pytest.raises(InputError, match="not finite"):
+            Picture(pixels)
 
 
 @given(SEEDS, COUNTS, COUNTS)

@@ -146,6 +146,9 @@ def test_light_that_is_written_is_read_back_to_the_last_bit(make_scene, make_mes
         images={
             "small": Picture(rng.random((1, 2, 3), np.float32), srgb=True),
             "large": Picture(rng.normal(size=(7, 5, 3)).astype(np.float32)),
+            "halves": Picture(rng.normal(size=(7, 5, 3)).astype(np.float16)),
+            "bytes": Picture(rng.integers(0, 256, (7, 5, 3), np.uint8), srgb=True),
+            "shorts": Picture(rng.integers(0, 65536, (7, 5, 4), np.uint16)),
         },
         materials=chosen,
         lamps=tuple(data.draw(st.lists(lamps, max_size=3))),
@@ -169,6 +172,15 @@ def test_light_that_is_written_is_read_back_to_the_last_bit(make_scene, make_mes
     back = scene_file.read(path)
     found = list(differences(scene, back))
     assert not found, "\n".join(found)
+
+
+def test_in_a_list_numbers_are_what_they_say_and_in_an_array_bytes_are_shares_of_255(random_scene, tmp_path):
+    few, many = np.full((1, 2, 3), 51, np.uint8), np.full((9, 2, 3), 51, np.uint8)
+    scene_file.write(replace(random_scene(0), images={"few": Picture(few), "many": Picture(many)}), tmp_path / "scene.json")
+    back = scene_file.read(tmp_path / "scene.json").images
+    assert back["few"].pixels.dtype == np.float32 and back["many"].pixels.dtype == np.uint8
+    for picture in (*back.values(), Picture(many)):
+        assert (picture.values == np.float32(51) * (np.float32(1) / np.float32(255))).all()
 
 
 def test_the_round_trip_sees_what_is_lost(random_scene):

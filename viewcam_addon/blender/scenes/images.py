@@ -75,9 +75,12 @@ def picture_of(image: bpy.types.Image, alpha: bool = False) -> Picture:
     if alpha and image.channels == 4 and image.alpha_mode != "NONE":
         rgb = pixels
     elif is_multiplied(image):
-        # As Cycles does it, in whole bytes.
-        rgb = np.rint(rgb * 255) * np.rint(pixels[..., 3:] * 255) // 255 / 255
-    return Picture(np.ascontiguousarray(np.nan_to_num(rgb, posinf=0.0, neginf=0.0), np.float32), srgb)
+        # As Cycles does it, in whole bytes. By rows: there may be gigabytes.
+        multiplied = np.empty(rgb.shape, np.uint8)
+        for row, to in zip(pixels, multiplied, strict=True):
+            to[:] = np.rint(row[:, :3] * 255) * np.rint(row[:, 3:] * 255) // 255
+        return Picture(multiplied, srgb)
+    return Picture.compact(np.nan_to_num(rgb, copy=False, posinf=0.0, neginf=0.0) if image.is_float else rgb, srgb)
 
 
 def image_of(picture: Picture, name: str, overrides: Overrides, packed: bool = True) -> bpy.types.Image:
@@ -92,7 +95,7 @@ def image_of(picture: Picture, name: str, overrides: Overrides, packed: bool = T
     overrides.afterwards(bpy.data.batch_remove, [image])
     if channels == 4:
         image.alpha_mode = "STRAIGHT" if picture.srgb else "CHANNEL_PACKED"
-    pixels = np.concatenate([picture.pixels, np.ones((height, width, 4 - channels), np.float32)], axis=2)
+    pixels = np.concatenate([picture.values, np.ones((height, width, 4 - channels), np.float32)], axis=2)
     image.pixels.foreach_set(pixels.ravel())
     image.update()
     if packed:
@@ -103,7 +106,7 @@ def image_of(picture: Picture, name: str, overrides: Overrides, packed: bool = T
 def mean(image: bpy.types.Image) -> tuple[float, float, float]:
     """The mean colour, linear, of an image without an obstacle that is wrapped around the world (equirectangular)."""
     picture = picture_of(image)
-    pixels = picture.pixels.astype(np.float64)
+    pixels = picture.values.astype(np.float64)
     if picture.srgb:
         pixels = np.where(pixels < 0.04045, pixels / 12.92, ((np.maximum(pixels, 0) + 0.055) / 1.055) ** 2.4)
     height = len(pixels)

@@ -100,7 +100,7 @@ def _arrange(node: bpy.types.Node, column: int, taken: dict[int, int]) -> None:
 
 def image_from(picture: Picture, name: str, overrides: Overrides, ledger: Ledger) -> bpy.types.Image:
     """A packed image with these pixels."""
-    if picture.srgb and np.abs(picture.pixels - np.rint(picture.pixels * 255) / 255).max() > 2.0**-20:
+    if picture.srgb and np.abs(picture.values - np.rint(picture.values * 255) / 255).max() > 2.0**-20:
         ledger.note(name, "approximated", "its sRGB pixels are rounded to the 256 levels that Blender keeps")
     return images.image_of(picture, name, overrides)
 

@@ -1,7 +1,8 @@
 /* The C interface: structures and one table of functions for each instruction set. tracer/native.py is the only one that calls it.
  *
- * Arrays belong to the caller; those of meshes and spheres must outlive their scene, and all others are copied. Functions that
- * return an int return 0, or another number and leave a message: 1 without memory, 2 for what checks.h refuses.
+ * Arrays belong to the caller; those of meshes and spheres must outlive their scene, an image's pixels what gives light there, and
+ * all others are copied. Functions that return an int return 0, or another number and leave a message: 1 without memory, 2 for what
+ * checks.h refuses.
  */
 #pragma once
 #include <stddef.h>
@@ -94,7 +95,7 @@ typedef struct {
 
     int (*clear_light)(ViewcamScene*);
     /* channels: 3, or 4 with an alpha. */
-    int (*add_texture)(ViewcamScene*, int width, int height, int channels, int srgb, const float* pixels);
+    int (*add_texture)(ViewcamScene*, int width, int height, int channels, int srgb, int texel, const void* pixels);
     /* Of materials' inputs; it names nodes that were added before. */
     int (*add_node)(ViewcamScene*, const ViewcamNode*);
     /* Whether the last node is the same everywhere; value: receives what it is, and that as a number. */

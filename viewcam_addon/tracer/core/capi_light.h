@@ -32,6 +32,8 @@ typedef struct {
     int32_t factor_count;
 } ViewcamClosure;
 
+/* What an image's numbers are; whole ones are shares of 255 and 65535. */
+enum ViewcamTexel { VIEWCAM_FLOAT, VIEWCAM_HALF, VIEWCAM_BYTE, VIEWCAM_SHORT };
 enum ViewcamFilter { VIEWCAM_BOX, VIEWCAM_BLACKMAN_HARRIS, VIEWCAM_GAUSSIAN };
 enum ViewcamLampKind { VIEWCAM_SUN, VIEWCAM_POINT, VIEWCAM_SPOT, VIEWCAM_RECTANGLE, VIEWCAM_ELLIPSE };
 /* matrix: (3, 4), the lamp's space to the world's; a sun is seen towards its z. color: irradiance of a sun, power of others.

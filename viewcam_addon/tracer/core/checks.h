@@ -74,8 +74,9 @@ inline void camera(const ViewcamCamera& given) {
 inline void rows(const Scene& scene, uint32_t first, uint32_t end) {
     that(first <= end && end <= scene.camera.height, "rows are asked for that the picture does not have");
 }
-inline void texture(int width, int height, int channels, const float* pixels) {
+inline void texture(int width, int height, int channels, int texel, const void* pixels) {
     that(width > 0 && height > 0 && pixels && (channels == 3 || channels == 4), "an image has no pixels");
+    that(texel >= VIEWCAM_FLOAT && texel <= VIEWCAM_SHORT, "an image has pixels of no kind");
 }
 inline void node(const Scene& scene, const ViewcamNode& given) {
     for (int i = 0; i < given.input_count; i++)

@@ -105,7 +105,8 @@ const ViewcamCore core = {
             return guarded([&] {
                 check::placement(scene_of(scene), matrices, origin, threads);
                 scene_of(scene).origin = vector(origin);
-                scene_of(scene).commit(matrices, threads);
+                scene_of(scene).threads = threads;
+                scene_of(scene).commit(matrices);
             });
         },
     .set_camera =
@@ -188,10 +189,10 @@ const ViewcamCore core = {
 
     .clear_light = [](ViewcamScene* scene) { return guarded([&] { clear_light(scene_of(scene)); }); },
     .add_texture =
-        [](ViewcamScene* scene, int width, int height, int channels, int srgb, const float* pixels) {
+        [](ViewcamScene* scene, int width, int height, int channels, int srgb, int texel, const void* pixels) {
             return guarded([&] {
-                check::texture(width, height, channels, pixels);
-                add_texture(scene_of(scene), width, height, channels, srgb, pixels);
+                check::texture(width, height, channels, texel, pixels);
+                add_texture(scene_of(scene), width, height, channels, srgb, texel, pixels);
             });
         },
     .add_node =

@@ -5,13 +5,8 @@
 
 namespace viewcam::VIEWCAM_ISA {
 
-inline Texture texture_of(int width, int height, int channels, bool srgb, const float* pixels) {
-    Texture texture{width, height, srgb, std::vector<float>(pixels, pixels + size_t(channels) * size_t(width) * height), channels};
-    texture.premultiply();
-    return texture;
-}
-inline void add_texture(Scene& scene, int width, int height, int channels, bool srgb, const float* pixels) {
-    scene.illumination.textures.push_back(texture_of(width, height, channels, srgb, pixels));
+inline void add_texture(Scene& scene, int width, int height, int channels, bool srgb, int texel, const void* pixels) {
+    scene.illumination.textures.push_back({width, height, srgb, pixels, channels, Texel(texel)});
 }
 
 inline Color color_of(const ViewcamColor& given, const ValueNodes& nodes) {
@@ -57,20 +52,20 @@ inline Lamp lamp_of(const ViewcamLamp& given) {
 }
 inline void add_lamp(Scene& scene, const ViewcamLamp& given) { scene.illumination.lamps.push_back(lamp_of(given)); }
 
-inline Environment environment_of(const ViewcamWorld& given, uint32_t hidden_from, const std::vector<Texture>& textures) {
+inline Environment environment_of(const ViewcamWorld& given, uint32_t hidden_from, const std::vector<Texture>& textures, int threads) {
     Environment world;
     world.radiance = {given.radiance[0], given.radiance[1], given.radiance[2]}, world.hidden_from = hidden_from;
     world.image = given.image < 0 ? NONE : uint32_t(given.image), world.closest = given.closest;
     for (int i = 0; i < 12; i++) world.to_image.m[i / 4][i % 4] = given.to_image[i];
     if (world.image != NONE && world.image >= textures.size()) throw std::invalid_argument("the world has an image that the scene does not have");
-    world.prepare(textures);
+    world.prepare(textures, threads);
     return world;
 }
 inline void set_film(Scene& scene, const ViewcamFilm& given) {
     Illumination& light = scene.illumination;
-    light.environment = environment_of(given.world, given.hidden_from, light.textures);
+    light.environment = environment_of(given.world, given.hidden_from, light.textures, scene.threads);
     light.backdrop.reset();
-    if (given.has_backdrop) light.backdrop = environment_of(given.backdrop, given.hidden_from, light.textures);
+    if (given.has_backdrop) light.backdrop = environment_of(given.backdrop, given.hidden_from, light.textures, scene.threads);
     light.film = {bool(given.transparent), given.exposure};
     light.filter = FilterShape(given.filter), light.filter_width = given.filter_width, light.version = given.version;
     scene.make_tangents();

@@ -38,9 +38,10 @@ class Scene {
     Camera camera;
     Vec3 origin;  // of rendering space, in the world
     Illumination illumination;
+    int threads = 1;  // that it is made ready with
 
     // Makes the scene ready for rays. matrices: (objects, 3, 4), to world space.
-    void commit(const double* matrices, int threads) {
+    void commit(const double* matrices) {
         std::vector<size_t> users(geometries.size());
         for (size_t i = 0; i < objects.size(); i++) {
             objects[i].place(matrices + 12 * i, origin);
@@ -52,8 +53,8 @@ class Scene {
         std::vector<uint32_t> placed;
         for (uint32_t i = 0; i < objects.size(); i++) (merged[i] ? still[objects[i].visible] : placed).push_back(i);
         merged_.clear();
-        for (auto& [visible, some] : still) merged_.push_back({visible, merge(some, threads)});
-        build_geometries(placed, threads);
+        for (auto& [visible, some] : still) merged_.push_back({visible, merge(some)});
+        build_geometries(placed);
         instances_ = build_bvh(placed.size(), [&](size_t i) { return world_bounds(objects[placed[i]]); }, 1, threads);
         for (uint32_t& leaf : instances_.leaves) leaf = placed[leaf];
     }
@@ -212,7 +213,7 @@ class Scene {
         return merged;
     }
 
-    TriangleBvh merge(const std::vector<uint32_t>& some, int threads) const {
+    TriangleBvh merge(const std::vector<uint32_t>& some) const {
         std::vector<size_t> first(some.size() + 1);
         for (size_t i = 0; i < some.size(); i++)
             first[i + 1] = first[i] + std::get<TriangleMesh>(geometries[objects[some[i]].geometry]).count;
@@ -233,7 +234,7 @@ class Scene {
         return triangles;
     }
 
-    void build_geometries(const std::vector<uint32_t>& placed, int threads) {
+    void build_geometries(const std::vector<uint32_t>& placed) {
         triangles_.clear();
         triangles_.resize(geometries.size());
         std::vector<bool> needed(geometries.size());

@@ -4,9 +4,11 @@
 // pixels at their border are blended with those on the other side; sRGB is decoded after blending, which makes blends of
 // light and dark darker than half-way. Cycles has UV in float32: at 64 pixels, its colours are off by up to 2e-5 of the contrast.
 //
-// Rejected: decoding images when they are loaded (not what Cycles does), and mip maps, which it has not.
+// Rejected: decoding images when they are loaded (not what Cycles does, and up to twelve times the memory), and mip maps, which it
+// has not.
 #pragma once
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <vector>
 
@@ -33,50 +35,86 @@ struct Lookup {
     bool straight = false;
 };
 
-// An image laid out over UV (0, 0) to (1, 1). pixels: rows from the bottom, RGB or, with that many channels, RGBA, as they are
-// encoded. Colours that are encoded are multiplied by their alpha in whole bytes, before they are blended.
+// What a pixel's numbers are: floats, half floats, or whole numbers that are shares of the largest of their kind, rounded as Blender
+// and Cycles round them.
+enum class Texel { FLOAT, HALF, BYTE, SHORT };
+
+// The number of a finite half float.
+inline float half_float(uint16_t bits) {
+    uint32_t sign = uint32_t(bits & 0x8000) << 16, rest = bits & 0x7fff;
+    float size = rest < 0x400 ? float(rest) * 0x1p-24f : std::bit_cast<float>((rest << 13) + (112u << 23));
+    return std::bit_cast<float>(std::bit_cast<uint32_t>(size) | sign);
+}
+
+// An image laid out over UV (0, 0) to (1, 1). pixels: somebody else's, as they are encoded, rows from the bottom, RGB or, with that
+// many channels, RGBA. Colours that are encoded are multiplied by their alpha in whole bytes, before they are blended.
 struct Texture {
     int width, height;
     bool srgb;
-    std::vector<float> pixels;
+    const void* pixels;
     int channels = 3;
-
-    // To be called when all pixels are there.
-    void premultiply() {
-        if (channels != 4 || !srgb) return;
-        for (size_t i = 0; i < pixels.size(); i += 4)
-            for (size_t c = 0; c < 3; c++) pixels[i + c] = float(std::floor(std::rint(pixels[i + c] * 255) * std::rint(pixels[i + 3] * 255) / 255) / 255);
-    }
+    Texel texel = Texel::FLOAT;
 
     // The linear colour at UV; that at 0 where UV is not finite. closest: of the nearest pixel instead of between four.
     Vec3 at(Vec2 uv, bool closest) const { return at(uv, Lookup{closest ? Lookup::CLOSEST : Lookup::LINEAR}); }
     Vec3 at(Vec2 uv, Lookup lookup) const {
-        Vec3 rgb = blend<Vec3>(uv, lookup, [&](int column, int row) { return pixel(column, row); });
+        Vec3 rgb = blend<Vec3>(uv, lookup, [&](int column, int row) { return pixel(place(column, row)); });
         if (lookup.straight && channels == 4)
             if (double a = alpha(uv, lookup); a != 0 && a != 1) rgb = rgb / a;
         return decoded(rgb);
     }
     double alpha(Vec2 uv, Lookup lookup) const {
-        auto opaque = [&](int column, int row) { return channels == 4 ? double(pixels[4 * (size_t(row) * width + column) + 3]) : 1; };
+        auto opaque = [&](int column, int row) {
+            return channels == 4 ? read<double>([&](auto number) { return number(place(column, row) + 3); }) : 1;
+        };
         return blend<double>(uv, lookup, opaque);
     }
 
     Vec3 mean() const { return mean(0, width, 0, height); }
     // Over the pixels of some columns and rows, to 1e-6.
     Vec3 mean(int left, int right, int first, int last) const {
-        Vec3 sum;
-        for (int row = first; row < last; row++) {
-            Vec3 of_row;
-            for (int column = left; column < right; column++) of_row += srgb ? decoded_bytes(pixel(column, row)) : pixel(column, row);
-            sum += of_row;
-        }
-        return sum / (double(right - left) * (last - first));
+        auto over = [&](auto&& color) {
+            Vec3 sum;
+            for (int row = first; row < last; row++) {
+                Vec3 of_row;
+                for (size_t i = place(left, row), end = place(right, row); i < end; i += size_t(channels)) of_row += color(i);
+                sum += of_row;
+            }
+            return sum / (double(right - left) * (last - first));
+        };
+        if (!srgb) return read<Vec3>([&](auto number) { return over([&](size_t i) { return Vec3{number(i), number(i + 1), number(i + 2)}; }); });
+        if (texel != Texel::BYTE) return over([&](size_t i) { return decoded_bytes(pixel(i)); });
+        const std::array<double, 256>& light = linear_bytes();
+        return over([&](size_t i) { return Vec3{light[byte(i, 0)], light[byte(i, 1)], light[byte(i, 2)]}; });
     }
 
    private:
-    Vec3 pixel(int column, int row) const {
-        const float* rgb = &pixels[size_t(channels) * (size_t(row) * width + column)];
-        return {rgb[0], rgb[1], rgb[2]};
+    // Where a pixel's numbers begin.
+    size_t place(int column, int row) const { return size_t(channels) * (size_t(row) * size_t(width) + size_t(column)); }
+    // What is made of a function that reads the number of an index.
+    template <class Value, class Use> Value read(Use&& use) const {
+        auto shorts = static_cast<const uint16_t*>(pixels);
+        switch (texel) {
+            case Texel::BYTE: return use([bytes = static_cast<const uint8_t*>(pixels)](size_t i) { return BYTES[bytes[i]]; });
+            case Texel::SHORT: return use([shorts](size_t i) { return double(float(shorts[i]) * (1 / 65535.0f)); });
+            case Texel::HALF: return use([shorts](size_t i) { return double(half_float(shorts[i])); });
+            default: return use([floats = static_cast<const float*>(pixels)](size_t i) { return double(floats[i]); });
+        }
+    }
+    Vec3 pixel(size_t first) const {
+        if (srgb && channels == 4 && texel == Texel::BYTE) return {BYTES[byte(first, 0)], BYTES[byte(first, 1)], BYTES[byte(first, 2)]};
+        return read<Vec3>([&](auto number) -> Vec3 {
+            Vec3 rgb{number(first), number(first + 1), number(first + 2)};
+            if (!srgb || channels != 4) return rgb;
+            double alpha = std::rint(number(first + 3) * 255);
+            auto times = [&](double encoded) { return double(float(std::floor(std::rint(encoded * 255) * alpha / 255)) * (1 / 255.0f)); };
+            return {times(rgb.x), times(rgb.y), times(rgb.z)};
+        });
+    }
+    // The byte of a colour's channel, multiplied by its alpha.
+    size_t byte(size_t first, size_t channel) const {
+        auto bytes = static_cast<const uint8_t*>(pixels) + first;
+        return channels == 4 ? bytes[channel] * bytes[3] / 255u : bytes[channel];
     }
     // The pixel that stands for one beyond the border, −1 for nothing.
     static int within(int64_t i, int64_t count, Lookup::Extension extension) {
@@ -129,16 +167,25 @@ struct Texture {
     }
     static constexpr double FARTHEST = 1e4, LARGEST = 1 - 0x1p-53;
 
-    // The linear colour of what is nearly always made of bytes: looked up, which takes an eighth of the time.
-    static Vec3 decoded_bytes(Vec3 rgb) {
+    static constexpr std::array<double, 256> BYTES = [] {
+        std::array<double, 256> table{};
+        for (size_t i = 0; i < table.size(); i++) table[i] = double(float(i) * (1 / 255.0f));
+        return table;
+    }();
+    static const std::array<double, 256>& linear_bytes() {
         static const std::array<double, 256> LINEAR = [] {
             std::array<double, 256> table;
             for (size_t i = 0; i < table.size(); i++) table[i] = linear(double(i) / 255);
             return table;
         }();
-        auto of = [](double encoded) {
+        return LINEAR;
+    }
+    // The linear colour of what is often made of bytes: looked up, which takes an eighth of the time.
+    static Vec3 decoded_bytes(Vec3 rgb) {
+        const std::array<double, 256>& light = linear_bytes();
+        auto of = [&](double encoded) {
             double level = encoded * 255, nearest = std::rint(level);
-            return std::fabs(level - nearest) < 0x1p-14 && nearest >= 0 && nearest <= 255 ? LINEAR[size_t(nearest)] : linear(encoded);
+            return std::fabs(level - nearest) < 0x1p-14 && nearest >= 0 && nearest <= 255 ? light[size_t(nearest)] : linear(encoded);
         };
         return {of(rgb.x), of(rgb.y), of(rgb.z)};
     }

@@ -25,22 +25,32 @@ def radiance(name: str, values: object) -> tuple[float, float, float]:
     return rgb
 
 
+TEXELS = tuple(map(np.dtype, (np.float32, np.float16, np.uint8, np.uint16)))
+"""What the pixels of a `Picture` are made of, as the core counts it (capi_light.h)."""
+_ROWS = 1 << 20  # numbers that are looked at together: larger arrays would not stay in a processor's cache
+
+
 @dataclass(frozen=True, eq=False)
 class Picture:
     """An image that colours surfaces, laid out over UV (0, 0) to (1, 1) and repeated beyond.
 
-    pixels : (height, width, 3) float32, or 4 with an alpha, rows from the bottom; encoded as sRGB where `srgb` is true, else
-        linear. Between pixels the encoded values are interpolated, as Cycles does; with an alpha, after they are multiplied by
-        it. Linear ones are not multiplied.
+    pixels : (height, width, 3), or 4 with an alpha, rows from the bottom; floats, half floats, or whole numbers of one byte or
+        two, which are shares of 255 or 65535; anything else becomes float32. Encoded as sRGB where `srgb` is true, else linear.
+        Between pixels the encoded values are interpolated, as Cycles does; with an alpha, after they are multiplied by it.
+        Linear ones are not multiplied. The tracer reads them where they are: don't write to them.
     """
 
-    pixels: NDArray[np.float32]
+    pixels: NDArray
     srgb: bool = False
 
     def __post_init__(self) -> None:
         if self.pixels.ndim != 3 or self.pixels.shape[2] not in (3, 4) or not self.pixels.size:
             raise InputError(f"an image has the shape {self.pixels.shape} and must have height × width × 3 or 4: check it")
-        ends = float(self.pixels.min()), float(self.pixels.max())  # without a copy of what may be gigabytes
+        dtype = self.pixels.dtype.newbyteorder("=")
+        with np.errstate(over="ignore"):  # what is too large for float32 becomes infinite, and is refused here
+            pixels = np.ascontiguousarray(self.pixels, dtype if dtype in TEXELS else np.float32)
+        object.__setattr__(self, "pixels", pixels)
+        ends = _ends(pixels)
         if not np.isfinite(ends).all():
             raise InputError("an image holds a number that is not finite: check it")
         # What is encoded as sRGB is raised to the power of 2.4.
@@ -50,6 +60,49 @@ class Picture:
             raise InputError(
                 f"an image holds {largest:.3g}: give numbers up to {most:.3g}, so that its light can be computed with"
             )
+
+    @classmethod
+    def compact(cls, values: NDArray[np.float32], srgb: bool = False) -> "Picture":
+        """The picture of some float32 values, in as few bytes as hold each of them to the bit. values : as `pixels`."""
+        return cls(next(filter(lambda made: made is not None, (_exactly(values, dtype) for dtype in _SMALLEST_FIRST))), srgb)
+
+    @property
+    def values(self) -> NDArray[np.float32]:
+        """The pixels as float32: a share of 255 is rounded as Blender and Cycles round it."""
+        return _values(self.pixels)
+
+
+_SMALLEST_FIRST = tuple(map(np.dtype, (np.uint8, np.uint16, np.float16, np.float32)))
+
+
+def _values(pixels: NDArray) -> NDArray[np.float32]:
+    values = pixels.astype(np.float32, copy=False)
+    return values if pixels.dtype.kind == "f" else values * (np.float32(1) / np.float32(np.iinfo(pixels.dtype).max))
+
+
+def _exactly(values: NDArray[np.float32], dtype: np.dtype) -> NDArray | None:
+    """Values as pixels of another type, None where not all of them are what these stand for."""
+    if dtype == values.dtype:
+        return values
+    made = np.empty(values.shape, dtype)
+    rows = max(1, _ROWS // values[0].size)
+    for first in range(0, len(values), rows):
+        some, part = values[first : first + rows], made[first : first + rows]
+        with np.errstate(over="ignore", invalid="ignore"):
+            part[:] = some if dtype.kind == "f" else np.rint(some * np.float32(np.iinfo(dtype).max))
+        if not np.array_equal(_values(part).view(np.int32), some.view(np.int32)):
+            return None
+    return made
+
+
+def _ends(pixels: NDArray) -> tuple[float, float]:
+    """Numbers between which all are, without a copy of what may be gigabytes."""
+    if pixels.dtype.kind == "u":
+        return 0.0, 1.0
+    if pixels.dtype == np.float16:  # whose bits are compared several times as fast: of either sign they grow with the size
+        most = pixels.view(np.int16).max(), pixels.view(np.uint16).max()
+        return tuple(float(np.array(bits).astype(np.uint16).view(np.float16)) for bits in most)
+    return float(pixels.min()), float(pixels.max())
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import math
 import os
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO, Literal, NoReturn, overload
 
@@ -97,10 +97,17 @@ class Field:
             self.fail(f"is {_shown(self.value)}: give a list of {count} finite numbers")
         return tuple(map(float, self.value))
 
-    def array(self, arrays: "Arrays | None", dtype: type, shape: tuple[int | None, ...]) -> NDArray:
-        """A list of lists of numbers, or {"npz": key} where `arrays` are given; None in the shape stands for any number."""
+    def array(
+        self, arrays: "Arrays | None", dtype: type, shape: tuple[int | None, ...], kept: Sequence[np.dtype] = ()
+    ) -> NDArray:
+        """A list of lists of numbers, or {"npz": key} where `arrays` are given; None in the shape stands for any number.
+
+        kept : other types than `dtype` that an array in the .npz may have.
+        """
         if arrays is not None and isinstance(self.value, dict):
             array = arrays.take(self.fields(("npz",))["npz"])
+            stored = array.dtype.newbyteorder("=")
+            dtype = stored if stored in kept else dtype
         else:
             array = self._nested(len(shape))
         if np.issubdtype(dtype, np.integer):
@@ -115,7 +122,7 @@ class Field:
             self.fail(f"has the shape {' × '.join(map(str, array.shape))} and must have {wanted}: correct it")
         with np.errstate(over="ignore"):  # what is too large for float32 becomes infinite, and is refused here
             array = array.astype(dtype, copy=False)
-        if not np.isfinite(array).all():
+        if array.dtype.kind == "f" and not np.isfinite(array).all():
             self.fail("holds a number that is not finite: give finite ones")
         return array
 

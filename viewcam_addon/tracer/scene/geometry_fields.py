@@ -10,7 +10,7 @@ from ...errors import InputError
 from . import Mesh, Spheres
 from .fields import Arrays, Field
 
-_LARGEST_INLINE = 48  # numbers: a plane or a few spheres stay readable in the JSON
+LARGEST_INLINE = 48  # numbers: a plane or a few spheres stay readable in the JSON
 
 
 def geometry_document(geometry: Mesh | Spheres, prefix: str, arrays: dict[str, NDArray]) -> dict:
@@ -31,7 +31,7 @@ def geometry_document(geometry: Mesh | Spheres, prefix: str, arrays: dict[str, N
 
 def array_document(array: NDArray, key: str, arrays: dict[str, NDArray]) -> list | dict:
     """A small array itself, or where a large one stands."""
-    if array.size <= _LARGEST_INLINE:
+    if array.size <= LARGEST_INLINE:
         return array.tolist()
     arrays[key] = array
     return {"npz": key}

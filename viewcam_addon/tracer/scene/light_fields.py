@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from ...checks import shown
 from ...errors import InputError
 from . import Scene, placing, value_nodes
+from .colours import TEXELS
 from .fields import Arrays, Field
 from .film import Bounces, Film
-from .geometry_fields import array_document
+from .geometry_fields import LARGEST_INLINE, array_document
 from .lamps import Area, Lamp, Point, Spot, Sun, World
 from .materials import Colour, Material, Picture
 from .shader_nodes import KINDS, Node
@@ -45,7 +46,10 @@ def light_document(scene: Scene, arrays: dict[str, NDArray]) -> dict:
     document = {
         "images": {
             name: {
-                "pixels": array_document(picture.pixels, f"image{index}.pixels", arrays),
+                # In lists a number is what it says.
+                "pixels": array_document(
+                    picture.values if picture.pixels.size <= LARGEST_INLINE else picture.pixels, f"image{index}.pixels", arrays
+                ),
                 **({"srgb": True} if picture.srgb else {}),
             }
             for index, (name, picture) in enumerate(scene.images.items())
@@ -137,7 +141,7 @@ def _colour_document(colour: Colour) -> list[float] | dict[str, Any]:
 
 def _picture(field: Field, arrays: Arrays) -> Picture:
     keys = field.fields(("pixels",), ("srgb",))
-    pixels = keys["pixels"].array(arrays, np.float32, (None, None, None))
+    pixels = keys["pixels"].array(arrays, np.float32, (None, None, None), kept=TEXELS)
     if pixels.shape[2] not in (3, 4):
         keys["pixels"].fail(f"has {pixels.shape[2]} numbers a pixel and must have 3 or 4: correct it")
     try:

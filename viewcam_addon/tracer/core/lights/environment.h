@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "../accel/parallel.h"
 #include "../textures.h"
 #include "light_sample.h"
 
@@ -23,22 +24,20 @@ class Environment {
     Affine to_image;  // directions of the world to the image's
 
     // To be called when all images are there.
-    void prepare(const std::vector<Texture>& textures) {
+    void prepare(const std::vector<Texture>& textures, int threads) {
         texture_ = image == NONE ? nullptr : &textures[image];
         mean_ = radiance;
         if (!texture_) return;
         columns_ = std::min(texture_->width, MOST_COLUMNS), rows_ = std::min(texture_->height, MOST_COLUMNS / 2);
         reached_.assign(size_t(rows_) * columns_, 0), rows_reached_.assign(rows_, 0);
-        std::vector<double> light(reached_.size());
+        std::vector<Vec3> of_rows(rows_);
+        parallel_for(threads, size_t(rows_), [&](size_t row) { of_rows[row] = cells(int(row), &reached_[row * columns_]); });
         mean_ = {};
         double total = 0;
         for (int row = 0; row < rows_; row++) {
-            Vec3 of_row = cells(row, &light[size_t(row) * columns_]);
-            double part = (cosine_below(row + 1) - cosine_below(row)) / 2, sum = 0;  // of the sphere
-            mean_ += of_row * (part / columns_);
-            for (int column = 0; column < columns_; column++)
-                reached_[size_t(row) * columns_ + column] = sum += light[size_t(row) * columns_ + column];
-            rows_reached_[row] = total += sum * part;
+            double part = (cosine_below(row + 1) - cosine_below(row)) / 2;  // of the sphere
+            mean_ += of_rows[row] * (part / columns_);
+            rows_reached_[row] = total += reached_[size_t(row + 1) * columns_ - 1] * part;
         }
         mean_ = mean_ * radiance;
         if (!(total > 0)) texture_ = nullptr, radiance = mean_ = {};
@@ -87,15 +86,16 @@ class Environment {
     static Vec2 place(Vec3 direction) { return equirectangular(direction); }
     // The height of the lower edge of a row of cells on the unit sphere.
     double cosine_below(int row) const { return row == 0 ? -1 : row == rows_ ? 1 : sin(PI * (double(row) / rows_ - 0.5)); }
-    // What the cells of a row give in the mean over their pixels, and all of them together.
-    Vec3 cells(int row, double* light) const {
+    // What the cells of a row give in the mean over their pixels, all of them together; reached: receives their light, summed up.
+    Vec3 cells(int row, double* reached) const {
         Vec3 sum;
+        double light = 0;
         int first = int(int64_t(row) * texture_->height / rows_), last = int(int64_t(row + 1) * texture_->height / rows_);
         for (int column = 0; column < columns_; column++) {
             int left = int(int64_t(column) * texture_->width / columns_), right = int(int64_t(column + 1) * texture_->width / columns_);
             Vec3 cell = texture_->mean(left, right, first, last);
             sum += cell;
-            light[column] = larger(mean(cell * radiance), 0.0);
+            reached[column] = light += larger(mean(cell * radiance), 0.0);
         }
         return sum;
     }
