@@ -141,6 +141,15 @@ def test_by_script_it_waits_and_says_where_the_sheet_is(two, stand_in, tmp_path)
         bpy.ops.viewcam.render_all_cameras(directory=str(tmp_path / "other"))
 
 
+@pytest.mark.parametrize("check", [False, True])
+def test_a_proof_of_each_picture_is_asked_for_by_one_box(two, stand_in, tmp_path, monkeypatch, check):
+    (tmp_path / "go").touch()
+    asked, stood_in = [], comparing.command
+    monkeypatch.setattr(comparing, "command", lambda *given: asked.append(given[3]) or stood_in(*given))
+    assert bpy.ops.viewcam.render_all_cameras(directory=str(tmp_path), check=check) == {"FINISHED"}
+    assert [("--check" in words) for words in asked] == [check]
+
+
 def test_without_a_folder_it_is_refused_and_a_child_that_dies_leaves_no_folder(two, monkeypatch, tmp_path):
     with pytest.raises(RuntimeError, match="There is no folder for the pictures"):
         bpy.ops.viewcam.render_all_cameras()
