@@ -172,8 +172,9 @@ def test_the_render_menu_is_as_before_without_the_add_on(registered_addon):
 @pytest.mark.exhaustive
 def test_two_cameras_of_two_formats_are_rendered_by_one_click(two, monkey, tmp_path):
     two.render.engine, two.cycles.samples = "CYCLES", 1
-    assert bpy.ops.viewcam.render_all_cameras(directory=str(tmp_path)) == {"FINISHED"}
+    assert bpy.ops.viewcam.render_all_cameras(directory=str(tmp_path), check=True) == {"FINISHED"}
     (folder,) = tmp_path.iterdir()
     sheet = (folder / "contact-sheet.html").read_text(encoding="utf-8")
     assert "20 × 30" in sheet and "50 × 30" in sheet and "untitled.blend" in sheet
+    assert sheet.count("identical") == 3 and "not checked" not in sheet
     assert {path.name for path in folder.glob("*.exr")} == {"Hero_ close.exr", "Wide.exr", "Camera.exr"}

@@ -94,8 +94,8 @@ class VIEWCAM_OT_render_all_cameras(bpy.types.Operator):
         name="Animation", description="All frames of each camera's range, not only the current one", options={"SKIP_SAVE"}
     )
     check: bpy.props.BoolProperty(
-        name="Proof",
-        description="Compare each picture's geometry with the reference tracer. The contact sheet has the verdicts",
+        name="Prove Each Picture",
+        description="Compare its geometry with the reference tracer's. The contact sheet tells the verdicts",
         options={"SKIP_SAVE"},
     )
 
