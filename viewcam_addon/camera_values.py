@@ -153,6 +153,8 @@ class CameraValues:
 
     def with_unbound(self, other: "CameraValues", bound: Collection[tuple[str, int]]) -> "CameraValues":
         """Other values, but their own numbers (name, index) that something else decides."""
+        if not bound:
+            return other
         kept = {}
         for name in {name for name, _ in bound}:
             mine, others = getattr(self, name), getattr(other, name)

@@ -46,16 +46,11 @@ def two_sum(a: Number, b: Number) -> tuple[Number, Number]:
 def two_product(a: Number, b: Number) -> tuple[Number, Number]:
     """The rounded product and its error: a · b = product + error, exactly, for |a|, |b| < 2^996 and |a · b| > 2^-969 or 0."""
     product = a * b
-    a_high, a_low = _split(a)
-    b_high, b_low = _split(b)
+    # Each factor in two parts of at most 26 significant bits. Not by a function: an edit in Blender multiplies 36 times.
+    shifted_a, shifted_b = _SPLITTER * a, _SPLITTER * b
+    a_high, b_high = shifted_a - (shifted_a - a), shifted_b - (shifted_b - b)
+    a_low, b_low = a - a_high, b - b_high
     return product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
-
-
-def _split(a: Number) -> tuple[Number, Number]:
-    """Two numbers of at most 26 significant bits each whose sum is `a`."""
-    shifted = _SPLITTER * a
-    high = shifted - (shifted - a)
-    return high, a - high
 
 
 def sum_terms(terms: Sequence[Number]) -> tuple[Number, Number, bool | NDArray[np.bool_]]:

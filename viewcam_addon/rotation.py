@@ -215,9 +215,9 @@ class Channels:
     @property
     def delta(self) -> Array:
         """(3, 3): the rotation that Blender applies after the object's own."""
-        if not self.delta_rotation:
-            return np.eye(3)
         numbers = self.delta_rotation
+        if not any(numbers) and self.mode != "QUATERNION":  # none, or no turn
+            return np.eye(3)
         return from_quaternion(numbers) if self.mode == "QUATERNION" else from_euler(numbers, self.mode)
 
     def bringing_to(self, pinhole: Pinhole, parent: Array) -> tuple[tuple[float, ...], Array, tuple[float, ...]]:

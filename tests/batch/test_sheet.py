@@ -115,6 +115,21 @@ def test_each_shot_says_what_it_is_of_by_which_lens_and_at_what_angle():
         assert sheet.facts(broken) == []
 
 
+def test_each_picture_has_its_verdict_or_says_that_it_was_not_checked():
+    record = {"image": "a.exr", "rendered": {"width": 4, "height": 3}, "warnings": []}
+
+    def said(check):
+        return Page(sheet.picture(Result("a", {**record, **({"check": check} if check else {})}))).text
+
+    assert "not checked" in said(None)
+    passed = {"passed": True, "verdict": "The same picture.", "figures": {"position": {"p50": 1e-5, "max": 0.000304}}}
+    assert "identical to 0.0003 px" in said(passed) and "not checked" not in said(passed)
+    assert "identical" in said({**passed, "figures": {"position": {}}})
+    assert "differs Another picture." in said({"passed": False, "verdict": "Another picture."})
+    without_picture = {key: value for key, value in record.items() if key != "image"}
+    assert "not checked" not in Page(sheet.picture(Result("a", without_picture))).text, "labels alone are no picture"
+
+
 def test_a_click_shows_a_picture_larger_and_the_page_says_when_it_was_made(tmp_path, painting):
     painting.paint(tmp_path, 2)
     text = (tmp_path / "contact-sheet.html").read_text(encoding="utf-8")

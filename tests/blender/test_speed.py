@@ -1,6 +1,7 @@
 """What following costs: what is done for one camera among many, what is written, and what 10,000 updates leave behind.
 
-Bounds on time have a factor of ten of room for slow and busy machines; what matters is counted.
+What takes time is measured as a multiple of what Blender itself takes for the like in the same process, so that slow and busy
+machines count on both sides; what matters is counted.
 """
 
 import gc
@@ -8,6 +9,7 @@ import itertools
 import resource
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -163,10 +165,23 @@ def seconds_each(action, count=100, rounds=3):
     return min(durations)
 
 
-@pytest.mark.parametrize("mode", ["XYZ", "QUATERNION"])
-@pytest.mark.parametrize("kind", ["point", "target", "keyed"])
-def test_an_update_takes_about_half_a_millisecond(posed_camera, scene, target, kind, mode):
-    group, posed_camera.rotation_mode = posed_camera.virtual_pinhole, mode
+# Calibrated: twice what was found on a busy machine with any Blender from 4.2 to 5.2, where Blender's own move takes 0.04 ms.
+LARGEST_MULTIPLES = {"point": 48, "moved": 70, "target": 62, "keyed": 38}
+
+
+def as_multiple_of_blenders_own_move(once, plain):
+    """What an update takes, in moves of a plain camera."""
+
+    def move(i):
+        plain.location.x = 0.01 * i
+        update()
+
+    return seconds_each(once) / seconds_each(move)
+
+
+def an_update(kind, camera_object, scene, target):
+    """A function that makes the i-th of them."""
+    group = camera_object.virtual_pinhole
     if kind == "target":
         group.look_at_target = target
 
@@ -175,16 +190,78 @@ def test_an_update_takes_about_half_a_millisecond(posed_camera, scene, target, k
             update()
 
     elif kind == "keyed":
-        key_the_eye(posed_camera)
+        key_the_eye(camera_object)
         once = scene.frame_set
+    elif kind == "moved":
+
+        def once(i):
+            camera_object.location.x = 7 + 0.01 * i
+            update()
+
     else:
 
         def once(i):
             group.eye = (7 + 0.01 * i, -6, 5)
             update()
 
-    milliseconds = 1e3 * seconds_each(once)
-    assert milliseconds < 10, f"{milliseconds:.2f} ms"
+    return once
+
+
+@pytest.mark.parametrize("mode", ["XYZ", "QUATERNION"])
+@pytest.mark.parametrize("kind", LARGEST_MULTIPLES)
+def test_an_update_takes_a_few_dozen_of_blenders_own_moves(posed_camera, add_camera, scene, target, kind, mode):
+    plain, scene.camera = add_camera("Plain"), posed_camera
+    posed_camera.rotation_mode = mode
+    multiple = as_multiple_of_blenders_own_move(an_update(kind, posed_camera, scene, target), plain)
+    assert multiple < LARGEST_MULTIPLES[kind], f"{multiple:.0f} moves"
+
+
+def test_an_edit_that_places_its_camera_four_times_would_be_noticed(posed_camera, add_camera, scene, target, monkeypatch):
+    plain, scene.camera, place = add_camera("Plain"), posed_camera, cameras.place
+
+    def four_times(camera_object, pinhole, *rest):
+        for _ in range(4):
+            cameras._in_place.clear()
+            place(camera_object, replace(pinhole), *rest)
+
+    monkeypatch.setattr(cameras, "place", four_times)
+    multiple = as_multiple_of_blenders_own_move(an_update("point", posed_camera, scene, target), plain)
+    assert multiple > LARGEST_MULTIPLES["point"], f"{multiple:.0f} moves"
+
+
+def others_cost(cameras_at_rest, target):
+    """What another object's move takes where these are enabled, as a multiple of what it takes where they are plain cameras.
+
+    Each the least of rounds that take turns, so that what else the machine does falls on both.
+    """
+
+    def move(i):
+        target.location.x = 0.01 * i
+        update()
+
+    taken = {True: [], False: []}
+    for is_enabled in [True, False] * 5:
+        for each in cameras_at_rest:
+            each.virtual_pinhole.enabled = is_enabled
+        update()
+        taken[is_enabled].append(seconds_each(move, 50, 2))
+    return min(taken[True]) / min(taken[False])
+
+
+def test_two_hundred_cameras_at_rest_cost_nothing(two_hundred_cameras, target):
+    """But for what clocks and caches make of the same work, calibrated: from 0.92 to 1.01 was found."""
+    assert others_cost(two_hundred_cameras, target) < 1.15
+
+
+def test_a_look_at_a_number_of_each_camera_at_rest_would_be_noticed(two_hundred_cameras, target):
+    def look(_scene, _depsgraph):
+        return [each.virtual_pinhole.eye for each in two_hundred_cameras if each.virtual_pinhole.enabled]
+
+    bpy.app.handlers.depsgraph_update_post.append(look)
+    try:
+        assert others_cost(two_hundred_cameras, target) > 1.15
+    finally:
+        bpy.app.handlers.depsgraph_update_post.remove(look)
 
 
 def leftovers(once, count, rounds=3):

@@ -144,12 +144,10 @@ def compare_to_the_verdict():
     yield
     _, other = bpy.context.window_manager.windows
     assert other.screen.areas[0].spaces.active.image.name == "Virtual Pinhole Proof"
-    with bpy.context.temp_override(window=other, area=other.screen.areas[0], region=other.screen.areas[0].regions[-1]):
-        bpy.ops.image.view_all()
-    yield
-    yield
+    yield from _filled(other.screen.areas[0])
     picture("all_three.png")
     bpy.context.window_manager.virtual_pinhole_proof.view = "SWIPE"
+    yield from _filled(other.screen.areas[0])
     bpy.context.window_manager.virtual_pinhole_proof.swipe = 0.4
     yield
     yield
@@ -160,6 +158,17 @@ def compare_to_the_verdict():
     yield
     yield
     picture("verdict.png")
+
+
+def _filled(area):
+    """Steps until the picture reaches from side to side or from top to bottom of its editor, but for the legend's margins."""
+    part = next(part for part in area.regions if part.type == "WINDOW")
+    share, ends = 0, time.monotonic() + PATIENCE
+    while not 0.7 < share < 1 and time.monotonic() < ends:
+        yield
+        (left, bottom), (right, top) = (part.view2d.view_to_region(at, at, clip=False) for at in (0, 1))
+        share = max((right - left) / part.width, (top - bottom) / part.height)
+    assert 0.7 < share < 1, f"the picture has {share:.0%} of its editor"
 
 
 def _of_the_session():

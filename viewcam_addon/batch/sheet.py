@@ -15,6 +15,7 @@ from typing import Any
 from urllib.parse import quote
 
 from .. import html_page
+from ..comparison.statistics import plain
 from ..files import written_whole
 from .summary import Result
 
@@ -23,7 +24,13 @@ _WORDS = {"failed": "failed", "left": "left to render", "checks_failed": "not wh
 
 def picture(result: Result) -> str:
     """A shot's part of the page."""
-    return html_page.filled("batch/sheet_picture.html", shot=result, file=quote(result.name), facts=facts(result.record or {}))
+    return html_page.filled(
+        "batch/sheet_picture.html",
+        shot=result,
+        file=quote(result.name),
+        facts=facts(result.record or {}),
+        verdict=verdict(result.check),
+    )
 
 
 def facts(record: Mapping[str, Any]) -> list[str]:
@@ -46,6 +53,16 @@ def facts(record: Mapping[str, Any]) -> list[str]:
     ):
         told.append(f"{math.degrees(2 * math.atan2(across / 2, distance[0])):.3g}° across")
     return told
+
+
+def verdict(check: Mapping[str, Any] | None) -> str:
+    """What became of a shot's check, in the words of the panel's proof."""
+    if not check:
+        return "not checked"
+    if not check.get("passed"):
+        return "differs"
+    largest = _part(_part(check, "figures"), "position").get("max")
+    return f"identical to {plain(largest)} px" if isinstance(largest, float) else "identical"
 
 
 def _part(record: Mapping[str, Any], name: str) -> Mapping[str, Any]:

@@ -1,5 +1,6 @@
 """What Blender says about a camera and its picture, in the plain classes of intrinsics.py. Nothing here changes anything."""
 
+import functools
 import math
 
 import bpy
@@ -33,11 +34,16 @@ def is_animated(camera_object: bpy.types.Object) -> bool:
     return any(curve.data_path.startswith("virtual_pinhole.") for curve in curves)
 
 
+# What is checked once is not checked again as a camera moves.
+_known_frame = functools.lru_cache(maxsize=64)(intrinsics.Frame)
+_known_camera = functools.lru_cache(maxsize=64)(intrinsics.CameraData)
+
+
 def frame_of(scene: bpy.types.Scene) -> intrinsics.Frame:
     """The picture that the scene renders."""
     render = scene.render
     border = (render.border_min_x, render.border_min_y, render.border_max_x, render.border_max_y) if render.use_border else None
-    return intrinsics.Frame(
+    return _known_frame(
         render.resolution_x,
         render.resolution_y,
         render.resolution_percentage,
@@ -60,7 +66,7 @@ def camera_data_of(camera_object: bpy.types.Object) -> intrinsics.CameraData:
         raise _no_perspective(camera_object)
     camera = camera_object.data
     try:
-        return intrinsics.CameraData(
+        return _known_camera(
             camera.lens, camera.sensor_width, camera.sensor_height, camera.sensor_fit, camera.shift_x, camera.shift_y
         )
     except InputError as error:

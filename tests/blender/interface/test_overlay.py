@@ -26,6 +26,12 @@ def shown(posed_camera, scene, monkeypatch):
     return SimpleNamespace(space_data=space, region_data=space.region_3d, scene=scene, view_layer=layer)
 
 
+def test_a_letter_stands_where_no_line_goes():
+    lines = [overlay.Vector(end) for end in ((100, 0), (0, 100), (-3, 0), (-70, 70))]
+    assert tuple(overlay._clearest(lines)) == pytest.approx((0, -1), abs=1e-6)
+    assert overlay._clearest([]).angle(overlay.Vector((1, -1))) < 1e-3
+
+
 def test_the_active_camera_has_its_diagram(shown, posed_camera):
     assert overlay._cameras(shown) == [posed_camera]
 

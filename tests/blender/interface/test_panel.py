@@ -140,9 +140,11 @@ class Layout:
 
     def prop_decorator(self, owner, name):
         assert name in owner.bl_rna.properties, f"{owner} has no {name}"
+        self._draw("decorator", name, {})
 
     def _draw(self, kind, name, look):
-        unknown = set(look) - set(bpy.types.UILayout.bl_rna.functions[kind].parameters.keys())
+        known = {"decorator": "prop_decorator"}.get(kind, kind)
+        unknown = set(look) - set(bpy.types.UILayout.bl_rna.functions[known].parameters.keys())
         assert not unknown, f"this Blender's {kind}() does not take {unknown}"
         properties = SimpleNamespace()
         self.drawn.append((kind, name, look, self, properties))
@@ -297,6 +299,24 @@ def test_in_the_narrowest_sidebar_no_name_stands_beside_its_field(posed_camera, 
         described = type(posed_camera.virtual_pinhole).bl_rna.properties[name]
         if described.type in lacking:
             assert look["text"] == "" and before[0] == "label" and before[1], f"{name} has no name"
+
+
+def keyed_by_a_dot(each, width):
+    """The fields that Blender or the panel draws a dot beside."""
+    found = drawn(each, width)
+    columns = {name for kind, name, _, at, _ in found if kind == "prop" and at.use_property_split and at.use_property_decorate}
+    return columns | {name for kind, name, *_ in found if kind == "decorator"}
+
+
+@pytest.mark.parametrize("each", [panel.VIEWCAM_PT_data, panel.VIEWCAM_PT_sidebar])
+def test_what_can_be_keyed_has_its_dot_however_narrow_the_panel_is(posed_camera, each):
+    for posed_camera.virtual_pinhole.pole in ("CANONICAL", "HOLD"):
+        for posed_camera.virtual_pinhole.lens_unit in ("MILLIMETERS", "PIXELS"):
+            shown = {name for kind, name, *_ in drawn(each) if kind == "prop" and name != "name"}
+            keyed = {name for name in shown if fields()[name].is_animatable}
+            assert {"eye", "look_at", "up", "zoom"} <= keyed
+            for width in (300, 249, NARROWEST):
+                assert keyed <= keyed_by_a_dot(each, width), f"at {width} pixels"
 
 
 @pytest.mark.parametrize("each", [panel.VIEWCAM_PT_sidebar_move, panel.VIEWCAM_PT_sidebar_readouts])

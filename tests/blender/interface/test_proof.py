@@ -1,6 +1,7 @@
 """The sub-panel Proof: what it starts from, and what is left without the add-on. What it does is in test_comparing.py."""
 
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -152,6 +153,26 @@ def test_escape_during_playback_ends_the_playback_and_not_the_comparison(monkeyp
 )
 def test_the_first_line_says_it_in_words(result, words):
     assert comparing.headline(result) == words
+
+
+@pytest.mark.parametrize("width", [150, 202, 260, 600])
+def test_the_green_line_is_read_whole_in_a_sidebar_of_any_width(posed_camera, monkeypatch, width):
+    """At the mean width of a character, by which all sentences of the panel are wrapped."""
+    monkeypatch.setattr(proof.icons, "tick", lambda: 7)
+    layout, column = MagicMock(), MagicMock()
+    layout.column.return_value = column
+    context = SimpleNamespace(
+        scene=bpy.context.scene,
+        region=SimpleNamespace(width=width),
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
+    )
+    seen = comparing.camera_seen(posed_camera, context.scene)
+    passed = comparing.Outcome("", "Camera", seen, True, "The same picture: so it is.", "Identical to 0.000086 px")
+    proof._draw_outcome(layout, passed, posed_camera, context)
+    first, *more = [call.kwargs for call in column.label.call_args_list]
+    assert first["icon_value"] == 7 and all(line["icon"] == "BLANK1" for line in more)
+    assert " ".join(line["text"] for line in (first, *more)) == passed.headline
+    assert max(len(line["text"]) for line in (first, *more)) * 6.8 <= width - 60
 
 
 def test_what_is_approximated_is_told_by_name():

@@ -141,6 +141,15 @@ def test_by_script_it_waits_and_says_where_the_sheet_is(two, stand_in, tmp_path)
         bpy.ops.viewcam.render_all_cameras(directory=str(tmp_path / "other"))
 
 
+@pytest.mark.parametrize("check", [False, True])
+def test_a_proof_of_each_picture_is_asked_for_by_one_box(two, stand_in, tmp_path, monkeypatch, check):
+    (tmp_path / "go").touch()
+    asked, stood_in = [], comparing.command
+    monkeypatch.setattr(comparing, "command", lambda *given: asked.append(given[3]) or stood_in(*given))
+    assert bpy.ops.viewcam.render_all_cameras(directory=str(tmp_path), check=check) == {"FINISHED"}
+    assert [("--check" in words) for words in asked] == [check]
+
+
 def test_without_a_folder_it_is_refused_and_a_child_that_dies_leaves_no_folder(two, monkeypatch, tmp_path):
     with pytest.raises(RuntimeError, match="There is no folder for the pictures"):
         bpy.ops.viewcam.render_all_cameras()
@@ -163,8 +172,9 @@ def test_the_render_menu_is_as_before_without_the_add_on(registered_addon):
 @pytest.mark.exhaustive
 def test_two_cameras_of_two_formats_are_rendered_by_one_click(two, monkey, tmp_path):
     two.render.engine, two.cycles.samples = "CYCLES", 1
-    assert bpy.ops.viewcam.render_all_cameras(directory=str(tmp_path)) == {"FINISHED"}
+    assert bpy.ops.viewcam.render_all_cameras(directory=str(tmp_path), check=True) == {"FINISHED"}
     (folder,) = tmp_path.iterdir()
     sheet = (folder / "contact-sheet.html").read_text(encoding="utf-8")
     assert "20 × 30" in sheet and "50 × 30" in sheet and "untitled.blend" in sheet
+    assert sheet.count("identical") == 3 and "not checked" not in sheet
     assert {path.name for path in folder.glob("*.exr")} == {"Hero_ close.exr", "Wide.exr", "Camera.exr"}

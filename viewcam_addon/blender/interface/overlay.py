@@ -10,6 +10,7 @@ objects in the scene (they would be in the file, the outliner and the render).
 """
 
 import functools
+import math
 from collections.abc import Iterable, Iterator
 
 import bpy
@@ -26,11 +27,12 @@ from . import panel_rows
 from .panel_places import BelowProperties, BelowSidebar, SubPanel
 
 _NAMES = ("u", "v", "w")
-_LETTER_SIZE = 14  # points
+_LETTER_SIZE = 16  # points
 _LETTER_AT = 1.1  # of the axis, beyond its tip
-_BESIDE = 0.8  # of a letter's size, to the right and below the eye or the look-at point
+_BESIDE = 1.2  # of a letter's size, from the eye or the look-at point to its letter
 _FAINT = 0.35  # of a line's opacity, for the grid
 HALO, _HALO_WIDTH = (0.0, 0.0, 0.0, 0.45), 2.5  # its colour, and by how many pixels it is wider than its line
+_OUTLINE = 6  # what blf.shadow calls so
 _MARK = (4.0, 9.0)  # pixels from the look-at point at which each of the mark's four strokes begins and ends
 
 _handlers = []
@@ -158,10 +160,9 @@ def _draw_letters() -> None:
 
     font, size, line = 0, _LETTER_SIZE * context.preferences.system.ui_scale, tuple(preferences.get().line_color)
     colors = _axis_colors(context) | dict.fromkeys(("up", "e", "l"), (*line[:3], 1.0))
-    beside = Vector((_BESIDE * size, -_BESIDE * size))
     blf.size(font, size)
     blf.enable(font, blf.SHADOW)
-    blf.shadow(font, 5, *HALO[:3], 1.0)
+    blf.shadow(font, _OUTLINE, *HALO[:3], 1.0)
     for pinhole, up, share in figures:
         figure = _diagram(pinhole, up, share)
         eye = _pixel(pinhole.eye, context)
@@ -170,15 +171,24 @@ def _draw_letters() -> None:
         tips = zip((*_NAMES, "up"), (*figure.axes, figure.up), strict=True)
         places = {name: _pixel(np.add(pinhole.eye, _LETTER_AT * tip), context) for name, tip in tips} if eye else {}
         places = {name: at for name, at in places.items() if at and (at - eye).length > size}
-        for name, at in (("e", eye), ("l", _pixel(pinhole.look_at, context))):
+        corners = [_pixel(np.add(pinhole.eye, corner), context) for corner in figure.plane]
+        look_at = _pixel(pinhole.look_at, context)
+        lines = {"e": (eye, [*places.values(), *corners, look_at]), "l": (look_at, [eye])}
+        for name, (at, ends) in lines.items():
             if at:
-                places[name] = at + beside
+                places[name] = at + _BESIDE * size * _clearest([end - at for end in ends if end])
         for name, at in places.items():
             width, height = blf.dimensions(font, name)
             blf.position(font, at.x - width / 2, at.y - height / 2, 0)
             blf.color(font, *colors[name])
             blf.draw(font, name)
     blf.disable(font, blf.SHADOW)
+
+
+def _clearest(lines: list[Vector]) -> Vector:
+    """Of eight directions on the screen the one farthest from where lines go, of the same the first, to the lower right."""
+    directions = [Vector((math.cos(angle), math.sin(angle))) for angle in np.arange(8) * (math.pi / 4) - math.pi / 4]
+    return min(directions, key=lambda way: max((round(way.dot(line.normalized()), 6) for line in lines), default=0.0))
 
 
 def mark(context: bpy.types.Context) -> Vector | None:

@@ -71,22 +71,22 @@ def _draw_values(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> 
     for point in targets.POINTS:
         rows = column.column()
         rows.enabled = targets.place(group.id_data, point) is None  # where the point is, its target says
-        rows.prop(group, point)
+        panel_rows.field(rows, group, point)
         panel_rows.field(column, group, f"{point}_target", text="Object")
         target = targets.target_of(group.id_data, point)
         if target and target.type == "ARMATURE":
             panel_rows.field(column, group, f"{point}_bone", text="Bone", among=(target.data, "bones"))
         elif target and target.type == "MESH":
             panel_rows.field(column, group, f"{point}_group", text="Group", among=(target, "vertex_groups"))
-    column.prop(group, "up")
+    panel_rows.field(column, group, "up")
     column.separator()
     _draw_lens(column, group)
     for name in ("zoom", "keeps"):
         panel_rows.field(column, group, name)
     column.separator()
-    column.prop(group, "held_roll" if group.pole == "HOLD" else "roll")
+    panel_rows.field(column, group, "held_roll" if group.pole == "HOLD" else "roll")
     if group.pole == "HOLD":
-        column.prop(group, "hold_within")
+        panel_rows.field(column, group, "hold_within")
     panel_rows.field(column, group, "pole")
 
 
@@ -97,7 +97,8 @@ def _draw_lens(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> No
     """
     field = {"MILLIMETERS": "focal_length", "PIXELS": "distance"}.get(group.lens_unit, "field_of_view")
     if not column.use_property_split:
-        column.prop(group, field)
+        column.label(text="Lens")
+        panel_rows.field(column, group, field, text="")
         panel_rows.field(column, group, "lens_unit", text="Unit")
         return
     row = column.row(align=True)

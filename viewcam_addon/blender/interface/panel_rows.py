@@ -27,17 +27,25 @@ def field(
 ) -> None:
     """A property by its name. Inside a choice, an object or a path there is no room for it, so that it stands above.
 
+    The dots for keyframes, which Blender draws beside a column of values alone, stand beside a narrow panel's fields as well.
     among : what has the names to choose from, and its collection of them.
     """
     described = owner.bl_rna.properties[name]
     text = described.name if text is None else text
-    if not column.use_property_split and described.type in ("ENUM", "POINTER", "STRING"):
+    row = where = column
+    is_dotted = column.use_property_decorate and not column.use_property_split
+    if not column.use_property_split and (described.type in ("ENUM", "POINTER", "STRING") or getattr(described, "is_array", 0)):
         column.label(text=text)
         text = ""
+    if is_dotted:
+        row = column.row(align=True)
+        where = row.column(align=True)
     if among:
-        column.prop_search(owner, name, *among, text=text)
+        where.prop_search(owner, name, *among, text=text)
     else:
-        column.prop(owner, name, text=text)
+        where.prop(owner, name, text=text)
+    if is_dotted:
+        row.column(align=True).prop_decorator(owner, name)
 
 
 def buttons(column: bpy.types.UILayout, context: bpy.types.Context) -> bpy.types.UILayout:
@@ -64,11 +72,12 @@ def described(
     return row
 
 
-def sentence(column: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:
-    """A sentence in lines that fit, never translated here."""
-    below = "NONE" if icon == "NONE" else "BLANK1"
+def sentence(column: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str | int = "NONE") -> None:
+    """A sentence in lines that fit, never translated here. icon : one of Blender's by its name, or one of icons.py."""
+    below = {} if icon == "NONE" else {"icon": "BLANK1"}
+    first = {"icon_value": icon} if isinstance(icon, int) else {"icon": icon}
     for i, line in enumerate(readouts.wrapped(text, _width(context) - _BESIDE_TEXT)):
-        column.label(text=line, icon=below if i else icon, translate=False)
+        column.label(text=line, translate=False, **(below if i else first))
 
 
 def _width(context: bpy.types.Context) -> float:

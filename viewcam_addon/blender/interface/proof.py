@@ -76,9 +76,14 @@ def _stop_timer() -> None:
     _timer = None
 
 
-def _on_view(settings: "ProofSettings", _context: bpy.types.Context) -> None:
+def _on_swipe(settings: "ProofSettings", _context: bpy.types.Context) -> None:
     if _latest and _latest.pictures and proof_image.loaded():
         proof_image.load(_latest, settings.view, settings.swipe)
+
+
+def _on_view(settings: "ProofSettings", context: bpy.types.Context) -> None:
+    _on_swipe(settings, context)
+    proof_image.fit()
 
 
 class ProofSettings(bpy.types.PropertyGroup):
@@ -116,7 +121,7 @@ class ProofSettings(bpy.types.PropertyGroup):
         default=0.5,
         min=0.0,
         max=1.0,
-        update=_on_view,
+        update=_on_swipe,
     )
 
 
@@ -303,14 +308,11 @@ def _draw_progress(layout: bpy.types.UILayout, timed: bool = True) -> None:
 def _draw_outcome(
     layout: bpy.types.UILayout, outcome: Outcome, camera_object: bpy.types.Object, context: bpy.types.Context
 ) -> None:
-    lines = [(outcome.headline or outcome.verdict, "ERROR")]
+    lines = [(outcome.headline or outcome.verdict, icons.tick() if outcome.passed else "ERROR")]
     if outcome.passed is False:
         rest = outcome.verdict.partition(": ")[2]
         lines.append((rest[:1].upper() + rest[1:], "BLANK1"))
     column = layout.column(align=True)
-    if outcome.passed:
-        column.label(text=outcome.headline, icon_value=icons.tick())
-        lines = []
     if camera_object.name != outcome.camera:
         lines.append((f"Of another camera: {outcome.what}", "INFO"))
     elif not outcome.is_of(camera_object, context.scene):

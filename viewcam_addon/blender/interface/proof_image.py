@@ -30,7 +30,8 @@ _LABELS |= {"ALL": ("Cycles", "Tracer", "Difference"), "SWIPE": ("Cycles", "Trac
 _GAP = 8  # pixels between two pictures
 _MARGIN, _LETTERS, _STRIP = 10, 12, (240, 12)  # points: around a label, its size, and the legend's strip
 
-_SECONDS = 0.3  # from a picture to its packing
+_SECONDS = 0.3  # from a picture to its packing, and from a new editor to its size
+_BELOW = 64  # points below the picture, for the legend
 
 _handlers = []
 _shown: Outcome | None = None
@@ -103,6 +104,24 @@ def show(outcome: Outcome, context: bpy.types.Context, anyway: bool = False) -> 
         space = _new_image_editor(context)
     if space:
         space.image = image
+        fit()
+
+
+def fit() -> None:
+    """Zoom the Image Editors that show it to all of the picture, once those that are new have their size."""
+    if not bpy.app.background and not bpy.app.timers.is_registered(_fit):
+        bpy.app.timers.register(_fit, first_interval=_SECONDS)
+
+
+def _fit() -> None:
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "IMAGE_EDITOR" and _is_shown_in(area.spaces.active):
+                part = next(part for part in area.regions if part.type == "WINDOW")
+                with bpy.context.temp_override(window=window, area=area, region=part):
+                    bpy.ops.image.view_all(fit_view=True)
+                    margin = 2 * _BELOW * bpy.context.preferences.system.ui_scale / part.height
+                    area.spaces.active.zoom_percentage *= max(0.5, 1 - margin)
 
 
 @functools.lru_cache(maxsize=3)
@@ -220,7 +239,8 @@ def unregister() -> None:
     global _shown
     _shown = None
     _pixels.cache_clear()
-    if bpy.app.timers.is_registered(_pack):
-        bpy.app.timers.unregister(_pack)
+    for later in (_pack, _fit):
+        if bpy.app.timers.is_registered(later):
+            bpy.app.timers.unregister(later)
     bpy.types.SpaceImageEditor.draw_handler_remove(_handlers.pop(), "WINDOW")
     bpy.types.IMAGE_HT_header.remove(_draw_header)

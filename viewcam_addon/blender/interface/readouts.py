@@ -100,4 +100,4 @@ def _corner(camera: Pinhole) -> float:
 
 def wrapped(sentence: str, width: float) -> list[str]:
     """The lines of a sentence in a region of so many pixels, at the panel's mean character width."""
-    return textwrap.wrap(sentence, max(20, int(width / 6.8)))
+    return textwrap.wrap(sentence, max(8, int(width / 6.8)))

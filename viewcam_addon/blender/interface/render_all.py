@@ -53,8 +53,9 @@ def shots(scene: bpy.types.Scene, animation: bool) -> list[dict[str, Any]]:
 class Rendering(BackgroundBatch):
     """The pictures on their way. Raises InputError as its base and `shots` do."""
 
-    def __init__(self, scene: bpy.types.Scene, into: Path, animation: bool = False) -> None:
-        super().__init__(scene, into, "all cameras", shots(scene, animation), "*.exr")
+    def __init__(self, scene: bpy.types.Scene, into: Path, animation: bool = False, check: bool = False) -> None:
+        words = ["--check"] if check else []
+        super().__init__(scene, into, "all cameras", shots(scene, animation), "*.exr", words)
 
     def progress(self) -> tuple[float, str]:
         """How far it is, from 0 to 1, and what it is doing."""
@@ -92,6 +93,11 @@ class VIEWCAM_OT_render_all_cameras(bpy.types.Operator):
     animation: bpy.props.BoolProperty(
         name="Animation", description="All frames of each camera's range, not only the current one", options={"SKIP_SAVE"}
     )
+    check: bpy.props.BoolProperty(
+        name="Prove Each Picture",
+        description="Compare its geometry with the reference tracer's. The contact sheet tells the verdicts",
+        options={"SKIP_SAVE"},
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -112,7 +118,7 @@ class VIEWCAM_OT_render_all_cameras(bpy.types.Operator):
         try:
             if not self.directory:
                 raise InputError("there is no folder for the pictures: name one")
-            _running = Rendering(context.scene, Path(bpy.path.abspath(self.directory)), self.animation)
+            _running = Rendering(context.scene, Path(bpy.path.abspath(self.directory)), self.animation, self.check)
         except InputError as error:
             self.report({"ERROR"}, datablocks.sentence(error))
             return {"CANCELLED"}
