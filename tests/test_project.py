@@ -461,6 +461,7 @@ def test_how_to_add_something_is_told_in_fewer_than_ten_lines():
         "A camera format": 2,
         "A command": 2,
         "A pass": 3,
+        "A pass of light": 3,
         "A material": 4,
         "A tolerance of geometry": 2,
         "A tolerance of light": 2,
