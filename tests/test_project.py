@@ -77,8 +77,8 @@ BLENDER_ROOMS = {
     "targets": "versions datablocks storage",
     "hold": "versions storage targets",
     "pose": "",
-    "suspects": "versions findings datablocks storage pose",
-    "camera": "findings preferences datablocks storage targets hold pose suspects",
+    "causes": "versions findings datablocks storage pose",
+    "camera": "findings preferences datablocks storage targets hold pose causes",
     "properties": "datablocks storage targets camera",
     "resolution": "datablocks storage camera",
     "dataset_cameras": "opening datablocks camera",
@@ -87,7 +87,7 @@ BLENDER_ROOMS = {
     "scenes": "versions temporary_settings another_blender picture findings datablocks pose camera",
     "rendering": "versions temporary_settings another_blender opening datablocks resolution scenes",
     "interface": (
-        "versions temporary_settings picture findings render_settings preferences datablocks storage targets hold suspects "
+        "versions temporary_settings picture findings render_settings preferences datablocks storage targets hold causes "
         "pose camera own_picture scenes rendering"
     ),
     "batch": "versions temporary_settings opening datablocks camera resolution scenes rendering",
@@ -461,6 +461,7 @@ def test_how_to_add_something_is_told_in_fewer_than_ten_lines():
         "A camera format": 2,
         "A command": 2,
         "A pass": 3,
+        "A pass of light": 3,
         "A material": 4,
         "A tolerance of geometry": 2,
         "A tolerance of light": 2,

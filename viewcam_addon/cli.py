@@ -304,10 +304,10 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         added.set_defaults(run=chart.run)
         added.add_argument(
             "subject",
-            choices=["stability", "light", "speed", "scaling", "poses", "judge"],
+            choices=["stability", "light", "speed", "scaling", "poses", "detection"],
             help="stability: every method up to where it fails; light: error against samples; speed: error against time; "
             "scaling: time and memory against size; poses: time against error of the camera's axes; "
-            "judge: faults that are missed against false alarms",
+            "detection: faults that are missed against false alarms",
         )
         added.add_argument(
             "--output",

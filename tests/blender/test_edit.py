@@ -12,7 +12,7 @@ import viewcam_addon
 PACKAGE = Path(viewcam_addon.__file__).parent
 # As they stand on one another, from below. All that is outside blender/ lies below them, and is plain mathematics here.
 ROOMS = [
-    *("versions", "datablocks", "preferences", "storage", "targets", "hold", "findings", "pose", "suspects"),
+    *("versions", "datablocks", "preferences", "storage", "targets", "hold", "findings", "pose", "causes"),
     *("camera", "resolution", "animation", "properties"),
 ]
 BY_BLENDER = {"on_update", "on_frame_change", "_edit_of"}  # what Blender calls as it evaluates, and as a property is stored

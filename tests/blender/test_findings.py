@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from viewcam_addon.blender.findings import CENTRE, DISTANCE, EYE, POSE, VIEW, Suspect, blame, differences
+from viewcam_addon.blender.findings import CENTRE, DISTANCE, EYE, POSE, VIEW, Cause, differences, explain
 from viewcam_addon.pinhole import Pinhole
 
 WANTED = Pinhole((7.0, -6.0, 5.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), 1500.0, 1920, 1080)
@@ -47,14 +47,14 @@ def test_far_from_the_origin_more_is_rounding():
 
 
 def test_only_a_suspect_that_acts_on_a_difference_is_blamed():
-    track = Suspect("The constraint 'Track' moves 'Camera'", POSE, "disable it")
-    driver = Suspect("A driver sets 'lens'", frozenset({DISTANCE}), "remove it")
-    found = blame({VIEW: "the view is turned by 3°"}, [track, driver])
+    track = Cause("The constraint 'Track' moves 'Camera'", POSE, "disable it")
+    driver = Cause("A driver sets 'lens'", frozenset({DISTANCE}), "remove it")
+    found = explain({VIEW: "the view is turned by 3°"}, [track, driver])
     assert found == ["The constraint 'Track' moves 'Camera', the view is turned by 3°: disable it"]
 
 
 def test_a_difference_that_nobody_explains_is_told_with_what_to_do():
-    (eye, lens, shift) = blame({EYE: "the eye is 1 away", DISTANCE: "d is 5", CENTRE: "off"}, [])
+    (eye, lens, shift) = explain({EYE: "the eye is 1 away", DISTANCE: "d is 5", CENTRE: "off"}, [])
     assert "moved since, the eye is 1 away" in eye
     assert "lens" in lens
     assert "shift" in shift
@@ -62,6 +62,6 @@ def test_a_difference_that_nobody_explains_is_told_with_what_to_do():
 
 
 def test_what_will_act_later_is_told_though_nothing_differs():
-    later = Suspect("'lens' is animated", frozenset({DISTANCE}), "animate the four values instead", always=True)
-    assert blame({}, [later]) == ["'lens' is animated: animate the four values instead"]
-    assert blame({}, [Suspect("The constraint", POSE, "disable it")]) == []
+    later = Cause("'lens' is animated", frozenset({DISTANCE}), "animate the four values instead", always=True)
+    assert explain({}, [later]) == ["'lens' is animated: animate the four values instead"]
+    assert explain({}, [Cause("The constraint", POSE, "disable it")]) == []

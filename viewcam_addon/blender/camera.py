@@ -34,7 +34,7 @@ from .. import roll as rolls
 from ..camera_values import HOLD, CameraValues, without_border
 from ..errors import InputError
 from ..pinhole import Pinhole, Triple
-from . import datablocks, findings, hold, pose, preferences, storage, suspects, targets
+from . import causes, datablocks, findings, hold, pose, preferences, storage, targets
 
 Array = NDArray[np.float64]
 
@@ -228,14 +228,14 @@ def _store(block: bpy.types.ID, **properties: float | tuple[float, ...]) -> None
 
 def check(camera_object: bpy.types.Object, wanted: Pinhole, scene: bpy.types.Scene) -> list[str]:
     """One sentence for each thing that keeps the camera from being `wanted`, or will; empty where all is well."""
-    culprits = list(suspects.suspects(camera_object, scene))
+    possible = list(causes.causes(camera_object, scene))
     try:
         found = read(camera_object, scene)
     except InputError as error:
-        return [datablocks.sentence(error), *findings.blame({}, culprits)]
+        return [datablocks.sentence(error), *findings.explain({}, possible)]
     reach = pose.reach(camera_object, datablocks.depsgraph_of(scene))
     differing = findings.differences(wanted, found, reach, lambda value: datablocks.length(value, scene, digits=3))
-    return findings.blame(differing, culprits)
+    return findings.explain(differing, possible)
 
 
 def read(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
@@ -452,7 +452,7 @@ def _moved(camera_object: bpy.types.Object, wanted: Pinhole, found: Pinhole, dep
     moved = {findings.EYE, findings.VIEW, findings.DISTANCE} & differing
     if findings.EYE in moved and np.array_equal(np.float32(wanted.eye), np.float32(found.eye)):
         moved.remove(findings.EYE)
-    return moved - suspects.held(camera_object) if moved else moved
+    return moved - causes.held(camera_object) if moved else moved
 
 
 def agree(camera_object: bpy.types.Object, rests: tuple[tuple[tuple, CameraValues], ...] = (), is_moving: bool = False) -> None:

@@ -1,8 +1,8 @@
 """What became of a camera after it was set: where it differs from what was asked, and who did it.
 
-`differences` says what is off by more than float32 storage explains, `blame` says which suspects (suspects.py) explain it. Both
-are pure and know no Blender. A suspect is told of when what it acts on differs, so that a constraint which leaves the camera
-where it belongs is never accused; some (animation, libraries, locks) are told of always, since they act later. Rejected: to
+`differences` says what is off by more than float32 storage explains, `explain` says which causes (causes.py) explain it. Both
+are pure and know no Blender. A cause is told of when what it acts on differs, so that a constraint which leaves the camera
+where it belongs is never named; some (animation, libraries, locks) are told of always, since they act later. Rejected: to
 remember what was set and when, which undo, linking and scripts would make stale.
 """
 
@@ -34,14 +34,14 @@ REMEDY = f"{APPLY_AGAIN}, or adopt the camera as it stands"
 
 
 @dataclass(frozen=True)
-class Suspect:
+class Cause:
     """Something that may keep a camera from being what its four values say.
 
-    culprit : a clause with the culprit's name and its deed. acts_on : some of EYE, VIEW, DISTANCE, CENTRE.
+    clause : who does what, in words. acts_on : some of EYE, VIEW, DISTANCE, CENTRE.
     remedy : what to do. always : told even where nothing differs yet.
     """
 
-    culprit: str
+    clause: str
     acts_on: frozenset[str]
     remedy: str
     always: bool = False
@@ -73,16 +73,16 @@ def differences(
     return result
 
 
-def blame(differing: dict[str, str], suspects: Iterable[Suspect]) -> list[str]:
-    """One sentence for each suspect that explains a difference, and for each difference that none explains. Pure."""
+def explain(differing: dict[str, str], causes: Iterable[Cause]) -> list[str]:
+    """One sentence for each cause that explains a difference, and for each difference that none explains. Pure."""
     sentences, unexplained = [], dict(differing)
-    for suspect in suspects:
-        guilty_of = [name for name in differing if name in suspect.acts_on]
-        if guilty_of:
-            sentences.append(f"{suspect.culprit}, {_and(differing[name] for name in guilty_of)}: {suspect.remedy}")
-        elif suspect.always:
-            sentences.append(f"{suspect.culprit}: {suspect.remedy}")
-        for name in guilty_of:
+    for cause in causes:
+        explained = [name for name in differing if name in cause.acts_on]
+        if explained:
+            sentences.append(f"{cause.clause}, {_and(differing[name] for name in explained)}: {cause.remedy}")
+        elif cause.always:
+            sentences.append(f"{cause.clause}: {cause.remedy}")
+        for name in explained:
             unexplained.pop(name, None)
     if POSE & unexplained.keys():
         words = _and(unexplained[name] for name in (EYE, VIEW) if name in unexplained)

@@ -25,7 +25,7 @@ from ...comparison.cameras import conversion_error
 from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
-from .. import datablocks, pose, suspects, versions
+from .. import causes, datablocks, pose, versions
 from .operators import CameraOperator
 
 Array = NDArray[np.float64]
@@ -304,7 +304,7 @@ class VIEWCAM_OT_delete_keyframes(CameraOperator, bpy.types.Operator):
     )
 
     def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
-        found = suspects.keyed(camera_object, versions.action_curves)
+        found = causes.keyed(camera_object, versions.action_curves)
         if not found:
             raise InputError(
                 f"no action of camera {camera_object.name!r} has keyframes of its own channels: look into its NLA tracks"

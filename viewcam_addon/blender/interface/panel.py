@@ -17,7 +17,7 @@ from bpy.app.translations import pgettext_iface as iface
 from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
-from .. import datablocks, findings, hold, suspects, targets, versions
+from .. import causes, datablocks, findings, hold, targets, versions
 from . import baking, clipboard, dragging, panel_rows, presets, readouts, scene_cameras
 from .panel_places import BelowProperties, BelowSidebar, CameraPanel, InProperties, InSidebar, SubPanel
 
@@ -205,7 +205,7 @@ def notices(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> list[Not
 
 def _notice(finding: str, camera_object: bpy.types.Object) -> Notice:
     """A finding, with the button that deletes the keyframes which it is about, if it is."""
-    is_about_keyframes = findings.DELETE_KEYFRAMES in finding and suspects.keyed(camera_object, versions.action_curves)
+    is_about_keyframes = findings.DELETE_KEYFRAMES in finding and causes.keyed(camera_object, versions.action_curves)
     return Notice(finding, ("viewcam.delete_keyframes", iface("Delete These Keyframes")) if is_about_keyframes else None)
 
 

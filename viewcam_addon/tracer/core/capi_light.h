@@ -69,7 +69,7 @@ typedef struct {
     double error;
 } ViewcamLightSettings;
 
-/* Of a whole picture, rows from the bottom. sample_count: or null. */
+/* Of a whole picture, rows from the bottom. Those that nobody wants are null; Combined is always wanted. */
 typedef struct {
     float *combined, *emission, *environment, *diffuse_direct, *diffuse_indirect, *diffuse_color, *variance, *sample_count;
 } ViewcamLightPasses;

@@ -76,8 +76,7 @@ inline TileSampler* create_light(const Scene& scene, const ViewcamLightSettings&
     Bounces bounces{given.bounces[0], given.bounces[1], given.bounces[2], given.bounces[3], given.bounces[4]};
     return new TileSampler(scene, bounces, given.seed, given.samples, given.error);
 }
-inline void trace_light(const TileSampler& sampler, uint32_t row, uint32_t column, const ViewcamLightPasses& to, const volatile int* stop) {
-    LightPasses passes{to.combined, to.emission, to.environment, to.diffuse_direct, to.diffuse_indirect, to.diffuse_color, to.variance, to.sample_count};
+inline void trace_light(const TileSampler& sampler, uint32_t row, uint32_t column, const ViewcamLightPasses& passes, const volatile int* stop) {
     sampler.trace(row, column, passes, stop);
 }
 

@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "../capi_light.h"
 #include "../math/simd.h"
 
 namespace viewcam::VIEWCAM_ISA {
@@ -38,11 +39,6 @@ struct PathLight {
 struct FilmSettings {
     bool transparent = false;  // whether the world behind the scene leaves pixels see-through
     double exposure = 1;
-};
-
-// A tile's passes, row after row of the picture; each of so many channels. Those that nobody wants are null.
-struct LightPasses {
-    float *combined, *emission, *environment, *diffuse_direct, *diffuse_indirect, *diffuse_color, *variance, *sample_count;
 };
 
 // The sums over the samples of one pixel.
@@ -86,21 +82,24 @@ class Pixel {
     }
 
     // random: whether another seed would give another picture; if so, the variance of a single sample is infinite.
-    void write(const LightPasses& passes, size_t pixel, const FilmSettings& film, uint32_t batch_size, bool random) const {
+    void write(const ViewcamLightPasses& passes, size_t pixel, const FilmSettings& film, uint32_t batch_size, bool random) const {
         Vec3 unknown;
         if (random) unknown.x = unknown.y = unknown.z = std::numeric_limits<double>::infinity();
         write(passes, pixel, film, count_ > 1 ? variance(film, batch_size) : unknown);
     }
-    void write(const LightPasses& passes, size_t pixel, const FilmSettings& film, Vec3 variance) const {
+    void write(const ViewcamLightPasses& passes, size_t pixel, const FilmSettings& film, Vec3 variance) const {
         Vec3 color = totals_[COLOR] / count_;
         store(passes.combined + 4 * pixel, combined(film));
         passes.combined[4 * pixel + 3] = film.transparent ? float(covered_ / count_) : 1.0f;
-        store(passes.diffuse_color + 3 * pixel, color);
-        store(passes.emission + 3 * pixel, mean(EMISSION, film));
-        store(passes.environment + 3 * pixel, mean(ENVIRONMENT, film));
-        store(passes.diffuse_direct + 3 * pixel, without_color(mean(DIRECT, film), color));
-        store(passes.diffuse_indirect + 3 * pixel, without_color(mean(INDIRECT, film), color));
-        for (int channel = 0; channel < 3; channel++) passes.variance[3 * pixel + channel] = float(variance[channel]);
+        auto show = [&](float* pass, Vec3 value) {
+            if (pass) store(pass + 3 * pixel, value);
+        };
+        show(passes.diffuse_color, color);
+        show(passes.emission, mean(EMISSION, film));
+        show(passes.environment, mean(ENVIRONMENT, film));
+        show(passes.diffuse_direct, without_color(mean(DIRECT, film), color));
+        show(passes.diffuse_indirect, without_color(mean(INDIRECT, film), color));
+        for (int channel = 0; passes.variance && channel < 3; channel++) passes.variance[3 * pixel + channel] = float(variance[channel]);
         if (passes.sample_count) passes.sample_count[pixel] = float(count_);
     }
 

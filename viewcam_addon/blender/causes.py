@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterator
 import bpy
 
 from . import datablocks, pose, storage, versions
-from .findings import APPLY_AGAIN, CENTRE, DELETE_KEYFRAMES, DISTANCE, EYE, LENS, POSE, REMEDY, VIEW, Suspect
+from .findings import APPLY_AGAIN, CENTRE, DELETE_KEYFRAMES, DISTANCE, EYE, LENS, POSE, REMEDY, VIEW, Cause
 
 
-def suspects(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[Suspect]:
+def causes(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[Cause]:
     yield from _constraints(camera_object)
     yield from _drivers(camera_object)
     yield from _animation(camera_object)
@@ -30,7 +30,7 @@ def held(camera_object: bpy.types.Object) -> set[str]:
         holding += _constraints(camera_object)
     if datablocks.is_animated(camera_object):
         holding += _animation(camera_object)
-    return set().union(*(suspect.acts_on for suspect in holding))
+    return set().union(*(cause.acts_on for cause in holding))
 
 
 # Constraints that leave the eye or the view alone; all others act on both.
@@ -39,15 +39,15 @@ _TURNING = ("TRACK_TO", "DAMPED_TRACK", "LOCKED_TRACK", "COPY_ROTATION", "LIMIT_
 _CONSTRAINTS = dict.fromkeys(_MOVING, frozenset({EYE})) | dict.fromkeys(_TURNING, frozenset({VIEW}))
 
 
-def _constraints(camera_object: bpy.types.Object) -> Iterator[Suspect]:
+def _constraints(camera_object: bpy.types.Object) -> Iterator[Cause]:
     is_carried = pose.is_carried_by_constraints(camera_object)
     for constraint in pose.active_constraints(camera_object):
         name, camera = repr(constraint.name), repr(camera_object.name)
         if is_carried:  # what is set now takes it into account
-            yield Suspect(f"The constraint {name} has carried {camera} along", POSE, f"{APPLY_AGAIN}, or animate them")
+            yield Cause(f"The constraint {name} has carried {camera} along", POSE, f"{APPLY_AGAIN}, or animate them")
         else:
             acts_on = _CONSTRAINTS.get(constraint.type, POSE)
-            yield Suspect(f"The constraint {name} moves {camera}", acts_on, "disable it, or the Virtual Pinhole")
+            yield Cause(f"The constraint {name} moves {camera}", acts_on, "disable it, or the Virtual Pinhole")
 
 
 # A channel by the start of its data path: what it acts on, and its name as a sentence says it.
@@ -73,13 +73,13 @@ def _paths(curves: list[bpy.types.FCurve]) -> list[str]:
     return sorted({curve.data_path for curve in curves if not versions.is_muted(curve)})
 
 
-def _drivers(camera_object: bpy.types.Object) -> Iterator[Suspect]:
+def _drivers(camera_object: bpy.types.Object) -> Iterator[Cause]:
     for block in (camera_object, camera_object.data):
         for path in _paths(versions.drivers(block)):
             quantity, words = _channel(path)
             if quantity:
-                culprit = f"A driver sets the {words} of {block.name!r}"
-                yield Suspect(culprit, frozenset({quantity}), "remove it, or disable the Virtual Pinhole")
+                clause = f"A driver sets the {words} of {block.name!r}"
+                yield Cause(clause, frozenset({quantity}), "remove it, or disable the Virtual Pinhole")
 
 
 def keyed(
@@ -90,27 +90,27 @@ def keyed(
     return [(block, path) for block in blocks for path in _paths(curves(block)) if _channel(path)[0] not in (None, CENTRE)]
 
 
-def _animation(camera_object: bpy.types.Object) -> Iterator[Suspect]:
+def _animation(camera_object: bpy.types.Object) -> Iterator[Cause]:
     if found := keyed(camera_object, versions.animation_curves):
         channels = [_channel(path) for _, path in found]
         words = list(dict.fromkeys(words for _, words in channels))
         which = f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0]
-        culprit = f"Keyframes set the {which} of {camera_object.name!r}, and in a render they win over the four values"
-        yield Suspect(culprit, frozenset(quantity for quantity, _ in channels), DELETE_KEYFRAMES, always=True)
+        clause = f"Keyframes set the {which} of {camera_object.name!r}, and in a render they win over the four values"
+        yield Cause(clause, frozenset(quantity for quantity, _ in channels), DELETE_KEYFRAMES, always=True)
 
 
-def _ancestors(camera_object: bpy.types.Object) -> Iterator[Suspect]:
+def _ancestors(camera_object: bpy.types.Object) -> Iterator[Cause]:
     """Who carries the camera away. Where the four values are animated they are set anew at every frame, and nobody can."""
     if datablocks.is_animated(camera_object):
         return
     remedy = "animate the four values instead, or disable the Virtual Pinhole"
     for ancestor in pose.ancestors(camera_object):
         if _is_moved_by_animation(ancestor):
-            culprit = f"{ancestor.name!r} is animated and carries {camera_object.name!r} along"
-            yield Suspect(culprit, POSE, remedy, always=True)
+            clause = f"{ancestor.name!r} is animated and carries {camera_object.name!r} along"
+            yield Cause(clause, POSE, remedy, always=True)
         elif any(pose.active_constraints(ancestor)):
-            culprit = f"{ancestor.name!r} is moved by its constraints and carries {camera_object.name!r} along"
-            yield Suspect(culprit, POSE, remedy)
+            clause = f"{ancestor.name!r} is moved by its constraints and carries {camera_object.name!r} along"
+            yield Cause(clause, POSE, remedy)
 
 
 def _is_moved_by_animation(block: bpy.types.Object) -> bool:
@@ -120,55 +120,55 @@ def _is_moved_by_animation(block: bpy.types.Object) -> bool:
     return any(_channel(path)[0] in POSE or path.startswith("pose.bones") or path == "eval_time" for path in paths)
 
 
-def _libraries(camera_object: bpy.types.Object) -> Iterator[Suspect]:
+def _libraries(camera_object: bpy.types.Object) -> Iterator[Cause]:
     blocks = ((camera_object, "Camera", POSE), (camera_object.data, "The camera data", LENS))
     for block, kind, acts_on in blocks:
         if block.library:
-            culprit = f"{kind} {block.name!r} is linked from {block.library.name!r}, and what is set here is not saved"
-            yield Suspect(culprit, acts_on, "make a library override of it", always=True)
+            clause = f"{kind} {block.name!r} is linked from {block.library.name!r}, and what is set here is not saved"
+            yield Cause(clause, acts_on, "make a library override of it", always=True)
 
 
-def _locks(camera_object: bpy.types.Object) -> Iterator[Suspect]:
+def _locks(camera_object: bpy.types.Object) -> Iterator[Cause]:
     locked = {"location": any(camera_object.lock_location), "rotation": any(camera_object.lock_rotation)}
     names = [name for name, is_locked in locked.items() if is_locked]
     if names:
         channels = " and ".join(names)
-        culprit = f"{camera_object.name!r} is locked in its {channels}, and the Virtual Pinhole moves it all the same"
-        yield Suspect(culprit, frozenset(), "unlock it, or disable the Virtual Pinhole", always=True)
+        clause = f"{camera_object.name!r} is locked in its {channels}, and the Virtual Pinhole moves it all the same"
+        yield Cause(clause, frozenset(), "unlock it, or disable the Virtual Pinhole", always=True)
 
 
-def _sensor(camera: bpy.types.Camera) -> Iterator[Suspect]:
+def _sensor(camera: bpy.types.Camera) -> Iterator[Cause]:
     width, _ = datablocks.own_sensor(camera)
     if width != camera.sensor_width:
         growth = camera.sensor_width / width
-        culprit = (
+        clause = (
             f"The lens would be {camera.lens / growth:.3g} mm, which Blender clamps to 1 mm, "
             f"so it and the sensor are {growth:g} times as large"
         )
-        yield Suspect(culprit, frozenset(), "the picture is the same, nothing needs to be done", always=True)
+        yield Cause(clause, frozenset(), "the picture is the same, nothing needs to be done", always=True)
 
 
-def _render_size(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[Suspect]:
+def _render_size(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[Cause]:
     frame = storage.load(camera_object).set_for
     if frame is None or frame.size == datablocks.frame_of(scene).size:
         return
     before, now = frame.size, datablocks.frame_of(scene).size
     if others := storage.scenes_it_is_set_for(camera_object, scene):
-        culprit = (
+        clause = (
             f"The camera is set for the {before[0]} × {before[1]} px of scene {others[0].name!r}, "
             f"and scene {scene.name!r} renders {now[0]} × {now[1]}"
         )
-        yield Suspect(culprit, LENS, "give both scenes the same resolution, or each a camera of its own")
+        yield Cause(clause, LENS, "give both scenes the same resolution, or each a camera of its own")
     else:
-        culprit = f"The picture was {before[0]} × {before[1]} px and is {now[0]} × {now[1]} now"
-        yield Suspect(culprit, LENS, REMEDY)
+        clause = f"The picture was {before[0]} × {before[1]} px and is {now[0]} × {now[1]} now"
+        yield Cause(clause, LENS, REMEDY)
 
 
-def _sharers(camera_object: bpy.types.Object) -> Iterator[Suspect]:
+def _sharers(camera_object: bpy.types.Object) -> Iterator[Cause]:
     camera = camera_object.data
     if camera.users < 2:
         return
     others = [other.name for other in bpy.data.objects if other.data == camera and other.name != camera_object.name]
     if others:
-        culprit = f"The camera data {camera.name!r} is shared with {', '.join(map(repr, sorted(others)))}"
-        yield Suspect(culprit, LENS, "make the data single-user, or give both the same distance")
+        clause = f"The camera data {camera.name!r} is shared with {', '.join(map(repr, sorted(others)))}"
+        yield Cause(clause, LENS, "make the data single-user, or give both the same distance")
