@@ -304,10 +304,10 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         added.set_defaults(run=chart.run)
         added.add_argument(
             "subject",
-            choices=["stability", "light", "speed", "scaling", "poses", "detection"],
+            choices=["stability", "light", "speed", "scaling", "poses", "judge"],
             help="stability: every method up to where it fails; light: error against samples; speed: error against time; "
             "scaling: time and memory against size; poses: time against error of the camera's axes; "
-            "detection: faults that are missed against false alarms",
+            "judge: faults that are missed against false alarms",
         )
         added.add_argument(
             "--output",

@@ -36,8 +36,8 @@ NOT_RUN = {
     "make test": "it runs this test",
     "make bench": _LONG,
     "make charts": _LONG,
-    "viewcam chart detection": _LONG,
-    "viewcam chart detection --quick": _LONG,
+    "viewcam chart judge": _LONG,
+    "viewcam chart judge --quick": _LONG,
     "viewcam chart poses": _LONG,
     "viewcam compare traced.exr elsewhere.exr --scene scene.json --channels position=P.X,P.Y,P.Z distance=dist.Y "
     "object-index=id.X": "tests/test_cli.py names the channels of a file of its own",

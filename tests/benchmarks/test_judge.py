@@ -1,11 +1,11 @@
-"""The chart of detection: its faults are faults, and what a good renderer makes is not one."""
+"""The chart of the judge: its faults are faults, and what a good renderer makes is not one."""
 
 import numpy as np
 import pytest
 
 pytest.importorskip("flip_evaluator")
 
-from benchmarks.detection import detection, faults
+from benchmarks.judge import detection, faults
 
 
 @pytest.fixture(scope="module")

@@ -1,17 +1,17 @@
-"""Faults found against false alarms: each method sees the same pictures, of a good renderer and of one with a fault.
+"""Faults found against false alarms: each judge sees the same pictures, of a good renderer and of one with a fault.
 
 A renderer is our own tracer with other numbers and, where geometry is compared, with rays that are off by what float32 makes of
 them (the law of comparison/tolerances.py). All pictures of a trial are one picture of a few seeds, as `viewcam check` has it.
 
-What a method misses depends on where it puts its threshold. So the threshold is moved: on the one axis how many good pictures
-are called bad, on the other how many of the faults are missed. What it does at its own threshold is in the sentence below.
+What a judge misses depends on where it puts its threshold. So the threshold is moved: on the one axis how many good pictures
+are called bad, on the other how many of the faults are missed. What a judge does at its own threshold is in the sentence below.
 
 Rendering takes the time. So good pictures come in blocks: each of five is judged against each of five references, with errors
 of geometry of its own. Blocks share nothing, and pairs within one are nearly independent where it counts: with one side in
 common their differences have a correlation of one half, and where one of two normal numbers is 4.5 standard errors off the
 other is, too, in 0.6 % of the cases. How often a second pair's figure is among the highest hundredth if the first one's is
 is measured, and told. A fault is judged once for each picture of a block; one of the picture is put into the good one. Light
-is not asked about where geometry has said no already, which costs ours nothing but the figure how much. The others compare one
+is not asked about where geometry has said no already, which costs ours nothing but the figure how much. The others judge one
 pair of each block, always by light.
 """
 
@@ -44,29 +44,29 @@ SIDE = 5
 _ROUNDINGS = 0.35
 
 Said = dict[str, float]
-"""Method → how different two pictures are; 1 is where it says so by itself."""
-Answers = tuple[list[Said], list[list[Said]]]
+"""Judge → how different two pictures are; 1 is where it says so by itself."""
+Judged = tuple[list[Said], list[list[Said]]]
 """Of a block: each picture against each reference, row after row; and of each fault, if they are wanted, each picture."""
 
 
 def charts(quick: bool = False) -> tuple[Chart, ...]:
     blocks, with_faults = (4, 1) if quick else (170, 40)
     with ProcessPoolExecutor() as pool:
-        return drawn(pool.map(compared, range(blocks), (block < with_faults for block in range(blocks))))
+        return drawn(pool.map(judged, range(blocks), (block < with_faults for block in range(blocks))))
 
 
-def compared(number: int, with_faults: bool) -> Answers:
-    """What all methods say of one block."""
+def judged(number: int, with_faults: bool) -> Judged:
+    """What all judges say of one block."""
     block = Block(_bench(), number)
     return block.good(), [block.faulty(fault) for fault in FAULTS] if with_faults else []
 
 
-def drawn(blocks: Iterable[Answers]) -> tuple[Chart, ...]:
+def drawn(blocks: Iterable[Judged]) -> tuple[Chart, ...]:
     """A chart for each family and one for all of them."""
     good, bad = zip(*blocks, strict=True)
-    clean = _by_method(itertools.chain(*good))
+    clean = _by_judge(itertools.chain(*good))
     of_faults = (itertools.chain(*said) for said in zip(*filter(None, bad), strict=True))
-    found = dict(zip(FAULTS, map(_by_method, of_faults), strict=True))
+    found = dict(zip(FAULTS, map(_by_judge, of_faults), strict=True))
     return tuple(
         _chart(family, {fault: of for fault, of in found.items() if family in ("all", fault.family)}, clean)
         for family in (*FAMILIES, "all")
@@ -83,24 +83,24 @@ def together(scores: np.ndarray, share: float = 0.01) -> float:
     return float(beside[is_high].mean() / (2 * (SIDE - 1)))
 
 
-def _by_method(said: Iterable[Said]) -> dict[str, np.ndarray]:
+def _by_judge(said: Iterable[Said]) -> dict[str, np.ndarray]:
     said = list(said)
-    return {method: np.array([each[method] for each in said if method in each]) for method in said[0]}
+    return {judge: np.array([each[judge] for each in said if judge in each]) for judge in said[0]}
 
 
 def _chart(family: str, found: dict[Fault, dict[str, np.ndarray]], clean: dict[str, np.ndarray]) -> Chart:
     curves, at_own_threshold = [], []
-    for method, said in clean.items():
-        of_faults = np.concatenate([each[method] for each in found.values()])
+    for judge, said in clean.items():
+        of_faults = np.concatenate([each[judge] for each in found.values()])
         # So many good pictures are above the threshold, and no more.
         alarms = [share for share in (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3) if share * len(said) >= 1]
         limits = [np.sort(said)[::-1][int(share * len(said))] for share in alarms]
         missed = [float(np.mean(of_faults <= limit)) for limit in limits]
-        curves.append(Curve(method, alarms, missed, ours=method == rivals.OURS))
-        at_own_threshold.append(f"{method} {np.mean(of_faults > 1):.1%} at {np.mean(said > 1):.2%}")
+        curves.append(Curve(judge, alarms, missed, ours=judge == rivals.OURS))
+        at_own_threshold.append(f"{judge} {np.mean(of_faults > 1):.1%} at {np.mean(said > 1):.2%}")
     share = together(clean[rivals.OURS])
     beside = f" Where a pair is in ours' highest hundredth, so are {share:.1%} of those that share a side."
-    trials, seen = ([len(of[method]) for of in (*found.values(), clean)] for method in (rivals.OURS, "FLIP"))
+    trials, seen = ([len(of[judge]) for of in (*found.values(), clean)] for judge in (rivals.OURS, "FLIP"))
     return Chart(
         family,
         {"all": "All faults", "camera": "The camera", "geometry": "What stands in the scene", "light": "Light"}.get(
@@ -133,7 +133,7 @@ _bench = functools.cache(Bench)
 
 
 class Block:
-    """Pictures and references, and what the methods say of them."""
+    """Pictures and references, and what the judges say of them."""
 
     def __init__(self, bench: Bench, number: int) -> None:
         self._bench, self._number = bench, number
@@ -180,7 +180,7 @@ class Block:
         colours = np.mean([picture["Combined"][..., :3].astype(float) for picture in pictures], axis=0)
         expected, variance = reference["Combined"][..., :3].astype(float), reference["Variance"] * float(_REFERENCE_SAMPLES)
         given = expected, colours, variance, _PICTURES * _SAMPLES
-        return said | {name: method(*given) for name, method in rivals.RIVALS.items()}
+        return said | {name: judge(*given) for name, judge in rivals.RIVALS.items()}
 
     def _of_geometry(self, test: Passes) -> float:
         image = rivals.without_the_tracers_own(Image(test))
