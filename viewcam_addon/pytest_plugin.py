@@ -55,8 +55,8 @@ def viewcam_check(request: pytest.FixtureRequest) -> "Callable[..., Check]":
 
     Returns the viewcam_addon.Check: `.sentence`, `.figures`.
     """
-    judge = _Judge(request)
-    return lambda blend, **options: judge("check", [blend], options)
+    run = _Runner(request)
+    return lambda blend, **options: run("check", [blend], options)
 
 
 @pytest.fixture
@@ -68,11 +68,11 @@ def same_picture(request: pytest.FixtureRequest) -> "Callable[..., Check]":
 
     Returns the viewcam_addon.Check: `.sentence`, `.figures`.
     """
-    judge = _Judge(request)
-    return lambda reference, *tests, **options: judge("compare", [reference, *tests], options)
+    run = _Runner(request)
+    return lambda reference, *tests, **options: run("compare", [reference, *tests], options)
 
 
-class _Judge:
+class _Runner:
     """Runs commands for one test, and fails it with their sentences."""
 
     def __init__(self, request: pytest.FixtureRequest) -> None:

@@ -42,7 +42,7 @@ def of_geometry(reference: Image, test: Image, surface_at: Callable) -> float:
 def of_light(reference: Image, tests: Sequence[Image]) -> float:
     """Ours, of light: the largest share of what is allowed."""
     shares = []
-    for row in radiance.judge(reference, tests, reference.camera).rows:
+    for row in radiance.compare_quantities(reference, tests, reference.camera).rows:
         if row.broken or (row.noise_free and not row.noise_free.ok):
             shares.append(np.inf)
         shares += [float(np.nanmax(np.abs(test.errors) / test.allowed)) for test in row.hypothesis_tests]

@@ -6,7 +6,7 @@ pixel, in tiles of 8 and of 32 pixels and in the whole picture, since the sum ov
 tests together raise a false alarm in one comparison of a hundred at most.
 
 Rejected: a threshold for the mean error or for FLIP. Both shrink with the samples and grow with the scene's contrast, so that
-any threshold is right for one picture; they are told, and judge nothing.
+any threshold is right for one picture; they are told, and decide nothing.
 """
 
 from collections.abc import Callable, Sequence
@@ -45,20 +45,20 @@ def compare(reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_sam
     InputError
         if the sizes differ, a pass is missing, or there is no test picture.
     """
-    judged = judge(reference, tests, pinhole, test_samples)
-    maps = dict(judged.maps)
-    appearance, flip = perception.appearance(judged.combined)
+    compared = compare_quantities(reference, tests, pinhole, test_samples)
+    maps = dict(compared.maps)
+    appearance, flip = perception.appearance(compared.combined)
     if flip is not None:
         maps["FLIP"] = flip
-    samples, seeds = judged.samples, len(tests)
+    samples, seeds = compared.samples, len(tests)
     together = (samples[0], samples[1] and samples[1] * seeds)
     return RadianceComparison(
-        pinhole, together, seeds, judged.is_noisy, judged.rows, judged.equal, appearance, judged.combined.test, maps
+        pinhole, together, seeds, compared.is_noisy, compared.rows, compared.equal, appearance, compared.combined.test, maps
     )
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class QuantityComparison:
     """What the verdict stands on.
 
     combined : both sides of it. samples : of the reference, and of each test picture. rows, equal, maps : as in
@@ -74,8 +74,10 @@ class Judged:
 
 
 @np.errstate(all="ignore")
-def judge(reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_samples: int | None = None) -> Judged:
-    """`compare` without what judges nothing."""
+def compare_quantities(
+    reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_samples: int | None = None
+) -> QuantityComparison:
+    """`compare` without what decides nothing."""
     found = list(all_sides(reference, tests))
     combined, equal = found[0], tuple(sides.name for sides in found[1:] if sides.are_equal)
     unequal = [sides for sides in found if sides.name not in equal]
@@ -96,7 +98,7 @@ def judge(reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_sampl
         rows.append(row)
         if sides.name == "Combined" or not row.ok:
             maps |= {f"{sides.name}: {name}": in_float32(values) for name, values in drawn.items()}
-    return Judged(combined, samples, is_noisy, tuple(rows), equal, maps)
+    return QuantityComparison(combined, samples, is_noisy, tuple(rows), equal, maps)
 
 
 def _noise_free(sides: Sides, rounding: noise_free.Rounding) -> tuple[LightRow, dict[str, Array]]:
