@@ -8,6 +8,8 @@ threads. Tracer and yardstick take turns, and the median of their ratios counts,
 
 - geometry: a picture of 1920 × 1080 with all passes. The yardstick traces a ray for each pixel.
 - direct: light of a wide sun. The yardstick traces the eye's ray and the shadow ray of each sample.
+- path: the same with interreflection, of a plain surface: what materials, textures and nodes can do must cost it nothing. The
+  yardstick stays that of direct.
 - adaptive: light of a sun without size, with a wanted error. The yardstick traces the rays of as many samples of each pixel as
   have, without a wanted error, the same RMS error.
 
@@ -24,6 +26,7 @@ import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -110,10 +113,10 @@ def _geometry() -> float:
     return _share(lambda: yardstick.trace(eyes, directions), Tracer(scene).render)
 
 
-def _direct() -> float:
+def _light(level: str) -> float:
     scene = scenes.one_mesh(_TRIANGLES, _SIZE, [_WIDE_SUN])
     tracer = Tracer(scene)
-    return _share(Yardstick(scene).of_light(_SAMPLES), lambda: tracer.render_light("direct", _SAMPLES, 0))
+    return _share(Yardstick(scene).of_light(_SAMPLES), lambda: tracer.render_light(level, _SAMPLES, 0))
 
 
 def _adaptive() -> float:
@@ -131,7 +134,7 @@ def _adaptive() -> float:
     return worth / _SAMPLES * _share(Yardstick(scene).of_light(_SAMPLES), lambda: light(_MOST, 0, _ERROR))
 
 
-_MEASURES = {"geometry": _geometry, "direct": _direct, "adaptive": _adaptive}
+_MEASURES = {"geometry": _geometry, "direct": partial(_light, "direct"), "path": partial(_light, "path"), "adaptive": _adaptive}
 
 
 def _share(yardstick: Callable[[], object], work: Callable[[], object]) -> float:

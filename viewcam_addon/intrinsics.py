@@ -11,7 +11,6 @@ in Cycles' intern/cycles/blender/camera.cpp. Rejected: going through the field o
 is limited to one axis.
 """
 
-import functools
 import math
 from dataclasses import dataclass, replace
 
@@ -121,7 +120,6 @@ def _set(instance: object, name: str, value: object) -> None:
     object.__setattr__(instance, name, value)
 
 
-@functools.lru_cache(maxsize=64)  # a camera that moves keeps its lens
 def view_plane(camera: CameraData, frame: Frame) -> ViewPlane:
     """The view plane of a Blender camera in the picture of `frame` (its window, if it crops to a border).
 
@@ -146,7 +144,6 @@ def view_plane(camera: CameraData, frame: Frame) -> ViewPlane:
     )
 
 
-@functools.lru_cache(maxsize=64)
 def camera_data(plane: ViewPlane, frame: Frame, sensor_width: float, sensor_height: float, sensor_fit: str) -> CameraData:
     """The Blender camera that has this view plane in the picture of `frame`, on the given sensor.
 

@@ -38,7 +38,7 @@ def test_what_is_slow_in_every_attempt_has_fallen_and_what_is_slow_in_two_has_no
 
 
 def test_everything_that_is_measured_has_a_ratio():
-    assert RECORDED.keys() == guard._MEASURES.keys() == {"geometry", "direct", "adaptive"}
+    assert RECORDED.keys() == guard._MEASURES.keys() == {"geometry", "direct", "path", "adaptive"}
 
 
 @pytest.mark.speed

@@ -175,7 +175,7 @@ def place(
     order = (pinhole, frame, parent.tobytes())
     if (*order, *before) not in _in_place:
         sensor = intrinsics.own_sensor((camera.sensor_width, camera.sensor_height), grown_from)
-        data = intrinsics.camera_data(pinhole.plane, frame, *sensor, camera.sensor_fit)
+        data = datablocks.camera_data(pinhole.plane, frame, *sensor, camera.sensor_fit)
         if not np.isfinite(channels.delta_rotation).all():
             raise pose.no_size(camera_object)
         location, turn, scale = channels.bringing_to(pinhole, parent)
@@ -210,10 +210,10 @@ def refit(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
         as `follow` does. Nothing has changed then.
     """
     camera, frame = camera_object.data, datablocks.frame_of(scene)
-    plane = intrinsics.view_plane(datablocks.camera_data_of(camera_object), frame)
+    plane = datablocks.view_plane(datablocks.camera_data_of(camera_object), frame)
     distance = targets.values(camera_object).distances(frame, camera.sensor_fit)
     sensor = datablocks.own_sensor(camera)
-    data = intrinsics.camera_data(replace(plane, distance=distance), frame, *sensor, camera.sensor_fit)
+    data = datablocks.camera_data(replace(plane, distance=distance), frame, *sensor, camera.sensor_fit)
     intrinsics.check_storable(camera_object.name, distance=(data.lens, data.sensor_width))
     _store(camera, **intrinsics.lens_and_sensor(data, sensor))
 
@@ -269,7 +269,7 @@ def read(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
     eye = matrix[:3, 3]
     # As far away as the eye's largest coordinate: then eye − reach · w loses none of w's digits.
     reach = 2.0 ** math.ceil(math.log2(max(1.0, np.abs(eye).max())))
-    plane = intrinsics.view_plane(datablocks.camera_data_of(evaluated), datablocks.frame_of(scene))
+    plane = datablocks.view_plane(datablocks.camera_data_of(evaluated), datablocks.frame_of(scene))
     return Pinhole(
         tuple(eye.tolist()),
         tuple((eye - reach * w).tolist()),
@@ -303,7 +303,7 @@ def _level(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> tuple[Cam
     """The values, and the Pinhole that they ask for, whatever the roll is."""
     evaluated = camera_object if camera_object.is_evaluated else camera_object.evaluated_get(datablocks.depsgraph_of(scene))
     frame = datablocks.frame_of(scene)
-    plane = intrinsics.view_plane(datablocks.camera_data_of(evaluated), frame)
+    plane = datablocks.view_plane(datablocks.camera_data_of(evaluated), frame)
     values = storage.load(camera_object)
     if values.follows:
         values = targets.followed(camera_object, values)

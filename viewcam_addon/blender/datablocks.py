@@ -37,6 +37,8 @@ def is_animated(camera_object: bpy.types.Object) -> bool:
 # What is checked once is not checked again as a camera moves.
 _known_frame = functools.lru_cache(maxsize=64)(intrinsics.Frame)
 _known_camera = functools.lru_cache(maxsize=64)(intrinsics.CameraData)
+view_plane = functools.lru_cache(maxsize=64)(intrinsics.view_plane)
+camera_data = functools.lru_cache(maxsize=64)(intrinsics.camera_data)
 
 
 def frame_of(scene: bpy.types.Scene) -> intrinsics.Frame:

@@ -278,7 +278,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
     # No minimum either.
     zoom: bpy.props.FloatProperty(
         name="Zoom",
-        description="A factor on the distance, to key or drive a zoom apart from it: 2 shows everything twice as large",
+        description="A factor on the view-plane distance d, to key or drive a zoom apart from it: 2 shows all twice as large",
         default=1.0,
         soft_min=0.1,
         soft_max=10.0,

@@ -7,10 +7,12 @@ import ast
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from viewcam_addon.blender import preferences
 from viewcam_addon.blender.interface import overlay, viewport
 
 SOURCES = Path(overlay.__file__).parents[1]
@@ -24,6 +26,30 @@ def shown(posed_camera, scene, monkeypatch):
     layer = bpy.context.view_layer
     layer.objects.active = posed_camera
     return SimpleNamespace(space_data=space, region_data=space.region_3d, scene=scene, view_layer=layer)
+
+
+def _contrast(one, other):
+    """Of two colors as a screen gets them, as the Web's guidelines have it: from 1 to 21."""
+    dark, light = sorted(
+        float(np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4) @ (0.2126, 0.7152, 0.0722)) for c in (one, other)
+    )
+    return (light + 0.05) / (dark + 0.05)
+
+
+def test_axes_lines_and_handles_read_on_any_gray_which_without_their_halo_they_would_not(fresh_blender):
+    """Calibrated: 2.46 is the least, of the red axis on a gray of 0.53."""
+    theme = bpy.context.preferences.themes[0].user_interface
+    pens = [theme.axis_x, theme.axis_y, theme.axis_z, theme.gizmo_primary, theme.gizmo_secondary]
+    pens = [np.array(pen) for pen in (*pens, preferences.get().line_color[:3])]
+    halo, share = np.array(overlay.HALO[:3]), overlay.HALO[3]
+    for pen in pens:
+        grays = [np.full(3, gray) for gray in np.linspace(0, 1, 101)]
+        halos = [share * halo + (1 - share) * gray for gray in grays]
+        seen = [
+            max(_contrast(pen, gray), _contrast(pen, dark), _contrast(gray, dark))
+            for gray, dark in zip(grays, halos, strict=True)
+        ]
+        assert min(seen) > 2.4 and min(_contrast(pen, gray) for gray in grays) < 1.05
 
 
 def test_a_letter_stands_where_no_line_goes():

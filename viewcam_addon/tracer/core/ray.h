@@ -48,9 +48,11 @@ struct Hit {
 // The nearest hit so far. Of equal distances that of the smaller object counts, then that of the smaller primitive.
 struct Nearest {
     double t;
-    uint64_t name = 0;  // object · 2³² + primitive; 0 so that nothing wins a tie with the ray's end
+    uint64_t name = 0;    // object · 2³² + primitive; 0 so that nothing wins a tie with the ray's end
+    uint32_t but = NONE;  // an object that does not count
 
     bool offer(double distance, uint32_t object, uint32_t primitive) {
+        if (object == but) return false;
         uint64_t other = uint64_t(object) << 32 | primitive;
         if (!(distance < t || (distance == t && other < name))) return false;
         t = distance;

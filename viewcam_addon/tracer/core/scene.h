@@ -59,9 +59,9 @@ class Scene {
         for (uint32_t& leaf : instances_.leaves) leaf = placed[leaf];
     }
 
-    // What a ray meets first among the objects that its kind sees.
-    Hit closest(const Ray& ray, RayKind kind) const {
-        Nearest nearest{ray.t_max};
+    // What a ray meets first among the objects that its kind sees, but one.
+    Hit closest(const Ray& ray, RayKind kind, uint32_t but = NONE) const {
+        Nearest nearest{ray.t_max, 0, but};
         for (const Merged& some : merged_)
             if (some.visible & kind) some.triangles.intersect<false>(ray, NONE, nearest);
         intersect_instances<false>(ray, kind, nearest);

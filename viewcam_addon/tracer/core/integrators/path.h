@@ -112,6 +112,8 @@ class PathIntegrator {
         int passed = 0;                      // surfaces that it has gone straight through
         double width = 0, spread = 0;        // of its pixel, as RayState has it, where materials ask for that
         std::array<uint16_t, 3> scattered = {};  // diffuse, glossy, transmission
+        uint32_t inside = NONE;                   // the object that it has been let into last, until it is let out
+        bool may_touch = false, touches = false;  // whether its ray may meet, or has met, a surface right where it starts
         Vec3 weight{1, 1, 1};
         Ray ray;
         double pdf = INFINITE;
@@ -243,7 +245,7 @@ class PathIntegrator {
             Path& path = block.paths[met];  // the rest is known when it is scattered
             path.sample = i, path.from = met;
             path.category = COLOR, path.kind = CAMERA, path.last = path.diffuse = false, path.pdf = INFINITE, path.passed = 0;
-            path.scattered = {};
+            path.scattered = {}, path.inside = NONE, path.touches = false;
             path.weight = {1, 1, 1};
             meet_lamps(path, rays[i], hits[i], 0, block);
             if (!hits[i]) {
@@ -329,6 +331,9 @@ class PathIntegrator {
             next.pdf = sampled.pdf;
             if (has_pixels_) next.width = at.footprint(), next.spread = path.kind == CAMERA ? scene_.camera.spread(path.ray.direction) : path.spread;
             next.ray = {point.ray_origin(sampled.direction), sampled.direction, 0, INFINITE};
+            bool passed = sampled.kind == TRANSMISSION;
+            if (passed) next.inside = point.backside ? NONE : point.object;
+            next.may_touch = passed ? point.backside : path.touches;
             onwards++;
         }
         block.live = onwards;
@@ -385,18 +390,53 @@ class PathIntegrator {
         }
     }
 
+    // Where one thing stands on another, their surfaces are in one place, up to rounding. Rays come out of the one before they meet
+    // the other, as if there were air between: what is found nearest is not asked there.
+    static double nearly(const Interaction& point, Vec3 direction) {
+        return 8 * point.offset / larger(std::fabs(dot(point.normal, direction)), 1e-6);
+    }
+    // What another thing has from before where a path's ray starts, which comes out of one or goes back to what it came from.
+    Hit touched(Path& path, const Interaction& point) const {
+        double range = nearly(point, path.ray.direction);
+        Ray ray{point.position - path.ray.direction * range, path.ray.direction, 0, 2 * range};
+        while (Hit hit = scene_.closest(ray, path.kind, point.object)) {
+            if (!scene_.interaction(ray, hit).backside) {
+                path.ray = ray, path.ray.t_max = INFINITE;
+                return hit;
+            }
+            ray.t_min = hit.t;
+        }
+        return {};
+    }
+    // Puts the surface through which a path leaves what it is inside of in the place of what it has met there.
+    void let_out_first(const Path& path, Hit& met, Interaction& point) const {
+        double range = nearly(point, path.ray.direction);
+        Ray ray = path.ray;
+        ray.t_min = larger(ray.t_min, met.t - range), ray.t_max = met.t + range;
+        while (Hit hit = scene_.closest(ray, path.kind, met.object)) {
+            if (hit.object == path.inside) {
+                Interaction exit = scene_.interaction(ray, hit);
+                if (exit.backside) met = hit, point = exit;
+                return;
+            }
+            ray.t_min = hit.t;
+        }
+    }
+
     // Where rays come to; adds what shines there.
     void arrive(const CameraSample* samples, int depth, Block& block) const {
         const Ray* met_by[MOST];
         Hit hits[MOST];
         int arrived[MOST], met = 0;
         for (int i = 0; i < block.live; i++) {
-            const Path& path = block.onwards[i];
+            Path& path = block.onwards[i];
+            Hit hit = path.may_touch ? touched(path, block.points[path.from]) : Hit{};
+            path.touches = bool(hit);
             if (path.last && only_sky_[path.kind]) {
-                if (!scene_.occluded(path.ray)) leave(path, path.ray, depth, block);
+                if (!hit && !scene_.occluded(path.ray)) leave(path, path.ray, depth, block);
                 continue;
             }
-            Hit hit = scene_.closest(path.ray, path.kind);
+            if (!hit) hit = scene_.closest(path.ray, path.kind);
             meet_lamps(path, path.ray, hit, depth, block);
             if (hit && path.last && dark_) continue;
             if (hit)
@@ -408,6 +448,7 @@ class PathIntegrator {
         int live = 0;
         for (int k = 0; k < met; k++) {
             Path& path = block.onwards[arrived[k]];
+            if (path.inside != NONE && path.inside != hits[k].object) let_out_first(path, hits[k], block.next_points[k]);
             if (!follow(path, path.ray, hits[k], block.next_points[k], samples[path.sample], depth, block)) continue;
             block.paths[live] = path;
             block.paths[live].from = k;
