@@ -158,6 +158,61 @@ def test_a_sphere_of_light_and_how_it_is_seen(stage, add_lamp, kind, soft):
     assert_same_within_noise(stage(light, 64, 4))
 
 
+def nodes(lamp, output):
+    """Let a lamp's colour be a Texture Coordinate of its place, without signs, and its light fall off with the distance."""
+    if not lamp.data.node_tree:
+        lamp.data.use_nodes = True
+    lamp.data.use_nodes = True
+    tree = lamp.data.node_tree
+    emission = next(node for node in tree.nodes if node.type == "EMISSION")
+    absolute = tree.nodes.new("ShaderNodeVectorMath")
+    absolute.operation = "ABSOLUTE"
+    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs[output], absolute.inputs[0])
+    tree.links.new(absolute.outputs[0], emission.inputs["Color"])
+    tree.links.new(tree.nodes.new("ShaderNodeLightFalloff").outputs["Linear"], emission.inputs["Strength"])
+
+
+NODES = [
+    ("AREA", "UV"),
+    ("POINT", "Normal"),
+    pytest.param("POINT", "UV", marks=pytest.mark.exhaustive),
+    pytest.param("SPOT", "UV", marks=pytest.mark.exhaustive),
+    pytest.param("SPOT", "Object", marks=pytest.mark.exhaustive),
+]
+
+
+@pytest.mark.parametrize(("kind", "output"), NODES)
+def test_lamps_that_are_not_the_same_all_over_and_how_they_are_seen(stage, add_lamp, kind, output):
+    def light(rng):
+        size = {"size": rng.uniform(0.5, 2)} if kind == "AREA" else {"shadow_soft_size": rng.uniform(0.1, 0.8)}
+        lamp = add_lamp(kind, (*rng.uniform(-2, 2, 2), rng.uniform(2, 3)), turned(rng, 0.5), energy=200, **size)
+        nodes(lamp, output)
+        return lamp
+
+    assert_same_within_noise(stage(light, 64, 4))
+
+
+def test_a_picture_on_a_lamp_that_is_a_little_aside_is_told(stage, add_lamp, monkeypatch):
+    """Whose UV begins at 0.02 in place of 0."""
+    from viewcam_addon.tracer import native
+
+    right = native._described_node
+
+    def described(node, *numbers):
+        if node.type == "math" and node["operation"] == "add" and isinstance(node["a"], native.Node):
+            node = native.Node(node.type, (*node.inputs, ("b", node["b"][0] + 0.02)))
+        return right(node, *numbers)
+
+    def light(rng):
+        lamp = add_lamp("AREA", (0, 0, 2), energy=200, size=2)
+        nodes(lamp, "UV")
+        return lamp
+
+    monkeypatch.setattr(native, "_described_node", described)
+    told = sum(not same_within_noise(*pair)[0] for pair in stage(light, 64, 4))
+    assert told > SCENES / 2, f"only {told} of {SCENES} pictures are found to be wrong"
+
+
 def test_a_sun_with_an_angle(stage, add_lamp):
     def light(rng):
         return add_lamp("SUN", rotation=turned(rng, 0.9), energy=3, angle=math.pi if rng.random() < 0.2 else rng.uniform(0, 1))

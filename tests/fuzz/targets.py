@@ -33,6 +33,7 @@ LONGEST = 1500  # characters of a sentence, which may name files
 
 CAMERA = {"eye": [0, -5, 0], "look_at": [0, 0, 0], "up": [0, 0, 1], "distance": 14, "width": 16, "height": 12}
 IDENTITY = np.eye(4).tolist()
+WEB = {"type": "ies", "text": "IESNA\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 100\n0 90\n0\n100 50\n", "strength": 0.5}
 SCENE = {
     "format": "virtual-pinhole-scene",
     "version": 1,
@@ -64,7 +65,7 @@ SCENE = {
     "images": {"chequer": {"pixels": [[[0, 0, 0], [1, 1, 1]]], "srgb": True}, "large": {"pixels": {"npz": "i"}}},
     "materials": {
         "glass": {"glass": [1, 1, 1], "ior": 1.5},
-        "glowing": {"emission": [2, 1, 1], "diffuse": [0.5, 0.5, 0.5]},
+        "glowing": {"emission": [2, 1, 1], "diffuse": [0.5, 0.5, 0.5], "displacement": {"type": "wave"}},
         "drawn": {
             "diffuse": {"image": "chequer", "closest": True, "vertex": True},
             "mirror": {"image": "large", "rgb": [1, 1, 1]},
@@ -72,7 +73,15 @@ SCENE = {
     },
     "lamps": [
         {"type": "sun", "name": "sun", "towards": [0, 0.5, -1], "irradiance": [1, 1, 1], "angle": 0.01},
-        {"type": "point", "name": "bulb", "position": [0, -3, 3], "power": [9, 9, 9], "radius": 0.1, "soft_falloff": True},
+        {
+            "type": "point",
+            "name": "bulb",
+            "position": [0, -3, 3],
+            "power": [9, 9, 9],
+            "radius": 0.1,
+            "soft_falloff": True,
+            "emission": WEB,
+        },
         {"type": "spot", "name": "spot", "matrix": IDENTITY, "power": [9, 9, 9], "angle": 1.0, "blend": 0.2, "radius": 0},
         {"type": "area", "name": "area", "location": [0, 0, 3], "size": [1, 2], "power": [9, 9, 9], "ellipse": True},
     ],

@@ -123,7 +123,7 @@ def light_up(draw, calls):
         field = getattr(lamp, name)
         field[:] = [draw(NUMBER) for _ in field]
     lamp.radius, lamp.angle, lamp.blend = draw(LENGTH), draw(LENGTH), draw(LENGTH)
-    calls("add_lamp", calls.scene, lamp)
+    calls("add_lamp", calls.scene, lamp, made_by(draw))
     film = native._Film(filter=draw(mostly(st.integers(0, 2), WHOLE)), filter_width=draw(LENGTH), exposure=draw(NUMBER))
     film.has_backdrop = draw(st.booleans())
     for world in (film.world, film.backdrop):
@@ -134,6 +134,11 @@ def light_up(draw, calls):
     pixels = calls.at(np.ones(4 * max(width * height, 1)), np.float32)
     texel = draw(mostly(st.integers(0, 3), WHOLE))
     calls("add_texture", calls.scene, width, height, draw(st.integers(2, 4)), draw(st.booleans()), texel, pixels)
+
+
+def made_by(draw):
+    """A colour of a node, which there may be."""
+    return native._Color((1.0, 1.0, 1.0), image=-1, node=draw(mostly(st.integers(-1, 1), WHOLE)))
 
 
 def make_nodes(draw, calls):
@@ -203,7 +208,8 @@ def story(draw, calls):
         return
     look(draw, calls)
     for _ in range(draw(st.integers(0, 2))):
-        assert calls("add_material", calls.scene, None, 0, 1)
+        if not calls("add_material", calls.scene, None, 0, made_by(draw), 1):
+            assert calls("add_material", calls.scene, None, 0, native._Color(image=-1, node=-1), 1)
         light_up(draw, calls)
         make_nodes(draw, calls)
     trace(draw, calls)

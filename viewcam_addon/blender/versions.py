@@ -12,6 +12,10 @@ from ..image import OLDER_NAMES
 
 # Whose materials a scene from here has: the tracer knows what Cycles changed (core/closures/shading_point.h).
 CYCLES = bpy.app.version[:2]
+# What Light Falloff does to suns: nothing, or before, it multiplies them by as good as infinity.
+SUNS_HAVE_NO_FALLOFF = bpy.app.version >= (4, 4)
+# Whether lights are objects to their nodes, in whose space places are; before, these are the world's.
+LIGHTS_HAVE_SPACES = bpy.app.version >= (4, 5)
 _LINEAR = 1  # an enum's number, as foreach_set takes it
 # What Cycles draws without a material: a diffuse surface, and since 5.0 a Principled one, which bends grazing smooth normals.
 DEFAULT_SURFACE_BENDS_NORMALS = bpy.app.version >= (5, 0)

@@ -24,14 +24,14 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..image import GEOMETRY_PASSES, LIGHT_PASSES
 from ..pinhole import Pinhole
-from .scene import Mesh, Object, Scene, Spheres, placing
+from .scene import Mesh, Object, Scene, Spheres, ies, placing
 from .scene.colours import TEXELS, WHITE
 from .scene.film import FILTERS
 from .scene.lamps import RAYS, Area, Lamp, Point, Spot, Sun, World
 from .scene.materials import PLAIN, Colour, Material
 from .scene.sameness import same_things
 from .scene.shader_nodes import KINDS, Closure, Node
-from .scene.value_nodes import OWN
+from .scene.value_nodes import IES, OWN
 from .tiles import Passes
 
 LIGHT = (*LIGHT_PASSES, "Sample Count")
@@ -167,8 +167,8 @@ class _Core(Structure):
         ("add_texture", _function(c_int, c_void_p, *[c_int] * 5, c_void_p)),
         ("add_node", _function(c_int, c_void_p, POINTER(_Node))),
         ("constant_node", _function(c_int, c_void_p, c_void_p, POINTER(c_int))),
-        ("add_material", _function(c_int, c_void_p, c_void_p, c_int, c_int)),
-        ("add_lamp", _function(c_int, c_void_p, POINTER(_Lamp))),
+        ("add_material", _function(c_int, c_void_p, c_void_p, c_int, POINTER(_Color), c_int)),
+        ("add_lamp", _function(c_int, c_void_p, POINTER(_Lamp), POINTER(_Color))),
         ("set_film", _function(c_int, c_void_p, POINTER(_Film))),
         ("light_create", _function(c_int, c_void_p, POINTER(_LightSettings), POINTER(c_void_p))),
         ("light_free", _function(None, c_void_p)),
@@ -399,38 +399,50 @@ class CoreScene:
         nodes: dict[Node, int] = {}
         for name in ["", *scene.materials]:
             material = (scene.materials[name] if name else PLAIN) if name in used else Material()
-            for _, colour in material.inputs:
-                if colour.image is not None and colour.image not in images:
-                    images[colour.image] = len(images)
-                    self._add_texture(scene, colour.image)
+            self._add_textures(scene, (colour for _, colour in material.inputs), images)
             for closure in material.closures:
                 for value in (*dict(closure.node.inputs).values(), *(factor for factor, _ in closure.factors)):
                     if isinstance(value, Node):
                         self.add_nodes(value, images, nodes)
             closures = [described_closure(closure, images, nodes) for closure in material.closures]
             described = (_Closure * len(closures))(*closures)
-            self.check(self.core.add_material(self.handle, described, len(closures), material.transparent_shadow))
+            normal: Node | None = None
+            if material.displacement is not None:
+                normal = Node(
+                    "bump", (("height", material.displacement), ("distance", 1.0), ("filter_width", _filter_width(scene)))
+                )
+                self.add_nodes(normal, images, nodes)
+            turned = _color(normal or (0.0, 0.0, 0.0), images, nodes)
+            self.check(self.core.add_material(self.handle, described, len(closures), turned, material.transparent_shadow))
         for lamp in scene.lamps:
-            if not lamp.is_dark:
-                self.check(self.core.add_lamp(self.handle, described_lamp(lamp, self._links)))
+            if lamp.is_dark:
+                continue
+            if lamp.emission is not None:
+                self._add_textures(scene, lamp.emission.colours, images)
+                self.add_nodes(lamp.emission, images, nodes)
+            emission = _color(lamp.emission or WHITE, images, nodes)
+            self.check(self.core.add_lamp(self.handle, described_lamp(lamp, self._links), emission))
         film, world = scene.film, scene.world
         described = _Film(hidden_from=kinds(world.hidden_from), transparent=film.transparent, exposure=film.exposure)
         described.version = 100 * scene.cycles[0] + scene.cycles[1]
         described.filter, described.filter_width = FILTERS.index(film.filter), film.filter_width
-        for image in world.images:
-            if image not in images:
-                images[image] = len(images)
-                self._add_texture(scene, image)
+        self._add_textures(scene, (Colour(WHITE, image) for image in world.images), images)
         described.world, described.has_backdrop = _described_world(world, images), world.backdrop is not None
         described.backdrop = _described_world(world.backdrop or world, images)
         self.check(self.core.set_film(self.handle, described))
         self._light = scene
 
-    def _add_texture(self, scene: Scene, name: str) -> None:
-        picture = scene.images[name]
-        height, width, channels = picture.pixels.shape
-        texel = TEXELS.index(picture.pixels.dtype)  # the pixels are read in place: the scene has them
-        self.check(self.core.add_texture(self.handle, width, height, channels, picture.srgb, texel, _address(picture.pixels)))
+    def _add_textures(self, scene: Scene, colours: Iterable[Colour], images: dict[str, int]) -> None:
+        """Add the images that colours show and that are not there yet. images : the numbers of those that are."""
+        for name in (colour.image for colour in colours):
+            if name is None or name in images:
+                continue
+            images[name] = len(images)
+            picture = scene.images[name]
+            height, width, channels = picture.pixels.shape
+            texel = TEXELS.index(picture.pixels.dtype)  # the pixels are read in place: the scene has them
+            address = _address(picture.pixels)
+            self.check(self.core.add_texture(self.handle, width, height, channels, picture.srgb, texel, address))
 
     def add_nodes(self, node: Node, images: Mapping[str, int], nodes: dict[Node, int]) -> None:
         """Add a node that makes values after those that feed it. nodes : the numbers of those that are there."""
@@ -576,6 +588,11 @@ def sobol(seed: int, samples: int, pixels: NDArray, numbers: NDArray, first: int
     return found
 
 
+def _filter_width(scene: Scene) -> float:
+    """How many pixels away the slopes of displacements are taken, as Cycles takes them, which has had a choice since 4.5."""
+    return 0.1 if scene.cycles >= (4, 5) else 1.0
+
+
 def kinds(names: frozenset[str]) -> int:
     """Kinds of rays as the core's bits."""
     return sum(_KINDS[name] for name in names)
@@ -631,6 +648,8 @@ def _described_node(node: Node, images: Mapping[str, int], nodes: Mapping[Node, 
         value = node[name]
         if isinstance(value, str | bool):
             word = value if isinstance(value, str) else str(value).lower()
+            if default is IES:
+                word = ies.read(name, word).in_words()
             inputs.append(_Input(name.encode(), word.encode(), _color(WHITE, images, nodes)))
         elif value is not None:
             inputs.append(_Input(name.encode(), None, _color(value, images, nodes)))

@@ -90,6 +90,28 @@ def bump(material, mapped, vector=OBJECT, filter_width=1.0, invert=False, first=
         tree.links.new(node.outputs[0], tree.nodes["Shader"].inputs[name])
 
 
+def displace(material, mapped, vector=OBJECT, kind="Displacement", space="WORLD", raw=False, **inputs):
+    """Raise hills out of the material. raw : by a vector alone."""
+    tree = material.node_tree
+    source = tree.nodes.new(vector[0])
+    height = hills(tree, source.outputs[vector[1]])
+    output = tree.get_output_node("CYCLES").inputs["Displacement"]
+    if raw:
+        combine = tree.nodes.new("ShaderNodeCombineXYZ")
+        for name in "XZ":
+            tree.links.new(height, combine.inputs[name])
+        tree.links.new(combine.outputs[0], output)
+        return
+    node = tree.nodes.new(f"ShaderNode{kind}")
+    node.space = space
+    for name, value in {"Scale": 0.2, **inputs}.items():
+        node.inputs[name].default_value = value
+    tree.links.new(height, node.inputs[0])
+    tree.links.new(node.outputs[0], output)
+    if mapped:
+        map_normals(material, mapped, (0.7, 0.4, 0.9))
+
+
 @pytest.fixture
 def shown(scene, camera, add_lamp, set_world, read_passes, tmp_path):
     """shown(size, level) → ours, theirs: (height, width, 3), and the number of the object that each pixel shows."""
@@ -166,6 +188,23 @@ def test_every_shader_is_bumped_by_heights_as_in_cycles(patches):
     check(patches(cases, bump), cases, p50=3e-5)
 
 
+def test_every_shader_is_bumped_by_its_displacement_as_in_cycles(patches):
+    """It is the smooth normal that turns, with all that stands on it."""
+    bare = [(kind, inputs, properties, ()) for kind, inputs, properties, _ in list(shaders())[:7] + list(shaders())[9:]]
+    cases = [(shader, {}) for shader in bare]
+    check(patches(cases, displace), cases, p50=3e-5, p99=2e-4)  # a narrow filter, as below
+
+
+def test_every_way_to_displace_is_cycles(patches):
+    lambert = (DIFFUSE, {"Color": COLOUR}, {}, ())
+    cases = [(lambert, {name: value}) for name, value in (("Midlevel", 0.9), ("Scale", -0.3), ("Scale", 1.0))]
+    cases += [(lambert, {"vector": vector}) for vector in (("ShaderNodeTexCoord", "UV"), ("ShaderNodeNewGeometry", "Position"))]
+    cases += [(lambert, {"space": "OBJECT"}), (lambert, {"raw": True})]
+    cases += [(lambert, {"kind": "VectorDisplacement", "space": space}) for space in ("OBJECT", "WORLD")]
+    cases += [((DIFFUSE, {"Color": COLOUR}, {}, ("Normal",)), {})]  # a map of the smooth normal, in which nothing is displaced
+    check(patches(cases, displace), cases, p50=2e-5, p99=2e-4)  # as of a narrow filter below
+
+
 def test_heights_of_all_that_varies_and_all_ways_to_bump_are_cycles(patches):
     lambert = (DIFFUSE, {"Color": COLOUR}, {}, ("Normal",))
     vectors = [("ShaderNodeTexCoord", output) for output in ("Object", "Generated", "UV", "Camera")]
@@ -217,12 +256,18 @@ def body(camera, add, mesh_from, make_material):
     return material, image
 
 
-@pytest.mark.parametrize("turned_by", ["a map", "heights", "heights on a map"])
+@pytest.mark.parametrize(
+    "turned_by", ["a map", "heights", "heights on a map", "a displacement", "a displacement of the object", "both"]
+)
 def test_a_smooth_body_has_normals_of_its_own(shown, body, turned_by):
     """The map's stand on the tangents of MikkTSpace."""
     material, image = body
     if turned_by == "a map":
         map_normals(material, ("Normal",), (0, 0, 0), image=image)
+    elif "displacement" in turned_by or turned_by == "both":
+        displace(material, (), space="OBJECT" if "object" in turned_by else "WORLD")
+        if turned_by == "both":
+            bump(material, ("Normal",), Distance=0.1)
     else:
         bump(material, ("Normal",), first=(0.6, 0.4, 0.9) if "map" in turned_by else None, Distance=0.1)
     ours, theirs, numbers = shown(96)
@@ -230,7 +275,7 @@ def test_a_smooth_body_has_normals_of_its_own(shown, body, turned_by):
     apart = np.abs(ours - theirs)[here].max(axis=1) / theirs.max()
     told = here.sum(), *np.percentile(apart, (50, 90, 99, 100))
     packed = bpy.app.version >= (5, 1)  # normals as two numbers of 16 bits
-    assert here.sum() > 300 and told[1] < (1e-4 if packed else 1e-5) and told[3] < 2e-3, told
+    assert here.sum() > 200 and told[1] < (1e-4 if packed else 1e-5) and told[3] < 2e-3, told
 
 
 @pytest.mark.parametrize("tangent", ["X", "Y", "Z", "UV_MAP", None])
@@ -370,6 +415,31 @@ def test_a_normal_that_is_a_little_wrong_is_found(patches, monkeypatch, wrong):
     monkeypatch.setattr(native, "_described_node", described)
     with pytest.raises(AssertionError, match="p50"):
         check(patches(cases), cases)
+
+
+@pytest.mark.parametrize("wrong", ["filter_width", "height"])
+def test_a_displacement_that_is_a_little_wrong_is_found(patches, monkeypatch, wrong):
+    """The tests above must be able to fail."""
+    from viewcam_addon.tracer import native
+
+    right = native._described_node
+
+    def described(node, *numbers):
+        if (
+            node.type == "math"
+            and node["operation"] == "multiply"
+            and node["b"] == (float(np.float32(0.2)),) * 3
+            and wrong == "height"
+        ):
+            node = native.Node("math", (*node.inputs, ("b", 0.2004)))
+        if node.type == "bump" and wrong == "filter_width":
+            node = native.Node("bump", (*node.inputs, (wrong, 1.3)))
+        return right(node, *numbers)
+
+    cases = [((DIFFUSE, {"Color": COLOUR}, {}, ()), {})]
+    monkeypatch.setattr(native, "_described_node", described)
+    with pytest.raises(AssertionError, match="p50"):
+        check(patches(cases, displace), cases, p50=2e-5, p99=2e-4)
 
 
 WRONG = {"strength": 0.999, "distance": 0.2002, "filter_width": 1.01, "invert": True}

@@ -83,6 +83,8 @@ def graphs(image, straight):
     a, b = two_colours()
     for word in KINDS["math"].inputs["operation"]:
         found[f"math {word}"] = N("Math", {"Value": U, "Value_001": V, "Value_002": 0.4}, operation=word.upper())
+    warm = N("Gamma", {"Color": (0.8, 0.3, 0.1, 1.0), "Gamma": 1.2})
+    found["a constant colour as a number"] = N("Math", {"Value": warm, "Value_001": U}, operation="MULTIPLY")
     found["math clamp"] = N("Math", {"Value": U, "Value_001": V}, operation="ADD", use_clamp=True)
     for word in KINDS["vector_math"].inputs["operation"]:
         theirs = {"fract": "FRACTION"}.get(word, word.upper())

@@ -20,6 +20,7 @@ from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres, scene_file
 from viewcam_addon.tracer.scene.film import Bounces, Film
 from viewcam_addon.tracer.scene.lamps import RAYS, Area, Point, Spot, Sun, World
 from viewcam_addon.tracer.scene.materials import PLAIN, Colour, Material, Picture
+from viewcam_addon.tracer.scene.shader_nodes import node
 
 pytestmark = pytest.mark.slow
 
@@ -93,6 +94,7 @@ def check_same_surfaces(one, other):
             if i == index
             and [(name, c.image is None, c.closest, c.vertex) for name, c in each.colours.items()]
             == [(name, c.image is None, c.closest, c.vertex) for name, c in material.colours.items()]
+            and each.displacement == material.displacement
             and np.allclose(numbers_of(each), numbers_of(material), rtol=PRODUCT, atol=0)
             and (each.ior == pytest.approx(material.ior, rel=2.0**-24) or not material.colours.keys() & {"glass", "refraction"})
         ]
@@ -211,6 +213,15 @@ def test_a_pixel_more_is_seen(fresh_blender):
 # --- Scenes that hypothesis makes
 
 
+IES = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 100\n0 90\n0\n100 50\n"
+EMISSIONS = (
+    node("math", operation="multiply", a=node("light_path", output="ray_length"), b=0.5),
+    node("ies", text=IES, strength=0.5),
+    node("wave", vector=node("geometry"), scale=0.25),
+    node("image", image=Colour((1.0, 1.0, 1.0), "dots"), vector=node("geometry", output="incoming")),
+)
+
+
 def tetrahedron(**more):
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float64)
     triangles = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]], np.int32)
@@ -261,7 +272,8 @@ def scenes(draw):
         kinds = draw(st.lists(st.sampled_from(components), min_size=1, unique=True))
         made = {kind: draw(colours(varying=True)) for kind in kinds}
         made = {kind: dataclasses.replace(c, closest=c.closest and c.image is not None) for kind, c in made.items()}
-        materials[name] = Material(**made, ior=float(np.float32(draw(st.floats(1, 2)))))
+        raised = draw(st.none() | st.just(node("noise", vector=node("geometry"), scale=2.0)))
+        materials[name] = Material(**made, ior=float(np.float32(draw(st.floats(1, 2)))), displacement=raised)
     images = {
         "dots": Picture((random.integers(0, 256, (3, 2, 3)) / 255).astype(np.float32), srgb=True),
         "shades": Picture(random.random((2, 5, 3)).astype(np.float32)),
@@ -304,7 +316,12 @@ def scenes(draw):
     )
     lamps = []
     for number, kind in enumerate(draw(st.lists(st.sampled_from([Sun, Point, Spot, Area]), max_size=3))):
-        common = {"hidden_from": frozenset(draw(st.sets(st.sampled_from(RAYS[:-1])))), "casts_shadow": draw(st.booleans())}
+        shone = st.none() | st.sampled_from(EMISSIONS)
+        common = {
+            "emission": draw(shone),
+            "hidden_from": frozenset(draw(st.sets(st.sampled_from(RAYS[:-1])))),
+            "casts_shadow": draw(st.booleans()),
+        }
         power = draw(colours()).rgb
         name = f"Lamp {number}"
         if kind is Sun:

@@ -158,7 +158,8 @@ def test_emissions_are_mixed_and_added_and_fall_off_as_light_does(add_lamp, expo
     tree.links.new(twice.outputs[0], falloff.inputs["Strength"])
     assert export()[0][0].power == close((60.0, 62.5, 60.0))
     falloff.inputs["Smooth"].default_value = 1.0
-    assert "'Light Falloff' that is not modelled" in export()[1]["Lamp"]
+    ((point,), told) = export()
+    assert not told and point.emission is not None
 
 
 def test_whatever_nodes_make_the_same_everywhere_colours_a_lamp(add_lamp, export):
@@ -178,31 +179,60 @@ def test_whatever_nodes_make_the_same_everywhere_colours_a_lamp(add_lamp, export
 @pytest.mark.parametrize(
     ("kind", "output", "words"),
     [
-        ("TexIES", "Fac", "'IES Texture' that is not modelled"),
-        ("TexImage", "Color", "do not shine alike"),
-        ("TexChecker", "Color", "do not shine alike"),
-        ("LightPath", "Is Camera Ray", "do not shine alike"),
+        ("TexIES", "Fac", "'IES Texture' that shows what is no text of an IES file"),
+        ("TexCoord", "Camera", "says the Camera of a light"),
+        ("UVMap", "UV", "says the UV of a sun"),
+        ("LightPath", "Ray Depth", "says the Ray Depth of a light"),
+        ("ObjectInfo", "Random", "says the Random of a light"),
+        ("NewGeometry", "Pointiness", "says the Pointiness of a light"),
+        ("TexSky", "Color", "'Sky Texture' that is not modelled"),
     ],
 )
-def test_what_makes_a_lamp_uneven_is_named(add_lamp, export, kind, output, words):
-    tree = use_nodes(add_lamp("POINT").data)
-    emission = next(node for node in tree.nodes if node.type == "EMISSION")
-    made = tree.nodes.new(f"ShaderNode{kind}")
-    if kind == "TexImage":
-        made.image = bpy.data.images.new("Gobo", 2, 2)
-    tree.links.new(made.outputs[output], emission.inputs["Strength"])
+def test_what_a_lamps_nodes_say_that_is_not_modelled_is_named(add_lamp, export, kind, output, words):
+    attach(add_lamp("SUN"), kind, output)
     told = export()[1]["Lamp"]
     assert words in told and "plain light" in told
 
 
-def attach_falloff(block):
+@pytest.mark.parametrize(
+    ("kind", "output", "type"),
+    [
+        ("TexImage", "Color", "image"),
+        ("TexChecker", "Color", "checker"),
+        ("LightPath", "Is Camera Ray", "light_path"),
+        ("LightFalloff", "Constant", "math"),
+        ("TexCoord", "Normal", "vector_math"),
+    ],
+)
+def test_what_makes_a_lamp_uneven_is_its_emission(add_lamp, export, kind, output, type):
+    """The lamp keeps its own strength, which the node multiplies."""
+    lamp = add_lamp("POINT", energy=10.0)
+    made = attach(lamp, kind, output, "Color")
+    if kind == "TexImage":
+        made.image = bpy.data.images.new("Gobo", 2, 2)
+    ((point,), told) = export()
+    assert not told and point.power == (10.0,) * 3 and point.emission.type == type
+
+
+@pytest.mark.parametrize(("scale", "words"), [(1e-30, "nodes that are too much"), (0.0, None)])
+def test_a_lamp_that_is_scaled_to_nothing_has_no_nodes(add_lamp, export, scale, words):
+    lamp = add_lamp("POINT")
+    attach(lamp, "TexCoord", "UV")
+    lamp.scale = (scale,) * 3
+    ((point,), told) = export()
+    assert point.emission is None and (words is None or words in told["Lamp"])
+
+
+def attach(block, kind, output, to="Strength"):
     tree = use_nodes(block.data)
     emission = next(node for node in tree.nodes if node.type == "EMISSION")
-    tree.links.new(tree.nodes.new("ShaderNodeLightFalloff").outputs["Linear"], emission.inputs["Strength"])
+    made = tree.nodes.new(f"ShaderNode{kind}")
+    tree.links.new(made.outputs[output], emission.inputs[to])
+    return made
 
 
 APPROXIMATED = {
-    "nodes": (attach_falloff, "'Light Falloff' that is not modelled"),
+    "nodes": (lambda block: attach(block, "ObjectInfo", "Random"), "'Object Info' that says the Random of a light"),
     "spread": (lambda block: setattr(block.data, "spread", 0.0), "spread"),
     "bounces": (lambda block: setattr(block.data.cycles, "max_bounces", 1), "bounces are limited"),
     "sampling": (lambda block: setattr(block.data.cycles, "use_multiple_importance_sampling", False), "importance"),

@@ -142,7 +142,35 @@ def test_every_node_that_makes_values_is_made_for_blender():
     def kinds(value):
         return {value.type}.union(*(kinds(each) for _, each in value.inputs if isinstance(each, Node)))
 
-    assert set().union(*map(kinds, VALUES)) | {*CURVES} == {name for name, kind in KINDS.items() if kind.is_value}
+    assert set().union(*map(kinds, VALUES)) | {*CURVES, "ies"} == {name for name, kind in KINDS.items() if kind.is_value}
+
+
+def test_an_ies_text_is_made_for_blender_and_gone_with_the_stand_in(diffuse):
+    text = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 100\n0 90\n0\n100 50\n"
+    made = Material(surface=node("emission", color=node("ies", text=text, strength=0.5)))
+    before = len(bpy.data.texts)
+    with overridden() as overrides:
+        materials.stand_in(overrides, diffuse, shaders.Reading(made))
+        read = shaders.read(diffuse)
+        assert len(bpy.data.texts) == before + 1
+    assert not read.reasons and read.material == made and len(bpy.data.texts) == before
+
+
+def test_a_displacement_is_read_as_the_height_that_it_is_made_of(diffuse):
+    """And as what it is made into along the normal, where it is a Vector Displacement, or goes along other axes."""
+    height = node("noise", vector=node("texture_coordinate"), scale=3.0)
+    made = Material(diffuse=Colour(RED), displacement=height)
+    with overridden() as overrides:
+        materials.stand_in(overrides, diffuse, shaders.Reading(made))
+        assert exactly(diffuse) == made
+        raised = next(each for each in diffuse.node_tree.nodes if each.type == "DISPLACEMENT")
+        raised.space, raised.inputs["Midlevel"].default_value, raised.inputs["Scale"].default_value = "OBJECT", 0.5, 0.25
+        found = exactly(diffuse).displacement
+        assert (found["operation"], found["b"].type, found["a"]["b"]) == ("multiply", "vector_math", (0.25,) * 3)
+        diffuse.displacement_method = "BOTH"
+        assert exactly(diffuse).displacement is None and materials.departures(diffuse, lit=True) == ["is displaced"]
+        diffuse.displacement_method = "BUMP"
+        assert not materials.departures(diffuse, lit=True) and materials.departures(diffuse) == ["is displaced"]
 
 
 CURVES = {"rgb_curves": "color", "vector_curves": "vector", "float_curve": "value"}

@@ -131,13 +131,16 @@ def level_needed(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera
 def light_in(
     depsgraph: bpy.types.Depsgraph, ledger: Ledger, images: dict[str, Picture] | None = None, render: bool = True
 ) -> Lighting:
-    """What gives light in a depsgraph, and how it becomes a picture. images : receives the world's. render : as in world_of."""
+    """What gives light in a depsgraph, and how it becomes a picture.
+
+    images : receives the world's and the lamps'. render : as in world_of.
+    """
     scene = depsgraph.scene
     bounces = film.bounces_of(scene, ledger)
     shown = world.shown_world(scene, depsgraph.view_layer_eval)
     seen, suns = world.world_of(depsgraph.scene_eval, shown, ledger, images, render)
     return Lighting(
-        lamps=(*lamps.lamps_in(depsgraph, bounces, ledger), *suns),
+        lamps=(*lamps.lamps_in(depsgraph, bounces, ledger, images), *suns),
         world=seen,
         film=film.film_of(scene),
         bounces=bounces,

@@ -12,6 +12,7 @@ from ...tracer.scene import Scene
 from ...tracer.scene.film import Bounces, Film
 from ...tracer.scene.lamps import RAYS, Area, Lamp, Spot, Sun, World
 from ...tracer.scene.materials import PLAIN, Material, Picture
+from ...tracer.scene.shader_nodes import Node
 from ..temporary_settings import LARGEST_INDEX, Overrides
 from . import film, images, materials, nodes, shaders
 from .ledger import Ledger
@@ -60,10 +61,19 @@ class Paints:
         if index > LARGEST_INDEX:
             self._ledger.note(material.name, "approximated", f"its index is {index}, and Blender's end at {LARGEST_INDEX}")
         made = self._scene.materials[name] if name else PLAIN
-        paint(material, made, {key: self._image(key) for key in _images_of(made)})
+        texts = materials.texts_of(made.nodes, self._overrides)
+        paint(material, made, {key: self.image(key) for key in _images_of(made)}, texts)
         return material
 
-    def _image(self, key: str) -> bpy.types.Image:
+    def light(self, lamp: Lamp) -> tuple[bpy.types.Light, np.ndarray]:
+        """The light, and the (4, 4) matrix that it stands by, with the nodes of its emission."""
+        data, matrix = light_from(lamp, self._overrides, self._ledger)
+        if lamp.emission is not None:
+            shown = {colour.image: self.image(colour.image) for colour in lamp.emission.colours if colour.image is not None}
+            light_up(data, lamp.emission, shown, materials.texts_of(lamp.emission.all, self._overrides))
+        return data, matrix
+
+    def image(self, key: str) -> bpy.types.Image:
         if key not in self._images:
             self._images[key] = image_from(self._scene.images[key], key, self._overrides, self._ledger)
         return self._images[key]
@@ -73,8 +83,26 @@ def _images_of(made: Material) -> list[str]:
     return [colour.image for _, colour in made.inputs if colour.image is not None]
 
 
-def paint(material: bpy.types.Material, made: Material, shown: dict[str, bpy.types.Image]) -> None:
-    """Give a new material the nodes of the tracer's. shown : `Colour.image` → the image."""
+def light_up(
+    data: bpy.types.Light, emission: Node, shown: dict[str, bpy.types.Image], texts: dict[str, bpy.types.Text]
+) -> None:
+    """Give a new light the nodes of a lamp's emission. shown, texts : as in `paint`."""
+    if not data.node_tree:
+        data.use_nodes = True
+    data.node_tree.nodes.clear()
+    adder = nodes.Adder(data.node_tree)
+    output = adder.add("ShaderNodeOutputLight")
+    materials.add_emission(adder, output, emission, shaders.Reading(images=shown, texts=texts))
+    _arrange(output, 0, {})
+
+
+def paint(
+    material: bpy.types.Material,
+    made: Material,
+    shown: dict[str, bpy.types.Image],
+    texts: dict[str, bpy.types.Text] | None = None,
+) -> None:
+    """Give a new material the nodes of the tracer's. shown : `Colour.image` → the image. texts : those of IES files."""
     if not material.node_tree:  # from 5.0 on new materials have one
         material.use_nodes = True
     tree = material.node_tree
@@ -82,7 +110,7 @@ def paint(material: bpy.types.Material, made: Material, shown: dict[str, bpy.typ
     material.use_transparent_shadow = made.transparent_shadow
     adder = nodes.Adder(tree)
     output = adder.add("ShaderNodeOutputMaterial")
-    materials.add_surface(adder, output, shaders.Reading(made, shown, ""))
+    materials.add_surface(adder, output, shaders.Reading(made, shown, "", texts=texts or {}))
     _arrange(output, 0, {})
     colour = next((colour for _, colour in made.inputs), None)
     if colour:

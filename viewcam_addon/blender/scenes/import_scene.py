@@ -72,6 +72,7 @@ class _SceneImport:
     def __init__(self, made: Scene, name: str, scene: bpy.types.Scene, overrides: Overrides) -> None:
         self._made, self._name, self._scene, self._overrides = made, name, scene, overrides
         self._ledger = Ledger()
+        self._paints = import_light.Paints(made, overrides, self._ledger)
         self._objects: list[bpy.types.Object] = []
         self._surfaces_named: dict[str, list[bpy.types.Object]] = {}
         self._root: bpy.types.Object | None = None
@@ -86,7 +87,7 @@ class _SceneImport:
         camera = self._camera(set_picture or scene.camera is None)
         self._surfaces()
         for lamp in made.lamps:
-            data, matrix = import_light.light_from(lamp, self._overrides, ledger)
+            data, matrix = self._paints.light(lamp)
             block = self._placed(lamp.name, data, matrix)
             import_light.hide(block, lamp.hidden_from)
             linking.link(block, lamp, self._surfaces_named, self._overrides)
@@ -162,7 +163,7 @@ class _SceneImport:
 
     def _surfaces(self) -> None:
         """Every object, those of one geometry sharing its data."""
-        paints, is_lit = import_light.Paints(self._made, self._overrides, self._ledger), import_light.has_light(self._made)
+        paints, is_lit = self._paints, import_light.has_light(self._made)
         data: dict[str, list[tuple[int, bpy.types.Mesh | bpy.types.PointCloud]]] = {}
         for placed in self._made.objects:
             if placed.geometry not in data:

@@ -14,11 +14,12 @@ import numpy as np
 
 from ...tracer.scene.film import Bounces
 from ...tracer.scene.lamps import LEAST_SPREAD, Area, Lamp, Point, Spot, Sun
+from ...tracer.scene.materials import Picture
+from ...tracer.scene.shader_nodes import Node
 from .. import versions
 from ..temporary_settings import Overrides
-from . import features, linking, nodes, shaders
+from . import features, images, lamp_nodes, linking, nodes, shaders, shading
 from .ledger import Ledger
-from .nodes import Input
 from .shaders import RGB
 
 _WHITE = (1.0, 1.0, 1.0)
@@ -26,8 +27,13 @@ _WHITE = (1.0, 1.0, 1.0)
 _SHEAR = 1e-5
 
 
-def lamps_in(depsgraph: bpy.types.Depsgraph, bounces: Bounces, ledger: Ledger) -> Iterator[Lamp]:
-    """The lamps that a render of this depsgraph shows, and their remedies for Cycles."""
+def lamps_in(
+    depsgraph: bpy.types.Depsgraph, bounces: Bounces, ledger: Ledger, pictures: dict[str, Picture] | None = None
+) -> Iterator[Lamp]:
+    """The lamps that a render of this depsgraph shows, and their remedies for Cycles.
+
+    pictures : receives the images of their nodes.
+    """
     links = linking.Links(depsgraph)
     for instance in depsgraph.object_instances:
         if instance.object.type == "LIGHT" and instance.show_self:
@@ -37,10 +43,13 @@ def lamps_in(depsgraph: bpy.types.Depsgraph, bounces: Bounces, ledger: Ledger) -
             hidden_from = features.hidden_from(placed, depsgraph.view_layer_eval) - {"shadow"}
             matrix = np.array(instance.matrix_world, dtype=np.float64)
             _note(name, light, bounces, ledger)
-            lamp = _lamp(name, light, matrix, hidden_from, _strength(name, light, ledger), ledger)
+            factor, emission, reading = _emission(name, light, matrix, ledger)
+            lamp = _lamp(name, light, matrix, hidden_from, _strength(name, light, factor, ledger), ledger)
             if lamp is not None:
                 receivers, blockers = links.of(placed, ledger)
-                yield replace(lamp, receivers=receivers, blockers=blockers)
+                if pictures is not None and reading:
+                    shading.add_pictures(reading, reading.alphas, pictures)
+                yield replace(lamp, receivers=receivers, blockers=blockers, emission=emission)
 
 
 def _lamp(
@@ -89,13 +98,13 @@ def _area(
     return Area(matrix=matrix, size=size, ellipse=ellipse, spread=spread, power=power, **common)
 
 
-def _strength(name: str, light: bpy.types.Light, ledger: Ledger) -> RGB | None:
-    """Energy, colour and exposure, or None where light can have no such."""
+def _strength(name: str, light: bpy.types.Light, emission: RGB, ledger: Ledger) -> RGB | None:
+    """Energy, colour, exposure and what nodes make of them everywhere, or None where light can have no such."""
     factor = light.energy * 2.0 ** getattr(light, "exposure", 0.0)
     strength = _times(tuple(light.color), factor)
     if getattr(light, "use_temperature", False):
         strength = tuple(a * b for a, b in zip(strength, light.temperature_color, strict=True))
-    strength = tuple(a * b for a, b in zip(strength, _emission(name, light, ledger), strict=True))
+    strength = tuple(a * b for a, b in zip(strength, emission, strict=True))
     possible = shaders.possible(strength)
     if possible is None:
         ledger.note(name, "skipped", f"a light of the strength {', '.join(f'{value:g}' for value in strength)}")
@@ -103,18 +112,22 @@ def _strength(name: str, light: bpy.types.Light, ledger: Ledger) -> RGB | None:
     return possible
 
 
-def _emission(name: str, light: bpy.types.Light, ledger: Ledger) -> RGB:
-    """The factor that a light's nodes are."""
+def _emission(
+    name: str, light: bpy.types.Light, matrix: np.ndarray, ledger: Ledger
+) -> tuple[RGB, Node | None, shaders.Reading | None]:
+    """The factor that a light's nodes are everywhere, or the node that makes it, with what that asks for."""
     tree = versions.light_tree(light)
     output = tree and tree.get_output_node("CYCLES")
-    if not output:
-        return _WHITE
-    emission = shaders.plain_emission(Input(output.inputs["Surface"]))
-    if isinstance(emission, tuple):
-        return emission
-    ledger.note(name, "approximated", f"{'; '.join(emission)}: plain light stands in")
-    ledger.call_for_cycles(light.original, _make_plain)
-    return _WHITE
+    if not output or not np.linalg.det(matrix[:3, :3]):
+        return _WHITE, None, None
+    for missing in images.missing(tree):
+        ledger.note(name, "exported", missing)
+    emission, reading = lamp_nodes.emission(light, matrix, output)
+    if reading.reasons:
+        ledger.note(name, "approximated", f"{'; '.join(reading.reasons)}: plain light stands in")
+        ledger.call_for_cycles(light.original, _make_plain)
+        return _WHITE, None, None
+    return (_WHITE, emission, reading) if isinstance(emission, Node) else (emission, None, None)
 
 
 def _make_plain(overrides: Overrides, light: bpy.types.Light) -> None:

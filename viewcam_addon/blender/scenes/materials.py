@@ -7,6 +7,7 @@ they are. At the levels of light the same is done to every material that the tra
 shaders.py has found.
 """
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import bpy
@@ -46,7 +47,7 @@ def departures(material: bpy.types.Material, lit: bool = False) -> list[str]:
     if output is None:
         return ["has no output, so that Cycles draws nothing"]
     reasons = []
-    if output.inputs["Displacement"].is_linked:
+    if output.inputs["Displacement"].is_linked and not (lit and shaders.is_only_bumped(material)):
         reasons.append("is displaced")
     if output.inputs["Volume"].is_linked:
         reasons.append("has a volume")
@@ -70,14 +71,29 @@ def make_plain(overrides: Overrides, material: bpy.types.Material) -> None:
 def stand_in(overrides: Overrides, material: bpy.types.Material, reading: shaders.Reading) -> None:
     """Let Cycles see a tracer's material until the overrides end."""
     tables = {key: images.image_of(picture, key, overrides) for key, picture in reading.tables.items()}
-    reading = replace(reading, images=reading.images | tables)
+    reading = replace(reading, images=reading.images | tables, texts=texts_of(reading.material.nodes, overrides))
     output, adder = nodes.override_output(overrides, material.node_tree, "ShaderNodeOutputMaterial")
     add_surface(adder, output, reading)
+
+
+def texts_of(made: Iterable[Node], overrides: Overrides) -> dict[str, bpy.types.Text]:
+    """The texts that nodes ask for, in Blender, until the overrides end."""
+    found = {}
+    for text in dict.fromkeys(node["text"] for node in made if "text" in KINDS[node.type].inputs):
+        found[text] = bpy.data.texts.new("IES")
+        found[text].write(text)
+        overrides.afterwards(bpy.data.batch_remove, [found[text]])
+    return found
 
 
 def add_surface(adder: nodes.Adder, output: bpy.types.Node, reading: shaders.Reading) -> None:
     """Add the nodes that shaders.read would read so, and link them to a material's output."""
     made = reading.material
+    if made.displacement is not None:
+        raised = adder.add("ShaderNodeDisplacement", Midlevel=0.0, Scale=1.0)
+        raised.space = "WORLD"
+        _colour(adder, raised.inputs["Height"], made.displacement, reading)
+        adder.link(raised.outputs[0], output.inputs["Displacement"])
     if made.surface is not None:
         adder.link(_shader(adder, made.surface, reading).outputs[0], output.inputs["Surface"])
         return
@@ -91,6 +107,13 @@ def add_surface(adder: nodes.Adder, output: bpy.types.Node, reading: shaders.Rea
     # Without any light Cycles would draw nothing: not even the depth.
     total = total or adder.add("ShaderNodeBsdfDiffuse", Color=(0.0, 0.0, 0.0, 1.0))
     adder.link(total.outputs[0], output.inputs["Surface"])
+
+
+def add_emission(adder: nodes.Adder, output: bpy.types.Node, emission: Node, reading: shaders.Reading) -> None:
+    """Let a light's output give what a node makes."""
+    shader = adder.add("ShaderNodeEmission", Strength=1.0)
+    _colour(adder, shader.inputs["Color"], emission, reading)
+    adder.link(shader.outputs[0], output.inputs["Surface"])
 
 
 def _shader(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.types.Node:
@@ -127,6 +150,8 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
             setattr(added, theirs, type(getattr(added, theirs))(node[name][0]))
         if "image" in KINDS[node.type].inputs and node["image"] is not None:
             added.image = reading.images[node["image"].image]
+        if "text" in KINDS[node.type].inputs:
+            added.mode, added.ies = "INTERNAL", reading.texts[node["text"]]
         if "table" in KINDS[node.type].inputs:
             table, ends = reading.images[node["table"].image], (node["least"][0], node["most"][0])
             value_nodes.draw_curves(added.mapping, table, *ends, node["extrapolate"])

@@ -13,14 +13,16 @@ the same for the time of a comparison (materials.stand_in): an approximation is 
 import functools
 import math
 import zlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import bpy
 import numpy as np
 
+from ...errors import InputError
+from ...tracer.scene import ies
 from ...tracer.scene.materials import LARGEST_RADIANCE, PLAIN, Colour, Material, Picture
-from ...tracer.scene.shader_nodes import KINDS, Node, closures
-from ...tracer.scene.value_nodes import GENERATED, NORMAL, OWN, POSITION, TANGENT, UV
+from ...tracer.scene.shader_nodes import KINDS, Node
+from ...tracer.scene.value_nodes import GENERATED, INCOMING, NORMAL, OWN, POSITION, TANGENT, UV
 from .. import versions
 from . import images, nodes, value_nodes
 from .nodes import Input, Output
@@ -37,7 +39,7 @@ _PRINCIPLED_ZERO = (
     "Sheen Weight",
     "Thin Film Thickness",
 )
-_WHITE = (1.0, 1.0, 1.0)
+_WHITE, _ZERO = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 _BLACK = Colour((0.0, 0.0, 0.0))
 _RAMP = 256  # Cycles looks ramps up in a table of one more
 _BESIDE = 1e-6  # of a pixel: where a step lies is the pixel's that it leads to
@@ -111,7 +113,8 @@ class Reading:
     """What a Blender material is to the tracer.
 
     images : key in `Colour.image` → the image. vertex : the colour attribute that `Colour.vertex` stands for ("" is the one
-    that is active for rendering), or None. reasons : why it is approximated, one clause each, about the material.
+    that is active for rendering), or None. texts : of IES files, where nodes are made that show them.
+    reasons : why it is approximated, one clause each, about the material.
     """
 
     material: Material = PLAIN
@@ -119,6 +122,7 @@ class Reading:
     vertex: str | None = None
     alphas: set[str] = field(default_factory=set)
     tables: dict[str, Picture] = field(default_factory=dict)
+    texts: dict[str, bpy.types.Text] = field(default_factory=dict)
     reasons: list[str] = field(default_factory=list)
 
     @functools.cached_property
@@ -128,14 +132,14 @@ class Reading:
 
     @property
     def is_bumped(self) -> bool:
-        """Whether a shader has a normal of its own."""
-        return any(
+        """Whether it, or a shader of it, has a normal of its own."""
+        return self.material.displacement is not None or any(
             KINDS[each.node.type].inputs[name] is NORMAL for each in self.material.closures for name, _ in each.node.inputs
         )
 
 
 def read(material: bpy.types.Material) -> Reading:
-    """What Cycles would show of an evaluated material, but for its displacement and volume."""
+    """What Cycles would show of an evaluated material, but for what moves the surface and its volume."""
     tree = versions.node_tree(material)
     output = tree and tree.get_output_node("CYCLES")
     if not output:
@@ -144,49 +148,33 @@ def read(material: bpy.types.Material) -> Reading:
     plain = _Components(viewport)
     components = plain.surface(Input(output.inputs["Surface"]))
     plain.reading.material = Material(**components, **({} if plain.ior is None else {"ior": plain.ior}))
+    shines = not components.get("emission", _BLACK).is_black
     if not plain.reading.reasons:
-        return plain.reading
-    tree = _Tree(viewport, not components.get("emission", _BLACK).is_black)
+        return _displaced(plain.reading, material, output, shines)
+    tree = Tree(viewport, shines)
     surface = tree.surface(Input(output.inputs["Surface"]))
     tree.reading.material = Material(surface=surface, transparent_shadow=material.use_transparent_shadow)
     is_plain = len(plain.reading.reasons) < len(tree.reading.reasons) or plain.reading.reasons == tree.reading.reasons
-    return plain.reading if is_plain else tree.reading
+    return _displaced(plain.reading if is_plain else tree.reading, material, output, shines)
+
+
+def _displaced(reading: Reading, material: bpy.types.Material, output: bpy.types.Node, shines: bool) -> Reading:
+    """The same with what its displacement does to the normals, where that is all that it does."""
+    if is_only_bumped(material):
+        reader = Tree(PLAIN.diffuse, shines)
+        reader.reading = reading
+        reading.material = replace(reading.material, displacement=reader.height(Input(output.inputs["Displacement"])))
+    return reading
+
+
+def is_only_bumped(material: bpy.types.Material) -> bool:
+    """Whether a displacement moves nothing, but turns the normals."""
+    return material.displacement_method == "BUMP"
 
 
 def in_the_viewport(material: bpy.types.Material) -> Reading:
     """A Lambert surface of the colour that the material has in Blender's viewport."""
     return Reading(Material(diffuse=Colour(possible(material.diffuse_color[:3]) or PLAIN.diffuse.rgb)))
-
-
-def plain_emission(of: Input) -> RGB | list[str]:
-    """What shaders give off that do nothing else, the same everywhere; else why not, as in `Reading.reasons`."""
-    reader = _Tree(Colour(_WHITE), True)
-    surface = reader.surface(of)
-    if reader.reading.reasons:
-        return reader.reading.reasons
-    total = np.zeros(3)
-    for closure in closures(surface):
-        if closure.node.type != "emission":
-            return ["has nodes that scatter light"]
-        inputs = (closure.node["color"], closure.node["strength"], *(factor for factor, _ in closure.factors))
-        values = [value for value in map(_everywhere, inputs) if value]
-        if len(values) < len(inputs):
-            return ["has nodes that do not shine alike in all directions"]
-        (color, _), (_, strength), *factors = values
-        for (_, factor), (_, rest) in zip(factors, closure.factors, strict=True):
-            share = min(max(factor, 0.0), 1.0)
-            strength *= 1.0 - share if rest else share
-        total += np.maximum(color, 0.0) * strength
-    return tuple(total.tolist())
-
-
-def _everywhere(value: Colour | Node) -> tuple[RGB, float] | None:
-    """What a value is and that as a number, or None where it varies."""
-    if isinstance(value, Node):
-        from ...tracer import native  # here: ctypes keeps its structures, and enabling the add-on needs none
-
-        return native.constant_value(value)
-    return None if value.varies else (value.rgb, value.rgb[0])
 
 
 class _Reader:
@@ -394,7 +382,7 @@ class _Components(_Reader):
         return total
 
 
-class _Tree(_Reader):
+class Tree(_Reader):
     """Reads shaders as a tree of shader nodes."""
 
     def __init__(self, viewport: Colour, shines: bool) -> None:
@@ -435,6 +423,52 @@ class _Tree(_Reader):
                 given[name] = self.surface(source.input(shader.inputs[name]))
         return Node(ours, tuple((given | self._words(source, ours)).items()))
 
+    def height(self, of: Input) -> Node | None:
+        """What a displacement is along the normal, or None where it is the same everywhere or not modelled."""
+        source = nodes.source(of)
+        if not isinstance(source, Output):
+            return None
+        self._is_beside = True
+        if source.node.type == "DISPLACEMENT":
+            return self._displacement(source)
+        is_vector = source.node.type == "VECTOR_DISPLACEMENT"
+        offset = self._displacement_vector(source) if is_vector else self._value(source)
+        return None if offset is None else _along_normal(offset)
+
+    def _displacement(self, output: Output) -> Node | None:
+        """What a Displacement node raises along the normal."""
+        height, midlevel, scale = (self._value_input(output.input(name), 0.0) for name in ("Height", "Midlevel", "Scale"))
+        if height is None or midlevel is None or scale is None:
+            return None
+        for by, operation, neutral in ((midlevel, "subtract", 0.0), (scale, "multiply", 1.0)):
+            if by != (neutral,) * 3:
+                height = _node("math", operation=operation, a=height, b=by)
+        if not isinstance(height, Node):  # an image as it is, or the same everywhere
+            height = _node("math", operation="multiply", a=height, b=1.0)
+        given = self._normal(output, "normal", "Normal").get("normal")
+        if given is None and output.node.space == "WORLD":
+            return height
+        way = given or _node("geometry", output="normal")
+        if output.node.space == "OBJECT":
+            inwards = _node("vector_transform", vector=way, kind="normal", **{"from": "world", "to": "object"})
+            way = _node("vector_transform", vector=inwards, **{"from": "object", "to": "world"})
+        return _node("math", operation="multiply", a=height, b=_along_normal(way))
+
+    def _displacement_vector(self, output: Output) -> Node | None:
+        """What a Vector Displacement node moves."""
+        if output.node.space == "TANGENT":
+            self._reason(output, "displaces along tangents")
+            return None
+        vector = self._value_input(output.input("Vector"), None)
+        midlevel, scale = (self._value_input(output.input(name), 0.0) for name in ("Midlevel", "Scale"))
+        if vector is None or midlevel is None or scale is None:
+            return None
+        offset = _node("vector_math", operation="subtract", a=vector, b=midlevel)
+        offset = _node("vector_math", operation="scale", a=offset, scale=scale)
+        if output.node.space == "WORLD":
+            return offset
+        return _node("vector_transform", vector=offset, **{"from": "object", "to": "world"})
+
     def _normal(self, output: Output, name: str, theirs: str) -> dict[str, Node]:
         """The node that makes a normal, where one does and is modelled."""
         of = output.input(theirs)
@@ -469,7 +503,7 @@ class _Tree(_Reader):
         if isinstance(name, str) and name.endswith("Rotation"):
             value %= 1.0
         if name == "Anisotropy":
-            value = abs(value)  # which way, _Tree.surface asks
+            value = abs(value)  # which way, Tree.surface asks
         most = 1.0 if isinstance(name, int) else LARGEST_RADIANCE
         if not math.isfinite(value) or value > LARGEST_RADIANCE or (value < 0 and name == "Strength"):
             self._reason(output, f"has a {output.node.inputs[name].name} of {value:g}")
@@ -487,9 +521,9 @@ class _Tree(_Reader):
         if node.type == "UVMAP" and self._is_uv(output):
             return Node("texture_coordinate")
         if node.type == "TEX_COORD" and output.socket.name == "Object" and node.object is not None:
-            return _in_space_of(node.object)
-        if node.type == "LIGHT_FALLOFF" and output.socket.name == "Quadratic" and constant_number(output, "Smooth") == 0:
-            return self._value(nodes.source(output.input("Strength")))  # as light falls off of itself
+            return in_space_of(node.object.matrix_world)
+        if node.type == "LIGHT_FALLOFF":
+            return self._falloff(output)
         if node.type == "CAMERA":
             return _from_camera(output.socket.name)
         if node.type == "VALTORGB":
@@ -500,6 +534,7 @@ class _Tree(_Reader):
         if found is None:
             self._reason(output, "is not modelled")
             return None
+        told = len(self.reading.reasons)
         ours, value = found
         words = value_nodes.given_words(output, ours, value)
         why = words if isinstance(words, str) else self._departure(output, ours)
@@ -520,8 +555,17 @@ class _Tree(_Reader):
                 self.reading.alphas.add(image.name_full)
         if "table" in KINDS[ours].inputs:
             given |= self._curves(output)
+        if ours == "ies":
+            text = value_nodes.ies_text(node)
+            try:
+                ies.read("it", text)
+            except InputError as error:
+                self._reason(output, f"shows what {str(error).partition(': ')[0].removeprefix('it ')}")
+                return None
+            given["text"] = text
         for name, theirs in value.inputs.items():
-            if KINDS[ours].inputs[name] in OWN:
+            known = KINDS[ours].inputs[name]
+            if known in OWN:
                 given |= self._normal(output, name, theirs)
                 continue
             socket = value_nodes.input_of(node, theirs)
@@ -529,12 +573,16 @@ class _Tree(_Reader):
                 given[name] = (value.before[name],) * 3
                 continue
             is_beside, self._is_beside = self._is_beside, self._is_beside or name == "height"
-            read = self._value_input(Input(socket, output.groups), KINDS[ours].inputs[name])
+            read = self._value_input(Input(socket, output.groups), known)
             self._is_beside = is_beside
             if read is None:
                 return None
-            if KINDS[ours].inputs[name] not in (UV, GENERATED, POSITION) or isinstance(read, Colour | Node):
+            if known not in (UV, GENERATED, POSITION, INCOMING) or isinstance(read, Colour | Node):
                 given[name] = read
+            elif (of_itself := self._of_itself(output, known)) is not None:
+                given[name] = of_itself
+            elif len(self.reading.reasons) > told:
+                return None
         made = Node(ours, tuple(given.items()))
         plain = Node("image", tuple((name, made[name]) for name in ("image", "interpolation"))) if ours == "image" else None
         if made == plain and made["interpolation"] != "cubic":
@@ -566,6 +614,26 @@ class _Tree(_Reader):
         if ours == "attribute" and node.type == "VERTEX_COLOR" and not node.layer_name:
             return "has an attribute without a name"
         return None
+
+    def _of_itself(self, output: Output, known: object) -> Node | None:
+        """What a node that makes values looks itself up by where nothing is given, but for what we do alike."""
+        if known is INCOMING:
+            return _node("vector_transform", vector=_node("geometry", output="incoming"), kind="normal")
+        return None
+
+    def _falloff(self, output: Output) -> Colour | Node | None:
+        """What a Light Falloff node makes of light that falls off with the square of its way."""
+        strength, smooth = (self._value_input(output.input(name), 0.0) for name in ("Strength", "Smooth"))
+        if strength is None or smooth is None:
+            return None
+        way = _node("light_path", output="ray_length")
+        squared = _node("math", operation="multiply", a=way, b=way)
+        by: Node | None = {"Linear": way, "Constant": squared}.get(output.socket.name)
+        made = strength if by is None else _node("math", operation="multiply", a=strength, b=by)
+        if smooth != _ZERO:
+            slower = _node("math", operation="add", a=squared, b=_node("math", operation="maximum", a=smooth, b=0.0))
+            made = _node("math", operation="multiply", a=made, b=_node("math", operation="divide", a=squared, b=slower))
+        return made if isinstance(made, Colour | Node) else _node("math", operation="add", a=made, b=0.0)
 
     def _curves(self, output: Output) -> dict[str, object]:
         """The table that Cycles makes of a node's curves."""
@@ -627,6 +695,10 @@ def _node(type: str, **inputs: object) -> Node:
     return Node(type, tuple(inputs.items()))
 
 
+def _along_normal(vector: Colour | Node) -> Node:
+    return _node("vector_math", operation="dot_product", a=vector, b=_node("geometry", output="normal"))
+
+
 def _quarter_further(rotation: Colour | Node) -> Colour | Node:
     """A rotation in turns and a quarter, as stretched across a tangent is along another."""
     if rotation.varies:
@@ -634,20 +706,16 @@ def _quarter_further(rotation: Colour | Node) -> Colour | Node:
     return Colour(((rotation.rgb[0] + 0.25) % 1.0,) * 3)
 
 
-def _in_space_of(block: bpy.types.Object) -> Node:
-    """Where a point of a surface is in an object's space."""
-    inverse = np.linalg.inv(np.array(block.matrix_world, np.float64))
-    position = _node("geometry", output="position")
-    rows = (
-        _node(
-            "math",
-            operation="add",
-            a=_node("vector_math", operation="dot_product", a=position, b=tuple(row[:3])),
-            b=(row[3],) * 3,
-        )
-        for row in inverse[:3].tolist()
-    )
+def in_space_of(matrix: object) -> Node:
+    """Where a point of a surface is in the space of an object with this matrix."""
+    inverse, position = np.linalg.inv(np.array(matrix, np.float64)), _node("geometry", output="position")
+    rows = (_node("math", operation="add", a=dot(position, row[:3]), b=row[3]) for row in inverse[:3])
     return _node("combine_xyz", **dict(zip("xyz", rows, strict=True)))
+
+
+def dot(vector: Node, by: object) -> Node:
+    """How far a vector goes along another."""
+    return _node("vector_math", operation="dot_product", a=vector, b=tuple(float(number) for number in by))
 
 
 def _from_camera(output: str) -> Node:

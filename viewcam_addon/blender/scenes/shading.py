@@ -11,6 +11,14 @@ _DEFAULT = "Cycles' default surface"
 """What is without material since 5.0 (intern/cycles/scene/shader.cpp, add_default)."""
 
 
+def add_pictures(reading: shaders.Reading, alphas: set[str], to: dict[str, Picture]) -> None:
+    """Read the images of a material, or a light, that are not there yet. alphas : of which the alpha is asked for."""
+    to |= reading.tables
+    for key, image in reading.images.items():
+        if key not in to or (key in alphas and to[key].pixels.shape[2] < 4):
+            to[key] = images.picture_of(image, key in alphas)
+
+
 class Shading:
     def __init__(self) -> None:
         self._readings: dict[str, shaders.Reading] = {}
@@ -32,10 +40,7 @@ class Shading:
         found: dict[str, Picture] = {}
         alphas = {key for reading in self._readings.values() for key in reading.alphas}
         for reading in self._readings.values():
-            found |= reading.tables
-            for key, image in reading.images.items():
-                if key not in found:
-                    found[key] = images.picture_of(image, key in alphas)
+            add_pictures(reading, alphas, found)
         return found
 
     def names(self, slots: tuple[bpy.types.Material | None, ...], are_points: bool = False) -> tuple[str, ...]:

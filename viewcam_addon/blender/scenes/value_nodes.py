@@ -1,6 +1,7 @@
 """The tracer's nodes that make values (tracer/scene/value_nodes.py) as Blender has them, to be read and to be made again."""
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -188,6 +189,7 @@ VALUES: tuple[tuple[str, Value], ...] = (
             before={"filter_width": 1.0},
         ),
     ),
+    ("ies", Value("TEX_IES", "ShaderNodeTexIES", _same("Vector", "Strength"), {"Fac": None})),
     ("fresnel", Value("FRESNEL", "ShaderNodeFresnel", {"ior": "IOR", "normal": "Normal"}, {"Fac": None})),
     ("layer_weight", Value("LAYER_WEIGHT", "ShaderNodeLayerWeight", _same("Blend", "Normal"), _words("Fresnel", "Facing"))),
     (
@@ -509,6 +511,16 @@ def curve_table(mapping: bpy.types.CurveMapping) -> tuple[np.ndarray, float, flo
         places = [mapping.evaluate(common, place) for place in places]
     channels = [[mapping.evaluate(curve, place) for place in places] for curve in curves]
     return np.array([channels * (3 // len(channels))], np.float32).transpose(0, 2, 1), least, most
+
+
+def ies_text(node: bpy.types.Node) -> str:
+    """What an IES Texture shows; empty where it is missing."""
+    if node.mode == "INTERNAL":
+        return node.ies.as_string() if node.ies else ""
+    try:
+        return Path(bpy.path.abspath(node.filepath, library=node.id_data.library)).read_text("utf-8", "replace")
+    except OSError:
+        return ""
 
 
 def draw_curves(mapping: bpy.types.CurveMapping, table: bpy.types.Image, least: float, most: float, extrapolate: bool) -> None:

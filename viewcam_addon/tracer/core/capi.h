@@ -100,9 +100,10 @@ typedef struct {
     int (*add_node)(ViewcamScene*, const ViewcamNode*);
     /* Whether the last node is the same everywhere; value: receives what it is, and that as a number. */
     int (*constant_node)(const ViewcamScene*, double* value, int* is_constant);
-    /* transparent_shadow: whether shadow rays go through it where it is transparent. */
-    int (*add_material)(ViewcamScene*, const ViewcamClosure*, int count, int transparent_shadow);
-    int (*add_lamp)(ViewcamScene*, const ViewcamLamp*);
+    /* normal: in place of the smooth one; black where there is none. transparent_shadow: whether shadow rays go through it where it is transparent. */
+    int (*add_material)(ViewcamScene*, const ViewcamClosure*, int count, const ViewcamColor* normal, int transparent_shadow);
+    /* emission: what its light is multiplied by, at each place of the lamp and in each direction. */
+    int (*add_lamp)(ViewcamScene*, const ViewcamLamp*, const ViewcamColor* emission);
     int (*set_film)(ViewcamScene*, const ViewcamFilm*);
     /* What is made must be freed before its scene, or what gives light there, changes. */
     int (*light_create)(const ViewcamScene*, const ViewcamLightSettings*, ViewcamLight** made);

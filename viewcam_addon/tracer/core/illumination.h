@@ -16,6 +16,7 @@ struct Lamp {
     enum Kind { SUN, POINT, SPOT, RECTANGLE, ELLIPSE } kind = SUN;
     Affine to_world;  // the lamp's own space to the world's; a sun is seen towards its z
     Vec3 color;       // irradiance of a sun, power of all others
+    Color emission{{1, 1, 1}};  // what that is multiplied by, at each place of the lamp and in each direction
     double radius = 0, angle = 0, blend = 0;
     Vec2 size;
     bool soft = false, casts_shadow = true;

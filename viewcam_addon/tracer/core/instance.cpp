@@ -214,13 +214,13 @@ const ViewcamCore core = {
                 std::copy(all, all + 4, value);
             });
         },
-    .add_material = [](ViewcamScene* scene, const ViewcamClosure* closures, int count,
-                       int transparent_shadow) { return guarded([&] { add_material(scene_of(scene), closures, count, transparent_shadow); }); },
+    .add_material = [](ViewcamScene* scene, const ViewcamClosure* closures, int count, const ViewcamColor* normal,
+                       int transparent_shadow) { return guarded([&] { add_material(scene_of(scene), closures, count, *normal, transparent_shadow); }); },
     .add_lamp =
-        [](ViewcamScene* scene, const ViewcamLamp* lamp) {
+        [](ViewcamScene* scene, const ViewcamLamp* lamp, const ViewcamColor* emission) {
             return guarded([&] {
                 check::lamp(*lamp);
-                add_lamp(scene_of(scene), *lamp);
+                add_lamp(scene_of(scene), *lamp, *emission);
             });
         },
     .set_film =

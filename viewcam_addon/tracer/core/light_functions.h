@@ -33,10 +33,12 @@ inline WeightedClosure closure_of(const ViewcamClosure& given, const ValueNodes&
     }
     return made;
 }
-inline void add_material(Scene& scene, const ViewcamClosure* closures, int count, bool transparent_shadow) {
+inline void add_material(Scene& scene, const ViewcamClosure* closures, int count, const ViewcamColor& normal, bool transparent_shadow) {
+    const ValueNodes& nodes = scene.illumination.nodes;
     Material material;
     material.transparent_shadow = transparent_shadow;
-    for (int i = 0; i < count; i++) material.closures.push_back(closure_of(closures[i], scene.illumination.nodes));
+    material.normal = color_of(normal, nodes), material.normal_on_tangents = nodes.need_tangents(Inputs({{"", "", material.normal}}));
+    for (int i = 0; i < count; i++) material.closures.push_back(closure_of(closures[i], nodes));
     material.prepare(scene.illumination.textures);
     scene.illumination.materials.push_back(std::move(material));
 }
@@ -50,7 +52,12 @@ inline Lamp lamp_of(const ViewcamLamp& given) {
     lamp.receivers = given.receivers, lamp.shadow_rays = RayKind(given.shadow_rays);
     return lamp;
 }
-inline void add_lamp(Scene& scene, const ViewcamLamp& given) { scene.illumination.lamps.push_back(lamp_of(given)); }
+inline void add_lamp(Scene& scene, const ViewcamLamp& given, const ViewcamColor& emission) {
+    Lamp lamp = lamp_of(given);
+    lamp.emission = color_of(emission, scene.illumination.nodes);
+    if (!lamp.emission.varies()) lamp.color *= Vec3{larger(lamp.emission.rgb.x, 0), larger(lamp.emission.rgb.y, 0), larger(lamp.emission.rgb.z, 0)};
+    if (!is_black(lamp.color)) scene.illumination.lamps.push_back(lamp);
+}
 
 inline Environment environment_of(const ViewcamWorld& given, uint32_t hidden_from, const std::vector<Texture>& textures, int threads) {
     Environment world;

@@ -45,6 +45,8 @@ template <size_t I = 0> Closure closure_of(std::string_view name, const Inputs& 
 struct Material {
     std::vector<WeightedClosure> closures;
     bool transparent_shadow = true;  // whether shadow rays, too, go through what is transparent
+    Color normal;                    // what it has in place of the smooth one, on which those of its closures stand; black: none
+    bool normal_on_tangents = false; // whether that asks for the tangents of a UV map
 
     // The kinds of rays that its lobes scatter.
     uint32_t kinds() const { return kinds_; }
@@ -58,7 +60,7 @@ struct Material {
     bool is_bumped() const { return bumped_; }
     // Whether it asks for the tangents of a UV map.
     bool needs_tangents() const {
-        return std::any_of(closures.begin(), closures.end(), [](const WeightedClosure& one) { return one.on_tangents; });
+        return normal_on_tangents || std::any_of(closures.begin(), closures.end(), [](const WeightedClosure& one) { return one.on_tangents; });
     }
     // About what it gives off, black only where it gives off nothing; and whether that is what it gives off everywhere.
     Vec3 mean_emission() const { return mean_emission_; }

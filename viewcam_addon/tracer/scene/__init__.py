@@ -210,13 +210,20 @@ class Scene:
         for image in self.world.images:
             if image not in self.images:
                 raise InputError(f"the world names the image {shown(image)}, which the scene does not have")
-        for name, material in self.materials.items():
-            for component, colour in material.inputs:
-                if colour.image is not None and colour.image not in self.images:
-                    raise InputError(
-                        f"{component} of material {shown(name)} names the image {shown(colour.image)}, "
-                        "which the scene does not have"
-                    )
+        named = [
+            (f"{component} of material {shown(name)}", colour)
+            for name, material in self.materials.items()
+            for component, colour in material.inputs
+        ]
+        named += [
+            (f"the emission of light {shown(lamp.name)}", colour)
+            for lamp in self.lamps
+            if lamp.emission
+            for colour in lamp.emission.colours
+        ]
+        for what, colour in named:
+            if colour.image is not None and colour.image not in self.images:
+                raise InputError(f"{what} names the image {shown(colour.image)}, which the scene does not have")
 
 
 def _check_links(lamps: tuple[Lamp, ...], names: set[str]) -> None:

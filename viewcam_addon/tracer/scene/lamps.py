@@ -21,6 +21,7 @@ from ... import checks
 from ...checks import shown
 from ...errors import InputError
 from .materials import radiance
+from .shader_nodes import Node
 
 RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
 """The kinds of rays that things may be hidden from; lamps have no shadow."""
@@ -40,7 +41,9 @@ class Lamp:
     """What all lamps have.
 
     casts_shadow : whether objects can stand in its light. receivers : names of the objects that it lights; blockers : of those
-    that can stand in its light; None is all objects. The eye sees a lamp whatever it lights.
+    that can stand in its light; None is all objects. The eye sees a lamp whatever it lights. emission : a node that makes what
+    its light is multiplied by, at each place of the lamp and in each direction, or None; it is told the place there, in the
+    world, the normal, the way that light goes, and how far that is.
     """
 
     name: str
@@ -48,11 +51,16 @@ class Lamp:
     casts_shadow: bool = True
     receivers: frozenset[str] | None = None
     blockers: frozenset[str] | None = None
+    emission: Node | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "hidden_from", hidden_from(f"light {shown(self.name)}", self.hidden_from))
         truth = checks.truth(f"casts_shadow of light {shown(self.name)}", self.casts_shadow)
         object.__setattr__(self, "casts_shadow", truth)
+        if self.emission is not None and not self.emission.is_value:
+            raise InputError(
+                f"the emission of light {shown(self.name)} is a shader {self.emission.type!r}: give a node that makes a colour"
+            )
         for what in ("receivers", "blockers"):
             if getattr(self, what) is not None:
                 object.__setattr__(self, what, frozenset(getattr(self, what)))

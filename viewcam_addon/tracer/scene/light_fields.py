@@ -36,6 +36,7 @@ _READERS: dict[str, Callable[[Field], Any]] = {
     "size": lambda field: field.vector(2),
     "hidden_from": lambda field: hidden_from(field),
     **dict.fromkeys(("receivers", "blockers"), lambda field: frozenset(name.text() for name in field.items("object's name"))),
+    "emission": lambda field: _node(field),
     "backdrop": lambda field: _simple(World, field, without=("hidden_from", "backdrop")),
 }
 """How the values are read that are called the same as in Lamp, World and Film."""
@@ -102,6 +103,8 @@ def _changed(owner: Lamp | World | Film | Bounces) -> dict[str, Any]:
             changed["matrix"] = value.tolist()
         elif isinstance(value, World):
             changed[each.name] = _changed(value)
+        elif isinstance(value, Node):
+            changed[each.name] = _node_document(value)
         elif each.name != "name" and value != each.default:
             changed[each.name] = sorted(value) if isinstance(value, frozenset) else value
     return changed
@@ -114,7 +117,8 @@ def _material_document(material: Material) -> dict[str, Any]:
         colour = getattr(material, each.name)
         if isinstance(colour, Colour):
             document[each.name] = _colour_document(colour)
-    return document if material.surface is None else document | {"surface": _node_document(material.surface)}
+    trees = ((name, getattr(material, name)) for name in ("surface", "displacement"))
+    return document | {name: _node_document(tree) for name, tree in trees if tree is not None}
 
 
 def _node_document(node: Node) -> dict[str, Any]:
@@ -151,14 +155,13 @@ def _picture(field: Field, arrays: Arrays) -> Picture:
 
 
 def _material(field: Field) -> Material:
-    others = ("ior", "surface", "transparent_shadow")
+    others = ("ior", "surface", "transparent_shadow", "displacement")
     components = [each.name for each in dataclasses.fields(Material) if each.name not in others]
     keys = field.fields((), (*components, *others))
     given: dict[str, Any] = {name: _colour(keys[name]) for name in components if name in keys}
     if "ior" in keys:
         given["ior"] = keys["ior"].number()
-    if "surface" in keys:
-        given["surface"] = _node(keys["surface"])
+    given |= {name: _node(keys[name]) for name in ("surface", "displacement") if name in keys}
     if "transparent_shadow" in keys:
         given["transparent_shadow"] = keys["transparent_shadow"].truth()
     try:
@@ -190,7 +193,7 @@ def _node_input(field: Field, default: object, of_value: bool) -> Any:
         return field.truth()
     if default is value_nodes.IMAGE:
         return Colour(_WHITE, field.text())
-    if default is value_nodes.NAME or (isinstance(default, tuple) and isinstance(default[0], str)):
+    if default in (value_nodes.NAME, value_nodes.IES) or (isinstance(default, tuple) and isinstance(default[0], str)):
         return field.text()
     if isinstance(field.value, list) and of_value:
         return field.vector(3)

@@ -23,6 +23,7 @@ class Material:
     perfect mirror. glass : colour of what is reflected and refracted by a clear dielectric, shared out by Fresnel's equations.
     refraction : colour of what is refracted, nothing being reflected. ior : of glass and refraction, inside over outside.
     surface : the shader that is in their place. transparent_shadow : whether shadow rays go through it where it is transparent.
+    displacement : a node that makes a height, world units, whose slope turns the normals; nothing moves.
     """
 
     diffuse: Colour | None = None
@@ -33,6 +34,7 @@ class Material:
     ior: float = 1.45
     surface: Node | None = None
     transparent_shadow: bool = True
+    displacement: Node | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "ior", checks.number("ior of a material", self.ior, 1e-3, 1e3))
@@ -42,6 +44,10 @@ class Material:
             raise InputError(f"the surface of a material is a node {self.surface.type!r}: give a shader")
         if self.surface is not None and self.colours:
             raise InputError(f"a material has a surface beside {', '.join(self.colours)}: give one or the other")
+        if self.displacement is not None and not self.displacement.is_value:
+            raise InputError(
+                f"the displacement of a material is a shader {self.displacement.type!r}: give a node that makes a height"
+            )
 
     @property
     def colours(self) -> dict[str, Colour]:
@@ -66,9 +72,9 @@ class Material:
     @property
     def inputs(self) -> tuple[tuple[str, Colour], ...]:
         """What all colours and numbers are given or made from, each with what a sentence calls it."""
+        found = [("displacement", colour) for colour in self.displacement.colours] if self.displacement else []
         if self.surface is None:
-            return tuple(self.colours.items())
-        found = []
+            return (*self.colours.items(), *found)
         for closure in self.closures:
             kind = closure.node.type
             for name, value in (*closure.node.inputs, *(("a factor", factor) for factor, _ in closure.factors)):
@@ -78,8 +84,9 @@ class Material:
 
     @property
     def nodes(self) -> Iterator[Node]:
-        """Those of its closures, and all that feed them."""
+        """Those of its closures and its displacement, and all that feed them."""
         makers = [maker for each in self.closures for maker in (each.node, *(factor for factor, _ in each.factors))]
+        makers.append(self.displacement)
         for maker in makers:
             if isinstance(maker, Node):
                 yield from maker.all

@@ -11,7 +11,7 @@ from typing import Any
 
 from ... import checks
 from ...errors import InputError
-from . import value_nodes
+from . import ies, value_nodes
 from .colours import LARGEST_RADIANCE, WHITE, Colour
 
 RGB = tuple[float, float, float]
@@ -137,6 +137,8 @@ class Node:
             values[name] = _checked(f"{name} of a {what} {self.type!r}", value, known[name], self.is_value)
         if "table" in known and "table" not in values:
             raise InputError(f"a {what} {self.type!r} has no table: give the name of an image of one row")
+        if "text" in known and "text" not in values:
+            raise InputError(f"a {what} {self.type!r} has no text: give that of an IES file")
         ordered = ((name, values[name]) for name in known if name in values and values[name] != self._default(name))
         object.__setattr__(self, "inputs", tuple(ordered))
         size = 1 + sum(value.size for _, value in self.inputs if isinstance(value, Node) and value.is_value)
@@ -156,7 +158,9 @@ class Node:
             return Node("texture_coordinate", (("output", "generated"),))
         if default is value_nodes.POSITION:
             return Node("geometry")
-        if default is None or default in (value_nodes.IMAGE, *value_nodes.OWN):
+        if default is value_nodes.INCOMING:
+            return Node("geometry", (("output", "incoming"),))
+        if default is None or default in (value_nodes.IMAGE, value_nodes.IES, *value_nodes.OWN):
             return None
         if default is value_nodes.NAME:
             return ""
@@ -277,6 +281,9 @@ def _checked(name: str, value: Any, known: Any, of_value: bool) -> Any:
     if known is value_nodes.NAME:
         if not isinstance(value, str):
             raise InputError(f"{name} is {checks.shown(value)}: give a name")
+        return value
+    if known is value_nodes.IES:
+        ies.read(name, value)
         return value
     if known is value_nodes.IMAGE:
         if not isinstance(value, Colour) or value != Colour(WHITE, value.image):

@@ -25,6 +25,12 @@ NORMAL = "normal"
 TANGENT = "tangent"
 """The default of a tangent that runs round the z axis of the generated coordinates where nothing else is given."""
 
+IES = "an IES text"
+"""The default of an input that is the text of an IES file."""
+
+INCOMING = "incoming"
+"""The default of a vector that is the way that light leaves in, in the world, where nothing else is given."""
+
 OWN = (NORMAL, TANGENT)
 """What surfaces have of themselves where no node makes another."""
 
@@ -102,6 +108,7 @@ KINDS: dict[str, Mapping[str, Default]] = {
         "to": ("object", "world", "camera"),
     },
     "geometry": {"output": ("position", "normal", "true_normal", "incoming", "backfacing", "tangent", "parametric")},
+    "ies": {"text": IES, "vector": INCOMING, "strength": 1.0},
     "tangent": {"kind": ("radial", "uv_map"), "axis": ("z", "x", "y"), "uv": NAME},
     "object_info": {"output": ("location", "object_index", "material_index", "color", "alpha", "random")},
     "light_path": {"output": tuple(LIGHT_PATH.split())},

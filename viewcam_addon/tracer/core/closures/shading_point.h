@@ -45,7 +45,7 @@ struct ShadingPoint {
         return {larger(rgb.x, 0), larger(rgb.y, 0), larger(rgb.z, 0)};
     }
     double number(const Color& color) const {
-        if (!color.varies()) return color.rgb.x;
+        if (!color.varies()) return color.rgb.x == color.rgb.y && color.rgb.y == color.rgb.z ? color.rgb.x : luminance(color.rgb);
         return color.node == NONE ? luminance(color.at(textures, point)) : number_of_node(color.node);
     }
     // The index of refraction beyond the surface over that before it. ior: inside over outside.

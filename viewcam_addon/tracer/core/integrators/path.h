@@ -179,6 +179,7 @@ class PathIntegrator {
         for (double u = -1;;) {
             const Material& made_of = material(point);
             ShadingPoint at = shading(point, path, path.ray.direction, depth);
+            if (VIEWCAM_ISA::is_bumped(made_of.normal)) point.shading = at.normal(made_of.normal);
             if (made_of.emits()) {
                 double share = 1;
                 if (path.pdf < INFINITE && lights_.has_meshes())
@@ -202,7 +203,7 @@ class PathIntegrator {
     void meet_lamps(const Path& path, const Ray& ray, const Hit& hit, int depth, Block& block) const {
         if (!lights_.meets_lamps(path.kind)) return;
         double size = path.kind == CAMERA ? length(ray.direction) : 1;
-        LightRay seen{ray.origin, ray.direction / size, ray.t_min * size, smaller(ray.t_max, hit.t) * size, !hit};
+        LightRay seen{ray.origin, ray.direction / size, ray.t_min * size, smaller(ray.t_max, hit.t) * size, !hit, path.kind == CAMERA ? scene_.camera.t_min * size : 0};
         Vec3 radiance = path.kind == CAMERA ? lights_.le(seen, CAMERA)
                                             : lights_.le(seen, path.kind, block.points[path.from], path.pdf, depth == 1, path.through);
         block.light[path.sample].add(path.kind == CAMERA ? EMISSION : path.category, path.weight * radiance);

@@ -106,16 +106,18 @@ class Area {
         return cosine > 0 ? distance * distance / (cosine * area_) : 0;
     }
 
-    Vec3 le(const LightRay& ray) const {
+    Vec3 le(const LightRay& ray, double& distance) const {
         double facing = dot(normal_, ray.direction);
         Vec3 way = center_ - ray.origin;
-        double distance = dot(normal_, way) / facing;
+        distance = dot(normal_, way) / facing;
         if (!(facing < 0 && distance > ray.nearest && distance < ray.farthest)) return {};
         // Each coordinate along the direction that the other side is perpendicular to: the sides may be askew.
         Vec3 place = ray.direction * distance - way, plane = cross(first_, second_) / (sine_ * sine_);
         double across = dot(cross(second_, plane), place) / lengths_[0], along = dot(cross(plane, first_), place) / lengths_[1];
         return covers(across, along) ? radiance_ * through_grid(-facing) : Vec3{};
     }
+
+    Vec3 normal(Vec3, Vec3) const { return normal_; }
 
     double estimate(Vec3 position, Vec3 normal) const {
         Vec3 way = center_ - position;

@@ -28,7 +28,7 @@ class Light {
 
     // part: one number more in [0, 1), of those that have parts.
     LightSample sample_li(const Interaction& from, double part, Vec2 u) const {
-        return std::visit(
+        LightSample sample = std::visit(
             [&](const auto& light) {
                 if constexpr (requires { light.sample_li(from, part, u); })
                     return light.sample_li(from, part, u);
@@ -36,17 +36,21 @@ class Light {
                     return light.sample_li(from, u);
             },
             kind_);
+        if (emission_.varies() && !is_black(sample.weight)) sample.weight *= emission(from.position, sample.direction, sample.distance);
+        return sample;
     }
     // What a ray sees of a lamp that it runs into; surfaces are met as all others are.
     Vec3 le(const LightRay& ray) const {
-        return std::visit(
+        double distance = INFINITE;
+        Vec3 radiance = std::visit(
             [&](const auto& light) {
-                if constexpr (requires { light.le(ray); })
-                    return light.le(ray);
+                if constexpr (requires { light.le(ray, distance); })
+                    return light.le(ray, distance);
                 else
                     return Vec3{};
             },
             kind_);
+        return emission_.varies() && !is_black(radiance) ? radiance * emission(ray.origin, ray.direction, distance, ray.start) : radiance;
     }
     double pdf_li(const Interaction& from, Vec3 direction) const {
         return std::visit(
@@ -58,8 +62,15 @@ class Light {
             },
             kind_);
     }
+    // With what nodes make of the light from its middle: all there is of what has no size.
     double estimate(Vec3 position, Vec3 normal) const {
-        return std::visit([&](const auto& light) { return light.estimate(position, normal); }, kind_);
+        constexpr double LEAST_OF_SIZED = 0.1;
+        double brought = std::visit([&](const auto& light) { return light.estimate(position, normal); }, kind_);
+        if (!emission_.varies() || std::holds_alternative<Sun>(kind_)) return brought;
+        Vec3 way = middle_ - position;
+        double distance = length(way);
+        if (!(brought > 0 && distance > 0)) return brought;
+        return brought * larger(mean(emission(position, way / distance, distance)), is_sized() ? LEAST_OF_SIZED : 0);
     }
     double irradiance() const {
         return std::visit(
@@ -90,12 +101,32 @@ class Light {
     // Whether rays of a kind that are scattered all over find it, too: diffuse ones see no lamps.
     bool is_found_by(RayKind kind) const { return mesh() || is_environment() || (kind != DIFFUSE && is_sized()); }
 
+    // Lets nodes change what a lamp gives, at each place of it and in each direction.
+    void shine_by(const Color& emission, Vec3 middle, const Scene* scene) { emission_ = emission, middle_ = middle, scene_ = scene; }
+
    private:
+    // What nodes make of a lamp's light at a place that is seen from another, along a unit direction. A sun's place is the way that its
+    // light goes, as in Cycles. start: from where on the way counts.
+    Vec3 emission(Vec3 from, Vec3 ahead, double distance, double start = 0) const {
+        Interaction point;
+        point.position = distance < INFINITE ? from + ahead * distance : -ahead - scene_->origin;
+        std::visit(
+            [&](const auto& light) {
+                if constexpr (requires { light.normal(point.position, ahead); }) point.normal = point.shading = light.normal(point.position, ahead);
+            },
+            kind_);
+        const Illumination& light = scene_->illumination;
+        return ShadingPoint{point, ahead, light.textures, light.version, &light.nodes, nullptr, scene_->origin, nullptr, {.kind = NO_RAY, .length = distance - start}}.color(emission_);
+    }
+
     Kind kind_;
+    Color emission_;
+    Vec3 middle_;
+    const Scene* scene_ = nullptr;
 };
 
-// A lamp in rendering space, whose origin is given in the world's. It must shine.
-inline Light light_of(const Lamp& lamp, Vec3 origin) {
+// A lamp in rendering space, whose origin is given in the world's. It must shine. scene: whose nodes its emission is made by.
+inline Light light_of(const Lamp& lamp, Vec3 origin, const Scene* scene = nullptr) {
     Affine placed = lamp.to_world;
     placed.m[0][3] -= origin.x, placed.m[1][3] -= origin.y, placed.m[2][3] -= origin.z;
     auto kind = [&]() -> Light::Kind {
@@ -106,7 +137,9 @@ inline Light light_of(const Lamp& lamp, Vec3 origin) {
             default: return Area(placed, lamp.color, lamp.size, lamp.kind == Lamp::ELLIPSE, lamp.angle);
         }
     };
-    return {kind(), lamp.hidden_from, lamp.casts_shadow, lamp.receivers, lamp.shadow_rays};
+    Light light(kind(), lamp.hidden_from, lamp.casts_shadow, lamp.receivers, lamp.shadow_rays);
+    if (scene) light.shine_by(lamp.emission, placed.translation(), scene);
+    return light;
 }
 
 }  // namespace viewcam::VIEWCAM_ISA

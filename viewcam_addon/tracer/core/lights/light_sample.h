@@ -6,7 +6,9 @@
 //   fills there where that can be. So what a point gets is bounded however near the light, and a light of no size is no special
 //   case: power and solid angle are multiplied out, and the radius cancels. `weight` is the radiance over the density.
 // - `pdf_li`: the density with which `sample_li` chooses a direction that does see the light.
-// - `le`: what a ray sees that runs into the light. Lamps block no ray, as in Cycles: a ray sees all that it runs through.
+// - `le`: what a ray sees that runs into the light, and how far away. Lamps block no ray, as in Cycles: a ray sees all that it runs
+//   through.
+// - `normal`: of lamps, which way they face at a place that is seen along a direction.
 // - `estimate`: how much the light brings to a point, roughly, and 0 only where it brings nothing.
 // - `irradiance`: of what lies at infinity, the most that a surface receives.
 // - `is_sized`: whether rays can run into it.
@@ -29,11 +31,12 @@ struct LightSample {
     double cosine = 1;           // under which the light's own surface is seen, of flat lights
 };
 
-// A ray that may run into lights, its direction unit. escaped: whether it meets no surface.
+// A ray that may run into lights, its direction unit. escaped: whether it meets no surface. start: from where its length counts.
 struct LightRay {
     Vec3 origin, direction;
     double nearest = 0, farthest = INFINITE;
     bool escaped = false;
+    double start = 0;
 };
 
 constexpr double MOST_WEIGHT_OF_LIGHT = 1e100;  // more light than any picture holds, less than makes products overflow

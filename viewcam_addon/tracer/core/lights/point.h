@@ -54,9 +54,9 @@ class Point {
     }
 
     // Whether a ray runs into the light. leaves: from inside, `only_outside` forbids what lies behind the middle.
-    bool is_met(const LightRay& ray, bool only_ahead) const {
+    bool is_met(const LightRay& ray, bool only_ahead, double& distance) const {
         Vec3 way = center_ - ray.origin;
-        double along = dot(way, ray.direction), squared = dot(way, way), distance;
+        double along = dot(way, ray.direction), squared = dot(way, way);
         if (soft_) {
             distance = squared / along;
             if (!(along > 0 && distance * distance - squared <= radius_ * radius_)) return false;
@@ -69,7 +69,12 @@ class Point {
         }
         return distance > ray.nearest && distance < ray.farthest;
     }
-    Vec3 le(const LightRay& ray) const { return radius_ > 0 && is_met(ray, false) ? radiance_ : Vec3{}; }
+    Vec3 le(const LightRay& ray, double& distance) const { return radius_ > 0 && is_met(ray, false, distance) ? radiance_ : Vec3{}; }
+    Vec3 normal(Vec3 place, Vec3 ahead) const {
+        if (soft_ || radius_ == 0) return -ahead;
+        Vec3 outward = normalize(place - center_);
+        return dot(outward, ahead) > 0 ? -outward : outward;
+    }
 
     double estimate(Vec3 position, Vec3 normal) const {
         Vec3 way = center_ - position;

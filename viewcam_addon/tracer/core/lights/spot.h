@@ -36,10 +36,12 @@ class Spot {
         return point_.pdf_li(from, direction);
     }
 
-    Vec3 le(const LightRay& ray) const {
-        if (!is_sized() || !point_.is_met(ray, true)) return {};
+    Vec3 le(const LightRay& ray, double& distance) const {
+        if (!is_sized() || !point_.is_met(ray, true, distance)) return {};
         return point_.is_around(ray.origin) ? point_.radiance() : point_.radiance() * attenuation(ray.direction);
     }
+
+    Vec3 normal(Vec3 place, Vec3 ahead) const { return point_.normal(place, ahead); }
 
     // Part of a sphere may be seen from where its middle is dark.
     double estimate(Vec3 position, Vec3 normal) const {

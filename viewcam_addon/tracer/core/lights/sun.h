@@ -23,10 +23,12 @@ class Sun {
     }
     double pdf_li(const Interaction&, Vec3) const { return pdf_li(); }
 
-    Vec3 le(const LightRay& ray) const {
+    Vec3 le(const LightRay& ray, double&) const {
         Vec3 apart = ray.direction - towards_;
         return ray.escaped && dot(apart, apart) <= 4 * half_chord_ * half_chord_ ? radiance_ : Vec3{};
     }
+
+    Vec3 normal(Vec3, Vec3 ahead) const { return -ahead; }
 
     double estimate(Vec3, Vec3 normal) const {
         return risen(dot(normal, towards_), 1, std::sqrt(spread_ * (2 - spread_))) * mean(irradiance_);

@@ -10,6 +10,7 @@
 #include "color.h"
 #include "curves.h"
 #include "geometry.h"
+#include "ies.h"
 #include "image.h"
 #include "light_path.h"
 #include "normal_map.h"
@@ -33,7 +34,7 @@ using ValueNode = std::variant<ConstantNode, ImageNode, EnvironmentImageNode, Te
                                SeparateNode, CombineXYZNode, SeparateColorNode, CombineColorNode, MixColorNode, MixNumberNode, MixVectorNode, MixComponentsNode,
                                RGBCurvesNode, VectorCurvesNode, FloatCurveNode, BlackbodyNode, WavelengthNode, GammaNode,
                                BrightContrastNode, HueSaturationNode, InvertNode, LuminanceNode, NoiseNode, WhiteNoiseNode, CheckerNode,
-                               GradientNode, WaveNode, MagicNode, BrickNode, VoronoiNode>;
+                               GradientNode, WaveNode, MagicNode, BrickNode, VoronoiNode, IESNode>;
 
 // A number of a value that is of some sort: a colour's luminance, a vector's mean.
 inline double number_of(Vec3 value, Gives sort) {
