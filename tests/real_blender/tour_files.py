@@ -55,7 +55,6 @@ class CompareWithCycles(Step):
 
     def pose_for_the_picture(self):
         """The verdict stands at the end of the panel."""
-        call(bpy.ops.image.view_all, ("IMAGE_EDITOR", "WINDOW"))
         for _ in range(10):
             yield from scroll(bpy.ops.view2d.scroll_down)
 

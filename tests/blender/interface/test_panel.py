@@ -222,6 +222,15 @@ def test_every_value_has_its_row_and_the_roll_is_the_one_that_counts(posed_camer
     assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "held_roll", "hold_within", "pole"]
 
 
+def test_nothing_but_a_dot_takes_room_from_the_lens(posed_camera):
+    """Of "112.5 mm" a sidebar as Blender opens it would show "112.5 m"."""
+    for unit in [item.identifier for item in fields()["lens_unit"].enum_items]:
+        posed_camera.virtual_pinhole.lens_unit = unit
+        found = drawn(panel.VIEWCAM_PT_sidebar, 292)
+        beside = [(kind, name) for kind, name, _, layout, _ in found if layout.is_row and kind in ("label", "decorator")]
+        assert ("label", "") not in beside and (("decorator", "distance") in beside) == (unit == "PIXELS")
+
+
 BLENDERS = {
     "eye": (bpy.types.Object, "location"),
     "look_at": (bpy.types.Object, "location"),

@@ -93,7 +93,7 @@ def _draw_values(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> 
 def _draw_lens(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
     """One field and its unit, no wider than its words, or below it where both would be cut.
 
-    The dot keys d, and Blender wants d's own field beside it.
+    The dot keys d, and Blender wants d's own field beside it. Other fields have its room: "112.5 mm" would be cut to "112.5 m".
     """
     field = {"MILLIMETERS": "focal_length", "PIXELS": "distance"}.get(group.lens_unit, "field_of_view")
     if not column.use_property_split:
@@ -110,8 +110,6 @@ def _draw_lens(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> No
     unit.prop(group, "lens_unit", text="")
     if group.lens_unit == "PIXELS":
         row.prop_decorator(group, "distance")
-    else:
-        row.label(text="", icon="BLANK1")
 
 
 def _draw_setting(row: bpy.types.UILayout, camera_object: bpy.types.Object, alert: bool) -> None:

@@ -195,6 +195,7 @@ def _draw_legend(x: float, y: float, scale: float) -> None:
         return
     colours = (pictures.signed_scale() if told["kind"] == "signed" else pictures.colour_scale()) / 255.0
     width, height = (size * scale for size in _STRIP)
+    x = max(_MARGIN * scale, min(x, bpy.context.region.width - width - 2 * _MARGIN * scale))  # whole, where there is room
     for number, colour in enumerate(colours):
         _fill(x + width * number / len(colours), y, width / len(colours) + 1, height, (*colour, 1.0))
     signed = told["kind"] == "signed"
