@@ -175,7 +175,7 @@ def some_camera(source):
 
 @attacks(
     *(f"pinhole.Pinhole.{name}" for name in ("basis", "axes", "is_singular", "sine_to_up", "roll_uncertainty")),
-    *(f"pinhole.Pinhole.{name}" for name in ("field_of_view", "resized", "cropped")),
+    *(f"pinhole.Pinhole.{name}" for name in ("picture_axes", "field_of_view", "resized", "cropped")),
 )
 def what_a_camera_says(source):
     camera = some_camera(source)
@@ -184,6 +184,8 @@ def what_a_camera_says(source):
         assert abs(math.hypot(*axis) - 1) <= 1e-15, camera
     assert abs(u[0] * v[0] + u[1] * v[1] + u[2] * v[2]) <= 1e-15 >= abs(u[0] * w[0] + u[1] * w[1] + u[2] * w[2]), camera
     assert [axis.tolist() for axis in camera.basis()] == list(map(list, (u, v, w)))
+    right = [-each for each in u] if camera.mirrored else list(u)
+    assert camera.picture_axes().tolist() == [right, list(v), [-each for each in w]]
     sine = camera.sine_to_up
     assert 0 <= sine <= 1 and not (camera.is_singular and sine), camera
     assert 0 <= camera.roll_uncertainty() <= math.pi, camera

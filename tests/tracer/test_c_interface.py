@@ -138,7 +138,7 @@ def light_up(draw, calls):
 
 def made_by(draw):
     """A colour of a node, which there may be."""
-    return native._Color((1.0, 1.0, 1.0), image=-1, node=draw(mostly(st.integers(-1, 1), WHOLE)))
+    return native._Color((1.0, 1.0, 1.0), image=draw(mostly(st.just(-1), WHOLE)), node=draw(mostly(st.integers(-1, 1), WHOLE)))
 
 
 def make_nodes(draw, calls):

@@ -34,7 +34,9 @@ def field(
     text = described.name if text is None else text
     row = where = column
     is_dotted = column.use_property_decorate and not column.use_property_split
-    if not column.use_property_split and (described.type in ("ENUM", "POINTER", "STRING") or getattr(described, "is_array", False)):
+    if not column.use_property_split and (
+        described.type in ("ENUM", "POINTER", "STRING") or getattr(described, "is_array", False)
+    ):
         column.label(text=text)
         text = ""
     if is_dotted:

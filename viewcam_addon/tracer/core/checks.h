@@ -78,9 +78,18 @@ inline void texture(int width, int height, int channels, int texel, const void* 
     that(width > 0 && height > 0 && pixels && (channels == 3 || channels == 4), "an image has no pixels");
     that(texel >= VIEWCAM_FLOAT && texel <= VIEWCAM_SHORT, "an image has pixels of no kind");
 }
+inline void color(const Scene& scene, const ViewcamColor& given) {
+    that(given.image < int64_t(scene.illumination.textures.size()), "a colour is that of an image that the scene does not have");
+}
 inline void node(const Scene& scene, const ViewcamNode& given) {
-    for (int i = 0; i < given.input_count; i++)
-        that(given.inputs[i].color.image < int64_t(scene.illumination.textures.size()), "a node has an image that the scene does not have");
+    for (int i = 0; i < given.input_count; i++) color(scene, given.inputs[i].color);
+}
+inline void material(const Scene& scene, const ViewcamClosure* closures, int count, const ViewcamColor& normal) {
+    color(scene, normal);
+    for (int i = 0; i < count; i++) {
+        node(scene, closures[i].node);
+        for (int j = 0; j < closures[i].factor_count; j++) color(scene, closures[i].factors[j].value);
+    }
 }
 inline void lamp(const ViewcamLamp& given) {
     that(given.kind >= VIEWCAM_SUN && given.kind <= VIEWCAM_ELLIPSE, "a lamp is of no kind");

@@ -214,12 +214,18 @@ const ViewcamCore core = {
                 std::copy(all, all + 4, value);
             });
         },
-    .add_material = [](ViewcamScene* scene, const ViewcamClosure* closures, int count, const ViewcamColor* normal,
-                       int transparent_shadow) { return guarded([&] { add_material(scene_of(scene), closures, count, *normal, transparent_shadow); }); },
+    .add_material =
+        [](ViewcamScene* scene, const ViewcamClosure* closures, int count, const ViewcamColor* normal, int transparent_shadow) {
+            return guarded([&] {
+                check::material(scene_of(scene), closures, count, *normal);
+                add_material(scene_of(scene), closures, count, *normal, transparent_shadow);
+            });
+        },
     .add_lamp =
         [](ViewcamScene* scene, const ViewcamLamp* lamp, const ViewcamColor* emission) {
             return guarded([&] {
                 check::lamp(*lamp);
+                check::color(scene_of(scene), *emission);
                 add_lamp(scene_of(scene), *lamp, *emission);
             });
         },
