@@ -86,7 +86,7 @@ def _chart(
     width, height = still.size
     rounds = max(len(point.seconds) for points in tracks.values() for point in points)
     return standings.Contested(
-        f"{still.name}-{figure.name.replace(' ', '-')}",
+        f"{still.name}-{figure.name}".translate(str.maketrans(" _", "--")),
         f"{still.title}, {width} × {height}, {still.level}: the {figure.name}",
         f"seconds, {figure.seconds}: median, least and most of {rounds}",
         "RMS error of Combined",

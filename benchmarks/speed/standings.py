@@ -79,7 +79,12 @@ class Contested(Chart):
 
     def figures(self) -> dict[str, object]:
         times = {f"{target:g}": [each.figures() for each in all_reached] for target, all_reached in self.times.items()}
-        return {**self.measured, "times": times, "standings": [standing.figures() for standing in self.standings]}
+        return {
+            **super().figures(),
+            **self.measured,
+            "times": times,
+            "standings": [standing.figures() for standing in self.standings],
+        }
 
 
 def reached(method: Method, points: Sequence[Point], target: float) -> Reached | None:
