@@ -11,7 +11,7 @@ import operator
 import warnings
 from collections.abc import Mapping, Set
 from numbers import Real
-from typing import Any, Literal, overload
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,14 +39,7 @@ def number(name: str, value: object, least: float = -math.inf, most: float = mat
     return result
 
 
-@overload
-def vector(name: str, values: object, count: Literal[2]) -> tuple[float, float]: ...
-@overload
-def vector(name: str, values: object, count: Literal[3]) -> tuple[float, float, float]: ...
-@overload
-def vector(name: str, values: object, count: int) -> tuple[float, ...]: ...
-
-
+# No overloads by count: typing would keep them, and with them this module, once the add-on is gone.
 def vector(name: str, values: object, count: int) -> tuple[float, ...]:
     """`count` values, of whatever can be iterated over, as finite floats."""
     try:

@@ -11,7 +11,7 @@ import zipfile
 import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import IO, Literal, NoReturn, overload
+from typing import IO, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,13 +84,6 @@ class Field:
         if type(self.value) is not int or not least <= self.value <= _LARGEST_WHOLE:
             self.fail(f"is {_shown(self.value)}: give a whole number of at least {least}")
         return self.value
-
-    @overload
-    def vector(self, count: Literal[3]) -> tuple[float, float, float]: ...
-    @overload
-    def vector(self, count: Literal[4]) -> tuple[float, float, float, float]: ...
-    @overload
-    def vector(self, count: int) -> tuple[float, ...]: ...
 
     def vector(self, count: int) -> tuple[float, ...]:
         if not isinstance(self.value, list) or len(self.value) != count or not all(map(_is_number, self.value)):
