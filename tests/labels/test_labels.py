@@ -183,6 +183,17 @@ def test_a_silhouette_ends_where_the_clip_range_begins(camera, near):
         np.testing.assert_array_equal(found, alone, err_msg=f"instance {number}")
 
 
+def test_what_is_shown_is_in_its_silhouette_even_if_its_box_seems_beside_the_picture(monkeypatch):
+    scene = room()
+    surfaces = Surfaces(scene)
+    monkeypatch.setattr(Silhouettes, "_reaches", lambda self: np.zeros((len(surfaces.instances), 4), np.intp))
+    windows = Silhouettes(surfaces).windows()
+    for number, pixels in surfaces.shown_numbers:
+        left, low, covered = windows[number]
+        rows, columns = np.divmod(pixels, scene.camera.width)
+        assert covered[rows - low, columns - left].all() and min(rows - low) >= 0 and min(columns - left) >= 0
+
+
 def test_an_id_stays_when_others_come_and_go_and_none_is_given_twice():
     scene = room()
     before = {each.key: each.id for each in instances(scene)}

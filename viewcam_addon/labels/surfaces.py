@@ -227,6 +227,7 @@ class Silhouettes:
         surfaces = self._surfaces
         if not surfaces.instances:
             return []
+        shown = dict(surfaces.shown_numbers)
         camera, clip = surfaces.camera, surfaces.scene.clip
         matrices, inverses = (np.array([getattr(each, name) for each in surfaces.instances]) for name in ("matrix", "inverse"))
         is_flat = np.linalg.det(matrices[:, :3, :3]) == 0
@@ -234,7 +235,11 @@ class Silhouettes:
         eyes = (inverses[:, :3, :3] @ (np.array(camera.eye) - matrices[:, :3, 3])[..., None])[..., 0]
         axes = camera.picture_axes() @ inverses[:, :3, :3].swapaxes(1, 2)
         reaches = self._reaches()
-        shown = dict(surfaces.shown_numbers)
+        for number, pixels in shown.items():  # rounding may have left out a box that begins where the clip range does
+            rows, columns = np.divmod(pixels, camera.width)
+            first = np.minimum(reaches[number, :2], [columns.min(), rows.min()])
+            last = np.maximum(reaches[number, :2] + reaches[number, 2:], [columns.max() + 1, rows.max() + 1])
+            reaches[number] = *first, *(last - first)
         found: list[Window | None] = [None] * len(surfaces.instances)
 
         def trace(numbers: NDArray[np.intp]) -> None:
