@@ -122,7 +122,7 @@ def test_a_chart_brings_its_paper_along_and_turns_dark_where_the_reader_prefers_
     drawn = text.partition("</style>")[0].partition("<style")[0] + text.partition("</style>")[2]
     for colour in charts._IN_THE_DARK:
         assert f'[style*="fill: {colour}"]' in dark and f'[style*="stroke: {colour}"]' in dark
-    for colour in (charts._INK, charts._PAPER, charts._FAINT, charts._GRID, charts._OURS):
+    for colour in (charts._INK, charts._BACKGROUND, charts._FAINT, charts._GRID, charts._OURS):
         assert f"fill: {colour}" in drawn or f"stroke: {colour}" in drawn, f"nothing is {colour}: the rule for it does nothing"
 
 
@@ -138,8 +138,8 @@ def test_every_colour_of_a_chart_can_be_read_on_a_light_and_on_a_dark_page():
         return (light + 0.05) / (dark + 0.05)
 
     for colour in (charts._INK, charts._FAINT, charts._OURS, *charts._COLOURS):
-        at_night = contrast(charts._IN_THE_DARK[colour], charts._IN_THE_DARK[charts._PAPER])
-        assert contrast(colour, charts._PAPER) >= 3 <= at_night, f"{colour} can't be read"
+        at_night = contrast(charts._IN_THE_DARK[colour], charts._IN_THE_DARK[charts._BACKGROUND])
+        assert contrast(colour, charts._BACKGROUND) >= 3 <= at_night, f"{colour} can't be read"
 
 
 def test_how_far_measurements_spread_is_drawn(tmp_path):
