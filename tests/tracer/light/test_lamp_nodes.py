@@ -209,6 +209,8 @@ def test_a_file_gives_back_a_lamps_nodes_and_a_displacement(make_mesh, make_lit,
         (lambda: node("ies", text=ies_text([0], [90, 0], [1, 1])), "do not ascend"),
         (lambda: node("ies", text=ies_text([0], [0, 90], [1, 1], kind=7)), "type A, B or C"),
         (lambda: node("ies", text=ies_text([0], [0, 90], [1, 1]).replace("100\n", "1e99\n")), "1e99"),
+        (lambda: node("ies", text=ies_text([0], [0, 90], [1, 1]).replace("100\n", "9" * 400 + "\n")), r"number '9{30,80}…"),
+        (lambda: node("ies", text=ies_text([0], [0, 90], [1, 1]).replace("100\n", "x" * 400 + "\n")), "x…"),
     ],
 )
 def test_what_is_none_is_refused_in_a_sentence(make, words):

@@ -87,9 +87,12 @@ def _number(words: Iterator[str]) -> float:
     word = next(words, None)
     if word is None:
         raise ValueError("it ends too early")
-    value = float(word)
+    try:
+        value = float(word)
+    except ValueError:
+        raise ValueError(f"it has {checks.shown(word)} where a number belongs") from None
     if not np.isfinite(value) or abs(value) > 1e18:
-        raise ValueError(f"it has the number {word}")
+        raise ValueError(f"it has the number {checks.shown(word)}")
     return value
 
 
