@@ -45,7 +45,7 @@ test: lint
 	$(call PARALLEL,.venv)
 
 test-exhaustive: .venv/test
-	$(call PARALLEL,.venv) --dist=worksteal -m "slow or exhaustive"
+	$(call PARALLEL,.venv) --numprocesses=3 --dist=worksteal -m "slow or exhaustive"
 
 # GCC's sanitizers, which come with it: preloaded, since Python itself is compiled without them.
 sanitizers-address = address,undefined
@@ -112,9 +112,10 @@ tests-5.0 = $(TOUCHING_BLENDER)
 tests-4.2 = $(TOUCHING_BLENDER) $(QUICK)
 tests-5.2 = tests/blender/light tests/blender/test_light_by_light.py $(filter-out tests/blender,$(TOUCHING_BLENDER)) $(QUICK) tests/batch
 
-# Few examples of each property: make test has the many, and what a version changes, it changes for most of them.
+# Few examples of each property: make test has the many, and what a version changes, it changes for most of them. What is slow
+# begins first (tests/conftest.py), so that no process ends with it alone.
 test-wheel-%: .venvs/%/ready
-	$(call PARALLEL,.venvs/$*) --hypothesis-profile=quick -m "not exhaustive and not light and not speed$(without-$*)" $(tests-$*)
+	$(call PARALLEL,.venvs/$*) --no-loadscope-reorder --hypothesis-profile=quick -m "not exhaustive and not light and not speed$(without-$*)" $(tests-$*)
 
 test-light: $(WHEELS:%=test-light-%)
 

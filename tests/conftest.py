@@ -37,6 +37,7 @@ def pytest_collection_modifyitems(items):
             item.add_marker(pytest.mark.exhaustive)  # what measures is not what is shipped
         if "real_blender" in item.path.parts or any(map(item.get_closest_marker, ("exhaustive", "light", "speed"))):
             item.add_marker(pytest.mark.timeout(_LONG))
+    items.sort(key=lambda item: item.get_closest_marker("slow") is None)  # what takes long begins first
 
 
 @pytest.fixture(scope="session", autouse=True)
