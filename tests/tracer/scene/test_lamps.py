@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from viewcam_addon.errors import InputError
-from viewcam_addon.tracer.scene.lamps import RAYS, Area, Lamp, Point, Spot, Sun, World
+from viewcam_addon.tracer.scene.lamps import RAYS, Area, Point, Spot, Sun, World
 
 EYE = np.eye(4)
 
@@ -83,5 +83,3 @@ def test_what_has_no_power_no_area_or_no_direction_is_dark(lamp, dark):
 
 def test_every_kind_of_ray_may_be_hidden_from():
     assert Sun("sun", hidden_from=RAYS).hidden_from == World(hidden_from=RAYS).hidden_from == frozenset(RAYS)
-    with pytest.raises(NotImplementedError):
-        bool(Lamp("lamp").is_dark)
