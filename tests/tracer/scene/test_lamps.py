@@ -10,7 +10,7 @@ EYE = np.eye(4)
 
 
 @pytest.mark.parametrize(
-    ("make", "culprit"),
+    ("make", "named"),
     [
         (lambda: Sun("key", irradiance=(1, float("nan"), 1)), "irradiance of light 'key'"),
         (lambda: Sun("key", irradiance=(1, -1, 1)), "irradiance of light 'key'"),
@@ -37,8 +37,8 @@ EYE = np.eye(4)
         (lambda: World(backdrop=World(hidden_from={"camera"})), "backdrop of the world"),
     ],
 )
-def test_a_lamp_that_cannot_be_is_refused_by_name(make, culprit):
-    with pytest.raises(InputError, match=culprit) as refused:
+def test_a_lamp_that_cannot_be_is_refused_by_name(make, named):
+    with pytest.raises(InputError, match=named) as refused:
         make()
     assert "\n" not in str(refused.value)
 

@@ -30,7 +30,7 @@ class LampReader(shaders.Tree):
     """Follows the nodes of a light. matrix : (4, 4), the light's space to the world's. uv : makes what its UV is."""
 
     def __init__(self, light: bpy.types.Light, matrix: np.ndarray, uv: UVMaker) -> None:
-        super().__init__(Colour(_WHITE), False)
+        super().__init__(Colour(_WHITE))
         self._light, self._matrix, self._uv = light, matrix, uv
 
     def emission(self, of: Input) -> RGB | Node:
