@@ -13,6 +13,7 @@ from bpy.app.handlers import persistent
 
 from ...errors import InputError
 from .. import datablocks
+from .operators import NamesCamera
 
 
 class Background:
@@ -101,6 +102,20 @@ class Background:
         if self.latest:
             self._discard(self.latest)
         self.latest = None
+
+
+class StartsForCamera(NamesCamera):
+    """An operator that starts one for a camera. busy : what is said while one is on its way."""
+
+    background: Background
+    busy: str
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not cls.background.running and context.scene and datablocks.camera_in(context):
+            return True
+        cls.poll_message_set(cls.busy if cls.background.running else "There is no camera")
+        return False
 
 
 class Cancels:

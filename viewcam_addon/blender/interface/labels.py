@@ -16,9 +16,8 @@ from ...labels import DEPTH_STEPS, KINDS, PASSES, endings
 from ...shots.names import made_fit
 from .. import datablocks
 from . import panel_rows
-from .background import Background, Cancels
+from .background import Background, Cancels, StartsForCamera
 from .background_batch import BackgroundBatch, shot
-from .operators import NamesCamera
 from .panel_places import BelowProperties, BelowSidebar, SubPanel
 
 _SUMMARY = "summary.json"
@@ -109,23 +108,14 @@ class Writing(BackgroundBatch):
         return None, sentence[:1].upper() + sentence[1:]
 
 
-class VIEWCAM_OT_write_labels(NamesCamera, bpy.types.Operator):
+class VIEWCAM_OT_write_labels(StartsForCamera, bpy.types.Operator):
     bl_idname = "viewcam.write_labels"
     bl_label = "Write Labels"
     bl_description = (
         "Write what is true of this camera's picture at this frame, as the reference tracer finds it, in the background. The "
         "file stays as it is, and its unsaved edits count"
     )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if background.running:
-            cls.poll_message_set("Labels are being written")
-            return False
-        if context.scene and datablocks.camera_in(context):
-            return True
-        cls.poll_message_set("There is no camera")
-        return False
+    background, busy = background, "Labels are being written"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.window_manager.virtual_pinhole_labels

@@ -14,9 +14,8 @@ from ...tracer.scene.film import SAMPLES
 from .. import datablocks, preferences
 from ..render_settings import LEVELS
 from . import icons, panel_rows, proof_image
-from .background import Background, Cancels
+from .background import Background, Cancels, StartsForCamera
 from .comparing import Outcome, RunningComparison
-from .operators import NamesCamera
 from .panel_places import BelowProperties, BelowSidebar, SubPanel
 
 _SECONDS = 0.2  # between two looks
@@ -85,25 +84,16 @@ class ProofSettings(bpy.types.PropertyGroup):
     )
 
 
-class VIEWCAM_OT_compare_with_cycles(NamesCamera, bpy.types.Operator):
+class VIEWCAM_OT_compare_with_cycles(StartsForCamera, bpy.types.Operator):
     bl_idname = "viewcam.compare_with_cycles"
     bl_label = "Compare with Cycles"
     bl_description = (
         "Render the picture of this camera with Cycles and with the reference tracer, in the background, and tell how far they "
         "differ. The file stays as it is, and its unsaved edits count"
     )
+    background, busy = background, "A comparison is on its way"
 
     _shown = ("", 0)  # the step and the second that were drawn last
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if background.running:
-            cls.poll_message_set("A comparison is on its way")
-            return False
-        if context.scene and datablocks.camera_in(context):
-            return True
-        cls.poll_message_set("There is no camera")
-        return False
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if bpy.app.background:
