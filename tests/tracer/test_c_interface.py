@@ -125,7 +125,7 @@ def light_up(draw, calls):
         each.color.node = draw(mostly(st.just(-1), WHOLE))
     kind, count = draw(mostly(st.sampled_from([b"sun", b"point", b"spot", b"area"]), [b"", b"candle"])), draw(st.integers(6, 7))
     kind = native._Node(kind, (native._Input * len(inputs))(*inputs), count)
-    lamp = native._Lamp(kind, True, draw(st.integers(0, 31)))
+    lamp = native._Lamp(kind=kind, casts_shadow=True, hidden_from=draw(st.integers(0, 31)))
     for name in ("matrix", "color"):
         field = getattr(lamp, name)
         field[:] = [draw(NUMBER) for _ in field]

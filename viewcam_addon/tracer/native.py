@@ -608,7 +608,7 @@ def described_lamp(lamp: Lamp, links: _Links = _UNLINKED) -> _Lamp:
     """A lamp as the core takes it. links : of all the scene's lamps, where this one has such."""
     inputs = [_constant_input(name, value) for name, value in lamp.numbers.items()]
     kind = _Node(lamp.kind.encode(), (_Input * len(inputs))(*inputs), len(inputs))
-    described = _Lamp(kind, lamp.casts_shadow, kinds(lamp.hidden_from))
+    described = _Lamp(kind=kind, casts_shadow=lamp.casts_shadow, hidden_from=kinds(lamp.hidden_from))
     described.receivers, described.shadow_rays = links.receivers(lamp), links.shadow_rays(lamp)
     described.matrix[:] = tuple(np.asarray(lamp.to_world, np.float64)[:3].ravel())
     described.color[:] = lamp.strength

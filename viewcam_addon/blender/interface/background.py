@@ -6,7 +6,7 @@ it.
 
 import atexit
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 import bpy
 from bpy.app.handlers import persistent
@@ -109,6 +109,7 @@ class StartsForCamera(NamesCamera):
 
     background: Background
     busy: str
+    poll_message_set: ClassVar[Callable[[str], None]]  # Blender's
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -21,6 +21,7 @@ from ...errors import InputError
 from ...tracer.scene import ies
 from ...tracer.scene.materials import LARGEST_RADIANCE, PLAIN, Colour, Material, Picture, components
 from ...tracer.scene.shader_nodes import KINDS, Node, closures
+from ...tracer.scene.shader_nodes import node as _node
 from ...tracer.scene.value_nodes import GENERATED, INCOMING, NORMAL, OWN, POSITION, TANGENT, UV
 from .. import versions
 from . import images, nodes, value_nodes
@@ -557,27 +558,15 @@ class Tree:
         self.reading.tables[key] = Picture(pixels)
         closest = ramp.interpolation == "CONSTANT" and ramp.color_mode == "RGB"
         first = _BESIDE if closest else 0.5
-        return Node(
+        steps = _RAMP + 1
+        place = _node("math", operation="multiply_add", a=factor, b=_RAMP / steps, c=first / steps, clamp=False)
+        return _node(
             "image",
-            (
-                ("image", Colour(_WHITE, key)),
-                (
-                    "vector",
-                    Node(
-                        "math",
-                        (
-                            ("operation", "multiply_add"),
-                            ("a", factor),
-                            ("b", _RAMP / (_RAMP + 1)),
-                            ("c", first / (_RAMP + 1)),
-                            ("clamp", False),
-                        ),
-                    ),
-                ),
-                ("interpolation", "closest" if closest else "linear"),
-                ("extension", "extend"),
-                ("output", "alpha" if output.socket.name == "Alpha" else "color"),
-            ),
+            image=Colour(_WHITE, key),
+            vector=place,
+            interpolation="closest" if closest else "linear",
+            extension="extend",
+            output="alpha" if output.socket.name == "Alpha" else "color",
         )
 
 
@@ -591,10 +580,6 @@ def _is_zero(output: Output, name: str) -> bool:
     if name == "Specular IOR Level" and constant_number(output, "IOR") == 1.0:
         return True
     return constant_number(output, name) == 0.0
-
-
-def _node(type: str, **inputs: object) -> Node:
-    return Node(type, tuple(inputs.items()))
 
 
 def _along_normal(vector: Colour | Node) -> Node:
