@@ -96,7 +96,7 @@ def pixels_in_a_cell(width: int, height: int) -> int:
 
 def _in_plane(pinhole: Pinhole, places: Array, depth: float) -> Array:
     """(n, 3): places (n, 2) of the picture, column and row, in the plane at `depth` before the eye, relative to the eye."""
-    u, v, w = pinhole.basis()
+    right, up, ahead = pinhole.picture_axes()
     x, y = pinhole.view_plane(places[:, 0], places[:, 1])
     with np.errstate(all="ignore"):
-        return depth * (x[:, None] * (-u if pinhole.mirrored else u) + y[:, None] * v - w)
+        return depth * (x[:, None] * right + y[:, None] * up + ahead)

@@ -1,4 +1,4 @@
-"""The errors that a user meets: one sentence that names the culprit and says what to do.
+"""The errors that a user meets: one sentence that names what is wrong and says what to do.
 
 Everything that a wrong input can cause is raised as one of these, so that the command line, the panel and the render engine
 can show `str(error)` as it stands and need no knowledge of what went wrong. A rejected alternative: letting OSError, KeyError

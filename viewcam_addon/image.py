@@ -367,9 +367,8 @@ def _camera(text: str | None, path: Path) -> Pinhole | None:
 
 def _camera_attributes(camera: Pinhole) -> dict[str, Any]:
     """The exact camera, the shape of its pixels, and its matrices unless they are beyond float32."""
-    u, v, w = camera.basis()
     to_camera, to_ndc = np.eye(4), np.zeros((4, 4))
-    to_camera[:3, :3] = np.stack([-u if camera.mirrored else u, v, w], axis=1)
+    to_camera[:3, :3] = camera.picture_axes().T * (1, 1, -1)
     (d_x, d_y), (c_x, c_y) = camera.distance, camera.principal_point
     with np.errstate(all="ignore"):
         to_camera[3, :3] = -np.array(camera.eye) @ to_camera[:3, :3]

@@ -159,9 +159,9 @@ def _seen_from_eye(pinhole: Pinhole, points: ArrayLike) -> tuple[tuple[Array, Ar
     if not len(points):
         raise InputError("there are no points: give at least one")
     checks.finite("points", points)
-    u, v, w = pinhole.basis()
+    right, up, ahead = pinhole.picture_axes()
     relative = points - np.array(pinhole.eye)
-    return (relative @ (-u if pinhole.mirrored else u), relative @ v), -(relative @ w)
+    return (relative @ right, relative @ up), relative @ ahead
 
 
 def _sides(pinhole: Pinhole, margin: float, across: tuple[Array, Array]) -> list[tuple[float, float, Array]]:

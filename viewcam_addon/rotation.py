@@ -226,8 +226,7 @@ class Channels:
         parent : (4, 4), invertible, from the camera's own channels to world space.
         """
         is_free = np.array_equal(parent, IDENTITY)  # as most cameras are, which need no linear algebra
-        u, v, w = pinhole.basis()
-        wanted = np.array([-u if pinhole.mirrored else u, v, w]).T
+        wanted = pinhole.picture_axes().T * (1, 1, -1)
         scale, signs = float64(self.scale), self.signs
         local = wanted if is_free else np.linalg.solve(parent[:3, :3], wanted)
         if (pinhole.mirrored if is_free else np.linalg.det(local) < 0) != (signs.prod() < 0):

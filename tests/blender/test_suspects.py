@@ -80,7 +80,7 @@ def test_a_keyframe_in_the_nla_is_named(posed_camera, scene):
     assert finding.startswith("Keyframes set the rotation of 'Camera'")
 
 
-def test_keyframes_on_the_four_values_are_no_culprits(posed_camera, scene):
+def test_keyframes_on_the_four_values_are_not_named(posed_camera, scene):
     posed_camera.virtual_pinhole.keyframe_insert("eye", frame=1)
     assert findings_after_setting(posed_camera, scene) == []
 

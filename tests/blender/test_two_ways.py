@@ -16,7 +16,7 @@ def update():
     bpy.context.view_layer.update()
 
 
-def law(camera_object, scene):
+def differences(camera_object, scene):
     """What differs between values and camera by more than float32 storage explains."""
     update()
     reach = pose.reach(camera_object, bpy.context.evaluated_depsgraph_get())
@@ -28,7 +28,7 @@ def test_a_camera_moved_in_blender_takes_eye_and_look_at_along(posed_camera, sce
     update()
     group = posed_camera.virtual_pinhole
     assert tuple(group.eye) == (9, -6, 5) and tuple(group.look_at) == (2, 0, 1) and tuple(group.up) == (0, 0, 1)
-    assert law(posed_camera, scene) == {}
+    assert differences(posed_camera, scene) == {}
 
 
 def test_a_camera_turned_in_blender_looks_as_far_as_before_and_keeps_its_eye(posed_camera, scene):
@@ -38,7 +38,7 @@ def test_a_camera_turned_in_blender_looks_as_far_as_before_and_keeps_its_eye(pos
     eye, look_at, up, _ = posed_camera.virtual_pinhole.numbers()
     assert eye == (7, -6, 5) and up == (0, 0, 1)
     assert math.dist(eye, look_at) == pytest.approx(reach, rel=1e-15)
-    assert law(posed_camera, scene) == {}
+    assert differences(posed_camera, scene) == {}
 
 
 def test_a_focal_length_typed_in_blender_is_the_values_distance(posed_camera, scene):
@@ -59,7 +59,7 @@ def test_under_a_target_the_eye_moves_and_the_view_keeps_the_target(posed_camera
     update()
     found = cameras.read(posed_camera, scene)
     assert found.eye == (3, -9, 4)
-    assert law(posed_camera, scene) == {}
+    assert differences(posed_camera, scene) == {}
     column, row, _ = found.project(np.array([1, 2, 3.0]))
     assert (column, row) == pytest.approx((960, 540), abs=1e-3)
 
@@ -125,7 +125,7 @@ def test_a_parent_moved_by_hand_carries_the_values_along(posed_camera, scene, em
     update()
     parent.location.z = 2
     update()
-    assert tuple(posed_camera.virtual_pinhole.eye) == (7, -6, 7) and law(posed_camera, scene) == {}
+    assert tuple(posed_camera.virtual_pinhole.eye) == (7, -6, 7) and differences(posed_camera, scene) == {}
 
 
 def test_keyframes_on_the_location_move_the_values_as_frames_pass(posed_camera, scene):
@@ -135,7 +135,7 @@ def test_keyframes_on_the_location_move_the_values_as_frames_pass(posed_camera, 
     for frame in (11, 6, 1):
         scene.frame_set(frame)
         assert posed_camera.virtual_pinhole.eye[2] == pytest.approx(posed_camera.location.z, rel=1e-7)
-        assert law(posed_camera, scene) == {}
+        assert differences(posed_camera, scene) == {}
 
 
 def test_a_keyed_value_wins_at_the_next_frame(posed_camera, scene):
@@ -155,7 +155,7 @@ def test_a_driven_number_stays_and_the_others_follow_the_move(posed_camera, scen
     update()
     update()
     assert tuple(posed_camera.matrix_world.translation) == (1, 2, 5)
-    assert law(posed_camera, scene) == {}
+    assert differences(posed_camera, scene) == {}
 
 
 def test_where_the_eye_follows_an_object_a_move_comes_back_and_a_turn_stays(posed_camera, scene, empty):
@@ -173,7 +173,7 @@ def test_where_the_eye_follows_an_object_a_move_comes_back_and_a_turn_stays(pose
     posed_camera.rotation_euler.z += 0.5
     update()
     assert tuple(posed_camera.virtual_pinhole.look_at) != look_at
-    assert law(posed_camera, scene) == {}
+    assert differences(posed_camera, scene) == {}
 
 
 def test_what_a_constraint_or_a_driver_sets_is_not_adopted(posed_camera, scene):
@@ -184,7 +184,7 @@ def test_what_a_constraint_or_a_driver_sets_is_not_adopted(posed_camera, scene):
     posed_camera.data.driver_add("lens").driver.expression = "20.0 + 1.0"
     scene.frame_set(2)
     assert posed_camera.virtual_pinhole.distance == 1500
-    assert {"eye", "distance"} <= law(posed_camera, scene).keys()
+    assert {"eye", "distance"} <= differences(posed_camera, scene).keys()
 
 
 def test_a_roll_that_is_held_takes_a_turn_about_the_view(posed_camera, scene):
@@ -197,7 +197,7 @@ def test_a_roll_that_is_held_takes_a_turn_about_the_view(posed_camera, scene):
     update()
     group = posed_camera.virtual_pinhole
     assert tuple(group.up) == (0, 0, 1) and group.held_roll == pytest.approx(0.3, abs=1e-6)
-    assert law(posed_camera, scene) == {}
+    assert differences(posed_camera, scene) == {}
 
 
 def test_an_edit_and_a_move_at_once_both_count(posed_camera, scene):
@@ -206,7 +206,7 @@ def test_an_edit_and_a_move_at_once_both_count(posed_camera, scene):
     posed_camera.virtual_pinhole.distance = 800
     update()
     assert tuple(posed_camera.virtual_pinhole.eye) == (1, 2, 3) and posed_camera.virtual_pinhole.distance == 800
-    assert law(posed_camera, scene) == {}
+    assert differences(posed_camera, scene) == {}
 
 
 def test_a_thousand_updates_of_nothing_change_no_bit(posed_camera, scene):
@@ -273,7 +273,7 @@ def test_values_and_camera_agree_whoever_is_edited(posed_camera, scene, empty, s
                 edits[name]()
             except RuntimeError:  # nothing to undo
                 done[-1] += " (none)"
-        differing = law(camera_(), bpy.context.scene)
+        differing = differences(camera_(), bpy.context.scene)
         assert differing == {}, f"after {done[-6:]}: {differing}"
     assert {"undo", "redo"} <= set(done)
 
@@ -288,7 +288,7 @@ def test_auto_keying_keys_the_camera_that_is_moved_and_its_values_follow_those_k
         posed_camera.keyframe_insert("location")  # as G does when it is confirmed
         update()
     scene.frame_set(1)
-    assert posed_camera.virtual_pinhole.eye[0] == 1 and law(posed_camera, scene) == {}
+    assert posed_camera.virtual_pinhole.eye[0] == 1 and differences(posed_camera, scene) == {}
     assert not any(curve.data_path.startswith("virtual_pinhole") for curve in versions.action_curves(posed_camera))
 
 
@@ -306,7 +306,7 @@ def test_where_the_values_have_keyframes_those_win_over_what_auto_keying_keys_of
     assert notice.remedy == ("viewcam.delete_keyframes", "Delete These Keyframes")
     assert bpy.ops.viewcam.delete_keyframes() == {"FINISHED"}
     update()
-    assert panel.notices(posed_camera, scene) == [] and law(posed_camera, scene) == {}
+    assert panel.notices(posed_camera, scene) == [] and differences(posed_camera, scene) == {}
     assert [curve.data_path for curve in versions.action_curves(posed_camera)] == ["virtual_pinhole.eye"] * 3
 
 
@@ -338,4 +338,4 @@ def test_auto_keying_keys_the_cameras_own_channels_too_where_a_button_moves_them
     scene.frame_set(6)
     scene.frame_set(5)
     assert (tuple(posed_camera.location), posed_camera.data.lens) == there
-    assert there[0] != (7, -6, 5) and law(posed_camera, scene) == {}
+    assert there[0] != (7, -6, 5) and differences(posed_camera, scene) == {}

@@ -14,7 +14,7 @@ from viewcam_addon.errors import InputError
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_errors_within_the_law_pass(seed, paper_scene):
+def test_errors_within_the_tolerance_pass(seed, paper_scene):
     comparison = compare(paper_scene.picture(), paper_scene.rendered(seed=seed), paper_scene.pinhole, paper_scene.surface_at)
     assert comparison.passed, "\n".join(comparison.lines())
 
@@ -27,7 +27,7 @@ def test_errors_within_the_law_pass(seed, paper_scene):
     away=st.sampled_from([0.0, 1.0, 100.0, 1e4]),
     seed=st.integers(0, 99),
 )
-def test_errors_within_the_law_pass_from_anywhere(azimuth, height, distance, away, seed, paper_scene):
+def test_errors_within_the_tolerance_pass_from_anywhere(azimuth, height, distance, away, seed, paper_scene):
     offset = (away, -away, away / 2)
     eye = np.array([7 * np.cos(azimuth), 7 * np.sin(azimuth), height]) + offset
     target = np.array([0.2, 0.1, 0.6]) + offset
@@ -55,7 +55,7 @@ def test_without_a_scene_a_crossed_silhouette_stays_unexplained_and_the_verdict_
     assert "give the scene" in comparison.sentence
 
 
-def test_the_law_works_without_the_tracers_own_passes(paper_scene):
+def test_the_comparison_works_without_the_tracers_own_passes(paper_scene):
     reference = paper_scene.picture()
     bare = replace(reference, passes={name: reference[name] for name in ("Depth", "Position", "Normal", "Object Index")})
     comparison = compare(bare, paper_scene.rendered(), paper_scene.pinhole, paper_scene.surface_at)

@@ -123,7 +123,7 @@ def test_a_pixel_or_two_that_leak_are_let_pass_and_no_more(paper_scene):
     assert leaking(2).passed and not leaking(3).passed
 
 
-def test_the_law_grows_with_value_lamp_and_samples():
+def test_the_tolerance_grows_with_value_lamp_and_samples():
     base = tolerances.radiance_error(1.0, 1.0, 1)
     assert base == 2.0**-24 * (
         tolerances.RADIANCE_ROUNDINGS + 1 / tolerances.SAMPLES_PER_ROUNDING + tolerances.COSINE_ROUNDINGS
@@ -148,7 +148,7 @@ def test_short_normals_are_allowed_to_the_blender_that_has_them_and_to_no_other(
     assert not off("Blender 5.0.1").passed and not off("").passed
 
 
-def test_the_law_s_shares_are_of_the_floor_too(paper_scene):
+def test_the_tolerance_s_shares_are_of_the_floor_too(paper_scene):
     image = combined(rendered(paper_scene), brighter(1 + 1e-3))
     image = replace(image, attributes={"Software": "Blender 5.2.3 LTS"})
     assert not compare(picture(paper_scene), [image], paper_scene.pinhole).passed

@@ -202,7 +202,7 @@ def test_a_conversion_that_went_wrong_is_told_from_a_wrong_renderer(compared, st
     assert "from the stated one" in comparison.sentence
 
 
-def test_the_law_holds_far_from_the_origin_where_a_fixed_tolerance_would_not(compared, still):
+def test_the_tolerance_holds_far_from_the_origin_where_a_fixed_tolerance_would_not(compared, still):
     """All is moved by 2 km: errors grow to several thousandths of a pixel, and stay within the same k."""
     offset = (2000.0, -1000.0, 500.0)
     for item in still.objects:

@@ -139,8 +139,8 @@ def render_two_formats():
     own.use, own.resolution_x, own.resolution_y = True, 30, 40
     yield
     yield from choose_in_the_file_browser(bpy.ops.viewcam.render_all_cameras, FOLDER)
-    yield from until(lambda: render_all._running or render_all._latest, "the rendering's start")
-    yield from until(lambda: render_all._running is None, "the pictures", 2000)
+    yield from until(lambda: render_all.background.running or render_all._sheet, "the rendering's start")
+    yield from until(lambda: render_all.background.running is None, "the pictures", 2000)
     (folder,) = [each for each in FOLDER.iterdir() if "all cameras" in each.name]
     sheet = (folder / "contact-sheet.html").read_text(encoding="utf-8")
     assert {path.stem for path in folder.glob("*.exr")} == {"Camera", "Portrait"}

@@ -28,9 +28,9 @@ def prove_two_cameras_during_playback():
         yield from until(proof.running, f"the comparison of {each.name}")
         yield from _play_and_press_escape(proof)
         ends = time.monotonic() + PATIENCE
-        while proof.running() and time.monotonic() < ends:
+        while proof.background.running and time.monotonic() < ends:
             yield
-        outcome = proof.latest()
+        outcome = proof.background.latest
         assert outcome and outcome.passed and outcome.camera == each.name, outcome
         assert outcome.headline.startswith("Identical to ") and outcome.headline.endswith(" px"), outcome.headline
         assert len(bpy.context.window_manager.windows) == 1, "a pass opens a window"
@@ -50,10 +50,12 @@ def prove_two_cameras_during_playback():
 def _play_and_press_escape(proof):
     call(bpy.ops.screen.animation_play)
     yield
-    assert window().screen.is_animation_playing and proof.running(), "the proof was over before Escape could be pressed"
+    assert window().screen.is_animation_playing and proof.background.running, (
+        "the proof was over before Escape could be pressed"
+    )
     press("ESC", *NOWHERE)
     yield from until(lambda: not window().screen.is_animation_playing, "the end of the playback")
-    assert proof.running(), "Escape during playback has canceled the proof"
+    assert proof.background.running, "Escape during playback has canceled the proof"
 
 
 def _show_it(images):

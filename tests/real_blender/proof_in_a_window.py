@@ -36,7 +36,7 @@ proof = None  # the module PROOF, once the add-on is enabled
 
 def button(operator, across=MIDDLE):
     """Steps that end with where the button stands, looked for from the bottom of the sidebar."""
-    there = operator, proof.latest() is None
+    there = operator, proof.background.latest is None
     if there in found and (yield from look(*found[there], SIDEBAR)).startswith(operator):
         return found[there]
     area, part = region(*SIDEBAR)
@@ -69,10 +69,10 @@ def begin():
     """Steps that end with the comparison that a click has begun, and the height at which its progress is shown."""
     _, y = yield from push("viewcam.compare_with_cycles")
     ends = time.monotonic() + 5
-    while not proof.running() and time.monotonic() < ends:
+    while not proof.background.running and time.monotonic() < ends:
         yield
-    assert proof.running(), "the click has begun nothing"
-    return proof.running(), y
+    assert proof.background.running, "the click has begun nothing"
+    return proof.background.running, y
 
 
 def begin_and_stop():
@@ -85,9 +85,9 @@ def begin_and_stop():
 def ended(comparison):
     """Steps until it has gone, without a trace."""
     ends = time.monotonic() + 5
-    while (proof.running() or proof._timer) and time.monotonic() < ends:
+    while (proof.background.running or proof._timer) and time.monotonic() < ends:
         yield
-    assert proof.running() is None and proof._timer is None and not comparison.folder.exists()
+    assert proof.background.running is None and proof._timer is None and not comparison.folder.exists()
     assert comparison._process.status() is not None
 
 
@@ -123,14 +123,14 @@ def compare_to_the_verdict():
     areas = [area.ui_type for area in window().screen.areas]
     started, told = time.monotonic(), set()
     yield from begin()
-    while proof.running() and time.monotonic() < started + PATIENCE:
-        words = proof.running().progress()[1]
+    while proof.background.running and time.monotonic() < started + PATIENCE:
+        words = proof.background.running.progress()[1]
         if words == "Tracing" and words not in told:
             yield
             picture("running.png")
         told.add(words)
         yield
-    outcome = proof.latest()
+    outcome = proof.background.latest
     assert outcome and outcome.passed, outcome or "no verdict"
     print(f"verdict after {time.monotonic() - started:.1f} s: {outcome.verdict}", flush=True)
     assert "Rendering with Cycles" in told, told
@@ -181,7 +181,7 @@ def open_the_report():
     webbrowser.open = lambda url, *_, **__: opened.append(url) or True
     yield from push("viewcam.open_report", across=RIGHT)
     yield
-    assert opened == [proof.latest().report.as_uri()], opened
+    assert opened == [proof.background.latest.report.as_uri()], opened
 
 
 def take_the_edit_back_and_show_the_difference_again():
@@ -204,7 +204,7 @@ def press_escape():
     yield
     press("ESC", *NOWHERE)
     yield from ended(comparison)
-    assert proof.latest().passed, "the verdict before is forgotten"
+    assert proof.background.latest.passed, "the verdict before is forgotten"
 
 
 def press_cancel():
@@ -224,18 +224,18 @@ def undo_while_it_runs():
     press("Z", *NOWHERE, ctrl=True)
     yield
     yield
-    assert proof.running() is comparison and comparison._process.status() is None
+    assert proof.background.running is comparison and comparison._process.status() is None
     press("ESC", *NOWHERE)
     yield from ended(comparison)
 
 
 def open_a_file_while_it_runs():
     comparison, _ = yield from begin_and_stop()
-    kept = proof.latest().temporary
+    kept = proof.background.latest.temporary
     bpy.ops.wm.open_mainfile(filepath=str(FILE), load_ui=False)
     yield
     yield from ended(comparison)
-    assert proof.latest() is None and not kept.exists()
+    assert proof.background.latest is None and not kept.exists()
 
 
 def turn_the_add_on_off_while_it_runs():
@@ -259,9 +259,9 @@ def write_the_labels():
     yield
     yield from push("viewcam.write_labels")
     ends = time.monotonic() + PATIENCE
-    while labels.latest() is None and time.monotonic() < ends:
+    while labels.background.latest is None and time.monotonic() < ends:
         yield
-    folder, sentence = labels.latest() or (None, "nothing came of it")
+    folder, sentence = labels.background.latest or (None, "nothing came of it")
     assert folder and folder.parent == FOLDER and sentence == f"Written to {folder}", sentence
     missing = {*labels.file_names(bpy.context.scene.camera, settings.chosen())} - {path.name for path in folder.iterdir()}
     assert not missing, missing

@@ -68,7 +68,7 @@ def roundings(pinhole, picture):
     return np.linalg.norm(found - np.column_stack([columns, rows]) - 0.5, axis=1) / one_rounding
 
 
-def beyond_the_law(pictures, pinholes):
+def beyond_the_tolerance(pictures, pinholes):
     """What is not within tolerance over all frames, in words; empty where all is."""
     counts = np.concatenate([roundings(pinholes[frame], pictures[frame]) for frame in pinholes])
     found = np.percentile(counts, tolerances.PERCENTILES)
@@ -80,11 +80,11 @@ def beyond_the_law(pictures, pinholes):
 
 
 @pytest.mark.parametrize("way", ["live", "f12", "baked"])
-def test_each_way_to_render_the_flight_is_within_the_law(flight, way):
+def test_each_way_to_render_the_flight_is_within_the_tolerance(flight, way):
     pictures, pinholes, _ = flight
     assert len(pictures[way]) == len(pinholes) == 250
     live = {frame: live for frame, (_, live) in pinholes.items()}
-    assert beyond_the_law(pictures[way], live) == []
+    assert beyond_the_tolerance(pictures[way], live) == []
 
 
 def test_the_baked_file_and_f12_render_what_is_rendered_live(flight):
@@ -110,22 +110,22 @@ def test_the_live_camera_is_the_one_that_is_stated(flight):
     assert straight_down == [*STRAIGHT_DOWN]
 
 
-def test_a_flight_that_is_a_frame_late_is_beyond_the_law(flight):
+def test_a_flight_that_is_a_frame_late_is_beyond_the_tolerance(flight):
     pictures, pinholes, _ = flight
     late = {frame: pinholes[frame - 1][1] for frame in FRAMES[1:]}
-    assert beyond_the_law(pictures["baked"], late)
+    assert beyond_the_tolerance(pictures["baked"], late)
 
 
-def test_a_thousandth_of_the_distance_is_beyond_the_law(flight):
+def test_a_thousandth_of_the_distance_is_beyond_the_tolerance(flight):
     pictures, pinholes, _ = flight
     zoomed = {
         frame: dataclasses.replace(live, distance=tuple(1.001 * each for each in live.distance))
         for frame, (_, live) in pinholes.items()
     }
-    assert beyond_the_law(pictures["baked"], zoomed)
+    assert beyond_the_tolerance(pictures["baked"], zoomed)
 
 
-def test_a_single_frame_of_the_flight_that_is_turned_is_beyond_the_law(flight):
+def test_a_single_frame_of_the_flight_that_is_turned_is_beyond_the_tolerance(flight):
     """Straight down with the roll held: canonical axes there would be another picture."""
     pictures, pinholes, _ = flight
     frame = STRAIGHT_DOWN[1]
@@ -133,7 +133,7 @@ def test_a_single_frame_of_the_flight_that_is_turned_is_beyond_the_law(flight):
     stated, held = pinholes[frame][0], live[frame]
     canonical = dataclasses.replace(held, look_at=(*held.eye[:2], 0.0), up=(0.0, 0.0, 1.0))
     assert stated.basis()[1] @ canonical.basis()[1] < 0.9, "the roll that is held happens to be the canonical one"
-    assert beyond_the_law(pictures["baked"], live | {frame: canonical})
+    assert beyond_the_tolerance(pictures["baked"], live | {frame: canonical})
 
 
 def test_the_report_says_how_close_the_keyframes_are(flight):

@@ -118,11 +118,17 @@ def look(draw, calls):
 
 
 def light_up(draw, calls):
-    lamp = native._Lamp(draw(mostly(st.integers(0, 4), WHOLE)), draw(st.booleans()), True, draw(st.integers(0, 31)))
-    for name in ("matrix", "color", "size"):
+    names = ("angle", "blend", "spread", "soft_falloff", "ellipse", "size", "radius")
+    inputs = [native._Input(name.encode(), b"true", native._Color(image=-1, node=-1)) for name in names]
+    for each in inputs:
+        each.color.rgb[:] = [draw(LENGTH) for _ in range(3)]
+        each.color.node = draw(mostly(st.just(-1), WHOLE))
+    kind, count = draw(mostly(st.sampled_from([b"sun", b"point", b"spot", b"area"]), [b"", b"candle"])), draw(st.integers(6, 7))
+    kind = native._Node(kind, (native._Input * len(inputs))(*inputs), count)
+    lamp = native._Lamp(kind=kind, casts_shadow=True, hidden_from=draw(st.integers(0, 31)))
+    for name in ("matrix", "color"):
         field = getattr(lamp, name)
         field[:] = [draw(NUMBER) for _ in field]
-    lamp.radius, lamp.angle, lamp.blend = draw(LENGTH), draw(LENGTH), draw(LENGTH)
     calls("add_lamp", calls.scene, lamp, made_by(draw))
     film = native._Film(filter=draw(mostly(st.integers(0, 2), WHOLE)), filter_width=draw(LENGTH), exposure=draw(NUMBER))
     film.has_backdrop = draw(st.booleans())

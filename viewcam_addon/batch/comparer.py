@@ -11,8 +11,9 @@ only. It is no part of Blender's process, where there must be no second copy of 
 import dataclasses
 import importlib.util
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from .. import checks, child_process
 from ..errors import InputError
@@ -29,12 +30,23 @@ def lacking() -> str | None:
     return None
 
 
-class Comparer(child_process.ServerOnDemand):
-    """The comparer, as the one who asks has it."""
+class TracingServer(child_process.ServerOnDemand):
+    """A process of ours that traces, as the one who asks has it."""
+
+    name: ClassVar[str]
 
     def __init__(self, threads: int | None = None) -> None:
-        super().__init__("the comparer", "batch.comparer")
+        super().__init__(f"the {self.name}", f"batch.{self.name}")
         self._threads = threads
+
+    def ask(self, request: Mapping[str, Any]) -> Any:
+        if sentence := lacking():
+            raise InputError(sentence)
+        return super().ask({**request, "threads": self._threads})
+
+
+class Comparer(TracingServer):
+    name = "comparer"
 
     def verdict(
         self, scene: Path, image: Path, camera: Pinhole, clip: tuple[float, float], stated: Pinhole | None = None
@@ -54,15 +66,12 @@ class Comparer(child_process.ServerOnDemand):
         InputError
             if scene or picture can't be read or are not of the same size, there is no OpenEXR, or the process ended first.
         """
-        if sentence := lacking():
-            raise InputError(sentence)
         request = {
             "scene": str(scene),
             "image": str(image),
             "camera": dataclasses.asdict(camera),
             "clip": list(clip),
             "stated": stated and dataclasses.asdict(stated),
-            "threads": self._threads,
         }
         return self.ask(request)
 

@@ -20,21 +20,21 @@ class Interruption:
     """Listens while its block runs; in the main thread only, since signals are the main thread's. Elsewhere it does nothing.
 
     number : of the signal that asked for the end, None so far.
-    heard : called once, as heard(signal="SIGINT"), from another thread.
+    on_signal : called once, as on_signal(signal="SIGINT"), from another thread.
     passed_on : signals by which one process tells this one of a SIGINT or SIGTERM of its own → which; this one may have had it
     as well, so that only the second of either way is a second one.
     """
 
-    def __init__(self, heard: Callable[..., None], passed_on: Mapping[int, int] = MappingProxyType({})) -> None:
+    def __init__(self, on_signal: Callable[..., None], passed_on: Mapping[int, int] = MappingProxyType({})) -> None:
         self.number: int | None = None
-        self._heard, self._passed_on = heard, passed_on
+        self._on_signal, self._passed_on = on_signal, passed_on
         self._listens = threading.current_thread() is threading.main_thread()
 
     def __enter__(self) -> "Interruption":
         if self._listens:
             self._receiver, self._sender = socket.socketpair()
             self._sender.setblocking(False)
-            self._meant = {**{number: number for number in _SIGNALS}, **self._passed_on}
+            self._meant: dict[int, int] = dict(zip(_SIGNALS, _SIGNALS, strict=True)) | dict(self._passed_on)
             self._before = [(number, signal.signal(number, _do_nothing)) for number in self._meant]
             self._wakeup_before = signal.set_wakeup_fd(self._sender.fileno(), warn_on_full_buffer=False)
             self._thread = threading.Thread(target=self._listen, daemon=True)
@@ -61,7 +61,7 @@ class Interruption:
                 os._exit(128 + self._meant[number])
             if self.number is None:
                 self.number = self._meant[number]
-                self._heard(signal=signal.Signals(self.number).name)
+                self._on_signal(signal=signal.Signals(self.number).name)
 
 
 def _do_nothing(number: int, frame: object) -> None:

@@ -13,9 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import child_process
-from ..errors import InputError
 from ..pinhole import Pinhole
-from .comparer import lacking
+from .comparer import TracingServer
 
 if TYPE_CHECKING:
     from ..tracer.scene import Scene
@@ -24,12 +23,8 @@ _MOST_SCENES = 4
 """Kept: a frame, its neighbours, and the one that comes next."""
 
 
-class Labeller(child_process.ServerOnDemand):
-    """The labeller, as the one who asks has it."""
-
-    def __init__(self, threads: int | None = None) -> None:
-        super().__init__("the labeller", "batch.labeller")
-        self._threads = threads
+class Labeller(TracingServer):
+    name = "labeller"
 
     @staticmethod
     def frame(scene: Path, camera: Pinhole, clip: tuple[float, float]) -> dict[str, Any]:
@@ -46,15 +41,7 @@ class Labeller(child_process.ServerOnDemand):
         InputError
             if scenes can't be read or labels not be written, there is no OpenEXR, or the process ended first.
         """
-        if sentence := lacking():
-            raise InputError(sentence)
-        request = {
-            "frames": dict(frames),
-            "picture": str(picture),
-            "kinds": list(kinds),
-            "depth_steps": depth_steps,
-            "threads": self._threads,
-        }
+        request = {"frames": dict(frames), "picture": str(picture), "kinds": list(kinds), "depth_steps": depth_steps}
         return self.ask(request)["files"]
 
 

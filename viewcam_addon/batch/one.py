@@ -64,7 +64,7 @@ def in_turn(folder: Folder, renderer: Renderer, settings: Mapping[str, str], out
                 time.sleep(_MOMENT)
                 continue
             try:
-                outcome = render_one(shot, folder, renderer, settings[shot.name], outputs)
+                outcome: Outcome = render_one(shot, folder, renderer, settings[shot.name], outputs)
             except Exception as error:  # a shot that fails is reported, and the rest go on
                 outcome = error
             yield shot, outcome

@@ -84,14 +84,14 @@ def write(path: Path, pictures: Sequence[str], counts: Mapping[str, int]) -> Non
         about="batch",
         title=(title := "1 shot" if counts["shots"] == 1 else f"{counts['shots']:,} shots"),
         headline=title,
-        lede=_lede(counts),
+        intro=_intro(counts),
         pictures=pictures,
     )
     with written_whole(path) as temporary:
         temporary.write_text(page, encoding="utf-8", newline="\n")
 
 
-def _lede(counts: Mapping[str, int]) -> str:
+def _intro(counts: Mapping[str, int]) -> str:
     told = ["All are there" if counts["done"] == counts["shots"] else f"{counts['done']:,} are there"]
     told += [f"{counts[state]:,} {words}" for state, words in _WORDS.items() if counts[state]]
     return ", ".join(told) + "."

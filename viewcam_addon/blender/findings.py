@@ -62,7 +62,7 @@ def differences(
     if wanted.mirrored != found.mirrored:
         result[VIEW] = "the picture is mirrored"
     elif np.abs(turn).max() > LARGEST_TURN:
-        angle = 2 * math.asin(min(1.0, np.linalg.norm(turn) / math.sqrt(8)))
+        angle = 2 * math.asin(min(1.0, float(np.linalg.norm(turn)) / math.sqrt(8)))
         result[VIEW] = f"the view is turned by {math.degrees(angle):.3g}°"
     if any(abs(a - b) > _LENS_ROUNDINGS * _FLOAT32 * a for a, b in zip(wanted.distance, found.distance, strict=True)):
         result[DISTANCE] = f"the view plane is {found.distance[0]:.6g} px away and not {wanted.distance[0]:.6g}"

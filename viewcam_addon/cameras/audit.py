@@ -106,21 +106,24 @@ class Tracks:
         return np.where((depth > 0) & np.isfinite(errors), errors, np.inf)
 
 
+_SAMPLES, _NEIGHBOURS = 60, 4  # points of a picture, and how many of the next pictures each is looked up in
+
+
 class Depths:
     """Depth maps, one a picture: (height, width), rows from the top, not finite or ≤ 0 where nothing is."""
 
     # What one picture sees the next may not: of the errors the lowest fifth are those of what both see, if anything is.
     floor, unit, plausible, part = 1e-6, "of the depth", 0.02, 0.2
 
-    def __init__(self, maps: Sequence[Array], samples: int = 60, neighbours: int = 4) -> None:
+    def __init__(self, maps: Sequence[Array]) -> None:
         self.maps = [np.asarray(depth, dtype=np.float64) for depth in maps]
         random = np.random.default_rng(0)
         count = len(self.maps)
-        self.pairs = [(i, (i + step) % count) for i in range(count) for step in range(1, min(neighbours, count - 1) + 1)]
+        self.pairs = [(i, (i + step) % count) for i in range(count) for step in range(1, min(_NEIGHBOURS, count - 1) + 1)]
         self.samples = []
         for depth in self.maps:
             rows, columns = np.nonzero(np.isfinite(depth) & (depth > 0))
-            chosen = random.choice(len(rows), min(samples, len(rows)), replace=False) if len(rows) else []
+            chosen = random.choice(len(rows), min(_SAMPLES, len(rows)), replace=False) if len(rows) else []
             self.samples.append((columns[chosen] + 0.5, rows[chosen] + 0.5, depth[rows[chosen], columns[chosen]]))
 
     def errors(self, views: Views) -> Array:
@@ -155,13 +158,13 @@ def _between(depth: Array, places: Array) -> Array:
         return np.where(inside & smooth & (value > 0), 1 / value, np.nan)
 
 
-def tracks_through(true: Sequence[Camera], each: int = 60) -> Tracks:
+def tracks_through(true: Sequence[Camera]) -> Tracks:
     """What true cameras, as a .blend's, show of points before them: evidence for cameras that should be the same."""
     random = np.random.default_rng(0)
     views = views_of(true)
     spread = np.linalg.norm(views.eye - views.eye.mean(axis=0), axis=1).max()
     reach = max(spread, 1e-6 * float(np.abs(views.eye).max()), 1.0 if len(true) == 1 else 0.0) or 1.0
-    which = np.repeat(np.arange(len(true)), each)
+    which = np.repeat(np.arange(len(true)), _SAMPLES)
     places = random.uniform(0, 1, (len(which), 2)) * views.size[which]
     points = views.points(which, places, reach * random.uniform(0.5, 2, len(which)))
     return Tracks(which, places, points)

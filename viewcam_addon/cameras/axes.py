@@ -298,9 +298,8 @@ def _in_world(camera: Camera, turned: bool, scale: float, turn) -> Camera:
     return dataclasses.replace(camera, pinhole=dataclasses.replace(pinhole, eye=e, look_at=l, up=tuple(a + 0.0 for a in up)))
 
 
-def _axes(pinhole: Pinhole) -> tuple:
-    u, v, w = pinhole.axes()
-    return (tuple(-a for a in u) if pinhole.mirrored else u), v, w
+def _axes(pinhole: Pinhole) -> list:
+    return (pinhole.picture_axes() * [[1], [1], [-1]]).tolist()
 
 
 def _plain(number: float) -> float:

@@ -41,7 +41,6 @@ _SENSOR = re.compile(
 _DEFAULT = re.compile(r"\$([^\s,$]{1,100}+)")
 _LOOK = re.compile(r"\blook_at\s*+\(")
 _FOV_AXES = ("x", "y", "diagonal", "smaller", "larger")
-_SENSORS = ("perspective", "thinlens", "orthographic", "radiancemeter", "distant", "irradiancemeter", "batch")
 _HARMLESS = {
     *("nearclip", "farclip", "shutteropen", "shutterclose", "focusdistance", "type", "id", "film", "sampler", "toworld"),
     *("fov", "fovaxis", "focallength", "principalpointoffsetx", "principalpointoffsety", "medium", "srf", "samplecount"),

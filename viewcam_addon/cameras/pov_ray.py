@@ -332,10 +332,10 @@ def _written(camera: Camera) -> str:
             f"  look_at <{texts.listed(pinhole.look_at, ', ')}>",
         ]
     else:
-        u, v, w = pinhole.basis()
-        right = (-u if pinhole.mirrored else u) * (width / d_x)
-        up = v * (height / d_y)
-        direction = -w + right * ((width / 2 - c_x) / width) + up * ((height / 2 - c_y) / height)
+        right, up, ahead = pinhole.picture_axes()
+        right *= width / d_x
+        up *= height / d_y
+        direction = ahead + right * ((width / 2 - c_x) / width) + up * ((height / 2 - c_y) / height)
         vectors = (("right", right), ("up", up), ("direction", direction))
         lines += [f"  {name} <{texts.listed(vector.tolist(), ', ')}>" for name, vector in vectors]
     return "\n".join([*lines, "}", ""])

@@ -59,7 +59,9 @@ class _Block(dict):
 
 def _joined(text: str) -> list[str]:
     """The lines, those of one pair of brackets in one; comments and the document's marks left out."""
-    lines, parts, open_brackets = [], [], 0
+    lines: list[str] = []
+    parts: list[str] = []
+    open_brackets = 0
     for line in text.split("\n"):
         if not line or line.startswith(("%", "---", "...")) or line.lstrip().startswith("#"):
             continue

@@ -19,7 +19,7 @@ from . import Result, blender_room
 def run(options: argparse.Namespace) -> Result:
     taken = Options(size=options.size, original_world=True, without_distortion=True)
     with silent_libraries():
-        found = cameras.read(options.dataset, options=taken)
+        found: Sequence[Camera] = cameras.read(options.dataset, options=taken)
         found, evidence, by = _evidence(options, found, taken)
     verdict = audit(found, evidence)
     say(f"{options.dataset}: {verdict.sentence}")

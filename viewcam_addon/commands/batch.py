@@ -134,8 +134,8 @@ def _address(text: str) -> str:
 def run(options: argparse.Namespace) -> Result:
     _refuse_contradictions(options)
     outputs = _outputs(options)
-    heard = functools.partial(options.events.tell, "stopping")
-    with silent_libraries(), Interruption(heard, crashes.passed_on) as interruption, contextlib.ExitStack() as stack:
+    on_signal = functools.partial(options.events.tell, "stopping")
+    with silent_libraries(), Interruption(on_signal, crashes.passed_on) as interruption, contextlib.ExitStack() as stack:
         renderer = stack.enter_context(_renderer(options))
         job = _job(options, renderer, outputs)
         if _on_cluster(options):

@@ -2,7 +2,7 @@
 
 The conversion's error is the stated camera (e, l, up, d) against the one read back from Blender's float32 matrix and lens: pure
 geometry, no picture needed. The renderer's error shows in the picture; what is the same for all its pixels (shift, zoom,
-roll) is told apart here, since it names the culprit.
+roll) is told apart here, since it names what is wrong.
 """
 
 from dataclasses import asdict, dataclass

@@ -110,7 +110,7 @@ def common(
         "title": f"{headline} · {_subject(test)}",
         "about": _subject(test),
         "headline": f"{headline}.",
-        "lede": with_powers(rest[:1].upper() + rest[1:]),
+        "intro": with_powers(rest[:1].upper() + rest[1:]),
         "plates": {"reference": f"reference · {names[0]}", "test": f"test · {names[1]}"},
         "width": width,
         "height": height,

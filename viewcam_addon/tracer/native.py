@@ -27,7 +27,7 @@ from ..pinhole import Pinhole
 from .scene import Mesh, Object, Scene, Spheres, ies, placing
 from .scene.colours import TEXELS, WHITE
 from .scene.film import FILTERS
-from .scene.lamps import RAYS, Area, Lamp, Point, Spot, Sun, World
+from .scene.lamps import RAYS, Lamp, World
 from .scene.materials import PLAIN, Colour, Material
 from .scene.sameness import same_things
 from .scene.shader_nodes import KINDS, Closure, Node
@@ -106,12 +106,11 @@ class _Closure(Structure):
 
 class _Lamp(Structure):
     _fields_ = [
-        *((name, c_int32) for name in ("kind", "soft", "casts_shadow")),
+        ("kind", _Node),
+        ("casts_shadow", c_int32),
         ("hidden_from", c_uint32),
         ("matrix", c_double * 12),
         ("color", c_double * 3),
-        *((name, c_double) for name in ("radius", "angle", "blend")),
-        ("size", c_double * 2),
         ("receivers", c_uint64),
         ("shadow_rays", c_uint32),
     ]
@@ -607,26 +606,21 @@ def _described_world(world: World, images: Mapping[str, int]) -> _World:
 
 def described_lamp(lamp: Lamp, links: _Links = _UNLINKED) -> _Lamp:
     """A lamp as the core takes it. links : of all the scene's lamps, where this one has such."""
-    described = _Lamp(hidden_from=kinds(lamp.hidden_from), casts_shadow=lamp.casts_shadow)
+    inputs = [_constant_input(name, value) for name, value in lamp.numbers.items()]
+    kind = _Node(lamp.kind.encode(), (_Input * len(inputs))(*inputs), len(inputs))
+    described = _Lamp(kind=kind, casts_shadow=lamp.casts_shadow, hidden_from=kinds(lamp.hidden_from))
     described.receivers, described.shadow_rays = links.receivers(lamp), links.shadow_rays(lamp)
-    matrix = np.eye(4)
-    if isinstance(lamp, Sun):
-        described.kind, described.angle, described.color[:] = 0, lamp.angle, lamp.irradiance
-        matrix[:3, 2] = lamp.towards
-    elif isinstance(lamp, Area):
-        described.kind, described.size[:], described.color[:] = 4 if lamp.ellipse else 3, lamp.size, lamp.power
-        described.angle = lamp.spread
-        matrix = lamp.matrix
-    elif isinstance(lamp, Point | Spot):
-        described.kind, described.radius, described.color[:] = 1, lamp.radius, lamp.power
-        described.soft = lamp.soft_falloff
-        if isinstance(lamp, Spot):
-            described.kind, described.angle, described.blend = 2, lamp.angle, lamp.blend
-            matrix = lamp.matrix
-        else:
-            matrix[:3, 3] = lamp.position
-    described.matrix[:] = tuple(np.asarray(matrix, np.float64)[:3].ravel())
+    described.matrix[:] = tuple(np.asarray(lamp.to_world, np.float64)[:3].ravel())
+    described.color[:] = lamp.strength
     return described
+
+
+def _constant_input(name: str, value: float | bool | str | tuple[float, ...]) -> _Input:
+    """value : of fewer than three numbers those that lack are 0."""
+    if isinstance(value, bool | str):
+        return _Input(name.encode(), str(value).lower().encode(), _Color(image=-1, node=-1))
+    numbers = value if isinstance(value, tuple) else (value,)
+    return _Input(name.encode(), None, _Color((c_double * 3)(*numbers), -1, node=-1))
 
 
 def _color(value: Colour | Node | tuple[float, ...], images: Mapping[str, int], nodes: Mapping[Node, int]) -> _Color:

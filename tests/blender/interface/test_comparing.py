@@ -58,7 +58,7 @@ def seen(monkey, posed_camera, scene):
 def nothing_left():
     """No comparison goes on, and none is remembered, from one test to the next."""
     yield
-    proof.end()
+    proof.background.end()
 
 
 @pytest.fixture
@@ -160,14 +160,14 @@ def test_a_camera_that_is_not_where_it_was_put_differs_and_then_is_mended(seen):
     limit.use_min_x, limit.min_x = True, seen.camera.location.x + 0.01
     bpy.context.view_layer.update()
     assert bpy.ops.viewcam.compare_with_cycles() == {"FINISHED"}
-    first = proof.latest()
+    first = proof.background.latest
     assert first.passed is False and "from the stated one" in first.verdict
     image = bpy.data.images["Virtual Pinhole Proof"]
     bytes_before = image.packed_file.data
     assert tuple(image.size) == (3 * 64 + 2 * proof_image._GAP, 48)
     seen.camera.constraints.remove(limit)
     assert bpy.ops.viewcam.compare_with_cycles(camera="Camera") == {"FINISHED"}
-    second = proof.latest()
+    second = proof.background.latest
     assert second.passed and not first.temporary.exists() and second.report.is_file()
     assert image.packed_file.data == bytes_before, "a pass shows nothing that nobody asked for"
     assert bpy.ops.viewcam.show_difference() == {"FINISHED"}
@@ -186,7 +186,7 @@ def test_light_is_compared_with_as_many_samples_as_said(seen, add_lamp):
     finally:
         for name in ("level", "said", "samples", "clay"):
             settings.property_unset(name)
-    outcome = proof.latest()
+    outcome = proof.background.latest
     assert outcome.passed, outcome.verdict
     assert outcome.what == "Camera, frame 1, direct" and "Light, to Tracer's" in dict(outcome.rows)
     assert "Orange where Cycles is brighter" in outcome.colours
@@ -277,14 +277,14 @@ def test_a_full_disk_leaves_no_half_of_a_report_s_file(stand_in, tmp_path, monke
 
 @pytest.mark.parametrize("ends", ["another file", "the add-on"])
 def test_another_file_and_turning_the_add_on_off_end_it(stand_in, registered_addon, ends):
-    proof._running = comparison = stand_in()
+    proof.background.running = comparison = stand_in()
     assert not bpy.ops.viewcam.compare_with_cycles.poll(), "two at a time"
     if ends == "another file":
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     else:
         registered_addon.unregister()
         registered_addon.register()
-    assert proof.running() is None and proof.latest() is None
+    assert proof.background.running is None and proof.background.latest is None
     assert not comparison.folder.exists() and processes_of(comparison.folder) == []
 
 
@@ -292,12 +292,12 @@ def test_cancel_ends_it_and_keeps_what_the_last_one_came_to(stand_in):
     comparison = stand_in()
     comparison.let(8)
     wait_for(lambda: comparison._process.status() is not None)
-    proof._running = comparison
-    assert proof._look() is proof.latest() and proof.running() is None
+    proof.background.running = comparison
+    assert proof.background.poll() is proof.background.latest and proof.background.running is None
     assert not bpy.ops.viewcam.cancel_comparison.poll()
-    proof._running = stand_in()
+    proof.background.running = stand_in()
     assert bpy.ops.viewcam.cancel_comparison() == {"FINISHED"}
-    assert proof.running() is None and proof.latest().report.is_file()
+    assert proof.background.running is None and proof.background.latest.report.is_file()
 
 
 def test_a_child_that_dies_is_told_with_its_last_words(monkeypatch, seen):
@@ -305,7 +305,7 @@ def test_a_child_that_dies_is_told_with_its_last_words(monkeypatch, seen):
     monkeypatch.setattr(comparing, "command", lambda *_: [sys.executable, "-c", program])
     with pytest.raises(RuntimeError, match="was ended by signal 11 after saying: out of memory"):
         bpy.ops.viewcam.compare_with_cycles()
-    outcome = proof.latest()
+    outcome = proof.background.latest
     assert outcome.passed is None and outcome.report is None and outcome.rows == ()
     assert not bpy.ops.viewcam.open_report.poll() and not bpy.ops.viewcam.show_difference.poll()
     assert list(Path(bpy.app.tempdir).glob("viewcam-*")) == []
@@ -377,7 +377,7 @@ def test_what_can_not_be_compared_is_refused_at_once_in_one_sentence(seen, monke
     seen.camera = None
     bpy.context.view_layer.objects.active = None
     assert not bpy.ops.viewcam.compare_with_cycles.poll()
-    assert set(Path(bpy.app.tempdir).iterdir()) == there and proof.running() is None
+    assert set(Path(bpy.app.tempdir).iterdir()) == there and proof.background.running is None
 
 
 @pytest.mark.parametrize("compress", [False, True])

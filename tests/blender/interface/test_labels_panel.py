@@ -26,7 +26,7 @@ def settings(fresh_blender, tmp_path):
     found = bpy.context.window_manager.virtual_pinhole_labels
     found.folder = str(tmp_path / "out")
     yield found
-    labels.end()
+    labels.background.end()
     for name in ("kinds", "depth_steps", "folder"):
         found.property_unset(name)
 
@@ -55,7 +55,7 @@ def test_a_click_starts_a_batch_of_this_frame_with_labels_alone(settings, camera
     settings.kinds, settings.depth_steps = {"FLOW", "DEPTH"}, 250
     bpy.data.objects["Hero: close"].select_set(True)
     assert bpy.ops.viewcam.write_labels(camera="Hero: close") == {"FINISHED"}
-    folder, sentence = labels.latest()
+    folder, sentence = labels.background.latest
     assert folder.parent == Path(settings.folder) and sentence == f"Written to {folder}"
     assert folder.name.startswith("untitled Hero_ close 0003 labels 2")
     shot, words = json.loads((folder / "Hero_ close.labels.json").read_text())
@@ -67,7 +67,7 @@ def test_a_child_that_dies_leaves_no_folder_and_its_last_words_are_said(settings
     monkeypatch.setattr(comparing, "command", lambda *_: [sys.executable, "-c", "print('out of memory'); raise SystemExit(9)"])
     with pytest.raises(RuntimeError, match="out of memory"):
         bpy.ops.viewcam.write_labels()
-    folder, sentence = labels.latest()
+    folder, sentence = labels.background.latest
     assert folder is None and "out of memory" in sentence and list(Path(settings.folder).iterdir()) == []
 
 
@@ -81,7 +81,7 @@ def test_a_shot_that_fails_is_said_in_its_own_words(settings, camera, monkeypatc
 
 def test_while_labels_are_written_there_is_cancel_and_no_second_start(settings, camera, monkeypatch, scene):
     monkeypatch.setattr(comparing, "command", lambda *_: [sys.executable, "-c", "import time; time.sleep(600)"])
-    labels._running = writing = labels.Writing(camera, scene, settings)
+    labels.background.running = writing = labels.Writing(camera, scene, settings)
     assert writing.poll() is None and not bpy.ops.viewcam.write_labels.poll()
     assert bpy.ops.viewcam.cancel_labels() == {"FINISHED"}
     assert not bpy.ops.viewcam.cancel_labels.poll() and not writing.folder.exists()
@@ -102,7 +102,7 @@ def test_nothing_is_left_of_it_without_the_add_on(registered_addon):
     registered_addon.unregister()
     try:
         assert not hasattr(bpy.types.WindowManager, "virtual_pinhole_labels")
-        assert labels._on_load not in bpy.app.handlers.load_pre
+        assert labels.background.on_load not in bpy.app.handlers.load_pre
     finally:
         registered_addon.register()
 
@@ -112,7 +112,7 @@ def test_the_files_that_the_panel_shows_are_those_that_are_written(settings, mon
     settings.kinds = {kind.upper() for kind in KINDS}
     shown = labels.file_names(bpy.context.scene.camera, settings.chosen())
     assert bpy.ops.viewcam.write_labels() == {"FINISHED"}
-    folder, _ = labels.latest()
+    folder, _ = labels.background.latest
     of_the_batch = {"summary.json", "contact-sheet.html"}
     assert {path.name for path in folder.glob("[!.]*")} - of_the_batch == set(shown)
     told = label_files.read(folder / shown[-1])

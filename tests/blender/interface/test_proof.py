@@ -31,7 +31,7 @@ def test_the_render_menu_and_the_status_bar_are_as_before_without_the_add_on(reg
             *bpy.app.handlers.load_pre,
         ]
 
-    ours = {proof._draw_render_menu, proof._draw_status_bar, proof._on_load}
+    ours = {proof._draw_render_menu, proof._draw_status_bar, proof.background.on_load}
     assert ours <= set(entries())
     for _ in range(3):
         registered_addon.unregister()
@@ -81,7 +81,7 @@ def test_each_view_is_one_image_of_its_own_that_is_saved_with_the_file(outcome):
 
 def test_the_view_that_is_chosen_is_what_the_image_shows(outcome, monkeypatch):
     settings = bpy.context.window_manager.virtual_pinhole_proof
-    monkeypatch.setattr(proof, "_latest", outcome)
+    monkeypatch.setattr(proof.background, "latest", outcome)
     settings.view = "CYCLES"
     assert proof_image.loaded() is None, "nobody has asked to see it"
     assert bpy.ops.viewcam.show_difference() == {"FINISHED"}
@@ -118,8 +118,7 @@ def test_no_editor_loses_the_render_result_the_viewer_or_the_artist_s_own_image(
 def escape(monkeypatch, playing):
     """What the modal operator does with Escape while a comparison is on its way: (its answer, whether it was ended)."""
     ended, said = [], []
-    monkeypatch.setattr(proof, "_running", object())
-    monkeypatch.setattr(proof, "end", lambda forget: ended.append(setattr(proof, "_running", None)))
+    monkeypatch.setattr(proof.background, "running", SimpleNamespace(cancel=lambda: ended.append(True)))
     screen = SimpleNamespace(is_animation_playing=playing, areas=[])
     context = SimpleNamespace(window_manager=SimpleNamespace(windows=[SimpleNamespace(screen=screen)]), workspace=None)
     operator = SimpleNamespace(report=lambda *words: said.append(words), _leave=lambda _context: None)

@@ -31,8 +31,8 @@ sys.exit(status)
 @pytest.fixture(autouse=True)
 def nothing_left():
     yield
-    render_all.end()
-    render_all._latest = None
+    render_all.background.end()
+    render_all._sheet = None
 
 
 @pytest.fixture
@@ -122,10 +122,10 @@ def test_cancelled_it_leaves_the_pictures_that_are_there_and_no_process(two, sta
     ends = time.monotonic() + 60
     while rendering.progress()[0] == 0 and time.monotonic() < ends:
         time.sleep(0.01)
-    render_all._running = rendering
+    render_all.background.running = rendering
     assert not bpy.ops.viewcam.render_all_cameras.poll(), "two at a time"
     assert bpy.ops.viewcam.cancel_render_all() == {"FINISHED"}
-    assert render_all._running is None and rendering._process.status() is not None
+    assert render_all.background.running is None and rendering._process.status() is not None
     assert [path.suffix for path in rendering.folder.iterdir()] == [".exr"] and not rendering._temporary.exists()
 
 
@@ -133,7 +133,7 @@ def test_by_script_it_waits_and_says_where_the_sheet_is(two, stand_in, tmp_path)
     (tmp_path / "go").touch()
     assert not bpy.ops.viewcam.open_contact_sheet.poll()
     assert bpy.ops.viewcam.render_all_cameras(directory=str(tmp_path)) == {"FINISHED"}
-    assert bpy.ops.viewcam.open_contact_sheet.poll() and render_all._latest.is_file()
+    assert bpy.ops.viewcam.open_contact_sheet.poll() and render_all._sheet.is_file()
     stand_in(4)
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "go").touch()

@@ -367,13 +367,22 @@ def test_what_has_no_weight_in_a_mixture_is_not_looked_at(diffuse, factor, left)
     assert exactly(diffuse) == Material(diffuse=Colour(RED))
 
 
+@pytest.mark.parametrize(("socket", "weight"), [("Coat Roughness", "Coat Weight"), ("Sheen Tint", "Sheen Weight")])
+def test_what_makes_an_input_that_does_not_count_is_not_followed(make_material, socket, weight):
+    material = make_material("p", "ShaderNodeBsdfPrincipled", Base_Color=colour(RED))
+    link(material, "ShaderNodeWireframe", 0, socket)
+    exactly(material)
+    material.node_tree.nodes["Shader"].inputs[weight].default_value = 0.5
+    approximately(material, "'Wireframe'", "not modelled")
+
+
 def test_a_factor_that_is_not_modelled_is_a_half(diffuse):
     mixed = add_shader(diffuse, "ShaderNodeMixShader", (1, diffuse.node_tree.nodes["Shader"]))
     mixed.name = "Blend"
     link(diffuse, "ShaderNodeWireframe", 0, 0, "Blend")
     show(diffuse, mixed)
     (closure,) = approximately(diffuse, "'Wireframe'", "not modelled").closures
-    assert closure.node["color"] == Colour(RED) and closure.factors == ((Colour((0.5, 0.5, 0.5)), True),)
+    assert closure.node["color"] == Colour(tuple(value / 2 for value in RED)) and not closure.factors
 
 
 def test_other_shaders_are_lamberts_of_their_colour(make_material):

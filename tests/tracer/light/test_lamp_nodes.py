@@ -77,19 +77,19 @@ FALLOFFS = {
 @pytest.mark.parametrize("falloff", FALLOFFS)
 def test_light_falls_off_as_its_way_says(floor, falloff):
     """E = P/(4π) · f(r) · cos θ, of which a white floor shows E/π."""
-    emission, law = FALLOFFS[falloff]
+    emission, falls_off = FALLOFFS[falloff]
     shown, squared, cosine = floor(replace(LAMP, emission=emission))
-    expected = POWER / (4 * np.pi**2) * law(squared) * cosine
+    expected = POWER / (4 * np.pi**2) * falls_off(squared) * cosine
     np.testing.assert_allclose(shown, expected, rtol=EXACT)
 
 
 @pytest.mark.parametrize("falloff", ["linear", "constant", "smooth"])
 def test_a_falloff_that_is_a_little_wrong_is_found(floor, falloff):
-    emission, law = FALLOFFS[falloff]
+    emission, falls_off = FALLOFFS[falloff]
     wrong = node("math", operation="power", a=emission, b=1.00001)
     shown, squared, cosine = floor(replace(LAMP, emission=wrong))
     with pytest.raises(AssertionError):
-        np.testing.assert_allclose(shown, POWER / (4 * np.pi**2) * law(squared) * cosine, rtol=EXACT)
+        np.testing.assert_allclose(shown, POWER / (4 * np.pi**2) * falls_off(squared) * cosine, rtol=EXACT)
 
 
 @pytest.mark.parametrize(

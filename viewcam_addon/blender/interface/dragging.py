@@ -9,7 +9,6 @@ import math
 from dataclasses import replace
 
 import bpy
-import numpy as np
 
 from ... import moves
 from ...errors import InputError
@@ -39,8 +38,8 @@ def moved(pinhole: Pinhole, kind: str, amount: tuple[float, float]) -> Pinhole:
     if kind == ORBIT:
         return moves.orbited(pinhole, -amount[0] if pinhole.mirrored else amount[0], amount[1])
     if kind == TRUCK:
-        u, v, _ = pinhole.basis()
-        step = amount[0] * np.array(u) * (-1 if pinhole.mirrored else 1) + amount[1] * np.array(v)
+        right, up, _ = pinhole.picture_axes()
+        step = amount[0] * right + amount[1] * up
         return moves.trucked_to(pinhole, tuple((pinhole.look_at + step).tolist()))
     reach = math.dist(pinhole.eye, pinhole.look_at)
     dollied = moves.dollied(pinhole, reach + amount[0]) if amount[0] else pinhole

@@ -5,24 +5,21 @@ in a new folder that is named by file, camera, frame and time: nothing is writte
 though flow needs the frames before and after. What it came to belongs to this session of Blender.
 """
 
-import atexit
 import contextlib
 import json
 from pathlib import Path
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ...errors import InputError
 from ...labels import DEPTH_STEPS, KINDS, PASSES, endings
 from ...shots.names import made_fit
 from .. import datablocks
 from . import panel_rows
+from .background import Background, Cancels, StartsForCamera
 from .background_batch import BackgroundBatch, shot
-from .operators import NamesCamera
 from .panel_places import BelowProperties, BelowSidebar, SubPanel
 
-_SECONDS = 0.2  # between two looks
 _SUMMARY = "summary.json"
 
 _KINDS = (
@@ -35,21 +32,17 @@ _KINDS = (
     ("COVERAGE", "Coverage", "How much of each pixel each object has, as Cryptomatte: for soft masks"),
 )
 
-_running: "Writing | None" = None
-_latest: "tuple[Path | None, str] | None" = None  # where the last ones are, and a sentence
+
+def _looked(_: object) -> None:
+    if background.running is None:
+        for window in bpy.context.window_manager.windows:
+            for area in window.screen.areas:
+                if area.type in ("PROPERTIES", "VIEW_3D"):
+                    area.tag_redraw()
 
 
-def latest() -> "tuple[Path | None, str] | None":
-    """Where the last labels are (None where there are none), and a sentence; None if none were written in this session."""
-    return _latest
-
-
-def end() -> None:
-    """End the writing on its way, and forget what the last came to."""
-    global _running, _latest
-    if _running:
-        _running.cancel()
-    _running = _latest = None
+background = Background(0.2, _looked)
+"""What it comes to: the folder of the labels (None where there are none), and a sentence."""
 
 
 class LabelSettings(bpy.types.PropertyGroup):
@@ -115,60 +108,24 @@ class Writing(BackgroundBatch):
         return None, sentence[:1].upper() + sentence[1:]
 
 
-class VIEWCAM_OT_write_labels(NamesCamera, bpy.types.Operator):
+class VIEWCAM_OT_write_labels(StartsForCamera, bpy.types.Operator):
     bl_idname = "viewcam.write_labels"
     bl_label = "Write Labels"
     bl_description = (
         "Write what is true of this camera's picture at this frame, as the reference tracer finds it, in the background. The "
         "file stays as it is, and its unsaved edits count"
     )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if _running:
-            cls.poll_message_set("Labels are being written")
-            return False
-        if context.scene and datablocks.camera_in(context):
-            return True
-        cls.poll_message_set("There is no camera")
-        return False
+    background, busy = background, "Labels are being written"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        global _running
-        try:
-            found = self.found(context)
-            if found is None:
-                raise InputError(f"there is no camera {self.camera!r}: name another")
-            _running = Writing(found, context.scene, context.window_manager.virtual_pinhole_labels)
-        except InputError as error:
-            self.report({"ERROR"}, datablocks.sentence(error))
-            return {"CANCELLED"}
-        if not bpy.app.background:
-            bpy.app.timers.register(_look, first_interval=_SECONDS)
-            return {"FINISHED"}
-        try:  # for scripts: wait for it
-            _running.wait()
-            _poll()
-        except BaseException:  # Ctrl-C
-            end()
-            raise
-        folder, sentence = _latest
-        self.report({"INFO" if folder else "ERROR"}, sentence)
-        return {"FINISHED" if folder else "CANCELLED"}
+        settings = context.window_manager.virtual_pinhole_labels
+        return background.begin(self, lambda: Writing(self.one(context), context.scene, settings))
 
 
-class VIEWCAM_OT_cancel_labels(bpy.types.Operator):
+class VIEWCAM_OT_cancel_labels(Cancels, bpy.types.Operator):
     bl_idname = "viewcam.cancel_labels"
-    bl_label = "Cancel"
     bl_description = "End the writing of labels"
-
-    @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        return _running is not None
-
-    def execute(self, _context: bpy.types.Context) -> set[str]:
-        end()
-        return {"FINISHED"}
+    background = background
 
 
 class _LabelsPanel(SubPanel):
@@ -182,7 +139,7 @@ class _LabelsPanel(SubPanel):
         )
         panel_rows.begin(layout, context)
         column = layout.column()
-        column.active = _running is None
+        column.active = background.running is None
         panel_rows.field(column.column(align=True), settings, "kinds")
         if "DEPTH" in settings.kinds:
             column.prop(settings, "depth_steps")
@@ -193,13 +150,13 @@ class _LabelsPanel(SubPanel):
             for i, name in enumerate(file_names(camera_object, settings.chosen())):
                 names.label(text=name, icon="BLANK1" if i else "FILE", translate=False)
         row = layout.row(align=True)
-        if _running:
+        if background.running:
             row.label(text="Writing labels", icon="SORTTIME")
             row.operator("viewcam.cancel_labels", text="", icon="CANCEL")
         else:
             row.operator("viewcam.write_labels", icon="PLAY").camera = camera_object.name
-        if _latest:
-            _draw_latest(layout, context, *_latest)
+        if background.latest:
+            _draw_latest(layout, context, *background.latest)
 
 
 def _draw_latest(layout: bpy.types.UILayout, context: bpy.types.Context, folder: Path | None, sentence: str) -> None:
@@ -217,46 +174,16 @@ class VIEWCAM_PT_sidebar_labels(_LabelsPanel, BelowSidebar, bpy.types.Panel):
     pass
 
 
-def _poll() -> bool:
-    """Whether it has ended."""
-    global _running, _latest
-    outcome = _running.poll()
-    if outcome:
-        _running, _latest = None, outcome
-    return outcome is not None
-
-
-def _look() -> float | None:
-    """Blender's timer asks again after so many seconds, as long as it goes on."""
-    goes_on = _running is not None and not _poll()
-    if not goes_on:
-        for window in bpy.context.window_manager.windows:
-            for area in window.screen.areas:
-                if area.type in ("PROPERTIES", "VIEW_3D"):
-                    area.tag_redraw()
-    return _SECONDS if goes_on else None
-
-
-@persistent
-def _on_load(*_: object) -> None:
-    end()
-
-
 CLASSES = (VIEWCAM_OT_write_labels, VIEWCAM_OT_cancel_labels, VIEWCAM_PT_data_labels, VIEWCAM_PT_sidebar_labels)
 
 
 def register() -> None:
     bpy.utils.register_class(LabelSettings)
     bpy.types.WindowManager.virtual_pinhole_labels = bpy.props.PointerProperty(type=LabelSettings)
-    bpy.app.handlers.load_pre.append(_on_load)
-    atexit.register(end)
+    background.register()
 
 
 def unregister() -> None:
-    end()
-    atexit.unregister(end)
-    if bpy.app.timers.is_registered(_look):
-        bpy.app.timers.unregister(_look)
-    bpy.app.handlers.load_pre.remove(_on_load)
+    background.unregister()
     del bpy.types.WindowManager.virtual_pinhole_labels
     bpy.utils.unregister_class(LabelSettings)

@@ -28,6 +28,13 @@ class NamesCamera:
         """The object that is meant, if there is one."""
         return bpy.data.objects.get(self.camera) if self.camera else datablocks.camera_in(context)
 
+    def one(self, context: bpy.types.Context) -> bpy.types.Object:
+        """The object that is meant, or InputError."""
+        found = self.found(context)
+        if found is None:
+            raise InputError(f"there is no camera {self.camera!r}: name another")
+        return found
+
 
 class CameraOperator(NamesCamera):
     """What all of them share. A subclass says in `work(camera_object, scene)` what it does."""

@@ -5,19 +5,17 @@ Blender: nothing of it is in the file but, while an Image Editor shows it, its p
 playback), Cancel, another file, turning the add-on off and leaving Blender end a comparison without a trace.
 """
 
-import atexit
 from pathlib import Path
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ...errors import InputError
 from ...tracer.scene.film import SAMPLES
 from .. import datablocks, preferences
 from ..render_settings import LEVELS
 from . import icons, panel_rows, proof_image
+from .background import Background, Cancels, StartsForCamera
 from .comparing import Outcome, RunningComparison
-from .operators import NamesCamera
 from .panel_places import BelowProperties, BelowSidebar, SubPanel
 
 _SECONDS = 0.2  # between two looks
@@ -25,48 +23,8 @@ _MOST_LACKING = 4  # objects that the panel names
 _NAMES = tuple(name for name, *_ in LEVELS)
 
 _timer: bpy.types.Timer | None = None
-_running: RunningComparison | None = None
-_latest: Outcome | None = None
-
-
-def running() -> RunningComparison | None:
-    """The comparison on its way, if there is one."""
-    return _running
-
-
-def latest() -> Outcome | None:
-    """What the last one came to, in this session and with this file."""
-    return _latest
-
-
-def end(forget: bool = True) -> None:
-    """Cancel the comparison on its way, and forget what the last one came to."""
-    global _running, _latest
-    if _running:
-        _running.cancel()
-    _running = None
-    if forget and _latest:
-        _latest.discard()
-        _latest = None
-
-
-def _begin(camera_object: bpy.types.Object, context: bpy.types.Context) -> None:
-    global _running
-    settings = context.window_manager.virtual_pinhole_proof
-    folder = Path(bpy.path.abspath(settings.folder)) if settings.folder else None
-    level = settings.level.lower()
-    _running = RunningComparison(camera_object, context.scene, level, settings.samples, settings.clay, folder)
-
-
-def _look() -> Outcome | None:
-    """What the comparison on its way has come to, None while it runs."""
-    global _running, _latest
-    outcome = _running.poll()
-    if outcome:
-        if _latest:
-            _latest.discard()
-        _running, _latest = None, outcome
-    return outcome
+background = Background(_SECONDS, lambda _: _redraw(bpy.context), Outcome.discard)
+"""A `RunningComparison`, and its `Outcome`."""
 
 
 def _stop_timer() -> None:
@@ -77,8 +35,9 @@ def _stop_timer() -> None:
 
 
 def _on_swipe(settings: "ProofSettings", _context: bpy.types.Context) -> None:
-    if _latest and _latest.pictures and proof_image.loaded():
-        proof_image.load(_latest, settings.view, settings.swipe)
+    latest = background.latest
+    if latest and latest.pictures and proof_image.loaded():
+        proof_image.load(latest, settings.view, settings.swipe)
 
 
 def _on_view(settings: "ProofSettings", context: bpy.types.Context) -> None:
@@ -125,25 +84,16 @@ class ProofSettings(bpy.types.PropertyGroup):
     )
 
 
-class VIEWCAM_OT_compare_with_cycles(NamesCamera, bpy.types.Operator):
+class VIEWCAM_OT_compare_with_cycles(StartsForCamera, bpy.types.Operator):
     bl_idname = "viewcam.compare_with_cycles"
     bl_label = "Compare with Cycles"
     bl_description = (
         "Render the picture of this camera with Cycles and with the reference tracer, in the background, and tell how far they "
         "differ. The file stays as it is, and its unsaved edits count"
     )
+    background, busy = background, "A comparison is on its way"
 
     _shown = ("", 0)  # the step and the second that were drawn last
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if _running:
-            cls.poll_message_set("A comparison is on its way")
-            return False
-        if context.scene and datablocks.camera_in(context):
-            return True
-        cls.poll_message_set("There is no camera")
-        return False
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if bpy.app.background:
@@ -158,14 +108,14 @@ class VIEWCAM_OT_compare_with_cycles(NamesCamera, bpy.types.Operator):
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if event.type == "ESC" and event.value == "PRESS" and not _is_playing(context):
-            end(forget=False)
+            background.end(forget=False)
         elif event.type != "TIMER":
             return {"PASS_THROUGH"}
-        if _running is None:
+        if background.running is None:
             self.report({"INFO"}, "The comparison is canceled")
             self._leave(context)
             return {"CANCELLED"}
-        outcome = _look()
+        outcome = background.poll()
         if outcome is None:
             self._show(context)
             return {"PASS_THROUGH"}
@@ -174,27 +124,21 @@ class VIEWCAM_OT_compare_with_cycles(NamesCamera, bpy.types.Operator):
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Blender closes the window or the file."""
-        end(forget=False)
+        background.end(forget=False)
         self._leave(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """For scripts: wait for it."""
         if not self._begins(context):
             return {"CANCELLED"}
-        try:
-            _running.wait()
-            outcome = _look()
-        except BaseException:  # Ctrl-C
-            end(forget=False)
-            raise
-        return self._tells(outcome, context)
+        return self._tells(background.wait(), context)
 
     def _begins(self, context: bpy.types.Context) -> bool:
         try:
-            found = self.found(context)
-            if found is None:
-                raise InputError(f"there is no camera {self.camera!r}: name another")
-            _begin(found, context)
+            settings = context.window_manager.virtual_pinhole_proof
+            folder = Path(bpy.path.abspath(settings.folder)) if settings.folder else None
+            asked = settings.level.lower(), settings.samples, settings.clay, folder
+            background.running = RunningComparison(self.one(context), context.scene, *asked)
         except InputError as error:
             self.report({"ERROR"}, datablocks.sentence(error))
             return False
@@ -202,7 +146,7 @@ class VIEWCAM_OT_compare_with_cycles(NamesCamera, bpy.types.Operator):
 
     def _show(self, context: bpy.types.Context) -> None:
         """Draw what has changed since the last look."""
-        step, second = _running.progress()[1], int(_running.seconds)
+        step, second = background.running.progress()[1], int(background.running.seconds)
         if (step, second) != self._shown:
             _redraw(context, status_bar=step != self._shown[0])
         self._shown = step, second
@@ -221,19 +165,10 @@ class VIEWCAM_OT_compare_with_cycles(NamesCamera, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class VIEWCAM_OT_cancel_comparison(bpy.types.Operator):
+class VIEWCAM_OT_cancel_comparison(Cancels, bpy.types.Operator):
     bl_idname = "viewcam.cancel_comparison"
-    bl_label = "Cancel"
     bl_description = "End the comparison with Cycles"
-
-    @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        return _running is not None
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        end(forget=False)
-        _redraw(context)
-        return {"FINISHED"}
+    background = background
 
 
 class VIEWCAM_OT_show_difference(bpy.types.Operator):
@@ -243,10 +178,10 @@ class VIEWCAM_OT_show_difference(bpy.types.Operator):
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
-        return bool(_latest and _latest.pictures)
+        return bool(background.latest and background.latest.pictures)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        proof_image.show(_latest, context, anyway=True)
+        proof_image.show(background.latest, context, anyway=True)
         return {"FINISHED"}
 
 
@@ -257,10 +192,10 @@ class VIEWCAM_OT_open_report(bpy.types.Operator):
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
-        return bool(_latest and _latest.report)
+        return bool(background.latest and background.latest.report)
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
-        return bpy.ops.wm.url_open(url=_latest.report.absolute().as_uri())
+        return bpy.ops.wm.url_open(url=background.latest.report.absolute().as_uri())
 
 
 class _ProofPanel(SubPanel):
@@ -269,14 +204,14 @@ class _ProofPanel(SubPanel):
     def draw(self, context: bpy.types.Context) -> None:
         camera_object = datablocks.camera_in(context)
         _draw_settings(self.layout, context)
-        if _running:
+        if background.running:
             _draw_progress(self.layout)
         else:
             self.layout.operator("viewcam.compare_with_cycles", icon="PLAY").camera = camera_object.name
-        if _latest:
+        if background.latest:
             column = self.layout.column()
-            column.active = _running is None
-            _draw_outcome(column, _latest, camera_object, context)
+            column.active = background.running is None
+            _draw_outcome(column, background.latest, camera_object, context)
 
 
 class VIEWCAM_PT_data_proof(_ProofPanel, BelowProperties, bpy.types.Panel):
@@ -290,7 +225,7 @@ class VIEWCAM_PT_sidebar_proof(_ProofPanel, BelowSidebar, bpy.types.Panel):
 def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     panel_rows.begin(layout, context)
     settings, column = context.window_manager.virtual_pinhole_proof, layout.column()
-    column.active = _running is None
+    column.active = background.running is None
     panel_rows.field(column, settings, "level")
     if settings.level != "GEOMETRY":
         column.prop(settings, "samples")
@@ -299,9 +234,9 @@ def _draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
 
 
 def _draw_progress(layout: bpy.types.UILayout, timed: bool = True) -> None:
-    share, words = _running.progress()
+    share, words = background.running.progress()
     row = layout.row(align=True)
-    row.progress(factor=share, text=f"{words} ({_running.seconds:.0f} s)" if timed else words)
+    row.progress(factor=share, text=f"{words} ({background.running.seconds:.0f} s)" if timed else words)
     row.operator("viewcam.cancel_comparison", text="", icon="CANCEL")
 
 
@@ -349,7 +284,7 @@ def _is_playing(context: bpy.types.Context) -> bool:
 
 
 def _draw_status_bar(header: bpy.types.Header, _context: bpy.types.Context) -> None:
-    if _running:
+    if background.running:
         row = header.layout.row()
         row.ui_units_x = 14
         _draw_progress(row, timed=False)
@@ -373,11 +308,6 @@ def _redraw(context: bpy.types.Context, status_bar: bool = True) -> None:
         context.workspace.status_text_set(None)  # as no status bar is in a screen's areas, nothing else tells it to draw
 
 
-@persistent
-def _on_load(*_: object) -> None:
-    end()
-
-
 CLASSES = (
     VIEWCAM_OT_compare_with_cycles,
     VIEWCAM_OT_cancel_comparison,
@@ -393,18 +323,15 @@ def register() -> None:
     bpy.types.WindowManager.virtual_pinhole_proof = bpy.props.PointerProperty(type=ProofSettings)
     bpy.types.TOPBAR_MT_render.append(_draw_render_menu)
     bpy.types.STATUSBAR_HT_header.append(_draw_status_bar)
-    bpy.app.handlers.load_pre.append(_on_load)
-    atexit.register(end)
+    background.register()
     proof_image.register()
 
 
 def unregister() -> None:
-    end()
+    background.unregister()
     proof_image.unregister()
     icons.forget()
     _stop_timer()  # Blender takes a modal operator that is unregistered away without its cancel()
-    atexit.unregister(end)
-    bpy.app.handlers.load_pre.remove(_on_load)
     bpy.types.STATUSBAR_HT_header.remove(_draw_status_bar)
     bpy.types.TOPBAR_MT_render.remove(_draw_render_menu)
     del bpy.types.WindowManager.virtual_pinhole_proof

@@ -6,24 +6,38 @@ A timer looks how far it is; the status bar shows it, and has Cancel. Rejected: 
 that waits, and a scene whose camera and resolution change under the artist's hands).
 """
 
-import atexit
 from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ...errors import InputError
 from ...shots.names import made_fit, one_file
-from .. import datablocks, own_picture
+from .. import own_picture
 from . import scene_cameras
+from .background import Background, Cancels
 from .background_batch import BackgroundBatch, shot
 
-_SECONDS = 0.5  # between two looks
 _SHEET = "contact-sheet.html"
 
-_running: "Rendering | None" = None
-_latest: Path | None = None  # the last contact sheet
+_sheet: Path | None = None  # the last contact sheet
+
+
+def _looked(outcome: tuple[bool, str] | None) -> None:
+    if bpy.context.workspace:
+        bpy.context.workspace.status_text_set(None)
+    if outcome:
+        well, sentence = outcome
+
+        def draw(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+            menu.layout.label(text=sentence, translate=False)
+            menu.layout.operator("viewcam.open_contact_sheet", icon="URL")
+
+        bpy.context.window_manager.popup_menu(draw, title="Render All Cameras", icon="CHECKMARK" if well else "ERROR")
+
+
+background = Background(0.5, _looked)
+"""What it comes to: whether all went well, and a sentence."""
 
 
 def shots(scene: bpy.types.Scene, animation: bool) -> list[dict[str, Any]]:
@@ -67,9 +81,11 @@ class Rendering(BackgroundBatch):
 
     def poll(self) -> tuple[bool, str] | None:
         """Whether all went well, and a sentence; None while it runs."""
+        global _sheet
         ended = self.ended()
         if ended is None:
             return None
+        _sheet = self.sheet if self.sheet.is_file() else _sheet
         status, sentence = ended
         if status == 0:
             return True, f"{self.count} picture{'s' if self.count > 1 else ''} in {self.folder}"
@@ -101,7 +117,7 @@ class VIEWCAM_OT_render_all_cameras(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if _running:
+        if background.running:
             cls.poll_message_set("The cameras are being rendered")
             return False
         if context.scene and scene_cameras.of_scene(context.scene):
@@ -114,40 +130,18 @@ class VIEWCAM_OT_render_all_cameras(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        global _running
-        try:
+        def start() -> Rendering:
             if not self.directory:
                 raise InputError("there is no folder for the pictures: name one")
-            _running = Rendering(context.scene, Path(bpy.path.abspath(self.directory)), self.animation, self.check)
-        except InputError as error:
-            self.report({"ERROR"}, datablocks.sentence(error))
-            return {"CANCELLED"}
-        if not bpy.app.background:
-            bpy.app.timers.register(_look, first_interval=_SECONDS)
-            return {"FINISHED"}
-        try:  # for scripts: wait for it
-            _running.wait()
-            well, sentence = _ended()
-        except BaseException:  # Ctrl-C
-            end()
-            raise
-        self.report({"INFO" if well else "ERROR"}, sentence)
-        return {"FINISHED" if well else "CANCELLED"}
+            return Rendering(context.scene, Path(bpy.path.abspath(self.directory)), self.animation, self.check)
+
+        return background.begin(self, start)
 
 
-class VIEWCAM_OT_cancel_render_all(bpy.types.Operator):
+class VIEWCAM_OT_cancel_render_all(Cancels, bpy.types.Operator):
     bl_idname = "viewcam.cancel_render_all"
-    bl_label = "Cancel"
     bl_description = "End the rendering of all cameras. The pictures that are there stay"
-
-    @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        return _running is not None
-
-    def execute(self, _context: bpy.types.Context) -> set[str]:
-        end()
-        _redraw()
-        return {"FINISHED"}
+    background = background
 
 
 class VIEWCAM_OT_open_contact_sheet(bpy.types.Operator):
@@ -157,55 +151,15 @@ class VIEWCAM_OT_open_contact_sheet(bpy.types.Operator):
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
-        return bool(_latest and _latest.is_file())
+        return bool(_sheet and _sheet.is_file())
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
-        return bpy.ops.wm.url_open(url=_latest.absolute().as_uri())
-
-
-def end() -> None:
-    """Cancel the rendering that goes on, if there is one."""
-    global _running
-    if _running:
-        _running.cancel()
-    _running = None
-
-
-def _ended() -> tuple[bool, str] | None:
-    global _running, _latest
-    told = _running.poll()
-    if told:
-        _latest = _running.sheet if _running.sheet.is_file() else _latest
-        _running = None
-    return told
-
-
-def _look() -> float | None:
-    """Blender's timer asks again after so many seconds, as long as it goes on."""
-    if _running is None:
-        return None
-    told = _ended()
-    _redraw()
-    if told is None:
-        return _SECONDS
-    well, sentence = told
-
-    def draw(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
-        menu.layout.label(text=sentence, translate=False)
-        menu.layout.operator("viewcam.open_contact_sheet", icon="URL")
-
-    bpy.context.window_manager.popup_menu(draw, title="Render All Cameras", icon="CHECKMARK" if well else "ERROR")
-    return None
-
-
-def _redraw() -> None:
-    if bpy.context.workspace:
-        bpy.context.workspace.status_text_set(None)
+        return bpy.ops.wm.url_open(url=_sheet.absolute().as_uri())
 
 
 def _draw_status_bar(header: bpy.types.Header, _context: bpy.types.Context) -> None:
-    if _running:
-        share, words = _running.progress()
+    if background.running:
+        share, words = background.running.progress()
         row = header.layout.row(align=True)
         row.ui_units_x = 14
         row.progress(factor=share, text=words)
@@ -218,26 +172,16 @@ def _draw_render_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None
     menu.layout.operator("viewcam.open_contact_sheet")
 
 
-@persistent
-def _on_load(*_: object) -> None:
-    end()
-
-
 CLASSES = (VIEWCAM_OT_render_all_cameras, VIEWCAM_OT_cancel_render_all, VIEWCAM_OT_open_contact_sheet)
 
 
 def register() -> None:
     bpy.types.TOPBAR_MT_render.append(_draw_render_menu)
     bpy.types.STATUSBAR_HT_header.append(_draw_status_bar)
-    bpy.app.handlers.load_pre.append(_on_load)
-    atexit.register(end)
+    background.register()
 
 
 def unregister() -> None:
-    end()
-    atexit.unregister(end)
-    if bpy.app.timers.is_registered(_look):
-        bpy.app.timers.unregister(_look)
-    bpy.app.handlers.load_pre.remove(_on_load)
+    background.unregister()
     bpy.types.STATUSBAR_HT_header.remove(_draw_status_bar)
     bpy.types.TOPBAR_MT_render.remove(_draw_render_menu)

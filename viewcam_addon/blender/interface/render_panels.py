@@ -130,15 +130,9 @@ def lamp_settings(lamp: bpy.types.Light) -> Iterator[str]:
         yield from ("use_temperature", "temperature") if lamp.use_temperature else ("use_temperature",)
     yield "energy"
     yield from (name for name in ("exposure", "normalize") if hasattr(lamp, name))
-    if lamp.type == "SUN":
-        yield "angle"
-    elif lamp.type == "AREA":
-        yield from ("shape", "size", "size_y") if lamp.shape in ("RECTANGLE", "ELLIPSE") else ("shape", "size")
-        yield "spread"
-    else:
-        yield from ("shadow_soft_size", "use_soft_falloff")
-    if lamp.type == "SPOT":
-        yield from ("spot_size", "spot_blend", "show_cone")
+    from ..scenes.lamps import KINDS  # here, since Blender starts without
+
+    yield from KINDS[lamp.type].shown(lamp)
     yield "use_shadow"
 
 

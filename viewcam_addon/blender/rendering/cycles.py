@@ -8,7 +8,7 @@ truth for less noise: clamping, filtered gloss, culled lights, guesses of indire
 
 import errno
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -166,7 +166,7 @@ def _settings_of(light: LightSettings) -> dict[str, object]:
     return settings
 
 
-def override_all(overrides: Overrides, owner: bpy.types.bpy_struct, settings: dict[str, object]) -> None:
+def override_all(overrides: Overrides, owner: bpy.types.bpy_struct, settings: Mapping[str, object]) -> None:
     """Set the properties that this version has of those in `settings`."""
     for name, value in settings.items():
         if hasattr(owner, name):  # versions know fewer of them

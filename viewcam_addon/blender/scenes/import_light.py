@@ -7,14 +7,13 @@ and blue, which is its energy.
 import bpy
 import numpy as np
 
-from ...pinhole import Pinhole
 from ...tracer.scene import Scene
 from ...tracer.scene.film import Bounces, Film
-from ...tracer.scene.lamps import RAYS, Area, Lamp, Spot, Sun, World
+from ...tracer.scene.lamps import RAYS, Lamp, World
 from ...tracer.scene.materials import PLAIN, Material, Picture
 from ...tracer.scene.shader_nodes import Node
 from ..temporary_settings import LARGEST_INDEX, Overrides
-from . import film, images, materials, nodes, shaders
+from . import film, images, lamps, materials, nodes, shaders
 from .ledger import Ledger
 
 _COLUMN = 260.0  # between nodes, in the node editor's units
@@ -23,14 +22,6 @@ _COLUMN = 260.0  # between nodes, in the node editor's units
 def has_light(scene: Scene) -> bool:
     """Whether a scene says anything beyond geometry."""
     return bool(scene.materials or scene.lamps) or (scene.world, scene.film, scene.bounces) != (World(), Film(), Bounces())
-
-
-def store(owner: bpy.types.bpy_struct, name: str, value: float, who: str, ledger: Ledger) -> None:
-    """Set a property, and tell if Blender took another number."""
-    setattr(owner, name, value)
-    stored = getattr(owner, name)
-    if stored != value and stored != float(np.float32(value)):
-        ledger.note(who, "approximated", f"its {name.replace('_', ' ')} is {value:g}, and Blender makes it {stored:g}")
 
 
 class Paints:
@@ -67,7 +58,7 @@ class Paints:
 
     def light(self, lamp: Lamp) -> tuple[bpy.types.Light, np.ndarray]:
         """The light, and the (4, 4) matrix that it stands by, with the nodes of its emission."""
-        data, matrix = light_from(lamp, self._overrides, self._ledger)
+        data, matrix = lamps.light_from(lamp, self._overrides, self._ledger)
         if lamp.emission is not None:
             shown = {colour.image: self.image(colour.image) for colour in lamp.emission.colours if colour.image is not None}
             light_up(data, lamp.emission, shown, materials.texts_of(lamp.emission.all, self._overrides))
@@ -131,42 +122,6 @@ def image_from(picture: Picture, name: str, overrides: Overrides, ledger: Ledger
     if picture.srgb and np.abs(picture.values - np.rint(picture.values * 255) / 255).max() > 2.0**-20:
         ledger.note(name, "approximated", "its sRGB pixels are rounded to the 256 levels that Blender keeps")
     return images.image_of(picture, name, overrides)
-
-
-def light_from(lamp: Lamp, overrides: Overrides, ledger: Ledger) -> tuple[bpy.types.Light, np.ndarray]:
-    """The light, and the (4, 4) matrix that it stands by."""
-    data = bpy.data.lights.new(lamp.name, lamp.kind.upper())
-    overrides.afterwards(bpy.data.batch_remove, [data])
-    strength = lamp.irradiance if isinstance(lamp, Sun) else lamp.power
-    data.energy = max(strength)
-    data.color = tuple(value / max(strength) for value in strength) if any(strength) else (1.0, 1.0, 1.0)
-    data.use_shadow = lamp.casts_shadow
-    if isinstance(lamp, Sun):
-        store(data, "angle", lamp.angle, lamp.name, ledger)
-        return data, _facing(lamp.towards)
-    if isinstance(lamp, Area):
-        data.shape = "ELLIPSE" if lamp.ellipse else "RECTANGLE"
-        for name, value in zip(("size", "size_y"), lamp.size, strict=True):
-            store(data, name, value, lamp.name, ledger)
-        store(data, "spread", lamp.spread, lamp.name, ledger)
-        return data, lamp.matrix
-    store(data, "shadow_soft_size", lamp.radius, lamp.name, ledger)
-    data.use_soft_falloff = lamp.soft_falloff
-    if isinstance(lamp, Spot):
-        store(data, "spot_size", lamp.angle, lamp.name, ledger)
-        store(data, "spot_blend", lamp.blend, lamp.name, ledger)
-        return data, lamp.matrix
-    matrix = np.eye(4)
-    matrix[:3, 3] = lamp.position
-    return data, matrix
-
-
-def _facing(towards: tuple[float, ...]) -> np.ndarray:
-    """(4, 4): at the origin, with z along a direction."""
-    u, v, _ = Pinhole(towards, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1.0, 1, 1).basis()
-    matrix = np.eye(4)
-    matrix[:3, :3] = np.column_stack([u, v, towards])
-    return matrix
 
 
 def add_world(adder: nodes.Adder, output: bpy.types.Node, made: World, shown: dict[str, bpy.types.Image]) -> None:
@@ -235,7 +190,7 @@ def set_surroundings(scene: bpy.types.Scene, made: Scene, name: str, overrides: 
     numbers |= {theirs: getattr(made.bounces, ours) for ours, theirs in film.BOUNCES.items()}
     for name, value in numbers.items():
         overrides.afterwards(setattr, scene.cycles, name, getattr(scene.cycles, name))
-        store(scene.cycles, name, value, scene.name, ledger)
+        ledger.store(scene.cycles, name, value, scene.name)
     overrides.set(scene.cycles, "pixel_filter_type", made.film.filter)
     for name in film.CAUSTICS:
         overrides.set(scene.cycles, name, True)

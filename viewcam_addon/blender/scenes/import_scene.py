@@ -123,7 +123,7 @@ class _SceneImport:
         pinhole = self._fitted(self._shown())
         depths = visible_depths(dataclasses.replace(self._made, camera=pinhole))
         for name, depth in zip(("clip_start", "clip_end"), depths, strict=True):
-            import_light.store(data, name, depth, self._name, self._ledger)
+            self._ledger.store(data, name, depth, self._name)
         if is_shown:
             self._overrides.set(self._scene, "camera", block)
         for finding in cameras.apply(block, pinhole, self._scene):

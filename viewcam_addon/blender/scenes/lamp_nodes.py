@@ -4,7 +4,7 @@ A lamp of the tracer has no space of its own: what Blender's nodes say in a ligh
 the world, as Cycles has them (shader_setup_from_sample, and the files of intern/cycles/kernel/light).
 """
 
-import math
+from collections.abc import Callable
 
 import bpy
 import numpy as np
@@ -23,13 +23,15 @@ _WHITE, _BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 _OF_SURFACES = {"ATTRIBUTE", "VERTEX_COLOR", "CAMERA", "TANGENT", "BUMP", "NORMAL_MAP", "OBJECT_INFO", "VECT_TRANSFORM"}
 _PLACES = {"Position", "Normal", "True Normal", "Incoming"}
 
+UVMaker = Callable[[bpy.types.Light, np.ndarray], Node | None]
+
 
 class LampReader(shaders.Tree):
-    """Follows the nodes of a light. matrix : (4, 4), the light's space to the world's."""
+    """Follows the nodes of a light. matrix : (4, 4), the light's space to the world's. uv : makes what its UV is."""
 
-    def __init__(self, light: bpy.types.Light, matrix: np.ndarray) -> None:
-        super().__init__(Colour(_WHITE), False)
-        self._light, self._matrix = light, matrix
+    def __init__(self, light: bpy.types.Light, matrix: np.ndarray, uv: UVMaker) -> None:
+        super().__init__(Colour(_WHITE))
+        self._light, self._matrix, self._uv = light, matrix, uv
 
     def emission(self, of: Input) -> RGB | Node:
         """What the shaders give off: the same everywhere, or a node that makes it; if `reading` has no reasons then."""
@@ -78,52 +80,30 @@ class LampReader(shaders.Tree):
             return self._turned(node("geometry", output="incoming"))
         if known is GENERATED:
             return shaders.in_space_of(self._matrix) if versions.LIGHTS_HAVE_SPACES else node("geometry")
-        return self._uv(output) if known is UV else None
+        return self._uv_of(output) if known is UV else None
 
     def _turned(self, normal: Node) -> Node:
         """A normal in the light's space."""
         columns = (shaders.dot(normal, column) for column in self._matrix[:3, :3].T)
         return node("vector_math", operation="normalize", a=node("combine_xyz", **dict(zip("xyz", columns, strict=True))))
 
-    def _uv(self, output: Output) -> Node | None:
-        """Over the whole of an area light, over the cone of a spot, and around a point."""
-        light, inverse = self._light, np.linalg.inv(self._matrix)
-        if light.type == "SUN":
-            self._reason(output, "says the UV of a sun")
-            return None
-        if light.type == "AREA":
-            size = (light.size or 1.0, (light.size if light.shape in ("SQUARE", "DISK") else light.size_y) or 1.0)
-            position = node("geometry")
-            across, along = (
-                node("math", operation="add", a=shaders.dot(position, row[:3] / side), b=row[3] / side + 0.5)
-                for row, side in zip(inverse, size, strict=False)
-            )
-            return node("combine_xyz", x=across, y=along)
-        way = node("geometry", output="incoming" if light.type == "SPOT" else "normal")
-        x, y, z = (shaders.dot(way, row[:3]) for row in inverse[:3])
-        if light.type == "SPOT":
-            half = -0.5 / math.tan(light.spot_size / 2)
-            across, along = (_affine(node("math", operation="divide", a=each, b=z), half, 0.5) for each in (x, y))
-        else:
-            length = node("vector_math", operation="length", a=node("combine_xyz", x=x, y=y, z=z))
-            across = _affine(node("math", operation="arctan2", a=x, b=y), -0.5 / math.pi, 0.5)
-            down = node("math", operation="arccosine", a=node("math", operation="divide", a=z, b=length))
-            along = _affine(down, -1.0 / math.pi, 1.0)
-        return node("combine_xyz", x=across, y=along)
+    def _uv_of(self, output: Output) -> Node | None:
+        found = self._uv(self._light, np.linalg.inv(self._matrix))
+        if found is None:
+            self._reason(output, f"says the UV of a {self._light.type.lower()}")
+        return found
 
 
-def emission(light: bpy.types.Light, matrix: np.ndarray, output: bpy.types.Node) -> tuple[RGB | Node, shaders.Reading]:
+def emission(
+    light: bpy.types.Light, matrix: np.ndarray, output: bpy.types.Node, uv: UVMaker
+) -> tuple[RGB | Node, shaders.Reading]:
     """The factor of its light that a light's output is shown, and what that asks for, or why there is none."""
-    reader = LampReader(light, matrix)
+    reader = LampReader(light, matrix, uv)
     try:
         return reader.emission(Input(output.inputs["Surface"])), reader.reading
     except InputError as error:
         reader.reading.reasons.append(f"has nodes that are too much ({str(error).rpartition(': ')[0]})")
         return _WHITE, reader.reading
-
-
-def _affine(value: Node, scale: float, plus: float) -> Node:
-    return node("math", operation="multiply_add", a=value, b=scale, c=plus)
 
 
 def _constant(value: Colour | Node) -> tuple[RGB, float] | None:

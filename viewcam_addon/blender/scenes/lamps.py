@@ -1,4 +1,4 @@
-"""Blender's lights as the tracer's lamps.
+"""Blender's lights as the tracer's lamps, and the other way round: a class each.
 
 What the settings mean is Cycles' (light.cpp of intern/cycles/blender and of intern/cycles/scene): a light of the strength s, in
 watts for all but suns, has the radiance s/(π A) if it is normalised, else s/π; a sun the irradiance s, else the radiance s.
@@ -8,14 +8,16 @@ The position and the angles are the matrix's, the radius is not scaled with it.
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any, ClassVar
 
 import bpy
 import numpy as np
 
+from ...pinhole import Pinhole
 from ...tracer.scene.film import Bounces
 from ...tracer.scene.lamps import LEAST_SPREAD, Area, Lamp, Point, Spot, Sun
 from ...tracer.scene.materials import Picture
-from ...tracer.scene.shader_nodes import Node
+from ...tracer.scene.shader_nodes import Node, node
 from .. import versions
 from ..temporary_settings import Overrides
 from . import features, images, lamp_nodes, linking, nodes, shaders, shading
@@ -25,6 +27,179 @@ from .shaders import RGB
 _WHITE = (1.0, 1.0, 1.0)
 # Of the cosine between two axes of an area light; beyond it Cycles' own formulas contradict each other.
 _SHEAR = 1e-5
+
+
+class _Kind:
+    """One of Blender's lights as a lamp of the tracer, both ways.
+
+    lamp : what it is there. settings : of its numbers → Blender's property. size : the property that is above 0 where it has a
+    size.
+    """
+
+    lamp: type[Lamp]
+    settings: ClassVar[dict[str, str]]
+    size = "shadow_soft_size"
+
+    def values(self, light: bpy.types.Light, matrix: np.ndarray, strength: RGB) -> dict[str, Any]:
+        """Of the lamp: where it is, how strong it is, and its numbers."""
+        place = {"power": strength, "matrix": matrix}
+        return place | {ours: getattr(light, theirs) for ours, theirs in self.settings.items()}
+
+    def exported(
+        self, name: str, light: bpy.types.Light, matrix: np.ndarray, strength: RGB, common: dict[str, Any], ledger: Ledger
+    ) -> Lamp | None:
+        """The lamp, or None where there is no light. strength : in watts, or, where it is not normalised, by area."""
+        if not getattr(light, "normalize", True):
+            strength = _times(strength, self.area(light, matrix))
+        return self.lamp(name, **self.values(light, matrix, strength), **common)
+
+    def area(self, light: bpy.types.Light, matrix: np.ndarray) -> float:
+        """What a strength by area is times."""
+        radius = light.shadow_soft_size
+        return 4 * math.pi * radius**2 if radius > 0 else 4.0
+
+    def store(self, lamp: Any, data: bpy.types.Light, ledger: Ledger) -> np.ndarray:
+        """Give a new light the lamp's numbers; the (4, 4) matrix that it stands by."""
+        for ours, theirs in self.settings.items():
+            ledger.store(data, theirs, getattr(lamp, ours), lamp.name)
+        return lamp.to_world
+
+    def shown(self, light: bpy.types.Light) -> tuple[str, ...]:
+        """The properties that count in the picture, and no other kind of light has."""
+        return tuple(self.settings.values())
+
+    def uv(self, light: bpy.types.Light, inverse: np.ndarray) -> Node | None:
+        """What nodes find as its UV; None where that is not modelled. inverse : (4, 4), the world's space to the light's."""
+        raise NotImplementedError
+
+
+class _Sun(_Kind):
+    lamp, size, settings = Sun, "angle", {"angle": "angle"}
+
+    def values(self, light: bpy.types.Light, matrix: np.ndarray, strength: RGB) -> dict[str, Any]:
+        return {"irradiance": strength, "towards": tuple(matrix[:3, 2]), "angle": light.angle}
+
+    def area(self, light: bpy.types.Light, matrix: np.ndarray) -> float:
+        return math.pi * math.sin(light.angle / 2) ** 2 if light.angle > 0 else 1.0
+
+    def store(self, lamp: Sun, data: bpy.types.Light, ledger: Ledger) -> np.ndarray:
+        super().store(lamp, data, ledger)
+        u, v, _ = Pinhole(lamp.towards, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1.0, 1, 1).basis()
+        matrix = np.eye(4)
+        matrix[:3, :3] = np.column_stack([u, v, lamp.towards])
+        return matrix
+
+    def uv(self, light: bpy.types.Light, inverse: np.ndarray) -> Node | None:
+        return None
+
+
+class _Point(_Kind):
+    lamp, settings = Point, {"radius": "shadow_soft_size", "soft_falloff": "use_soft_falloff"}
+
+    def values(self, light: bpy.types.Light, matrix: np.ndarray, strength: RGB) -> dict[str, Any]:
+        values = super().values(light, matrix, strength)
+        return values | {"position": tuple(values.pop("matrix")[:3, 3])}
+
+    def uv(self, light: bpy.types.Light, inverse: np.ndarray) -> Node | None:
+        """Around it."""
+        x, y, z = _within(inverse, "normal")
+        length = node("vector_math", operation="length", a=node("combine_xyz", x=x, y=y, z=z))
+        across = _affine(node("math", operation="arctan2", a=x, b=y), -0.5 / math.pi, 0.5)
+        down = node("math", operation="arccosine", a=node("math", operation="divide", a=z, b=length))
+        return node("combine_xyz", x=across, y=_affine(down, -1.0 / math.pi, 1.0))
+
+
+class _Spot(_Kind):
+    lamp = Spot
+    settings = _Point.settings | {"angle": "spot_size", "blend": "spot_blend"}
+
+    def shown(self, light: bpy.types.Light) -> tuple[str, ...]:
+        return (*super().shown(light), "show_cone")
+
+    def uv(self, light: bpy.types.Light, inverse: np.ndarray) -> Node | None:
+        """Over its cone."""
+        x, y, z = _within(inverse, "incoming")
+        half = -0.5 / math.tan(light.spot_size / 2)
+        across, along = (_affine(node("math", operation="divide", a=each, b=z), half, 0.5) for each in (x, y))
+        return node("combine_xyz", x=across, y=along)
+
+
+class _Area(_Kind):
+    lamp, size, settings = Area, "size", {"spread": "spread"}
+
+    def sides(self, light: bpy.types.Light) -> tuple[float, float]:
+        return light.size, light.size if light.shape in ("SQUARE", "DISK") else light.size_y
+
+    def values(self, light: bpy.types.Light, matrix: np.ndarray, strength: RGB) -> dict[str, Any]:
+        shape = {"size": self.sides(light), "ellipse": light.shape in ("DISK", "ELLIPSE")}
+        spread = light.spread if light.spread >= LEAST_SPREAD else math.pi
+        return super().values(light, matrix, strength) | shape | {"spread": spread}
+
+    def area(self, light: bpy.types.Light, matrix: np.ndarray) -> float:
+        across, along = np.linalg.norm(matrix[:3, :2], axis=0) * self.sides(light)
+        return across * along * (math.pi / 4 if light.shape in ("DISK", "ELLIPSE") else 1.0)
+
+    def exported(
+        self, name: str, light: bpy.types.Light, matrix: np.ndarray, strength: RGB, common: dict[str, Any], ledger: Ledger
+    ) -> Lamp | None:
+        if light.cycles.is_portal:
+            return None
+        if not self.area(light, matrix) > 0:
+            ledger.note(name, "exported", "has no size and gives no light")
+            return None
+        lengths = np.linalg.norm(matrix[:3, :3], axis=0)
+        axes = matrix[:3, :3] / np.where(lengths > 0, lengths, 1.0)
+        if np.abs(axes.T @ axes - np.diag(np.diag(axes.T @ axes))).max() > _SHEAR:
+            ledger.note(name, "approximated", "is sheared, which Cycles takes for one shape here and another there")
+        if light.spread < LEAST_SPREAD:
+            ledger.note(name, "approximated", f"has a spread of {math.degrees(light.spread):.2g}°, 180° on both sides")
+            ledger.set_for_cycles(light.original, "spread", math.pi)
+        return super().exported(name, light, matrix, strength, common, ledger)
+
+    def store(self, lamp: Area, data: bpy.types.Light, ledger: Ledger) -> np.ndarray:
+        data.shape = "ELLIPSE" if lamp.ellipse else "RECTANGLE"
+        for name, value in zip(("size", "size_y"), lamp.size, strict=True):
+            ledger.store(data, name, value, lamp.name)
+        return super().store(lamp, data, ledger)
+
+    def shown(self, light: bpy.types.Light) -> tuple[str, ...]:
+        sides = ("size", "size_y") if light.shape in ("RECTANGLE", "ELLIPSE") else ("size",)
+        return ("shape", *sides, *super().shown(light))
+
+    def uv(self, light: bpy.types.Light, inverse: np.ndarray) -> Node | None:
+        """Over the whole of it."""
+        position = node("geometry")
+        across, along = (
+            node("math", operation="add", a=shaders.dot(position, row[:3] / (side or 1.0)), b=row[3] / (side or 1.0) + 0.5)
+            for row, side in zip(inverse, self.sides(light), strict=False)
+        )
+        return node("combine_xyz", x=across, y=along)
+
+
+KINDS: dict[str, _Kind] = {kind.lamp.kind.upper(): kind for kind in (_Sun(), _Point(), _Spot(), _Area())}
+"""Blender's type of a light → what it is to the tracer."""
+
+
+def light_from(lamp: Lamp, overrides: Overrides, ledger: Ledger) -> tuple[bpy.types.Light, np.ndarray]:
+    """The light, and the (4, 4) matrix that it stands by."""
+    type = lamp.kind.upper()
+    data = bpy.data.lights.new(lamp.name, type)
+    overrides.afterwards(bpy.data.batch_remove, [data])
+    largest = max(lamp.strength)
+    data.energy = largest
+    data.color = tuple(value / largest for value in lamp.strength) if largest else (1.0, 1.0, 1.0)
+    data.use_shadow = lamp.casts_shadow
+    return data, KINDS[type].store(lamp, data, ledger)
+
+
+def _within(inverse: np.ndarray, output: str) -> Iterator[Node]:
+    """The components of a direction of the geometry's in a light's space."""
+    way = node("geometry", output=output)
+    return (shaders.dot(way, row[:3]) for row in inverse[:3])
+
+
+def _affine(value: Node, scale: float, plus: float) -> Node:
+    return node("math", operation="multiply_add", a=value, b=scale, c=plus)
 
 
 def lamps_in(
@@ -44,58 +219,16 @@ def lamps_in(
             matrix = np.array(instance.matrix_world, dtype=np.float64)
             _note(name, light, bounces, ledger)
             factor, emission, reading = _emission(name, light, matrix, ledger)
-            lamp = _lamp(name, light, matrix, hidden_from, _strength(name, light, factor, ledger), ledger)
+            strength = _strength(name, light, factor, ledger)
+            if strength is None or not any(strength):
+                continue
+            common = {"hidden_from": hidden_from, "casts_shadow": light.use_shadow}
+            lamp = KINDS[light.type].exported(name, light, matrix, strength, common, ledger)
             if lamp is not None:
                 receivers, blockers = links.of(placed, ledger)
                 if pictures is not None and reading:
                     shading.add_pictures(reading, reading.alphas, pictures)
                 yield replace(lamp, receivers=receivers, blockers=blockers, emission=emission)
-
-
-def _lamp(
-    name: str, light: bpy.types.Light, matrix: np.ndarray, hidden_from: frozenset[str], strength: RGB | None, ledger: Ledger
-) -> Lamp | None:
-    """The lamp, or None where there is no light."""
-    if strength is None or not any(strength) or (light.type == "AREA" and light.cycles.is_portal):
-        return None
-    is_normalised = getattr(light, "normalize", True)
-    common = {"name": name, "hidden_from": hidden_from, "casts_shadow": light.use_shadow}
-    if light.type == "SUN":
-        if not is_normalised and light.angle > 0:
-            strength = _times(strength, math.pi * math.sin(light.angle / 2) ** 2)
-        return Sun(towards=tuple(matrix[:3, 2]), irradiance=strength, angle=light.angle, **common)
-    if light.type == "AREA":
-        return _area(light, matrix, strength, is_normalised, common, ledger)
-    radius = light.shadow_soft_size
-    if not is_normalised:
-        strength = _times(strength, 4 * math.pi * radius**2 if radius > 0 else 4.0)
-    common |= {"power": strength, "radius": radius, "soft_falloff": light.use_soft_falloff}
-    if light.type == "SPOT":
-        return Spot(matrix=matrix, angle=light.spot_size, blend=light.spot_blend, **common)
-    return Point(position=tuple(matrix[:3, 3]), **common)
-
-
-def _area(
-    light: bpy.types.Light, matrix: np.ndarray, strength: RGB, is_normalised: bool, common: dict, ledger: Ledger
-) -> Area | None:
-    name = common["name"]
-    size = (light.size, light.size if light.shape in ("SQUARE", "DISK") else light.size_y)
-    ellipse = light.shape in ("DISK", "ELLIPSE")
-    lengths = np.linalg.norm(matrix[:3, :3], axis=0)
-    area = lengths[0] * size[0] * lengths[1] * size[1] * (math.pi / 4 if ellipse else 1.0)
-    if not area > 0:
-        ledger.note(name, "exported", "has no size and gives no light")
-        return None
-    axes = matrix[:3, :3] / np.where(lengths > 0, lengths, 1.0)
-    if np.abs(axes.T @ axes - np.diag(np.diag(axes.T @ axes))).max() > _SHEAR:
-        ledger.note(name, "approximated", "is sheared, which Cycles takes for one shape here and another there")
-    spread = light.spread
-    if spread < LEAST_SPREAD:
-        ledger.note(name, "approximated", f"has a spread of {math.degrees(spread):.2g}°, 180° on both sides")
-        ledger.set_for_cycles(light.original, "spread", math.pi)
-        spread = math.pi
-    power = strength if is_normalised else _times(strength, area)
-    return Area(matrix=matrix, size=size, ellipse=ellipse, spread=spread, power=power, **common)
 
 
 def _strength(name: str, light: bpy.types.Light, emission: RGB, ledger: Ledger) -> RGB | None:
@@ -122,7 +255,7 @@ def _emission(
         return _WHITE, None, None
     for missing in images.missing(tree):
         ledger.note(name, "exported", missing)
-    emission, reading = lamp_nodes.emission(light, matrix, output)
+    emission, reading = lamp_nodes.emission(light, matrix, output, KINDS[light.type].uv)
     if reading.reasons:
         ledger.note(name, "approximated", f"{'; '.join(reading.reasons)}: plain light stands in")
         ledger.call_for_cycles(light.original, _make_plain)
@@ -141,16 +274,14 @@ def _note(name: str, light: bpy.types.Light, bounces: Bounces, ledger: Ledger) -
     if not settings.use_multiple_importance_sampling:  # then Cycles' rays pass through it unlit
         ledger.note(name, "approximated", "its multiple importance sampling is on on both sides")
         ledger.set_for_cycles(settings, "use_multiple_importance_sampling", True)
-    if not light.use_shadow and _size(light) > 0:  # then Cycles shows a part of its light behind what would block it
+    if (
+        not light.use_shadow and getattr(light, KINDS[light.type].size) > 0
+    ):  # then Cycles shows a part of its light behind what would block it
         ledger.note(name, "approximated", "casts no shadow although it has a size: Cycles shows less of it in the shadows")
     if light.cycles.max_bounces < bounces.total:
         ledger.note(name, "approximated", "its bounces are limited, and are not on both sides")
         ledger.set_for_cycles(settings, "max_bounces", 1024)
     ledger.set_for_cycles(settings, "is_caustics_light", False)
-
-
-def _size(light: bpy.types.Light) -> float:
-    return getattr(light, {"SUN": "angle", "AREA": "size"}.get(light.type, "shadow_soft_size"))
 
 
 def _times(rgb: RGB, factor: float) -> RGB:

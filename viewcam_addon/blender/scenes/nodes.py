@@ -112,10 +112,10 @@ class Adder:
     """Adds nodes to a tree, and takes them out again."""
 
     def __init__(self, tree: bpy.types.NodeTree) -> None:
-        self._tree, self._added = tree, []
-        self.values: dict[
-            object, bpy.types.Node
-        ] = {}  # the nodes that make values, by what they are, of which one of each will do
+        self._tree = tree
+        self._added: list[bpy.types.Node] = []
+        # The nodes that make values, by what they are, of which one of each will do.
+        self.values: dict[object, bpy.types.Node] = {}
 
     def add(self, kind: str, *linked: bpy.types.NodeSocket, **values: object) -> bpy.types.Node:
         """A node of this class. linked : outputs for its first inputs. values : of its inputs, by name."""

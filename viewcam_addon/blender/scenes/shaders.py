@@ -1,10 +1,9 @@
 """A Blender material as the tracer's: the shaders that its nodes are, or the nearest ones and why.
 
-What Emission, Lambert's Diffuse, a Principled BSDF whose gloss has no strength, and Glossy, Glass and Refraction BSDFs without
-roughness add up to is read as components, which a hand can change; whatever else is modelled, as a tree of shader nodes. Either
-with constants, textures, vertex colours and their products. Measured in 4.2, 4.5, 5.0 and 5.2: with a specular IOR level of 0,
-or an IOR of 1, a Principled BSDF gives the Diffuse BSDF's pixels to the last bit, whatever its roughness, anisotropy and tint,
-unless a weight or the thin film below is not 0.
+It is read as a tree of shader nodes, and where that is a sum of components (materials.components) as these, which a hand can
+change. What makes an input that does not count is not followed. Measured in 4.2, 4.5, 5.0 and 5.2: with a specular IOR level
+of 0, or an IOR of 1, a Principled BSDF gives the Diffuse BSDF's pixels to the last bit, whatever its roughness, anisotropy and
+tint, unless a weight or the thin film is not 0.
 
 What is not modelled is left out, and where nothing is left becomes a Lambert surface of its base colour. Then Cycles is shown
 the same for the time of a comparison (materials.stand_in): an approximation is never a difference between the two sides.
@@ -20,8 +19,9 @@ import numpy as np
 
 from ...errors import InputError
 from ...tracer.scene import ies
-from ...tracer.scene.materials import LARGEST_RADIANCE, PLAIN, Colour, Material, Picture
-from ...tracer.scene.shader_nodes import KINDS, Node
+from ...tracer.scene.materials import LARGEST_RADIANCE, PLAIN, Colour, Material, Picture, components
+from ...tracer.scene.shader_nodes import KINDS, Node, closures
+from ...tracer.scene.shader_nodes import node as _node
 from ...tracer.scene.value_nodes import GENERATED, INCOMING, NORMAL, OWN, POSITION, TANGENT, UV
 from .. import versions
 from . import images, nodes, value_nodes
@@ -29,18 +29,20 @@ from .nodes import Input, Output
 
 RGB = tuple[float, float, float]
 
-# What must be 0 for a Principled BSDF to be Lambert's; versions know fewer of them.
-_PRINCIPLED_ZERO = (
-    "Metallic",
-    "Diffuse Roughness",
-    "Subsurface Weight",
-    "Transmission Weight",
-    "Coat Weight",
-    "Sheen Weight",
-    "Thin Film Thickness",
-)
+# What counts only where one of these is not 0, by their names.
+_GLOSS = ("Metallic", "Transmission Weight", "Specular IOR Level")
+_ONLY_WITH: dict[str, dict[str, tuple[str, ...]]] = {
+    "glossy": dict.fromkeys(("Anisotropy", "Rotation", "Tangent"), ("Roughness",)),
+    "principled": {
+        **dict.fromkeys(("Roughness", "Specular Tint", "Anisotropic", "Anisotropic Rotation", "Tangent"), _GLOSS),
+        **dict.fromkeys(("Coat Roughness", "Coat IOR", "Coat Tint", "Coat Normal"), ("Coat Weight",)),
+        **dict.fromkeys(("Sheen Roughness", "Sheen Tint"), ("Sheen Weight",)),
+        "Emission Color": ("Emission Strength",),
+        "Thin Wall": ("Transmission Weight", "Subsurface Weight"),
+    },
+}
+_CLEAR_OR_MIRRORS = ("glossy", "glass", "refraction")  # without roughness, whatever their facets
 _WHITE, _ZERO = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
-_BLACK = Colour((0.0, 0.0, 0.0))
 _RAMP = 256  # Cycles looks ramps up in a table of one more
 _BESIDE = 1e-6  # of a pixel: where a step lies is the pixel's that it leads to
 # What Light Path says alike of rays that meet a light and of those that are sent to it.
@@ -144,18 +146,17 @@ def read(material: bpy.types.Material) -> Reading:
     output = tree and tree.get_output_node("CYCLES")
     if not output:
         return in_the_viewport(material)
-    viewport = in_the_viewport(material).material.diffuse
-    plain = _Components(viewport)
-    components = plain.surface(Input(output.inputs["Surface"]))
-    plain.reading.material = Material(**components, **({} if plain.ior is None else {"ior": plain.ior}))
-    shines = not components.get("emission", _BLACK).is_black
-    if not plain.reading.reasons:
-        return _displaced(plain.reading, material, output, shines)
-    tree = Tree(viewport, shines)
-    surface = tree.surface(Input(output.inputs["Surface"]))
-    tree.reading.material = Material(surface=surface, transparent_shadow=material.use_transparent_shadow)
-    is_plain = len(plain.reading.reasons) < len(tree.reading.reasons) or plain.reading.reasons == tree.reading.reasons
-    return _displaced(plain.reading if is_plain else tree.reading, material, output, shines)
+    viewport, of = in_the_viewport(material).material.diffuse, Input(output.inputs["Surface"])
+    reader = Tree(viewport)
+    surface = reader.surface(of)
+    shines = any(closure.node.is_shining for closure in closures(surface))
+    if shines:
+        reader = Tree(viewport, shines)
+        surface = reader.surface(of)
+    simple = components(surface)
+    of_tree = {"surface": surface, "transparent_shadow": material.use_transparent_shadow}
+    reader.reading.material = Material(**(of_tree if simple is None else simple))
+    return _displaced(reader.reading, material, output, shines)
 
 
 def _displaced(reading: Reading, material: bpy.types.Material, output: bpy.types.Node, shines: bool) -> Reading:
@@ -177,19 +178,53 @@ def in_the_viewport(material: bpy.types.Material) -> Reading:
     return Reading(Material(diffuse=Colour(possible(material.diffuse_color[:3]) or PLAIN.diffuse.rgb)))
 
 
-class _Reader:
-    """Follows the nodes to colours and numbers, and gathers what they ask for."""
+class Tree:
+    """Follows the nodes to a tree of shader nodes, and gathers what they ask for.
 
-    def __init__(self, viewport: Colour) -> None:
+    viewport : what stands in for a colour that is not modelled. shines : whether it gives off light.
+    """
+
+    def __init__(self, viewport: Colour, shines: bool = False) -> None:
         self.reading = Reading()
         self.viewport = viewport
+        self._shines = shines
+        self._is_beside = False  # whether values are asked for a little beside, too, as heights are
 
-    def _scaled(self, colour: Colour, factor: float) -> Colour:
-        rgb = possible(tuple(value * factor for value in colour.rgb))
-        if rgb is None:
-            self.reading.reasons.append(f"has a strength of {factor:g}")
-            return Colour((0.0, 0.0, 0.0))
-        return Colour(rgb, colour.image, colour.closest, colour.vertex)
+    def surface(self, of: Input | None) -> Node | None:
+        """The tracer's node, or None where there is no surface."""
+        source = of and nodes.source(of)
+        if not isinstance(source, Output):
+            return None
+        found = next(((ours, shader) for ours, shader in SHADERS.items() if shader.kind == source.node.type), None)
+        if found is None:
+            self._reason(source, "is not modelled")
+            name = next((name for name in ("Base Color", "Color") if name in source.node.inputs), None)
+            return Node("diffuse", (("color", self._colour(source, name) if name else self.viewport),))
+        ours, shader = found
+        for name, neutral in shader.neutral.items():
+            if _counts(source, ours, name):
+                self._want(source, name, neutral)
+        known = KINDS[ours].inputs
+        given: dict[str, object] = {}
+        for name, theirs in shader.inputs.items():
+            if not _counts(source, ours, theirs) and constant_colour(source, theirs) is None:
+                continue
+            if known[name] is TANGENT and not Node(ours, tuple(given.items())).is_stretched:
+                continue
+            if known[name] in OWN:
+                given |= self._normal(source, name, theirs)
+            elif known[name] is not None and source.input(theirs) is not None:
+                given[name] = self._input(source, theirs, known[name] if isinstance(known[name], float) else None)
+        if "rotation" in given and (constant_number(source, "Anisotropy") or 0.0) < 0.0:
+            given["rotation"] = _quarter_further(given["rotation"])
+        for name in (name for name, default in known.items() if default is None):
+            if (
+                ours == "add"
+                or given["factor"].varies
+                or given["factor"].rgb[0] not in {"first": (1.0,), "second": (0.0,)}[name]
+            ):
+                given[name] = self.surface(source.input(shader.inputs[name]))
+        return Node(ours, tuple((given | self._words(source, ours)).items()))
 
     def _colour(self, output: Output, name: str | int) -> Colour:
         rgb = constant_colour(output, name)
@@ -264,13 +299,6 @@ class _Reader:
         self.reading.vertex = output.node.layer_name
         return Colour(_WHITE, vertex=True)
 
-    def _number(self, output: Output, name: str | int, otherwise: float) -> float:
-        """A constant, or what stands in for what is none."""
-        value = constant_number(output, name)
-        if value is None:
-            self._reason(output, f"has a {output.node.inputs[name].name} that varies")
-        return otherwise if value is None else value
-
     def _want(self, output: Output, name: str, wanted: float) -> bool:
         """Whether an input has this value, or is none in this version; a reason is noted where it has another."""
         if output.input(name) is None:
@@ -284,144 +312,6 @@ class _Reader:
         reason = f"has a node {output.node.name!r} that {clause}"
         if reason not in self.reading.reasons:
             self.reading.reasons.append(reason)
-
-
-class _Components(_Reader):
-    """Reads shaders as sums of components."""
-
-    def __init__(self, viewport: Colour) -> None:
-        super().__init__(viewport)
-        self.ior: float | None = None
-
-    def surface(self, of: Input | None) -> dict[str, Colour]:
-        """Component of Material → its colour."""
-        source = of and nodes.source(of)
-        if not isinstance(source, Output):
-            return {}
-        for socket in source.node.inputs:
-            if "Normal" in socket.name and isinstance(nodes.source(Input(socket, source.groups)), Output):
-                self._reason(source, f"has a {socket.name} of its own")
-        read = {
-            "EMISSION": self._emission,
-            "BSDF_DIFFUSE": self._diffuse,
-            "BSDF_PRINCIPLED": self._principled,
-            "BSDF_GLOSSY": self._glossy,
-            "BSDF_GLASS": self._clear,
-            "BSDF_REFRACTION": self._clear,
-            "MIX_SHADER": self._mix,
-            "ADD_SHADER": self._add,
-        }.get(source.node.type, self._unknown)
-        return read(source)
-
-    def _emission(self, output: Output) -> dict[str, Colour]:
-        strength = self._number(output, "Strength", 1.0)
-        return {"emission": self._scaled(self._colour(output, "Color"), strength)}
-
-    def _diffuse(self, output: Output) -> dict[str, Colour]:
-        self._want(output, "Roughness", 0.0)
-        return {"diffuse": self._colour(output, "Color")}
-
-    def _principled(self, output: Output) -> dict[str, Colour]:
-        for name in _PRINCIPLED_ZERO:
-            self._want(output, name, 0.0)
-        self._want(output, "Alpha", 1.0)
-        if constant_number(output, "IOR") != 1.0:
-            self._want(output, "Specular IOR Level", 0.0)
-        found = {"diffuse": self._colour(output, "Base Color")}
-        strength = self._number(output, "Emission Strength", 1.0)
-        if strength:
-            found["emission"] = self._scaled(self._colour(output, "Emission Color"), strength)
-        return found
-
-    def _glossy(self, output: Output) -> dict[str, Colour]:
-        component = "mirror" if self._want(output, "Roughness", 0.0) else "diffuse"
-        return {component: self._colour(output, "Color")}
-
-    def _clear(self, output: Output) -> dict[str, Colour]:
-        self._want(output, "Roughness", 0.0)
-        self._want(output, "Thin Film Thickness", 0.0)
-        ior = self._number(output, "IOR", Material.ior)
-        if not 1e-3 <= ior <= 1e3:
-            self._reason(output, f"has an IOR of {ior:g}")
-            ior = Material.ior
-        if self.ior not in (None, ior):
-            self._reason(output, "has another IOR than the first")
-        else:
-            self.ior = ior
-        return {"glass" if output.node.type == "BSDF_GLASS" else "refraction": self._colour(output, "Color")}
-
-    def _mix(self, output: Output) -> dict[str, Colour]:
-        factor = min(max(self._number(output, 0, 0.5), 0.0), 1.0)
-        # The side without weight is not there: what is odd about it does not matter.
-        first = self.surface(output.input(1)) if factor < 1.0 else {}
-        second = self.surface(output.input(2)) if factor > 0.0 else {}
-        return self._sum(output, first, 1.0 - factor, second, factor)
-
-    def _add(self, output: Output) -> dict[str, Colour]:
-        return self._sum(output, self.surface(output.input(0)), 1.0, self.surface(output.input(1)), 1.0)
-
-    def _unknown(self, output: Output) -> dict[str, Colour]:
-        self._reason(output, "is not modelled")
-        name = next((name for name in ("Base Color", "Color") if name in output.node.inputs), None)
-        return {"diffuse": self._colour(output, name) if name else self.viewport}
-
-    def _sum(
-        self, output: Output, first: dict[str, Colour], weight: float, second: dict[str, Colour], other_weight: float
-    ) -> dict[str, Colour]:
-        total = {name: self._scaled(colour, weight) for name, colour in first.items()}
-        for name, colour in second.items():
-            colour = self._scaled(colour, other_weight)
-            before = total.get(name)
-            if before is None or before.is_black:
-                total[name] = colour
-            elif not colour.is_black:
-                if _pattern(before) != _pattern(colour):
-                    self._reason(output, f"adds two {name} colours that vary")
-                rgb = tuple(a + b for a, b in zip(before.rgb, colour.rgb, strict=True))
-                total[name] = Colour(rgb, before.image, before.closest, before.vertex)
-        return total
-
-
-class Tree(_Reader):
-    """Reads shaders as a tree of shader nodes."""
-
-    def __init__(self, viewport: Colour, shines: bool) -> None:
-        super().__init__(viewport)
-        self._shines = shines
-        self._is_beside = False  # whether values are asked for a little beside, too, as heights are
-
-    def surface(self, of: Input | None) -> Node | None:
-        """The tracer's node, or None where there is no surface."""
-        source = of and nodes.source(of)
-        if not isinstance(source, Output):
-            return None
-        found = next(((ours, shader) for ours, shader in SHADERS.items() if shader.kind == source.node.type), None)
-        if found is None:
-            self._reason(source, "is not modelled")
-            name = next((name for name in ("Base Color", "Color") if name in source.node.inputs), None)
-            return Node("diffuse", (("color", self._colour(source, name) if name else self.viewport),))
-        ours, shader = found
-        for name, neutral in shader.neutral.items():
-            self._want(source, name, neutral)
-        known = KINDS[ours].inputs
-        given: dict[str, object] = {}
-        for name, theirs in shader.inputs.items():
-            if known[name] is TANGENT and not Node(ours, tuple(given.items())).is_stretched:
-                continue
-            if known[name] in OWN:
-                given |= self._normal(source, name, theirs)
-            elif known[name] is not None and source.input(theirs) is not None:
-                given[name] = self._input(source, theirs, known[name] if isinstance(known[name], float) else None)
-        if ours == "glossy" and (constant_number(source, "Anisotropy") or 0.0) < 0.0:
-            given["rotation"] = _quarter_further(given["rotation"])
-        for name in (name for name, default in known.items() if default is None):
-            if (
-                ours == "add"
-                or given["factor"].varies
-                or given["factor"].rgb[0] not in {"first": (1.0,), "second": (0.0,)}[name]
-            ):
-                given[name] = self.surface(source.input(shader.inputs[name]))
-        return Node(ours, tuple((given | self._words(source, ours)).items()))
 
     def height(self, of: Input) -> Node | None:
         """What a displacement is along the normal, or None where it is the same everywhere or not modelled."""
@@ -483,7 +373,8 @@ class Tree(_Reader):
         for name, theirs in SHADERS[ours].words.items():
             word = getattr(output.node, theirs)
             known = [each for each in KINDS[ours].inputs[name] if word_of(each) == word]
-            if not known:
+            is_smooth = ours in _CLEAR_OR_MIRRORS and constant_number(output, "Roughness") == 0.0
+            if not known and not is_smooth:
                 self._reason(output, f"has the {name} {word}")
             found |= dict.fromkeys([name] if known else [], *known)
         return found
@@ -667,32 +558,28 @@ class Tree(_Reader):
         self.reading.tables[key] = Picture(pixels)
         closest = ramp.interpolation == "CONSTANT" and ramp.color_mode == "RGB"
         first = _BESIDE if closest else 0.5
-        return Node(
+        steps = _RAMP + 1
+        place = _node("math", operation="multiply_add", a=factor, b=_RAMP / steps, c=first / steps, clamp=False)
+        return _node(
             "image",
-            (
-                ("image", Colour(_WHITE, key)),
-                (
-                    "vector",
-                    Node(
-                        "math",
-                        (
-                            ("operation", "multiply_add"),
-                            ("a", factor),
-                            ("b", _RAMP / (_RAMP + 1)),
-                            ("c", first / (_RAMP + 1)),
-                            ("clamp", False),
-                        ),
-                    ),
-                ),
-                ("interpolation", "closest" if closest else "linear"),
-                ("extension", "extend"),
-                ("output", "alpha" if output.socket.name == "Alpha" else "color"),
-            ),
+            image=Colour(_WHITE, key),
+            vector=place,
+            interpolation="closest" if closest else "linear",
+            extension="extend",
+            output="alpha" if output.socket.name == "Alpha" else "color",
         )
 
 
-def _node(type: str, **inputs: object) -> Node:
-    return Node(type, tuple(inputs.items()))
+def _counts(output: Output, ours: str, theirs: str | int) -> bool:
+    """Whether what an input of a shader is given has a say."""
+    needed = _ONLY_WITH.get(ours, {}).get(theirs, ())
+    return not needed or not all(_is_zero(output, name) for name in needed)
+
+
+def _is_zero(output: Output, name: str) -> bool:
+    if name == "Specular IOR Level" and constant_number(output, "IOR") == 1.0:
+        return True
+    return constant_number(output, name) == 0.0
 
 
 def _along_normal(vector: Colour | Node) -> Node:
@@ -724,10 +611,6 @@ def _from_camera(output: str) -> Node:
     if output == "View Z Depth":
         return _node("separate", color=place, output="z")
     return _node("vector_math", operation="length" if output == "View Distance" else "normalize", a=place)
-
-
-def _pattern(colour: Colour) -> tuple:
-    return colour.image, colour.closest, colour.vertex
 
 
 def maps_plainly(node: bpy.types.Node) -> bool:

@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
 
 from ...tracer.scene.shader_nodes import KINDS
-from ...tracer.scene.value_nodes import LIGHT_PATH
+from ...tracer.scene.value_nodes import IES, IMAGE, LIGHT_PATH, NAME
 from .nodes import Output
 
 
@@ -32,423 +33,253 @@ class Value:
     before: dict[str, float] = field(default_factory=dict)
 
 
-def _same(*names: str) -> dict[str, str]:
-    return {name.lower().replace(" ", "_"): name for name in names}
-
-
 def _words(*names: str) -> dict[str, str | None]:
     return {name: name.lower().replace(" ", "_") for name in names}
 
 
-_COLOR = {"Color": None}
-_FACTOR_OR_COLOR = {"Color": "color", "Fac": "factor"}
+def _as_they_are(*names: str) -> dict[str, str]:
+    return {name: name for name in names}
+
+
+def _value(
+    ours: str, kind: str, name: str, outputs: dict[str, str | None], *, inputs: dict[str, str] | None = None, **more: Any
+) -> tuple[str, Value]:
+    """inputs : whose identifiers are others than our names, as titles. more : of `Value`."""
+    identifiers = {}
+    for each, default in KINDS[ours].inputs.items():
+        is_no_socket = isinstance(default, bool) or (isinstance(default, tuple) and isinstance(default[0], str))
+        if not (is_no_socket or default in (IMAGE, NAME, IES) or each in more.get("numbers", ()) or each in _OF_CURVES):
+            identifiers[each] = (inputs or {}).get(each, each.replace("_", " ").title())
+    return ours, Value(kind, f"ShaderNode{name}", identifiers, outputs, **more)
+
+
+_OF_CURVES = ("table", "least", "most")  # which are no sockets, but what is drawn
+_COLOR: dict[str, str | None] = {"Color": None}
+_FACTOR_OR_COLOR: dict[str, str | None] = {"Color": "color", "Fac": "factor"}
 VALUES: tuple[tuple[str, Value], ...] = (
-    (
+    _value(
         "image",
-        Value(
-            "TEX_IMAGE",
-            "ShaderNodeTexImage",
-            {"vector": "Vector"},
-            _words("Color", "Alpha"),
-            {"interpolation": "interpolation", "extension": "extension", "projection": "projection"},
-            numbers={"blend": "projection_blend"},
-        ),
+        "TEX_IMAGE",
+        "TexImage",
+        _words("Color", "Alpha"),
+        words=_as_they_are("interpolation", "extension", "projection"),
+        numbers={"blend": "projection_blend"},
     ),
-    (
-        "environment",
-        Value(
-            "TEX_ENVIRONMENT",
-            "ShaderNodeTexEnvironment",
-            {"vector": "Vector"},
-            _COLOR,
-            {"interpolation": "interpolation", "projection": "projection"},
-        ),
-    ),
-    (
+    _value("environment", "TEX_ENVIRONMENT", "TexEnvironment", _COLOR, words=_as_they_are("interpolation", "projection")),
+    _value(
         "texture_coordinate",
-        Value(
-            "TEX_COORD",
-            "ShaderNodeTexCoord",
-            {},
-            _words("UV", "Generated", "Object", "Normal", "Reflection", "Camera", "Window"),
-        ),
+        "TEX_COORD",
+        "TexCoord",
+        _words("UV", "Generated", "Object", "Normal", "Reflection", "Camera", "Window"),
     ),
-    (
+    _value(
         "attribute",
-        Value(
-            "ATTRIBUTE",
-            "ShaderNodeAttribute",
-            {},
-            {"Color": "color", "Vector": "vector", "Fac": "number", "Alpha": "alpha"},
-            names={"name": "attribute_name"},
-            fixed={"attribute_type": "GEOMETRY"},
-        ),
+        "ATTRIBUTE",
+        "Attribute",
+        {"Color": "color", "Vector": "vector", "Fac": "number", "Alpha": "alpha"},
+        fixed={"attribute_type": "GEOMETRY"},
+        names={"name": "attribute_name"},
     ),
-    (
-        "attribute",
-        Value(
-            "VERTEX_COLOR",
-            "ShaderNodeVertexColor",
-            {},
-            {"Color": "color", "Alpha": "alpha"},
-            names={"name": "layer_name"},
-        ),
-    ),
-    (
-        "attribute",
-        Value("UVMAP", "ShaderNodeUVMap", {}, {"UV": "vector"}, names={"name": "uv_map"}, fixed={"from_instancer": False}),
-    ),
-    (
-        "mapping",
-        Value(
-            "MAPPING",
-            "ShaderNodeMapping",
-            _same("Vector", "Location", "Rotation", "Scale"),
-            {"Vector": None},
-            {"kind": "vector_type"},
-        ),
-    ),
-    (
+    _value("attribute", "VERTEX_COLOR", "VertexColor", _words("Color", "Alpha"), names={"name": "layer_name"}),
+    _value("attribute", "UVMAP", "UVMap", {"UV": "vector"}, fixed={"from_instancer": False}, names={"name": "uv_map"}),
+    _value("mapping", "MAPPING", "Mapping", {"Vector": None}, words={"kind": "vector_type"}),
+    _value(
         "geometry",
-        Value(
-            "NEW_GEOMETRY",
-            "ShaderNodeNewGeometry",
-            {},
-            _words("Position", "Normal", "True Normal", "Incoming", "Backfacing", "Tangent", "Parametric"),
-        ),
+        "NEW_GEOMETRY",
+        "NewGeometry",
+        _words("Position", "Normal", "True Normal", "Incoming", "Backfacing", "Tangent", "Parametric"),
     ),
-    (
+    _value(
         "vector_rotate",
-        Value(
-            "VECTOR_ROTATE",
-            "ShaderNodeVectorRotate",
-            _same("Vector", "Center", "Axis", "Angle", "Rotation"),
-            {"Vector": None},
-            {"kind": "rotation_type"},
-            {"invert": "invert"},
-        ),
+        "VECTOR_ROTATE",
+        "VectorRotate",
+        {"Vector": None},
+        words={"kind": "rotation_type"},
+        flags=_as_they_are("invert"),
     ),
-    (
+    _value(
         "vector_transform",
-        Value(
-            "VECT_TRANSFORM",
-            "ShaderNodeVectorTransform",
-            {"vector": "Vector"},
-            {"Vector": None},
-            {"kind": "vector_type", "from": "convert_from", "to": "convert_to"},
-        ),
+        "VECT_TRANSFORM",
+        "VectorTransform",
+        {"Vector": None},
+        words={"kind": "vector_type", "from": "convert_from", "to": "convert_to"},
     ),
-    (
-        "light_path",
-        Value(
-            "LIGHT_PATH",
-            "ShaderNodeLightPath",
-            {},
-            _words(*(name.replace("_", " ").title() for name in LIGHT_PATH.split())),
-        ),
-    ),
-    (
+    _value("light_path", "LIGHT_PATH", "LightPath", _words(*(name.replace("_", " ").title() for name in LIGHT_PATH.split()))),
+    _value(
         "object_info",
-        Value(
-            "OBJECT_INFO",
-            "ShaderNodeObjectInfo",
-            {},
-            _words("Location", "Object Index", "Material Index", "Color", "Alpha", "Random"),
-        ),
+        "OBJECT_INFO",
+        "ObjectInfo",
+        _words("Location", "Object Index", "Material Index", "Color", "Alpha", "Random"),
     ),
-    (
+    _value(
         "tangent",
-        Value(
-            "TANGENT",
-            "ShaderNodeTangent",
-            {},
-            {"Tangent": None},
-            {"kind": "direction_type", "axis": "axis"},
-            names={"uv": "uv_map"},
-        ),
+        "TANGENT",
+        "Tangent",
+        {"Tangent": None},
+        words={"kind": "direction_type", "axis": "axis"},
+        names={"uv": "uv_map"},
     ),
-    (
+    _value(
         "normal_map",
-        Value(
-            "NORMAL_MAP",
-            "ShaderNodeNormalMap",
-            _same("Color", "Strength"),
-            {"Normal": None},
-            {"space": "space", "convention": "convention"},
-            names={"uv": "uv_map"},
-        ),
+        "NORMAL_MAP",
+        "NormalMap",
+        {"Normal": None},
+        words=_as_they_are("space", "convention"),
+        names={"uv": "uv_map"},
     ),
-    (
-        "bump",
-        Value(
-            "BUMP",
-            "ShaderNodeBump",
-            _same("Height", "Strength", "Distance", "Filter Width", "Normal"),
-            {"Normal": None},
-            flags={"invert": "invert"},
-            before={"filter_width": 1.0},
-        ),
-    ),
-    ("ies", Value("TEX_IES", "ShaderNodeTexIES", _same("Vector", "Strength"), {"Fac": None})),
-    ("fresnel", Value("FRESNEL", "ShaderNodeFresnel", {"ior": "IOR", "normal": "Normal"}, {"Fac": None})),
-    ("layer_weight", Value("LAYER_WEIGHT", "ShaderNodeLayerWeight", _same("Blend", "Normal"), _words("Fresnel", "Facing"))),
-    (
+    _value("bump", "BUMP", "Bump", {"Normal": None}, flags=_as_they_are("invert"), before={"filter_width": 1.0}),
+    _value("ies", "TEX_IES", "TexIES", {"Fac": None}),
+    _value("fresnel", "FRESNEL", "Fresnel", {"Fac": None}, inputs={"ior": "IOR"}),
+    _value("layer_weight", "LAYER_WEIGHT", "LayerWeight", _words("Fresnel", "Facing")),
+    _value(
         "math",
-        Value(
-            "MATH",
-            "ShaderNodeMath",
-            {"a": "Value", "b": "Value_001", "c": "Value_002"},
-            {"Value": None},
-            {"operation": "operation"},
-            {"clamp": "use_clamp"},
-        ),
+        "MATH",
+        "Math",
+        {"Value": None},
+        inputs={"a": "Value", "b": "Value_001", "c": "Value_002"},
+        words=_as_they_are("operation"),
+        flags={"clamp": "use_clamp"},
     ),
-    (
+    _value(
         "vector_math",
-        Value(
-            "VECT_MATH",
-            "ShaderNodeVectorMath",
-            {"a": "Vector", "b": "Vector_001", "c": "Vector_002", "scale": "Scale"},
-            {"Vector": None, "Value": None},
-            {"operation": "operation"},
-        ),
+        "VECT_MATH",
+        "VectorMath",
+        {"Vector": None, "Value": None},
+        inputs={"a": "Vector", "b": "Vector_001", "c": "Vector_002"},
+        words=_as_they_are("operation"),
     ),
-    (
+    _value(
         "map_range",
-        Value(
-            "MAP_RANGE",
-            "ShaderNodeMapRange",
-            _same("Value", "From Min", "From Max", "To Min", "To Max", "Steps"),
-            {"Result": None},
-            {"interpolation": "interpolation_type"},
-            {"clamp": "clamp"},
-            {"data_type": "FLOAT"},
-        ),
+        "MAP_RANGE",
+        "MapRange",
+        {"Result": None},
+        words={"interpolation": "interpolation_type"},
+        flags=_as_they_are("clamp"),
+        fixed={"data_type": "FLOAT"},
     ),
-    (
+    _value(
         "map_range_vector",
-        Value(
-            "MAP_RANGE",
-            "ShaderNodeMapRange",
-            {
-                "value": "Vector",
-                "from_min": "From_Min_FLOAT3",
-                "from_max": "From_Max_FLOAT3",
-                "to_min": "To_Min_FLOAT3",
-                "to_max": "To_Max_FLOAT3",
-                "steps": "Steps_FLOAT3",
-            },
-            {"Vector": None},
-            {"interpolation": "interpolation_type"},
-            {"clamp": "clamp"},
-            {"data_type": "FLOAT_VECTOR"},
-        ),
+        "MAP_RANGE",
+        "MapRange",
+        {"Vector": None},
+        inputs={
+            "value": "Vector",
+            "from_min": "From_Min_FLOAT3",
+            "from_max": "From_Max_FLOAT3",
+            "to_min": "To_Min_FLOAT3",
+            "to_max": "To_Max_FLOAT3",
+            "steps": "Steps_FLOAT3",
+        },
+        words={"interpolation": "interpolation_type"},
+        flags=_as_they_are("clamp"),
+        fixed={"data_type": "FLOAT_VECTOR"},
     ),
-    (
-        "clamp",
-        Value("CLAMP", "ShaderNodeClamp", _same("Value", "Min", "Max"), {"Result": None}, {"kind": "clamp_type"}),
+    _value("clamp", "CLAMP", "Clamp", {"Result": None}, words={"kind": "clamp_type"}),
+    _value("separate", "SEPXYZ", "SeparateXYZ", _words("X", "Y", "Z"), inputs={"color": "Vector"}),
+    _value(
+        "separate_color", "SEPARATE_COLOR", "SeparateColor", {"Red": "x", "Green": "y", "Blue": "z"}, words=_as_they_are("mode")
     ),
-    (
-        "separate",
-        Value("SEPXYZ", "ShaderNodeSeparateXYZ", {"color": "Vector"}, {"X": "x", "Y": "y", "Z": "z"}),
-    ),
-    (
-        "separate_color",
-        Value(
-            "SEPARATE_COLOR",
-            "ShaderNodeSeparateColor",
-            {"color": "Color"},
-            {"Red": "x", "Green": "y", "Blue": "z"},
-            {"mode": "mode"},
-        ),
-    ),
-    (
-        "combine_xyz",
-        Value("COMBXYZ", "ShaderNodeCombineXYZ", {"x": "X", "y": "Y", "z": "Z"}, {"Vector": None}),
-    ),
-    (
+    _value("combine_xyz", "COMBXYZ", "CombineXYZ", {"Vector": None}),
+    _value(
         "combine_color",
-        Value(
-            "COMBINE_COLOR",
-            "ShaderNodeCombineColor",
-            {"x": "Red", "y": "Green", "z": "Blue"},
-            _COLOR,
-            {"mode": "mode"},
-        ),
+        "COMBINE_COLOR",
+        "CombineColor",
+        _COLOR,
+        inputs={"x": "Red", "y": "Green", "z": "Blue"},
+        words=_as_they_are("mode"),
     ),
-    (
+    _value(
         "mix_color",
-        Value(
-            "MIX",
-            "ShaderNodeMix",
-            {"factor": "Factor_Float", "a": "A_Color", "b": "B_Color"},
-            {"Result_Color": None},
-            {"blend": "blend_type"},
-            {"clamp_factor": "clamp_factor", "clamp_result": "clamp_result"},
-            {"data_type": "RGBA"},
-        ),
+        "MIX",
+        "Mix",
+        {"Result_Color": None},
+        inputs={"factor": "Factor_Float", "a": "A_Color", "b": "B_Color"},
+        words={"blend": "blend_type"},
+        flags=_as_they_are("clamp_factor", "clamp_result"),
+        fixed={"data_type": "RGBA"},
     ),
-    (
+    _value(
         "mix_color",
-        Value(
-            "MIX_RGB",
-            "ShaderNodeMixRGB",
-            {"factor": "Fac", "a": "Color1", "b": "Color2"},
-            _COLOR,
-            {"blend": "blend_type"},
-            {"clamp_result": "use_clamp"},
-        ),
+        "MIX_RGB",
+        "MixRGB",
+        _COLOR,
+        inputs={"factor": "Fac", "a": "Color1", "b": "Color2"},
+        words={"blend": "blend_type"},
+        flags={"clamp_result": "use_clamp"},
     ),
-    (
+    _value(
         "mix_number",
-        Value(
-            "MIX",
-            "ShaderNodeMix",
-            {"factor": "Factor_Float", "a": "A_Float", "b": "B_Float"},
-            {"Result_Float": None},
-            {},
-            {"clamp_factor": "clamp_factor"},
-            {"data_type": "FLOAT"},
-        ),
+        "MIX",
+        "Mix",
+        {"Result_Float": None},
+        inputs={"factor": "Factor_Float", "a": "A_Float", "b": "B_Float"},
+        flags=_as_they_are("clamp_factor"),
+        fixed={"data_type": "FLOAT"},
     ),
-    (
+    _value(
         "mix_vector",
-        Value(
-            "MIX",
-            "ShaderNodeMix",
-            {"factor": "Factor_Float", "a": "A_Vector", "b": "B_Vector"},
-            {"Result_Vector": None},
-            {},
-            {"clamp_factor": "clamp_factor"},
-            {"data_type": "VECTOR", "factor_mode": "UNIFORM"},
-        ),
+        "MIX",
+        "Mix",
+        {"Result_Vector": None},
+        inputs={"factor": "Factor_Float", "a": "A_Vector", "b": "B_Vector"},
+        flags=_as_they_are("clamp_factor"),
+        fixed={"data_type": "VECTOR", "factor_mode": "UNIFORM"},
     ),
-    (
+    _value(
         "mix_components",
-        Value(
-            "MIX",
-            "ShaderNodeMix",
-            {"factor": "Factor_Vector", "a": "A_Vector", "b": "B_Vector"},
-            {"Result_Vector": None},
-            {},
-            {"clamp_factor": "clamp_factor"},
-            {"data_type": "VECTOR", "factor_mode": "NON_UNIFORM"},
-        ),
+        "MIX",
+        "Mix",
+        {"Result_Vector": None},
+        inputs={"factor": "Factor_Vector", "a": "A_Vector", "b": "B_Vector"},
+        flags=_as_they_are("clamp_factor"),
+        fixed={"data_type": "VECTOR", "factor_mode": "NON_UNIFORM"},
     ),
-    ("rgb_curves", Value("CURVE_RGB", "ShaderNodeRGBCurve", {"factor": "Fac", "color": "Color"}, _COLOR)),
-    (
-        "vector_curves",
-        Value("CURVE_VEC", "ShaderNodeVectorCurve", {"factor": "Fac", "vector": "Vector"}, {"Vector": None}),
-    ),
-    (
-        "float_curve",
-        Value("CURVE_FLOAT", "ShaderNodeFloatCurve", _same("Factor", "Value"), {"Value": None}),
-    ),
-    ("blackbody", Value("BLACKBODY", "ShaderNodeBlackbody", _same("Temperature"), _COLOR)),
-    ("wavelength", Value("WAVELENGTH", "ShaderNodeWavelength", _same("Wavelength"), _COLOR)),
-    ("gamma", Value("GAMMA", "ShaderNodeGamma", _same("Color", "Gamma"), _COLOR)),
-    (
-        "bright_contrast",
-        Value("BRIGHTCONTRAST", "ShaderNodeBrightContrast", _same("Color", "Bright", "Contrast"), _COLOR),
-    ),
-    (
-        "hue_saturation",
-        Value(
-            "HUE_SAT",
-            "ShaderNodeHueSaturation",
-            _same("Color", "Hue", "Saturation", "Value") | {"factor": "Fac"},
-            _COLOR,
-        ),
-    ),
-    ("invert", Value("INVERT", "ShaderNodeInvert", {"color": "Color", "factor": "Fac"}, _COLOR)),
-    (
+    _value("rgb_curves", "CURVE_RGB", "RGBCurve", _COLOR, inputs={"factor": "Fac"}),
+    _value("vector_curves", "CURVE_VEC", "VectorCurve", {"Vector": None}, inputs={"factor": "Fac"}),
+    _value("float_curve", "CURVE_FLOAT", "FloatCurve", {"Value": None}),
+    _value("blackbody", "BLACKBODY", "Blackbody", _COLOR),
+    _value("wavelength", "WAVELENGTH", "Wavelength", _COLOR),
+    _value("gamma", "GAMMA", "Gamma", _COLOR),
+    _value("bright_contrast", "BRIGHTCONTRAST", "BrightContrast", _COLOR),
+    _value("hue_saturation", "HUE_SAT", "HueSaturation", _COLOR, inputs={"factor": "Fac"}),
+    _value("invert", "INVERT", "Invert", _COLOR, inputs={"factor": "Fac"}),
+    _value(
         "noise",
-        Value(
-            "TEX_NOISE",
-            "ShaderNodeTexNoise",
-            _same("Vector", "W", "Scale", "Detail", "Roughness", "Lacunarity", "Offset", "Gain", "Distortion"),
-            _FACTOR_OR_COLOR,
-            {"dimensions": "noise_dimensions", "kind": "noise_type"},
-            {"normalize": "normalize"},
-        ),
+        "TEX_NOISE",
+        "TexNoise",
+        _FACTOR_OR_COLOR,
+        words={"dimensions": "noise_dimensions", "kind": "noise_type"},
+        flags=_as_they_are("normalize"),
     ),
-    (
-        "white_noise",
-        Value(
-            "TEX_WHITE_NOISE",
-            "ShaderNodeTexWhiteNoise",
-            _same("Vector", "W"),
-            _words("Value", "Color"),
-            {"dimensions": "noise_dimensions"},
-        ),
+    _value(
+        "white_noise", "TEX_WHITE_NOISE", "TexWhiteNoise", _words("Value", "Color"), words={"dimensions": "noise_dimensions"}
     ),
-    (
-        "checker",
-        Value("TEX_CHECKER", "ShaderNodeTexChecker", _same("Vector", "Color1", "Color2", "Scale"), _FACTOR_OR_COLOR),
-    ),
-    (
-        "gradient",
-        Value(
-            "TEX_GRADIENT",
-            "ShaderNodeTexGradient",
-            _same("Vector"),
-            {"Color": None, "Fac": None},
-            {"kind": "gradient_type"},
-        ),
-    ),
-    (
+    _value("checker", "TEX_CHECKER", "TexChecker", _FACTOR_OR_COLOR),
+    _value("gradient", "TEX_GRADIENT", "TexGradient", {"Color": None, "Fac": None}, words={"kind": "gradient_type"}),
+    _value(
         "wave",
-        Value(
-            "TEX_WAVE",
-            "ShaderNodeTexWave",
-            _same("Vector", "Scale", "Distortion", "Detail", "Detail Scale", "Detail Roughness", "Phase Offset"),
-            {"Color": None, "Fac": None},
-            {"kind": "wave_type", "bands": "bands_direction", "rings": "rings_direction", "profile": "wave_profile"},
-        ),
+        "TEX_WAVE",
+        "TexWave",
+        {"Color": None, "Fac": None},
+        words={"kind": "wave_type", "bands": "bands_direction", "rings": "rings_direction", "profile": "wave_profile"},
     ),
-    (
-        "magic",
-        Value(
-            "TEX_MAGIC",
-            "ShaderNodeTexMagic",
-            _same("Vector", "Scale", "Distortion"),
-            _FACTOR_OR_COLOR,
-            numbers={"depth": "turbulence_depth"},
-        ),
-    ),
-    (
+    _value("magic", "TEX_MAGIC", "TexMagic", _FACTOR_OR_COLOR, numbers={"depth": "turbulence_depth"}),
+    _value(
         "brick",
-        Value(
-            "TEX_BRICK",
-            "ShaderNodeTexBrick",
-            _same(
-                "Vector",
-                "Color1",
-                "Color2",
-                "Mortar",
-                "Scale",
-                "Mortar Size",
-                "Mortar Smooth",
-                "Bias",
-                "Brick Width",
-                "Row Height",
-            ),
-            _FACTOR_OR_COLOR,
-            numbers={name: name for name in ("offset", "offset_frequency", "squash", "squash_frequency")},
-        ),
+        "TEX_BRICK",
+        "TexBrick",
+        _FACTOR_OR_COLOR,
+        numbers=_as_they_are("offset", "offset_frequency", "squash", "squash_frequency"),
     ),
-    (
+    _value(
         "voronoi",
-        Value(
-            "TEX_VORONOI",
-            "ShaderNodeTexVoronoi",
-            _same("Vector", "W", "Scale", "Detail", "Roughness", "Lacunarity", "Smoothness", "Exponent", "Randomness"),
-            _words("Distance", "Color", "Position", "W", "Radius"),
-            {"dimensions": "voronoi_dimensions", "feature": "feature", "metric": "distance"},
-            {"normalize": "normalize"},
-        ),
+        "TEX_VORONOI",
+        "TexVoronoi",
+        _words("Distance", "Color", "Position", "W", "Radius"),
+        words={"dimensions": "voronoi_dimensions", "feature": "feature", "metric": "distance"},
+        flags=_as_they_are("normalize"),
     ),
-    ("rgb_to_bw", Value("RGBTOBW", "ShaderNodeRGBToBW", {"color": "Color"}, {"Val": None})),
+    _value("rgb_to_bw", "RGBTOBW", "RGBToBW", {"Val": None}),
 )
 """What we call each, and what it is; of what is one thing to us the first is made."""
 

@@ -18,7 +18,7 @@ from ...tracer.scene.lamps import RAYS, Sun, World
 from ...tracer.scene.materials import Picture
 from .. import another_blender, versions
 from ..temporary_settings import Overrides
-from . import images, import_light, nodes
+from . import images, import_light, lamps, nodes
 from .ledger import Ledger
 from .nodes import Input, Output
 
@@ -119,7 +119,7 @@ def show(overrides: Overrides, world: bpy.types.World, scene: bpy.types.Scene, m
     shown = {name: images.image_of(picture, name, overrides, packed=False) for name, picture in made.pictures.items()}
     import_light.add_world(adder, output, made.world, shown)
     for sun in made.suns:
-        data, matrix = import_light.light_from(sun, overrides, ledger)
+        data, matrix = lamps.light_from(sun, overrides, ledger)
         block = bpy.data.objects.new(sun.name, data)
         overrides.afterwards(bpy.data.batch_remove, [block])
         block.matrix_world = matrix.T.tolist()

@@ -35,14 +35,14 @@ typedef struct {
 /* What an image's numbers are; whole ones are shares of 255 and 65535. */
 enum ViewcamTexel { VIEWCAM_FLOAT, VIEWCAM_HALF, VIEWCAM_BYTE, VIEWCAM_SHORT };
 enum ViewcamFilter { VIEWCAM_BOX, VIEWCAM_BLACKMAN_HARRIS, VIEWCAM_GAUSSIAN };
-enum ViewcamLampKind { VIEWCAM_SUN, VIEWCAM_POINT, VIEWCAM_SPOT, VIEWCAM_RECTANGLE, VIEWCAM_ELLIPSE };
 /* matrix: (3, 4), the lamp's space to the world's; a sun is seen towards its z. color: irradiance of a sun, power of others.
- * angle: of a sun's disc, a spot's cone, and the cone that a flat one shines into.
+ * kind: its name, and the numbers that such a lamp has.
  * receivers: a bit of ViewcamObject's lit_by, or all. shadow_rays: of which kind, a bit of `visible`. */
 typedef struct {
-    int32_t kind, soft, casts_shadow;
+    ViewcamNode kind;
+    int32_t casts_shadow;
     uint32_t hidden_from;
-    double matrix[12], color[3], radius, angle, blend, size[2];
+    double matrix[12], color[3];
     uint64_t receivers;
     uint32_t shadow_rays;
 } ViewcamLamp;

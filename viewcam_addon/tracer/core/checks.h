@@ -92,10 +92,12 @@ inline void material(const Scene& scene, const ViewcamClosure* closures, int cou
     }
 }
 inline void lamp(const ViewcamLamp& given) {
-    that(given.kind >= VIEWCAM_SUN && given.kind <= VIEWCAM_ELLIPSE, "a lamp is of no kind");
     that(all_within(given.matrix, 12, -LARGEST, LARGEST), "a lamp has a matrix with too large a number, or none");
-    that(all_finite(given.color, 3) && all_within(given.size, 2, 0, LARGEST), "a lamp has a colour or a size that is no number");
-    for (double value : {given.radius, given.angle, given.blend}) that(value >= 0 && value <= LARGEST, "a lamp has a size that is no number");
+    that(all_finite(given.color, 3), "a lamp has a colour that is no number");
+    for (int i = 0; i < given.kind.input_count; i++) {
+        const ViewcamColor& input = given.kind.inputs[i].color;
+        that(all_within(input.rgb, 3, 0, LARGEST) && input.node < 0, "a lamp has a size that is no number");
+    }
 }
 inline void film(const ViewcamFilm& given) {
     for (const ViewcamWorld& world : {given.world, given.backdrop}) {

@@ -6,20 +6,17 @@
 #include "film/film.h"
 #include "film/filter.h"
 #include "lights/environment.h"
+#include "lights/lamps.h"
 #include "material.h"
 #include "nodes/value_node.h"
 
 namespace viewcam::VIEWCAM_ISA {
 
-// A lamp in world space, as capi.h has it.
 struct Lamp {
-    enum Kind { SUN, POINT, SPOT, RECTANGLE, ELLIPSE } kind = SUN;
-    Affine to_world;  // the lamp's own space to the world's; a sun is seen towards its z
-    Vec3 color;       // irradiance of a sun, power of all others
-    Color emission{{1, 1, 1}};  // what that is multiplied by, at each place of the lamp and in each direction
-    double radius = 0, angle = 0, blend = 0;
-    Vec2 size;
-    bool soft = false, casts_shadow = true;
+    LampOr<> kind;  // in rendering space
+    Vec3 middle;
+    Color emission{{1, 1, 1}};  // what its light is multiplied by, at each place of the lamp and in each direction
+    bool casts_shadow = true;
     uint32_t hidden_from = 0;
     uint64_t receivers = ~0ull;    // which of the sets that objects are in it lights
     RayKind shadow_rays = SHADOW;  // of its own blockers, where it has such

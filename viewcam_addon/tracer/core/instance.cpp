@@ -36,7 +36,6 @@ template <class Work> int guarded(const Work& work) {
 Scene& scene_of(ViewcamScene* scene) { return *reinterpret_cast<Scene*>(scene); }
 const Scene& scene_of(const ViewcamScene* scene) { return *reinterpret_cast<const Scene*>(scene); }
 const TileSampler& light_of(const ViewcamLight* light) { return *reinterpret_cast<const TileSampler*>(light); }
-Vec3 vector(const double* v) { return {v[0], v[1], v[2]}; }
 
 Ray ray_of(const double* row) { return {vector(row), vector(row + 3), row[6], row[7]}; }
 Camera camera_of(const ViewcamCamera& given) {

@@ -5,6 +5,8 @@
 
 namespace viewcam::VIEWCAM_ISA {
 
+inline Vec3 vector(const double* v) { return {v[0], v[1], v[2]}; }
+
 inline void add_texture(Scene& scene, int width, int height, int channels, bool srgb, int texel, const void* pixels) {
     scene.illumination.textures.push_back({width, height, srgb, pixels, channels, Texel(texel)});
 }
@@ -26,7 +28,7 @@ inline void add_node(Scene& scene, const ViewcamNode& given) {
 }
 inline WeightedClosure closure_of(const ViewcamClosure& given, const ValueNodes& nodes) {
     Inputs inputs = inputs_of(given.node, nodes);
-    WeightedClosure made{closure_of(given.node.name, inputs), {}, nodes.need_tangents(inputs)};
+    WeightedClosure made{of_name<Closure>("closure", given.node.name, inputs), {}, nodes.need_tangents(inputs)};
     for (int i = 0; i < given.factor_count; i++) {
         made.factors.push_back({color_of(given.factors[i].value, nodes), bool(given.factors[i].rest)});
         made.on_tangents |= nodes.need_tangents(Inputs({{"", "", made.factors.back().value}}));
@@ -43,20 +45,23 @@ inline void add_material(Scene& scene, const ViewcamClosure* closures, int count
     scene.illumination.materials.push_back(std::move(material));
 }
 
-inline Lamp lamp_of(const ViewcamLamp& given) {
-    Lamp lamp;
-    lamp.kind = Lamp::Kind(given.kind), lamp.color = {given.color[0], given.color[1], given.color[2]};
-    for (int i = 0; i < 12; i++) lamp.to_world.m[i / 4][i % 4] = given.matrix[i];
-    lamp.radius = given.radius, lamp.angle = given.angle, lamp.blend = given.blend, lamp.size = {given.size[0], given.size[1]};
-    lamp.soft = given.soft, lamp.casts_shadow = given.casts_shadow, lamp.hidden_from = given.hidden_from;
+// In rendering space, whose origin is given in the world's.
+inline Lamp lamp_of(const ViewcamLamp& given, Vec3 color, Vec3 origin) {
+    Affine placed;
+    for (int i = 0; i < 12; i++) placed.m[i / 4][i % 4] = given.matrix[i];
+    placed.m[0][3] -= origin.x, placed.m[1][3] -= origin.y, placed.m[2][3] -= origin.z;
+    Lamp lamp{of_name<LampOr<>>("lamp", given.kind.name, placed, color, inputs_of(given.kind, {})), placed.translation()};
+    lamp.casts_shadow = given.casts_shadow, lamp.hidden_from = given.hidden_from;
     lamp.receivers = given.receivers, lamp.shadow_rays = RayKind(given.shadow_rays);
     return lamp;
 }
 inline void add_lamp(Scene& scene, const ViewcamLamp& given, const ViewcamColor& emission) {
-    Lamp lamp = lamp_of(given);
-    lamp.emission = color_of(emission, scene.illumination.nodes);
-    if (!lamp.emission.varies()) lamp.color *= Vec3{larger(lamp.emission.rgb.x, 0), larger(lamp.emission.rgb.y, 0), larger(lamp.emission.rgb.z, 0)};
-    if (!is_black(lamp.color)) scene.illumination.lamps.push_back(lamp);
+    Vec3 color = vector(given.color);
+    Color factor = color_of(emission, scene.illumination.nodes);
+    if (!factor.varies()) color *= Vec3{larger(factor.rgb.x, 0), larger(factor.rgb.y, 0), larger(factor.rgb.z, 0)};
+    if (is_black(color)) return;
+    scene.illumination.lamps.push_back(lamp_of(given, color, scene.origin));
+    scene.illumination.lamps.back().emission = factor;
 }
 
 inline Environment environment_of(const ViewcamWorld& given, uint32_t hidden_from, const std::vector<Texture>& textures, int threads) {
@@ -119,7 +124,6 @@ inline void function(int which, size_t count, const double* a, const double* b, 
 // given: (count, 9), incoming, normal, shading. out: (count, 9), the bent normal, where a mirror and where a surface of that ratio
 // sends the ray.
 inline void specular(double ratio, size_t count, const double* given, double* out) {
-    auto vector = [](const double* v) { return Vec3{v[0], v[1], v[2]}; };
     for (size_t i = 0; i < count; i++) {
         Interaction point;
         Vec3 incoming = vector(given + 9 * i);
@@ -132,7 +136,7 @@ inline void specular(double ratio, size_t count, const double* given, double* ou
 // given: (count, 8), position, normal, u. out: (count, 11), direction, distance, weight, pdf, pdf_li of the direction, cosine,
 // estimate.
 inline void sample_light(const ViewcamLamp& lamp, size_t count, const double* given, double* out) {
-    Light light = light_of(lamp_of(lamp), {});
+    Light light = light_of(lamp_of(lamp, vector(lamp.color), {}));
     for (size_t i = 0; i < count; i++, given += 8, out += 11) {
         Interaction from;
         from.position = {given[0], given[1], given[2]};
@@ -146,7 +150,7 @@ inline void sample_light(const ViewcamLamp& lamp, size_t count, const double* gi
 }
 // given: (count, 9), origin, direction, nearest and farthest distance, whether the ray escapes. out: (count, 3).
 inline void light_le(const ViewcamLamp& lamp, size_t count, const double* given, double* out) {
-    Light light = light_of(lamp_of(lamp), {});
+    Light light = light_of(lamp_of(lamp, vector(lamp.color), {}));
     for (size_t i = 0; i < count; i++, given += 9, out += 3) {
         Vec3 radiance = light.le({{given[0], given[1], given[2]}, {given[3], given[4], given[5]}, given[6], given[7], given[8] != 0});
         out[0] = radiance.x, out[1] = radiance.y, out[2] = radiance.z;

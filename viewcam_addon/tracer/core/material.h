@@ -4,22 +4,9 @@
 #include <variant>
 #include <vector>
 
-#include "closures/diffuse.h"
-#include "closures/emission.h"
-#include "closures/glass.h"
-#include "closures/glossy.h"
-#include "closures/metallic.h"
-#include "closures/principled.h"
-#include "closures/sheen.h"
-#include "closures/transparent.h"
+#include "closures/closures.h"
 
 namespace viewcam::VIEWCAM_ISA {
-
-// One line a closure. Each has a NAME, by which a scene asks for it, KINDS, the kinds of rays that its lobes scatter, and `add_to`;
-// `kinds` where its inputs leave some of them out, `is_rough` where it may spread light otherwise than diffuse surfaces do,
-// `mean_emission` and `shines_evenly` where it shines, `lets_through` where light may go straight through it.
-using Closure = std::variant<DiffuseClosure, GlossyClosure, GlassClosure, RefractionClosure, EmissionClosure, TranslucentClosure, MetallicClosure,
-                             PrincipledClosure, SheenClosure, TransparentClosure>;
 
 // A factor of a closure's weight, from 0 to 1: a mixture's, or what it leaves to the other side.
 struct MixFactor {
@@ -31,16 +18,6 @@ struct WeightedClosure {
     std::vector<MixFactor> factors;
     bool on_tangents = false;  // whether its inputs ask for the tangents of a UV map
 };
-
-// The closure of this name; std::invalid_argument if there is none.
-template <size_t I = 0> Closure closure_of(std::string_view name, const Inputs& inputs) {
-    if constexpr (I == std::variant_size_v<Closure>) {
-        throw std::invalid_argument("no closure is called " + std::string(name));
-    } else {
-        using Kind = std::variant_alternative_t<I, Closure>;
-        return name == Kind::NAME ? Closure(Kind(inputs)) : closure_of<I + 1>(name, inputs);
-    }
-}
 
 struct Material {
     std::vector<WeightedClosure> closures;

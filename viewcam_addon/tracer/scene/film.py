@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from ... import checks
 from ...errors import InputError
+from . import values
 
 FILTERS = ("BOX", "BLACKMAN_HARRIS", "GAUSSIAN")
 
@@ -28,6 +29,18 @@ def seeds(level: str, samples: int) -> int:
     return 1 if level == LEVELS[0] else max(min(_SEEDS, samples // 2), 1)
 
 
+def _filter(_: str, name: object) -> object:
+    if name not in FILTERS:
+        raise InputError(f"the pixel filter is {checks.shown(name)}: give one of {', '.join(FILTERS)}")
+    return name
+
+
+def _bounces(name: str, value: object) -> object:
+    if type(value) is not int or not 0 <= value <= 1024:
+        raise InputError(f"{name} is {checks.shown(value)}: give a whole number from 0 to 1024")
+    return value
+
+
 @dataclass(frozen=True)
 class Film:
     """filter : over which pixels spread their samples. filter_width : pixels, as Cycles counts
@@ -36,17 +49,13 @@ class Film:
     transparent : whether the world behind the scene leaves pixels see-through. exposure : factor on all light.
     """
 
-    filter: str = "BLACKMAN_HARRIS"
-    filter_width: float = 1.5
-    transparent: bool = False
-    exposure: float = 1.0
+    filter: str = values.value("BLACKMAN_HARRIS", _filter, "text")
+    filter_width: float = values.number(1.5, 0.001, 10.0)
+    transparent: bool = values.truth(False)
+    exposure: float = values.number(1.0, most=1e6)
 
     def __post_init__(self) -> None:
-        if self.filter not in FILTERS:
-            raise InputError(f"the pixel filter is {checks.shown(self.filter)}: give one of {', '.join(FILTERS)}")
-        object.__setattr__(self, "filter_width", checks.number("filter_width", self.filter_width, 0.001, 10.0))
-        object.__setattr__(self, "transparent", checks.truth("transparent", self.transparent))
-        object.__setattr__(self, "exposure", checks.number("exposure", self.exposure, 0.0, 1e6))
+        values.check(self)
 
 
 @dataclass(frozen=True)
@@ -54,17 +63,14 @@ class Bounces:
     """How often light is scattered before it must reach a lamp: in all, and by each kind of surface; 0 is light that comes
     straight from a lamp. transparent : how often it may go straight through a surface. Cycles' own counting and defaults."""
 
-    total: int = 12
-    diffuse: int = 4
-    glossy: int = 4
-    transmission: int = 12
-    transparent: int = 8
+    total: int = values.value(12, _bounces, "whole", 0)
+    diffuse: int = values.value(4, _bounces, "whole", 0)
+    glossy: int = values.value(4, _bounces, "whole", 0)
+    transmission: int = values.value(12, _bounces, "whole", 0)
+    transparent: int = values.value(8, _bounces, "whole", 0)
 
     def __post_init__(self) -> None:
-        for name in ("total", "diffuse", "glossy", "transmission", "transparent"):
-            value = getattr(self, name)
-            if type(value) is not int or not 0 <= value <= 1024:
-                raise InputError(f"{name} of the bounces is {checks.shown(value)}: give a whole number from 0 to 1024")
+        values.check(self, "the bounces")
 
     @property
     def none(self) -> "Bounces":

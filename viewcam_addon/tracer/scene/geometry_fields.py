@@ -1,6 +1,7 @@
 """Geometries as a scene file has them: meshes, spheres, and the planes that a hand writes."""
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +41,7 @@ def array_document(array: NDArray, key: str, arrays: dict[str, NDArray]) -> list
 def geometry(field: Field, arrays: Arrays) -> Mesh | Spheres:
     """The geometry that a field holds."""
     kind = field.fields(("type",), others=True)["type"]
-    readers = {"mesh": _mesh, "spheres": _spheres, "plane": _plane}
+    readers: dict[str, Callable[[Field, Arrays], Mesh | Spheres]] = {"mesh": _mesh, "spheres": _spheres, "plane": _plane}
     if kind.text() not in readers:
         kind.fail(f"is {shown(kind.value)}: give one of {', '.join(readers)}")
     try:

@@ -1,4 +1,4 @@
-"""Lamps and the world, as data. What they do to a surface is computed in emitters.py.
+"""Lamps and the world, as data. What they do to a surface stands in core/lights/lamps.h.
 
 All quantities are what Cycles makes of Blender's settings, colour, strength, exposure and temperature multiplied out: for each
 of red, green and blue the irradiance of a sun on what faces it, and the power P of any other lamp. One with the area A has the
@@ -11,8 +11,8 @@ hidden_from : which rays don't see the lamp itself, of "camera", "diffuse", "glo
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ... import checks
 from ...checks import shown
 from ...errors import InputError
-from .materials import radiance
+from . import values
 from .shader_nodes import Node
 
 RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
@@ -29,16 +29,68 @@ RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
 MOST_LINKS = {"receivers": 64, "blockers": 27}
 """How many different sets of objects the lamps of a scene may have: bits of the core's numbers. Blender's own limit is 64."""
 
-# Of coordinates and sizes: as of scenes, products of a few of them are float64's.
-LARGEST = 1e18
-
 LEAST_SPREAD = 1e-3
 """Radians; what is less spread is nearly a beam, whose light would be found by chance alone."""
+
+_UNIT = 2.0**-50  # what is a unit vector stays one, to the last bit
+
+
+def hidden_from(name: str, rays: Collection[str]) -> frozenset[str]:
+    """The kinds of rays that something is hidden from; InputError with its `name` where there is no such kind."""
+    unknown = sorted(set(rays) - set(RAYS))
+    if unknown:
+        raise InputError(f"{name} is hidden from {shown(unknown[0])}: give some of {', '.join(RAYS)}")
+    return frozenset(rays)
+
+
+def _hidden(name: str, rays: Collection[str]) -> frozenset[str]:
+    return hidden_from(name.removeprefix("hidden_from of "), rays)
+
+
+def _linked(name: str, objects: Collection[str] | None) -> frozenset[str] | None:
+    return None if objects is None else frozenset(objects)
+
+
+def _emission(name: str, node: Node | None) -> Node | None:
+    if node is not None and not node.is_value:
+        raise InputError(f"the {name} is a shader {node.type!r}: give a node that makes a colour")
+    return node
+
+
+def _direction(name: str, value: object) -> tuple[float, ...]:
+    towards = checks.vector(name, value, 3)
+    largest = max(map(abs, towards))
+    if not largest > 0:
+        raise InputError(f"{name} is 0, 0, 0: give the direction to the sun")
+    if abs(math.hypot(*towards) - 1) > _UNIT:
+        towards = tuple(component / largest for component in towards)
+        towards = tuple(component / math.hypot(*towards) for component in towards)
+    return towards
+
+
+def _position(name: str, value: object) -> tuple[float, ...]:
+    position = checks.vector(name, value, 3)
+    if max(map(abs, position)) > values.LARGEST:
+        raise InputError(f"{name} is {shown(position)}: give numbers below {values.LARGEST:g}")
+    return position
+
+
+def _matrix(name: str, value: Any) -> Any:
+    if np.shape(value) != (4, 4) or not (np.abs(value) <= values.LARGEST).all():
+        raise InputError(f"the {name} must be 4 × 4 numbers below {values.LARGEST:g}: check its transform")
+    return value
+
+
+def _size(name: str, value: object) -> tuple[float, ...]:
+    size = checks.vector(name, value, 2)
+    if not all(0 <= side <= values.LARGEST for side in size):
+        raise InputError(f"{name} is {shown(size)}: give two numbers from 0 to {values.LARGEST:g}")
+    return size
 
 
 @dataclass(frozen=True, eq=False)
 class Lamp:
-    """What all lamps have.
+    """What all lamps have. A kind declares where it is, how strong, and then the numbers that the core's lamp of its name has.
 
     casts_shadow : whether objects can stand in its light. receivers : names of the objects that it lights; blockers : of those
     that can stand in its light; None is all objects. The eye sees a lamp whatever it lights. emission : a node that makes what
@@ -46,46 +98,41 @@ class Lamp:
     world, the normal, the way that light goes, and how far that is.
     """
 
+    kind: ClassVar[str]
     name: str
-    hidden_from: frozenset[str] = frozenset()
-    casts_shadow: bool = True
-    receivers: frozenset[str] | None = None
-    blockers: frozenset[str] | None = None
-    emission: Node | None = None
+    hidden_from: frozenset[str] = values.value(frozenset(), _hidden, "names", "kind of ray")
+    casts_shadow: bool = values.truth(True)
+    receivers: frozenset[str] | None = values.value(None, _linked, "names", "object's name")
+    blockers: frozenset[str] | None = values.value(None, _linked, "names", "object's name")
+    emission: Node | None = values.value(None, _emission, "node")
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "hidden_from", hidden_from(f"light {shown(self.name)}", self.hidden_from))
-        truth = checks.truth(f"casts_shadow of light {shown(self.name)}", self.casts_shadow)
-        object.__setattr__(self, "casts_shadow", truth)
-        if self.emission is not None and not self.emission.is_value:
-            raise InputError(
-                f"the emission of light {shown(self.name)} is a shader {self.emission.type!r}: give a node that makes a colour"
-            )
-        for what in ("receivers", "blockers"):
-            if getattr(self, what) is not None:
-                object.__setattr__(self, what, frozenset(getattr(self, what)))
+        values.check(self, f"light {shown(self.name)}")
+
+    @property
+    def _own(self) -> dict[str, Any]:
+        """What its kind declares."""
+        return {each.name: getattr(self, each.name) for each in fields(self)[len(fields(Lamp)) :]}
+
+    @property
+    def to_world(self) -> NDArray[np.float64]:
+        """(4, 4): its own space to world space; a sun is seen towards its z."""
+        return next(iter(self._own.values()))
+
+    @property
+    def strength(self) -> tuple[float, float, float]:
+        """Its power, or a sun's irradiance."""
+        return list(self._own.values())[1]
+
+    @property
+    def numbers(self) -> dict[str, float | bool | tuple[float, ...]]:
+        """The rest of what its kind declares."""
+        return dict(list(self._own.items())[2:])
 
     @property
     def is_dark(self) -> bool:
         """Whether it gives no light at all."""
-        raise NotImplementedError
-
-    def _check(self, what: str, value: object, least: float = 0.0, most: float = LARGEST) -> None:
-        object.__setattr__(self, what, checks.number(f"{what} of light {shown(self.name)}", value, least, most))
-
-    def _check_angle(self, what: str = "angle", least: float = 0.0) -> None:
-        """At most π, as which the float32 just above it counts, Blender's 180°."""
-        self._check(what, getattr(self, what), least, float(np.float32(np.pi)))
-        object.__setattr__(self, what, min(getattr(self, what), np.pi))
-
-    def _check_colour(self, what: str) -> None:
-        object.__setattr__(self, what, radiance(f"{what} of light {shown(self.name)}", getattr(self, what)))
-
-    def _check_matrix(self) -> None:
-        if np.shape(self.matrix) != (4, 4) or not (np.abs(self.matrix) <= LARGEST).all():
-            raise InputError(
-                f"the matrix of light {shown(self.name)} must be 4 × 4 numbers below {LARGEST:g}: check its transform"
-            )
+        return not any(self.strength)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,26 +144,15 @@ class Sun(Lamp):
     """
 
     kind: ClassVar[str] = "sun"
-    towards: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    irradiance: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    angle: float = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._check_colour("irradiance")
-        self._check_angle()
-        towards = checks.vector(f"towards of light {shown(self.name)}", self.towards, 3)
-        largest = max(map(abs, towards))
-        if not largest > 0:
-            raise InputError(f"towards of light {shown(self.name)} is 0, 0, 0: give the direction to the sun")
-        if abs(math.hypot(*towards) - 1) > 2.0**-50:  # what is a unit vector stays one, to the last bit
-            towards = tuple(component / largest for component in towards)
-            towards = tuple(component / math.hypot(*towards) for component in towards)
-        object.__setattr__(self, "towards", towards)
+    towards: tuple[float, float, float] = values.value((0.0, 0.0, 1.0), _direction, "vector", 3)
+    irradiance: tuple[float, float, float] = values.light()
+    angle: float = values.angle(0.0)
 
     @property
-    def is_dark(self) -> bool:
-        return not any(self.irradiance)
+    def to_world(self) -> NDArray[np.float64]:
+        matrix = np.eye(4)
+        matrix[:3, 2] = self.towards
+        return matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,23 +164,16 @@ class Point(Lamp):
     """
 
     kind: ClassVar[str] = "point"
-    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    power: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    radius: float = 0.0
-    soft_falloff: bool = False
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        position = checks.vector(f"position of light {shown(self.name)}", self.position, 3)
-        if max(map(abs, position)) > LARGEST:
-            raise InputError(f"position of light {shown(self.name)} is {shown(position)}: give numbers below {LARGEST:g}")
-        object.__setattr__(self, "position", position)
-        self._check_colour("power")
-        self._check("radius", self.radius)
+    position: tuple[float, float, float] = values.value((0.0, 0.0, 0.0), _position, "vector", 3)
+    power: tuple[float, float, float] = values.light()
+    radius: float = values.number(0.0)
+    soft_falloff: bool = values.truth(False)
 
     @property
-    def is_dark(self) -> bool:
-        return not any(self.power)
+    def to_world(self) -> NDArray[np.float64]:
+        matrix = np.eye(4)
+        matrix[:3, 3] = self.position
+        return matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,51 +186,33 @@ class Spot(Lamp):
     """
 
     kind: ClassVar[str] = "spot"
-    matrix: NDArray[np.float64] = None
-    power: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    radius: float = 0.0
-    angle: float = np.pi / 4
-    blend: float = 0.15
-    soft_falloff: bool = False
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._check_matrix()
-        self._check_colour("power")
-        self._check("radius", self.radius)
-        self._check_angle()
-        self._check("blend", self.blend, 0.0, 1.0)
+    matrix: NDArray[np.float64] = values.value(None, _matrix)
+    power: tuple[float, float, float] = values.light()
+    radius: float = values.number(0.0)
+    angle: float = values.angle(np.pi / 4)
+    blend: float = values.number(0.15, most=1.0)
+    soft_falloff: bool = values.truth(False)
 
     @property
     def is_dark(self) -> bool:
-        return not any(self.power) or np.linalg.det(self.matrix[:3, :3]) == 0
+        return super().is_dark or np.linalg.det(self.matrix[:3, :3]) == 0
 
 
 @dataclass(frozen=True, eq=False)
 class Area(Lamp):
     """A rectangle or an ellipse that shines evenly to one side, towards its local −z axis; one without an area is dark.
 
-    matrix : (4, 4) float64, the lamp's space to world space. size : along its local x and y axes, before the matrix. power :
-    (3,). ellipse : instead of a rectangle. spread : the angle of the cone into which it shines as through a grid, radians; π is
-    without one, and the power is the same.
+    matrix : (4, 4) float64, the lamp's space to world space. power : (3,). size : along its local x and y axes, before the
+    matrix. ellipse : instead of a rectangle. spread : the angle of the cone into which it shines as through a grid, radians; π
+    is without one, and the power is the same.
     """
 
     kind: ClassVar[str] = "area"
-    matrix: NDArray[np.float64] = None
-    size: tuple[float, float] = (1.0, 1.0)
-    power: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    ellipse: bool = False
-    spread: float = np.pi
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._check_matrix()
-        self._check_colour("power")
-        self._check_angle("spread", LEAST_SPREAD)
-        size = checks.vector(f"size of light {shown(self.name)}", self.size, 2)
-        if not all(0 <= side <= LARGEST for side in size):
-            raise InputError(f"size of light {shown(self.name)} is {shown(size)}: give two numbers from 0 to {LARGEST:g}")
-        object.__setattr__(self, "size", size)
+    matrix: NDArray[np.float64] = values.value(None, _matrix)
+    power: tuple[float, float, float] = values.light()
+    size: tuple[float, float] = values.value((1.0, 1.0), _size, "vector", 2)
+    ellipse: bool = values.truth(False)
+    spread: float = values.angle(np.pi, LEAST_SPREAD)
 
     @property
     def area(self) -> float:
@@ -211,7 +222,10 @@ class Area(Lamp):
 
     @property
     def is_dark(self) -> bool:
-        return not any(self.power) or self.area == 0 or not self.matrix[:3, 2].any()
+        return super().is_dark or self.area == 0 or not self.matrix[:3, 2].any()
+
+
+KINDS: dict[str, type[Lamp]] = {kind.kind: kind for kind in (Sun, Point, Spot, Area)}
 
 
 @dataclass(frozen=True)
@@ -225,19 +239,17 @@ class World:
     is, or None.
     """
 
-    radiance: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    hidden_from: frozenset[str] = frozenset()
-    image: str | None = None
-    closest: bool = False
-    rotation: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    backdrop: "World | None" = None
+    radiance: tuple[float, float, float] = values.light(0.0)
+    hidden_from: frozenset[str] = values.value(frozenset(), _hidden, "names", "kind of ray")
+    image: str | None = values.value(None, None, "text")
+    closest: bool = values.truth(False)
+    rotation: tuple[float, float, float] = values.vector((0.0, 0.0, 0.0))
+    backdrop: "World | None" = values.value(None, None, "backdrop")
 
     def __post_init__(self) -> None:
         if self.backdrop and (self.backdrop.backdrop or self.backdrop.hidden_from):
             raise InputError("the backdrop of the world has a backdrop or is hidden: leave both to the world")
-        object.__setattr__(self, "radiance", radiance("radiance of the world", self.radiance))
-        object.__setattr__(self, "hidden_from", hidden_from("the world", self.hidden_from))
-        object.__setattr__(self, "rotation", checks.vector("rotation of the world", self.rotation, 3))
+        values.check(self, "the world")
 
     @property
     def images(self) -> tuple[str, ...]:
@@ -248,11 +260,3 @@ class World:
     def is_black(self) -> bool:
         """Whether neither it nor its backdrop shows anything."""
         return not any(self.radiance) and (self.backdrop is None or self.backdrop.is_black)
-
-
-def hidden_from(name: str, rays: Collection[str]) -> frozenset[str]:
-    """The kinds of rays that something is hidden from; InputError with its `name` where there is no such kind."""
-    unknown = sorted(set(rays) - set(RAYS))
-    if unknown:
-        raise InputError(f"{name} is hidden from {shown(unknown[0])}: give some of {', '.join(RAYS)}")
-    return frozenset(rays)

@@ -43,7 +43,7 @@ def level_of(lamps: Sequence[Lamp], world: World, bounces: Bounces, shown: Seque
 def _light(lamps: Sequence[Lamp], world: World, shown: Sequence[tuple[str, Material]]) -> str | None:
     """The first thing that gives light."""
     for lamp in lamps:
-        if any(getattr(lamp, "irradiance", ()) or getattr(lamp, "power", ())):
+        if any(lamp.strength):
             return f"the lamp {lamp.name!r}"
     for name, material in shown:
         if any(closure.node.is_shining for closure in material.closures):

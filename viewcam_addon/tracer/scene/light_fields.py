@@ -6,7 +6,6 @@ radians: a file must give back the last bit of them, which degrees can't.
 
 import dataclasses
 import re
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,32 +13,18 @@ from numpy.typing import NDArray
 
 from ...checks import shown
 from ...errors import InputError
-from . import Scene, placing, value_nodes
+from . import Scene, lamps, placing, value_nodes
 from .colours import TEXELS
 from .fields import Arrays, Field
 from .film import Bounces, Film
 from .geometry_fields import LARGEST_INLINE, array_document
-from .lamps import Area, Lamp, Point, Spot, Sun, World
+from .lamps import Lamp, World
 from .materials import Colour, Material, Picture
 from .shader_nodes import KINDS, Node
 
 KEYS = ("images", "materials", "lamps", "world", "film", "bounces", "cycles")
 
-_LAMPS: dict[str, type[Lamp]] = {kind.kind: kind for kind in (Sun, Point, Spot, Area)}
 _WHITE = (1.0, 1.0, 1.0)
-
-_READERS: dict[str, Callable[[Field], Any]] = {
-    **dict.fromkeys(("towards", "irradiance", "position", "power", "radiance", "rotation"), lambda field: field.vector(3)),
-    **dict.fromkeys(("angle", "spread", "radius", "blend", "filter_width", "exposure"), Field.number),
-    **dict.fromkeys(("casts_shadow", "soft_falloff", "ellipse", "transparent", "closest"), Field.truth),
-    **dict.fromkeys(("filter", "image"), Field.text),
-    "size": lambda field: field.vector(2),
-    "hidden_from": lambda field: hidden_from(field),
-    **dict.fromkeys(("receivers", "blockers"), lambda field: frozenset(name.text() for name in field.items("object's name"))),
-    "emission": lambda field: _node(field),
-    "backdrop": lambda field: _simple(World, field, without=("hidden_from", "backdrop")),
-}
-"""How the values are read that are called the same as in Lamp, World and Film."""
 
 
 def light_document(scene: Scene, arrays: dict[str, NDArray]) -> dict:
@@ -89,9 +74,9 @@ def _version(field: Field) -> tuple[int, int]:
     return first, second
 
 
-def hidden_from(field: Field) -> frozenset[str]:
-    """Kinds of rays; whether there are such kinds is asked by what has the value."""
-    return frozenset(ray.text() for ray in field.items("kind of ray"))
+def names(field: Field, kind: str) -> frozenset[str]:
+    """A list of names of things of this kind; whether there are such is asked by what has the value."""
+    return frozenset(name.text() for name in field.items(kind))
 
 
 def _changed(owner: Lamp | World | Film | Bounces) -> dict[str, Any]:
@@ -216,13 +201,13 @@ def _colour(field: Field) -> Colour:
 
 def _lamp(field: Field) -> Lamp:
     kind = field.fields(("type", "name"), others=True)["type"]
-    if kind.text() not in _LAMPS:
-        kind.fail(f"is {shown(kind.value)}: give one of {', '.join(_LAMPS)}")
-    lamp = _LAMPS[kind.value]
-    names = [each.name for each in dataclasses.fields(lamp) if each.name not in ("name", "matrix")]
-    is_placed = len(names) + 1 < len(dataclasses.fields(lamp))
-    keys = field.fields(("type", "name"), (*names, *(placing.KEYS if is_placed else ())))
-    values = {name: _READERS[name](keys[name]) for name in names if name in keys}
+    if kind.text() not in lamps.KINDS:
+        kind.fail(f"is {shown(kind.value)}: give one of {', '.join(lamps.KINDS)}")
+    lamp = lamps.KINDS[kind.value]
+    declared = [each.name for each in dataclasses.fields(lamp) if each.name not in ("name", "matrix")]
+    is_placed = len(declared) + 1 < len(dataclasses.fields(lamp))
+    keys = field.fields(("type", "name"), (*declared, *(placing.KEYS if is_placed else ())))
+    values = _values(lamp, {name: keys[name] for name in declared if name in keys})
     if is_placed:
         values["matrix"] = placing.matrix(field, keys)
     try:
@@ -234,8 +219,24 @@ def _lamp(field: Field) -> Lamp:
 def _simple(kind: type, field: Field, without: tuple[str, ...] = ()) -> Any:
     """A World, Film or Bounces."""
     keys = field.fields((), tuple(each.name for each in dataclasses.fields(kind) if each.name not in without))
-    values = {name: each.whole(0) if kind is Bounces else _READERS[name](each) for name, each in keys.items()}
+    values = _values(kind, keys)
     try:
         return kind(**values)
     except InputError as error:
         field.hand_on(error)
+
+
+def _values(kind: type, keys: dict[str, Field]) -> dict[str, Any]:
+    """The values that `values.value` declares, as it says that they are read."""
+    read = {each.name: each.metadata["read"] for each in dataclasses.fields(kind) if each.name in keys}
+    return {name: _value(field, *read[name]) for name, field in keys.items()}
+
+
+def _value(field: Field, how: str, *arguments: Any) -> Any:
+    if how == "node":
+        return _node(field)
+    if how == "names":
+        return names(field, *arguments)
+    if how == "backdrop":
+        return _simple(World, field, without=("hidden_from", "backdrop"))
+    return getattr(field, how)(*arguments)

@@ -5,14 +5,17 @@ roughness, each with a colour: Lambert's diffuse reflection, emission, a perfect
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 from ... import checks
 from ...errors import InputError
-from .colours import LARGEST_RADIANCE, Colour, Picture, radiance
+from .colours import LARGEST_RADIANCE, WHITE, Colour, Picture, radiance
 from .shader_nodes import Closure, Node, closures, node
 
-__all__ = ["LARGEST_RADIANCE", "PLAIN", "Colour", "Material", "Picture", "radiance"]
+__all__ = ["LARGEST_RADIANCE", "PLAIN", "Colour", "Material", "Picture", "components", "radiance"]
+
+LEAST_IOR, MOST_IOR = 1e-3, 1e3
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,7 @@ class Material:
     displacement: Node | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "ior", checks.number("ior of a material", self.ior, 1e-3, 1e3))
+        object.__setattr__(self, "ior", checks.number("ior of a material", self.ior, LEAST_IOR, MOST_IOR))
         truth = checks.truth("transparent_shadow of a material", self.transparent_shadow)
         object.__setattr__(self, "transparent_shadow", truth)
         if self.surface is not None and self.surface.is_value:
@@ -95,6 +98,75 @@ class Material:
     def attributes(self) -> set[str]:
         """What its nodes ask meshes for, by name."""
         return {name for node in self.nodes for name in node.attributes}
+
+
+def components(shader: Node | None) -> dict[str, Any] | None:
+    """What a tree of shaders is the sum of, as a `Material` takes it; None where no components say the same."""
+    if shader is None:
+        return {}
+    if shader.type not in ("mix", "add"):
+        return _component(shader)
+    factor = _constant(shader["factor"]) if shader.type == "mix" else None
+    if factor is None and shader.type == "mix":
+        return None
+    total: dict[str, Any] | None = {}
+    for name, weight in (("first", 1.0 if factor is None else 1.0 - factor), ("second", 1.0 if factor is None else factor)):
+        some = components(shader[name]) if weight else {}
+        total = None if total is None or some is None else _sum(total, some, weight)
+    return total
+
+
+_SMOOTH = {"diffuse": "diffuse", "glossy": "mirror", "glass": "glass", "refraction": "refraction"}
+_LAYERS = ("metallic", "diffuse_roughness", "transmission_weight", "coat_weight", "sheen_weight")
+
+
+def _component(shader: Node) -> dict[str, Any] | None:
+    found: dict[str, Any] = {}
+    if shader.type == "emission":
+        found = {"emission": _scaled(shader["color"], _constant(shader["strength"]))}
+    elif shader.type in _SMOOTH and _constant(shader["roughness"]) == 0.0:
+        found = {_SMOOTH[shader.type]: _scaled(shader["color"], 1.0)}
+        if shader.type in ("glass", "refraction"):
+            ior = _constant(shader["ior"])
+            found["ior"] = ior if ior is not None and LEAST_IOR <= ior <= MOST_IOR else None
+    elif shader.type == "principled" and _is_diffuse(shader):
+        found = {"diffuse": _scaled(shader["base_color"], 1.0)}
+        if not shader["emission_strength"].is_black:
+            found["emission"] = _scaled(shader["emission_color"], _constant(shader["emission_strength"]))
+    is_bent = any(name in ("normal", "coat_normal") for name, _ in shader.inputs)
+    return None if is_bent or not found or None in found.values() else found
+
+
+def _is_diffuse(principled: Node) -> bool:
+    has_gloss = _constant(principled["ior"]) != 1.0 and not principled["specular_ior_level"].is_black
+    return not has_gloss and _constant(principled["alpha"]) == 1.0 and all(principled[name].is_black for name in _LAYERS)
+
+
+def _sum(total: dict[str, Any], some: dict[str, Any], weight: float) -> dict[str, Any] | None:
+    made = dict(total)
+    for name, value in some.items():
+        before = made.get(name)
+        scaled = value if name == "ior" else _scaled(value, weight)
+        if name == "ior" or before is None or before.is_black:
+            made[name] = scaled if name != "ior" or before in (None, value) else None
+        elif scaled is not None and not scaled.is_black:
+            is_alike = replace(before, rgb=WHITE) == replace(scaled, rgb=WHITE)
+            rgb = tuple(a + b for a, b in zip(before.rgb, scaled.rgb, strict=True))
+            made[name] = replace(before, rgb=rgb) if is_alike and max(rgb) <= LARGEST_RADIANCE else None
+        if made[name] is None or scaled is None:
+            return None
+    return made
+
+
+def _scaled(value: Colour | Node, factor: float | None) -> Colour | None:
+    """None where light can't have that, or the core alone knows what it is."""
+    if factor is None or isinstance(value, Node) or max(value.rgb) * factor > LARGEST_RADIANCE:
+        return None
+    return replace(value, rgb=tuple(each * factor for each in value.rgb))
+
+
+def _constant(value: Colour | Node) -> float | None:
+    return None if isinstance(value, Node) or value.varies or len(set(value.rgb)) > 1 else value.rgb[0]
 
 
 PLAIN = Material(diffuse=Colour((0.8, 0.8, 0.8)))

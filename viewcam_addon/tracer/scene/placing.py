@@ -31,7 +31,7 @@ def rotated(angles: Sequence[float] | NDArray) -> NDArray[np.float64]:
 
 def _placed(keys: dict[str, Field]) -> NDArray[np.float64]:
     rotation = rotated(np.radians(keys["rotation"].vector(3) if "rotation" in keys else (0.0, 0.0, 0.0)))
-    scale = 1.0
+    scale: float | tuple[float, ...] = 1.0
     if "scale" in keys:
         scale = keys["scale"].vector(3) if isinstance(keys["scale"].value, list) else keys["scale"].number()
     placed = np.eye(4)

@@ -206,7 +206,7 @@ def _object(field: Field, arrays: Arrays) -> Object:
             object_index=keys["object_index"].whole(0) if "object_index" in keys else 0,
             material_indices=(0,) if indices is None else tuple(index.whole(0) for index in indices),
             materials=tuple(each.text() for each in keys["materials"].items("material")) if "materials" in keys else (),
-            hidden_from=light_fields.hidden_from(keys["hidden_from"]) if "hidden_from" in keys else frozenset(),
+            hidden_from=light_fields.names(keys["hidden_from"], "kind of ray") if "hidden_from" in keys else frozenset(),
             color=keys["color"].vector(4) if "color" in keys else Object.color,
             random=keys["random"].array(arrays, np.float32, (None,)) if "random" in keys else None,
         )

@@ -48,7 +48,7 @@ def depth_of(comparison):
     return next(row for row in comparison.rows if row.name == "Depth").values[0]
 
 
-def test_a_map_that_was_pulled_home_is_within_the_law_and_exact_when_recentred(look, both_sides, check, add_map):
+def test_a_map_that_was_pulled_home_is_within_the_tolerance_and_exact_when_recentred(look, both_sides, check, add_map):
     """Its vertices are far from its origin, and its origin as far from the world's: Cycles adds the two in float32.
 
     Each of its rays meets the rounded surface where it should, and so only Depth tells.

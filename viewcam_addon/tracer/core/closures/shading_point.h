@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 #include "../bsdf/bsdf.h"
@@ -122,6 +123,8 @@ class Inputs {
     const Color& operator[](std::string_view name) const { return find(name).color; }
     const std::string& choice(std::string_view name) const { return find(name).choice; }
     bool flag(std::string_view name) const { return choice(name) == "true"; }
+    // Of what is the same everywhere.
+    double number(std::string_view name) const { return find(name).color.rgb.x; }
     // Whether any is made by a node of which that holds.
     template <class Holds> bool any_node(Holds&& holds) const {
         return std::any_of(inputs_.begin(), inputs_.end(), [&](const Input& input) { return input.color.node != NONE && holds(input.color.node); });
@@ -138,5 +141,15 @@ class Inputs {
     }
     std::vector<Input> inputs_;
 };
+
+// That of a variant's alternatives which has this NAME, made of `from`; std::invalid_argument if none has. what: they are.
+template <class Kinds, size_t I = 0, class... From> Kinds of_name(const char* what, std::string_view name, const From&... from) {
+    if constexpr (I == std::variant_size_v<Kinds>) {
+        throw std::invalid_argument("no " + std::string(what) + " is called " + std::string(name));
+    } else {
+        using Kind = std::variant_alternative_t<I, Kinds>;
+        return name == Kind::NAME ? Kinds(Kind(from...)) : of_name<Kinds, I + 1>(what, name, from...);
+    }
+}
 
 }  // namespace viewcam::VIEWCAM_ISA

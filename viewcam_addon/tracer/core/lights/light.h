@@ -1,20 +1,16 @@
-// A light of any kind: one line a kind in the variant.
+// A light of any kind.
 #pragma once
 #include <optional>
 #include <variant>
 
-#include "area.h"
 #include "environment.h"
 #include "mesh.h"
-#include "point.h"
-#include "spot.h"
-#include "sun.h"
 
 namespace viewcam::VIEWCAM_ISA {
 
 class Light {
    public:
-    using Kind = std::variant<Sun, Point, Spot, Area, MeshLight, EnvironmentLight>;
+    using Kind = LampOr<MeshLight, EnvironmentLight>;
 
     // hidden_from: the kinds of rays that don't see it; what a light hides from, it does not light. receivers: a bit that objects have
     // which it lights, Object::lit_by. shadow_rays: the kind of those that are sent to it.
@@ -125,20 +121,11 @@ class Light {
     const Scene* scene_ = nullptr;
 };
 
-// A lamp in rendering space, whose origin is given in the world's. It must shine. scene: whose nodes its emission is made by.
-inline Light light_of(const Lamp& lamp, Vec3 origin, const Scene* scene = nullptr) {
-    Affine placed = lamp.to_world;
-    placed.m[0][3] -= origin.x, placed.m[1][3] -= origin.y, placed.m[2][3] -= origin.z;
-    auto kind = [&]() -> Light::Kind {
-        switch (lamp.kind) {
-            case Lamp::SUN: return Sun({placed.m[0][2], placed.m[1][2], placed.m[2][2]}, lamp.color, lamp.angle);
-            case Lamp::POINT: return Point(placed.translation(), lamp.color, lamp.radius, lamp.soft);
-            case Lamp::SPOT: return Spot(placed, lamp.color, lamp.radius, lamp.soft, lamp.angle, lamp.blend);
-            default: return Area(placed, lamp.color, lamp.size, lamp.kind == Lamp::ELLIPSE, lamp.angle);
-        }
-    };
-    Light light(kind(), lamp.hidden_from, lamp.casts_shadow, lamp.receivers, lamp.shadow_rays);
-    if (scene) light.shine_by(lamp.emission, placed.translation(), scene);
+// scene: whose nodes the lamp's emission is made by.
+inline Light light_of(const Lamp& lamp, const Scene* scene = nullptr) {
+    auto kind = std::visit([](const auto& one) -> Light::Kind { return one; }, lamp.kind);
+    Light light(kind, lamp.hidden_from, lamp.casts_shadow, lamp.receivers, lamp.shadow_rays);
+    if (scene) light.shine_by(lamp.emission, lamp.middle, scene);
     return light;
 }
 

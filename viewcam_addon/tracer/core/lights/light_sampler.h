@@ -38,7 +38,7 @@ class LightSampler {
         std::vector<Light> unlit;
         for (const Lamp& lamp : given.lamps) {
             linked_ |= lamp.receivers != ~0ull;
-            Light light = light_of(lamp, scene.origin, &scene);
+            Light light = light_of(lamp, &scene);
             (lit & ~lamp.hidden_from ? lights_ : unlit).push_back(light);
         }
         if (environment_->has_image() && lit & ~environment_->hidden_from) {

@@ -1,0 +1,134 @@
+"""What goes on beside Blender while the artist works on: at most one of its kind, and what the last one came to.
+
+That belongs to this session of Blender and to this file. Cancel, another file, turning the add-on off and leaving Blender end
+it.
+"""
+
+import atexit
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ...errors import InputError
+from .. import datablocks
+from .operators import NamesCamera
+
+
+class Background:
+    """One kind.
+
+    running : that on its way, with `poll` (what it came to, None while it runs), `wait` and `cancel`; or None. latest : what
+    the last one came to, or None. seconds : between two looks. looked : is called after each, with what it came to or None, and
+    when it is cancelled. discard : is called with what the last one came to before that is forgotten.
+    """
+
+    def __init__(self, seconds: float, looked: Callable[[Any], None], discard: Callable[[Any], None] = lambda _: None) -> None:
+        self.running: Any = None
+        self.latest: Any = None
+        self._seconds, self._looked, self._discard = seconds, looked, discard
+
+        def look() -> float | None:
+            """Blender's timer asks again after so many seconds, as long as it goes on."""
+            looked(self.poll() if self.running else None)
+            return self._seconds if self.running else None
+
+        @persistent
+        def on_load(*_: object) -> None:
+            self.end()
+
+        self._look, self.on_load = look, on_load
+
+    def begin(self, operator: bpy.types.Operator, start: Callable[[], Any]) -> set[str]:
+        """What an operator returns that starts one; for scripts, in a Blender without a window, it waits for it.
+
+        start : makes what runs, or raises InputError. What it came to is then (whether all went well, a sentence).
+        """
+        try:
+            self.running = start()
+        except InputError as error:
+            operator.report({"ERROR"}, datablocks.sentence(error))
+            return {"CANCELLED"}
+        if not bpy.app.background:
+            bpy.app.timers.register(self._look, first_interval=self._seconds)
+            return {"FINISHED"}
+        well, sentence = self.wait()
+        operator.report({"INFO" if well else "ERROR"}, sentence)
+        return {"FINISHED" if well else "CANCELLED"}
+
+    def poll(self) -> Any:
+        """What that on its way has come to; None while it runs."""
+        outcome = self.running.poll()
+        if outcome:
+            self._forget()
+            self.running, self.latest = None, outcome
+        return outcome
+
+    def wait(self) -> Any:
+        """What it comes to."""
+        try:
+            self.running.wait()
+            return self.poll()
+        except BaseException:  # Ctrl-C
+            self.end(forget=False)
+            raise
+
+    def end(self, forget: bool = True) -> None:
+        """Cancel that on its way, and forget what the last one came to."""
+        if self.running:
+            self.running.cancel()
+        self.running = None
+        if forget:
+            self._forget()
+
+    def cancel(self) -> None:
+        """By a button."""
+        self.end(forget=False)
+        self._looked(None)
+
+    def register(self) -> None:
+        bpy.app.handlers.load_pre.append(self.on_load)
+        atexit.register(self.end)
+
+    def unregister(self) -> None:
+        self.end()
+        atexit.unregister(self.end)
+        if bpy.app.timers.is_registered(self._look):
+            bpy.app.timers.unregister(self._look)
+        bpy.app.handlers.load_pre.remove(self.on_load)
+
+    def _forget(self) -> None:
+        if self.latest:
+            self._discard(self.latest)
+        self.latest = None
+
+
+class StartsForCamera(NamesCamera):
+    """An operator that starts one for a camera. busy : what is said while one is on its way."""
+
+    background: Background
+    busy: str
+    poll_message_set: ClassVar[Callable[[str], None]]  # Blender's
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not cls.background.running and context.scene and datablocks.camera_in(context):
+            return True
+        cls.poll_message_set(cls.busy if cls.background.running else "There is no camera")
+        return False
+
+
+class Cancels:
+    """An operator that ends what is on its way of its `background`."""
+
+    bl_label = "Cancel"
+    background: Background
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        return cls.background.running is not None
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        self.background.cancel()
+        return {"FINISHED"}

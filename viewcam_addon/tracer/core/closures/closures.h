@@ -1,0 +1,111 @@
+// Closures: the simple ones, and at the end the list of all.
+#pragma once
+#include "principled.h"
+
+namespace viewcam::VIEWCAM_ISA {
+
+// Light that a surface gives off, to both sides.
+struct EmissionClosure {
+    static constexpr const char* NAME = "emission";
+    static constexpr uint32_t KINDS = 0;
+    Color color, strength;
+
+    explicit EmissionClosure(const Inputs& in) : color(in["color"]), strength(in["strength"]) {}
+    void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const { bsdf.emit(weight * at.color(color) * at.number(strength)); }
+    bool shines_evenly() const { return !color.varies() && !strength.varies(); }
+    // In the mean over the images of its inputs.
+    Vec3 mean_emission(const std::vector<Texture>& textures) const { return color.mean(textures) * strength.mean(textures); }
+};
+
+// Surfaces, or parts of them, that light goes straight through: the path goes on as if they were not there, but for a colour.
+struct TransparentClosure {
+    static constexpr const char* NAME = "transparent";
+    static constexpr uint32_t KINDS = 0;
+    Color color;
+
+    explicit TransparentClosure(const Inputs& in) : color(in["color"]) {}
+    bool lets_through() const { return !color.is_black(); }
+    void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const { bsdf.let_through(weight * at.color(color)); }
+};
+
+// Reflection of one colour by facets without a Fresnel term: a mirror where it is not rough.
+struct GlossyClosure {
+    static constexpr const char* NAME = "glossy";
+    static constexpr uint32_t KINDS = GLOSSY;
+    Color color, roughness, normal;
+    Anisotropy anisotropy;
+    Distribution distribution;
+
+    explicit GlossyClosure(const Inputs& in)
+        : color(in["color"]), roughness(in["roughness"]), normal(in["normal"]), anisotropy{in["anisotropy"], in["rotation"], in["tangent"]},
+          distribution(in.choice("distribution")) {}
+    bool is_rough() const { return roughness.varies() || roughness.rgb.x > 0; }
+    void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
+        Vec3 rgb = at.color(color), normal = at.specular_normal(this->normal);
+        Facets facets = anisotropy.of_glossy(at, normal, distribution.facets(at.number(roughness)));
+        weight = weight * rgb;
+        if (distribution.multiple) {
+            MultipleScattering more = multiple_reflection(at, normal, facets, unit_range(rgb));
+            weight = weight * more.albedo * more.lobe;
+        }
+        add_reflection(bsdf, at, weight, normal, facets, NoFresnel{});
+    }
+};
+
+// Rough conductors.
+struct MetallicClosure {
+    static constexpr const char* NAME = "metallic";
+    static constexpr uint32_t KINDS = GLOSSY;
+    Color color, edge_tint, ior, extinction, roughness, normal;
+    Anisotropy anisotropy;
+    Distribution distribution;
+    bool physical;  // by index of refraction and extinction instead of two colours
+
+    explicit MetallicClosure(const Inputs& in)
+        : color(in["color"]), edge_tint(in["edge_tint"]), ior(in["ior"]), extinction(in["extinction"]), roughness(in["roughness"]), normal(in["normal"]),
+          anisotropy{in["anisotropy"], in["rotation"], in["tangent"]}, distribution(in.choice("distribution")), physical(in.choice("fresnel") == "physical_conductor") {}
+    bool is_rough() const { return roughness.varies() || roughness.rgb.x > 0; }
+    void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
+        Vec3 normal = at.specular_normal(this->normal);
+        Facets facets = anisotropy.of(at, at.normal(this->normal), distribution.facets(at.number(roughness)));
+        auto add = [&](const auto& fresnel) {
+            if (distribution.multiple) {
+                MultipleScattering more = multiple_reflection(at, normal, facets, fresnel.mean());
+                weight = weight * more.albedo * more.lobe;
+            }
+            add_reflection(bsdf, at, weight, normal, facets, fresnel);
+        };
+        if (physical)
+            add(ConductorFresnel{at.color(ior), at.color(extinction), at.version >= CYCLES_5_0});
+        else
+            add(F82::of(unit_range(at.color(color)), unit_range(at.color(edge_tint))));
+    }
+};
+
+// Sheen of cloth.
+struct SheenClosure {
+    static constexpr const char* NAME = "sheen";
+    static constexpr uint32_t KINDS = DIFFUSE | GLOSSY;
+    Color color, roughness, normal;
+    bool fibers;  // or Ashikhmin's velvet
+
+    explicit SheenClosure(const Inputs& in)
+        : color(in["color"]), roughness(in["roughness"]), normal(in["normal"]), fibers(in.choice("distribution") == "microfiber") {}
+    uint32_t kinds() const { return fibers ? DIFFUSE : GLOSSY; }
+    bool is_rough() const { return true; }
+    void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
+        Vec3 tint = at.color(color) * weight, normal = at.normal(this->normal);
+        if (fibers)
+            bsdf.add(SheenLobe(tint, normal, -at.incoming, unit_range(at.number(roughness))));
+        else
+            bsdf.add(VelvetLobe(tint, normal, -at.incoming, unit_range(at.number(roughness))));
+    }
+};
+
+// Each has a NAME, by which a scene asks for it, KINDS, the kinds of rays that its lobes scatter, and `add_to`;
+// `kinds` where its inputs leave some of them out, `is_rough` where it may spread light otherwise than diffuse surfaces do,
+// `mean_emission` and `shines_evenly` where it shines, `lets_through` where light may go straight through it.
+using Closure = std::variant<DiffuseClosure, GlossyClosure, GlassClosure, RefractionClosure, EmissionClosure, TranslucentClosure, MetallicClosure,
+                             PrincipledClosure, SheenClosure, TransparentClosure>;
+
+}  // namespace viewcam::VIEWCAM_ISA

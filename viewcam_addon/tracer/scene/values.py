@@ -1,0 +1,53 @@
+"""The values of lamps, the world, the film and the bounces, each declared once: what it may be, and how a scene file gives it.
+
+Every function here is the default of a dataclass's field.
+"""
+
+from collections.abc import Callable
+from dataclasses import field, fields
+from typing import Any
+
+import numpy as np
+
+from ... import checks
+from .colours import radiance
+
+LARGEST = 1e18
+"""Of coordinates and sizes: as of scenes, products of a few of them are float64's."""
+
+
+def value(default: Any, check: Callable[[str, Any], Any] | None, *read: Any) -> Any:
+    """Any value. check : its name and what is given → what it is, or InputError. read : how `light_fields` reads it, a method
+    of `Field` and its arguments, or another word."""
+    return field(default=default, metadata={"check": check, "read": read})
+
+
+def number(default: float, least: float = 0.0, most: float = LARGEST) -> Any:
+    return value(default, lambda name, given: checks.number(name, given, least, most), "number")
+
+
+def angle(default: float, least: float = 0.0) -> Any:
+    """Radians, at most π, as which the float32 just above it counts, Blender's 180°."""
+    half_turn = float(np.float32(np.pi))
+    return value(default, lambda name, given: min(checks.number(name, given, least, half_turn), np.pi), "number")
+
+
+def truth(default: bool) -> Any:
+    return value(default, checks.truth, "truth")
+
+
+def vector(default: tuple[float, ...]) -> Any:
+    return value(default, lambda name, given: checks.vector(name, given, len(default)), "vector", len(default))
+
+
+def light(default: float = 1.0) -> Any:
+    """Of red, green and blue."""
+    return value((default,) * 3, radiance, "vector", 3)
+
+
+def check(owner: Any, of: str = "") -> None:
+    """Let all declared values of a frozen dataclass be what they may be. of : whose they are, as a sentence says it."""
+    for each in fields(owner):
+        if found := each.metadata.get("check"):
+            name = f"{each.name} of {of}" if of else each.name
+            object.__setattr__(owner, each.name, found(name, getattr(owner, each.name)))
