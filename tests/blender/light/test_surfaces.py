@@ -5,6 +5,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from viewcam_addon import png
 from viewcam_addon.blender.scenes import materials
 
 # Of the light that the brightest texture reflects. A cosine's rounding is 2e-7 at the 99th percentile (test_delta_lights.py); a
@@ -121,6 +122,22 @@ def test_images_from_files(pictures, floor, image, tmp_path, kind, opacity, pack
     sides = pictures(scenes=1)
     check(sides, TEXTURED)
     assert not told(sides)
+
+
+@pytest.mark.parametrize("space", ["sRGB", "Non-Color"])
+@pytest.mark.parametrize("opacity", [65535, 40000])
+def test_a_file_of_two_bytes_a_number(pictures, floor, tmp_path, space, opacity):
+    levels = np.random.default_rng(4).integers(0, 65536, (3, 5, 4)).astype(np.uint16)
+    levels[..., 3] = opacity
+    (tmp_path / "levels.png").write_bytes(png.encoded(levels))
+    loaded = bpy.data.images.load(str(tmp_path / "levels.png"))
+    loaded.colorspace_settings.name = space
+    texture(floor, loaded, "Closest")
+    sides = pictures(scenes=1)
+    check(sides, FLAT)
+    (picture,) = sides[0].exported.images.values()
+    assert picture.pixels.dtype == np.uint16 and not told(sides)
+    assert [each.name for each in bpy.data.images if each.source == "FILE"] == ["levels.png"]
 
 
 @pytest.mark.parametrize("domain", ["POINT", "CORNER"])
