@@ -7,6 +7,7 @@ they are those of the tables: core/bsdf/make_albedo_tables.cpp computes them by 
 import ctypes
 import itertools
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,10 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from viewcam_addon import api
 from viewcam_addon.blender.rendering import job
+from viewcam_addon.comparison import radiance
+from viewcam_addon.image import Image
 from viewcam_addon.tracer import native, render
 
 COLOUR = (0.8, 0.5, 0.2, 1.0)
@@ -258,3 +262,17 @@ def test_a_table_that_is_looked_up_a_quarter_of_a_step_beside_is_found(patches, 
     shaders = [(PRINCIPLED, {"Base Color": COLOUR, "Roughness": 0.4}, {})]
     with pytest.raises(AssertionError, match="p50"):
         check(patches(shaders), shaders, TABLES)
+
+
+def test_no_verdict_tells_the_tables_apart_by_which_a_principled_floor_is_a_little_brighter(pictures, painted):
+    inputs = {"Base Color": (0.287, 0.8, 0.42, 1.0), "Roughness": 0.5, "IOR": 1.45}
+    bpy.data.objects["Floor"].data.materials[0] = painted("ShaderNodeBsdfPrincipled", inputs)
+    (sides,) = pictures(scenes=1)
+    test = Image(sides.cycles[0], sides.exported.camera)
+    reference = api.render(sides.exported, "direct", 1, threads=2)
+    found = radiance.compare(reference, [test], sides.exported.camera, 1)
+    assert found.passed, found.sentence
+    unaware = replace(
+        reference, attributes={key: value for key, value in reference.attributes.items() if key != "albedo tables"}
+    )
+    assert not radiance.compare(unaware, [test], sides.exported.camera, 1).passed
