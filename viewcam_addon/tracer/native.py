@@ -106,7 +106,7 @@ class _Closure(Structure):
 
 class _Lamp(Structure):
     _fields_ = [
-        *((name, c_int32) for name in ("kind", "soft", "casts_shadow")),
+        *((name, c_int32) for name in ("kind", "soft", "casts_shadow", "is_met")),
         ("hidden_from", c_uint32),
         ("matrix", c_double * 12),
         ("color", c_double * 3),
@@ -607,7 +607,7 @@ def _described_world(world: World, images: Mapping[str, int]) -> _World:
 
 def described_lamp(lamp: Lamp, links: _Links = _UNLINKED) -> _Lamp:
     """A lamp as the core takes it. links : of all the scene's lamps, where this one has such."""
-    described = _Lamp(hidden_from=kinds(lamp.hidden_from), casts_shadow=lamp.casts_shadow)
+    described = _Lamp(hidden_from=kinds(lamp.hidden_from), casts_shadow=lamp.casts_shadow, is_met=lamp.is_met)
     described.receivers, described.shadow_rays = links.receivers(lamp), links.shadow_rays(lamp)
     matrix = np.eye(4)
     if isinstance(lamp, Sun):

@@ -140,7 +140,7 @@ def light_from(lamp: Lamp, overrides: Overrides, ledger: Ledger) -> tuple[bpy.ty
     strength = lamp.irradiance if isinstance(lamp, Sun) else lamp.power
     data.energy = max(strength)
     data.color = tuple(value / max(strength) for value in strength) if any(strength) else (1.0, 1.0, 1.0)
-    data.use_shadow = lamp.casts_shadow
+    data.use_shadow, data.cycles.use_multiple_importance_sampling = lamp.casts_shadow, lamp.is_met
     if isinstance(lamp, Sun):
         store(data, "angle", lamp.angle, lamp.name, ledger)
         return data, _facing(lamp.towards)

@@ -60,6 +60,7 @@ def _lamp(
         return None
     is_normalised = getattr(light, "normalize", True)
     common = {"name": name, "hidden_from": hidden_from, "casts_shadow": light.use_shadow}
+    common["is_met"] = light.cycles.use_multiple_importance_sampling
     if light.type == "SUN":
         if not is_normalised and light.angle > 0:
             strength = _times(strength, math.pi * math.sin(light.angle / 2) ** 2)
@@ -138,10 +139,9 @@ def _make_plain(overrides: Overrides, light: bpy.types.Light) -> None:
 def _note(name: str, light: bpy.types.Light, bounces: Bounces, ledger: Ledger) -> None:
     """What else Cycles does to a light, which both sides leave out."""
     settings = light.original.cycles
-    if not settings.use_multiple_importance_sampling:  # then Cycles' rays pass through it unlit
-        ledger.note(name, "approximated", "its multiple importance sampling is on on both sides")
-        ledger.set_for_cycles(settings, "use_multiple_importance_sampling", True)
-    if not light.use_shadow and _size(light) > 0:  # then Cycles shows a part of its light behind what would block it
+    if (
+        not light.use_shadow and settings.use_multiple_importance_sampling and _size(light) > 0
+    ):  # then Cycles shows a part of its light behind what would block it
         ledger.note(name, "approximated", "casts no shadow although it has a size: Cycles shows less of it in the shadows")
     if light.cycles.max_bounces < bounces.total:
         ledger.note(name, "approximated", "its bounces are limited, and are not on both sides")

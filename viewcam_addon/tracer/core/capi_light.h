@@ -38,9 +38,9 @@ enum ViewcamFilter { VIEWCAM_BOX, VIEWCAM_BLACKMAN_HARRIS, VIEWCAM_GAUSSIAN };
 enum ViewcamLampKind { VIEWCAM_SUN, VIEWCAM_POINT, VIEWCAM_SPOT, VIEWCAM_RECTANGLE, VIEWCAM_ELLIPSE };
 /* matrix: (3, 4), the lamp's space to the world's; a sun is seen towards its z. color: irradiance of a sun, power of others.
  * angle: of a sun's disc, a spot's cone, and the cone that a flat one shines into.
- * receivers: a bit of ViewcamObject's lit_by, or all. shadow_rays: of which kind, a bit of `visible`. */
+ * is_met: whether rays run into it. receivers: a bit of ViewcamObject's lit_by, or all. shadow_rays: of which kind, a bit of `visible`. */
 typedef struct {
-    int32_t kind, soft, casts_shadow;
+    int32_t kind, soft, casts_shadow, is_met;
     uint32_t hidden_from;
     double matrix[12], color[3], radius, angle, blend, size[2];
     uint64_t receivers;

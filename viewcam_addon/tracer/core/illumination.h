@@ -19,7 +19,7 @@ struct Lamp {
     Color emission{{1, 1, 1}};  // what that is multiplied by, at each place of the lamp and in each direction
     double radius = 0, angle = 0, blend = 0;
     Vec2 size;
-    bool soft = false, casts_shadow = true;
+    bool soft = false, casts_shadow = true, is_met = true;
     uint32_t hidden_from = 0;
     uint64_t receivers = ~0ull;    // which of the sets that objects are in it lights
     RayKind shadow_rays = SHADOW;  // of its own blockers, where it has such

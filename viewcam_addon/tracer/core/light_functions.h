@@ -48,7 +48,7 @@ inline Lamp lamp_of(const ViewcamLamp& given) {
     lamp.kind = Lamp::Kind(given.kind), lamp.color = {given.color[0], given.color[1], given.color[2]};
     for (int i = 0; i < 12; i++) lamp.to_world.m[i / 4][i % 4] = given.matrix[i];
     lamp.radius = given.radius, lamp.angle = given.angle, lamp.blend = given.blend, lamp.size = {given.size[0], given.size[1]};
-    lamp.soft = given.soft, lamp.casts_shadow = given.casts_shadow, lamp.hidden_from = given.hidden_from;
+    lamp.soft = given.soft, lamp.casts_shadow = given.casts_shadow, lamp.is_met = given.is_met, lamp.hidden_from = given.hidden_from;
     lamp.receivers = given.receivers, lamp.shadow_rays = RayKind(given.shadow_rays);
     return lamp;
 }

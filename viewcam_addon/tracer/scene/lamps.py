@@ -40,23 +40,26 @@ LEAST_SPREAD = 1e-3
 class Lamp:
     """What all lamps have.
 
-    casts_shadow : whether objects can stand in its light. receivers : names of the objects that it lights; blockers : of those
-    that can stand in its light; None is all objects. The eye sees a lamp whatever it lights. emission : a node that makes what
-    its light is multiplied by, at each place of the lamp and in each direction, or None; it is told the place there, in the
-    world, the normal, the way that light goes, and how far that is.
+    casts_shadow : whether objects can stand in its light. is_met : whether rays run into it, so that the eye, mirrors and glass
+    see it, where it has a size; else it only lights what is rough, as much as before. receivers : names of the objects that it
+    lights; blockers : of those that can stand in its light; None is all objects. The eye sees a lamp whatever it lights.
+    emission : a node that makes what its light is multiplied by, at each place of the lamp and in each direction, or None; it
+    is told the place there, in the world, the normal, the way that light goes, and how far that is.
     """
 
     name: str
     hidden_from: frozenset[str] = frozenset()
     casts_shadow: bool = True
+    is_met: bool = True
     receivers: frozenset[str] | None = None
     blockers: frozenset[str] | None = None
     emission: Node | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "hidden_from", hidden_from(f"light {shown(self.name)}", self.hidden_from))
-        truth = checks.truth(f"casts_shadow of light {shown(self.name)}", self.casts_shadow)
-        object.__setattr__(self, "casts_shadow", truth)
+        for what in ("casts_shadow", "is_met"):
+            truth = checks.truth(f"{what} of light {shown(self.name)}", getattr(self, what))
+            object.__setattr__(self, what, truth)
         if self.emission is not None and not self.emission.is_value:
             raise InputError(
                 f"the emission of light {shown(self.name)} is a shader {self.emission.type!r}: give a node that makes a colour"

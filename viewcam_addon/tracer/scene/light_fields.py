@@ -31,7 +31,7 @@ _WHITE = (1.0, 1.0, 1.0)
 _READERS: dict[str, Callable[[Field], Any]] = {
     **dict.fromkeys(("towards", "irradiance", "position", "power", "radiance", "rotation"), lambda field: field.vector(3)),
     **dict.fromkeys(("angle", "spread", "radius", "blend", "filter_width", "exposure"), Field.number),
-    **dict.fromkeys(("casts_shadow", "soft_falloff", "ellipse", "transparent", "closest"), Field.truth),
+    **dict.fromkeys(("casts_shadow", "is_met", "soft_falloff", "ellipse", "transparent", "closest"), Field.truth),
     **dict.fromkeys(("filter", "image"), Field.text),
     "size": lambda field: field.vector(2),
     "hidden_from": lambda field: hidden_from(field),
