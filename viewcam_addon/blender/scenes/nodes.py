@@ -85,9 +85,10 @@ def all_of(tree: bpy.types.NodeTree, seen: set[bpy.types.NodeTree] | None = None
 
 
 def invalid_links(tree: bpy.types.NodeTree) -> list[bpy.types.NodeLink]:
-    """Those that Blender marks as invalid, as where they go in a circle, and that are not muted."""
+    """Those that Blender marks as invalid, as where they go in a circle, of sockets that are in use."""
     trees = {node.id_data for node in all_of(tree)}
-    return [link for each in trees for link in each.links if not link.is_valid and not link.is_muted]
+    links = [link for each in trees for link in each.links if not link.is_valid and not link.is_muted]
+    return [link for link in links if link.from_socket.enabled and link.to_socket.enabled]
 
 
 def override_output(overrides: Overrides, tree: bpy.types.NodeTree, kind: str) -> tuple[bpy.types.Node, "Adder"]:
