@@ -74,6 +74,8 @@ def render(
             samples = round(float(passes["Sample Count"].mean(dtype=float)))
             attributes["error"] = str(error)
         attributes |= {"samples": str(samples), "seed": str(seed)}
+        if any(closure.node.is_tabulated for material in scene.materials.values() for closure in material.closures):
+            attributes["albedo tables"] = "yes"
     return Image(passes, scene.camera, attributes)
 
 

@@ -159,3 +159,14 @@ def test_a_light_without_a_diffuse_pass_is_compared_without_a_warning(paper_scen
     bare = [replace(one, passes={name: one[name] for name in ("Combined", "Depth")}) for one in (picture(paper_scene), image)]
     radiance = compare(bare[0], [bare[1]], paper_scene.pinhole)
     assert [row.name for row in radiance.rows] == ["Combined"] and not list(recwarn)
+
+
+@pytest.mark.parametrize(
+    ("factor", "tabulated", "passed"), [(1.00008, True, True), (1.00008, False, False), (1.0003, True, False)]
+)
+def test_albedos_from_tables_differ_by_a_ten_thousandth_and_by_no_more(paper_scene, factor, tabulated, passed):
+    reference, test = picture(paper_scene), rendered(paper_scene)
+    if tabulated:
+        reference = replace(reference, attributes={**reference.attributes, "albedo tables": "yes"})
+    test = replace(test, passes={**test.passes, "Diffuse Color": test["Diffuse Color"] * np.float32(factor)})
+    assert compare(reference, [test], paper_scene.pinhole).passed == passed

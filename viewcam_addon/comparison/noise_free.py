@@ -35,6 +35,7 @@ _BEYOND_COUNTING = 1e6
 # The first Blender that stores smooth normals in 16 bits, and the quantities that show it.
 _SHORT_NORMALS = (5, 2)
 _SHADED = ("Combined", "Diffuse Direct")
+_NOT_SCATTERED = ("Alpha", "Emission", "Environment")
 # Errors are told relative to the value, or to this share of the mean where the value is less.
 _DARK = 1e-3
 
@@ -96,6 +97,7 @@ class Rounding:
         # What the light on a surface would be if it came from straight above, as far as the picture tells: the largest
         # Diffuse Direct anywhere, in the surface's colour.
         self._brightest: Array | float = 0.0
+        self._tables = tolerances.ALBEDO_TABLES if "albedo tables" in reference.attributes else 0.0
         self._storage = tolerances.NORMAL_STORAGE if _blender_of(test) >= _SHORT_NORMALS else 0.0
         if "Diffuse Direct" in reference.passes and "Diffuse Color" in reference.passes:
             lit = float(np.nan_to_num(reference["Diffuse Direct"]).max())
@@ -109,10 +111,12 @@ class Rounding:
         return Allowance(self._shift * slope, error, self._floor(sides.name, value), self._shift)
 
     def _floor(self, name: str, value: Array) -> Array:
-        """What the storage of smooth normals may add: the light from straight above times the cosine's change."""
+        """What albedos from tables may add, and the storage of smooth normals: the light from straight above times the cosine's
+        change."""
+        tables = np.zeros(value.shape) if name in _NOT_SCATTERED else self._tables * value
         if not self._storage or name not in _SHADED:
-            return np.zeros(value.shape)
-        return self._storage * np.sqrt(np.maximum(self._brightest**2 - value**2, 0.0))
+            return tables
+        return tables + self._storage * np.sqrt(np.maximum(self._brightest**2 - value**2, 0.0))
 
 
 def compare(sides: Sides, allowed: Allowance, belongs: NDArray) -> tuple[PassErrors, Edges, Array]:

@@ -7,6 +7,7 @@ they are those of the tables: core/bsdf/make_albedo_tables.cpp computes them by 
 import ctypes
 import itertools
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,10 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from viewcam_addon import api
 from viewcam_addon.blender.rendering import job
+from viewcam_addon.comparison import radiance
+from viewcam_addon.image import Image
 from viewcam_addon.tracer import native, render
 
 COLOUR = (0.8, 0.5, 0.2, 1.0)
@@ -180,6 +184,19 @@ def test_sheen_is_cycles_to_float32(patches):
     check(patches(of_sheen()), of_sheen(), SHEEN)
 
 
+@pytest.mark.parametrize("of", [of_sheen, of_layers_below_sheen])
+def test_sheen_is_cycles_where_a_smooth_normal_is_turned_away(pictures, painted, mesh_from, of):
+    ball = mesh_from("ico_sphere", subdivisions=1, radius=2.0)
+    ball.shade_smooth()
+    bpy.data.objects["Monkey"].data = ball
+    for shader in list(of())[:4:2]:
+        ball.materials.clear()
+        ball.materials.append(painted(*shader))
+        (sides,) = pictures(scenes=1)
+        ours, theirs = (passes["Diffuse Color"][..., :3] for passes in (sides.traced, sides.cycles[0]))
+        assert np.abs(ours - theirs).max() <= TABLES[1], shader
+
+
 def test_what_lies_below_sheen_is_cycles_to_the_tables(patches):
     check(patches(of_layers_below_sheen()), of_layers_below_sheen(), TABLES)
 
@@ -258,3 +275,41 @@ def test_a_table_that_is_looked_up_a_quarter_of_a_step_beside_is_found(patches, 
     shaders = [(PRINCIPLED, {"Base Color": COLOUR, "Roughness": 0.4}, {})]
     with pytest.raises(AssertionError, match="p50"):
         check(patches(shaders), shaders, TABLES)
+
+
+def test_no_verdict_tells_the_tables_apart_by_which_a_principled_floor_is_a_little_brighter(pictures, painted):
+    inputs = {"Base Color": (0.287, 0.8, 0.42, 1.0), "Roughness": 0.5, "IOR": 1.45}
+    bpy.data.objects["Floor"].data.materials[0] = painted("ShaderNodeBsdfPrincipled", inputs)
+    (sides,) = pictures(scenes=1)
+    test = Image(sides.cycles[0], sides.exported.camera)
+    reference = api.render(sides.exported, "direct", 1, threads=2)
+    found = radiance.compare(reference, [test], sides.exported.camera, 1)
+    assert found.passed, found.sentence
+    unaware = replace(
+        reference, attributes={key: value for key, value in reference.attributes.items() if key != "albedo tables"}
+    )
+    assert not radiance.compare(unaware, [test], sides.exported.camera, 1).passed
+
+
+@pytest.mark.parametrize("kind", ["SUN", "POINT", "SPOT", "AREA"])
+@pytest.mark.parametrize("is_met", [True, False])
+def test_a_lamp_without_multiple_importance_is_met_by_no_ray_and_lights_what_is_rough_all_the_same(
+    pictures, painted, add_lamp, kind, is_met
+):
+    size = {"SUN": {"angle": 0.5}, "AREA": {"size": 1.0}}.get(kind, {"shadow_soft_size": 0.5})
+    size |= {"spot_size": 3.0} if kind == "SPOT" else {}
+    lamp = add_lamp(kind, (0, 5, 1.5), (-1.05, 0, 0), energy=3.0 if kind == "SUN" else 500.0, **size)
+    lamp.visible_camera = True
+    lamp.data.cycles.use_multiple_importance_sampling = is_met
+    for name, roughness in (("Monkey", 0.3), ("Floor", 0.0)):
+        bpy.data.objects[name].data.materials[0] = painted("ShaderNodeBsdfGlossy", {"Roughness": roughness})
+    (sides,) = pictures(samples=64, count=4, scenes=1, level="path")
+    assert [lamp.is_met for lamp in sides.exported.lamps] == [is_met]
+    assert not [entry for entry in sides.exported.ledger if entry.status != "exported"]
+    reference = Image(sides.traced, sides.exported.camera, {"samples": "256", "albedo tables": "yes"})
+    tests = [Image(passes, sides.exported.camera) for passes in sides.cycles]
+    found = radiance.compare(reference, tests, sides.exported.camera, 64)
+    assert found.passed, found.sentence
+    other = replace(sides.exported, lamps=tuple(replace(lamp, is_met=not is_met) for lamp in sides.exported.lamps))
+    wrong = replace(reference, passes=render.render(other, "path", 256, threads=2))
+    assert not radiance.compare(wrong, tests, sides.exported.camera, 64).passed, "and with it, it would differ"

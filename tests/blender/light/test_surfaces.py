@@ -5,6 +5,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from viewcam_addon import png
+from viewcam_addon.blender import versions
 from viewcam_addon.blender.scenes import materials
 
 # Of the light that the brightest texture reflects. A cosine's rounding is 2e-7 at the 99th percentile (test_delta_lights.py); a
@@ -123,6 +125,22 @@ def test_images_from_files(pictures, floor, image, tmp_path, kind, opacity, pack
     assert not told(sides)
 
 
+@pytest.mark.parametrize("space", ["sRGB", "Non-Color"])
+@pytest.mark.parametrize("opacity", [65535, 40000])
+def test_a_file_of_two_bytes_a_number(pictures, floor, tmp_path, space, opacity):
+    levels = np.random.default_rng(4).integers(0, 65536, (3, 5, 4)).astype(np.uint16)
+    levels[..., 3] = opacity
+    (tmp_path / "levels.png").write_bytes(png.encoded(levels))
+    loaded = bpy.data.images.load(str(tmp_path / "levels.png"))
+    loaded.colorspace_settings.name = space
+    texture(floor, loaded, "Closest")
+    sides = pictures(scenes=1)
+    check(sides, FLAT)
+    (picture,) = sides[0].exported.images.values()
+    assert picture.pixels.dtype == np.uint16 and not told(sides)
+    assert [each.name for each in bpy.data.images if each.source == "FILE"] == ["levels.png"]
+
+
 @pytest.mark.parametrize("domain", ["POINT", "CORNER"])
 @pytest.mark.parametrize("kind", ["FLOAT_COLOR", "BYTE_COLOR"])
 @pytest.mark.parametrize("name", ["Paint", ""])
@@ -140,6 +158,20 @@ def test_colours_of_the_mesh(pictures, floor, domain, kind, name):
     is_half = bpy.app.version >= (5, 1) and (kind, domain) == ("BYTE_COLOR", "CORNER")
     check(sides, HALF if is_half else TEXTURED)
     assert not told(sides) and len(np.unique(sides[0].cycles[0]["Diffuse Color"])) > 1000
+
+
+def test_links_that_go_in_a_circle_are_none_as_in_cycles(pictures, floor):
+    tree = floor.node_tree
+    first, second = (tree.nodes.new("ShaderNodeMath") for _ in range(2))
+    for node, number in ((first, 0.25), (second, 0.5)):
+        node.inputs[0].default_value, node.inputs[1].default_value = number, 0.125
+    tree.links.new(first.outputs[0], second.inputs[0])
+    tree.links.new(second.outputs[0], tree.nodes["Shader"].inputs["Color"])
+    tree.links.new(second.outputs[0], first.inputs[0])
+    sides = pictures(scenes=1)
+    check(sides, FLAT)
+    assert ("invalid links" in told(sides).get("Floor", "")) == versions.CIRCLES_ARE_BLACK
+    assert sorted(link.is_valid for link in tree.links) == [False, True, True, True]
 
 
 def toon(material):

@@ -23,6 +23,17 @@ def test_scales_that_mirror_stretch_and_shear_give_the_same_normals(add, both_si
     assert len(sides.exported.geometries) == 1
 
 
+def test_the_last_row_of_a_matrix_which_cycles_never_reads_may_be_rounded(add, both_sides, mesh_from):
+    parent = add(None, "Parent", location=(0, 0.5, 0))
+    child = add(mesh_from("monkey"), "Child", parent=parent)
+    inverse = child.matrix_parent_inverse.copy()
+    inverse[3][0], inverse[3][3] = 1e-8, 1.0 + 2.0**-23
+    child.matrix_parent_inverse = inverse
+    bpy.context.view_layer.update()
+    assert tuple(child.matrix_world[3]) != (0, 0, 0, 1)
+    both_sides().check()
+
+
 def test_objects_with_a_mesh_of_their_own_have_normals_as_if_applied(add, both_sides, mesh_from):
     """Cycles interpolates the normals of a mesh that one object uses in world space, of a shared one in object space."""
     monkey = mesh_from("monkey")

@@ -235,7 +235,6 @@ APPROXIMATED = {
     "nodes": (lambda block: attach(block, "ObjectInfo", "Random"), "'Object Info' that says the Random of a light"),
     "spread": (lambda block: setattr(block.data, "spread", 0.0), "spread"),
     "bounces": (lambda block: setattr(block.data.cycles, "max_bounces", 1), "bounces are limited"),
-    "sampling": (lambda block: setattr(block.data.cycles, "use_multiple_importance_sampling", False), "importance"),
     "shadows": (lambda block: setattr(block.data, "use_shadow", False), "casts no shadow"),
 }
 

@@ -18,6 +18,7 @@ EYE = np.eye(4)
         (lambda: Sun("key", towards=(0, float("inf"), 0)), "towards of light 'key'"),
         (lambda: Sun("key", angle=3.2), "angle of light 'key'"),
         (lambda: Sun("key", casts_shadow=2), "casts_shadow of light 'key'"),
+        (lambda: Sun("key", is_met=2), "is_met of light 'key'"),
         (lambda: Point("key", power=(1e30,) * 3), "power of light 'key'"),
         (lambda: Point("key", position=(0, 0, 1e19)), "position of light 'key'"),
         (lambda: Point("key", radius=-1), "radius of light 'key'"),

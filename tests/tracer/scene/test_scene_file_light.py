@@ -59,7 +59,14 @@ matrices = st.lists(st.floats(-1e6, 1e6), min_size=12, max_size=12).map(
 )
 links = st.none() | st.just(frozenset())
 made = st.none() | st.deferred(lambda: nodes)
-common = {"name": names, "hidden_from": rays, "casts_shadow": st.booleans(), "receivers": links, "blockers": links}
+common = {
+    "name": names,
+    "hidden_from": rays,
+    "casts_shadow": st.booleans(),
+    "is_met": st.booleans(),
+    "receivers": links,
+    "blockers": links,
+}
 common |= {"emission": made}
 round_lamps = common | {"power": rgb, "radius": st.floats(0, 1e6), "soft_falloff": st.booleans()}
 lamps = st.one_of(

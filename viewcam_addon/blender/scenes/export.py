@@ -281,8 +281,10 @@ def _drawn(placed: list[Placement], ledger: Ledger) -> Iterator[Placement]:
 
 
 def _by_rows(matrices: NDArray[np.float32]) -> Matrix:
-    """(n, 4, 4) of (n, 16), as Blender has them: by columns."""
-    return np.ascontiguousarray(np.swapaxes(matrices.reshape(-1, 4, 4), 1, 2), np.float64)
+    """(n, 4, 4) of (n, 16), as Blender has them: by columns. The last row, which Cycles never reads, may be a rounding off."""
+    by_rows = np.ascontiguousarray(np.swapaxes(matrices.reshape(-1, 4, 4), 1, 2), np.float64)
+    by_rows[:, 3] = 0.0, 0.0, 0.0, 1.0
+    return by_rows
 
 
 def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading | None) -> Surface | None:

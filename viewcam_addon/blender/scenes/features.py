@@ -10,7 +10,7 @@ import bpy
 
 from ...tracer.scene.lamps import RAYS
 from .. import datablocks, versions
-from . import export_geometry, images, materials
+from . import export_geometry, images, materials, nodes
 from .ledger import Ledger
 from .shading import Shading
 
@@ -132,7 +132,13 @@ def note_object(
         if shading:
             reading = shading.reading(material)
             reasons += reading.reasons
-            for missing in images.missing(versions.node_tree(material)):
+            tree = versions.node_tree(material)
+            if versions.CIRCLES_ARE_BLACK and tree and nodes.invalid_links(tree):
+                ledger.note(
+                    name, "approximated", f"material {material.name!r} has invalid links, which are left out on both sides"
+                )
+                ledger.call_for_cycles(material.original, materials.cut_invalid_links)
+            for missing in images.missing(tree):
                 ledger.note(name, "exported", f"material {material.name!r} {missing}")
             if reading.is_bumped and not material.cycles.use_bump_map_correction:
                 ledger.note(name, "approximated", f"material {material.name!r} has its bumped normals corrected on both sides")

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 from ...tracer.scene.materials import Picture
-from ..temporary_settings import Overrides
+from ..temporary_settings import Overrides, overridden
 from . import nodes
 
 _LINEAR = ("Non-Color", "Linear Rec.709", "Raw", "Linear")
@@ -62,24 +62,20 @@ def is_multiplied(image: bpy.types.Image) -> bool:
 
 def picture_of(image: bpy.types.Image, alpha: bool = False) -> Picture:
     """An image without an obstacle. alpha : whether it is to have its alpha, without an obstacle either."""
-    width, height = image.size
-    pixels = np.empty(width * height * image.channels, np.float32)
-    image.pixels.foreach_get(pixels)
-    pixels = pixels.reshape(height, width, image.channels)
-    rgb = pixels[..., :3] if image.channels >= 3 else np.repeat(pixels[..., :1], 3, axis=-1)
     srgb = image.colorspace_settings.name == "sRGB"
     if image.is_float and srgb:
         # Blender has decoded them. Cycles reads a file for itself; what Blender hands it stays as it is.
         srgb = image.source == "FILE" and not image.packed_file and not image.is_dirty
-        rgb = _encoded(rgb) if srgb else rgb
+    pixels = _encoded(image) if image.is_float and srgb else _pixels(image)
+    rgb = pixels[..., :3] if image.channels >= 3 else np.repeat(pixels[..., :1], 3, axis=-1)
     if alpha and image.channels == 4 and image.alpha_mode != "NONE":
         rgb = pixels
     elif is_multiplied(image):
-        # As Cycles does it, in whole bytes. By rows: there may be gigabytes.
-        multiplied = np.empty(rgb.shape, np.uint8)
-        for row, to in zip(pixels, multiplied, strict=True):
-            to[:] = np.rint(row[:, :3] * 255) * np.rint(row[:, 3:] * 255) // 255
-        return Picture(multiplied, srgb)
+        return Picture(_multiplied(pixels, np.uint8), srgb)
+    elif image.is_float and srgb and image.channels == 4 and image.alpha_mode == "STRAIGHT":
+        if Picture.compact(pixels).pixels.dtype.kind == "u":
+            return Picture(_multiplied(pixels, np.uint16), srgb)
+        rgb = rgb * pixels[..., 3:]
     return Picture.compact(np.nan_to_num(rgb, copy=False, posinf=0.0, neginf=0.0) if image.is_float else rgb, srgb)
 
 
@@ -114,6 +110,27 @@ def mean(image: bpy.types.Image) -> tuple[float, float, float]:
     return tuple(np.average(pixels.mean(axis=1), axis=0, weights=weights).tolist())
 
 
-def _encoded(linear: np.ndarray) -> np.ndarray:
-    positive = np.maximum(linear, 0.0)
-    return np.where(positive < 0.0031308, positive * 12.92, 1.055 * positive ** (1 / 2.4) - 0.055).astype(np.float32)
+def _pixels(image: bpy.types.Image) -> np.ndarray:
+    width, height = image.size
+    pixels = np.empty(width * height * image.channels, np.float32)
+    image.pixels.foreach_get(pixels)
+    return pixels.reshape(height, width, image.channels)
+
+
+def _multiplied(pixels: np.ndarray, dtype: type[np.unsignedinteger]) -> np.ndarray:
+    """Colours times their alpha as Cycles does it, in whole numbers. By rows: there may be gigabytes."""
+    most = np.uint32(np.iinfo(dtype).max)
+    multiplied = np.empty((*pixels.shape[:2], 3), dtype)
+    for row, to in zip(pixels, multiplied, strict=True):
+        levels = np.rint(row * np.float32(most)).astype(np.uint32)
+        to[:] = levels[:, :3] * levels[:, 3:] // most
+    return multiplied
+
+
+def _encoded(image: bpy.types.Image) -> np.ndarray:
+    """The numbers in an image's file; what Blender decodes from two bytes is off by up to 3e-4 of itself."""
+    with overridden() as overrides:
+        raw = image.original.copy()
+        overrides.afterwards(bpy.data.images.remove, raw)
+        raw.colorspace_settings.name = "Non-Color"
+        return _pixels(raw)

@@ -188,7 +188,7 @@ def light_from(lamp: Lamp, overrides: Overrides, ledger: Ledger) -> tuple[bpy.ty
     largest = max(lamp.strength)
     data.energy = largest
     data.color = tuple(value / largest for value in lamp.strength) if largest else (1.0, 1.0, 1.0)
-    data.use_shadow = lamp.casts_shadow
+    data.use_shadow, data.cycles.use_multiple_importance_sampling = lamp.casts_shadow, lamp.is_met
     return data, KINDS[type].store(lamp, data, ledger)
 
 
@@ -223,6 +223,7 @@ def lamps_in(
             if strength is None or not any(strength):
                 continue
             common = {"hidden_from": hidden_from, "casts_shadow": light.use_shadow}
+            common["is_met"] = light.cycles.use_multiple_importance_sampling
             lamp = KINDS[light.type].exported(name, light, matrix, strength, common, ledger)
             if lamp is not None:
                 receivers, blockers = links.of(placed, ledger)
@@ -271,11 +272,8 @@ def _make_plain(overrides: Overrides, light: bpy.types.Light) -> None:
 def _note(name: str, light: bpy.types.Light, bounces: Bounces, ledger: Ledger) -> None:
     """What else Cycles does to a light, which both sides leave out."""
     settings = light.original.cycles
-    if not settings.use_multiple_importance_sampling:  # then Cycles' rays pass through it unlit
-        ledger.note(name, "approximated", "its multiple importance sampling is on on both sides")
-        ledger.set_for_cycles(settings, "use_multiple_importance_sampling", True)
     if (
-        not light.use_shadow and getattr(light, KINDS[light.type].size) > 0
+        not light.use_shadow and settings.use_multiple_importance_sampling and getattr(light, KINDS[light.type].size) > 0
     ):  # then Cycles shows a part of its light behind what would block it
         ledger.note(name, "approximated", "casts no shadow although it has a size: Cycles shows less of it in the shadows")
     if light.cycles.max_bounces < bounces.total:

@@ -1,7 +1,7 @@
 """Reading shader nodes, and giving a tree another output for a while.
 
 An input is followed to the node that feeds it: reroutes, muted nodes and node groups are looked through. What nothing feeds
-has a value of its own.
+has a value of its own, and so has what a link feeds that Blender marks as invalid, as where links go in a circle.
 """
 
 from collections.abc import Iterator
@@ -36,7 +36,8 @@ class Output(NamedTuple):
 def source(of: Input) -> Output | Input:
     """The output that feeds an input, or the input, perhaps of a group around it, that nothing feeds."""
     while True:
-        link = next((link for link in of.socket.links if not link.is_muted), None) if of.socket.is_linked else None
+        links = of.socket.links if of.socket.is_linked else ()
+        link = next((link for link in links if link.is_valid and not link.is_muted), None)
         if link is None:
             return of
         node, socket = link.from_node, link.from_socket
@@ -81,6 +82,13 @@ def all_of(tree: bpy.types.NodeTree, seen: set[bpy.types.NodeTree] | None = None
         group = getattr(node, "node_tree", None)
         if group and group not in seen:
             yield from all_of(group, seen)
+
+
+def invalid_links(tree: bpy.types.NodeTree) -> list[bpy.types.NodeLink]:
+    """Those that Blender marks as invalid, as where they go in a circle, of sockets that are in use."""
+    trees = {node.id_data for node in all_of(tree)}
+    links = [link for each in trees for link in each.links if not link.is_valid and not link.is_muted]
+    return [link for link in links if link.from_socket.enabled and link.to_socket.enabled]
 
 
 def override_output(overrides: Overrides, tree: bpy.types.NodeTree, kind: str) -> tuple[bpy.types.Node, "Adder"]:

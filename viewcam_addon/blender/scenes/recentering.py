@@ -32,12 +32,13 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...pinhole import Pinhole
 from ...tracer.scene import Object
+from ...tracer.scene.shader_nodes import KINDS
 from .. import camera as cameras
 from .. import datablocks, findings, pose
 from ..temporary_settings import Overrides, overridden
 from . import features, materials
 from .depsgraph import visit_still
-from .export import light_in, placements
+from .export import Surface, light_in, placements
 from .film import CYCLES_SETTINGS
 from .ledger import Ledger
 from .shading import Shading
@@ -49,6 +50,8 @@ Geometry = bpy.types.Mesh | bpy.types.PointCloud
 # A number is rounded once when Blender stores it; twice that allows for a last place of its product with a 1.
 _ROUNDING = 2.0**-23
 _LEAST = float(np.finfo(np.float32).tiny)
+# Nodes, and outputs of theirs, that tell where in the file something is, or which object.
+_PLACES = {("object_info", "location"), ("object_info", "random"), ("geometry", "position"), ("texture_coordinate", "object")}
 
 # What of the render settings makes the picture's frame.
 _FRAME = (
@@ -170,7 +173,10 @@ def _seen(
     plain = materials.plain(overrides)
     copies: dict[tuple[int, int], _Copy] = {}
     placed = []
-    shown = placements(depsgraph, ledger, Shading() if lit else None)
+    shading = Shading() if lit else None
+    shown = placements(depsgraph, ledger, shading)
+    for source, *_ in shown if shading else ():
+        _note_places(source, shading, ledger)
     for source, matrix in ((source, matrix) for source, matrices, _ in shown for matrix in matrices):
         if not np.isfinite(matrix).all():
             raise InputError(f"the matrix of object {source.name!r} holds a number that is not finite: check its transform")
@@ -184,6 +190,22 @@ def _seen(
         matrix[:3, 3] += matrix[:3, :3] @ copy.anchor
         placed.append(_Placed(source.name, copy.data, matrix, source.object_index, source.hidden_from, source.color))
     return view, [*placed, *_lights(depsgraph, eye, ledger)], {copy.data: copy for copy in copies.values()}
+
+
+def _note_places(source: Surface, shading: Shading, ledger: Ledger) -> None:
+    """Name materials that say otherwise here than in the file: on both sides, which both are moved."""
+    for material in filter(None, source.slots):
+        found = {
+            node.type
+            for node in shading.reading(material).material.nodes
+            if "output" in KINDS[node.type].inputs and (node.type, node["output"]) in _PLACES
+        }
+        if found:
+            ledger.note(
+                source.name,
+                "approximated",
+                f"material {material.name!r} asks where it is, or which object: another answer on both sides than in the file",
+            )
 
 
 def _remove_keys_but(keys: set[bpy.types.Key]) -> None:

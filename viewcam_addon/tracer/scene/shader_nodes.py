@@ -212,6 +212,12 @@ class Node:
         return any(not self[name].is_black for name in ("anisotropy", "anisotropic") if name in KINDS[self.type].inputs)
 
     @property
+    def is_tabulated(self) -> bool:
+        """Whether it is a shader that looks up what it scatters in all (core/bsdf/albedo.h)."""
+        inputs = KINDS[self.type].inputs
+        return self.type in ("principled", "sheen") or ("distribution" in inputs and self["distribution"] == DISTRIBUTIONS[0])
+
+    @property
     def is_shining(self) -> bool:
         """Whether it gives off any light of its own."""
         if self.type == "emission":

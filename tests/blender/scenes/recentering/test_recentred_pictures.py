@@ -15,6 +15,7 @@ from viewcam_addon.blender.rendering import job
 from viewcam_addon.cli import main
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import scene_file
 
 pytestmark = pytest.mark.slow
@@ -277,3 +278,32 @@ def test_the_command_as_its_users_type_it(look, scene, tmp_path, capfd, add_map)
     assert main(["export", str(path), str(scene_path), "--recenter"]) == 0
     assert list(scene_file.read(scene_path).origin) == recentred["origin"]
     assert main(["cycles", str(path), str(tmp_path / "picture.exr"), "--recenter"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("output", "status"), [("Random", "approximated"), ("Location", "approximated"), ("Object Index", "exported")]
+)
+def test_materials_that_ask_where_they_are_are_the_same_on_both_sides_and_told(
+    output, status, look, add, mesh_from, make_material, add_lamp, tmp_path, read_passes
+):
+    look((1000.0, 2000.0, 30.0))
+    cubes = [add(mesh_from("cube"), name, (1000.0 + 3 * i, 2000.0, 30.0)) for i, name in enumerate(("Left", "Right"))]
+    material = make_material("Asks", "ShaderNodeBsdfDiffuse")
+    tree = material.node_tree
+    told = tree.nodes.new("ShaderNodeObjectInfo").outputs[output]
+    scaled = tree.nodes.new("ShaderNodeVectorMath")
+    scaled.operation, scaled.inputs[1].default_value = "MULTIPLY", (1e-2,) * 3 if output == "Location" else (1.0,) * 3
+    absolute = tree.nodes.new("ShaderNodeVectorMath")
+    absolute.operation = "ABSOLUTE"
+    tree.links.new(told, scaled.inputs[0])
+    tree.links.new(scaled.outputs[0], absolute.inputs[0])
+    tree.links.new(absolute.outputs[0], tree.nodes["Shader"].inputs["Color"])
+    for number, cube in enumerate(cubes):
+        cube.data.materials.append(material)
+        cube.pass_index = number
+    add_lamp("SUN", rotation=(0.3, 0.4, 0), angle=0.0)
+    exported = job.export_and_render(job.Request(level="direct", samples=1, recenter=True, threads=2), [tmp_path / "0.exr"])
+    (theirs,) = (passes["Diffuse Color"] for passes in read_passes([tmp_path / "0.exr"]))
+    ours = render(exported, "direct", 1, threads=2)["Diffuse Color"]
+    assert np.percentile(np.abs(ours - theirs), 99.5) <= 1e-6 and theirs.max() > 0.01
+    assert {entry.status for entry in exported.ledger if entry.object in ("Left", "Right")} == {status}

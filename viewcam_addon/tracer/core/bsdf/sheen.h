@@ -17,13 +17,13 @@ struct SheenLobe {
     Frame frame; // x towards the viewer
     double a, b;
 
-    // tint: of all that is scattered. The colour is black where there are no fibers that are seen.
+    // tint: of all that is scattered. A normal that is turned away from the viewer scatters as one that is seen edge-on.
     SheenLobe(Vec3 tint, Vec3 normal, Vec3 to_viewer, double roughness) : frame(frame_along(normal, to_viewer)) {
         constexpr double LEAST = 1e-5, SMOOTHEST = 1e-3;
         detail::Place r(larger(roughness, SMOOTHEST), 32), c(dot(normal, to_viewer), 32);
         a = detail::at(sheen_table::A, r, c, 32), b = detail::at(sheen_table::B, r, c, 32);
         double albedo = detail::at(sheen_table::ALBEDO, r, c, 32);
-        color = std::fabs(a) < LEAST || albedo < LEAST || !(dot(normal, to_viewer) >= 0) ? Vec3{} : tint * albedo;
+        color = std::fabs(a) < LEAST || albedo < LEAST ? Vec3{} : tint * albedo;
     }
 
     Vec3 eval(Vec3 to_light) const { return color * pdf(to_light); }
