@@ -104,15 +104,15 @@ class TriangleBvh {
     }
     size_t bytes() const { return bvh.bytes() + blocks.size() * sizeof(Block); }
 
-    // object: whose the triangles are, NONE where the blocks tell.
-    template <bool ANY> bool intersect(const Ray& ray, uint32_t object, Nearest& nearest) const {
+    // object: whose the triangles are, NONE where the blocks tell. origin_error: see LocalRay.
+    template <bool ANY> bool intersect(const Ray& ray, uint32_t object, Nearest& nearest, double origin_error = 0) const {
         BoxRay box;
-        if (bvh.root == NOTHING || !enter(bvh, ray, nearest.t, box)) return false;
+        if (bvh.root == NOTHING || !enter(bvh, ray, nearest.t, origin_error, box)) return false;
         Shear shear(ray.direction, box);
         const double* origin = &ray.origin.x;
         double4 x = splat4(origin[shear.x]), y = splat4(origin[shear.y]), z = splat4(origin[shear.z]);
         double4 by_x = splat4(shear.by_x), by_y = splat4(shear.by_y), by_z = splat4(shear.by_z);
-        return traverse(bvh, box, [&](uint32_t leaf) {
+        return traverse<ANY>(bvh, box, [&](uint32_t leaf) {
             const Block& block = blocks[leaf];
             double4 t, determinant;
             unsigned met = bits(block.intersect(shear, x, y, z, by_x, by_y, by_z, t, determinant));
