@@ -37,7 +37,11 @@ Scene& scene_of(ViewcamScene* scene) { return *reinterpret_cast<Scene*>(scene); 
 const Scene& scene_of(const ViewcamScene* scene) { return *reinterpret_cast<const Scene*>(scene); }
 const TileSampler& light_of(const ViewcamLight* light) { return *reinterpret_cast<const TileSampler*>(light); }
 
-Ray ray_of(const double* row) { return {vector(row), vector(row + 3), row[6], row[7]}; }
+// (n, 8): origins, directions, t_min, t_max.
+const Ray* rays_of(const double* rows) {
+    static_assert(sizeof(Ray) == 8 * sizeof(double) && offsetof(Ray, t_max) == 7 * sizeof(double));
+    return reinterpret_cast<const Ray*>(rows);
+}
 Camera camera_of(const ViewcamCamera& given) {
     Camera camera;
     camera.eye = vector(given.eye), camera.right = vector(given.right), camera.up = vector(given.up), camera.forward = vector(given.forward);
@@ -153,11 +157,10 @@ const ViewcamCore core = {
     .closest =
         [](const ViewcamScene* scene, size_t count, const double* rows, uint32_t kind, int packets, double* t, uint32_t* objects, uint32_t* primitives) {
             return guarded([&] {
-                Ray rays[64];
-                Hit hits[64];
-                for (size_t first = 0; first < count; first += 64) {
-                    int some = int(std::min<size_t>(count - first, 64));
-                    for (int i = 0; i < some; i++) rays[i] = ray_of(rows + 8 * (first + size_t(i)));
+                Hit hits[PACKET];
+                for (size_t first = 0; first < count; first += PACKET) {
+                    const Ray* rays = rays_of(rows) + first;
+                    int some = int(std::min<size_t>(count - first, PACKET));
                     if (packets)
                         scene_of(scene).closest(rays, some, RayKind(kind), hits);
                     else
@@ -172,11 +175,10 @@ const ViewcamCore core = {
     .occluded =
         [](const ViewcamScene* scene, size_t count, const double* rows, int packets, uint8_t* hidden) {
             return guarded([&] {
-                Ray rays[64];
-                bool found[64];
-                for (size_t first = 0; first < count; first += 64) {
-                    int some = int(std::min<size_t>(count - first, 64));
-                    for (int i = 0; i < some; i++) rays[i] = ray_of(rows + 8 * (first + size_t(i)));
+                bool found[PACKET];
+                for (size_t first = 0; first < count; first += PACKET) {
+                    const Ray* rays = rays_of(rows) + first;
+                    int some = int(std::min<size_t>(count - first, PACKET));
                     if (packets)
                         scene_of(scene).occluded(rays, some, found);
                     else

@@ -29,11 +29,16 @@ struct RayState {
     double length = 0, width = 0, spread = 0;
 };
 
-// A ray in rendering space (scene.h). direction: of any length; t counts in it. What is met must lie in t_min < t < t_max.
+// A ray in rendering space (scene.h), as it comes through the C interface. direction: of any length; t counts in it. What is met
+// must lie in t_min < t < t_max.
 struct Ray {
     Vec3 origin, direction;
     double t_min = 0, t_max = INFINITE;
-    double origin_error = 0;  // by how much the origin may be off in each coordinate, where it was taken into another space
+};
+
+// A ray in an object's space. origin_error: by how much the origin may be off in each coordinate, since it was taken there.
+struct LocalRay : Ray {
+    double origin_error = 0;
 };
 
 // What a ray meets first. object: the scene's number of the placed object, NONE where there is nothing. primitive: of the

@@ -275,15 +275,16 @@ class Scene {
 
     template <bool ANY> bool intersect_instances(const Ray& ray, RayKind kind, Nearest& nearest) const {
         if (instances_.root == NOTHING) return false;
-        return traverse(instances_, ray, nearest.t, [&](uint32_t leaf, BoxRay& box) {
+        return traverse<ANY>(instances_, ray, nearest.t, 0, [&](uint32_t leaf, BoxRay& box) {
             uint32_t number = instances_.leaves[leaf];
             const Object& object = objects[number];
             if (!(object.visible & kind)) return false;
             double before = nearest.t;
             if (auto spheres = std::get_if<Spheres>(&geometries[object.geometry])) {
                 if (intersect_spheres<ANY>(*spheres, object, ray, number, nearest)) return true;
-            } else if (triangles_[object.geometry].intersect<ANY>(object.to_object(ray), number, nearest)) {
-                return true;
+            } else {
+                LocalRay local = object.to_object(ray);
+                if (triangles_[object.geometry].intersect<ANY>(local, number, nearest, local.origin_error)) return true;
             }
             if (nearest.t < before) box.limit(nearest.t);
             return false;

@@ -48,8 +48,8 @@ struct BoxRay {
     void limit(double t) { far = std::min(far, round_up(max(t * unit - start, 0.0))); }
 };
 
-// The ray, no farther than t_max, for the boxes of `bvh`; false where it misses them all.
-inline bool enter(const Bvh& bvh, const Ray& ray, double t_max, BoxRay& box) {
+// The ray, no farther than t_max, for the boxes of `bvh`; false where it misses them all. origin_error: see LocalRay.
+inline bool enter(const Bvh& bvh, const Ray& ray, double t_max, double origin_error, BoxRay& box) {
     // Of all these the fourth is what comes next in memory, and no matter.
     double4 direction = load<double4>(&ray.direction.x), origin = load<double4>(&ray.origin.x);
     double4 size = abs(direction);
@@ -61,7 +61,7 @@ inline bool enter(const Bvh& bvh, const Ray& ray, double t_max, BoxRay& box) {
     reciprocal = copysign(min(abs(reciprocal), splat4(1e200)), unit);
     double4 centre = load<double4>(&bvh.centre.x), half = load<double4>(&bvh.half.x), scale = splat4(bvh.scale);
     double4 from = (origin - centre) * scale;
-    double4 edge = half * splat4(1 + 1e-9) + splat4(4e-16) * abs(from) + splat4(ray.origin_error * bvh.scale + 1e-300);
+    double4 edge = half * splat4(1 + 1e-9) + splat4(4e-16) * abs(from) + splat4(origin_error * bvh.scale + 1e-300);
     double4 one = (-edge - from) * reciprocal, other = (edge - from) * reciprocal, first = min(one, other), last = max(one, other);
     first -= abs(first) * splat4(4e-15);
     last += abs(last) * splat4(4e-15);
@@ -74,7 +74,7 @@ inline bool enter(const Bvh& bvh, const Ray& ray, double t_max, BoxRay& box) {
     double largest = max(half[0], max(half[1], half[2]));
     double away = max(std::fabs(from[0]), max(std::fabs(from[1]), std::fabs(from[2])));
     double error = largest * (4 * FLOAT_ROUNDING + 2e-12) + 8 * DOUBLE_ROUNDING * (away + std::fabs(start)) +
-                   ray.origin_error * bvh.scale;
+                   origin_error * bvh.scale;
     double4 entry = from + splat4(start) * unit, forward = copysign(splat4(error), unit);
     double4 bounded = copysign(min(abs(reciprocal), splat4(1e12)), reciprocal);
     float4 near = __builtin_convertvector(bounded * splat4(1.0 - 6 * FLOAT_ROUNDING), float4);

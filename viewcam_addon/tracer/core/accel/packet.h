@@ -1,10 +1,14 @@
 // Up to 64 rays through a hierarchy at once, where they lie close together: what each meets is what traverse.h finds for it.
 //
-// Rays of one packet have the same signs of direction and the same dominant axis. A node's eight boxes are first tested for all
-// rays in one interval; each that is met is then tested for eight rays at a time, from the first eight on that met its parent.
-// Leaves are tested four rays at a time, or ray by ray where no more meet them than there are triangles. Rejected: frusta (no better where rays come from surfaces), packets of 16 (a fifth slower
-// here), and sorting rays of bounces into packets (0.77 of single rays' speed before the sorting).
+// Rays of one packet have the same signs of direction and the same dominant axis; eight that follow each other are a group. A
+// node's eight boxes are first tested for all rays in one interval; each that is met, for all groups, an interval each, and then for
+// the eight rays of the first group that is left. Rays that meet a leaf's own box are tested against its triangles one by one.
+// Rejected: intervals alone, without rays (a fifth of the speed to a sun, where some groups' origins lie far apart), frusta (no
+// better where rays come from surfaces), packets of 16 (a fifth slower here), and sorting rays of bounces into packets (0.77 of
+// single rays' speed before the sorting).
 #pragma once
+#include <bit>
+
 #include "traverse.h"
 
 namespace viewcam::VIEWCAM_ISA {
@@ -37,8 +41,12 @@ struct Shear {
     return inside & long4(determinant != zero);
 }
 
-struct alignas(64) Packet {
-    float near_origin[3][PACKET], far_origin[3][PACKET], near_reciprocal[3][PACKET], far_reciprocal[3][PACKET], far[PACKET];
+// Of N rays, or sets of rays, what box_ray.h explains, but for the origin, which is no product yet.
+template <int N> struct alignas(64) BoxRays {
+    float near_origin[3][N], far_origin[3][N], near_reciprocal[3][N], far_reciprocal[3][N], far[N];
+};
+
+struct alignas(64) Packet : BoxRays<PACKET> {
     double origin[3][PACKET], by_x[PACKET], by_y[PACKET], by_z[PACKET], t_min[PACKET], start[PACKET], unit[PACKET], t[PACKET];
     uint64_t name[PACKET];
     int key[PACKET];     // axis · 8 + signs; −1 misses the hierarchy
@@ -121,12 +129,15 @@ inline void enter(const Bvh& bvh, const Ray* rays, const Nearest* nearest, int c
             size[axis] = abs(d[axis]);
         }
         store(packet.t_min + i, t_min);
-        double4 longest = max(size[0], max(size[1], size[2])), inverse = splat4(1.0) / longest, per = longest * splat4(bvh.scale);
+        double4 longest = max(size[0], max(size[1], size[2])), inverse = splat4(INFINITE), per = longest * splat4(bvh.scale);
+        for (int axis = 0; axis < 3; axis++) {
+            reciprocal[axis] = splat4(1.0) / d[axis];
+            inverse = min(abs(reciprocal[axis]), inverse);  // that of the longest, to the bit
+        }
         double4 start = t_min * per, end = load<double4>(packet.t + i) * per, far = splat4(0.0);
         for (int axis = 0; axis < 3; axis++) {
             unit[axis] = d[axis] * inverse;
-            reciprocal[axis] = longest * (splat4(1.0) / d[axis]);
-            reciprocal[axis] = copysign(min(abs(reciprocal[axis]), splat4(1e200)), unit[axis]);
+            reciprocal[axis] = copysign(min(abs(longest * reciprocal[axis]), splat4(1e200)), unit[axis]);
             from[axis] = (origin[axis] - splat4(bvh.centre[axis])) * splat4(bvh.scale);
             double4 edge = splat4(bvh.half[axis] * (1 + 1e-9) + 1e-300) + splat4(4e-16) * abs(from[axis]);
             double4 one = (-edge - from[axis]) * reciprocal[axis], other = (edge - from[axis]) * reciprocal[axis];
@@ -160,87 +171,82 @@ inline void enter(const Bvh& bvh, const Ray* rays, const Nearest* nearest, int c
     }
 }
 
-// Calls visit(leaf, first of four rays, which of them may meet it, nearer) for the leaves that any ray may meet.
+// Calls visit(leaf, first of eight rays, which of them may meet it) for the leaves that any ray may meet; it tells whether any of
+// them met something nearer.
 template <bool ANY, class Visit> inline void traverse_packet(const Bvh& bvh, Packet& packet, const Visit& visit) {
     const int groups = (packet.count + 7) / 8;
     int near[3], far[3];
-    // Of all rays together: near planes from the origin farthest along, by the reciprocal of least size; far planes the other way.
-    float8 near_origin[3], far_origin[3], near_reciprocal[3], far_reciprocal[3];
-    for (int axis = 0; axis < 3; axis++) {
-        near[axis] = 2 * axis + packet.backward[axis];
-        far[axis] = near[axis] ^ 1;
-        auto extreme = [&](const float* values, bool most) {
-            float8 found = load<float8>(values);
-            for (int g = 1; g < groups; g++) found = most ? max(found, load<float8>(values + 8 * g)) : min(found, load<float8>(values + 8 * g));
-            return splat8(most ? reduce_max(found) : reduce_min(found));
-        };
-        bool backward = packet.backward[axis];
-        near_origin[axis] = extreme(packet.near_origin[axis], !backward);
-        far_origin[axis] = extreme(packet.far_origin[axis], backward);
-        near_reciprocal[axis] = extreme(packet.near_reciprocal[axis], backward);
-        far_reciprocal[axis] = extreme(packet.far_reciprocal[axis], !backward);
-    }
-    auto farthest = [&] {
-        float8 most = load<float8>(packet.far);
-        for (int g = 1; g < groups; g++) most = max(most, load<float8>(packet.far + 8 * g));
-        return reduce_max(most);
+    // Of each group's rays together, and of all: near planes from the origin farthest along, by the reciprocal of least size; far
+    // planes the other way. Where there is no group, those of the last one, with an end before the start.
+    BoxRays<8> each, all;
+    auto reduce = [&](const float* values, bool most, float* of_each, float* of_all) {
+        float8 group[8];
+        for (int g = 0; g < 8; g++) group[g] = load<float8>(values + 8 * std::min(g, groups - 1));
+        float8 found = most ? reduce_eight<true>(group) : reduce_eight<false>(group);
+        store(of_each, found);
+        store(of_all, splat8(most ? reduce_max(found) : reduce_min(found)));
     };
-    // Which of eight rays meet a child of a node.
-    auto rays_of = [&](const Bvh::Node& node, int child, int group) {
-        int i = 8 * group;
-        auto enters = [&](int a) {
-            return (splat8(node.bounds[near[a]][child]) - load<float8>(packet.near_origin[a] + i)) * load<float8>(packet.near_reciprocal[a] + i);
-        };
-        auto leaves = [&](int a) {
-            return (splat8(node.bounds[far[a]][child]) - load<float8>(packet.far_origin[a] + i)) * load<float8>(packet.far_reciprocal[a] + i);
-        };
-        float8 first = max(max(enters(0), enters(1)), max(enters(2), splat8(0)));
-        float8 last = min(min(leaves(0), leaves(1)), min(leaves(2), load<float8>(packet.far + i)));
-        return bits(int8(first <= last));
+    for (int axis = 0; axis < 3; axis++) {
+        bool backward = packet.backward[axis];
+        near[axis] = 2 * axis + backward;
+        far[axis] = near[axis] ^ 1;
+        reduce(packet.near_origin[axis], !backward, each.near_origin[axis], all.near_origin[axis]);
+        reduce(packet.far_origin[axis], backward, each.far_origin[axis], all.far_origin[axis]);
+        reduce(packet.near_reciprocal[axis], backward, each.near_reciprocal[axis], all.near_reciprocal[axis]);
+        reduce(packet.far_reciprocal[axis], !backward, each.far_reciprocal[axis], all.far_reciprocal[axis]);
+    }
+    reduce(packet.far, true, each.far, all.far);
+    for (int g = groups; g < 8; g++) each.far[g] = -1;
+    // Which of eight rays, from i on, meet which planes, eight of them or one eight times; `first`: how far along.
+    auto meets = [&](const auto& plane, const auto& rays, int i, float8& first) {
+        auto enters = [&](int a) { return (plane(near[a]) - load<float8>(rays.near_origin[a] + i)) * load<float8>(rays.near_reciprocal[a] + i); };
+        auto leaves = [&](int a) { return (plane(far[a]) - load<float8>(rays.far_origin[a] + i)) * load<float8>(rays.far_reciprocal[a] + i); };
+        first = max(max(enters(0), enters(1)), max(enters(2), splat8(0)));
+        return bits(int8(first <= min(min(leaves(0), leaves(1)), min(leaves(2), load<float8>(rays.far + i)))));
     };
     struct Entry {
         uint32_t child, parent;
         float distance;
-        uint16_t slot, first;  // of the parent; the first group of rays that may meet it
-    } stack[Bvh::STACK], entry{bvh.root, NOTHING, 0, 0, 0};
+        uint16_t slot, groups;  // of the parent; those that may meet the parent
+    } stack[Bvh::STACK], entry{bvh.root, NOTHING, 0, 0, uint16_t((1u << groups) - 1)};
     int size = 0;
-    float most = farthest();
     for (;;) {
-        unsigned rays = 255;
-        int group = entry.first;
-        const Bvh::Node* parent = entry.parent == NOTHING ? nullptr : &bvh.nodes[entry.parent];
-        if (parent)
-            while (group < groups && !(rays = rays_of(*parent, entry.slot, group))) group++;
-        if (group < groups && !(entry.child & LEAF)) {
+        float8 first;
+        auto own_plane = [&](int i) { return splat8(bvh.nodes[entry.parent].bounds[i][entry.slot]); };
+        auto rays_of = [&](int group) { return entry.parent == NOTHING ? 255 : meets(own_plane, packet, 8 * group, first); };
+        unsigned met_by = entry.groups, rays = 0;
+        if (entry.parent != NOTHING) met_by &= meets(own_plane, each, 0, first);
+        while (met_by && !(rays = rays_of(std::countr_zero(met_by)))) met_by &= met_by - 1;
+        if (met_by && !(entry.child & LEAF)) {
             const Bvh::Node& node = bvh.nodes[entry.child];
-            auto enters = [&](int a) { return (load<float8>(node.bounds[near[a]]) - near_origin[a]) * near_reciprocal[a]; };
-            auto leaves = [&](int a) { return (load<float8>(node.bounds[far[a]]) - far_origin[a]) * far_reciprocal[a]; };
-            float8 first = max(max(enters(0), enters(1)), max(enters(2), splat8(0)));
-            float8 last = min(min(leaves(0), leaves(1)), min(leaves(2), splat8(most)));
-            unsigned met = bits(int8(first <= last));
+            unsigned met = meets([&](int i) { return load<float8>(node.bounds[i]); }, all, 0, first);
             float distance[8];
             store(distance, first);
             for (int base = size; met;) {
                 int i = take_bit(met), at = size++;
-                for (; at > base && stack[at - 1].distance < distance[i]; at--) stack[at] = stack[at - 1];
-                stack[at] = {node.child[i], entry.child, distance[i], uint16_t(i), uint16_t(group)};
+                for (; !ANY && at > base && stack[at - 1].distance < distance[i]; at--) stack[at] = stack[at - 1];
+                stack[at] = {node.child[i], entry.child, distance[i], uint16_t(i), uint16_t(met_by)};
             }
-        } else if (group < groups && entry.child != NOTHING) {  // see traverse
+        } else if (met_by && entry.child != NOTHING) {  // see traverse
             bool nearer = false;
-            for (int g = group; g < groups; g++) {
-                if (g > group) rays = parent ? rays_of(*parent, entry.slot, g) : 255;
-                if (rays & 15) visit(entry.child & ~LEAF, 8 * g, rays & 15, nearer);
-                if (rays >> 4) visit(entry.child & ~LEAF, 8 * g + 4, rays >> 4, nearer);
+            for (;;) {
+                int group = take_bit(met_by);
+                if (rays && visit(entry.child & ~LEAF, 8 * group, rays)) {
+                    each.far[group] = reduce_max(load<float8>(packet.far + 8 * group));
+                    nearer = true;
+                }
+                if (!met_by) break;
+                rays = rays_of(std::countr_zero(met_by));
             }
             if (nearer) {
-                most = farthest();
-                if (ANY && most < 0) return;
+                store(all.far, splat8(reduce_max(load<float8>(each.far))));
+                if (ANY && all.far[0] < 0) return;
             }
         }
         do {
             if (!size) return;
             size--;
-        } while (stack[size].distance > most);
+        } while (stack[size].distance > all.far[0]);
         entry = stack[size];
     }
 }

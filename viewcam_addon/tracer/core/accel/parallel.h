@@ -10,6 +10,9 @@
 #include <system_error>
 #include <thread>
 #include <vector>
+#if defined(__linux__)
+#include <sys/mman.h>
+#endif
 
 namespace viewcam::VIEWCAM_ISA {
 
@@ -48,12 +51,16 @@ template <class Work> void parallel_pieces(int threads, size_t count, size_t pie
                  [&](size_t i) { work(i * piece, std::min(count, (i + 1) * piece)); });
 }
 
-// An array on whole cache lines that holds whatever was there, until it is written: std::vector would write it twice.
+// An array on whole cache lines that holds whatever was there, until it is written: std::vector would write it twice. A large one
+// lies on huge pages where the system has them: rays jump about in it, and of small pages a processor knows few at a time.
 template <class T> class Array {
    public:
     Array() = default;
     explicit Array(size_t count) : size_(count) {
-        data_ = static_cast<T*>(::operator new(std::max<size_t>(count, 1) * sizeof(T), std::align_val_t{64}));
+        data_ = static_cast<T*>(::operator new(std::max<size_t>(count, 1) * sizeof(T), alignment()));
+#if defined(__linux__)
+        if (alignment() == HUGE_PAGE) madvise(data_, count * sizeof(T), MADV_HUGEPAGE);
+#endif
     }
     Array(Array&& other) noexcept { swap(other); }
     Array& operator=(Array&& other) noexcept {
@@ -61,7 +68,7 @@ template <class T> class Array {
         return *this;
     }
     ~Array() {
-        if (data_) ::operator delete(data_, std::align_val_t{64});
+        if (data_) ::operator delete(data_, alignment());
     }
     T& operator[](size_t i) { return data_[i]; }
     const T& operator[](size_t i) const { return data_[i]; }
@@ -72,6 +79,9 @@ template <class T> class Array {
     const T* end() const { return data_ + size_; }
 
    private:
+    static constexpr std::align_val_t CACHE_LINE{64}, HUGE_PAGE{1 << 21};
+
+    std::align_val_t alignment() const { return size_ * sizeof(T) < size_t(HUGE_PAGE) ? CACHE_LINE : HUGE_PAGE; }
     void swap(Array& other) {
         std::swap(data_, other.data_);
         std::swap(size_, other.size_);

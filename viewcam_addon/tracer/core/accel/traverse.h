@@ -1,11 +1,11 @@
-// One ray through a hierarchy, near boxes first.
+// One ray through a hierarchy, near boxes first; in any order where it only asks whether it meets anything.
 #pragma once
 #include "box_ray.h"
 
 namespace viewcam::VIEWCAM_ISA {
 
 // Calls visit(leaf) for the leaves whose boxes the ray meets before ray.far, which `visit` may lower, until one gives true.
-template <class Visit> inline bool traverse(const Bvh& bvh, BoxRay& ray, const Visit& visit) {
+template <bool ANY, class Visit> inline bool traverse(const Bvh& bvh, BoxRay& ray, const Visit& visit) {
     float8 near_start[3], far_start[3], near_reciprocal[3], far_reciprocal[3];
     int near[3], far[3];
     for (int axis = 0; axis < 3; axis++) {
@@ -44,7 +44,7 @@ template <class Visit> inline bool traverse(const Bvh& bvh, BoxRay& ray, const V
             store(distance, first);
             int j = take_bit(met);
             if (!met) {
-                if (distance[j] < distance[i]) std::swap(i, j);
+                if (!ANY && distance[j] < distance[i]) std::swap(i, j);
                 stack[size++] = {node.child[j], distance[j]};
                 current = node.child[i];
                 continue;
@@ -53,7 +53,7 @@ template <class Visit> inline bool traverse(const Bvh& bvh, BoxRay& ray, const V
             auto push = [&](int k) {  // farthest first
                 Entry entry{node.child[k], distance[k]};
                 int at = size++;
-                for (; at > base && stack[at - 1].distance < entry.distance; at--) stack[at] = stack[at - 1];
+                for (; !ANY && at > base && stack[at - 1].distance < entry.distance; at--) stack[at] = stack[at - 1];
                 stack[at] = entry;
             };
             push(i);
@@ -71,11 +71,12 @@ template <class Visit> inline bool traverse(const Bvh& bvh, BoxRay& ray, const V
     }
 }
 
-// The same of a ray as it comes, no farther than t_max.
-template <class Visit> inline bool traverse(const Bvh& bvh, const Ray& ray, double t_max, const Visit& visit) {
+// The same of a ray as it comes, no farther than t_max. origin_error: see LocalRay.
+template <bool ANY, class Visit>
+inline bool traverse(const Bvh& bvh, const Ray& ray, double t_max, double origin_error, const Visit& visit) {
     BoxRay box;
-    if (bvh.root == NOTHING || !enter(bvh, ray, t_max, box)) return false;
-    return traverse(bvh, box, [&](uint32_t leaf) { return visit(leaf, box); });
+    if (bvh.root == NOTHING || !enter(bvh, ray, t_max, origin_error, box)) return false;
+    return traverse<ANY>(bvh, box, [&](uint32_t leaf) { return visit(leaf, box); });
 }
 
 }  // namespace viewcam::VIEWCAM_ISA

@@ -227,7 +227,7 @@ class LightSampler {
             if (!is_black(radiance)) visit(light, radiance);
         };
         for (uint32_t light : boundless_) meet(light);
-        traverse(hierarchy_, Ray{ray.origin, ray.direction, ray.nearest}, ray.farthest, [&](uint32_t leaf, BoxRay&) {
+        traverse<false>(hierarchy_, Ray{ray.origin, ray.direction, ray.nearest}, ray.farthest, 0, [&](uint32_t leaf, BoxRay&) {
             meet(placed_[hierarchy_.leaves[leaf]]);
             return false;
         });

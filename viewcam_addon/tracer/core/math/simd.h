@@ -136,6 +136,20 @@ inline float reduce_max(float8 v) {
     return v[0] > v[1] ? v[0] : v[1];
 }
 
+// The most of each of eight vectors, or the least.
+template <bool MOST> inline float8 reduce_eight(const float8 (&v)[8]) {
+    auto of = [](float8 a, float8 b) { return MOST ? max(a, b) : min(a, b); };
+    float8 two[4], four[2];
+    for (int i = 0; i < 4; i++)
+        two[i] = of(__builtin_shufflevector(v[2 * i], v[2 * i + 1], 0, 8, 2, 10, 4, 12, 6, 14),
+                    __builtin_shufflevector(v[2 * i], v[2 * i + 1], 1, 9, 3, 11, 5, 13, 7, 15));
+    for (int i = 0; i < 2; i++)
+        four[i] = of(__builtin_shufflevector(two[2 * i], two[2 * i + 1], 0, 1, 8, 9, 4, 5, 12, 13),
+                     __builtin_shufflevector(two[2 * i], two[2 * i + 1], 2, 3, 10, 11, 6, 7, 14, 15));
+    return of(__builtin_shufflevector(four[0], four[1], 0, 1, 2, 3, 8, 9, 10, 11),
+              __builtin_shufflevector(four[0], four[1], 4, 5, 6, 7, 12, 13, 14, 15));
+}
+
 // The lowest bit that is set, which is taken out of `mask`.
 inline int take_bit(unsigned& mask) {
     int bit = __builtin_ctz(mask);

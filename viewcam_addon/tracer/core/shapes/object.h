@@ -24,9 +24,9 @@ struct Object {
 
     Vec3 to_object(Vec3 v) const { return product(inverse, v); }
     // The same ray in object space; t stays what it is.
-    Ray to_object(const Ray& ray) const {
+    LocalRay to_object(const Ray& ray) const {
         Vec3 apart = ray.origin - to_world.translation(), sizes = abs(apart);
-        Ray local{to_object(apart), to_object(ray.direction), ray.t_min, ray.t_max};
+        LocalRay local{{to_object(apart), to_object(ray.direction), ray.t_min, ray.t_max}};
         for (int row = 0; row < 3; row++)
             local.origin_error = max(local.origin_error, std::fabs(inverse[row][0]) * sizes.x + std::fabs(inverse[row][1]) * sizes.y +
                                                                    std::fabs(inverse[row][2]) * sizes.z);

@@ -106,7 +106,7 @@ struct UnitSphere {
 // Whether a ray in object space runs past a sphere, or away from it, by more than all that is rounded there: the way to the centre by
 // the origin's error and the centre's own rounding, the direction, relatively, by four roundings times the matrix's condition. So
 // most spheres whose boxes are met are left without a division, and those that a ray has just left without the pairs of `take_care`.
-inline bool passes(const Ray& local, Vec3 center, double radius, double condition) {
+inline bool passes(const LocalRay& local, Vec3 center, double radius, double condition) {
     Vec3 way = center - local.origin, d = local.direction, beside = cross(way, d);
     double size = max_component(abs(center)) + radius + condition * max_component(abs(way));
     double doubt = 2 * local.origin_error + 16 * DOUBLE_ROUNDING * size, reach = radius + doubt;
@@ -115,8 +115,8 @@ inline bool passes(const Ray& local, Vec3 center, double radius, double conditio
 
 template <bool ANY> bool intersect_spheres(const Spheres& spheres, const Object& object, const Ray& ray, uint32_t number, Nearest& nearest) {
     if (object.flat) return false;
-    Ray local = object.to_object(ray);
-    return traverse(spheres.bvh, local, nearest.t, [&](uint32_t leaf, BoxRay& box) {
+    LocalRay local = object.to_object(ray);
+    return traverse<ANY>(spheres.bvh, local, nearest.t, local.origin_error, [&](uint32_t leaf, BoxRay& box) {
         uint32_t i = spheres.bvh.leaves[leaf];
         if (passes(local, spheres.center(i), spheres.radii[i], object.condition)) return false;
         double t = UnitSphere(spheres, object, i, ray, local).distance();

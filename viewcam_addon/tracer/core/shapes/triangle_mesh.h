@@ -8,7 +8,6 @@
 // Leaves hold their corners, 80 bytes a triangle: indices into shared vertices are a third of that, and take single rays a fifth
 // longer.
 #pragma once
-#include <bit>
 #include <map>
 #include <string>
 #include <vector>
@@ -104,15 +103,15 @@ class TriangleBvh {
     }
     size_t bytes() const { return bvh.bytes() + blocks.size() * sizeof(Block); }
 
-    // object: whose the triangles are, NONE where the blocks tell.
-    template <bool ANY> bool intersect(const Ray& ray, uint32_t object, Nearest& nearest) const {
+    // object: whose the triangles are, NONE where the blocks tell. origin_error: see LocalRay.
+    template <bool ANY> bool intersect(const Ray& ray, uint32_t object, Nearest& nearest, double origin_error = 0) const {
         BoxRay box;
-        if (bvh.root == NOTHING || !enter(bvh, ray, nearest.t, box)) return false;
+        if (bvh.root == NOTHING || !enter(bvh, ray, nearest.t, origin_error, box)) return false;
         Shear shear(ray.direction, box);
         const double* origin = &ray.origin.x;
         double4 x = splat4(origin[shear.x]), y = splat4(origin[shear.y]), z = splat4(origin[shear.z]);
         double4 by_x = splat4(shear.by_x), by_y = splat4(shear.by_y), by_z = splat4(shear.by_z);
-        return traverse(bvh, box, [&](uint32_t leaf) {
+        return traverse<ANY>(bvh, box, [&](uint32_t leaf) {
             const Block& block = blocks[leaf];
             double4 t, determinant;
             unsigned met = bits(block.intersect(shear, x, y, z, by_x, by_y, by_z, t, determinant));
@@ -131,48 +130,28 @@ class TriangleBvh {
         });
     }
 
-    // The same of a packet's rays, each with what `intersect` would find. MANY: of four rays that meet a leaf, those that are tested
-    // together.
-    static constexpr int MANY = 4;
+    // The same of a packet's rays, each with what `intersect` would find.
     template <bool ANY> void intersect(Packet& packet) const {
         if (bvh.root == NOTHING) return;
-        traverse_packet<ANY>(bvh, packet, [&](uint32_t leaf, int lane, unsigned rays, bool& nearer) {
+        const Shear& shear = packet.shear;
+        traverse_packet<ANY>(bvh, packet, [&](uint32_t leaf, int first, unsigned rays) {
             const Block& block = blocks[leaf];
-            const Shear& shear = packet.shear;
-            if (std::popcount(rays) < MANY) {
-                while (rays) {
-                    int ray = lane + take_bit(rays);
-                    double4 t, determinant;
-                    unsigned met = bits(block.intersect(shear, splat4(packet.origin[shear.x][ray]), splat4(packet.origin[shear.y][ray]),
-                                                        splat4(packet.origin[shear.z][ray]), splat4(packet.by_x[ray]),
-                                                        splat4(packet.by_y[ray]), splat4(packet.by_z[ray]), t, determinant));
-                    if (!met) continue;
-                    t = t / determinant;
-                    met &= bits(long4(t > splat4(packet.t_min[ray])) & long4(t <= splat4(packet.t[ray])));
-                    while (met) {
-                        int i = take_bit(met);
-                        nearer |= packet.offer<ANY>(ray, t[i], block.object[i], block.primitive[i]);
-                    }
-                }
-                return;
-            }
-            double4 x = load<double4>(packet.origin[shear.x] + lane), y = load<double4>(packet.origin[shear.y] + lane),
-                    z = load<double4>(packet.origin[shear.z] + lane), by_x = load<double4>(packet.by_x + lane),
-                    by_y = load<double4>(packet.by_y + lane), by_z = load<double4>(packet.by_z + lane);
-            for (int i = 0; i < 4 && block.object[i] != NONE; i++) {
-                auto at = [&](int corner, int axis) { return splat4(block.corner[corner][axis][i]); };
+            bool nearer = false;
+            while (rays) {
+                int ray = first + take_bit(rays);
                 double4 t, determinant;
-                long4 inside = intersect_triangle(at(0, shear.x) - x, at(0, shear.y) - y, at(0, shear.z) - z, at(1, shear.x) - x,
-                                                  at(1, shear.y) - y, at(1, shear.z) - z, at(2, shear.x) - x, at(2, shear.y) - y,
-                                                  at(2, shear.z) - z, by_x, by_y, by_z, t, determinant);
-                if (!bits(inside)) continue;
+                unsigned met = bits(block.intersect(shear, splat4(packet.origin[shear.x][ray]), splat4(packet.origin[shear.y][ray]),
+                                                    splat4(packet.origin[shear.z][ray]), splat4(packet.by_x[ray]),
+                                                    splat4(packet.by_y[ray]), splat4(packet.by_z[ray]), t, determinant));
+                if (!met) continue;
                 t = t / determinant;
-                unsigned met = bits(inside & long4(t > load<double4>(packet.t_min + lane)) & long4(t <= load<double4>(packet.t + lane)));
+                met &= bits(long4(t > splat4(packet.t_min[ray])) & long4(t <= splat4(packet.t[ray])));
                 while (met) {
-                    int ray = lane + take_bit(met);
-                    nearer |= packet.offer<ANY>(ray, t[ray - lane], block.object[i], block.primitive[i]);
+                    int i = take_bit(met);
+                    nearer |= packet.offer<ANY>(ray, t[i], block.object[i], block.primitive[i]);
                 }
             }
+            return nearer;
         });
     }
 };
