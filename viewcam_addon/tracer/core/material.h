@@ -81,12 +81,6 @@ struct Material {
                 one.closure);
         return bsdf.emission();
     }
-    // The albedo of what is diffuse here. Of one diffuse closure, which most surfaces are, it is its colour.
-    Vec3 diffuse_color(const ShadingPoint& at) const {
-        if (closures.size() == 1 && closures[0].factors.empty())
-            if (auto* diffuse = std::get_if<DiffuseClosure>(&closures[0].closure)) return at.color(diffuse->color);
-        return kinds_ & (DIFFUSE | TRANSMISSION) ? bsdf(at).diffuse_color() : Vec3{};
-    }
 
    private:
     static void add(const WeightedClosure& one, const ShadingPoint& at, BSDF& bsdf) {

@@ -66,8 +66,8 @@ struct MetallicClosure {
           anisotropy{in["anisotropy"], in["rotation"], in["tangent"]}, distribution(in.choice("distribution")), physical(in.choice("fresnel") == "physical_conductor") {}
     bool is_rough() const { return roughness.varies() || roughness.rgb.x > 0; }
     void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
-        Vec3 normal = at.specular_normal(this->normal);
-        Facets facets = anisotropy.of(at, at.normal(this->normal), distribution.facets(at.number(roughness)));
+        Vec3 shading = at.normal(this->normal), normal = at.specular(shading);
+        Facets facets = anisotropy.of(at, shading, distribution.facets(at.number(roughness)));
         auto add = [&](const auto& fresnel) {
             if (distribution.multiple) {
                 MultipleScattering more = multiple_reflection(at, normal, facets, fresnel.mean());

@@ -36,15 +36,15 @@ struct PrincipledClosure {
 
     void add_to(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
         Vec3 base = not_negative(at.color(base_color)), tint = not_negative(at.color(specular_tint)), clamped = unit_range(base);
-        Vec3 normal = at.specular_normal(this->normal);
+        Vec3 shading = at.normal(this->normal), normal = at.specular(shading);
         double cosine = -dot(normal, at.incoming), index = larger(at.number(ior), LEAST_IOR);
-        Facets round = distribution.facets(at.number(roughness)), facets = anisotropy.of(at, at.normal(this->normal), round);
+        Facets round = distribution.facets(at.number(roughness)), facets = anisotropy.of(at, shading, round);
 
         if (double share = unit_range(at.number(alpha)); share < 1) {
             bsdf.let_through(weight * (1 - share));
             weight *= share;
         }
-        weight = below_coat(bsdf, at, below_sheen(bsdf, at, weight));
+        weight = below_coat(bsdf, at, below_sheen(bsdf, at, weight, shading));
         bsdf.emit(weight * at.color(emission_color) * at.number(emission_strength));
         if (double share = unit_range(at.number(metallic)); share > NEGLIGIBLE) {
             F82 fresnel = F82::of(clamped, unit_range(tint));
@@ -70,7 +70,7 @@ struct PrincipledClosure {
             Vec3 albedo = mix(fresnel.f0, grey(1), fresnel_progress_seen(eta, roughness_of(facets), cosine));
             weight = below(weight, weight * scattered.albedo * albedo);
         }
-        add_diffuse(bsdf, at, weight * base, at.normal(this->normal), at.number(diffuse_roughness), base);
+        add_diffuse(bsdf, at, weight * base, shading, at.number(diffuse_roughness), base);
     }
 
    private:
@@ -88,11 +88,11 @@ struct PrincipledClosure {
     static Vec3 not_negative(Vec3 rgb) { return {larger(rgb.x, 0), larger(rgb.y, 0), larger(rgb.z, 0)}; }
     static bool is_negligible(Vec3 weight) { return weight.x + weight.y + weight.z < 3 * NEGLIGIBLE; }
 
-    // Adds the sheen, which stands on the coat where there is one; what it leaves to the layers below.
-    Vec3 below_sheen(BSDF& bsdf, const ShadingPoint& at, Vec3 weight) const {
+    // Adds the sheen, which stands on the coat where there is one; what it leaves to the layers below. shading: the base's normal.
+    Vec3 below_sheen(BSDF& bsdf, const ShadingPoint& at, Vec3 weight, Vec3 shading) const {
         double share = larger(at.number(sheen_weight), 0.0);
         if (!(share > NEGLIGIBLE)) return weight;
-        Vec3 mixed = mix(at.normal(this->normal), at.normal(coat_normal), unit_range(at.number(coat_weight)));
+        Vec3 mixed = mix(shading, at.normal(coat_normal), unit_range(at.number(coat_weight)));
         double size = length(mixed);
         SheenLobe lobe(not_negative(at.color(sheen_tint)) * weight * share, size > 0 ? mixed / size : at.point.shading, -at.incoming,
                        unit_range(at.number(sheen_roughness)));

@@ -57,8 +57,9 @@ struct ShadingPoint {
         double size = length(asked);
         return size > 0 && size < INFINITE ? asked / size : point.shading;
     }
-    // The same, bent so that a mirror's ray rises above the surface.
-    Vec3 specular_normal(const Color& given) const { return VIEWCAM_ISA::specular_normal(incoming, point.normal, normal(given)); }
+    // A normal, bent so that a mirror's ray rises above the surface; and that which an input asks for.
+    Vec3 specular(Vec3 normal) const { return VIEWCAM_ISA::specular_normal(incoming, point.normal, normal); }
+    Vec3 specular_normal(const Color& given) const { return specular(normal(given)); }
     // Whether facets are so small that they are a mirror.
     bool is_smooth(const Microfacets& facets) const {
         return facets.alpha_x * facets.alpha_y <= (version < CYCLES_4_3 ? 5e-7 : 2e-10);

@@ -89,7 +89,7 @@ class PathIntegrator {
         block.live = 0;
         std::fill_n(light, count, PathLight{});
         start(samples, rays, count, block);
-        for (int depth = 1; block.live > 0 && lit_; depth++) {
+        for (int depth = 1; block.live > 0; depth++) {
             scatter(samples, depth, block);
             gather(depth, block);
             arrive(samples, depth, block);
@@ -155,8 +155,7 @@ class PathIntegrator {
 
     // Whether a path goes straight through a surface; what it brings from now on is weighted by the chance of that. u: a number in
     // [0, 1) that chooses, or −1 where none has been made yet.
-    bool passes(Path& path, const ShadingPoint& at, const CameraSample& sample, int depth, double& u) const {
-        BSDF bsdf = material(at.point).bsdf(at);
+    bool passes(Path& path, const BSDF& bsdf, const CameraSample& sample, int depth, double& u) const {
         double chance = path.last ? !is_black(bsdf.transparency()) : bsdf.chance_through();
         if (!(chance > 0)) return false;
         if (chance < 1) {
@@ -187,8 +186,10 @@ class PathIntegrator {
                 light.add(path.kind == CAMERA ? EMISSION : path.category, path.weight * made_of.emission(at) * share);
             }
             if (has_ended(path)) return false;
-            if (path.kind == CAMERA && made_of.scatters()) light.add(COLOR, path.weight * made_of.diffuse_color(at));
-            if (!made_of.is_transparent() || !passes(path, at, sample, depth, u)) return made_of.scatters() && !path.last;
+            if (!made_of.is_transparent()) return made_of.scatters() && !path.last;
+            BSDF bsdf = made_of.bsdf(at);
+            if (path.kind == CAMERA) light.add(COLOR, path.weight * bsdf.diffuse_color());
+            if (!passes(path, bsdf, sample, depth, u)) return made_of.scatters() && !path.last;
             ray.t_min = hit.t;
             hit = scene_.closest(ray, path.kind);
             meet_lamps(path, ray, hit, depth, block);
@@ -273,8 +274,10 @@ class PathIntegrator {
             const Path& path = block.paths[i];
             const Interaction& point = block.points[path.from];
             ShadingPoint at = shading(point, path, path.ray.direction, depth - 1);
-            BSDF bsdf = material(point).bsdf(at);
-            if (bsdf.is_black()) continue;
+            const Material& made_of = material(point);
+            BSDF bsdf = made_of.bsdf(at);
+            if (depth == 1 && !made_of.is_transparent()) block.light[path.sample].add(COLOR, path.weight * bsdf.diffuse_color());
+            if (bsdf.is_black() || !lit_) continue;
             const CameraSample& sample = samples[path.sample];
             uint32_t key = sampler_.key(sample.pixel);
             auto number = [&](SobolSampler::Purpose purpose) {
