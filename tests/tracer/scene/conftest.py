@@ -4,6 +4,7 @@ import copy
 import json
 
 import pytest
+from hypothesis import strategies as st
 
 from viewcam_addon.errors import InputError
 from viewcam_addon.tracer.scene import scene_file
@@ -51,3 +52,27 @@ def assert_refused(read_document):
         assert "\n" not in message
 
     return check
+
+
+@pytest.fixture(scope="session")
+def meet_replaced(tmp_path_factory):
+    """(example, draw, value): an example with a value at some place of it is read, or refused in a sentence."""
+    file = tmp_path_factory.mktemp("replaced") / "scene.json"
+
+    def meet(example, draw, value):
+        inner, path = example, []
+        while isinstance(inner, dict | list) and len(inner) and (not path or draw(st.booleans())):
+            path.append(draw(st.sampled_from(sorted(inner) if isinstance(inner, dict) else range(len(inner)))))
+            inner = inner[path[-1]]
+        document = copy.deepcopy(example)
+        target = document
+        for key in path[:-1]:
+            target = target[key]
+        target[path[-1]] = value
+        file.write_text(json.dumps(document), encoding="utf-8")
+        try:
+            scene_file.read(file)
+        except InputError as error:
+            assert "\n" not in str(error) and len(str(error)) < 400, str(error)
+
+    return meet

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import ClassVar
 
 import bpy
-from bpy_extras.io_utils import ExportHelper, ImportHelper
+from bpy_extras.io_utils import ExportHelper
 
 from ... import cameras as formats
 from ...errors import InputError
@@ -22,7 +22,7 @@ _DROPPED = ".json;.txt;.bin;.xml;.yaml;.yml;.fspy;.sfm;.xmp;.out;.npy;.csv;.pbrt
 _MOST_NOTES = 12
 
 
-class VIEWCAM_OT_import_cameras(ReadingOptions, ImportHelper, bpy.types.Operator):
+class VIEWCAM_OT_import_cameras(ReadingOptions, file_menu.IntoScene, bpy.types.Operator):
     bl_idname = "viewcam.import_cameras"
     bl_label = "Import Cameras"
     bl_description = "Add the cameras of another program's file, or of the folder that is shown, in a collection of their own"
@@ -56,13 +56,6 @@ class VIEWCAM_OT_import_cameras(ReadingOptions, ImportHelper, bpy.types.Operator
         min=0.0,
         options={"SKIP_SAVE"},
     )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if context.scene and not context.scene.library:
-            return True
-        cls.poll_message_set("The scene is linked from another file")
-        return False
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Ask for the file, or of a dropped one for the options. A scene without a camera takes the file's size."""

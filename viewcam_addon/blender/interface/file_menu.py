@@ -63,7 +63,18 @@ class VIEWCAM_OT_export_scene(ExportHelper, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class VIEWCAM_OT_import_scene(ImportHelper, bpy.types.Operator):
+class IntoScene(ImportHelper):
+    """An operator that adds to the scene what a file holds."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.scene and not context.scene.library:
+            return True
+        cls.poll_message_set("The scene is linked from another file")
+        return False
+
+
+class VIEWCAM_OT_import_scene(IntoScene, bpy.types.Operator):
     bl_idname = "viewcam.import_scene"
     bl_label = "Import Virtual Pinhole Scene"
     bl_description = "Add the objects, lights and camera of a scene file, in a collection of their own"
@@ -82,13 +93,6 @@ class VIEWCAM_OT_import_scene(ImportHelper, bpy.types.Operator):
         description="Let the scene have the file's world, film and bounces, if the file has light",
         options={"SKIP_SAVE"},
     )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if context.scene and not context.scene.library:
-            return True
-        cls.poll_message_set("The scene is linked from another file")
-        return False
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Ask for the file, or of a dropped one for the options. A scene without a camera takes all that the file has."""
