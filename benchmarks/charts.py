@@ -385,23 +385,38 @@ def run_all(
     return (1 if behind else 0), {"behind": behind, "charts": measured}
 
 
-def redraw(figures: Path, folder: Path) -> tuple[int, dict[str, Any]]:
-    """Draw charts into `folder` from the figures of an earlier run, without measuring anything.
-
-    figures : the JSON that the run wrote.
-
-    Returns 0 and these figures.
+def read(figures: Path) -> dict[str, Any]:
+    """What an earlier run has measured, as `run_all` tells it. figures : the JSON that it wrote.
 
     Raises
     ------
     InputError
-        if the file can't be read or has no figures of charts, or the folder can't be written to.
+        if the file can't be read or has no figures of charts.
     """
     try:
         told = json.loads(figures.read_text(encoding="utf-8"))
-        drawn = {name: (Chart.of_figures(each), each["command"], each["machine"]) for name, each in told["charts"].items()}
+        for each in told["charts"].values():
+            Chart.of_figures(each), each["command"], each["machine"]
+        return {"behind": [*told["behind"]], "charts": told["charts"]}
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{figures} has no figures of charts: give what `viewcam chart SUBJECT --json` wrote") from error
-    for name, (chart, command, measured_on) in drawn.items():
-        draw(chart, folder / f"{name}.svg", command, measured_on)
-    return 0, {"behind": told["behind"], "charts": told["charts"]}
+
+
+def redraw(earlier: dict[str, Any], folder: Path) -> tuple[int, dict[str, Any]]:
+    """Draw charts into `folder` from figures, without measuring anything. Returns 0 and these figures.
+
+    Raises
+    ------
+    InputError
+        if the folder can't be written to.
+    """
+    for name, each in earlier["charts"].items():
+        draw(Chart.of_figures(each), folder / f"{name}.svg", each["command"], each["machine"])
+    return 0, earlier
+
+
+def beside(earlier: dict[str, Any], measured: dict[str, Any]) -> tuple[int, dict[str, Any]]:
+    """What a run of some sweeps has measured, with what an earlier one had of the others, as `run_all` tells it."""
+    anew = tuple(f"{each['title']}: " for each in measured["charts"].values())
+    behind = [sentence for sentence in earlier["behind"] if not sentence.startswith(anew)] + measured["behind"]
+    return (1 if behind else 0), {"behind": behind, "charts": earlier["charts"] | measured["charts"]}

@@ -322,7 +322,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
             "--figures",
             metavar="FILE",
             type=Path,
-            help="draw what an earlier run has measured, from its JSON, anew",
+            help="what an earlier run has measured, its JSON: is drawn anew, or with --only kept of all others",
         )
 
     def add_serve(hidden: argparse.ArgumentParser) -> None:

@@ -104,15 +104,26 @@ EVERY_KIND = (
 def test_a_chart_is_drawn_from_its_figures_as_it_was_drawn_when_it_was_measured(chart, tmp_path, capsys):
     status, told = charts.run_all("subject", {"sweep": lambda quick: [chart]}, tmp_path)
     (tmp_path / "figures.json").write_text(json.dumps({"exit_status": status, **told}, allow_nan=False), encoding="utf-8")
-    assert charts.redraw(tmp_path / "figures.json", tmp_path / "again") == (0, told)
+    assert charts.redraw(charts.read(tmp_path / "figures.json"), tmp_path / "again") == (0, told)
     assert (tmp_path / "again" / "subject-name.svg").read_bytes() == (tmp_path / "subject-name.svg").read_bytes()
+
+
+def test_what_is_measured_anew_stands_beside_the_figures_of_all_others():
+    def told(charts, *behind):
+        return {"behind": list(behind), "charts": {name: {"title": title, "run": run} for name, title, run in charts}}
+
+    earlier = told([("s-a", "A", 1), ("s-b", "A box", 1)], "A: slow", "A box: slow")
+    assert charts.beside(earlier, told([("s-a", "A", 2)])) == (1, told([("s-a", "A", 2), ("s-b", "A box", 1)], "A box: slow"))
+    assert charts.beside(earlier, told([("s-a", "A", 2), ("s-b", "A box", 2)]))[0] == 0
+    again = told([("s-b", "A box", 2)], "A box: slower")
+    assert charts.beside(earlier, again) == (1, told([("s-a", "A", 1), ("s-b", "A box", 2)], "A: slow", "A box: slower"))
 
 
 @pytest.mark.parametrize("text", ["", "[]", '{"charts": {"a": {"title": "A"}}}', '{"behind": []}'])
 def test_a_file_without_figures_of_charts_is_an_error_in_one_sentence(text, tmp_path):
     (tmp_path / "figures.json").write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=r"has no figures of charts: give what"):
-        charts.redraw(tmp_path / "figures.json", tmp_path)
+        charts.read(tmp_path / "figures.json")
 
 
 def test_a_chart_brings_its_paper_along_and_turns_dark_where_the_reader_prefers_that(tmp_path):

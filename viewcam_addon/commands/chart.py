@@ -19,6 +19,9 @@ def run(options: argparse.Namespace) -> Result:
         if importlib.util.find_spec(package) is None:
             raise InputError(f"this needs {package}: pip install {package}")
     sys.path.append(str(PROJECT))
-    if options.figures:
-        return importlib.import_module("benchmarks.charts").redraw(options.figures, options.output)
-    return importlib.import_module(f"benchmarks.{options.subject}").run(options.output, options.only, options.quick)
+    charts = importlib.import_module("benchmarks.charts")
+    earlier = charts.read(options.figures) if options.figures else None
+    if earlier and not options.only:
+        return charts.redraw(earlier, options.output)
+    status, measured = importlib.import_module(f"benchmarks.{options.subject}").run(options.output, options.only, options.quick)
+    return charts.beside(earlier, measured) if earlier else (status, measured)
