@@ -25,7 +25,7 @@ def prove_two_cameras_during_playback():
         window().view_layer.objects.active = each
         yield from settle()
         call(bpy.ops.viewcam.compare_with_cycles, camera=each.name)  # as Render › Compare with Cycles does
-        yield from until(proof.running, f"the comparison of {each.name}")
+        yield from until(lambda: proof.background.running, f"the comparison of {each.name}")
         yield from _play_and_press_escape(proof)
         ends = time.monotonic() + PATIENCE
         while proof.background.running and time.monotonic() < ends:

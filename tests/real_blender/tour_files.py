@@ -34,9 +34,9 @@ class CompareWithCycles(Step):
         yield from push("viewcam.compare_with_cycles(")
         for _ in range(200):  # it begins when a copy of the file is written
             yield
-            if room("interface.proof").running():
+            if room("interface.proof").background.running:
                 break
-        while room("interface.proof").running():
+        while room("interface.proof").background.running:
             yield
         for _ in range(6):
             yield
@@ -49,7 +49,7 @@ class CompareWithCycles(Step):
         bpy.ops.viewcam.show_difference()
 
     def check(self):
-        outcome = room("interface.proof").latest()
+        outcome = room("interface.proof").background.latest
         assert outcome is not None and outcome.passed, f"the verdict is {outcome and outcome.verdict}"
         is_at_its_values()
 
