@@ -139,6 +139,13 @@ class Reading:
             KINDS[each.node.type].inputs[name] is NORMAL for each in self.material.closures for name, _ in each.node.inputs
         )
 
+    @property
+    def mixes_refractions(self) -> bool:
+        """Whether another closure lets light through beside one that refracts it roughly."""
+        shaders = [each.node for each in self.material.closures]
+        refractions = sum(shader.is_rough_refraction for shader in shaders)
+        return refractions > 1 or (refractions == 1 and any(shader.type == "translucent" for shader in shaders))
+
 
 def read(material: bpy.types.Material) -> Reading:
     """What Cycles would show of an evaluated material, but for what moves the surface and its volume."""

@@ -218,6 +218,13 @@ class Node:
         return self.type in ("principled", "sheen") or ("distribution" in inputs and self["distribution"] == DISTRIBUTIONS[0])
 
     @property
+    def is_rough_refraction(self) -> bool:
+        """Whether it is a shader that refracts in more than one direction."""
+        if self.type == "principled" and self["transmission_weight"].is_black:
+            return False
+        return self.type in ("glass", "refraction", "principled") and not self["roughness"].is_black
+
+    @property
     def is_shining(self) -> bool:
         """Whether it gives off any light of its own."""
         if self.type == "emission":
