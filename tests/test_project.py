@@ -7,6 +7,7 @@ that what documents name exists.
 import ast
 import functools
 import graphlib
+import json
 import re
 import subprocess
 import sys
@@ -449,6 +450,51 @@ def test_every_module_that_a_comment_names_exists():
             if gone := {name for name in found if not any(file.endswith(f"/{name}") for file in files)}:
                 missing[str(path.relative_to(PACKAGE))] = gone
     assert not missing, missing
+
+
+@functools.cache
+def races() -> dict[tuple[str, str, str], float]:
+    """(race, error, "picture" or "job") → how many times as fast as the rival it was measured."""
+    measured = {}
+    for name, chart in json.loads((ROOT / "docs" / "charts" / "speed.json").read_text(encoding="utf-8"))["charts"].items():
+        race, _, figure = name.removeprefix("speed-").rpartition("-picture")
+        if not race:  # speed-RACE-whole-job, speed-mitsuba-fresh-process, speed-geometry
+            race, figure = figure.removesuffix("-whole-job").removesuffix("-fresh-process"), "job"
+        for each in chart["standings"]:
+            if "error" in each:
+                measured[race, f"{each['error']:g}", figure or "picture"] = each["ratio"]
+            elif "times as fast" in each["what"]:
+                measured[race, "", "picture" if "picture" in each["what"] else "job"] = each["ratio"]
+    return measured
+
+
+def untrue_of_races(page: str) -> list[str]:
+    """What a page's table of races says otherwise than was measured. Cells: race, error, picture, wanted, job, wanted."""
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in page.splitlines() if line.count("|") == 7]
+    told = {
+        (race.replace(" ", "-"), error, figure): cell
+        for race, error, picture, of_picture, job, of_job in rows[2:]
+        for figure, cell in (("picture", (picture, of_picture)), ("job", (job, of_job)))
+    }
+    untrue = [f"{key} is not told" for key in races() if key not in told]
+    for key, (cell, wanted) in told.items():
+        ratio = races().get(key)
+        figure = "–" if ratio is None else f"{ratio:.3g}" if ratio >= float(wanted) else f"**{ratio:.3g}**"
+        untrue += [] if cell == figure else [f"{key} is {figure}, not {cell}"]
+    return untrue
+
+
+def test_the_table_of_races_has_what_its_charts_have_measured_and_what_is_missed_in_bold():
+    assert not untrue_of_races((ROOT / "docs" / "speed.md").read_text(encoding="utf-8"))
+
+
+def test_a_figure_that_was_not_measured_is_seen_in_the_table_of_races():
+    page = (ROOT / "docs" / "speed.md").read_text(encoding="utf-8")
+    row = re.search(r"^\| studio \| 0.003 \|.*\n", page, re.MULTILINE)[0]
+    assert len(untrue_of_races(page.replace(row, ""))) == 2
+    cell = row.split("|")[3]
+    for other in (" 99 ", cell.replace(cell.strip(), f"**{cell.strip()}**")):
+        assert len(untrue_of_races(page.replace(row, row.replace(cell, other, 1)))) == 1
 
 
 def test_how_to_add_something_is_told_in_fewer_than_ten_lines():
