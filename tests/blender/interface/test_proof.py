@@ -62,6 +62,13 @@ def columns(image):
     return "".join("rgb"[int(colour[:3].argmax())] if colour[:3].any() else " " for colour in pixels[0])
 
 
+def test_labels_stand_where_their_pictures_begin(outcome):
+    shown = columns(proof_image.load(outcome, "ALL"))
+    for number, letter in enumerate("rgb"):
+        assert proof_image.begins(number, 3, len(shown)) == pytest.approx(shown.index(letter) / len(shown), abs=1e-12), letter
+    assert proof_image.begins(0, 1, WIDTH) == 0
+
+
 def test_each_view_is_one_image_of_its_own_that_is_saved_with_the_file(outcome):
     gap = " " * proof_image._GAP
     for view, swipe, shown in (

@@ -52,6 +52,11 @@ def composed(sides: Mapping[str, NDArray[np.float32]], view: str, swipe: float =
     return sides[view.lower()]
 
 
+def begins(number: int, count: int, width: int) -> float:
+    """Where one of several pictures side by side begins, from 0 to 1. width : of all together, pixels."""
+    return number * (width + _GAP) / (count * width)
+
+
 def load(outcome: Outcome, view: str = "ALL", swipe: float = 0.5) -> bpy.types.Image:
     """The image of a comparison: one datablock, packed, whose content is that view of the outcome."""
     global _shown
@@ -178,9 +183,9 @@ def _draw_labels() -> None:
         return
     settings, scale = context.window_manager.virtual_pinhole_proof, context.preferences.system.ui_scale
     at, labels = context.region.view2d.view_to_region, _LABELS[settings.view]
-    swiped = settings.view == "SWIPE"
+    swiped, width = settings.view == "SWIPE", context.space_data.image.size[0]
     for number, label in enumerate(labels):
-        x, y = at(number * settings.swipe if swiped else number / len(labels), 0.0, clip=False)
+        x, y = at(number * settings.swipe if swiped else begins(number, len(labels), width), 0.0, clip=False)
         _write(label, x + _MARGIN * scale, y + _MARGIN * scale, scale)
         if label == "Difference":
             _draw_legend(x + _MARGIN * scale, y - (2 * _MARGIN + 2 * _LETTERS) * scale, scale)
