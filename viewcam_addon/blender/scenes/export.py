@@ -26,7 +26,7 @@ from ...tracer.scene.levels import level_of
 from ...tracer.scene.materials import PLAIN, Picture
 from .. import camera as cameras
 from .. import versions
-from . import export_geometry, features, film, lamps, linking, world
+from . import cycles_attributes, export_geometry, features, film, lamps, linking, world
 from .depsgraph import visit_still
 from .ledger import Ledger
 from .shading import Shading
@@ -233,7 +233,7 @@ def placements(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading 
         random = None
         if draws and shading.asks_for_random(source.slots):
             draw = np.where(draws[0][numbers], draws[1][numbers], random_number(source.name))
-            random = (draw / float(0xFFFFFFFF)).astype(np.float32)
+            random = cycles_attributes.unit_number(draw.astype(np.uint32))
         placed.append(Placement(source, _by_rows(matrices[numbers]), random))
     return list(_drawn(placed, ledger))
 
@@ -248,21 +248,10 @@ def _draws(depsgraph: bpy.types.Depsgraph) -> tuple[NDArray[np.bool_], NDArray[n
 
 def random_number(name: str) -> int:
     """The 32 bits that Cycles draws for an object of this name (hash_string and hash_uint2 of intern/cycles/util/hash.h)."""
-    whole = 0xFFFFFFFF
     key = 0
     for byte in name.encode():
-        key = (37 * key + byte) & whole
-
-    def mixed(x: int, y: int, bits: int) -> int:
-        return ((x ^ y) - (y << bits | y >> 32 - bits)) & whole
-
-    b = c = 0xDEADBEEF + 8 + 13
-    a = (b + key) & whole
-    for i, j, k in ((14, 11, 25), (16, 4, 14)):
-        c = mixed(c, b, i)
-        a = mixed(a, c, j)
-        b = mixed(b, a, k)
-    return mixed(c, b, 24)
+        key = (37 * key + byte) & 0xFFFFFFFF
+    return int(cycles_attributes.hashed(key, 0))
 
 
 def _drawn(placed: list[Placement], ledger: Ledger) -> Iterator[Placement]:

@@ -24,7 +24,7 @@ from ...tracer.scene.shader_nodes import KINDS, Node, closures
 from ...tracer.scene.shader_nodes import node as _node
 from ...tracer.scene.value_nodes import GENERATED, INCOMING, NORMAL, OWN, POSITION, TANGENT, UV
 from .. import versions
-from . import images, nodes, value_nodes
+from . import cycles_attributes, images, nodes, value_nodes
 from .nodes import Input, Output
 
 RGB = tuple[float, float, float]
@@ -45,6 +45,11 @@ _CLEAR_OR_MIRRORS = ("glossy", "glass", "refraction")  # without roughness, what
 _WHITE, _ZERO = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 _RAMP = 256  # Cycles looks ramps up in a table of one more
 _BESIDE = 1e-6  # of a pixel: where a step lies is the pixel's that it leads to
+# What Cycles makes of a mesh's edges, as attributes that can be asked for by name, too.
+_OF_EDGES = {
+    ("NEW_GEOMETRY", "Pointiness"): cycles_attributes.POINTINESS,
+    ("NEW_GEOMETRY", "Random Per Island"): cycles_attributes.RANDOM_PER_ISLAND,
+}
 # What Light Path says alike of rays that meet a light and of those that are sent to it.
 _SURE_OF_PATHS = ("Is Camera Ray", "Is Shadow Ray", "Ray Length")
 # What Cycles does not ask for a little beside a point, or in each version in another way.
@@ -115,7 +120,8 @@ class Reading:
     """What a Blender material is to the tracer.
 
     images : key in `Colour.image` → the image. vertex : the colour attribute that `Colour.vertex` stands for ("" is the one
-    that is active for rendering), or None. texts : of IES files, where nodes are made that show them.
+    that is active for rendering), or None. texts : of IES files, where nodes are made that show them. renamed : what attributes
+    of these names are called there.
     reasons : why it is approximated, one clause each, about the material.
     """
 
@@ -125,6 +131,7 @@ class Reading:
     alphas: set[str] = field(default_factory=set)
     tables: dict[str, Picture] = field(default_factory=dict)
     texts: dict[str, bpy.types.Text] = field(default_factory=dict)
+    renamed: dict[str, str] = field(default_factory=dict)
     reasons: list[str] = field(default_factory=list)
 
     @functools.cached_property
@@ -420,6 +427,8 @@ class Tree:
             return Node("texture_coordinate")
         if node.type == "TEX_COORD" and output.socket.name == "Object" and node.object is not None:
             return in_space_of(node.object.matrix_world)
+        if (node.type, output.socket.name) in _OF_EDGES:
+            return _node("attribute", name=_OF_EDGES[node.type, output.socket.name], output="number")
         if node.type == "LIGHT_FALLOFF":
             return self._falloff(output)
         if node.type == "CAMERA":
