@@ -33,7 +33,7 @@ def sheet(scene, camera, add, make_material, set_world):
         mesh = bpy.data.meshes.new("Sheet")
         points = [(0.1, -1), (1, -1), (1, 0), (0.1, 0), (1, 1), (0.1, 1), (0.5, 1.2)]
         mesh.from_pydata([(x, y, 0.1 * x * y) for x, y in points], [], [(0, 1, 2, 3), (3, 2, 4), (3, 4, 6, 5)])
-        mesh.materials.append(make_material("Sheet", "ShaderNodeEmission", Strength=0.3))
+        mesh.materials.append(make_material("Material", "ShaderNodeEmission", Strength=0.3))
         tree = mesh.materials[0].node_tree
         shown = tree.nodes.new(f"ShaderNode{node}")
         if node == "TexSky":
@@ -48,14 +48,14 @@ def sheet(scene, camera, add, make_material, set_world):
                 made = step.outputs[0]
             tree.links.new(made, shown.inputs["Vector"])
         tree.links.new(shown.outputs[0], tree.nodes["Shader"].inputs["Color"])
-        block = add(mesh, "Sheet", pass_index=1)
+        block = add(mesh, "Cube", pass_index=1)  # names that are taken in a new Blender
         block.modifiers.new("Other half", "MIRROR")
         return block
 
     return make
 
 
-def told(exported, name="Sheet"):
+def told(exported, name="Cube"):
     return "; ".join(entry.reason for entry in exported.ledger if entry.object == name)
 
 
@@ -84,7 +84,7 @@ def state():
     """What is in the file."""
     kinds = ("objects", "meshes", "materials", "node_groups", "scenes", "libraries", "texts")
     found = {kind: sorted(block.name for block in getattr(bpy.data, kind)) for kind in kinds}
-    block = bpy.data.objects["Sheet"]
+    block = bpy.data.objects["Cube"]
     tree = block.data.materials[0].node_tree
     images = sorted(image.name for image in bpy.data.images if image.type != "RENDER_RESULT")
     of_block = [[each.name for each in some] for some in (block.modifiers, block.data.uv_layers, block.data.attributes)]
@@ -188,6 +188,7 @@ def test_what_is_occluded_is_baked_until_it_is_hardly_noisy(sheet, sides, add, m
     other.node_tree.links.remove(other.node_tree.nodes["Shader"].inputs["Strength"].links[0])
     other.node_tree.nodes["Shader"].inputs["Strength"].default_value = 0.0
     block.data.materials.append(other)
+    block.data.materials.append(None)
     block.data.polygons[1].material_index = 1
     exported, ours, shown, true = sides()
     assert "bakes of it stands in" in told(exported), told(exported)
@@ -235,4 +236,4 @@ def test_where_no_other_blender_bakes_it_the_material_is_a_plain_one(sheet, monk
             raise FileNotFoundError
 
     monkeypatch.setattr(another_blender, "call", fail)
-    assert "not modelled, and a plain one stands in" in told(export())
+    assert "can't be baked by another Blender, and a plain one stands in" in told(export())

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import versions
 from ..temporary_settings import Overrides, overridden
 from . import charts
 
@@ -23,15 +24,16 @@ _SAMPLES = 64
 """Of an input that is noisy, each with the samples that its nodes take."""
 
 
-def main(library: str, jobs: str, faces: str, out: str, layer: str, frame: str, subframe: str) -> None:
-    """Bake inputs of shaders in a scene, the only one in a .blend.
+def main(library: str, name: str, jobs: str, faces: str, out: str, layer: str, frame: str, subframe: str) -> None:
+    """Bake inputs of shaders in the scene of this name in a .blend.
 
     jobs : JSON, a list of {object, material, node, input, is_number, is_noisy}. faces : an npz, of job 0 `totals0`, how many
     corners each face has, and `shown0`, whether it is of the material. out : the npz that is written, of it `pixels0`,
     (n, n, 3) float32, rows from the bottom, and `difference0`; nothing of what Blender refuses to bake.
     """
-    with bpy.data.libraries.load(library) as (known, wanted):
-        wanted.scenes = known.scenes
+    bpy.data.batch_remove([*bpy.data.objects, *bpy.data.materials])  # whose names others may have
+    with bpy.data.libraries.load(library) as (_, wanted):
+        wanted.scenes = [name]
     (scene,) = wanted.scenes
     scene.frame_set(int(frame), subframe=float(subframe))
     _reset(scene)
@@ -99,6 +101,9 @@ class _Baker:
         """(width, width, 3) of the whole object."""
         image = bpy.data.images.new(charts.NAME, width, width, alpha=False, float_buffer=True, is_data=True)
         for slot in self._block.material_slots:
+            slot.material = slot.material or bpy.data.materials.new(charts.NAME)
+            if versions.node_tree(slot.material) is None:
+                slot.material.use_nodes = True
             tree = slot.material.node_tree
             texture = tree.nodes.new("ShaderNodeTexImage")
             texture.image, tree.nodes.active = image, texture

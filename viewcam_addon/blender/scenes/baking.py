@@ -25,18 +25,8 @@ _NOISY = {"AMBIENT_OCCLUSION"}
 _BAKED = {*_NOISY, "TEX_GABOR", "ShaderNodeRadialTiling", "TEX_SKY"}
 # What else than the place on the surface decides.
 _ELSEWHERE = {
-    *(
-        "LIGHT_PATH",
-        "CAMERA",
-        "FRESNEL",
-        "LAYER_WEIGHT",
-        "BUMP",
-        "NORMAL_MAP",
-        "BEVEL",
-        "MATERIAL_RAYCAST",
-        "WIREFRAME",
-        "SCRIPT",
-    ),
+    *("LIGHT_PATH", "CAMERA", "FRESNEL", "LAYER_WEIGHT", "BUMP", "NORMAL_MAP", "WIREFRAME"),
+    *("BEVEL", "MATERIAL_RAYCAST", "SCRIPT"),
     *("PARTICLE_INFO", "HAIR_INFO", "POINT_INFO", "UVALONGSTROKE", "VOLUME_INFO", "SHADERTORGB"),
     *(("TEX_COORD", output) for output in ("Reflection", "Camera", "Window")),
     *(("NEW_GEOMETRY", output) for output in ("Incoming", "Backfacing")),
@@ -54,19 +44,29 @@ class _Job:
     material: bpy.types.Material
 
 
-def baked_in(depsgraph: bpy.types.Depsgraph) -> dict[str, dict[tuple[str, str], shaders.Baked]]:
-    """What was baked for the materials of a depsgraph, by their full names. Of what can't be baked nothing is there."""
+def baked_in(depsgraph: bpy.types.Depsgraph) -> dict[str, dict[tuple[str, str], shaders.Baked | None]]:
+    """What was baked for the materials of a depsgraph, by their full names; None of what no other Blender could bake."""
     jobs = [*_jobs(depsgraph)]
     if not jobs or _runs_scripts():
         return {}
-    found: dict[str, dict[tuple[str, str], shaders.Baked]] = {}
+    found: dict[str, dict[tuple[str, str], shaders.Baked | None]] = {}
+    for job in jobs:
+        found.setdefault(job.material.name_full, {})[job.unknown.node, job.unknown.input] = None
     with tempfile.TemporaryDirectory(prefix="viewcam-") as folder:
         library, faces, out = (Path(folder, name) for name in ("scene.blend", "faces.npz", "baked.npz"))
         scene = depsgraph.scene
         bpy.data.libraries.write(str(library), {scene.original}, path_remap="ABSOLUTE", fake_user=True)
         np.savez(faces, **{name: values for number, job in enumerate(jobs) for name, values in _faces(job, number).items()})
         asked = json.dumps([_described(job) for job in jobs])
-        arguments = [str(library), asked, str(faces), str(out), depsgraph.view_layer.name, str(scene.frame_current)]
+        arguments = [
+            str(library),
+            scene.original.name,
+            asked,
+            str(faces),
+            str(out),
+            depsgraph.view_layer.name,
+            str(scene.frame_current),
+        ]
         try:
             another_blender.call("blender.scenes.baker", [*arguments, repr(scene.frame_subframe)], _TIMEOUT)
             with np.load(out) as made:
@@ -75,9 +75,9 @@ def baked_in(depsgraph: bpy.types.Depsgraph) -> dict[str, dict[tuple[str, str], 
                         continue
                     picture = Picture(np.nan_to_num(made[f"pixels{number}"], nan=0.0, posinf=0.0, neginf=0.0))
                     baked = shaders.Baked(picture, float(made[f"difference{number}"]), baker.DIFFERENCE)
-                    found.setdefault(job.material.name_full, {})[job.unknown.node, job.unknown.input] = baked
+                    found[job.material.name_full][job.unknown.node, job.unknown.input] = baked
         except (OSError, subprocess.TimeoutExpired):
-            return {}
+            pass
     return found
 
 
@@ -97,17 +97,16 @@ def _faces(job: _Job, number: int) -> dict[str, np.ndarray]:
 
 def _jobs(depsgraph: bpy.types.Depsgraph) -> Iterator[_Job]:
     """What may be baked: of materials that one object of the file's own shows, in one place."""
-    suspects = {material for material in bpy.data.materials if _has_any(material)}
+    suspects = {material for material in bpy.data.materials if not material.library and _has_any(material)}
     shown: dict[bpy.types.Material, list[tuple[bpy.types.Object, bpy.types.Mesh] | None]] = {}
     for instance in depsgraph.object_instances if suspects else ():
         placed = features.placed_by(instance)
         if not instance.show_self or depsgraph.view_layer_eval.material_override:
             continue
-        for slot in placed.shown.material_slots:
-            if slot.material and slot.material.original in suspects:
-                block, mesh = placed.real.original, placed.shown.data
-                is_own = not instance.is_instance and isinstance(mesh, bpy.types.Mesh) and _may_change(block)
-                shown.setdefault(slot.material.original, []).append((block, mesh) if is_own else None)
+        block, mesh = placed.real.original, placed.shown.data
+        is_own = not instance.is_instance and isinstance(mesh, bpy.types.Mesh) and _may_change(block)
+        for material in suspects & {slot.material.original for slot in placed.shown.material_slots if slot.material}:
+            shown.setdefault(material, []).append((block, mesh) if is_own else None)
     for material, where in shown.items():
         if len(where) == 1 and where[0] is not None:
             block, mesh = where[0]
@@ -128,15 +127,9 @@ def _has_any(material: bpy.types.Material) -> bool:
 def _runs_scripts() -> bool:
     """Whether something in the file is driven by Python, which does not run in the other Blender."""
     trees = [versions.node_tree(material) for material in bpy.data.materials]
-    kinds = (
-        bpy.data.objects,
-        bpy.data.meshes,
-        bpy.data.shape_keys,
-        bpy.data.armatures,
-        bpy.data.node_groups,
-        filter(None, trees),
-    )
-    drivers = (curve.driver for kind in kinds for each in kind if each.animation_data for curve in each.animation_data.drivers)
+    data = bpy.data
+    blocks = [*data.objects, *data.meshes, *data.shape_keys, *data.armatures, *data.node_groups, *filter(None, trees)]
+    drivers = [curve.driver for each in blocks if each.animation_data for curve in each.animation_data.drivers]
     return any(driver.type == "SCRIPTED" and not driver.is_simple_expression for driver in drivers)
 
 

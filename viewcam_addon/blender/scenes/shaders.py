@@ -135,8 +135,8 @@ class Baked(NamedTuple):
     most: float
 
 
-BakedInputs = Mapping[tuple[str, str], Baked]
-"""A shader's name and an input's identifier → what was baked."""
+BakedInputs = Mapping[tuple[str, str], Baked | None]
+"""A shader's name and an input's identifier → what was baked, or None where no other Blender could."""
 
 
 @dataclass
@@ -455,14 +455,16 @@ class Tree:
 
     def _baked_image(self, unknown: Unknown, reasons: list[str]) -> Node | None:
         """The image that stands in for an input, where one does that is exact enough. reasons : why there is no other."""
-        baked = self._baked.get((unknown.node, unknown.input))
+        if (unknown.node, unknown.input) not in self._baked:
+            return None
+        baked = self._baked[unknown.node, unknown.input]
         if baked is None:
+            self.reading.reasons[-1] = f"{reasons[-1]}, can't be baked by another Blender"
             return None
         width = baked.picture.pixels.shape[1]
         size = f"an image of {width} × {width} that Cycles bakes of it"
         if baked.difference > baked.most:
-            self.reading.reasons.append(f"{reasons[-1]}: {size} differs from one of half its width by {baked.difference:.2g}")
-            del self.reading.reasons[-2]
+            self.reading.reasons[-1] = f"{reasons[-1]}: {size} differs from one of half its width by {baked.difference:.2g}"
             return None
         self.reading.baked += [f"{reason}, and {size} stands in, exact to {baked.difference:.1g}" for reason in reasons]
         key = f"{unknown.node}, {unknown.input} {zlib.crc32(baked.picture.pixels.tobytes()):08x} (baked)"
