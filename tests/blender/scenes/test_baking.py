@@ -31,8 +31,8 @@ def sheet(scene, camera, add, make_material, set_world):
         set_world((0, 0, 0), 0.0)
         camera.location, camera.rotation_euler, camera.data.lens = (0.013, 0.029, 4.0), (0, 0, 0), 40.0
         mesh = bpy.data.meshes.new("Sheet")
-        points = [(0.1, -1), (1, -1), (1, 0), (0.1, 0), (1, 1), (0.1, 1), (0.5, 1.2)]
-        mesh.from_pydata([(x, y, 0.1 * x * y) for x, y in points], [], [(0, 1, 2, 3), (3, 2, 4), (3, 4, 6, 5)])
+        points = [(0.1, -1), (1, -1), (1, 0), (0.1, 0), (1, 1), (0.1, 1), (0.5, 1.35), (0.9, 1.4)]
+        mesh.from_pydata([(x, y, 0.1 * x * y) for x, y in points], [], [(0, 1, 2, 3), (3, 2, 4), (3, 4, 7, 6, 5)])
         mesh.materials.append(make_material("Material", "ShaderNodeEmission", Strength=0.3))
         tree = mesh.materials[0].node_tree
         shown = tree.nodes.new(f"ShaderNode{node}")
@@ -107,6 +107,24 @@ def test_both_sides_show_the_baked_image_which_is_nearly_what_cycles_computes(sh
     assert picture.pixels.dtype == np.float32
 
 
+def test_inputs_of_one_shader_are_baked_each_as_a_color_or_a_number(sheet):
+    block = sheet()
+    tree = block.active_material.node_tree
+    principled = tree.nodes.new("ShaderNodeBsdfPrincipled")
+    for name in ("Base Color", "Roughness"):
+        tree.links.new(next(node for node in tree.nodes if node.type == "TEX_SKY").outputs[0], principled.inputs[name])
+    tree.links.new(principled.outputs[0], tree.nodes["Output"].inputs["Surface"])
+    exported = export()
+    assert "a plain one stands in" not in told(exported) and "bakes of it stands in" in told(exported)
+    colors, numbers = (
+        next(picture.pixels for name, picture in exported.images.items() if each in name) for each in ("Base", "Rough")
+    )
+    covered = charts.covered(np.array([4, 3, 5, 4, 3, 5]), np.ones(6, bool), len(colors) // 3)
+    assert (numbers == numbers[..., :1]).all() and not (colors == colors[..., :1])[covered].all()
+    # The weights of a luminance are rounded to four digits in older versions.
+    assert np.abs(numbers[..., 0] - colors @ (0.2126390, 0.7151687, 0.0721923))[covered].max() < 1e-4 * colors.max()
+
+
 @pytest.mark.parametrize("wrong", ["a texel further", "another attribute"])
 def test_an_image_in_another_place_is_found(sheet, sides, monkeypatch, wrong):
     block = sheet()
@@ -133,7 +151,7 @@ def test_geometry_nodes_lay_faces_out_as_numpy_does_and_none_over_another(sheet)
         mesh = block.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
         values = export_geometry.read(mesh.attributes[charts.NAME].data, "vector", np.float32, 3)
         starts, totals = (export_geometry.read(mesh.polygons, name, np.int32) for name in ("loop_start", "loop_total"))
-        assert sorted(totals) == [3, 3, 4, 4, 4, 4]
+        assert sorted(totals) == [3, 3, 4, 4, 5, 5]
         assert np.abs(values[:, :2] - charts.corners(starts, totals)).max() < 1e-6
     cells = np.floor(charts.corners(starts, totals) * charts.columns(len(totals)))
     of_faces = [{tuple(cell) for cell in cells[start : start + total]} for start, total in zip(starts, totals, strict=True)]

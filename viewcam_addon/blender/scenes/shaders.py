@@ -428,20 +428,22 @@ class Tree:
         """What an input is given. otherwise : what a number is where that is not modelled, or None of a colour."""
         value = None if otherwise is None else constant_number(output, name)
         if value is None:
-            known, source = len(self.reading.reasons), nodes.source(output.input(name))
+            source = nodes.source(output.input(name))
+            told, self.reading.reasons = self.reading.reasons, []
             made: Colour | Node | None = self._colour(output, name)
-            if len(self.reading.reasons) > known and isinstance(source, Output):
-                del self.reading.reasons[known:]
+            if self.reading.reasons and isinstance(source, Output):
+                self.reading.reasons = []
                 made = self._value(source)
-            if made is not None and len(self.reading.reasons) == known:
+            why, self.reading.reasons = self.reading.reasons, told
+            if made is not None and not why:
                 return made
             if not output.groups and isinstance(source, Output):
                 socket = output.node.inputs[name]
                 unknown = Unknown(output.input(name), output.node.name, socket.identifier, otherwise is not None)
-                if (image := self._baked_image(unknown, self.reading.reasons[known:])) is not None:
-                    del self.reading.reasons[known:]
+                if (image := self._baked_image(unknown, why)) is not None:
                     return image
                 self.reading.unknown.append(unknown)
+            told += [reason for reason in why if reason not in told]
             return self.viewport if otherwise is None else Colour((otherwise,) * 3)
         if isinstance(name, str) and name.endswith("Rotation"):
             value %= 1.0
@@ -454,19 +456,20 @@ class Tree:
         return Colour((min(max(value, 0.0), most),) * 3)
 
     def _baked_image(self, unknown: Unknown, reasons: list[str]) -> Node | None:
-        """The image that stands in for an input, where one does that is exact enough. reasons : why there is no other."""
+        """The image that stands in for an input, where one is exact enough. reasons : why it is asked for; why there is none."""
         if (unknown.node, unknown.input) not in self._baked:
             return None
         baked = self._baked[unknown.node, unknown.input]
         if baked is None:
-            self.reading.reasons[-1] = f"{reasons[-1]}, can't be baked by another Blender"
+            reasons[-1] += ", can't be baked by another Blender"
             return None
         width = baked.picture.pixels.shape[1]
         size = f"an image of {width} × {width} that Cycles bakes of it"
         if baked.difference > baked.most:
-            self.reading.reasons[-1] = f"{reasons[-1]}: {size} differs from one of half its width by {baked.difference:.2g}"
+            reasons[-1] += f": {size} differs from one of half its width by {baked.difference:.2g}"
             return None
-        self.reading.baked += [f"{reason}, and {size} stands in, exact to {baked.difference:.1g}" for reason in reasons]
+        clauses = [f"{reason}, and {size} stands in, exact to {baked.difference:.1g}" for reason in reasons]
+        self.reading.baked += [clause for clause in clauses if clause not in self.reading.baked]
         key = f"{unknown.node}, {unknown.input} {zlib.crc32(baked.picture.pixels.tobytes()):08x} (baked)"
         self.reading.tables[key] = baked.picture
         place = _node("attribute", name=charts.NAME, output="vector")
