@@ -456,7 +456,7 @@ class Tree:
         return Colour((min(max(value, 0.0), most),) * 3)
 
     def _baked_image(self, unknown: Unknown, reasons: list[str]) -> Node | None:
-        """The image that stands in for an input, where one is exact enough. reasons : why it is asked for; why there is none."""
+        """The image that stands in for an input, where one is exact enough. reasons : why one is asked for, or is not there."""
         if (unknown.node, unknown.input) not in self._baked:
             return None
         baked = self._baked[unknown.node, unknown.input]
