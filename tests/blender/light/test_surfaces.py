@@ -181,7 +181,7 @@ def toon(material):
 
 def noisy(material):
     tree = material.node_tree
-    tree.links.new(tree.nodes.new("ShaderNodeWireframe").outputs[0], tree.nodes["Shader"].inputs["Color"])
+    tree.links.new(tree.nodes.new("ShaderNodeParticleInfo").outputs[0], tree.nodes["Shader"].inputs["Color"])
 
 
 def bumpy(material):

@@ -414,6 +414,19 @@ def test_objects_of_one_geometry_share_it_and_keep_their_own_materials(fresh_ble
     assert [block.material_slots[0].material.name for block in (one, other)] == ["red", "green"]
 
 
+def test_what_cycles_would_make_anew_of_a_meshs_edges_comes_back_by_another_name(fresh_blender):
+    values = np.random.default_rng(0).random((4, 3, 1)).astype(np.float32)
+    pointed = Material(surface=node("emission", color=node("attribute", name="pointiness", output="number")))
+    made = scene_of(
+        [Object("Thing", "thing", np.eye(4), materials=("pointed",))],
+        {"thing": tetrahedron(attributes={"pointiness": values})},
+        materials={"pointed": pointed},
+    )
+    found = there_and_back(made)
+    assert np.array_equal(found.geometries["thing"].attributes["Pointiness"], values)
+    assert found.materials["pointed"].attributes == {"Pointiness"}
+
+
 def test_an_image_survives_saving_and_loading(fresh_blender, tmp_path):
     pixels = np.random.default_rng(0).random((2, 3, 3)).astype(np.float32) * 10
     made = scene_of(

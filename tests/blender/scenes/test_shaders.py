@@ -99,6 +99,7 @@ VALUES = [
     node("mix_number", a=node("separate", color=CHECKS, output="y"), clamp_factor=False),
     node("combine_color", x=node("rgb_to_bw", color=CHECKS), z=node("object_info", output="object_index")),
     node("attribute", name="Paint", output="alpha"),
+    node("wireframe", size=node("attribute", name="pointiness", output="number"), pixel_size=True),
     node("noise", scale=node("wave", profile="saw", kind="rings", rings="spherical"), kind="hetero_terrain", dimensions="4d"),
     node("checker", vector=node("texture_coordinate"), color1=node("gradient", kind="radial"), color2=GREEN, output="factor"),
     node(
@@ -370,18 +371,18 @@ def test_what_has_no_weight_in_a_mixture_is_not_looked_at(diffuse, factor, left)
 @pytest.mark.parametrize(("socket", "weight"), [("Coat Roughness", "Coat Weight"), ("Sheen Tint", "Sheen Weight")])
 def test_what_makes_an_input_that_does_not_count_is_not_followed(make_material, socket, weight):
     material = make_material("p", "ShaderNodeBsdfPrincipled", Base_Color=colour(RED))
-    link(material, "ShaderNodeWireframe", 0, socket)
+    link(material, "ShaderNodeAmbientOcclusion", 0, socket)
     exactly(material)
     material.node_tree.nodes["Shader"].inputs[weight].default_value = 0.5
-    approximately(material, "'Wireframe'", "not modelled")
+    approximately(material, "'Ambient Occlusion'", "not modelled")
 
 
 def test_a_factor_that_is_not_modelled_is_a_half(diffuse):
     mixed = add_shader(diffuse, "ShaderNodeMixShader", (1, diffuse.node_tree.nodes["Shader"]))
     mixed.name = "Blend"
-    link(diffuse, "ShaderNodeWireframe", 0, 0, "Blend")
+    link(diffuse, "ShaderNodeAmbientOcclusion", 0, 0, "Blend")
     show(diffuse, mixed)
-    (closure,) = approximately(diffuse, "'Wireframe'", "not modelled").closures
+    (closure,) = approximately(diffuse, "'Ambient Occlusion'", "not modelled").closures
     assert closure.node["color"] == Colour(tuple(value / 2 for value in RED)) and not closure.factors
 
 
@@ -392,7 +393,7 @@ def test_other_shaders_are_lamberts_of_their_colour(make_material):
 
 def test_what_has_no_colour_has_the_viewports(make_material):
     unknown = make_material("s", "ShaderNodeBsdfDiffuse")
-    link(unknown, "ShaderNodeWireframe", 0, "Color").name = "Wires"
+    link(unknown, "ShaderNodeAmbientOcclusion", 0, "Color").name = "Wires"
     unknown.diffuse_color = colour(GREEN)
     assert approximately(unknown, "'Wires'", "not modelled") == Material(diffuse=Colour(GREEN))
 

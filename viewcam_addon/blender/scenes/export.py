@@ -26,7 +26,7 @@ from ...tracer.scene.levels import level_of
 from ...tracer.scene.materials import PLAIN, Picture
 from .. import camera as cameras
 from .. import versions
-from . import export_geometry, features, film, lamps, linking, world
+from . import baking, cycles_attributes, export_geometry, features, film, lamps, linking, world
 from .depsgraph import visit_still
 from .ledger import Ledger
 from .shading import Shading
@@ -105,7 +105,7 @@ def survey(
     """Fill the ledger as `export_scene` does, without reading any geometry; returns the light of the scene, if wanted."""
 
     def look(depsgraph: bpy.types.Depsgraph) -> Lighting | None:
-        placements(depsgraph, ledger, Shading() if lit else None)
+        placements(depsgraph, ledger, Shading(baking.baked_in(depsgraph)) if lit else None)
         return light_in(depsgraph, ledger) if lit else None
 
     features.note_render(scene, view_layer, camera_object, ledger, lit)
@@ -149,7 +149,7 @@ def light_in(
 
 def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, ledger: Ledger, lit: bool = False) -> Scene:
     """The scene in the depsgraph that a render engine is given. lit : as in `export_scene`."""
-    shading = Shading() if lit else None
+    shading = Shading(baking.baked_in(depsgraph)) if lit else None
     names: dict[tuple[int, int], str] = {}
     geometries: dict[str, Mesh | Spheres] = {}
     objects = []
@@ -233,7 +233,7 @@ def placements(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading 
         random = None
         if draws and shading.asks_for_random(source.slots):
             draw = np.where(draws[0][numbers], draws[1][numbers], random_number(source.name))
-            random = (draw / float(0xFFFFFFFF)).astype(np.float32)
+            random = cycles_attributes.unit_number(draw.astype(np.uint32))
         placed.append(Placement(source, _by_rows(matrices[numbers]), random))
     return list(_drawn(placed, ledger))
 
@@ -248,21 +248,10 @@ def _draws(depsgraph: bpy.types.Depsgraph) -> tuple[NDArray[np.bool_], NDArray[n
 
 def random_number(name: str) -> int:
     """The 32 bits that Cycles draws for an object of this name (hash_string and hash_uint2 of intern/cycles/util/hash.h)."""
-    whole = 0xFFFFFFFF
     key = 0
     for byte in name.encode():
-        key = (37 * key + byte) & whole
-
-    def mixed(x: int, y: int, bits: int) -> int:
-        return ((x ^ y) - (y << bits | y >> 32 - bits)) & whole
-
-    b = c = 0xDEADBEEF + 8 + 13
-    a = (b + key) & whole
-    for i, j, k in ((14, 11, 25), (16, 4, 14)):
-        c = mixed(c, b, i)
-        a = mixed(a, c, j)
-        b = mixed(b, a, k)
-    return mixed(c, b, 24)
+        key = (37 * key + byte) & 0xFFFFFFFF
+    return int(cycles_attributes.hashed(key, 0))
 
 
 def _drawn(placed: list[Placement], ledger: Ledger) -> Iterator[Placement]:

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from ...tracer.scene import Mesh, Spheres
 from .. import versions
+from . import charts, cycles_attributes
 
-GENERATED = "generated"
 # Type of an attribute → the field that has its values, and how many they are.
 _ATTRIBUTES = {
     "FLOAT": ("value", 1),
@@ -53,7 +53,7 @@ def mesh_of(mesh: bpy.types.Mesh, slot_count: int, colours: str | None = None, a
     return Mesh(
         vertices=vertices,
         triangles=triangles,
-        materials=_materials(mesh, slot_count)[faces],
+        materials=materials_of(mesh, slot_count)[faces],
         corner_normals=_corner_normals(mesh, vertices, triangles, corners, faces),
         corner_uvs=_corner_uvs(mesh, corners),
         corner_colours=None if colours is None else _corner_colours(mesh, colours, triangles, corners),
@@ -76,10 +76,10 @@ def spheres_of(points: bpy.types.PointCloud) -> Spheres:
 
 def used_slots(mesh: bpy.types.Mesh, slot_count: int) -> set[int]:
     """The material slots that some face of a mesh uses; geometry nodes leave an unused first one."""
-    return set(np.unique(_materials(mesh, slot_count)).tolist())
+    return set(np.unique(materials_of(mesh, slot_count)).tolist())
 
 
-def _materials(mesh: bpy.types.Mesh, slot_count: int) -> Array:
+def materials_of(mesh: bpy.types.Mesh, slot_count: int) -> Array:
     """(faces,) int32: each face's index among the material slots."""
     indices = _attribute(mesh, "material_index", "value", np.int32, domain="FACE")
     if indices is None:
@@ -130,8 +130,13 @@ def _corner_colours(mesh: bpy.types.Mesh, name: str, triangles: Array, corners: 
 
 def _corner_values(mesh: bpy.types.Mesh, name: str, triangles: Array, corners: Array, faces: Array) -> Array | None:
     """(triangles, 3, k) float32: an attribute as Cycles has it, or None where the mesh has none of this name."""
-    if name == GENERATED:
+    if name == cycles_attributes.GENERATED:
         return _generated(mesh)[triangles]
+    if name == charts.NAME:
+        starts, totals = (read(mesh.polygons, field, np.int32) for field in ("loop_start", "loop_total"))
+        return charts.corners(starts, totals)[corners]
+    if name in (cycles_attributes.POINTINESS, cycles_attributes.RANDOM_PER_ISLAND):
+        return _of_edges(mesh, name)[triangles, np.newaxis]
     attribute = mesh.attributes.get(name)
     if attribute is None or attribute.data_type not in _ATTRIBUTES:
         return None
@@ -149,6 +154,17 @@ def _generated(mesh: bpy.types.Mesh) -> Array:
         scale = np.where(size != 0, np.float32(0.5) / size, np.float32(0))
     places = read(mesh.vertices, "undeformed_co", np.float32, 3)
     return places * scale - (np.array(mesh.texspace_location, np.float32) * scale - np.float32(0.5))
+
+
+def _of_edges(mesh: bpy.types.Mesh, name: str) -> Array:
+    """(vertices,) float32: what edges say of the vertices that they connect."""
+    edges = read(mesh.edges, "vertices", np.int32, 2)
+    if name == cycles_attributes.RANDOM_PER_ISLAND:
+        return cycles_attributes.random_per_island(edges, len(mesh.vertices))
+    places, normals = (
+        read(each, field, np.float32, 3) for each, field in ((mesh.vertices, "co"), (mesh.vertex_normals, "vector"))
+    )
+    return cycles_attributes.pointiness(places, normals, edges)
 
 
 def _attribute(owner: bpy.types.ID, name: str, field: str, dtype: type, width: int = 1, domain: str = "POINT") -> Array | None:

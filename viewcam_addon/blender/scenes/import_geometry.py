@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from ...tracer.scene import Mesh, Spheres
 from .. import datablocks, versions
 from ..temporary_settings import Overrides, overridden
-from .export_geometry import GENERATED
+from . import cycles_attributes
 from .ledger import Ledger
 
 Array = NDArray[np.generic]
 
 UV_MAP, COLOURS = "UVMap", "Color"
+RENAMED = {name: name.replace("_", " ").title() for name in (cycles_attributes.POINTINESS, cycles_attributes.RANDOM_PER_ISLAND)}
+"""What is called otherwise, or Cycles would make it anew, of edges that triangles have and faces had not."""
 # Numbers a corner → the type of an attribute, and the field that has its values.
 _ATTRIBUTES = {1: ("FLOAT", "value"), 2: ("FLOAT2", "vector"), 3: ("FLOAT_VECTOR", "vector"), 4: ("FLOAT_COLOR", "color")}
 # Of a unit vector's float32 components, three roundings by which Blender's arithmetic may be off.
@@ -41,9 +43,11 @@ def mesh_from(made: Mesh, name: str, overrides: Overrides, ledger: Ledger) -> bp
     mesh.polygons.foreach_set("use_smooth", np.full(len(corners) // 3, made.corner_normals is not None))
     mesh.update(calc_edges=True)
     for attribute, values in made.attributes.items():
-        if attribute != GENERATED:  # Cycles makes it itself
+        if attribute != cycles_attributes.GENERATED:  # Cycles makes it itself
             kind, field = _ATTRIBUTES[values.shape[2]]
-            mesh.attributes.new(attribute, kind, "CORNER").data.foreach_set(field, values[drawn].ravel())
+            mesh.attributes.new(RENAMED.get(attribute, attribute), kind, "CORNER").data.foreach_set(
+                field, values[drawn].ravel()
+            )
     if made.corner_uvs is not None:
         layer = mesh.uv_layers.new(name=UV_MAP, do_init=False)
         layer.uv.foreach_set("vector", made.corner_uvs[drawn].ravel())

@@ -13,7 +13,7 @@ from ...tracer.scene.lamps import RAYS, Lamp, World
 from ...tracer.scene.materials import PLAIN, Material, Picture
 from ...tracer.scene.shader_nodes import Node
 from ..temporary_settings import LARGEST_INDEX, Overrides
-from . import film, images, lamps, materials, nodes, shaders
+from . import film, images, import_geometry, lamps, materials, nodes, shaders
 from .ledger import Ledger
 
 _COLUMN = 260.0  # between nodes, in the node editor's units
@@ -101,7 +101,7 @@ def paint(
     material.use_transparent_shadow = made.transparent_shadow
     adder = nodes.Adder(tree)
     output = adder.add("ShaderNodeOutputMaterial")
-    materials.add_surface(adder, output, shaders.Reading(made, shown, "", texts=texts or {}))
+    materials.add_surface(adder, output, shaders.Reading(made, shown, "", texts=texts or {}, renamed=import_geometry.RENAMED))
     _arrange(output, 0, {})
     colour = next((colour for _, colour in made.inputs), None)
     if colour:

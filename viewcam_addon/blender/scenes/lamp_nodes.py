@@ -20,7 +20,9 @@ from .shaders import RGB
 
 _WHITE, _BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 # What says something else of a light than of a surface, or nothing.
-_OF_SURFACES = {"ATTRIBUTE", "VERTEX_COLOR", "CAMERA", "TANGENT", "BUMP", "NORMAL_MAP", "OBJECT_INFO", "VECT_TRANSFORM"}
+_OF_SURFACES = {
+    *("ATTRIBUTE", "VERTEX_COLOR", "CAMERA", "TANGENT", "BUMP", "NORMAL_MAP", "OBJECT_INFO", "VECT_TRANSFORM", "WIREFRAME"),
+}
 _PLACES = {"Position", "Normal", "True Normal", "Incoming"}
 
 UVMaker = Callable[[bpy.types.Light, np.ndarray], Node | None]

@@ -144,8 +144,10 @@ def _value(adder: nodes.Adder, node: Node, reading: shaders.Reading) -> bpy.type
             if node[name] == KINDS[node.type].inputs[name][0] and not hasattr(added, theirs):
                 continue  # what an older version does
             _choose(added, theirs, value_nodes.word_of(node.type, node[name]))
-        for name, theirs in (value.flags | value.names).items():
+        for name, theirs in value.flags.items():
             setattr(added, theirs, node[name])
+        for name, theirs in value.names.items():
+            setattr(added, theirs, reading.renamed.get(node[name], node[name]))
         for name, theirs in value.numbers.items():
             setattr(added, theirs, type(getattr(added, theirs))(node[name][0]))
         if "image" in KINDS[node.type].inputs and node["image"] is not None:

@@ -68,6 +68,21 @@ def _by_identifier(node: bpy.types.Node, socket: bpy.types.NodeSocket, groups: t
     return inner and Input(inner, groups)
 
 
+def feeding(of: Input) -> set[Output]:
+    """All outputs that an input is made of."""
+    found: set[Output] = set()
+
+    def follow(of: Input) -> None:
+        output = source(of)
+        if isinstance(output, Output) and output not in found:
+            found.add(output)
+            for socket in output.node.inputs:
+                follow(Input(socket, output.groups))
+
+    follow(of)
+    return found
+
+
 def all_of(tree: bpy.types.NodeTree, seen: set[bpy.types.NodeTree] | None = None) -> Iterator[bpy.types.Node]:
     """All nodes of the tree and of the groups in it that are not muted; whether they lead to the output is not asked.
 

@@ -12,7 +12,10 @@ the same for the time of a comparison (materials.stand_in): an approximation is 
 import functools
 import math
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -24,7 +27,7 @@ from ...tracer.scene.shader_nodes import KINDS, Node, closures
 from ...tracer.scene.shader_nodes import node as _node
 from ...tracer.scene.value_nodes import GENERATED, INCOMING, NORMAL, OWN, POSITION, TANGENT, UV
 from .. import versions
-from . import images, nodes, value_nodes
+from . import charts, cycles_attributes, images, nodes, value_nodes
 from .nodes import Input, Output
 
 RGB = tuple[float, float, float]
@@ -45,6 +48,11 @@ _CLEAR_OR_MIRRORS = ("glossy", "glass", "refraction")  # without roughness, what
 _WHITE, _ZERO = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 _RAMP = 256  # Cycles looks ramps up in a table of one more
 _BESIDE = 1e-6  # of a pixel: where a step lies is the pixel's that it leads to
+# What Cycles makes of a mesh's edges, as attributes that can be asked for by name, too.
+_OF_EDGES = {
+    ("NEW_GEOMETRY", "Pointiness"): cycles_attributes.POINTINESS,
+    ("NEW_GEOMETRY", "Random Per Island"): cycles_attributes.RANDOM_PER_ISLAND,
+}
 # What Light Path says alike of rays that meet a light and of those that are sent to it.
 _SURE_OF_PATHS = ("Is Camera Ray", "Is Shadow Ray", "Ray Length")
 # What Cycles does not ask for a little beside a point, or in each version in another way.
@@ -110,13 +118,36 @@ def word_of(ours: str) -> str:
     return _WORDS.get(ours, ours.upper())
 
 
+class Unknown(NamedTuple):
+    """An input of a shader that is not modelled: the node's name, the input's identifier, whether it takes a number."""
+
+    of: Input
+    node: str
+    input: str
+    is_number: bool
+
+
+class Baked(NamedTuple):
+    """What stands in for such an input. difference, most : from an image of half its width (charts.difference), and of all."""
+
+    picture: Picture
+    difference: float
+    most: float
+
+
+BakedInputs = Mapping[tuple[str, str], Baked | None]
+"""A shader's name and an input's identifier → what was baked, or None where no other Blender could."""
+
+
 @dataclass
 class Reading:
     """What a Blender material is to the tracer.
 
     images : key in `Colour.image` → the image. vertex : the colour attribute that `Colour.vertex` stands for ("" is the one
-    that is active for rendering), or None. texts : of IES files, where nodes are made that show them.
-    reasons : why it is approximated, one clause each, about the material.
+    that is active for rendering), or None. texts : of IES files, where nodes are made that show them. renamed : what attributes
+    of these names are called there.
+    reasons : why it is approximated, one clause each, about the material. unknown : inputs of
+    shaders, in no group, of which one says so. baked : which images stand in for such inputs, one clause each.
     """
 
     material: Material = PLAIN
@@ -125,7 +156,10 @@ class Reading:
     alphas: set[str] = field(default_factory=set)
     tables: dict[str, Picture] = field(default_factory=dict)
     texts: dict[str, bpy.types.Text] = field(default_factory=dict)
+    renamed: dict[str, str] = field(default_factory=dict)
     reasons: list[str] = field(default_factory=list)
+    unknown: list[Unknown] = field(default_factory=list)
+    baked: list[str] = field(default_factory=list)
 
     @functools.cached_property
     def asks_for_random(self) -> bool:
@@ -147,18 +181,21 @@ class Reading:
         return refractions > 1 or (refractions == 1 and any(shader.type == "translucent" for shader in shaders))
 
 
-def read(material: bpy.types.Material) -> Reading:
-    """What Cycles would show of an evaluated material, but for what moves the surface and its volume."""
+def read(material: bpy.types.Material, baked: BakedInputs = MappingProxyType({})) -> Reading:
+    """What Cycles would show of an evaluated material, but for what moves the surface and its volume.
+
+    baked : what stands in for inputs that are not modelled.
+    """
     tree = versions.node_tree(material)
     output = tree and tree.get_output_node("CYCLES")
     if not output:
         return in_the_viewport(material)
     viewport, of = in_the_viewport(material).material.diffuse, Input(output.inputs["Surface"])
-    reader = Tree(viewport)
+    reader = Tree(viewport, baked=baked)
     surface = reader.surface(of)
     shines = any(closure.node.is_shining for closure in closures(surface))
     if shines:
-        reader = Tree(viewport, shines)
+        reader = Tree(viewport, shines, baked)
         surface = reader.surface(of)
     simple = components(surface)
     of_tree = {"surface": surface, "transparent_shadow": material.use_transparent_shadow}
@@ -188,10 +225,11 @@ def in_the_viewport(material: bpy.types.Material) -> Reading:
 class Tree:
     """Follows the nodes to a tree of shader nodes, and gathers what they ask for.
 
-    viewport : what stands in for a colour that is not modelled. shines : whether it gives off light.
+    viewport : what stands in for a colour that is not modelled. shines : whether it gives off light. baked : as in `read`.
     """
 
-    def __init__(self, viewport: Colour, shines: bool = False) -> None:
+    def __init__(self, viewport: Colour, shines: bool = False, baked: BakedInputs = MappingProxyType({})) -> None:
+        self._baked = baked
         self.reading = Reading()
         self.viewport = viewport
         self._shines = shines
@@ -390,13 +428,22 @@ class Tree:
         """What an input is given. otherwise : what a number is where that is not modelled, or None of a colour."""
         value = None if otherwise is None else constant_number(output, name)
         if value is None:
-            known, source = len(self.reading.reasons), nodes.source(output.input(name))
+            source = nodes.source(output.input(name))
+            told, self.reading.reasons = self.reading.reasons, []
             made: Colour | Node | None = self._colour(output, name)
-            if len(self.reading.reasons) > known and isinstance(source, Output):
-                del self.reading.reasons[known:]
+            if self.reading.reasons and isinstance(source, Output):
+                self.reading.reasons = []
                 made = self._value(source)
-            if made is not None and len(self.reading.reasons) == known:
+            why, self.reading.reasons = self.reading.reasons, told
+            if made is not None and not why:
                 return made
+            if not output.groups and isinstance(source, Output):
+                socket = output.node.inputs[name]
+                unknown = Unknown(output.input(name), output.node.name, socket.identifier, otherwise is not None)
+                if (image := self._baked_image(unknown, why)) is not None:
+                    return image
+                self.reading.unknown.append(unknown)
+            told += [reason for reason in why if reason not in told]
             return self.viewport if otherwise is None else Colour((otherwise,) * 3)
         if isinstance(name, str) and name.endswith("Rotation"):
             value %= 1.0
@@ -407,6 +454,26 @@ class Tree:
             self._reason(output, f"has a {output.node.inputs[name].name} of {value:g}")
             value = 0.0
         return Colour((min(max(value, 0.0), most),) * 3)
+
+    def _baked_image(self, unknown: Unknown, reasons: list[str]) -> Node | None:
+        """The image that stands in for an input, where one is exact enough. reasons : why one is asked for, or is not there."""
+        if (unknown.node, unknown.input) not in self._baked:
+            return None
+        baked = self._baked[unknown.node, unknown.input]
+        if baked is None:
+            reasons[-1] += ", can't be baked by another Blender"
+            return None
+        width = baked.picture.pixels.shape[1]
+        size = f"an image of {width} × {width} that Cycles bakes of it"
+        if baked.difference > baked.most:
+            reasons[-1] += f": {size} differs from one of half its width by {baked.difference:.2g}"
+            return None
+        clauses = [f"{reason}, and {size} stands in, exact to {baked.difference:.1g}" for reason in reasons]
+        self.reading.baked += [clause for clause in clauses if clause not in self.reading.baked]
+        key = f"{unknown.node}, {unknown.input} {zlib.crc32(baked.picture.pixels.tobytes()):08x} (baked)"
+        self.reading.tables[key] = baked.picture
+        place = _node("attribute", name=charts.NAME, output="vector")
+        return _node("image", image=Colour(_WHITE, key), vector=place, extension="extend")
 
     def _value(self, output: Output) -> Colour | Node | None:
         """The nodes that make a value; None where a reason says that it is not modelled."""
@@ -420,6 +487,8 @@ class Tree:
             return Node("texture_coordinate")
         if node.type == "TEX_COORD" and output.socket.name == "Object" and node.object is not None:
             return in_space_of(node.object.matrix_world)
+        if (node.type, output.socket.name) in _OF_EDGES:
+            return _node("attribute", name=_OF_EDGES[node.type, output.socket.name], output="number")
         if node.type == "LIGHT_FALLOFF":
             return self._falloff(output)
         if node.type == "CAMERA":

@@ -1,5 +1,8 @@
 """The materials and images of an export, each read once; where there is none of this class, level geometry is exported."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 import bpy
 
 from ...tracer.scene.materials import Material, Picture
@@ -20,14 +23,17 @@ def add_pictures(reading: shaders.Reading, alphas: set[str], to: dict[str, Pictu
 
 
 class Shading:
-    def __init__(self) -> None:
+    """baked : of materials by their names (baking.py)."""
+
+    def __init__(self, baked: Mapping[str, shaders.BakedInputs] = MappingProxyType({})) -> None:
+        self._baked = baked
         self._readings: dict[str, shaders.Reading] = {}
 
     def reading(self, material: bpy.types.Material) -> shaders.Reading:
         """What an evaluated material is to the tracer."""
         name = material.original.name_full
         if name not in self._readings:
-            self._readings[name] = shaders.read(material)
+            self._readings[name] = shaders.read(material, self._baked.get(name, {}))
         return self._readings[name]
 
     @property

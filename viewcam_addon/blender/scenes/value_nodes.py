@@ -129,6 +129,7 @@ VALUES: tuple[tuple[str, Value], ...] = (
     ),
     _value("bump", "BUMP", "Bump", {"Normal": None}, flags=_as_they_are("invert"), before={"filter_width": 1.0}),
     _value("ies", "TEX_IES", "TexIES", {"Fac": None}),
+    _value("wireframe", "WIREFRAME", "Wireframe", {"Fac": None}, flags={"pixel_size": "use_pixel_size"}),
     _value("fresnel", "FRESNEL", "Fresnel", {"Fac": None}, inputs={"ior": "IOR"}),
     _value("layer_weight", "LAYER_WEIGHT", "LayerWeight", _words("Fresnel", "Facing")),
     _value(

@@ -65,17 +65,7 @@ def tells_rays_apart(world: bpy.types.World) -> bool:
 
 def _feeding(world: bpy.types.World) -> set[Output]:
     """All outputs that a world's surface is made of."""
-    found: set[Output] = set()
-
-    def follow(of: Input) -> None:
-        source = nodes.source(of)
-        if isinstance(source, Output) and source not in found:
-            found.add(source)
-            for socket in source.node.inputs:
-                follow(Input(socket, source.groups))
-
-    follow(Input(versions.node_tree(world).get_output_node("CYCLES").inputs["Surface"]))
-    return found
+    return nodes.feeding(Input(versions.node_tree(world).get_output_node("CYCLES").inputs["Surface"]))
 
 
 def rendered(world: bpy.types.World, scene: bpy.types.Scene) -> Rendered | None:

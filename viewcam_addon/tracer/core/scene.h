@@ -395,6 +395,17 @@ inline double ShadingPoint::footprint() const {
     Vec3 seen = point.position - scene->camera.eye;
     return length(seen) * scene->camera.spread(seen);
 }
+inline double ShadingPoint::edge_distance() const {
+    if (!scene || !object || !std::holds_alternative<TriangleMesh>(scene->geometries[object->geometry])) return INFINITE;
+    Vec3 corner[3];
+    scene->corners(point.object, point.primitive, corner);
+    double least = INFINITE;
+    for (int c = 0; c < 3; c++) {
+        Vec3 edge = corner[(c + 1) % 3] - corner[c];
+        if (double size = length(edge); size > 0) least = smaller(least, length(cross(edge, point.position - corner[c])) / size);
+    }
+    return least;
+}
 inline double ShadingPoint::height_beside(const Color& height, Vec3 away) const {
     Interaction beside = point;
     beside.position = point.position + away;

@@ -112,6 +112,7 @@ KINDS: dict[str, Mapping[str, Default]] = {
     "tangent": {"kind": ("radial", "uv_map"), "axis": ("z", "x", "y"), "uv": NAME},
     "object_info": {"output": ("location", "object_index", "material_index", "color", "alpha", "random")},
     "light_path": {"output": tuple(LIGHT_PATH.split())},
+    "wireframe": {"size": 0.01, "pixel_size": False},
     "fresnel": {"ior": 1.5, "normal": NORMAL},
     "layer_weight": {"blend": 0.5, "normal": NORMAL, "output": ("fresnel", "facing")},
     "normal_map": {

@@ -102,6 +102,8 @@ struct ShadingPoint {
     double ray_length() const;
     // How wide the pixel is here that the path belongs to, world units.
     double footprint() const;
+    // How far the nearest line along an edge of the triangle is, world units; infinite where there is none. Defined in scene.h.
+    double edge_distance() const;
     // What a number would be a little beside, in the surface's own plane. away: in rendering space. Defined in scene.h.
     double height_beside(const Color& height, Vec3 away) const;
 
@@ -109,6 +111,12 @@ struct ShadingPoint {
     Vec3 value_of_node(uint32_t node) const;
     double number_of_node(uint32_t node) const;
 };
+
+// A unit vector in the plane at a right angle to a normal, the one that Cycles takes.
+inline Vec3 along_plane(Vec3 n) {
+    Vec3 along = n.x != n.y || n.x != n.z ? Vec3{n.z - n.y, n.x - n.z, n.y - n.x} : Vec3{n.z - n.y, n.x + n.z, -n.y - n.x};
+    return normalize(along);
+}
 
 // The inputs of a closure or a node by the names that scene files have for them. choice: of what is no number; of what holds or
 // does not, "true" or "false".

@@ -20,7 +20,7 @@ struct BumpNode {
         Vec3 before = is_bumped(normal) ? at.value(normal) : at.point.shading;
         double away = at.footprint() * at.number(filter_width);
         if (!height.varies() || !(away > 0)) return before;
-        Vec3 x = along(at.point.normal), y = cross(at.point.normal, x), across_x = cross(y, before), across_y = cross(before, x);
+        Vec3 x = along_plane(at.point.normal), y = cross(at.point.normal, x), across_x = cross(y, before), across_y = cross(before, x);
         double here = at.number(height), scale = at.number(distance) * (inwards ? -1 : 1), much = larger(at.number(strength), 0.0);
         Vec3 slope = across_x * (at.height_beside(height, x * away) - here) + across_y * (at.height_beside(height, y * away) - here);
         double area = dot(x, across_x);
@@ -30,13 +30,6 @@ struct BumpNode {
         Vec3 mixed = bumped * (much / size) + before * (1 - much);
         double mixed_size = length(mixed);
         return mixed_size > 0 && mixed_size < INFINITE ? mixed / mixed_size : before;
-    }
-
-   private:
-    // A unit vector in the plane at a right angle to a normal, the one that Cycles takes.
-    static Vec3 along(Vec3 n) {
-        Vec3 along = n.x != n.y || n.x != n.z ? Vec3{n.z - n.y, n.x - n.z, n.y - n.x} : Vec3{n.z - n.y, n.x + n.z, -n.y - n.x};
-        return normalize(along);
     }
 };
 

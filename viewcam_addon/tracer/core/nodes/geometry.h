@@ -195,6 +195,26 @@ struct TangentNode {
     Vec3 eval(const ShadingPoint& at) const { return radial ? at.tangent_round(axis) : at.tangent_along(uv); }
 };
 
+// 1 within half a width of the edges of triangles, else 0. pixels: what the width is counted in, of those in front of the ray.
+struct WireframeNode {
+    static constexpr const char* NAME = "wireframe";
+    static constexpr Gives GIVES = Gives::NUMBER;
+    static constexpr bool VARIES = true;
+    Color size;
+    bool pixels;
+
+    explicit WireframeNode(const Inputs& in) : size(in["size"]), pixels(in.flag("pixel_size")) {}
+    Vec3 eval(const ShadingPoint& at) const {
+        double width = std::fabs(at.number(size));
+        if (pixels) {
+            Vec3 x = along_plane(at.point.normal), y = cross(at.point.normal, x);
+            auto across = [&](Vec3 v) { return length(v - at.incoming * dot(v, at.incoming)); };
+            width *= at.footprint() * (across(x) + across(y)) / 2;
+        }
+        return grey(at.edge_distance() < width / 2);
+    }
+};
+
 struct ObjectInfoNode {
     static constexpr const char* NAME = "object_info";
     static constexpr Gives GIVES = Gives::VECTOR;
