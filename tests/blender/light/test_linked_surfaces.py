@@ -15,7 +15,7 @@ from viewcam_addon.image import Image
 from viewcam_addon.tracer import render
 
 ALL = {"Monkey", "Floor", "Panel"}
-LOSES = "Cycles, which would lose light"
+LOSES = "Cycles would lose light"
 
 
 @pytest.fixture
@@ -90,6 +90,20 @@ def test_of_a_collection_that_includes_blockers_cycles_loses_light_behind_all_ot
     (sides,) = pictures(scenes=1)
     assert LOSES in told(sides.exported)["Panel"]
     assert off(sides.exported, sides.traced, sides.cycles[0])[0] > 0.01
+
+
+@pytest.mark.parametrize(
+    ("links", "loses"),
+    [({"Floor": "EXCLUDE"}, True), ({"Floor": "INCLUDE", "Monkey": "INCLUDE"}, True), ({"Monkey": "EXCLUDE"}, False)],
+)
+def test_what_is_hidden_from_shadow_rays_stands_in_no_light_that_has_blockers(pictures, panel, painted, link, links, loses):
+    bpy.data.objects["Monkey"].visible_shadow = False
+    link(panel(60, 6, 5.0), blocker_collection=links)
+    for name in ("Monkey", "Floor"):
+        bpy.data.objects[name].data.materials[0] = painted("ShaderNodeBsdfGlossy", {"Roughness": 0.0})
+    (sides,) = pictures(scenes=1)
+    assert bool(told(sides.exported)) == loses
+    assert (np.array(off(sides.exported, sides.traced, sides.cycles[0])) <= (1e-3, 1e-6, 2e-5)).all()
 
 
 @pytest.mark.slow

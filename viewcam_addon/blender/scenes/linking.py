@@ -1,11 +1,11 @@
 """Light and shadow linking: which objects a lamp or a shining surface lights, and which cast its shadows, from and to Blender.
 
 As Blender has it: of what a collection includes or excludes, its own objects count rather than its children's, and one that
-includes nothing means all that it does not exclude. In Cycles an instance shines for what the object shines that it shows,
-and receives as what places it, where that is linked.
+includes nothing means all that it does not exclude. In Cycles an instance gives light to what the object that it shows gives
+light to, and gets the light that what places it gets, where that is linked.
 
-Where a collection includes what casts a light's shadows, Cycles loses what scattered rays find of that light behind opaque
-objects that no such collection names (kernel/integrator/shadow_linking.h). Where one excludes all others, it loses nothing.
+Cycles loses what scattered rays find of a light with blockers behind what casts none of its shadows and is opaque, unless some
+collection names that (kernel/integrator/shadow_linking.h). Where a collection excludes all that casts none, it loses nothing.
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -17,7 +17,7 @@ import bpy
 from ...tracer.scene import Object
 from ...tracer.scene.lamps import Lamp
 from ..temporary_settings import Overrides
-from .features import Placed, placed_by
+from .features import Placed, hidden_from, placed_by
 from .ledger import Ledger
 
 _COLLECTIONS = ("receiver_collection", "blocker_collection")
@@ -31,9 +31,12 @@ class Links:
     def __init__(self, depsgraph: bpy.types.Depsgraph) -> None:
         self._objects: dict[str, set[bpy.types.Object]] = {}  # that are shown, and what places them
         self._instances: set[str] = set()  # and what places them
+        self._shadowless: set[str] = set()  # hidden from shadow rays
         if any(is_linked(block) for block in depsgraph.objects):
             for placed, is_instance in ((placed_by(each), each.is_instance) for each in depsgraph.object_instances):
                 self._objects.setdefault(placed.name, set()).update((placed.real.original, placed.parent.original))
+                if "shadow" in hidden_from(placed, depsgraph.view_layer_eval):
+                    self._shadowless.add(placed.name)
                 if is_instance:
                     self._instances |= {placed.name, placed.parent.original.name}
 
@@ -49,12 +52,13 @@ class Links:
         if any(each and not self._instances.isdisjoint(shown.name for shown in each.all_objects) for each in collections):
             ledger.note(placed.name, "approximated", "is linked to instances, which count as the objects that they show")
         (receivers, _), (blockers, excluded) = (self._named(each) if each else (None, True) for each in collections)
-        others = set() if blockers is None else set(self._objects) - blockers
-        if is_met and others and not excluded:
-            reason = "casts shadows of a collection that includes things: Cycles, which would lose light, excludes all others"
-            ledger.note(placed.name, "approximated", reason)
-            blocks = set().union(*(self._objects[name] for name in others))
-            ledger.call_for_cycles(block, _exclude, sorted(blocks, key=lambda each: each.name_full))
+        if is_met and blockers is not None:
+            others = set(self._objects) - blockers
+            if self._shadowless & blockers if excluded else others:
+                reason = "has blockers, and Cycles would lose light behind others: it is given a collection that excludes these"
+                ledger.note(placed.name, "approximated", reason)
+                blocks = set().union(*(self._objects[name] for name in others | self._shadowless))
+                ledger.call_for_cycles(block, _exclude, sorted(blocks, key=lambda each: each.name_full))
         return receivers, blockers
 
     def _named(self, collection: bpy.types.Collection) -> tuple[_Names, bool]:
@@ -107,7 +111,7 @@ def link(
 
 
 def _exclude(overrides: Overrides, light: bpy.types.Object, others: Collection[bpy.types.Object]) -> None:
-    """Let all others cast no shadow in a light."""
+    """Let others cast no shadow in a light."""
     overrides.set(light.light_linking, "blocker_collection", _collection(light.name, others, "EXCLUDE", overrides))
 
 
