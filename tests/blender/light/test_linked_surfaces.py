@@ -98,11 +98,13 @@ def test_of_a_collection_that_includes_blockers_cycles_loses_light_behind_all_ot
 )
 def test_what_is_hidden_from_shadow_rays_stands_in_no_light_that_has_blockers(pictures, panel, painted, link, links, loses):
     bpy.data.objects["Monkey"].visible_shadow = False
-    link(panel(60, 6, 5.0), blocker_collection=links)
+    block = panel(60, 6, 5.0)
+    link(block, blocker_collection=links)
     for name in ("Monkey", "Floor"):
         bpy.data.objects[name].data.materials[0] = painted("ShaderNodeBsdfGlossy", {"Roughness": 0.0})
     (sides,) = pictures(scenes=1)
     assert bool(told(sides.exported)) == loses
+    assert [block.light_linking.blocker_collection] == list(bpy.data.collections)  # what Cycles was given is gone
     assert (np.array(off(sides.exported, sides.traced, sides.cycles[0])) <= (1e-3, 1e-6, 2e-5)).all()
 
 
