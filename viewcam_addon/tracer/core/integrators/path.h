@@ -201,12 +201,8 @@ class PathIntegrator {
         for (double u = -1;;) {
             const Material& made_of = material(point);
             ShadingPoint at = arriving(point, path, depth);
-            if (made_of.emits()) {
-                if (path.kind == CAMERA)
-                    light.add(EMISSION, emission(path, at, hit.t, block));
-                else if (!shadow_linked_ || scene_.objects[point.object].shadow_rays == SHADOW)
-                    light.add(path.category, emission(path, at, hit.t, block));
-            }
+            if (made_of.emits() && (!shadow_linked_ || path.kind == CAMERA || scene_.objects[point.object].shadow_rays == SHADOW))
+                light.add(path.kind == CAMERA ? EMISSION : path.category, emission(path, at, hit.t, block));
             if (has_ended(path)) return false;
             if (!made_of.is_transparent()) return made_of.scatters() && !path.last;
             BSDF bsdf = made_of.bsdf(at);
@@ -232,7 +228,7 @@ class PathIntegrator {
         block.light[path.sample].add(path.kind == CAMERA ? EMISSION : path.category, path.weight * radiance);
     }
     // Adds what lights with blockers of their own bring along a path's ray: whatever else it meets, only these stand before them.
-    void meet_shadow_linked(const Path& path, int depth, Block& block) const {
+    [[gnu::noinline]] void meet_shadow_linked(const Path& path, int depth, Block& block) const {
         const Interaction& from = block.points[path.from];
         RayState state{SHADOW, false, false, depth, path.passed, path.scattered, 0, path.width};
         auto add = [&](Vec3 light, double distance, double cosine, RayKind shadow_rays) {
