@@ -42,6 +42,7 @@ TILE = 32
 """Pixels, the side of the tiles in which light is traced."""
 
 _KINDS = {kind: 1 << number for number, kind in enumerate(RAYS)}
+_SHADOW_LINKED = 2 * _KINDS["shadow"]
 _ALL = 2**64 - 1
 # Rendering space's origin is the eye, snapped to a grid so much coarser than the scene that it stays where it is while a camera
 # moves about things: hierarchies then serve frame after frame, and coordinates are no larger than the grid.
@@ -70,7 +71,8 @@ class _Object(Structure):
         *((name, c_uint32) for name in ("geometry", "visible", "slot_count", "count")),
         ("index", c_float),
         *((name, c_void_p) for name in ("slot_indices", "slot_materials")),
-        ("lit_by", c_uint64),
+        *((name, c_uint64) for name in ("lit_by", "receivers")),
+        ("shadow_rays", c_uint32),
         ("info", c_void_p),
     ]
 
@@ -233,12 +235,15 @@ def array(values: object, dtype: type, shape: Sequence[int | None]) -> NDArray:
 
 
 class _Links:
-    """Which objects lamps light, and which cast their shadows, as bits: one for each set of objects that some lamp has."""
+    """Which objects lights light, and which cast their shadows, as bits: one for each set of objects that some light has."""
 
-    def __init__(self, lamps: Iterable[Lamp] = ()) -> None:
-        lamps = tuple(lamps)
-        self._receivers = list(dict.fromkeys(lamp.receivers for lamp in lamps if lamp.receivers is not None))
-        self._blockers = list(dict.fromkeys(lamp.blockers for lamp in lamps if lamp.blockers is not None))
+    def __init__(self, lights: Sequence[Lamp | Object] = ()) -> None:
+        self._receivers = list(dict.fromkeys(light.receivers for light in lights if light.receivers is not None))
+        self._blockers = list(dict.fromkeys(light.blockers for light in lights if light.blockers is not None))
+
+    @classmethod
+    def of(cls, scene: Scene) -> "_Links":
+        return cls((*scene.lamps, *scene.objects))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, _Links) and vars(self) == vars(other)
@@ -250,14 +255,14 @@ class _Links:
         return sum(1 << bit for bit, some in enumerate(self._receivers) if name in some)
 
     def blocking(self, name: str) -> int:
-        """Bits of `visible` above those of _KINDS."""
-        return sum(2 * _KINDS["shadow"] << bit for bit, some in enumerate(self._blockers) if name in some)
+        """Bits of `visible` above _SHADOW_LINKED."""
+        return sum(2 * _SHADOW_LINKED << bit for bit, some in enumerate(self._blockers) if name in some)
 
-    def receivers(self, lamp: Lamp) -> int:
-        return _ALL if lamp.receivers is None else 1 << self._receivers.index(lamp.receivers)
+    def receivers(self, light: Lamp | Object) -> int:
+        return _ALL if light.receivers is None else 1 << self._receivers.index(light.receivers)
 
-    def shadow_rays(self, lamp: Lamp) -> int:
-        return _KINDS["shadow"] if lamp.blockers is None else 2 * _KINDS["shadow"] << self._blockers.index(lamp.blockers)
+    def shadow_rays(self, light: Lamp | Object) -> int:
+        return _KINDS["shadow"] if light.blockers is None else 2 * _SHADOW_LINKED << self._blockers.index(light.blockers)
 
 
 _UNLINKED = _Links()
@@ -274,7 +279,7 @@ class CoreScene:
         if not self.handle:
             raise MemoryError
         self._kept: list[NDArray] = []  # what the core reads in place
-        self._links = _Links(scene.lamps)
+        self._links = _Links.of(scene)
         self.origin = _origin(scene)
         numbers = {name: number for number, name in enumerate(scene.geometries)}
         materials = {"": 0, **{name: number for number, name in enumerate(scene.materials, start=1)}}
@@ -339,13 +344,15 @@ class CoreScene:
         visible = sum(_KINDS.values()) & ~kinds(placed.hidden_from)
         if "shadow" not in placed.hidden_from:
             visible |= self._links.blocking(placed.name)
+        if placed.blockers is not None:
+            visible |= _SHADOW_LINKED
         shared = geometry, visible, slots, len(placed.matrices), placed.object_index
-        lit_by = self._links.receiving(placed.name)
+        links = self._links.receiving(placed.name), self._links.receivers(placed), self._links.shadow_rays(placed)
         info = None
         if placed.random is not None or placed.color != (1.0,) * 4:
             info = np.empty((len(placed.matrices), 5), np.float32)
             info[:, :4], info[:, 4] = placed.color, 0.0 if placed.random is None else placed.random
-        given = _Object(*shared, _address(indices), _address(numbers), lit_by, self._keep(info, np.float32, (None, 5)))
+        given = _Object(*shared, _address(indices), _address(numbers), *links, self._keep(info, np.float32, (None, 5)))
         self.check(self.core.add_objects(self.handle, given))
 
     def serves(self, scene: Scene) -> bool:
@@ -353,7 +360,7 @@ class CoreScene:
         return (
             list(scene.materials) == list(self._scene.materials)  # objects name them by their numbers
             and np.array_equal(self.origin, _origin(scene))
-            and _Links(scene.lamps) == self._links
+            and _Links.of(scene) == self._links
             and same_things(scene, self._scene)
         )
 

@@ -15,27 +15,6 @@ ALL = {"Monkey", "Floor"}
 
 
 @pytest.fixture
-def link(scene):
-    """link(light, receiver_collection={name: state}, …): names may be those of collections, which are then looked up."""
-
-    def make(light, **collections):
-        for what, states in collections.items():
-            collection = bpy.data.collections.new(what)
-            for name, state in states.items():
-                if name in bpy.data.objects:
-                    collection.objects.link(bpy.data.objects[name])
-                    place = list(collection.objects).index(bpy.data.objects[name])
-                    collection.collection_objects[place].light_linking.link_state = state
-                else:
-                    collection.children.link(bpy.data.collections[name])
-                    place = list(collection.children).index(bpy.data.collections[name])
-                    collection.collection_children[place].light_linking.link_state = state
-            setattr(light.light_linking, what, collection)
-
-    return make
-
-
-@pytest.fixture
 def lamp(stage, add_lamp):
     """A sun without a size over Suzanne and a floor."""
     stage(np.random.default_rng(0))

@@ -69,6 +69,11 @@ def test_of_two_lamps_each_has_links_of_its_own(halves):
     assert seen(halves(lamps, True), 16) == pytest.approx((LIT, 0), rel=1e-6)
 
 
+def test_a_lamp_without_links_lights_all_beside_one_that_has_some(halves):
+    lamps = replace(OVERHEAD, receivers={LEFT}), replace(OVERHEAD, name="other")
+    assert seen(halves(lamps), 16) == pytest.approx((2 * LIT, LIT), rel=1e-6)
+
+
 @pytest.mark.parametrize("count", [2, 5, 40])
 def test_of_many_lamps_each_half_gets_those_that_light_it(halves, count):
     """However many are asked at a point: each by itself, one by its part, one in a tree."""

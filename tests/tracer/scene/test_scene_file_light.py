@@ -148,8 +148,16 @@ def test_light_that_is_written_is_read_back_to_the_last_bit(make_scene, make_mes
     given_names = tuple(data.draw(st.lists(st.sampled_from(["", *chosen]), max_size=2)))
     scene = replace(
         scene,
-        # A tuple of names that are all empty says what no tuple says.
-        objects=(replace(scene.objects[0], materials=given_names if any(given_names) else (), hidden_from=data.draw(rays)),),
+        objects=(
+            replace(
+                scene.objects[0],
+                # A tuple of names that are all empty says what no tuple says.
+                materials=given_names if any(given_names) else (),
+                hidden_from=data.draw(rays),
+                receivers=data.draw(links | st.just(frozenset({scene.objects[0].name}))),
+                blockers=data.draw(links),
+            ),
+        ),
         images={
             "small": Picture(rng.random((1, 2, 3), np.float32), srgb=True),
             "large": Picture(rng.normal(size=(7, 5, 3)).astype(np.float32)),
@@ -342,6 +350,9 @@ def test_every_key_of_light_is_documented():
         (["objects", 0, "materials"], ["absent"], ["'floor'", "'absent'"]),
         (["objects", 0, "materials"], "wall", ["'materials' of object 'floor'", "list"]),
         (["objects", 1, "hidden_from"], ["everything"], ["'bead'", "'everything'"]),
+        (["objects", 1, "receivers"], ["absent"], ["receivers of object 'bead'", "'absent'"]),
+        (["objects", 1, "receivers"], "floor", ["'receivers' of object 'bead'", "list"]),
+        (["objects", 1, "blockers"], [None], ["'blockers' of object 'bead'", "text"]),
     ],
 )
 def test_what_is_wrong_with_light_is_said_in_one_sentence_that_names_the_key(

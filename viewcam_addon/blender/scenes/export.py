@@ -39,7 +39,8 @@ class Surface:
     """A visible surface that stands in the world once or many times; two that are equal are one.
 
     data : evaluated. key : the same for all that share a geometry in Cycles. slots : the materials, evaluated, at least 1.
-    hidden_from : the kinds of rays that don't see it. color : with its alpha; of instances that of what places them.
+    hidden_from : the kinds of rays that don't see it. color : with its alpha; of instances that of what places them. receivers,
+    blockers : of its light, as of Object, where it shines.
     """
 
     name: str
@@ -49,6 +50,12 @@ class Surface:
     slots: tuple[bpy.types.Material | None, ...]
     hidden_from: frozenset[str]
     color: tuple[float, float, float, float]
+    receivers: frozenset[str] | None = None
+    blockers: frozenset[str] | None = None
+
+    @property
+    def is_linked(self) -> bool:
+        return self.receivers is not None or self.blockers is not None
 
     @property
     def materials(self) -> tuple[int, ...]:
@@ -160,13 +167,15 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
             geometries[names[source.key]] = geometry
         materials = shading.names(source.slots, isinstance(source.data, bpy.types.PointCloud)) if shading else ()
         placed = (source.object_index, source.materials, materials, source.hidden_from, source.color, random)
+        links = source.receivers, source.blockers
         matrix = matrices if len(matrices) > 1 else matrices[0]
-        objects.append(Object(source.name, names[source.key], matrix, *placed))
+        objects.append(Object(source.name, names[source.key], matrix, *placed, *links))
+    surfaces = {placed.name for placed in objects}
     return Scene(
         **_view_in(depsgraph, camera_object),
         geometries=geometries,
-        objects=tuple(objects),
-        **(_shown_by_light(depsgraph, ledger, shading, {placed.name for placed in objects}) if shading else {}),
+        objects=linking.among(objects, surfaces),
+        **(_shown_by_light(depsgraph, ledger, shading, surfaces) if shading else {}),
         ledger=ledger.entries(),
     )
 
@@ -175,8 +184,7 @@ def _shown_by_light(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Sha
     """What of a Scene makes its light, and what shows it. surfaces : the names of its objects."""
     images = shading.pictures()
     light = light_in(depsgraph, ledger, images)
-    linked = tuple(replace(lamp, **linking.among(lamp, surfaces)) for lamp in light.lamps)
-    return vars(light) | {"lamps": linked, "materials": shading.materials, "images": images}
+    return vars(light) | {"lamps": linking.among(light.lamps, surfaces), "materials": shading.materials, "images": images}
 
 
 def seen_from(scene: Scene, depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) -> Scene:
@@ -213,6 +221,7 @@ def placements(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading 
     matrices = export_geometry.read(depsgraph.object_instances, "matrix_world", np.float32, 16)
     found: dict[Surface, list[int]] = {}
     known: dict[tuple[int, ...], list[int]] = {}
+    links = linking.Links(depsgraph) if shading else None
     for number, instance in enumerate(depsgraph.object_instances):
         features.note_hair(instance, ledger)
         shown = instance.object
@@ -222,7 +231,7 @@ def placements(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading 
         placed = features.placed_by(instance)
         identity = placed.real.as_pointer(), placed.parent.as_pointer(), data.as_pointer()
         if identity not in known:
-            source = _source(placed, depsgraph, ledger, shading)
+            source = _source(placed, depsgraph, ledger, shading, links)
             known[identity] = found.setdefault(source, []) if source else []
         known[identity].append(number)
     for source, numbers in found.items():
@@ -276,7 +285,13 @@ def _by_rows(matrices: NDArray[np.float32]) -> Matrix:
     return by_rows
 
 
-def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading | None) -> Surface | None:
+def _source(
+    placed: features.Placed,
+    depsgraph: bpy.types.Depsgraph,
+    ledger: Ledger,
+    shading: Shading | None,
+    links: linking.Links | None,
+) -> Surface | None:
     """What one object shows, or None if nothing of it is seen."""
     if not features.is_surface(placed, ledger, shading):
         return None
@@ -299,6 +314,9 @@ def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Led
     override = layer.material_override
     slots = [override or slot.material for slot in shown.material_slots] or [override]
     features.note_object(placed, slots, depsgraph, ledger, shading)
+    receivers, blockers = None, None
+    if links and linking.is_linked(placed.real.original) and shading.shines(slots):
+        receivers, blockers = links.of(placed, ledger, True)
     # Cycles shares a geometry among objects unless a slot belongs to the object (BlenderSync::BKE_object_is_modified).
     own = any(slot.link == "OBJECT" for slot in shown.material_slots)
     return Surface(
@@ -309,6 +327,8 @@ def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Led
         slots=tuple(slots),
         hidden_from=hidden_from if shading else frozenset(),
         color=tuple(placed.parent.color) if shading else Object.color,
+        receivers=receivers,
+        blockers=blockers,
     )
 
 

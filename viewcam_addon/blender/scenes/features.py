@@ -172,21 +172,11 @@ def _note_light(placed: Placed, slots: list[bpy.types.Material | None], ledger: 
     readings = [shading.reading(material) for material in filter(None, slots)]
     if len({reading.vertex for reading in readings} - {None}) > 1:
         ledger.note(placed.name, "approximated", "shows two colour attributes, and only the first comes along")
-    note_linking(placed, ledger)
     for each in (real.original, parent.original):
         for owner, name in versions.shadow_terminator(each):
             ledger.set_for_cycles(owner, name, 0.0)
         ledger.set_for_cycles(each.cycles, "is_caustics_caster", False)
         ledger.set_for_cycles(each.cycles, "is_caustics_receiver", False)
-
-
-def note_linking(placed: Placed, ledger: Ledger) -> None:
-    """Whether a light, or a surface that shines, lights some things and others not."""
-    for each in (placed.real.original, placed.parent.original):
-        for collection in ("receiver_collection", "blocker_collection"):
-            if getattr(each.light_linking, collection):
-                ledger.note(placed.name, "approximated", "light linking is off on both sides")
-                ledger.set_for_cycles(each.light_linking, collection, None)
 
 
 def _shows_empty_slot(data: bpy.types.ID, slots: list[bpy.types.Material | None]) -> bool:

@@ -90,7 +90,7 @@ class _SceneImport:
             data, matrix = self._paints.light(lamp)
             block = self._placed(lamp.name, data, matrix)
             import_light.hide(block, lamp.hidden_from)
-            linking.link(block, lamp, self._surfaces_named, self._overrides)
+            linking.link([block], lamp, self._surfaces_named, self._overrides)
             ledger.placed(lamp.name)
         if import_light.has_light(made):
             if set_surroundings:
@@ -165,6 +165,7 @@ class _SceneImport:
         """Every object, those of one geometry sharing its data."""
         paints, is_lit = self._paints, import_light.has_light(self._made)
         data: dict[str, list[tuple[int, bpy.types.Mesh | bpy.types.PointCloud]]] = {}
+        blocks: list[list[bpy.types.Object]] = []  # of each object
         for placed in self._made.objects:
             if placed.geometry not in data:
                 data[placed.geometry] = self._data(placed.geometry)
@@ -172,15 +173,19 @@ class _SceneImport:
                 paints.material(placed.materials[i] if i < len(placed.materials) else "", index)
                 for i, index in enumerate(placed.material_indices)
             ]
+            blocks.append([])
             for first, block in data[placed.geometry]:
                 shown = slots
                 if isinstance(block, bpy.types.PointCloud):
                     shown = [slots[first] or (paints.plain() if is_lit else None)]  # Cycles' default is another since 5.0
                 for matrix in placed.matrices:
-                    self._surface(dataclasses.replace(placed, matrix=matrix, random=None), block, shown, paints)
+                    one = dataclasses.replace(placed, matrix=matrix, random=None)
+                    blocks[-1].append(self._surface(one, block, shown, paints))
             if placed.random is not None:
                 self._ledger.note(placed.name, "approximated", "its random numbers are Blender's own")
             self._ledger.placed(placed.name, len(placed.matrices))
+        for placed, shown in zip(self._made.objects, blocks, strict=True):
+            linking.link(shown, placed, self._surfaces_named, self._overrides)
 
     def _data(self, name: str) -> list[tuple[int, bpy.types.Mesh | bpy.types.PointCloud]]:
         """(first material, data) of each datablock that a geometry becomes."""
@@ -198,7 +203,7 @@ class _SceneImport:
         data: bpy.types.Mesh | bpy.types.PointCloud,
         slots: list[bpy.types.Material | None],
         paints: import_light.Paints,
-    ) -> None:
+    ) -> bpy.types.Object:
         if not data.materials:
             for material in slots:
                 data.materials.append(material)
@@ -213,6 +218,7 @@ class _SceneImport:
         block.color = placed.color
         import_light.hide(block, placed.hidden_from)
         self._surfaces_named.setdefault(placed.name, []).append(block)
+        return block
 
     def _placed(self, name: str, data: bpy.types.ID, matrix: Array) -> bpy.types.Object:
         """A new object that stands by a matrix, rounded to float32."""

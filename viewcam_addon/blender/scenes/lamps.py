@@ -226,7 +226,8 @@ def lamps_in(
             common["is_met"] = light.cycles.use_multiple_importance_sampling
             lamp = KINDS[light.type].exported(name, light, matrix, strength, common, ledger)
             if lamp is not None:
-                receivers, blockers = links.of(placed, ledger)
+                is_sized = getattr(light, KINDS[light.type].size) > 0
+                receivers, blockers = links.of(placed, ledger, is_sized and common["is_met"])
                 if pictures is not None and reading:
                     shading.add_pictures(reading, reading.alphas, pictures)
                 yield replace(lamp, receivers=receivers, blockers=blockers, emission=emission)

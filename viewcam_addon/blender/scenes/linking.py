@@ -1,73 +1,125 @@
-"""Light and shadow linking: which objects a light lights, and which cast its shadows, out of Blender and into it.
+"""Light and shadow linking: which objects a lamp or a shining surface lights, and which cast its shadows, from and to Blender.
 
 As Blender has it: of what a collection includes or excludes, its own objects count rather than its children's, and one that
-includes nothing means all that it does not exclude. In Cycles an instance has the link of what places it, where that has one.
+includes nothing means all that it does not exclude. In Cycles an instance gives light to what the object that it shows gives
+light to, and gets the light that what places it gets, where that is linked.
+
+Cycles loses what scattered rays find of a light with blockers behind what casts none of its shadows and is opaque, unless some
+collection names that (kernel/integrator/shadow_linking.h). Where a collection excludes all that casts none, it loses nothing.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
+from typing import TypeVar
 
 import bpy
 
+from ...tracer.scene import Object
 from ...tracer.scene.lamps import Lamp
 from ..temporary_settings import Overrides
-from .features import Placed, placed_by
+from .features import Placed, hidden_from, placed_by
 from .ledger import Ledger
 
 _COLLECTIONS = ("receiver_collection", "blocker_collection")
 _Names = frozenset[str] | None
+_Light = TypeVar("_Light", Lamp, Object)
 
 
 class Links:
     """The links between lights and objects of a depsgraph, which is looked through only where there are any."""
 
     def __init__(self, depsgraph: bpy.types.Depsgraph) -> None:
-        self._names: set[str] = set()
+        self._objects: dict[str, set[bpy.types.Object]] = {}  # that are shown, and what places them
         self._instances: set[str] = set()  # and what places them
-        lights = [block.light_linking for block in depsgraph.objects if block.type == "LIGHT"]
-        if any(getattr(linking, name) for linking in lights for name in _COLLECTIONS):
+        self._shadowless: set[str] = set()  # hidden from shadow rays
+        if any(is_linked(block) for block in depsgraph.objects):
             for placed, is_instance in ((placed_by(each), each.is_instance) for each in depsgraph.object_instances):
-                self._names.add(placed.name)
+                self._objects.setdefault(placed.name, set()).update((placed.real.original, placed.parent.original))
+                if "shadow" in hidden_from(placed, depsgraph.view_layer_eval):
+                    self._shadowless.add(placed.name)
                 if is_instance:
                     self._instances |= {placed.name, placed.parent.original.name}
 
-    def of(self, placed: Placed, ledger: Ledger) -> tuple[_Names, _Names]:
-        """The names of a light's receivers and of its blockers, whether or not they are surfaces; None is all."""
-        linking, name = placed.real.original.light_linking, placed.name
-        collections = [getattr(linking, each) for each in _COLLECTIONS]
-        if any(each and not self._instances.isdisjoint(block.name for block in each.all_objects) for each in collections):
-            ledger.note(name, "approximated", "is linked to instances, which count as the objects that they show")
-        receivers, blockers = (self._named(each) if each else None for each in collections)
+    def of(self, placed: Placed, ledger: Ledger, is_met: bool) -> tuple[_Names, _Names]:
+        """The names of a light's receivers and of its blockers, whether or not they are surfaces; None is all.
+
+        is_met : whether scattered rays run into it.
+        """
+        block = placed.real.original
+        if not is_linked(block):
+            return None, None
+        collections = [getattr(block.light_linking, each) for each in _COLLECTIONS]
+        if any(each and not self._instances.isdisjoint(shown.name for shown in each.all_objects) for each in collections):
+            ledger.note(placed.name, "approximated", "is linked to instances, which count as the objects that they show")
+        (receivers, _), (blockers, excluded) = (self._named(each) if each else (None, True) for each in collections)
+        if is_met and blockers is not None:
+            others = set(self._objects) - blockers
+            if self._shadowless & blockers if excluded else others:
+                reason = "has blockers, and Cycles would lose light behind others: it is given a collection that excludes these"
+                ledger.note(placed.name, "approximated", reason)
+                blocks = set().union(*(self._objects[name] for name in others | self._shadowless))
+                ledger.call_for_cycles(block, _exclude, sorted(blocks, key=lambda each: each.name_full))
         return receivers, blockers
 
-    def _named(self, collection: bpy.types.Collection) -> _Names:
+    def _named(self, collection: bpy.types.Collection) -> tuple[_Names, bool]:
+        """The objects that a collection means, and whether these are all that it does not exclude."""
         states: dict[str, str] = {}
         for child, child_link in zip(collection.children, collection.collection_children, strict=True):
             states |= dict.fromkeys((block.name for block in child.all_objects), child_link.light_linking.link_state)
         for block, link in zip(collection.objects, collection.collection_objects, strict=True):
             states[block.name] = link.light_linking.link_state
         included = {name for name, state in states.items() if state == "INCLUDE"}
-        return frozenset((included or self._names) - (set(states) - included)) if states else None
+        names = frozenset((included or set(self._objects)) - (set(states) - included)) if states else None
+        return names, not included
 
 
-def among(lamp: Lamp, names: set[str]) -> dict[str, _Names]:
-    """The receivers and blockers of a lamp without those that are no objects of these names; all of them are None again."""
-    return {
-        each: None if getattr(lamp, each) is None or names <= getattr(lamp, each) else getattr(lamp, each) & names
-        for each in ("receivers", "blockers")
-    }
+def is_linked(block: bpy.types.Object) -> bool:
+    """Whether what gives light has receivers or blockers."""
+    return any(getattr(block.light_linking, each) for each in _COLLECTIONS)
 
 
-def link(block: bpy.types.Object, lamp: Lamp, surfaces: Mapping[str, list[bpy.types.Object]], overrides: Overrides) -> None:
-    """Let a new light have a lamp's receivers and blockers. surfaces : name → the objects of that name."""
-    for each, names in zip(_COLLECTIONS, (lamp.receivers, lamp.blockers), strict=True):
+def among(lights: Iterable[_Light], names: set[str]) -> tuple[_Light, ...]:
+    """Lights whose receivers and blockers are without those that are no objects of these names; all of them are None again."""
+
+    def some(linked: _Names) -> _Names:
+        return None if linked is None or names <= linked else linked & names
+
+    return tuple(
+        light
+        if light.receivers is None and light.blockers is None
+        else replace(light, receivers=some(light.receivers), blockers=some(light.blockers))
+        for light in lights
+    )
+
+
+def link(
+    blocks: Iterable[bpy.types.Object],
+    light: Lamp | Object,
+    surfaces: Mapping[str, list[bpy.types.Object]],
+    overrides: Overrides,
+) -> None:
+    """Let new objects have a light's receivers and blockers. surfaces : name → the objects of that name."""
+    for each, names in zip(_COLLECTIONS, (light.receivers, light.blockers), strict=True):
         if names is None:
             continue
-        collection = bpy.data.collections.new(f"{lamp.name} {each.split('_')[0]}s")
-        overrides.afterwards(bpy.data.batch_remove, [collection])
         # A collection that includes nothing would mean all.
         wanted, state = (names, "INCLUDE") if names else (set(surfaces), "EXCLUDE")
-        for other in (other for name in sorted(wanted) for other in surfaces[name]):
-            collection.objects.link(other)
-        for held in collection.collection_objects:
-            held.light_linking.link_state = state
-        setattr(block.light_linking, each, collection)
+        members = [other for name in sorted(wanted) for other in surfaces[name]]
+        collection = _collection(f"{light.name} {each.split('_')[0]}s", members, state, overrides)
+        for block in blocks:
+            setattr(block.light_linking, each, collection)
+
+
+def _exclude(overrides: Overrides, light: bpy.types.Object, others: Collection[bpy.types.Object]) -> None:
+    """Let others cast no shadow in a light."""
+    overrides.set(light.light_linking, "blocker_collection", _collection(light.name, others, "EXCLUDE", overrides))
+
+
+def _collection(name: str, members: Iterable[bpy.types.Object], state: str, overrides: Overrides) -> bpy.types.Collection:
+    collection = bpy.data.collections.new(name)
+    overrides.afterwards(bpy.data.batch_remove, [collection])
+    for member in members:
+        collection.objects.link(member)
+    for held in collection.collection_objects:
+        held.light_linking.link_state = state
+    return collection

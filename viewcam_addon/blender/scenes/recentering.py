@@ -36,7 +36,7 @@ from ...tracer.scene.shader_nodes import KINDS
 from .. import camera as cameras
 from .. import datablocks, findings, pose
 from ..temporary_settings import Overrides, overridden
-from . import baking, features, materials
+from . import baking, features, linking, materials
 from .depsgraph import visit_still
 from .export import Surface, light_in, placements
 from .film import CYCLES_SETTINGS
@@ -52,6 +52,8 @@ _ROUNDING = 2.0**-23
 _LEAST = float(np.finfo(np.float32).tiny)
 # Nodes, and outputs of theirs, that tell where in the file something is, or which object.
 _PLACES = {("object_info", "location"), ("object_info", "random"), ("geometry", "position"), ("texture_coordinate", "object")}
+
+_UNLINKED = "light linking is off on both sides"  # it does not come along
 
 # What of the render settings makes the picture's frame.
 _FRAME = (
@@ -177,6 +179,8 @@ def _seen(
     shown = placements(depsgraph, ledger, shading)
     for source, *_ in shown if shading else ():
         _note_places(source, shading, ledger)
+        if source.is_linked:
+            ledger.note(source.name, "approximated", _UNLINKED)
     for source, matrix in ((source, matrix) for source, matrices, _ in shown for matrix in matrices):
         if not np.isfinite(matrix).all():
             raise InputError(f"the matrix of object {source.name!r} holds a number that is not finite: check its transform")
@@ -221,7 +225,8 @@ def _lights(depsgraph: bpy.types.Depsgraph, eye: Array, ledger: Ledger) -> Itera
             matrix[:3, 3] -= eye
             placed = features.placed_by(instance)
             hidden_from = features.hidden_from(placed, depsgraph.view_layer_eval)
-            features.note_linking(placed, ledger)  # which does not come along
+            if linking.is_linked(placed.real.original):
+                ledger.note(placed.name, "approximated", _UNLINKED)
             yield _Placed(instance.object.original.name, instance.object.data.original, matrix, hidden_from=hidden_from)
 
 

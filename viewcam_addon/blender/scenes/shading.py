@@ -1,6 +1,6 @@
 """The materials and images of an export, each read once; where there is none of this class, level geometry is exported."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 import bpy
@@ -67,6 +67,10 @@ class Shading:
     def asks_for_random(self, slots: tuple[bpy.types.Material | None, ...]) -> bool:
         """Whether one of these materials differs from instance to instance."""
         return any(self.reading(material).asks_for_random for material in filter(None, slots))
+
+    def shines(self, slots: Iterable[bpy.types.Material | None]) -> bool:
+        """Whether one of these materials gives light."""
+        return any(self.reading(material).material.shines for material in filter(None, slots))
 
     def vertex_colours(self, slots: tuple[bpy.types.Material | None, ...]) -> str | None:
         """The colour attribute that a mesh of these materials is coloured by, "" being the active one, or None."""

@@ -49,7 +49,8 @@ typedef struct {
 } ViewcamSpheres;
 
 /* So many objects that differ by their matrices alone. geometry: its number, as they were added. visible: to which kinds of rays,
- * and above them to the shadow rays of which lamps with blockers of their own. lit_by: which lamps' receivers it is among.
+ * and above them to the shadow rays of which lights with blockers of their own. lit_by: which lights' receivers it is among.
+ * receivers, shadow_rays: of its own light, as of lamps.
  * info: (count, 5), their colors, alphas and random numbers, or null where they are white and 0.
  * slots: for each material of the geometry, what the Material Index pass shows and the number of a material. */
 typedef struct {
@@ -57,7 +58,8 @@ typedef struct {
     float index;
     const float* slot_indices;
     const uint32_t* slot_materials;
-    uint64_t lit_by;
+    uint64_t lit_by, receivers;
+    uint32_t shadow_rays;
     const float* info;
 } ViewcamObject;
 

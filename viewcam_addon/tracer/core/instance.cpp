@@ -94,7 +94,8 @@ const ViewcamCore core = {
                 Scene& to = scene_of(scene);
                 check::objects(to, *given);
                 Object object;
-                object.geometry = given->geometry, object.visible = given->visible, object.index = given->index, object.lit_by = given->lit_by;
+                object.geometry = given->geometry, object.visible = given->visible, object.index = given->index;
+                object.lit_by = given->lit_by, object.receivers = given->receivers, object.shadow_rays = RayKind(given->shadow_rays);
                 object.first_slot = uint32_t(to.slots.size());
                 for (uint32_t i = 0; i < given->count; i++) {
                     if (given->info) object.info = given->info + 5 * size_t(i);

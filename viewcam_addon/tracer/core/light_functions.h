@@ -152,7 +152,8 @@ inline void sample_light(const ViewcamLamp& lamp, size_t count, const double* gi
 inline void light_le(const ViewcamLamp& lamp, size_t count, const double* given, double* out) {
     Light light = light_of(lamp_of(lamp, vector(lamp.color), {}));
     for (size_t i = 0; i < count; i++, given += 9, out += 3) {
-        Vec3 radiance = light.le({{given[0], given[1], given[2]}, {given[3], given[4], given[5]}, given[6], given[7], given[8] != 0});
+        double distance;
+        Vec3 radiance = light.le({{given[0], given[1], given[2]}, {given[3], given[4], given[5]}, given[6], given[7], given[8] != 0}, distance);
         out[0] = radiance.x, out[1] = radiance.y, out[2] = radiance.z;
     }
 }

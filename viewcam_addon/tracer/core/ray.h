@@ -11,11 +11,12 @@ namespace viewcam::VIEWCAM_ISA {
 constexpr double INFINITE = std::numeric_limits<double>::infinity();
 constexpr uint32_t NONE = 0xffffffffu;
 constexpr double DOUBLE_ROUNDING = 0x1p-53;
+constexpr uint64_t EVERYTHING = ~0ull;  // the receivers of a light that has none of its own
 
 // The kinds of rays that objects and lights may be hidden from, as bits; tracer/native.py numbers scene/lamps.py RAYS so.
-// NO_RAY: what a light is sampled for.
-// Above SHADOW there is a bit for the shadow rays of each set of blockers that lamps have.
-enum RayKind : uint32_t { NO_RAY = 0, CAMERA = 1, DIFFUSE = 2, GLOSSY = 4, TRANSMISSION = 8, SHADOW = 16 };
+// NO_RAY: what a light is sampled for. SHADOW_LINKED: sees objects whose light has blockers of its own, and no others.
+// Above it there is a bit for the shadow rays of each set of blockers that lights have.
+enum RayKind : uint32_t { NO_RAY = 0, CAMERA = 1, DIFFUSE = 2, GLOSSY = 4, TRANSMISSION = 8, SHADOW = 16, SHADOW_LINKED = 32 };
 
 // What a material may ask of the ray that has come to it. kind: of its last scattering; diffuse, singular: what scattered it;
 // depth: scatterings so far; scattered: those that were diffuse, glossy and transmission; passed: surfaces that it has gone straight

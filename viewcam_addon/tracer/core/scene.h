@@ -169,6 +169,10 @@ class Scene {
         const TriangleMesh& mesh = std::get<TriangleMesh>(geometries[objects[object].geometry]);
         for (int c = 0; c < 3; c++) corners[c] = objects[object].to_world.point(mesh.corner(triangle, c));
     }
+    // Whether the light of any object has blockers of its own.
+    bool is_shadow_linked() const {
+        return std::any_of(objects.begin(), objects.end(), [](const Object& object) { return object.visible & SHADOW_LINKED; });
+    }
     // Whether an object is hidden from any kind of ray.
     bool hides_anything() const {
         return std::any_of(objects.begin(), objects.end(), [](const Object& object) { return (object.visible & 31) != 31; });

@@ -15,7 +15,7 @@ from ...checks import shown
 from ...errors import InputError
 from ...pinhole import Pinhole
 from .film import Bounces, Film
-from .lamps import MOST_LINKS, Lamp, World, hidden_from
+from .lamps import MOST_LINKS, Lamp, World, hidden_from, linked
 from .materials import Material, Picture
 
 # Visibility is found in float32, which holds the square of nothing larger.
@@ -98,6 +98,8 @@ class Object:
     material_indices : what the Material Index pass shows, for each material of the geometry; at least one.
     materials : keys in `Scene.materials`, for each material of the geometry; "", and all that are missing, are `PLAIN`.
     hidden_from : which rays don't see it (lights.RAYS).
+    receivers, blockers : where it shines, names of the objects that it lights, and of those that can stand in that light; None
+        is all objects. The eye sees it whatever it lights.
     color : red, green, blue and alpha, that materials may ask for. random : (n,) float32, 0 to 1, of each instance likewise, or
         None, which is 0.
     """
@@ -111,6 +113,8 @@ class Object:
     hidden_from: frozenset[str] = frozenset()
     color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     random: NDArray[np.float32] | None = None
+    receivers: frozenset[str] | None = None
+    blockers: frozenset[str] | None = None
 
     def __post_init__(self) -> None:
         _check_shape(f"the matrix of object {shown(self.name)}", self.matrix, (None, 4, 4)[-max(self.matrix.ndim, 2) :])
@@ -123,6 +127,8 @@ class Object:
                 f"object {shown(self.name)} has no material_indices: give at least one, 0 where it has no material"
             )
         object.__setattr__(self, "hidden_from", hidden_from(f"object {shown(self.name)}", self.hidden_from))
+        object.__setattr__(self, "receivers", linked(self.receivers))
+        object.__setattr__(self, "blockers", linked(self.blockers))
         object.__setattr__(self, "color", checks.vector(f"the color of object {shown(self.name)}", self.color, 4))
         if self.random is not None:
             _check_shape(f"random of object {shown(self.name)}", self.random, (len(self.matrices),))
@@ -206,7 +212,7 @@ class Scene:
                     raise InputError(
                         f"object {shown(placed.name)} names the material {shown(name)}, which the scene does not have"
                     )
-        _check_links(self.lamps, {placed.name for placed in self.objects})
+        _check_links(self.lamps, self.objects)
         for image in self.world.images:
             if image not in self.images:
                 raise InputError(f"the world names the image {shown(image)}, which the scene does not have")
@@ -226,16 +232,19 @@ class Scene:
                 raise InputError(f"{what} names the image {shown(colour.image)}, which the scene does not have")
 
 
-def _check_links(lamps: tuple[Lamp, ...], names: set[str]) -> None:
+def _check_links(lamps: tuple[Lamp, ...], objects: tuple[Object, ...]) -> None:
+    names = {placed.name for placed in objects}
+    lights: tuple[Lamp | Object, ...] = (*lamps, *objects)
     for what, most in MOST_LINKS.items():
-        sets = {getattr(lamp, what) for lamp in lamps} - {None}
+        sets = {getattr(light, what) for light in lights} - {None}
         if len(sets) > most:
-            raise InputError(f"lamps have {len(sets)} different sets of {what}: give at most {most}")
-        for lamp in lamps:
-            unknown = sorted((getattr(lamp, what) or frozenset()) - names)
+            raise InputError(f"lights have {len(sets)} different sets of {what}: give at most {most}")
+        for light in lights:
+            unknown = sorted((getattr(light, what) or frozenset()) - names)
             if unknown:
+                kind = "light" if isinstance(light, Lamp) else "object"
                 raise InputError(
-                    f"{what} of light {shown(lamp.name)} names the object {shown(unknown[0])}, which the scene does not have"
+                    f"{what} of {kind} {shown(light.name)} names the object {shown(unknown[0])}, which the scene does not have"
                 )
 
 

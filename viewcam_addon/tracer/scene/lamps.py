@@ -26,8 +26,8 @@ from .shader_nodes import Node
 RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
 """The kinds of rays that things may be hidden from; lamps have no shadow."""
 
-MOST_LINKS = {"receivers": 64, "blockers": 27}
-"""How many different sets of objects the lamps of a scene may have: bits of the core's numbers. Blender's own limit is 64."""
+MOST_LINKS = {"receivers": 64, "blockers": 26}
+"""How many different sets of objects the lights of a scene may have: bits of the core's numbers. Blender's own limit is 64."""
 
 LEAST_SPREAD = 1e-3
 """Radians; what is less spread is nearly a beam, whose light would be found by chance alone."""
@@ -47,8 +47,13 @@ def _hidden(name: str, rays: Collection[str]) -> frozenset[str]:
     return hidden_from(name.removeprefix("hidden_from of "), rays)
 
 
-def _linked(name: str, objects: Collection[str] | None) -> frozenset[str] | None:
+def linked(objects: Collection[str] | None) -> frozenset[str] | None:
+    """Names of receivers or blockers; None is all objects."""
     return None if objects is None else frozenset(objects)
+
+
+def _linked(name: str, objects: Collection[str] | None) -> frozenset[str] | None:
+    return linked(objects)
 
 
 def _emission(name: str, node: Node | None) -> Node | None:

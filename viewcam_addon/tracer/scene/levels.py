@@ -46,7 +46,7 @@ def _light(lamps: Sequence[Lamp], world: World, shown: Sequence[tuple[str, Mater
         if any(lamp.strength):
             return f"the lamp {lamp.name!r}"
     for name, material in shown:
-        if any(closure.node.is_shining for closure in material.closures):
+        if material.shines:
             return f"the surface of {name!r}"
     return None if world.is_black else "the world"
 

@@ -73,6 +73,11 @@ class Material:
         return tuple(Closure(make(self.colours[name])) for name, make in made.items() if name in self.colours)
 
     @property
+    def shines(self) -> bool:
+        """Whether it gives light."""
+        return any(closure.node.is_shining for closure in self.closures)
+
+    @property
     def inputs(self) -> tuple[tuple[str, Colour], ...]:
         """What all colours and numbers are given or made from, each with what a sentence calls it."""
         found = [("displacement", colour) for colour in self.displacement.colours] if self.displacement else []

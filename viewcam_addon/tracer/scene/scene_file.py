@@ -132,6 +132,8 @@ def _object_document(placed: Object, prefix: str, arrays: dict[str, NDArray]) ->
         document["color"] = list(placed.color)
     if placed.random is not None:
         document["random"] = array_document(placed.random, f"object {prefix}.random", arrays)
+    links = {"receivers": placed.receivers, "blockers": placed.blockers}
+    document |= {key: sorted(names) for key, names in links.items() if names is not None}
     return document
 
 
@@ -189,7 +191,8 @@ def _clip(field: Field) -> tuple[float, float]:
 
 
 def _object(field: Field, arrays: Arrays) -> Object:
-    optional = ("matrices", "object_index", "material_indices", "materials", "hidden_from", "color", "random")
+    links = ("receivers", "blockers")
+    optional = ("matrices", "object_index", "material_indices", "materials", "hidden_from", "color", "random", *links)
     keys = field.fields(("name", "geometry"), (*placing.KEYS, *optional))
     if "matrices" not in keys:
         matrix = placing.matrix(field, keys)
@@ -209,6 +212,7 @@ def _object(field: Field, arrays: Arrays) -> Object:
             hidden_from=light_fields.names(keys["hidden_from"], "kind of ray") if "hidden_from" in keys else frozenset(),
             color=keys["color"].vector(4) if "color" in keys else Object.color,
             random=keys["random"].array(arrays, np.float32, (None,)) if "random" in keys else None,
+            **{key: light_fields.names(keys[key], "object's name") for key in links if key in keys},
         )
     except InputError as error:
         field.hand_on(error)

@@ -12,6 +12,9 @@
 // from behind what it has met; else it is scattered. What shines there counts in either case. A shadow ray takes along the product of
 // what it goes through. Of two surfaces in the same place one counts.
 //
+// Before a light that has blockers of its own (shadow linking) nothing else stands: what scattered rays find of it is looked for
+// along the whole of each, past all that it meets, with a shadow ray to each such light that it runs into.
+//
 // Nothing is traced that can't bring anything: without lights no shadow rays, without anything bright that rays could run into
 // no last ray, without either one ray a sample. What a path brings depends on its own numbers alone, and is added up in an order
 // of its own: whichever paths go along with it, and whether rays are traced in packets, changes no bit.
@@ -66,6 +69,7 @@ class PathIntegrator {
             meets_[kind] = shines || lights_.environment().lights(kind) || lights_.meets_lamps(kind);
             only_sky_[kind] = !shines && !transparent_ && !lights_.meets_lamps(kind) && !scene.hides_anything();
         }
+        shadow_linked_ = shines && scene.is_shadow_linked();
         for (const ValueNode& node : scene.illumination.nodes.all) has_pixels_ |= std::holds_alternative<BumpNode>(node);
         dark_ = !shines && !transparent_;
         lit_ = !scene.illumination.lamps.empty() || shines || !is_black(lights_.environment().radiance);
@@ -150,6 +154,25 @@ class PathIntegrator {
         bool singular = path.kind != CAMERA && path.pdf == INFINITE;
         return scene_.shading(point, incoming, {path.kind, path.diffuse, singular, depth, path.passed, path.scattered, point.t, path.width, path.spread});
     }
+    // The same where it arrives there, with the normal that its material gives the point.
+    ShadingPoint arriving(Interaction& point, const Path& path, int depth) const {
+        ShadingPoint at = shading(point, path, path.ray.direction, depth);
+        const Color& normal = material(point).normal;
+        if (VIEWCAM_ISA::is_bumped(normal)) point.shading = at.normal(normal);
+        return at;
+    }
+    // What a path brings of the light of a surface where its ray arrives, less what samples of that light find. distance: from
+    // where it was scattered.
+    Vec3 emission(const Path& path, const ShadingPoint& at, double distance, const Block& block) const {
+        double share = 1;
+        if (path.kind != CAMERA) {
+            const Interaction& from = block.points[path.from];
+            if (!lights_.reaches(scene_.objects[at.point.object], from)) return {};
+            if (path.pdf < INFINITE && lights_.has_meshes())
+                share = power_heuristic(path.pdf, lights_.pdf_li(from, at.point, path.ray.direction, distance, path.through));
+        }
+        return path.weight * material(at.point).emission(at) * share;
+    }
 
     bool has_ended(const Path& path) const { return path.passed > 0 && path.passed >= ended_after_; }
 
@@ -177,14 +200,9 @@ class PathIntegrator {
         PathLight& light = block.light[path.sample];
         for (double u = -1;;) {
             const Material& made_of = material(point);
-            ShadingPoint at = shading(point, path, path.ray.direction, depth);
-            if (VIEWCAM_ISA::is_bumped(made_of.normal)) point.shading = at.normal(made_of.normal);
-            if (made_of.emits()) {
-                double share = 1;
-                if (path.pdf < INFINITE && lights_.has_meshes())
-                    share = power_heuristic(path.pdf, lights_.pdf_li(block.points[path.from], point, path.ray.direction, hit.t, path.through));
-                light.add(path.kind == CAMERA ? EMISSION : path.category, path.weight * made_of.emission(at) * share);
-            }
+            ShadingPoint at = arriving(point, path, depth);
+            if (made_of.emits() && (!shadow_linked_ || path.kind == CAMERA || scene_.objects[point.object].shadow_rays == SHADOW))
+                light.add(path.kind == CAMERA ? EMISSION : path.category, emission(path, at, hit.t, block));
             if (has_ended(path)) return false;
             if (!made_of.is_transparent()) return made_of.scatters() && !path.last;
             BSDF bsdf = made_of.bsdf(at);
@@ -208,6 +226,27 @@ class PathIntegrator {
         Vec3 radiance = path.kind == CAMERA ? lights_.le(seen, CAMERA)
                                             : lights_.le(seen, path.kind, block.points[path.from], path.pdf, depth == 1, path.through);
         block.light[path.sample].add(path.kind == CAMERA ? EMISSION : path.category, path.weight * radiance);
+    }
+    // Adds what lights with blockers of their own bring along a path's ray: whatever else it meets, only these stand before them.
+    [[gnu::noinline]] void meet_shadow_linked(const Path& path, int depth, Block& block) const {
+        const Interaction& from = block.points[path.from];
+        RayState state{SHADOW, false, false, depth, path.passed, path.scattered, 0, path.width};
+        auto add = [&](Vec3 light, double distance, double cosine, RayKind shadow_rays) {
+            if (!is_black(light)) block.light[path.sample].add(path.category, light * unoccluded(shadow_ray(from, {path.ray.direction, distance, {}, 0, cosine}), shadow_rays, state));
+        };
+        Ray ray = path.ray;
+        while (Hit hit = scene_.closest(ray, SHADOW_LINKED)) {
+            const Object& object = scene_.objects[hit.object];
+            ray.t_min = hit.t;
+            if (!(object.visible & path.kind)) continue;
+            Interaction point = scene_.interaction(path.ray, hit);
+            if (!material(point).emits()) continue;
+            ShadingPoint at = arriving(point, path, depth);
+            add(emission(path, at, hit.t, block), hit.t, std::fabs(dot(point.normal, ray.direction)), object.shadow_rays);
+        }
+        lights_.each_shadow_linked({ray.origin, ray.direction, 0, INFINITE, true}, path.kind, from, path.pdf, depth == 1, path.through, [&](const Light& lamp, Vec3 radiance, double distance) {
+            add(path.weight * radiance, distance, 1, lamp.casts_shadow ? lamp.shadow_rays : NO_RAY);
+        });
     }
     // Adds what the world brings to a path that leaves the scene.
     void leave(const Path& path, const Ray& ray, int depth, Block& block) const {
@@ -235,6 +274,12 @@ class PathIntegrator {
             ray.t_min = hit.t;
         }
         return left;
+    }
+
+    // What of light comes along a shadow ray.
+    Vec3 unoccluded(const Ray& ray, RayKind kind, const RayState& state) const {
+        if (!scene_.occluded(ray, kind)) return {1, 1, 1};
+        return transparent_ ? transmittance(ray, kind, state) : Vec3{};
     }
 
     // What the eye's rays come to, and the light that is of this alone.
@@ -434,6 +479,7 @@ class PathIntegrator {
         int arrived[MOST], met = 0;
         for (int i = 0; i < block.live; i++) {
             Path& path = block.onwards[i];
+            if (shadow_linked_ || lights_.is_shadow_linked()) meet_shadow_linked(path, depth, block);
             Hit hit = path.may_touch ? touched(path, block.points[path.from]) : Hit{};
             path.touches = bool(hit);
             if (path.last && only_sky_[path.kind]) {
@@ -471,6 +517,7 @@ class PathIntegrator {
     bool meets_[TRANSMISSION + 1] = {}, only_sky_[TRANSMISSION + 1] = {};
     bool lit_, transparent_ = false, mixed_ = false;  // whether materials let anything straight through, and beside that scatter
     bool dark_;                                       // whether nothing shines but lamps and the sky, and nothing lets light through
+    bool shadow_linked_ = false;                      // whether the light of surfaces has blockers of its own
     bool has_pixels_ = false;                         // whether materials ask how wide pixels are
     int most_passed_, ended_after_;                   // surfaces that shadow rays, and paths, go straight through
     uint32_t kinds_ = 0, spread_ = 0;  // of rays that any material scatters, and all over

@@ -14,7 +14,7 @@ class Light {
 
     // hidden_from: the kinds of rays that don't see it; what a light hides from, it does not light. receivers: a bit that objects have
     // which it lights, Object::lit_by. shadow_rays: the kind of those that are sent to it.
-    Light(Kind kind, uint32_t hidden_from, bool casts_shadow, uint64_t receivers = ~0ull, RayKind shadow_rays = SHADOW)
+    Light(Kind kind, uint32_t hidden_from, bool casts_shadow, uint64_t receivers = EVERYTHING, RayKind shadow_rays = SHADOW)
         : hidden_from(hidden_from), casts_shadow(casts_shadow), receivers(receivers), shadow_rays(shadow_rays), kind_(std::move(kind)) {}
 
     uint32_t hidden_from;
@@ -37,8 +37,8 @@ class Light {
         return sample;
     }
     // What a ray sees of a lamp that it runs into; surfaces are met as all others are.
-    Vec3 le(const LightRay& ray) const {
-        double distance = INFINITE;
+    // distance: receives how far away that is, where it is not at infinity.
+    Vec3 le(const LightRay& ray, double& distance) const {
         Vec3 radiance = std::visit(
             [&](const auto& light) {
                 if constexpr (requires { light.le(ray, distance); })

@@ -37,7 +37,7 @@ class LightSampler {
         for (const Material& material : given.materials) lit |= material.rough_kinds();
         std::vector<Light> unlit;
         for (const Lamp& lamp : given.lamps) {
-            linked_ |= lamp.receivers != ~0ull;
+            linked_ |= lamp.receivers != EVERYTHING;
             Light light = light_of(lamp, &scene);
             (lit & ~lamp.hidden_from ? lights_ : unlit).push_back(light);
         }
@@ -49,6 +49,7 @@ class LightSampler {
         std::vector<Vec3> emissions;
         for (const Material& material : given.materials) emissions.push_back(material.mean_emission());
         owners_.assign(scene.objects.size(), NONE);
+        for (const Object& placed : scene.objects) linked_ |= placed.receivers != EVERYTHING;
         const Object* black = nullptr;  // the last object none of whose triangles shines: most of a million instances are like it
         for (uint32_t object = 0; object < scene.objects.size(); object++) {
             const Object& placed = scene.objects[object];
@@ -58,14 +59,14 @@ class LightSampler {
             if (mesh.is_black()) black = &placed;
             if (mesh.is_dark()) continue;
             owners_[object] = uint32_t(lights_.size());
-            lights_.emplace_back(std::move(mesh), ~visible, true);
+            lights_.emplace_back(std::move(mesh), ~visible, true, placed.receivers, placed.shadow_rays);
         }
         size_t meshes = lights_.size();
         lights_.insert(lights_.end(), unlit.begin(), unlit.end());
         for (size_t i = 0; i < lights_.size(); i++)
             if ((i < lamps_ || i >= meshes) && i != sky_ && lights_[i].is_sized() && lights_[i].is_met)
                 (lights_[i].bounds() ? placed_ : boundless_).push_back(uint32_t(i)),
-                    met_by_ |= (CAMERA | GLOSSY | TRANSMISSION) & ~lights_[i].hidden_from;
+                    met_by_ |= (CAMERA | GLOSSY | TRANSMISSION) & ~lights_[i].hidden_from, shadow_linked_ |= lights_[i].shadow_rays != SHADOW;
         hierarchy_ = build_bvh(placed_.size(), [&](size_t i) { return lights_[placed_[i]].bounds()->box; }, 1, 1);
         count_ = int(meshes);
         random_ = count_ > 1 || (count_ == 1 && lights_[0].is_sized());
@@ -83,17 +84,23 @@ class LightSampler {
     // through: as in `choose`.
     Vec3 le(const LightRay& ray, RayKind kind, const Interaction& from, double pdf, bool seen, bool through) const {
         Vec3 sum;
-        each_met(ray, kind, [&](uint32_t light, Vec3 radiance) {
-            if (!reaches(lights_[light], from)) return;
-            double other = pdf < INFINITE && int(light) < count_ ? lights_[light].pdf_li(from, ray.direction) * chance(from, light, seen, through) : 0;
-            sum += radiance * power_heuristic(pdf, other);
+        each_met(ray, kind, [&](uint32_t light, Vec3 radiance, double) {
+            if (lights_[light].shadow_rays == SHADOW) sum += radiance * share(light, ray, from, pdf, seen, through);
         });
         return sum;
     }
+    // The same of lamps that have blockers of their own, but for what stands before them: calls visit(lamp, radiance, distance).
+    bool is_shadow_linked() const { return shadow_linked_; }
+    template <class Visit> void each_shadow_linked(const LightRay& ray, RayKind kind, const Interaction& from, double pdf, bool seen, bool through, const Visit& visit) const {
+        if (!shadow_linked_ || !meets_lamps(kind)) return;
+        each_met(ray, kind, [&](uint32_t light, Vec3 radiance, double distance) {
+            if (lights_[light].shadow_rays != SHADOW) visit(lights_[light], radiance * share(light, ray, from, pdf, seen, through), distance);
+        });
+    }
 
-    // Whether a light's receivers are all, or what a point is of is one of them.
-    bool reaches(const Light& light, const Interaction& point) const {
-        return !linked_ || point.object == NONE || light.receivers & (*objects_)[point.object].lit_by;
+    // Whether the receivers of a light, or of an object that shines, are all, or what a point is of is one of them.
+    template <class Linked> bool reaches(const Linked& light, const Interaction& point) const {
+        return !linked_ || light.receivers == EVERYTHING || point.object == NONE || light.receivers & (*objects_)[point.object].lit_by;
     }
 
     // How many lights surfaces can be lit by, and whether what they get depends on chance.
@@ -106,7 +113,7 @@ class LightSampler {
     // The radiance of all lamps that a ray of a kind runs through.
     Vec3 le(const LightRay& ray, RayKind kind) const {
         Vec3 sum;
-        each_met(ray, kind, [&](uint32_t, Vec3 radiance) { sum += radiance; });
+        each_met(ray, kind, [&](uint32_t, Vec3 radiance, double) { sum += radiance; });
         return sum;
     }
 
@@ -219,18 +226,26 @@ class LightSampler {
         return placed > 0 ? 0.25 + 0.5 * irradiance_ / (irradiance_ + placed) : 1;
     }
 
-    // Calls visit(light, radiance) for the lamps that a ray runs through.
+    // Calls visit(light, radiance, distance) for the lamps that a ray runs through.
     template <class Visit> void each_met(const LightRay& ray, RayKind kind, const Visit& visit) const {
         auto meet = [&](uint32_t light) {
             if (lights_[light].hidden_from & kind) return;
-            Vec3 radiance = lights_[light].le(ray);
-            if (!is_black(radiance)) visit(light, radiance);
+            double distance = INFINITE;
+            Vec3 radiance = lights_[light].le(ray, distance);
+            if (!is_black(radiance)) visit(light, radiance, distance);
         };
         for (uint32_t light : boundless_) meet(light);
         traverse<false>(hierarchy_, Ray{ray.origin, ray.direction, ray.nearest}, ray.farthest, 0, [&](uint32_t leaf, BoxRay&) {
             meet(placed_[hierarchy_.leaves[leaf]]);
             return false;
         });
+    }
+
+    // The part that counts of what a scattered ray sees of a lamp.
+    double share(uint32_t light, const LightRay& ray, const Interaction& from, double pdf, bool seen, bool through) const {
+        if (!reaches(lights_[light], from)) return 0;
+        double other = pdf < INFINITE && int(light) < count_ ? lights_[light].pdf_li(from, ray.direction) * chance(from, light, seen, through) : 0;
+        return power_heuristic(pdf, other);
     }
 
     double chance(const Interaction& point, uint32_t light, bool seen, bool through) const {
@@ -256,7 +271,8 @@ class LightSampler {
     }
 
     const std::vector<Object>* objects_;
-    bool linked_ = false;        // whether any lamp has receivers of its own
+    bool shadow_linked_ = false;  // whether rays run into a lamp that has blockers of its own
+    bool linked_ = false;        // whether any light has receivers of its own
     std::vector<Light> lights_;  // lamps that light diffuse surfaces, meshes, lamps that don't
     size_t lamps_;
     int count_;

@@ -9,10 +9,12 @@ namespace viewcam::VIEWCAM_ISA {
 struct Object {
     uint32_t geometry = 0;
     uint32_t visible = 0;       // to which kinds of rays, RayKind's bits
-    uint64_t lit_by = ~0ull;    // a bit for each set of receivers that it is in
+    uint64_t lit_by = 0;        // a bit for each set of receivers that it is in
+    uint64_t receivers = EVERYTHING;  // of its own light: a bit of their lit_by
     uint32_t first_slot = 0;    // of Scene::slots, one for each of the geometry's materials
     float index = 0;            // what the Object Index pass shows
     const float* info = nullptr;  // its color, alpha and random number, where a material may ask for them
+    RayKind shadow_rays = SHADOW;  // the kind of those that are sent to it
     bool shared = false;        // whether other objects place the same geometry
     bool flat = false;          // whether the matrix has no inverse to speak of
     bool mirrored = false;      // whether corners that run counter-clockwise in object space run clockwise in the world
