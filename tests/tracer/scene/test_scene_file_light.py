@@ -61,7 +61,7 @@ common = {
     "name": names,
     "hidden_from": rays,
     "casts_shadow": st.booleans(),
-    "is_met": st.booleans(),
+    "multiple_importance": st.booleans(),
     "receivers": links,
     "blockers": links,
 }
