@@ -438,7 +438,7 @@ class CoreScene:
                 continue
             images[name] = len(images)
             picture = scene.images[name]
-            height, width, channels = picture.pixels.shape
+            height, width, channels = picture.shape
             texel = TEXELS.index(picture.pixels.dtype)  # the pixels are read in place: the scene has them
             address = _address(picture.pixels)
             self.check(self.core.add_texture(self.handle, width, height, channels, picture.srgb, texel, address))

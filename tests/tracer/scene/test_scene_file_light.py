@@ -155,6 +155,7 @@ def test_light_that_is_written_is_read_back_to_the_last_bit(make_scene, make_mes
             "large": Picture(rng.normal(size=(7, 5, 3)).astype(np.float32)),
             "halves": Picture(rng.normal(size=(7, 5, 3)).astype(np.float16)),
             "bytes": Picture(rng.integers(0, 256, (7, 5, 3), np.uint8), srgb=True),
+            "rgbe": Picture(rng.integers(0, 1 << 31, (7, 7, 1), np.uint32)),
             "shorts": Picture(rng.integers(0, 65536, (7, 5, 4), np.uint16)),
         },
         materials=chosen,

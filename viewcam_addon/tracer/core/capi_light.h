@@ -32,8 +32,8 @@ typedef struct {
     int32_t factor_count;
 } ViewcamClosure;
 
-/* What an image's numbers are; whole ones are shares of 255 and 65535. */
-enum ViewcamTexel { VIEWCAM_FLOAT, VIEWCAM_HALF, VIEWCAM_BYTE, VIEWCAM_SHORT };
+/* What an image's numbers are; whole ones are shares of 255 and 65535. RGBE: four bytes a pixel, of three channels. */
+enum ViewcamTexel { VIEWCAM_FLOAT, VIEWCAM_HALF, VIEWCAM_BYTE, VIEWCAM_SHORT, VIEWCAM_RGBE };
 enum ViewcamFilter { VIEWCAM_BOX, VIEWCAM_BLACKMAN_HARRIS, VIEWCAM_GAUSSIAN };
 /* matrix: (3, 4), the lamp's space to the world's; a sun is seen towards its z. color: irradiance of a sun, power of others.
  * kind: its name, and the numbers that such a lamp has. multiple_importance: whether rays run into it.

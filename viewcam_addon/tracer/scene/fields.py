@@ -103,7 +103,7 @@ class Field:
             dtype = stored if stored in kept else dtype
         else:
             array = self._nested(len(shape))
-        if np.issubdtype(dtype, np.integer):
+        if np.issubdtype(dtype, np.integer) and dtype not in kept:
             if array.dtype.kind not in "iu" and array.size:
                 self.fail("holds numbers that are not whole: give whole ones")
             if array.size and not -_LARGEST_WHOLE <= array.min() <= array.max() <= _LARGEST_WHOLE:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...checks import shown
 from ...errors import InputError
 from . import Scene, lamps, placing, value_nodes
-from .colours import TEXELS
+from .colours import RGBE, TEXELS
 from .fields import Arrays, Field
 from .film import Bounces, Film
 from .geometry_fields import LARGEST_INLINE, array_document
@@ -131,7 +131,7 @@ def _colour_document(colour: Colour) -> list[float] | dict[str, Any]:
 def _picture(field: Field, arrays: Arrays) -> Picture:
     keys = field.fields(("pixels",), ("srgb",))
     pixels = keys["pixels"].array(arrays, np.float32, (None, None, None), kept=TEXELS)
-    if pixels.shape[2] not in (3, 4):
+    if pixels.shape[2] not in (3, 4) and pixels.dtype != RGBE:
         keys["pixels"].fail(f"has {pixels.shape[2]} numbers a pixel and must have 3 or 4: correct it")
     try:
         return Picture(pixels, keys["srgb"].truth() if "srgb" in keys else False)
