@@ -5,6 +5,7 @@ gathered at the end (the first wrong key usually explains the others).
 """
 
 import contextlib
+import json
 import math
 import os
 import zipfile
@@ -260,4 +261,4 @@ def _is_number(value: object) -> bool:
 def _shown(value: object) -> str:
     if isinstance(value, list | dict):
         return "a list" if isinstance(value, list) else "an object"
-    return checks.shown(value) if value is not None else "null"
+    return json.dumps(value) if value is None or isinstance(value, bool) else checks.shown(value)

@@ -20,7 +20,7 @@ from .film import Bounces, Film
 from .geometry_fields import LARGEST_INLINE, array_document
 from .lamps import Lamp, World
 from .materials import Colour, Material, Picture
-from .shader_nodes import KINDS, Node
+from .shader_nodes import KINDS, MOST_DEEP, Node
 
 KEYS = ("images", "materials", "lamps", "world", "film", "bounces", "cycles")
 
@@ -155,7 +155,9 @@ def _material(field: Field) -> Material:
         field.hand_on(error)
 
 
-def _node(field: Field) -> Node:
+def _node(field: Field, deep: int = 1) -> Node:
+    if deep > MOST_DEEP:
+        raise InputError(f"{field.file}: more than {MOST_DEEP} nodes feed one another in a row: give fewer")
     kind = field.fields(("type",), others=True)["type"]
     if kind.text() not in KINDS:
         kind.fail(f"is {shown(kind.value)}: give one of {', '.join(KINDS)}")
@@ -163,17 +165,19 @@ def _node(field: Field) -> Node:
     keys = field.fields(("type",), tuple(known.inputs))
     try:
         given = (
-            (name, _node_input(keys[name], default, known.is_value)) for name, default in known.inputs.items() if name in keys
+            (name, _node_input(keys[name], default, known.is_value, deep))
+            for name, default in known.inputs.items()
+            if name in keys
         )
         return Node(kind.value, tuple(given))
     except InputError as error:
         field.hand_on(error)
 
 
-def _node_input(field: Field, default: object, of_value: bool) -> Any:
+def _node_input(field: Field, default: object, of_value: bool, deep: int) -> Any:
     is_node = isinstance(field.value, dict) and "type" in field.value
     if default is None or is_node:
-        return _node(field)
+        return _node(field, deep + 1)
     if isinstance(default, bool):
         return field.truth()
     if default is value_nodes.IMAGE:
@@ -187,7 +191,8 @@ def _node_input(field: Field, default: object, of_value: bool) -> Any:
 
 def _colour(field: Field) -> Colour:
     """Three numbers, or an object where an image or the mesh's own colours come in."""
-    keys = {"rgb": field} if isinstance(field.value, list) else field.fields((), ("rgb", "image", "closest", "vertex"))
+    is_varied = isinstance(field.value, dict)
+    keys = field.fields((), ("rgb", "image", "closest", "vertex")) if is_varied else {"rgb": field}
     try:
         return Colour(
             rgb=keys["rgb"].vector(3) if "rgb" in keys else _WHITE,
