@@ -138,7 +138,7 @@ def light_up(draw, calls):
     calls("set_film", calls.scene, film)
     width, height = draw(st.integers(-1, 3)), draw(st.integers(-1, 3))
     pixels = calls.at(np.ones(4 * max(width * height, 1)), np.float32)
-    texel = draw(mostly(st.integers(0, 3), WHOLE))
+    texel = draw(mostly(st.integers(0, 4), WHOLE))
     calls("add_texture", calls.scene, width, height, draw(st.integers(2, 4)), draw(st.booleans()), texel, pixels)
 
 

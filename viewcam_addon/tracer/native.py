@@ -109,7 +109,7 @@ class _Closure(Structure):
 class _Lamp(Structure):
     _fields_ = [
         ("kind", _Node),
-        *((name, c_int32) for name in ("casts_shadow", "is_met")),
+        *((name, c_int32) for name in ("casts_shadow", "multiple_importance")),
         ("hidden_from", c_uint32),
         ("matrix", c_double * 12),
         ("color", c_double * 3),
@@ -445,7 +445,7 @@ class CoreScene:
                 continue
             images[name] = len(images)
             picture = scene.images[name]
-            height, width, channels = picture.pixels.shape
+            height, width, channels = picture.shape
             texel = TEXELS.index(picture.pixels.dtype)  # the pixels are read in place: the scene has them
             address = _address(picture.pixels)
             self.check(self.core.add_texture(self.handle, width, height, channels, picture.srgb, texel, address))
@@ -615,7 +615,12 @@ def described_lamp(lamp: Lamp, links: _Links = _UNLINKED) -> _Lamp:
     """A lamp as the core takes it. links : of all the scene's lamps, where this one has such."""
     inputs = [_constant_input(name, value) for name, value in lamp.numbers.items()]
     kind = _Node(lamp.kind.encode(), (_Input * len(inputs))(*inputs), len(inputs))
-    described = _Lamp(kind=kind, casts_shadow=lamp.casts_shadow, is_met=lamp.is_met, hidden_from=kinds(lamp.hidden_from))
+    described = _Lamp(
+        kind=kind,
+        casts_shadow=lamp.casts_shadow,
+        multiple_importance=lamp.multiple_importance,
+        hidden_from=kinds(lamp.hidden_from),
+    )
     described.receivers, described.shadow_rays = links.receivers(lamp), links.shadow_rays(lamp)
     described.matrix[:] = tuple(np.asarray(lamp.to_world, np.float64)[:3].ravel())
     described.color[:] = lamp.strength

@@ -109,7 +109,7 @@ def test_images_of_bytes_and_floats(pictures, floor, image, interpolation, space
 
 
 @pytest.mark.parametrize("packed", [False, True])
-@pytest.mark.parametrize("kind", ["PNG", "OPEN_EXR"])
+@pytest.mark.parametrize("kind", ["PNG", "OPEN_EXR", "HDR"])
 @pytest.mark.parametrize("opacity", [1.0, 0.5])
 def test_images_from_files(pictures, floor, image, tmp_path, kind, opacity, packed):
     made = image("sRGB" if kind == "PNG" else "Non-Color", opacity, float_buffer=kind != "PNG", alpha=True)

@@ -9,6 +9,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender.scenes.images import picture_of
+from viewcam_addon.tracer.scene.colours import RGBE
 
 
 @pytest.fixture
@@ -63,6 +64,19 @@ def test_floats_are_half_ones_where_these_hold_their_bits(image, bits, dtype):
     picture = picture_of(made)
     assert picture.pixels.dtype == dtype
     assert picture.values.tobytes() == in_blender(made).tobytes()
+
+
+def test_a_file_of_radiance_keeps_its_four_bytes_where_half_floats_are_too_small_and_too_coarse(fresh_blender, tmp_path):
+    """From a night's 2⁻³⁰ to a sun."""
+    levels = np.random.default_rng(0).integers(128, 256, (4, 5, 4)).astype(np.uint8)
+    levels[..., 3] = np.arange(20).reshape(4, 5) * 3 + 106
+    path = tmp_path / "sky.hdr"
+    path.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 5\n" + levels[::-1].tobytes())
+    made = bpy.data.images.load(str(path))
+    picture = picture_of(made)
+    assert picture.pixels.dtype == RGBE and np.array_equal(picture.pixels.view(np.uint8), levels)
+    assert picture.values.tobytes() == in_blender(made).tobytes()
+    assert picture_of(made, alpha=True).values[..., :3].tobytes() == picture.values.tobytes()
 
 
 def test_a_png_of_two_bytes_keeps_them(fresh_blender, tmp_path):

@@ -321,7 +321,7 @@ def scenes(draw):
             "emission": draw(shone),
             "hidden_from": frozenset(draw(st.sets(st.sampled_from(RAYS[:-1])))),
             "casts_shadow": draw(st.booleans()),
-            "is_met": draw(st.booleans()),
+            "multiple_importance": draw(st.booleans()),
         }
         power = draw(colours()).rgb
         name = f"Lamp {number}"

@@ -210,6 +210,23 @@ def test_what_light_path_says_of_light_is_named_where_both_ways_to_find_it_are_t
             approximately(lamp, "'Light Path", word)
 
 
+@pytest.mark.parametrize(("count", "both", "words"), [(150, False, "100 others in a row"), (20, True, "more than 500 others")])
+def test_a_value_of_more_nodes_than_are_followed_is_named(diffuse, count, both, words):
+    """Each of them feeds the next; or both of its inputs, so that 2^count are asked for."""
+    tree = diffuse.node_tree
+    made = tree.nodes.new("ShaderNodeTexCoord").outputs["UV"]
+    for number in range(count):
+        node = tree.nodes.new("ShaderNodeMath")
+        for socket in node.inputs[: 1 + both]:
+            tree.links.new(made, socket)
+        made = node.outputs[0]
+        if number == 6:
+            tree.links.new(made, tree.nodes["Shader"].inputs["Color"])
+            exactly(diffuse)
+    tree.links.new(made, tree.nodes["Shader"].inputs["Color"])
+    approximately(diffuse, "Math", words)
+
+
 def test_a_normal_node_is_its_direction_and_how_far_another_goes_along_it(diffuse):
     added = link(diffuse, "ShaderNodeNormal", "Dot", "Color")
     added.outputs["Normal"].default_value = (0.0, 3.0, 4.0)

@@ -7,6 +7,7 @@ from core_probes import ScatteredBy
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import render
+from viewcam_addon.tracer.scene.colours import RGBE
 from viewcam_addon.tracer.scene.film import Film
 from viewcam_addon.tracer.scene.lamps import World
 from viewcam_addon.tracer.scene.materials import Material, Picture
@@ -127,11 +128,14 @@ def test_an_encoded_image_of_bytes_is_sampled_as_one_whose_pixels_are_beside_byt
 
 
 @pytest.mark.parametrize("srgb", [False, True])
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16])
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16, RGBE])
 def test_an_image_of_small_numbers_is_sampled_to_the_bit_as_its_floats_are_on_any_number_of_threads(
     make_lit, make_mesh, dtype, srgb
 ):
-    levels = np.random.default_rng(0).integers(0, 256, (64, 128, 3)).astype(dtype)
+    rng = np.random.default_rng(0)
+    levels = rng.integers(0, 256, (64, 128, 3)).astype(dtype)
+    if dtype == RGBE:
+        levels = rng.integers(0, 2**24, (64, 128, 1), dtype) | (rng.integers(128, 138, (64, 128, 1), dtype) << 24)
     small = Picture(levels / np.float16(64) if dtype == np.float16 else levels, srgb)
     surface, world = node("diffuse", color=WHITE), World(WHITE, image="room")
     found = {

@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 from core_probes import looked_up
@@ -8,6 +10,7 @@ from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import Mesh, Object, Scene
+from viewcam_addon.tracer.scene.colours import RGBE
 from viewcam_addon.tracer.scene.materials import PLAIN, Colour, Material, Picture
 
 CAMERA = Pinhole((0, 0, 5), (0, 0, 0), (0, 1, 0), 10, 8, 8)
@@ -69,23 +72,29 @@ def test_the_closest_pixel_changes_half_way_between_centres():
 
 
 def stood_for(pixels):
-    """float32: a share is rounded as Blender and Cycles round it, times the rounded 255th."""
+    """float32: a share is rounded as Blender and Cycles round it, times the rounded 255th; all else is exact."""
+    if pixels.dtype == np.float16:
+        return pixels.astype(np.float32)
+    if pixels.dtype == RGBE:
+        red, green, blue, exponent = (pixels[..., 0] >> np.uint32(8 * place) & np.uint32(255) for place in range(4))
+        return (np.stack([red, green, blue], axis=-1) * 2.0 ** (exponent[..., None] - 136.0)).astype(np.float32)
     return pixels.astype(np.float32) * (np.float32(1) / np.float32({1: 255, 2: 65535}[pixels.itemsize]))
 
 
 def random_pixels(dtype, channels):
     rng = np.random.default_rng(3)
+    if dtype == RGBE:  # up to 255, and down to what half floats can't hold
+        return rng.integers(0, 2**24, (5, 7, 1), dtype) | (rng.integers(90, 136, (5, 7, 1), dtype, endpoint=True) << 24)
     if dtype == np.float16:
         return rng.normal(0.5, 1.0, (5, 7, channels)).astype(np.float16)
     return rng.integers(0, np.iinfo(dtype).max, (5, 7, channels), dtype, endpoint=True)
 
 
-@pytest.mark.parametrize("channels", [3, 4])
 @pytest.mark.parametrize("srgb", [False, True])
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16])
+@pytest.mark.parametrize(("dtype", "channels"), [(RGBE, 3), *itertools.product([np.uint8, np.uint16, np.float16], [3, 4])])
 def test_an_image_of_small_numbers_shows_the_bits_that_its_floats_show(dtype, srgb, channels):
     pixels = random_pixels(dtype, channels)
-    floats = pixels.astype(np.float32) if dtype == np.float16 else stood_for(pixels)
+    floats = stood_for(pixels)
     uv = np.random.default_rng(4).uniform(-2, 2, (2, 500))
     small, large, other = Picture(pixels, srgb), Picture(floats, srgb), Picture(np.nextafter(floats, 9), srgb)
     assert small.pixels.dtype == dtype and small.values.tobytes() == floats.tobytes()
@@ -110,7 +119,25 @@ def test_each_byte_pair_of_bytes_and_half_float_is_the_number_that_it_stands_for
         np.testing.assert_allclose(found, np.float64(expected), rtol=0 if each.dtype == np.float16 else 2.0**-23)
 
 
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16])
+@given(st.integers(0, 2**24 - 1), st.integers(0, 187))
+def test_whatever_radiances_files_can_say_is_kept_in_four_bytes_and_shown_to_the_bit(colours, exponent):
+    """187: colours up to the most that light can have."""
+    written = Picture(np.full((1, 1, 1), colours | exponent << 24, RGBE))
+    kept = Picture.compact(np.concatenate([written.values, np.full((1, 1, 3), 2.0**-100, np.float32)]))
+    assert kept.pixels.dtype == RGBE
+    found = np.array([looked_up(picture, at(0.5, 0.25), closest=True)[:, 0] for picture in (written, kept)])
+    np.testing.assert_array_equal(found, 2 * [stood_for(written.pixels)[0, 0].astype(np.float64)])
+    assert colours == 0 or (found[0] != stood_for(written.pixels + np.uint32(1 << 24))[0, 0]).any(), "an exponent is seen"
+
+
+@pytest.mark.parametrize("value", [-1.0, 257.0, np.nextafter(np.float32(1), np.float32(2)), 2.0**-137, 2.0**-149])
+def test_a_colour_that_needs_a_sign_or_more_than_its_byte_is_not_kept_in_four(value):
+    values = np.array([[[2.0**-100, 0, 0], [1.0, 1.0, value]]], np.float32)
+    assert Picture.compact(values).pixels.dtype != RGBE
+    assert Picture.compact(values[:, :1]).pixels.dtype == RGBE
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16, RGBE])
 def test_floats_are_kept_in_the_fewest_bytes_that_hold_each_of_them_to_the_bit(dtype):
     floats = Picture(random_pixels(dtype, 3)).values
     assert Picture.compact(floats).pixels.dtype == dtype
@@ -122,7 +149,7 @@ def test_floats_are_kept_in_the_fewest_bytes_that_hold_each_of_them_to_the_bit(d
 
 
 def test_what_a_half_float_or_a_byte_cannot_hold_stays_a_float():
-    for value in (65520.0, 2.0**-25, 1e18, -0.1, 0.3, np.nextafter(np.float32(1), np.float32(2))):
+    for value in (65520.0, 257 * 2.0**-33, 1e18, -0.1, 0.3, np.nextafter(np.float32(1), np.float32(2))):
         floats = np.full((2, 2, 3), value, np.float32)
         assert Picture.compact(floats).pixels.dtype == np.float32
     assert Picture.compact(np.full((2, 2, 3), -0.0, np.float32)).pixels.dtype == np.float16, "a byte has no sign"
@@ -133,6 +160,10 @@ def test_numbers_of_other_types_are_floats():
         picture = Picture(np.full((1, 2, 3), 2, dtype))
         assert picture.pixels.dtype == np.float32 and (picture.pixels == 2).all()
     assert (Picture(np.full((1, 2, 3), 257, ">u2")).pixels == np.full((1, 2, 3), 257, np.uint16)).all()
+    assert Picture(np.full((1, 2, 3), 257, np.uint32)).pixels.dtype == np.float32, "RGBE are one number a pixel"
+    assert (
+        Picture(np.full((1, 2, 1), 1 << 24, ">u4")).values.max() == 0 and Picture(np.full((1, 2, 1), 1, ">u4")).values.max() > 0
+    )
 
 
 @pytest.mark.parametrize("dtype", [np.float16, np.float32])

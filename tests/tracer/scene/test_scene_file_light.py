@@ -1,5 +1,6 @@
 """What gives light, in a scene file: nothing is lost on the way, a hand can write it, and what is wrong is named."""
 
+import functools
 import json
 import math
 import re
@@ -61,7 +62,7 @@ common = {
     "name": names,
     "hidden_from": rays,
     "casts_shadow": st.booleans(),
-    "is_met": st.booleans(),
+    "multiple_importance": st.booleans(),
     "receivers": links,
     "blockers": links,
 }
@@ -163,6 +164,7 @@ def test_light_that_is_written_is_read_back_to_the_last_bit(make_scene, make_mes
             "large": Picture(rng.normal(size=(7, 5, 3)).astype(np.float32)),
             "halves": Picture(rng.normal(size=(7, 5, 3)).astype(np.float16)),
             "bytes": Picture(rng.integers(0, 256, (7, 5, 3), np.uint8), srgb=True),
+            "rgbe": Picture(rng.integers(0, 1 << 31, (7, 7, 1), np.uint32)),
             "shorts": Picture(rng.integers(0, 65536, (7, 5, 4), np.uint16)),
         },
         materials=chosen,
@@ -237,6 +239,11 @@ def test_every_key_of_light_is_documented():
     assert not missing, missing
 
 
+def in_a_row(count):
+    """So many nodes, each of which feeds the next."""
+    return functools.reduce(lambda made, _: {"type": "math", "a": made}, range(count), 0.5)
+
+
 @pytest.mark.parametrize(
     ("path", "value", "words"),
     [
@@ -298,6 +305,12 @@ def test_every_key_of_light_is_documented():
             {"surface": {"type": "diffuse", "color": {"type": "rgb_curves"}}},
             ["material 'wall'", "'rgb_curves'", "no table"],
         ),
+        (
+            ["materials", "wall"],
+            {"surface": {"type": "diffuse", "color": {"type": "environment"}}},
+            ["material 'wall'", "'environment'", "no image"],
+        ),
+        (["materials", "wall"], {"surface": {"type": "diffuse", "color": in_a_row(250)}}, ["250 nodes", "in a row"]),
         (["materials", "wall"], {"surface": {"type": "glossy", "roughness": -1}}, ["material 'wall'", "roughness", "0 to"]),
         (["materials", "wall"], {"surface": {"type": "glossy", "color": {"image": "no"}}}, ["material 'wall'", "'no'"]),
         (["images", "checks", "pixels"], None, ["image 'checks'", "'pixels'"]),
@@ -313,7 +326,8 @@ def test_every_key_of_light_is_documented():
         (["materials", "wall", "diffuse"], {"image": "absent"}, ["'wall'", "'absent'"]),
         (["materials", "wall", "diffuse"], {"image": 5}, ["'image' of 'diffuse' of material 'wall'"]),
         (["materials", "wall", "diffuse"], {"texture": "checks"}, ["unknown key 'texture'"]),
-        (["materials", "wall", "diffuse"], "red", ["'diffuse' of material 'wall'", "object"]),
+        (["materials", "wall", "diffuse"], "red", ["'diffuse' of material 'wall' is 'red'", "3"]),
+        (["materials", "wall", "diffuse"], True, ["'diffuse' of material 'wall' is true", "3"]),
         (["materials", "wall", "gloss"], 1, ["material 'wall'", "unknown key 'gloss'"]),
         (["materials", "pane", "ior"], 0, ["material 'pane'", "ior"]),
         (["materials", "pane", "ior"], "glass", ["'ior' of material 'pane'"]),
@@ -359,6 +373,15 @@ def test_what_is_wrong_with_light_is_said_in_one_sentence_that_names_the_key(
     example, changed, assert_refused, path, value, words
 ):
     assert_refused(changed(example, path, value), words)
+
+
+def test_a_value_may_be_made_by_many_nodes_in_a_row(example, changed, tmp_path):
+    document = changed(example, ["materials", "wall"], {"surface": {"type": "diffuse", "color": in_a_row(249)}})
+    (tmp_path / "scene.json").write_text(json.dumps(document), encoding="utf-8")
+    scene = scene_file.read(tmp_path / "scene.json")
+    assert len(list(scene.materials["wall"].surface.all)) == 250
+    scene_file.write(scene, tmp_path / "again.json")
+    assert not list(differences(scene, scene_file.read(tmp_path / "again.json")))
 
 
 VALUES = (

@@ -84,7 +84,7 @@ def image_of(picture: Picture, name: str, overrides: Overrides, packed: bool = T
 
     packed : whether it is to be saved with the file.
     """
-    height, width, channels = picture.pixels.shape
+    height, width, channels = picture.shape
     image = bpy.data.images.new(
         name, width, height, alpha=channels == 4, float_buffer=not picture.srgb, is_data=not picture.srgb
     )

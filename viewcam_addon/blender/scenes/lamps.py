@@ -188,7 +188,7 @@ def light_from(lamp: Lamp, overrides: Overrides, ledger: Ledger) -> tuple[bpy.ty
     largest = max(lamp.strength)
     data.energy = largest
     data.color = tuple(value / largest for value in lamp.strength) if largest else (1.0, 1.0, 1.0)
-    data.use_shadow, data.cycles.use_multiple_importance_sampling = lamp.casts_shadow, lamp.is_met
+    data.use_shadow, data.cycles.use_multiple_importance_sampling = lamp.casts_shadow, lamp.multiple_importance
     return data, KINDS[type].store(lamp, data, ledger)
 
 
@@ -223,11 +223,11 @@ def lamps_in(
             if strength is None or not any(strength):
                 continue
             common = {"hidden_from": hidden_from, "casts_shadow": light.use_shadow}
-            common["is_met"] = light.cycles.use_multiple_importance_sampling
+            common["multiple_importance"] = light.cycles.use_multiple_importance_sampling
             lamp = KINDS[light.type].exported(name, light, matrix, strength, common, ledger)
             if lamp is not None:
                 is_sized = getattr(light, KINDS[light.type].size) > 0
-                receivers, blockers = links.of(placed, ledger, is_sized and common["is_met"])
+                receivers, blockers = links.of(placed, ledger, is_sized and common["multiple_importance"])
                 if pictures is not None and reading:
                     shading.add_pictures(reading, reading.alphas, pictures)
                 yield replace(lamp, receivers=receivers, blockers=blockers, emission=emission)

@@ -23,7 +23,7 @@ import numpy as np
 from ...errors import InputError
 from ...tracer.scene import ies
 from ...tracer.scene.materials import LARGEST_RADIANCE, PLAIN, Colour, Material, Picture, components
-from ...tracer.scene.shader_nodes import KINDS, Node, closures
+from ...tracer.scene.shader_nodes import KINDS, MOST_NODES, Node, closures
 from ...tracer.scene.shader_nodes import node as _node
 from ...tracer.scene.value_nodes import GENERATED, INCOMING, NORMAL, OWN, POSITION, TANGENT, UV
 from .. import versions
@@ -139,6 +139,10 @@ BakedInputs = Mapping[tuple[str, str], Baked | None]
 """A shader's name and an input's identifier → what was baked, or None where no other Blender could."""
 
 
+# Nodes that feed one another in a row. One of them may become two of the tracer's, which may be more (shader_nodes.MOST_DEEP).
+_MOST_DEEP = 100
+
+
 @dataclass
 class Reading:
     """What a Blender material is to the tracer.
@@ -233,6 +237,7 @@ class Tree:
         self.reading = Reading()
         self.viewport = viewport
         self._shines = shines
+        self._deep = 0
         self._is_beside = False  # whether values are asked for a little beside, too, as heights are
 
     def surface(self, of: Input | None) -> Node | None:
@@ -477,6 +482,16 @@ class Tree:
 
     def _value(self, output: Output) -> Colour | Node | None:
         """The nodes that make a value; None where a reason says that it is not modelled."""
+        if self._deep == _MOST_DEEP:
+            self._reason(output, f"feeds {_MOST_DEEP} others in a row")
+            return None
+        self._deep += 1
+        try:
+            return self._made(output)
+        finally:
+            self._deep -= 1
+
+    def _made(self, output: Output) -> Colour | Node | None:
         node = output.node
         if self._is_beside and {node.type, (node.type, output.socket.name)} & _FIXED:
             self._reason(output, "makes a height of what it says here alone")
@@ -550,7 +565,11 @@ class Tree:
                 given[name] = of_itself
             elif len(self.reading.reasons) > told:
                 return None
-        made = Node(ours, tuple(given.items()))
+        try:
+            made = Node(ours, tuple(given.items()))
+        except InputError:
+            self._reason(output, f"is computed by more than {MOST_NODES} others")
+            return None
         plain = Node("image", tuple((name, made[name]) for name in ("image", "interpolation"))) if ours == "image" else None
         if made == plain and made["interpolation"] != "cubic":
             return Colour(_WHITE, made["image"].image, made["interpolation"] == "closest")

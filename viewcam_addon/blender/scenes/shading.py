@@ -18,7 +18,7 @@ def add_pictures(reading: shaders.Reading, alphas: set[str], to: dict[str, Pictu
     """Read the images of a material, or a light, that are not there yet. alphas : of which the alpha is asked for."""
     to |= reading.tables
     for key, image in reading.images.items():
-        if key not in to or (key in alphas and to[key].pixels.shape[2] < 4):
+        if key not in to or (key in alphas and to[key].shape[2] < 4):
             to[key] = images.picture_of(image, key in alphas)
 
 

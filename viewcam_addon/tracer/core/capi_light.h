@@ -32,15 +32,15 @@ typedef struct {
     int32_t factor_count;
 } ViewcamClosure;
 
-/* What an image's numbers are; whole ones are shares of 255 and 65535. */
-enum ViewcamTexel { VIEWCAM_FLOAT, VIEWCAM_HALF, VIEWCAM_BYTE, VIEWCAM_SHORT };
+/* What an image's numbers are; whole ones are shares of 255 and 65535. RGBE: four bytes a pixel, of three channels. */
+enum ViewcamTexel { VIEWCAM_FLOAT, VIEWCAM_HALF, VIEWCAM_BYTE, VIEWCAM_SHORT, VIEWCAM_RGBE };
 enum ViewcamFilter { VIEWCAM_BOX, VIEWCAM_BLACKMAN_HARRIS, VIEWCAM_GAUSSIAN };
 /* matrix: (3, 4), the lamp's space to the world's; a sun is seen towards its z. color: irradiance of a sun, power of others.
- * kind: its name, and the numbers that such a lamp has. is_met: whether rays run into it.
+ * kind: its name, and the numbers that such a lamp has. multiple_importance: whether rays run into it.
  * receivers: a bit of ViewcamObject's lit_by, or all. shadow_rays: of which kind, a bit of `visible`. */
 typedef struct {
     ViewcamNode kind;
-    int32_t casts_shadow, is_met;
+    int32_t casts_shadow, multiple_importance;
     uint32_t hidden_from;
     double matrix[12], color[3];
     uint64_t receivers;

@@ -76,7 +76,8 @@ inline void rows(const Scene& scene, uint32_t first, uint32_t end) {
 }
 inline void texture(int width, int height, int channels, int texel, const void* pixels) {
     that(width > 0 && height > 0 && pixels && (channels == 3 || channels == 4), "an image has no pixels");
-    that(texel >= VIEWCAM_FLOAT && texel <= VIEWCAM_SHORT, "an image has pixels of no kind");
+    that(channels == 3 || texel != VIEWCAM_RGBE, "an image of RGBE has an alpha");
+    that(texel >= VIEWCAM_FLOAT && texel <= VIEWCAM_RGBE, "an image has pixels of no kind");
 }
 inline void color(const Scene& scene, const ViewcamColor& given) {
     that(given.image < int64_t(scene.illumination.textures.size()), "a colour is that of an image that the scene does not have");

@@ -16,7 +16,7 @@ struct Lamp {
     LampOr<> kind;  // in rendering space
     Vec3 middle;
     Color emission{{1, 1, 1}};  // what its light is multiplied by, at each place of the lamp and in each direction
-    bool casts_shadow = true, is_met = true;
+    bool casts_shadow = true, multiple_importance = true;
     uint32_t hidden_from = 0;
     uint64_t receivers = EVERYTHING;    // which of the sets that objects are in it lights
     RayKind shadow_rays = SHADOW;  // of its own blockers, where it has such

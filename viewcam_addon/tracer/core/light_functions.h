@@ -51,7 +51,7 @@ inline Lamp lamp_of(const ViewcamLamp& given, Vec3 color, Vec3 origin) {
     for (int i = 0; i < 12; i++) placed.m[i / 4][i % 4] = given.matrix[i];
     placed.m[0][3] -= origin.x, placed.m[1][3] -= origin.y, placed.m[2][3] -= origin.z;
     Lamp lamp{of_name<LampOr<>>("lamp", given.kind.name, placed, color, inputs_of(given.kind, {})), placed.translation()};
-    lamp.casts_shadow = given.casts_shadow, lamp.is_met = given.is_met, lamp.hidden_from = given.hidden_from;
+    lamp.casts_shadow = given.casts_shadow, lamp.multiple_importance = given.multiple_importance, lamp.hidden_from = given.hidden_from;
     lamp.receivers = given.receivers, lamp.shadow_rays = RayKind(given.shadow_rays);
     return lamp;
 }

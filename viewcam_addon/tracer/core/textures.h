@@ -5,7 +5,7 @@
 // light and dark darker than half-way. Cycles has UV in float32: at 64 pixels, its colours are off by up to 2e-5 of the contrast.
 //
 // Rejected: decoding images when they are loaded (not what Cycles does, and up to twelve times the memory), and mip maps, which it
-// has not.
+// has not; floats rounded to eight bytes a pixel (docs/light.md).
 #pragma once
 #include <array>
 #include <bit>
@@ -36,8 +36,8 @@ struct Lookup {
 };
 
 // What a pixel's numbers are: floats, half floats, or whole numbers that are shares of the largest of their kind, rounded as Blender
-// and Cycles round them.
-enum class Texel { FLOAT, HALF, BYTE, SHORT };
+// and Cycles round them. RGBE: a byte for each colour and one for their exponent (Ward, Real Pixels, Graphics Gems II, 1991).
+enum class Texel { FLOAT, HALF, BYTE, SHORT, RGBE };
 
 // The number of a finite half float.
 inline float half_float(uint16_t bits) {
@@ -77,7 +77,7 @@ struct Texture {
             Vec3 sum;
             for (int row = first; row < last; row++) {
                 Vec3 of_row;
-                for (size_t i = place(left, row), end = place(right, row); i < end; i += size_t(channels)) of_row += color(i);
+                for (size_t i = place(left, row), end = place(right, row); i < end; i += stride()) of_row += color(i);
                 sum += of_row;
             }
             return sum / (double(right - left) * (last - first));
@@ -90,12 +90,15 @@ struct Texture {
 
    private:
     // Where a pixel's numbers begin.
-    size_t place(int column, int row) const { return size_t(channels) * (size_t(row) * size_t(width) + size_t(column)); }
+    size_t place(int column, int row) const { return stride() * (size_t(row) * size_t(width) + size_t(column)); }
+    size_t stride() const { return texel == Texel::RGBE ? 4 : size_t(channels); }
     // What is made of a function that reads the number of an index.
     template <class Value, class Use> Value read(Use&& use) const {
+        auto bytes = static_cast<const uint8_t*>(pixels);
         auto shorts = static_cast<const uint16_t*>(pixels);
         switch (texel) {
-            case Texel::BYTE: return use([bytes = static_cast<const uint8_t*>(pixels)](size_t i) { return BYTES[bytes[i]]; });
+            case Texel::BYTE: return use([bytes](size_t i) { return BYTES[bytes[i]]; });
+            case Texel::RGBE: return use([bytes](size_t i) { return bytes[i] * std::bit_cast<double>(uint64_t(bytes[i | 3] + 1023 - 136) << 52); });
             case Texel::SHORT: return use([shorts](size_t i) { return double(float(shorts[i]) * (1 / 65535.0f)); });
             case Texel::HALF: return use([shorts](size_t i) { return double(half_float(shorts[i])); });
             default: return use([floats = static_cast<const float*>(pixels)](size_t i) { return double(floats[i]); });

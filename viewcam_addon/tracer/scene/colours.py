@@ -25,7 +25,8 @@ def radiance(name: str, values: object) -> tuple[float, float, float]:
     return rgb
 
 
-TEXELS = tuple(map(np.dtype, (np.float32, np.float16, np.uint8, np.uint16)))
+RGBE = np.dtype(np.uint32)
+TEXELS = (*map(np.dtype, (np.float32, np.float16, np.uint8, np.uint16)), RGBE)
 """What the pixels of a `Picture` are made of, as the core counts it (capi_light.h)."""
 _ROWS = 1 << 20  # numbers that are looked at together: larger arrays would not stay in a processor's cache
 
@@ -36,6 +37,8 @@ class Picture:
 
     pixels : (height, width, 3), or 4 with an alpha, rows from the bottom; floats, half floats, or whole numbers of one byte or
         two, which are shares of 255 or 65535; anything else becomes float32. Encoded as sRGB where `srgb` is true, else linear.
+        Or (height, width, 1) of `RGBE`, as Radiance's files have it: from the lowest a byte of red, green, blue and exponent;
+        a colour is its byte times 2^(exponent − 136).
         Between pixels the encoded values are interpolated, as Cycles does; with an alpha, after they are multiplied by it.
         Linear ones are not multiplied. The tracer reads them where they are: don't write to them.
     """
@@ -44,11 +47,12 @@ class Picture:
     srgb: bool = False
 
     def __post_init__(self) -> None:
-        if self.pixels.ndim != 3 or self.pixels.shape[2] not in (3, 4) or not self.pixels.size:
-            raise InputError(f"an image has the shape {self.pixels.shape} and must have height × width × 3 or 4: check it")
         dtype = self.pixels.dtype.newbyteorder("=")
+        is_rgbe = dtype == RGBE and self.pixels.shape[-1:] == (1,)
+        if self.pixels.ndim != 3 or not (is_rgbe or self.pixels.shape[2] in (3, 4)) or not self.pixels.size:
+            raise InputError(f"an image has the shape {self.pixels.shape} and must have height × width × 3 or 4: check it")
         with np.errstate(over="ignore"):  # what is too large for float32 becomes infinite, and is refused here
-            pixels = np.ascontiguousarray(self.pixels, dtype if dtype in TEXELS else np.float32)
+            pixels = np.ascontiguousarray(self.pixels, dtype if is_rgbe or dtype in TEXELS[:-1] else np.float32)
         object.__setattr__(self, "pixels", pixels)
         ends = _ends(pixels)
         if not np.isfinite(ends).all():
@@ -67,15 +71,24 @@ class Picture:
         return cls(next(filter(lambda made: made is not None, (_exactly(values, dtype) for dtype in _SMALLEST_FIRST))), srgb)
 
     @property
+    def shape(self) -> tuple[int, int, int]:
+        """Height, width, and 3 channels or 4."""
+        height, width, channels = self.pixels.shape
+        return height, width, max(channels, 3)
+
+    @property
     def values(self) -> NDArray[np.float32]:
         """The pixels as float32: a share of 255 is rounded as Blender and Cycles round it."""
         return _values(self.pixels)
 
 
-_SMALLEST_FIRST = tuple(map(np.dtype, (np.uint8, np.uint16, np.float16, np.float32)))
+_SMALLEST_FIRST = (np.dtype(np.uint8), RGBE, *map(np.dtype, (np.uint16, np.float16, np.float32)))
 
 
 def _values(pixels: NDArray) -> NDArray[np.float32]:
+    if pixels.dtype == RGBE:
+        parts = pixels.view(np.uint8)
+        return np.ldexp(parts[..., :3].astype(np.float32), parts[..., 3:].astype(np.int32) - 136)
     values = pixels.astype(np.float32, copy=False)
     return values if pixels.dtype.kind == "f" else values * (np.float32(1) / np.float32(np.iinfo(pixels.dtype).max))
 
@@ -84,12 +97,19 @@ def _exactly(values: NDArray[np.float32], dtype: np.dtype) -> NDArray | None:
     """Values as pixels of another type, None where not all of them are what these stand for."""
     if dtype == values.dtype:
         return values
-    made = np.empty(values.shape, dtype)
+    if dtype == RGBE and values.shape[2] != 3:
+        return None
+    made = np.empty((*values.shape[:2], 1) if dtype == RGBE else values.shape, dtype)
     rows = max(1, _ROWS // values[0].size)
     for first in range(0, len(values), rows):
         some, part = values[first : first + rows], made[first : first + rows]
         with np.errstate(over="ignore", invalid="ignore"):
-            part[:] = some if dtype.kind == "f" else np.rint(some * np.float32(np.iinfo(dtype).max))
+            if dtype == RGBE:
+                largest = np.maximum(np.maximum(some[..., 0], some[..., 1]), some[..., 2])
+                parts, exponents = part.view(np.uint8), np.clip(np.frexp(largest)[1] + 128, 0, 255)
+                parts[..., :3], parts[..., 3] = np.ldexp(some, 136 - exponents[..., None]), exponents
+            else:
+                part[:] = some if dtype.kind == "f" else np.rint(some * np.float32(np.iinfo(dtype).max))
         if not np.array_equal(_values(part).view(np.int32), some.view(np.int32)):
             return None
     return made
@@ -97,6 +117,8 @@ def _exactly(values: NDArray[np.float32], dtype: np.dtype) -> NDArray | None:
 
 def _ends(pixels: NDArray) -> tuple[float, float]:
     """Numbers between which all are, without a copy of what may be gigabytes."""
+    if pixels.dtype == RGBE:
+        return 0.0, max(float(_values(row).max()) for row in pixels)
     if pixels.dtype.kind == "u":
         return 0.0, 1.0
     if pixels.dtype == np.float16:  # whose bits are compared several times as fast: of either sign they grow with the size

@@ -5,6 +5,7 @@ gathered at the end (the first wrong key usually explains the others).
 """
 
 import contextlib
+import json
 import math
 import os
 import zipfile
@@ -103,7 +104,7 @@ class Field:
             dtype = stored if stored in kept else dtype
         else:
             array = self._nested(len(shape))
-        if np.issubdtype(dtype, np.integer):
+        if np.issubdtype(dtype, np.integer) and dtype not in kept:
             if array.dtype.kind not in "iu" and array.size:
                 self.fail("holds numbers that are not whole: give whole ones")
             if array.size and not -_LARGEST_WHOLE <= array.min() <= array.max() <= _LARGEST_WHOLE:
@@ -260,4 +261,4 @@ def _is_number(value: object) -> bool:
 def _shown(value: object) -> str:
     if isinstance(value, list | dict):
         return "a list" if isinstance(value, list) else "an object"
-    return checks.shown(value) if value is not None else "null"
+    return json.dumps(value) if value is None or isinstance(value, bool) else checks.shown(value)

@@ -97,9 +97,10 @@ def _size(name: str, value: object) -> tuple[float, ...]:
 class Lamp:
     """What all lamps have. A kind declares where it is, how strong, and then the numbers that the core's lamp of its name has.
 
-    casts_shadow : whether objects can stand in its light. is_met : whether rays run into it, so that the eye, mirrors and glass
-    see it, where it has a size; else it only lights what is rough, as much as before. receivers : names of the objects that it
-    lights; blockers : of those that can stand in its light; None is all objects. The eye sees a lamp whatever it lights.
+    casts_shadow : whether objects can stand in its light. multiple_importance : whether rays run into it, so that the eye,
+    mirrors and glass see it, where it has a size; else it only lights what is rough, as much as before. receivers : names of
+    the objects that it lights; blockers : of those that can stand in its light; None is all objects. The eye sees a lamp
+    whatever it lights.
     emission : a node that makes what its light is multiplied by, at each place of the lamp and in each direction, or None; it
     is told the place there, in the world, the normal, the way that light goes, and how far that is.
     """
@@ -108,7 +109,7 @@ class Lamp:
     name: str
     hidden_from: frozenset[str] = values.value(frozenset(), _hidden, "names", "kind of ray")
     casts_shadow: bool = values.truth(True)
-    is_met: bool = values.truth(True)
+    multiple_importance: bool = values.truth(True)
     receivers: frozenset[str] | None = values.value(None, _linked, "names", "object's name")
     blockers: frozenset[str] | None = values.value(None, _linked, "names", "object's name")
     emission: Node | None = values.value(None, _emission, "node")

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from ...checks import shown
 from ...errors import InputError
 from . import Scene, lamps, placing, value_nodes
-from .colours import TEXELS
+from .colours import RGBE, TEXELS
 from .fields import Arrays, Field
 from .film import Bounces, Film
 from .geometry_fields import LARGEST_INLINE, array_document
 from .lamps import Lamp, World
 from .materials import Colour, Material, Picture
-from .shader_nodes import KINDS, Node
+from .shader_nodes import KINDS, MOST_DEEP, Node
 
 KEYS = ("images", "materials", "lamps", "world", "film", "bounces", "cycles")
 
@@ -131,7 +131,7 @@ def _colour_document(colour: Colour) -> list[float] | dict[str, Any]:
 def _picture(field: Field, arrays: Arrays) -> Picture:
     keys = field.fields(("pixels",), ("srgb",))
     pixels = keys["pixels"].array(arrays, np.float32, (None, None, None), kept=TEXELS)
-    if pixels.shape[2] not in (3, 4):
+    if pixels.shape[2] not in (3, 4) and pixels.dtype != RGBE:
         keys["pixels"].fail(f"has {pixels.shape[2]} numbers a pixel and must have 3 or 4: correct it")
     try:
         return Picture(pixels, keys["srgb"].truth() if "srgb" in keys else False)
@@ -155,7 +155,9 @@ def _material(field: Field) -> Material:
         field.hand_on(error)
 
 
-def _node(field: Field) -> Node:
+def _node(field: Field, deep: int = 1) -> Node:
+    if deep > MOST_DEEP:
+        raise InputError(f"{field.file}: more than {MOST_DEEP} nodes feed one another in a row: give fewer")
     kind = field.fields(("type",), others=True)["type"]
     if kind.text() not in KINDS:
         kind.fail(f"is {shown(kind.value)}: give one of {', '.join(KINDS)}")
@@ -163,17 +165,19 @@ def _node(field: Field) -> Node:
     keys = field.fields(("type",), tuple(known.inputs))
     try:
         given = (
-            (name, _node_input(keys[name], default, known.is_value)) for name, default in known.inputs.items() if name in keys
+            (name, _node_input(keys[name], default, known.is_value, deep))
+            for name, default in known.inputs.items()
+            if name in keys
         )
         return Node(kind.value, tuple(given))
     except InputError as error:
         field.hand_on(error)
 
 
-def _node_input(field: Field, default: object, of_value: bool) -> Any:
+def _node_input(field: Field, default: object, of_value: bool, deep: int) -> Any:
     is_node = isinstance(field.value, dict) and "type" in field.value
     if default is None or is_node:
-        return _node(field)
+        return _node(field, deep + 1)
     if isinstance(default, bool):
         return field.truth()
     if default is value_nodes.IMAGE:
@@ -187,7 +191,8 @@ def _node_input(field: Field, default: object, of_value: bool) -> Any:
 
 def _colour(field: Field) -> Colour:
     """Three numbers, or an object where an image or the mesh's own colours come in."""
-    keys = {"rgb": field} if isinstance(field.value, list) else field.fields((), ("rgb", "image", "closest", "vertex"))
+    is_varied = isinstance(field.value, dict)
+    keys = field.fields((), ("rgb", "image", "closest", "vertex")) if is_varied else {"rgb": field}
     try:
         return Colour(
             rgb=keys["rgb"].vector(3) if "rgb" in keys else _WHITE,

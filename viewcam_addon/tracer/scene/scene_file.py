@@ -163,7 +163,9 @@ def _parsed(path: Path) -> object:
         raise InputError(f"{path} can't be read ({error.strerror}): check the name of the scene file") from error
     except json.JSONDecodeError as error:
         raise InputError(f"{path.name}: line {error.lineno} is not JSON ({error.msg}): correct it") from error
-    except (UnicodeError, RecursionError) as error:
+    except RecursionError as error:
+        raise InputError(f"{path.name}: its JSON nests lists or objects too deep: give a scene file") from error
+    except UnicodeError as error:
         raise InputError(f"{path.name}: this is no JSON text: give a scene file") from error
 
 

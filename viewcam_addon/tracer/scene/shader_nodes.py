@@ -106,8 +106,12 @@ KINDS: dict[str, Kind] = {
     **{name: Kind(inputs, is_value=True) for name, inputs in value_nodes.KINDS.items()},
 }
 
+_NEEDED = {"image": "the name of one", "table": "the name of an image of one row", "text": "that of an IES file"}
+
 MOST_NODES = 500
 """Of a value: a tree that is larger is none that a hand has made, or one node in it feeds others again and again."""
+MOST_DEEP = 250
+"""Nodes that feed one another in a row: Python does not follow many hundreds."""
 
 
 @dataclass(frozen=True)
@@ -135,10 +139,9 @@ class Node:
                     f"a {what} {self.type!r} has no input {checks.shown(name)}: give one of {', '.join(known) or 'none'}"
                 )
             values[name] = _checked(f"{name} of a {what} {self.type!r}", value, known[name], self.is_value)
-        if "table" in known and "table" not in values:
-            raise InputError(f"a {what} {self.type!r} has no table: give the name of an image of one row")
-        if "text" in known and "text" not in values:
-            raise InputError(f"a {what} {self.type!r} has no text: give that of an IES file")
+        for name, wanted in _NEEDED.items():
+            if name in known and name not in values:
+                raise InputError(f"a {what} {self.type!r} has no {name}: give {wanted}")
         ordered = ((name, values[name]) for name in known if name in values and values[name] != self._default(name))
         object.__setattr__(self, "inputs", tuple(ordered))
         size = 1 + sum(value.size for _, value in self.inputs if isinstance(value, Node) and value.is_value)

@@ -399,7 +399,7 @@ class PathIntegrator {
         bool behind = !(dot(point.normal, sample.direction) > 0);
         auto weight = [&](RayKind kind, auto&& pdf) {
             bool is_lost = behind != (kind == TRANSMISSION);
-            return (is_lost && choice.light->is_met) || choice.light->is_found_by(kind) ? power_heuristic(sample.pdf * choice.chance, pdf()) : 1;
+            return (is_lost && choice.light->multiple_importance) || choice.light->is_found_by(kind) ? power_heuristic(sample.pdf * choice.chance, pdf()) : 1;
         };
         ScatteredLight light = bsdf.eval(sample.direction, ~choice.light->hidden_from, weight);
         if (depth > 1) light.diffuse += light.other, light.other = {};

@@ -107,7 +107,7 @@ class Point {
     }
 
     // Whether a ray runs into the light. leaves: from inside, `only_outside` forbids what lies behind the middle.
-    bool is_met(const LightRay& ray, bool only_ahead, double& distance) const {
+    bool intersect(const LightRay& ray, bool only_ahead, double& distance) const {
         Vec3 way = center_ - ray.origin;
         double along = dot(way, ray.direction), squared = dot(way, way);
         if (soft_) {
@@ -122,7 +122,7 @@ class Point {
         }
         return distance > ray.nearest && distance < ray.farthest;
     }
-    Vec3 le(const LightRay& ray, double& distance) const { return radius_ > 0 && is_met(ray, false, distance) ? radiance_ : Vec3{}; }
+    Vec3 le(const LightRay& ray, double& distance) const { return radius_ > 0 && intersect(ray, false, distance) ? radiance_ : Vec3{}; }
     Vec3 normal(Vec3 place, Vec3 ahead) const {
         if (soft_ || radius_ == 0) return -ahead;
         Vec3 outward = normalize(place - center_);
@@ -186,7 +186,7 @@ class Spot {
     }
 
     Vec3 le(const LightRay& ray, double& distance) const {
-        if (!is_sized() || !point_.is_met(ray, true, distance)) return {};
+        if (!is_sized() || !point_.intersect(ray, true, distance)) return {};
         return point_.is_around(ray.origin) ? point_.radiance() : point_.radiance() * attenuation(ray.direction);
     }
 

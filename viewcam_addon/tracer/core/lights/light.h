@@ -19,7 +19,7 @@ class Light {
 
     uint32_t hidden_from;
     bool casts_shadow;
-    bool is_met = true;  // whether rays run into it, where it has a size
+    bool multiple_importance = true;  // whether rays run into it, where it has a size
     uint64_t receivers;
     RayKind shadow_rays;
 
@@ -96,7 +96,7 @@ class Light {
     const MeshLight* mesh() const { return std::get_if<MeshLight>(&kind_); }
     bool is_environment() const { return std::holds_alternative<EnvironmentLight>(kind_); }
     // Whether rays of a kind that are scattered all over find it, too: diffuse ones see no lamps.
-    bool is_found_by(RayKind kind) const { return mesh() || is_environment() || (kind != DIFFUSE && is_sized() && is_met); }
+    bool is_found_by(RayKind kind) const { return mesh() || is_environment() || (kind != DIFFUSE && is_sized() && multiple_importance); }
 
     // Lets nodes change what a lamp gives, at each place of it and in each direction.
     void shine_by(const Color& emission, Vec3 middle, const Scene* scene) { emission_ = emission, middle_ = middle, scene_ = scene; }
@@ -126,7 +126,7 @@ class Light {
 inline Light light_of(const Lamp& lamp, const Scene* scene = nullptr) {
     auto kind = std::visit([](const auto& one) -> Light::Kind { return one; }, lamp.kind);
     Light light(kind, lamp.hidden_from, lamp.casts_shadow, lamp.receivers, lamp.shadow_rays);
-    light.is_met = lamp.is_met;
+    light.multiple_importance = lamp.multiple_importance;
     if (scene) light.shine_by(lamp.emission, lamp.middle, scene);
     return light;
 }

@@ -64,7 +64,7 @@ class LightSampler {
         size_t meshes = lights_.size();
         lights_.insert(lights_.end(), unlit.begin(), unlit.end());
         for (size_t i = 0; i < lights_.size(); i++)
-            if ((i < lamps_ || i >= meshes) && i != sky_ && lights_[i].is_sized() && lights_[i].is_met)
+            if ((i < lamps_ || i >= meshes) && i != sky_ && lights_[i].is_sized() && lights_[i].multiple_importance)
                 (lights_[i].bounds() ? placed_ : boundless_).push_back(uint32_t(i)),
                     met_by_ |= (CAMERA | GLOSSY | TRANSMISSION) & ~lights_[i].hidden_from, shadow_linked_ |= lights_[i].shadow_rays != SHADOW;
         hierarchy_ = build_bvh(placed_.size(), [&](size_t i) { return lights_[placed_[i]].bounds()->box; }, 1, 1);
