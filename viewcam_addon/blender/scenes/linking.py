@@ -40,10 +40,10 @@ class Links:
                 if is_instance:
                     self._instances |= {placed.name, placed.parent.original.name}
 
-    def of(self, placed: Placed, ledger: Ledger, is_met: bool) -> tuple[_Names, _Names]:
+    def of(self, placed: Placed, ledger: Ledger, is_found: bool) -> tuple[_Names, _Names]:
         """The names of a light's receivers and of its blockers, whether or not they are surfaces; None is all.
 
-        is_met : whether scattered rays run into it.
+        is_found : whether scattered rays run into it.
         """
         block = placed.real.original
         if not is_linked(block):
@@ -52,7 +52,7 @@ class Links:
         if any(each and not self._instances.isdisjoint(shown.name for shown in each.all_objects) for each in collections):
             ledger.note(placed.name, "approximated", "is linked to instances, which count as the objects that they show")
         (receivers, _), (blockers, excluded) = (self._named(each) if each else (None, True) for each in collections)
-        if is_met and blockers is not None:
+        if is_found and blockers is not None:
             others = set(self._objects) - blockers
             if self._shadowless & blockers if excluded else others:
                 reason = "has blockers, and Cycles would lose light behind others: it is given a collection that excludes these"
