@@ -158,7 +158,7 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
             geometry = _geometry(source, ledger, shading)
             names[source.key] = _free_name(source.data.name, geometries)
             geometries[names[source.key]] = geometry
-        materials = shading.names(source.slots, isinstance(source.data, bpy.types.PointCloud)) if shading else ()
+        materials = shading.names(source.slots) if shading else ()
         placed = (source.object_index, source.materials, materials, source.hidden_from, source.color, random)
         matrix = matrices if len(matrices) > 1 else matrices[0]
         objects.append(Object(source.name, names[source.key], matrix, *placed))
@@ -326,9 +326,9 @@ def _source(placed: features.Placed, depsgraph: bpy.types.Depsgraph, ledger: Led
 def _geometry(source: Surface, ledger: Ledger, shading: Shading | None) -> Mesh | Spheres:
     if not isinstance(source.data, bpy.types.Mesh):
         return export_geometry.spheres_of(source.data)
-    colours = shading.vertex_colours(source.slots) if shading else None
+    has_colours = shading is not None and shading.asks_for_colours(source.slots)
     attributes = shading.attributes(source.slots) if shading else ()
-    mesh = export_geometry.mesh_of(source.data, len(source.materials), colours, attributes)
+    mesh = export_geometry.mesh_of(source.data, len(source.materials), has_colours, attributes)
     if nowhere := len(source.data.loop_triangles) - len(mesh.triangles):
         ledger.note(
             source.name, "exported", f"{nowhere} triangles have vertices that are not finite, and Cycles draws none of them"

@@ -121,7 +121,7 @@ def note_object(
     if adaptive:
         ledger.note(name, "approximated", "adaptive subdivision is subdivision at the render level on both sides")
         ledger.set_for_cycles(*adaptive, False)
-    if versions.DEFAULT_SURFACE_BENDS_NORMALS and _shows_empty_slot(shown.data, slots):
+    if not shading and versions.DEFAULT_SURFACE_BENDS_NORMALS and _shows_empty_slot(shown.data, slots):
         ledger.call_for_cycles(real.original, materials.fill_empty_slots)
         if any(modifier.type == "NODES" and modifier.show_render for modifier in real.modifiers):
             ledger.note(name, "approximated", "has no material, and Cycles may bend its normals where they graze")
@@ -164,9 +164,6 @@ def _note_light(placed: Placed, slots: list[bpy.types.Material | None], ledger: 
             ledger.note(
                 placed.name, "approximated", f"is a point cloud, of which the attribute {asked!r} does not come along: 0"
             )
-    readings = [shading.reading(material) for material in filter(None, slots)]
-    if len({reading.vertex for reading in readings} - {None}) > 1:
-        ledger.note(placed.name, "approximated", "shows two colour attributes, and only the first comes along")
     note_linking(placed, ledger)
     for each in (real.original, parent.original):
         for owner, name in versions.shadow_terminator(each):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...tracer.scene import Mesh, Spheres
 from .. import datablocks, versions
 from ..temporary_settings import Overrides, overridden
-from .export_geometry import GENERATED
+from .export_geometry import GENERATED, VERTEX_COLOR
 from .ledger import Ledger
 
 Array = NDArray[np.generic]
@@ -41,17 +41,16 @@ def mesh_from(made: Mesh, name: str, overrides: Overrides, ledger: Ledger) -> bp
     mesh.polygons.foreach_set("use_smooth", np.full(len(corners) // 3, made.corner_normals is not None))
     mesh.update(calc_edges=True)
     for attribute, values in made.attributes.items():
-        if attribute != GENERATED:  # Cycles makes it itself
+        if attribute not in (GENERATED, VERTEX_COLOR):  # Cycles makes the one itself, and the other is among the colours
             kind, field = _ATTRIBUTES[values.shape[2]]
             mesh.attributes.new(attribute, kind, "CORNER").data.foreach_set(field, values[drawn].ravel())
     if made.corner_uvs is not None:
         layer = mesh.uv_layers.new(name=UV_MAP, do_init=False)
         layer.uv.foreach_set("vector", made.corner_uvs[drawn].ravel())
         layer.active_render = True
-    if made.corner_colours is not None:
-        colours = np.concatenate([made.corner_colours[drawn], np.ones((len(corners) // 3, 3, 1), np.float32)], axis=2)
+    if (colours := _colours(made)) is not None:
         attributes = mesh.color_attributes
-        attributes.new(COLOURS, "FLOAT_COLOR", "CORNER").data.foreach_set("color", colours.ravel())
+        attributes.new(COLOURS, "FLOAT_COLOR", "CORNER").data.foreach_set("color", colours[drawn].ravel())
         attributes.render_color_index = len(attributes) - 1
     if made.corner_normals is not None and len(corners):
         off = _set_normals(mesh, made.corner_normals[drawn].reshape(-1, 3))
@@ -61,6 +60,18 @@ def mesh_from(made: Mesh, name: str, overrides: Overrides, ledger: Ledger) -> bp
             )
             ledger.note(name, "approximated", reason)
     return mesh
+
+
+def _colours(made: Mesh) -> Array | None:
+    """(triangles, 3, 4) float32: the mesh's colours, with the alpha of the attribute that Cycles calls as these, or None."""
+    found = made.attributes.get(VERTEX_COLOR)
+    if made.corner_colours is None and found is None:
+        return None
+    colours = np.ones((len(made.triangles), 3, 4), np.float32)
+    for known in (found, made.corner_colours):
+        if known is not None:
+            colours[:, :, : known.shape[2]] = known
+    return colours
 
 
 def _set_normals(mesh: bpy.types.Mesh, normals: Array) -> float:

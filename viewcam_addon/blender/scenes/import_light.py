@@ -101,7 +101,7 @@ def paint(
     material.use_transparent_shadow = made.transparent_shadow
     adder = nodes.Adder(tree)
     output = adder.add("ShaderNodeOutputMaterial")
-    materials.add_surface(adder, output, shaders.Reading(made, shown, "", texts=texts or {}))
+    materials.add_surface(adder, output, shaders.Reading(made, shown, texts=texts or {}))
     _arrange(output, 0, {})
     colour = next((colour for _, colour in made.inputs), None)
     if colour:

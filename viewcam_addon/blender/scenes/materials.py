@@ -199,9 +199,7 @@ def _colour(
         texture.interpolation = "Closest" if colour.closest else "Linear"
         factors.append(texture.outputs["Color"])
     if colour.vertex:
-        attribute = adder.add("ShaderNodeVertexColor")
-        attribute.layer_name = reading.vertex
-        factors.append(attribute.outputs["Color"])
+        factors.append(adder.add("ShaderNodeVertexColor").outputs["Color"])
     product = factors[0]
     for other in factors[1:]:
         product = _times(adder, product, other).outputs[0]

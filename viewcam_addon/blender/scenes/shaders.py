@@ -114,14 +114,12 @@ def word_of(ours: str) -> str:
 class Reading:
     """What a Blender material is to the tracer.
 
-    images : key in `Colour.image` → the image. vertex : the colour attribute that `Colour.vertex` stands for ("" is the one
-    that is active for rendering), or None. texts : of IES files, where nodes are made that show them.
+    images : key in `Colour.image` → the image. texts : of IES files, where nodes are made that show them.
     reasons : why it is approximated, one clause each, about the material.
     """
 
     material: Material = PLAIN
     images: dict[str, bpy.types.Image] = field(default_factory=dict)
-    vertex: str | None = None
     alphas: set[str] = field(default_factory=set)
     tables: dict[str, Picture] = field(default_factory=dict)
     texts: dict[str, bpy.types.Text] = field(default_factory=dict)
@@ -243,8 +241,8 @@ class Tree:
         node = source.node
         if node.type == "TEX_IMAGE" and source.socket.name == "Color":
             return self._image(source)
-        if node.type == "VERTEX_COLOR" and source.socket.name == "Color" and self._is_first(node.layer_name):
-            return self._vertex(source)
+        if _is_vertex_colour(source):
+            return Colour(_WHITE, vertex=True)
         if node.type == "VECT_MATH" and node.operation == "MULTIPLY":
             return self._product(source)
         self._reason(source, "is not modelled")
@@ -297,14 +295,6 @@ class Tree:
         if vector.node.type == "UVMAP" and not vector.node.from_instancer:
             return not vector.node.uv_map
         return vector.node.type == "TEX_COORD" and vector.socket.name == "UV" and not vector.node.from_instancer
-
-    def _is_first(self, name: str) -> bool:
-        """Whether a colour attribute is the one that `Colour.vertex` stands for; others are attributes like any."""
-        return self.reading.vertex in (None, name)
-
-    def _vertex(self, output: Output) -> Colour:
-        self.reading.vertex = output.node.layer_name
-        return Colour(_WHITE, vertex=True)
 
     def _want(self, output: Output, name: str, wanted: float) -> bool:
         """Whether an input has this value, or is none in this version; a reason is noted where it has another."""
@@ -414,8 +404,8 @@ class Tree:
         if self._is_beside and {node.type, (node.type, output.socket.name)} & _FIXED:
             self._reason(output, "makes a height of what it says here alone")
             return None
-        if node.type == "VERTEX_COLOR" and output.socket.name == "Color" and self._is_first(node.layer_name):
-            return self._vertex(output)
+        if _is_vertex_colour(output):
+            return Colour(_WHITE, vertex=True)
         if node.type == "UVMAP" and self._is_uv(output):
             return Node("texture_coordinate")
         if node.type == "TEX_COORD" and output.socket.name == "Object" and node.object is not None:
@@ -509,8 +499,6 @@ class Tree:
             return "has a Filter Width that varies"
         if ours == "light_path" and self._shines and output.socket.identifier not in _SURE_OF_PATHS:
             return f"says the {output.socket.name} of light"
-        if ours == "attribute" and node.type == "VERTEX_COLOR" and not node.layer_name:
-            return "has an attribute without a name"
         return None
 
     def _of_itself(self, output: Output, known: object) -> Node | None:
@@ -587,6 +575,11 @@ def _is_zero(output: Output, name: str) -> bool:
     if name == "Specular IOR Level" and constant_number(output, "IOR") == 1.0:
         return True
     return constant_number(output, name) == 0.0
+
+
+def _is_vertex_colour(output: Output) -> bool:
+    """Whether an output is the mesh's colour that is active for rendering, as `Colour.vertex` is; others are attributes."""
+    return output.node.type == "VERTEX_COLOR" and output.socket.name == "Color" and not output.node.layer_name
 
 
 def _along_normal(vector: Colour | Node) -> Node:
