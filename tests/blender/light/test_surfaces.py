@@ -207,18 +207,69 @@ def test_materials_of_one_mesh_show_its_colours_of_any_name_with_their_alphas(pi
     assert not told(sides) and len(np.unique(sides[0].cycles[0]["Diffuse Color"])) > 300
 
 
+GIVEN = (0.25, 0.5, 0.75, 1)
+ODD_TREES = {
+    "a volume beside": ("add", "ShaderNodeVolumeAbsorption", None),
+    "a volume in a mixture": ("mix", "ShaderNodeVolumePrincipled", None),
+    "a shader of EEVEE": ("mix", "ShaderNodeEeveeSpecular", None),
+    "a background": ("mix", "ShaderNodeBackground", None),
+    "a colour in place of a shader": ("mix", "ShaderNodeGamma", None),
+    "a number in place of a shader": ("mix", "ShaderNodeNewGeometry", "Backfacing"),
+    "a shader as a colour": ("colour", "ShaderNodeBsdfDiffuse", None),
+    "a shader as a colour, by EEVEE": ("colour", "ShaderNodeShaderToRGB", None),
+}
+
+
+@pytest.mark.parametrize("odd", ODD_TREES)
+def test_what_cycles_makes_of_odd_nodes(pictures, floor, odd):
+    """Of what it can't use, nothing; of a colour in place of a shader, light."""
+    how, kind, output = ODD_TREES[odd]
+    tree, shader = floor.node_tree, floor.node_tree.nodes["Shader"]
+    node = tree.nodes.new(kind)
+    if "Color" in node.inputs:
+        node.inputs["Color"].default_value = GIVEN
+    made = node.outputs[output or 0]
+    if how == "colour":
+        if kind == "ShaderNodeShaderToRGB":
+            tree.links.new(tree.nodes.new("ShaderNodeBsdfDiffuse").outputs[0], node.inputs[0])
+        mixed = tree.nodes.new("ShaderNodeGamma")
+        mixed.inputs["Color"].default_value = GIVEN
+        tree.links.new(made, mixed.inputs["Color"])
+        tree.links.new(mixed.outputs[0], shader.inputs["Color"])
+    else:
+        mixed = tree.nodes.new(f"ShaderNode{how.title()}Shader")
+        first, second = [socket for socket in mixed.inputs if socket.type == "SHADER"]
+        tree.links.new(shader.outputs[0], first)
+        tree.links.new(made, second)
+        tree.links.new(mixed.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+    sides = pictures(scenes=1)
+    assert not told(sides)
+    for name in ("Diffuse Color", "Emission"):
+        theirs = sides[0].cycles[0][name]
+        assert np.abs(sides[0].traced[name] - theirs).max() <= FLAT
+    shines = how == "mix" and kind in ("ShaderNodeBackground", "ShaderNodeGamma", "ShaderNodeNewGeometry")
+    assert sides[0].cycles[0]["Emission"].any() == (shines and output is None)
+
+
 def test_links_that_go_in_a_circle_are_none_as_in_cycles(pictures, floor):
-    tree = floor.node_tree
-    first, second = (tree.nodes.new("ShaderNodeMath") for _ in range(2))
-    for node, number in ((first, 0.25), (second, 0.5)):
-        node.inputs[0].default_value, node.inputs[1].default_value = number, 0.125
-    tree.links.new(first.outputs[0], second.inputs[0])
-    tree.links.new(second.outputs[0], tree.nodes["Shader"].inputs["Color"])
-    tree.links.new(second.outputs[0], first.inputs[0])
+    lamp = bpy.data.lights[0]
+    lamp.use_nodes = True
+    trees = floor.node_tree, lamp.node_tree
+    before = [len(tree.links) for tree in trees]
+    for tree, kind, name in zip(trees, ("BSDF_DIFFUSE", "EMISSION"), ("Color", "Strength"), strict=True):
+        first, second = (tree.nodes.new("ShaderNodeMath") for _ in range(2))
+        for node, number in ((first, 0.25), (second, 0.5)):
+            node.inputs[0].default_value, node.inputs[1].default_value = number, 0.125
+        tree.links.new(first.outputs[0], second.inputs[0])
+        shader = next(node for node in tree.nodes if node.type == kind)
+        tree.links.new(second.outputs[0], shader.inputs[name])
+        tree.links.new(second.outputs[0], first.inputs[0])
     sides = pictures(scenes=1)
     check(sides, FLAT)
-    assert ("invalid links" in told(sides).get("Floor", "")) == versions.CIRCLES_ARE_BLACK
-    assert sorted(link.is_valid for link in tree.links) == [False, True, True, True]
+    for name in ("Floor", "Lamp"):
+        assert ("go in a circle" in told(sides).get(name, "")) == versions.CIRCLES_ARE_BLACK
+    for tree, links in zip(trees, before, strict=True):
+        assert sorted(link.is_valid for link in tree.links) == [False, *[True] * (links + 2)]
 
 
 def toon(material):

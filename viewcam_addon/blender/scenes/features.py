@@ -133,11 +133,7 @@ def note_object(
             reading = shading.reading(material)
             reasons += reading.reasons
             tree = versions.node_tree(material)
-            if versions.CIRCLES_ARE_BLACK and tree and nodes.invalid_links(tree):
-                ledger.note(
-                    name, "approximated", f"material {material.name!r} has invalid links, which are left out on both sides"
-                )
-                ledger.call_for_cycles(material.original, materials.cut_invalid_links)
+            nodes.leave_out_circles(tree, ledger, name, f"material {material.name!r} has")
             for missing in images.missing(tree):
                 ledger.note(name, "exported", f"material {material.name!r} {missing}")
             if reading.mixes_refractions:  # Cycles weighs directions that no facet refracts into as if it sampled them

@@ -226,14 +226,6 @@ def keep_normals(overrides: Overrides, material: bpy.types.Material) -> None:
     overrides.set(material.cycles, "use_bump_map_correction", False)
 
 
-def cut_invalid_links(overrides: Overrides, material: bpy.types.Material) -> None:
-    """Take them out of a material's trees until the overrides end: muting them changes nothing."""
-    for link in nodes.invalid_links(material.node_tree):
-        tree, ends = link.id_data, (link.from_socket, link.to_socket)
-        tree.links.remove(link)
-        overrides.afterwards(tree.links.new, *ends)
-
-
 def fill_empty_slots(overrides: Overrides, block: bpy.types.Object) -> None:
     """Give an object a material where it has none, until the overrides end: Cycles' own default bends normals."""
     material = overrides.shared(plain)  # to remove a material, Blender looks at all that could use it

@@ -101,6 +101,9 @@ def _shader(ours: str) -> Shader:
 
 
 SHADERS = {ours: _shader(ours) for ours, kind in KINDS.items() if not kind.is_value}
+# What Cycles takes for another shader on a surface, and for none.
+_AS = {"BACKGROUND": "EMISSION"}
+_VOLUMES = ("VOLUME_ABSORPTION", "VOLUME_SCATTER", "VOLUME_COEFFICIENTS", "PRINCIPLED_VOLUME")
 # Blender's words, where they are others than ours in capitals.
 _WORDS = {"multiscatter_ggx": "MULTI_GGX"}
 
@@ -198,9 +201,12 @@ class Tree:
     def surface(self, of: Input | None) -> Node | None:
         """The tracer's node, or None where there is no surface."""
         source = of and nodes.source(of)
-        if not isinstance(source, Output):
+        if not isinstance(source, Output) or source.node.type in _VOLUMES:
             return None
-        found = next(((ours, shader) for ours, shader in SHADERS.items() if shader.kind == source.node.type), None)
+        if source.socket.type != "SHADER":
+            return Node("emission", (("color", self._shown(of)),))
+        kind = _AS.get(source.node.type, source.node.type)
+        found = next(((ours, shader) for ours, shader in SHADERS.items() if shader.kind == kind), None)
         if found is None:
             self._reason(source, "is not modelled")
             name = next((name for name in ("Base Color", "Color") if name in source.node.inputs), None)
@@ -230,6 +236,11 @@ class Tree:
             ):
                 given[name] = self.surface(source.input(shader.inputs[name]))
         return Node(ours, tuple((given | self._words(source, ours)).items()))
+
+    def _shown(self, of: Input) -> Colour | Node:
+        """What a surface shines with whose shader is a colour or a number."""
+        made = self._value_input(of, None)
+        return made if isinstance(made, Colour | Node) else Colour(made) if made and possible(made) else self.viewport
 
     def _colour(self, output: Output, name: str | int) -> Colour:
         rgb = constant_colour(output, name)
