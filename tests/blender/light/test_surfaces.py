@@ -207,6 +207,16 @@ def test_materials_of_one_mesh_show_its_colours_of_any_name_with_their_alphas(pi
     assert not told(sides) and len(np.unique(sides[0].cycles[0]["Diffuse Color"])) > 300
 
 
+@pytest.mark.parametrize("extension", ["REPEAT", "EXTEND", "CLIP"])
+def test_an_image_that_is_missing_is_magenta_and_a_plain_surface_where_it_is_clipped(pictures, floor, extension, tmp_path):
+    missing = bpy.data.images.new("Gone", 4, 4)
+    missing.source, missing.filepath = "FILE", str(tmp_path / "gone.png")
+    texture(floor, missing, "Linear").extension = extension
+    sides = pictures(scenes=1)
+    check(sides, FLAT)
+    assert bool(told(sides)) == (extension == "CLIP")
+
+
 GIVEN = (0.25, 0.5, 0.75, 1)
 ODD_TREES = {
     "a volume beside": ("add", "ShaderNodeVolumeAbsorption", None),
