@@ -24,7 +24,7 @@ CYCLES_KEEPS_FLAT_FACES = bpy.app.version < (5, 1)
 # Whether meshes can keep custom normals as they are given; before, as two angles of 16 bits. Measured: 4.2, 4.5, 5.0 and 5.2.
 MESHES_KEEP_NORMALS = bpy.app.version >= (4, 5)
 
-# Whether a material whose links go in a circle is black; before, Cycles left invalid links out. Measured: 4.2, 5.0 and 5.2.
+# Whether nodes whose links go in a circle are black; before, Cycles left these links out. Measured: 4.2, 5.0 and 5.2.
 CIRCLES_ARE_BLACK = bpy.app.version >= (5, 0)
 
 

@@ -12,7 +12,7 @@ from viewcam_addon.blender.scenes import materials
 # Of the light that the brightest texture reflects. A cosine's rounding is 2e-7 at the 99th percentile (test_delta_lights.py); a
 # texture adds what its UV is off: 1e-5 of the picture's width at most, in textures of a few pixels.
 FLAT, TEXTURED = 4e-7, 1e-4
-# Cycles has points as float32, and looks up how much they reflect in a table.
+# Cycles has points as float32, and looks up how much its default surface reflects in a table.
 POINTS = 1e-4
 # What 5.2 rounds the bytes of corners to, once decoded: it is off by as much as half floats are (they pass exactly before).
 HALF = 2.0**-12
@@ -76,13 +76,35 @@ def test_a_principled_surface_without_gloss(pictures, make_material):
     assert not told(sides)
 
 
-def test_no_material_is_a_plain_one(pictures):
+def is_gloss(colours):
+    """Whether what scatters diffusely is another share at each angle; the plain material scatters the same everywhere."""
+    return len(np.unique(colours[..., 0])) > 100
+
+
+@pytest.mark.parametrize("slots", [0, 1, 2])
+def test_no_material_is_cycles_own_default(pictures, slots):
     for name in ("Monkey", "Floor"):
-        bpy.data.objects[name].data.materials.clear()
+        mesh = bpy.data.objects[name].data
+        made = mesh.materials[0]
+        mesh.materials.clear()
+        for material in (None, made)[:slots]:
+            mesh.materials.append(material)
+        for face in mesh.polygons[: slots // 2 * len(mesh.polygons) // 2]:
+            face.material_index = 1
+    before = [len(bpy.data.objects[name].material_slots) for name in ("Monkey", "Floor")]
     sides = pictures(scenes=2)
-    check(sides, FLAT)
-    assert not told(sides)
-    assert np.unique(sides[0].traced["Diffuse Color"]).tolist() == pytest.approx([0, 0.8])
+    check(sides, POINTS)
+    assert not told(sides) and before == [len(bpy.data.objects[name].material_slots) for name in ("Monkey", "Floor")]
+    assert is_gloss(sides[0].traced["Diffuse Color"]) == (bpy.app.version >= (5, 0))
+
+
+def test_what_geometry_nodes_make_without_a_material_is_it_too(pictures, node_group):
+    tree, _, end = node_group("Cube")
+    tree.links.new(tree.nodes.new("GeometryNodeMeshCube").outputs[0], end.inputs[0])
+    bpy.data.objects["Monkey"].modifiers.new("Cube", "NODES").node_group = tree
+    sides = pictures(scenes=2)
+    check(sides, POINTS)
+    assert not told(sides) and is_gloss(sides[0].traced["Diffuse Color"]) == (bpy.app.version >= (5, 0))
 
 
 def test_points_that_no_material_came_along_with_are_cycles_own_default(pictures, node_group):
@@ -95,8 +117,7 @@ def test_points_that_no_material_came_along_with_are_cycles_own_default(pictures
     sides = pictures(scenes=1)
     check(sides, POINTS)
     assert not told(sides)
-    shown = sides[0].traced["Diffuse Color"][..., 0]
-    assert (len(np.unique(shown)) > 100) == (bpy.app.version >= (5, 0))  # since then some light is reflected, by the angle
+    assert is_gloss(sides[0].traced["Diffuse Color"]) == (bpy.app.version >= (5, 0))
 
 
 @pytest.mark.parametrize("interpolation", ["Linear", "Closest"])
@@ -160,18 +181,105 @@ def test_colours_of_the_mesh(pictures, floor, domain, kind, name):
     assert not told(sides) and len(np.unique(sides[0].cycles[0]["Diffuse Color"])) > 1000
 
 
-def test_links_that_go_in_a_circle_are_none_as_in_cycles(pictures, floor):
-    tree = floor.node_tree
-    first, second = (tree.nodes.new("ShaderNodeMath") for _ in range(2))
-    for node, number in ((first, 0.25), (second, 0.5)):
-        node.inputs[0].default_value, node.inputs[1].default_value = number, 0.125
-    tree.links.new(first.outputs[0], second.inputs[0])
-    tree.links.new(second.outputs[0], tree.nodes["Shader"].inputs["Color"])
-    tree.links.new(second.outputs[0], first.inputs[0])
+def test_materials_of_one_mesh_show_its_colours_of_any_name_with_their_alphas(pictures, floor):
+    mesh = bpy.data.objects["Monkey"].data
+    for seed, name in enumerate(("Paint", "Tint", "Shown")):
+        attribute = mesh.color_attributes.new(name, "FLOAT_COLOR", "POINT")
+        attribute.data.foreach_set("color", np.random.default_rng(seed).random(4 * len(attribute.data), np.float32))
+    mesh.color_attributes.render_color_index = mesh.color_attributes.find("Shown")
+    mesh.materials.clear()
+    for colour, alpha in (("Paint", "Tint"), ("Tint", ""), ("", "Paint")):
+        material = floor.copy()
+        mesh.materials.append(material)
+        tree, shader = material.node_tree, material.node_tree.nodes["Shader"]
+        mix, plain = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeBsdfDiffuse")
+        for name, output, socket in ((colour, "Color", shader.inputs["Color"]), (alpha, "Alpha", mix.inputs[0])):
+            node = tree.nodes.new("ShaderNodeVertexColor")
+            node.layer_name = name
+            tree.links.new(node.outputs[output], socket)
+        tree.links.new(plain.outputs[0], mix.inputs[1])
+        tree.links.new(shader.outputs[0], mix.inputs[2])
+        tree.links.new(mix.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+    for number, face in enumerate(mesh.polygons):
+        face.material_index = number % 3
+    sides = pictures(scenes=2)
+    check(sides, TEXTURED)
+    assert not told(sides) and len(np.unique(sides[0].cycles[0]["Diffuse Color"])) > 300
+
+
+@pytest.mark.parametrize("extension", ["REPEAT", "EXTEND", "CLIP"])
+def test_an_image_that_is_missing_is_magenta_and_a_plain_surface_where_it_is_clipped(pictures, floor, extension, tmp_path):
+    missing = bpy.data.images.new("Gone", 4, 4)
+    missing.source, missing.filepath = "FILE", str(tmp_path / "gone.png")
+    texture(floor, missing, "Linear").extension = extension
     sides = pictures(scenes=1)
     check(sides, FLAT)
-    assert ("invalid links" in told(sides).get("Floor", "")) == versions.CIRCLES_ARE_BLACK
-    assert sorted(link.is_valid for link in tree.links) == [False, True, True, True]
+    assert bool(told(sides)) == (extension == "CLIP")
+
+
+GIVEN = (0.25, 0.5, 0.75, 1)
+ODD_TREES = {
+    "a volume beside": ("add", "ShaderNodeVolumeAbsorption", None),
+    "a volume in a mixture": ("mix", "ShaderNodeVolumePrincipled", None),
+    "a shader of EEVEE": ("mix", "ShaderNodeEeveeSpecular", None),
+    "a background": ("mix", "ShaderNodeBackground", None),
+    "a colour in place of a shader": ("mix", "ShaderNodeGamma", None),
+    "a number in place of a shader": ("mix", "ShaderNodeNewGeometry", "Backfacing"),
+    "a shader as a colour": ("colour", "ShaderNodeBsdfDiffuse", None),
+    "a shader as a colour, by EEVEE": ("colour", "ShaderNodeShaderToRGB", None),
+}
+
+
+@pytest.mark.parametrize("odd", ODD_TREES)
+def test_what_cycles_makes_of_odd_nodes(pictures, floor, odd):
+    """Of what it can't use, nothing; of a colour in place of a shader, light."""
+    how, kind, output = ODD_TREES[odd]
+    tree, shader = floor.node_tree, floor.node_tree.nodes["Shader"]
+    node = tree.nodes.new(kind)
+    if "Color" in node.inputs:
+        node.inputs["Color"].default_value = GIVEN
+    made = node.outputs[output or 0]
+    if how == "colour":
+        if kind == "ShaderNodeShaderToRGB":
+            tree.links.new(tree.nodes.new("ShaderNodeBsdfDiffuse").outputs[0], node.inputs[0])
+        mixed = tree.nodes.new("ShaderNodeGamma")
+        mixed.inputs["Color"].default_value = GIVEN
+        tree.links.new(made, mixed.inputs["Color"])
+        tree.links.new(mixed.outputs[0], shader.inputs["Color"])
+    else:
+        mixed = tree.nodes.new(f"ShaderNode{how.title()}Shader")
+        first, second = [socket for socket in mixed.inputs if socket.type == "SHADER"]
+        tree.links.new(shader.outputs[0], first)
+        tree.links.new(made, second)
+        tree.links.new(mixed.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+    sides = pictures(scenes=1)
+    assert not told(sides)
+    for name in ("Diffuse Color", "Emission"):
+        theirs = sides[0].cycles[0][name]
+        assert np.abs(sides[0].traced[name] - theirs).max() <= FLAT
+    shines = how == "mix" and kind in ("ShaderNodeBackground", "ShaderNodeGamma", "ShaderNodeNewGeometry")
+    assert sides[0].cycles[0]["Emission"].any() == (shines and output is None)
+
+
+def test_links_that_go_in_a_circle_are_none_as_in_cycles(pictures, floor):
+    lamp = bpy.data.lights[0]
+    lamp.use_nodes = True
+    trees = floor.node_tree, lamp.node_tree
+    before = [len(tree.links) for tree in trees]
+    for tree, kind, name in zip(trees, ("BSDF_DIFFUSE", "EMISSION"), ("Color", "Strength"), strict=True):
+        first, second = (tree.nodes.new("ShaderNodeMath") for _ in range(2))
+        for node, number in ((first, 0.25), (second, 0.5)):
+            node.inputs[0].default_value, node.inputs[1].default_value = number, 0.125
+        tree.links.new(first.outputs[0], second.inputs[0])
+        shader = next(node for node in tree.nodes if node.type == kind)
+        tree.links.new(second.outputs[0], shader.inputs[name])
+        tree.links.new(second.outputs[0], first.inputs[0])
+    sides = pictures(scenes=1)
+    check(sides, FLAT)
+    for name in ("Floor", "Lamp"):
+        assert ("go in a circle" in told(sides).get(name, "")) == versions.CIRCLES_ARE_BLACK
+    for tree, links in zip(trees, before, strict=True):
+        assert sorted(link.is_valid for link in tree.links) == [False, *[True] * (links + 2)]
 
 
 def toon(material):

@@ -227,13 +227,14 @@ def test_a_transparent_film_leaves_the_sky_see_through(lit, write):
 
 
 def test_clay_is_one_material_for_all(lit, write, monkey):
+    lit.virtual_pinhole_reference.clay = True
     plain = written("Combined", write())
     material = bpy.data.materials.new("Red")
     monkey.data.materials.append(material)
     versions_tree(material).nodes["Principled BSDF"].inputs["Base Color"].default_value = (1, 0, 0, 1)
-    assert not np.array_equal(written("Combined", write()), plain)
-    lit.virtual_pinhole_reference.clay = True
     assert np.array_equal(written("Combined", write()), plain)
+    lit.virtual_pinhole_reference.clay = False
+    assert not np.array_equal(written("Combined", write()), plain)
 
 
 def versions_tree(material):

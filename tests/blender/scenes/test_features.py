@@ -283,3 +283,26 @@ def test_an_empty_slot_that_no_face_uses_is_not_told(monkey, both_sides, node_gr
     sides.check()
     (entry,) = sides.exported.ledger
     assert entry.status == "exported", entry.reason
+
+
+@pytest.mark.parametrize("kind", ["shared data", "copied data", "one mesh"])
+def test_triangles_that_lie_exactly_where_others_do_are_told_where_there_is_light(monkey, scene, add_lamp, kind):
+    from viewcam_addon.blender.rendering import job
+
+    def told(level="direct"):
+        return [entry.reason for entry in job.export(job.Request(level=level)).ledger if "lie exactly" in entry.reason]
+
+    add_lamp("SUN")
+    assert not told()
+    double = monkey.copy()
+    if kind != "shared data":
+        double.data = monkey.data.copy()
+    scene.collection.objects.link(double)
+    if kind == "one mesh":
+        with bpy.context.temp_override(active_object=monkey, selected_editable_objects=[monkey, double]):
+            bpy.ops.object.join()
+    (reason,) = told()
+    assert not told("geometry") and ("others of it" if kind == "one mesh" else "those of") in reason
+    if kind != "one mesh":
+        double.location.x += 1e-5
+        assert not told()

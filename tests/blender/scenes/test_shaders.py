@@ -134,7 +134,7 @@ VALUES = [
 def test_the_stand_in_of_a_value_is_read_as_that_value(diffuse, image, value):
     made = Material(surface=node("emission", color=value, strength=2.0))
     with overridden() as overrides:
-        materials.stand_in(overrides, diffuse, shaders.Reading(made, {"Checks": image}, "Paint"))
+        materials.stand_in(overrides, diffuse, shaders.Reading(made, {"Checks": image}))
         read = exactly(diffuse)
     assert read == made
 
@@ -240,7 +240,7 @@ def test_the_stand_in_of_a_shader_is_read_as_that_shader(diffuse, image, surface
     if surface.type == "metallic" and bpy.app.version < (4, 3):
         return  # it came with 4.3
     with overridden() as overrides:
-        materials.stand_in(overrides, diffuse, shaders.Reading(Material(surface=surface), {"Checks": image}, "Paint"))
+        materials.stand_in(overrides, diffuse, shaders.Reading(Material(surface=surface), {"Checks": image}))
         read = exactly(diffuse)
     if surface.type in ("diffuse", "emission", "glass", "refraction"):  # which are components while they are not rough
         read = Material(surface=read.closures[0].node)
@@ -457,9 +457,8 @@ def test_an_image_and_the_meshs_colours_are_factors(diffuse, image):
     texture = link(diffuse, "ShaderNodeTexImage", 0, "Color")
     texture.image, texture.interpolation = image, "Closest"
     assert exactly(diffuse) == Material(diffuse=Colour((1.0, 1.0, 1.0), "Checks", closest=True))
-    link(diffuse, "ShaderNodeVertexColor", 0, "Color").layer_name = "Paint"
+    link(diffuse, "ShaderNodeVertexColor", 0, "Color")
     assert exactly(diffuse) == Material(diffuse=Colour((1.0, 1.0, 1.0), vertex=True))
-    assert shaders.read(diffuse).vertex == "Paint"
 
 
 @pytest.mark.parametrize(
@@ -528,8 +527,8 @@ def test_products_of_colours_are_read_as_what_they_stand_for(diffuse, image):
         mirror=Colour((0.5, 0.5, 0.5), image.name_full),
     )
     with overridden() as overrides:
-        materials.stand_in(overrides, diffuse, shaders.Reading(made, {image.name_full: image}, "Paint"))
-        assert exactly(diffuse) == made and shaders.read(diffuse).vertex == "Paint"
+        materials.stand_in(overrides, diffuse, shaders.Reading(made, {image.name_full: image}))
+        assert exactly(diffuse) == made
 
 
 def test_the_plain_material_is_the_tracers(fresh_blender):

@@ -125,6 +125,18 @@ def test_the_light_of_a_sun_goes_with_what_is_done_to_the_sky(tree, export):
     assert np.allclose(weaker.irradiance, np.multiply(sun.irradiance, 0.25), rtol=2e-3)  # colours vary over the disc
 
 
+def test_links_that_go_in_a_circle_are_none(tree, export):
+    first, second = (tree.add("ShaderNodeMath") for _ in range(2))
+    for node, number in ((first, 0.25), (second, 0.5)):
+        node.inputs[0].default_value, node.inputs[1].default_value = number, 0.125
+    tree.link(first.outputs[0], second.inputs[0])
+    tree.colour(second.outputs[0])
+    tree.link(second.outputs[0], first.inputs[0])
+    exported, told = export()
+    assert (exported.images[exported.world.image].pixels == 0.5).all()
+    assert ("go in a circle" in told) == NEWER
+
+
 def test_neither_export_nor_render_changes_what_is_open(tree, export, scene, tmp_path):
     sky = tree.add("ShaderNodeTexSky", sky_type=WITH_SUN)
     tree.colour(sky.outputs[0])

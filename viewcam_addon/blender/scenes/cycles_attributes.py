@@ -8,6 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 
 GENERATED, POINTINESS, RANDOM_PER_ISLAND = "generated", "pointiness", "random_per_island"
 """What Cycles calls them; an Attribute node that names one asks for it, too."""
+VERTEX_COLOR = "vertex_color"
+"""What it calls the colour attribute that is active for rendering."""
 
 _EPSILON = float(np.finfo(np.float32).eps)
 _ROTATIONS = (14, 11, 25, 16, 4, 14, 24)

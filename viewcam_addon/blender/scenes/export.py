@@ -165,11 +165,13 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
             geometry = _geometry(source, ledger, shading)
             names[source.key] = _free_name(source.data.name, geometries)
             geometries[names[source.key]] = geometry
-        materials = shading.names(source.slots, isinstance(source.data, bpy.types.PointCloud)) if shading else ()
+        materials = shading.names(source.slots) if shading else ()
         placed = (source.object_index, source.materials, materials, source.hidden_from, source.color, random)
         links = source.receivers, source.blockers
         matrix = matrices if len(matrices) > 1 else matrices[0]
         objects.append(Object(source.name, names[source.key], matrix, *placed, *links))
+    if shading:
+        _note_doubles(objects, geometries, ledger)
     surfaces = {placed.name for placed in objects}
     return Scene(
         **_view_in(depsgraph, camera_object),
@@ -178,6 +180,33 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
         **(_shown_by_light(depsgraph, ledger, shading, surfaces) if shading else {}),
         ledger=ledger.entries(),
     )
+
+
+def _note_doubles(objects: list[Object], geometries: dict[str, Mesh | Spheres], ledger: Ledger) -> None:
+    """Triangles that lie where others do: which of the two a ray of Cycles leaves or meets is its rounding's choice."""
+    keys, owners = [np.empty(0)], [np.empty(0, np.int64)]
+    for number, placed in enumerate(objects):
+        made = geometries[placed.geometry]
+        if isinstance(made, Mesh) and len(placed.matrices) == 1:
+            places = (made.vertices @ placed.matrices[0, :3, :3].T + placed.matrices[0, :3, 3]).astype(np.float32)
+            corners = np.sort(_key(places.astype(np.float64))[made.triangles], axis=1)
+            corners = corners[(corners[:, :-1] != corners[:, 1:]).all(axis=1)]
+            keys.append(_key(corners))
+            owners.append(np.full(len(corners), number))
+    key = np.concatenate(keys)
+    order = np.argsort(key, kind="stable")
+    owner, key = np.concatenate(owners)[order], key[order]
+    pairs = np.flatnonzero(key[1:] == key[:-1])
+    for (first, second), count in Counter(zip(owner[pairs].tolist(), owner[pairs + 1].tolist(), strict=True)).items():
+        whose = "others of it" if first == second else f"those of {objects[first].name!r}"
+        reason = f"{count} triangles lie exactly where {whose} do: in Cycles one shadows the other"
+        ledger.note(objects[second].name, "approximated", reason)
+
+
+def _key(threes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) of (n, 3): numbers that are the same only where the three are, but for one pair in 2⁵²."""
+    x, y, z = threes.T
+    return x + y * np.sqrt(2) + z * np.sqrt(3)
 
 
 def _shown_by_light(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading, surfaces: set[str]) -> dict[str, object]:
@@ -335,9 +364,9 @@ def _source(
 def _geometry(source: Surface, ledger: Ledger, shading: Shading | None) -> Mesh | Spheres:
     if not isinstance(source.data, bpy.types.Mesh):
         return export_geometry.spheres_of(source.data)
-    colours = shading.vertex_colours(source.slots) if shading else None
+    has_colours = shading is not None and shading.asks_for_colours(source.slots)
     attributes = shading.attributes(source.slots) if shading else ()
-    mesh = export_geometry.mesh_of(source.data, len(source.materials), colours, attributes)
+    mesh = export_geometry.mesh_of(source.data, len(source.materials), has_colours, attributes)
     if nowhere := len(source.data.loop_triangles) - len(mesh.triangles):
         ledger.note(
             source.name, "exported", f"{nowhere} triangles have vertices that are not finite, and Cycles draws none of them"

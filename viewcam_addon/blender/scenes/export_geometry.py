@@ -33,12 +33,12 @@ DEFAULT_RADIUS = 0.01
 Array = NDArray[np.generic]
 
 
-def mesh_of(mesh: bpy.types.Mesh, slot_count: int, colours: str | None = None, attributes: Collection[str] = ()) -> Mesh:
+def mesh_of(mesh: bpy.types.Mesh, slot_count: int, has_colours: bool = False, attributes: Collection[str] = ()) -> Mesh:
     """The triangles of an evaluated mesh, object space.
 
-    slot_count : the object's material slots, which material indices are clamped to. colours : the colour attribute to bring
-    along, "" being the one that is active for rendering, or None. attributes : those to bring along by name, as in `Mesh`; of
-    those that the mesh has not, nothing comes.
+    slot_count : the object's material slots, which material indices are clamped to. has_colours : whether to bring along the
+    colour attribute that is active for rendering, black where there is none. attributes : those to bring along by name, as in
+    `Mesh`; of those that the mesh has not, nothing comes.
     """
     mesh.calc_loop_triangles()
     vertices = read(mesh.vertices, "co", np.float32, 3).astype(np.float64)
@@ -56,7 +56,7 @@ def mesh_of(mesh: bpy.types.Mesh, slot_count: int, colours: str | None = None, a
         materials=materials_of(mesh, slot_count)[faces],
         corner_normals=_corner_normals(mesh, vertices, triangles, corners, faces),
         corner_uvs=_corner_uvs(mesh, corners),
-        corner_colours=None if colours is None else _corner_colours(mesh, colours, triangles, corners),
+        corner_colours=_corner_colours(mesh, triangles, corners, faces) if has_colours else None,
         attributes={
             name: values
             for name in sorted(attributes)
@@ -116,16 +116,10 @@ def _corner_uvs(mesh: bpy.types.Mesh, corners: Array) -> Array | None:
     return None if layer is None else read(layer.uv, "vector", np.float32, 2)[corners]
 
 
-def _corner_colours(mesh: bpy.types.Mesh, name: str, triangles: Array, corners: Array) -> Array:
-    """(triangles, 3, 3) float32, linear: those of a colour attribute; black, as in Cycles, where there is none of this name."""
-    attributes = mesh.color_attributes
-    if not name and attributes.render_color_index >= 0:
-        name = attributes[attributes.render_color_index].name
-    attribute = attributes.get(name)
-    if attribute is None:
-        return np.zeros((*corners.shape, 3), np.float32)
-    colours = np.ascontiguousarray(read(attribute.data, "color", np.float32, 4)[:, :3])
-    return colours[corners if attribute.domain == "CORNER" else triangles]
+def _corner_colours(mesh: bpy.types.Mesh, triangles: Array, corners: Array, faces: Array) -> Array:
+    """(triangles, 3, 3) float32, linear: the colours that are active for rendering; black, as in Cycles, where none are."""
+    colours = _corner_values(mesh, cycles_attributes.VERTEX_COLOR, triangles, corners, faces)
+    return np.zeros((*corners.shape, 3), np.float32) if colours is None else np.ascontiguousarray(colours[:, :, :3])
 
 
 def _corner_values(mesh: bpy.types.Mesh, name: str, triangles: Array, corners: Array, faces: Array) -> Array | None:
@@ -137,6 +131,8 @@ def _corner_values(mesh: bpy.types.Mesh, name: str, triangles: Array, corners: A
         return charts.corners(starts, totals)[corners]
     if name in (cycles_attributes.POINTINESS, cycles_attributes.RANDOM_PER_ISLAND):
         return _of_edges(mesh, name)[triangles, np.newaxis]
+    if name == cycles_attributes.VERTEX_COLOR and mesh.color_attributes.render_color_index >= 0:
+        name = mesh.color_attributes[mesh.color_attributes.render_color_index].name
     attribute = mesh.attributes.get(name)
     if attribute is None or attribute.data_type not in _ATTRIBUTES:
         return None

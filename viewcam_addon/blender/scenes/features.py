@@ -121,7 +121,7 @@ def note_object(
     if adaptive:
         ledger.note(name, "approximated", "adaptive subdivision is subdivision at the render level on both sides")
         ledger.set_for_cycles(*adaptive, False)
-    if versions.DEFAULT_SURFACE_BENDS_NORMALS and _shows_empty_slot(shown.data, slots):
+    if not shading and versions.DEFAULT_SURFACE_BENDS_NORMALS and _shows_empty_slot(shown.data, slots):
         ledger.call_for_cycles(real.original, materials.fill_empty_slots)
         if any(modifier.type == "NODES" and modifier.show_render for modifier in real.modifiers):
             ledger.note(name, "approximated", "has no material, and Cycles may bend its normals where they graze")
@@ -133,11 +133,7 @@ def note_object(
             reading = shading.reading(material)
             reasons += reading.reasons
             tree = versions.node_tree(material)
-            if versions.CIRCLES_ARE_BLACK and tree and nodes.invalid_links(tree):
-                ledger.note(
-                    name, "approximated", f"material {material.name!r} has invalid links, which are left out on both sides"
-                )
-                ledger.call_for_cycles(material.original, materials.cut_invalid_links)
+            nodes.leave_out_circles(tree, ledger, name, f"material {material.name!r} has")
             for missing in images.missing(tree):
                 ledger.note(name, "exported", f"material {material.name!r} {missing}")
             if reading.mixes_refractions:  # Cycles weighs directions that no facet refracts into as if it sampled them
@@ -169,9 +165,6 @@ def _note_light(placed: Placed, slots: list[bpy.types.Material | None], ledger: 
             ledger.note(
                 placed.name, "approximated", f"is a point cloud, of which the attribute {asked!r} does not come along: 0"
             )
-    readings = [shading.reading(material) for material in filter(None, slots)]
-    if len({reading.vertex for reading in readings} - {None}) > 1:
-        ledger.note(placed.name, "approximated", "shows two colour attributes, and only the first comes along")
     for each in (real.original, parent.original):
         for owner, name in versions.shadow_terminator(each):
             ledger.set_for_cycles(owner, name, 0.0)

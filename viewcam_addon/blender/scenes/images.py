@@ -16,11 +16,14 @@ MISSING = (1.0, 0.0, 1.0, 1.0)
 
 
 def shows_nothing(node: bpy.types.Node) -> bool:
-    """Whether a texture node has no image, or one whose file is not there: then it is MISSING."""
+    """Whether a texture node is MISSING: has no image, or one whose file is not there, unless it is clipped, where it fades."""
     if node.type not in ("TEX_IMAGE", "TEX_ENVIRONMENT"):
         return False
     image = node.image and node.image.original
-    return image is None or (image.source == "FILE" and not (image.has_data or min(image.size)))
+    if image is None:
+        return True
+    fades = getattr(node, "extension", None) == "CLIP"
+    return not fades and image.source == "FILE" and not (image.has_data or min(image.size))
 
 
 def missing(tree: bpy.types.NodeTree | None) -> list[str]:

@@ -43,7 +43,7 @@ def mesh_from(made: Mesh, name: str, overrides: Overrides, ledger: Ledger) -> bp
     mesh.polygons.foreach_set("use_smooth", np.full(len(corners) // 3, made.corner_normals is not None))
     mesh.update(calc_edges=True)
     for attribute, values in made.attributes.items():
-        if attribute != cycles_attributes.GENERATED:  # Cycles makes it itself
+        if attribute not in (cycles_attributes.GENERATED, cycles_attributes.VERTEX_COLOR):  # made by Cycles; among the colours
             kind, field = _ATTRIBUTES[values.shape[2]]
             mesh.attributes.new(RENAMED.get(attribute, attribute), kind, "CORNER").data.foreach_set(
                 field, values[drawn].ravel()
@@ -52,10 +52,9 @@ def mesh_from(made: Mesh, name: str, overrides: Overrides, ledger: Ledger) -> bp
         layer = mesh.uv_layers.new(name=UV_MAP, do_init=False)
         layer.uv.foreach_set("vector", made.corner_uvs[drawn].ravel())
         layer.active_render = True
-    if made.corner_colours is not None:
-        colours = np.concatenate([made.corner_colours[drawn], np.ones((len(corners) // 3, 3, 1), np.float32)], axis=2)
+    if (colours := _colours(made)) is not None:
         attributes = mesh.color_attributes
-        attributes.new(COLOURS, "FLOAT_COLOR", "CORNER").data.foreach_set("color", colours.ravel())
+        attributes.new(COLOURS, "FLOAT_COLOR", "CORNER").data.foreach_set("color", colours[drawn].ravel())
         attributes.render_color_index = len(attributes) - 1
     if made.corner_normals is not None and len(corners):
         off = _set_normals(mesh, made.corner_normals[drawn].reshape(-1, 3))
@@ -65,6 +64,18 @@ def mesh_from(made: Mesh, name: str, overrides: Overrides, ledger: Ledger) -> bp
             )
             ledger.note(name, "approximated", reason)
     return mesh
+
+
+def _colours(made: Mesh) -> Array | None:
+    """(triangles, 3, 4) float32: the mesh's colours, with the alpha of the attribute that Cycles calls as these, or None."""
+    found = made.attributes.get(cycles_attributes.VERTEX_COLOR)
+    if made.corner_colours is None and found is None:
+        return None
+    colours = np.ones((len(made.triangles), 3, 4), np.float32)
+    for known in (found, made.corner_colours):
+        if known is not None:
+            colours[:, :, : known.shape[2]] = known
+    return colours
 
 
 def _set_normals(mesh: bpy.types.Mesh, normals: Array) -> float:

@@ -32,15 +32,8 @@ class Paints:
         self._made: dict[tuple[str, int], bpy.types.Material] = {}
         self._images: dict[str, bpy.types.Image] = {}
 
-    def material(self, name: str, index: int) -> bpy.types.Material | None:
-        """The material of this name and pass index, or None for what Blender shows without any."""
-        return self._one(name, index) if name or index else None
-
-    def plain(self) -> bpy.types.Material:
-        """A material that is as none."""
-        return self._one("", 0)
-
-    def _one(self, name: str, index: int) -> bpy.types.Material:
+    def material(self, name: str, index: int) -> bpy.types.Material:
+        """The material of this name and pass index; without a name the plain one, where Blender's own is another since 5.0."""
         if (name, index) not in self._made:
             self._made[name, index] = self._new(name, index)
         return self._made[name, index]
@@ -101,7 +94,7 @@ def paint(
     material.use_transparent_shadow = made.transparent_shadow
     adder = nodes.Adder(tree)
     output = adder.add("ShaderNodeOutputMaterial")
-    materials.add_surface(adder, output, shaders.Reading(made, shown, "", texts=texts or {}, renamed=import_geometry.RENAMED))
+    materials.add_surface(adder, output, shaders.Reading(made, shown, texts=texts or {}, renamed=import_geometry.RENAMED))
     _arrange(output, 0, {})
     colour = next((colour for _, colour in made.inputs), None)
     if colour:

@@ -163,7 +163,7 @@ class _SceneImport:
 
     def _surfaces(self) -> None:
         """Every object, those of one geometry sharing its data."""
-        paints, is_lit = self._paints, import_light.has_light(self._made)
+        paints = self._paints
         data: dict[str, list[tuple[int, bpy.types.Mesh | bpy.types.PointCloud]]] = {}
         blocks: list[list[bpy.types.Object]] = []  # of each object
         for placed in self._made.objects:
@@ -175,12 +175,10 @@ class _SceneImport:
             ]
             blocks.append([])
             for first, block in data[placed.geometry]:
-                shown = slots
-                if isinstance(block, bpy.types.PointCloud):
-                    shown = [slots[first] or (paints.plain() if is_lit else None)]  # Cycles' default is another since 5.0
+                shown = [slots[first]] if isinstance(block, bpy.types.PointCloud) else slots
                 for matrix in placed.matrices:
                     one = dataclasses.replace(placed, matrix=matrix, random=None)
-                    blocks[-1].append(self._surface(one, block, shown, paints))
+                    blocks[-1].append(self._surface(one, block, shown))
             if placed.random is not None:
                 self._ledger.note(placed.name, "approximated", "its random numbers are Blender's own")
             self._ledger.placed(placed.name, len(placed.matrices))
@@ -201,16 +199,15 @@ class _SceneImport:
         self,
         placed: Object,
         data: bpy.types.Mesh | bpy.types.PointCloud,
-        slots: list[bpy.types.Material | None],
-        paints: import_light.Paints,
+        slots: list[bpy.types.Material],
     ) -> bpy.types.Object:
         if not data.materials:
             for material in slots:
                 data.materials.append(material)
         block = self._placed(placed.name, data, placed.matrix)
         for slot, material in zip(block.material_slots, slots, strict=False):
-            if slot.material != material:  # another object of this geometry has others; an empty slot would show its
-                slot.link, slot.material = "OBJECT", material or paints.plain()
+            if slot.material != material:  # another object of this geometry has others
+                slot.link, slot.material = "OBJECT", material
         block.pass_index = min(placed.object_index, LARGEST_INDEX)
         if placed.object_index > LARGEST_INDEX:
             reason = f"its index is {placed.object_index}, and Blender's end at {LARGEST_INDEX}"

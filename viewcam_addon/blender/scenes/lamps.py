@@ -255,6 +255,7 @@ def _emission(
     output = tree and tree.get_output_node("CYCLES")
     if not output or not np.linalg.det(matrix[:3, :3]):
         return _WHITE, None, None
+    nodes.leave_out_circles(tree, ledger, name, "has")
     for missing in images.missing(tree):
         ledger.note(name, "exported", missing)
     emission, reading = lamp_nodes.emission(light, matrix, output, KINDS[light.type].uv)

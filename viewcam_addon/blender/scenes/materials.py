@@ -201,9 +201,7 @@ def _colour(
         texture.interpolation = "Closest" if colour.closest else "Linear"
         factors.append(texture.outputs["Color"])
     if colour.vertex:
-        attribute = adder.add("ShaderNodeVertexColor")
-        attribute.layer_name = reading.vertex
-        factors.append(attribute.outputs["Color"])
+        factors.append(adder.add("ShaderNodeVertexColor").outputs["Color"])
     product = factors[0]
     for other in factors[1:]:
         product = _times(adder, product, other).outputs[0]
@@ -228,14 +226,6 @@ def _set(node: bpy.types.Node, name: str, value: float) -> None:
 def keep_normals(overrides: Overrides, material: bpy.types.Material) -> None:
     """Keep Cycles from bending the normals of smooth surfaces, seen at a grazing angle, so far that they reflect."""
     overrides.set(material.cycles, "use_bump_map_correction", False)
-
-
-def cut_invalid_links(overrides: Overrides, material: bpy.types.Material) -> None:
-    """Take them out of a material's trees until the overrides end: muting them changes nothing."""
-    for link in nodes.invalid_links(material.node_tree):
-        tree, ends = link.id_data, (link.from_socket, link.to_socket)
-        tree.links.remove(link)
-        overrides.afterwards(tree.links.new, *ends)
 
 
 def fill_empty_slots(overrides: Overrides, block: bpy.types.Object) -> None:

@@ -1,7 +1,8 @@
 """Reading shader nodes, and giving a tree another output for a while.
 
 An input is followed to the node that feeds it: reroutes, muted nodes and node groups are looked through. What nothing feeds
-has a value of its own, and so has what a link feeds that Blender marks as invalid, as where links go in a circle.
+has a value of its own, and so has what a link feeds that counts for nothing: those that Blender marks as invalid, as where
+links go in a circle or from a shader to a colour, and those from nodes that only EEVEE has.
 """
 
 from collections.abc import Iterator
@@ -9,7 +10,11 @@ from typing import NamedTuple
 
 import bpy
 
+from .. import versions
 from ..temporary_settings import Overrides
+from .ledger import Ledger
+
+_UNKNOWN_TO_CYCLES = ("SHADERTORGB", "EEVEE_SPECULAR")
 
 
 class Input(NamedTuple):
@@ -37,7 +42,7 @@ def source(of: Input) -> Output | Input:
     """The output that feeds an input, or the input, perhaps of a group around it, that nothing feeds."""
     while True:
         links = of.socket.links if of.socket.is_linked else ()
-        link = next((link for link in links if link.is_valid and not link.is_muted), None)
+        link = next((link for link in links if _counts(link)), None)
         if link is None:
             return of
         node, socket = link.from_node, link.from_socket
@@ -45,6 +50,11 @@ def source(of: Input) -> Output | Input:
         if through is None:
             return Output(node, socket, of.groups)
         of = through
+
+
+def _counts(link: bpy.types.NodeLink) -> bool:
+    """Whether Cycles has a link, too."""
+    return link.is_valid and not link.is_muted and link.from_node.type not in _UNKNOWN_TO_CYCLES
 
 
 def _through(node: bpy.types.Node, socket: bpy.types.NodeSocket, groups: tuple[bpy.types.Node, ...]) -> Input | None:
@@ -99,11 +109,35 @@ def all_of(tree: bpy.types.NodeTree, seen: set[bpy.types.NodeTree] | None = None
             yield from all_of(group, seen)
 
 
-def invalid_links(tree: bpy.types.NodeTree) -> list[bpy.types.NodeLink]:
-    """Those that Blender marks as invalid, as where they go in a circle, of sockets that are in use."""
+def circular_links(tree: bpy.types.NodeTree) -> list[bpy.types.NodeLink]:
+    """Those that Blender marks as invalid since they go in a circle, of sockets that are in use."""
     trees = {node.id_data for node in all_of(tree)}
     links = [link for each in trees for link in each.links if not link.is_valid and not link.is_muted]
-    return [link for link in links if link.from_socket.enabled and link.to_socket.enabled]
+    return [
+        link
+        for link in links
+        if link.from_socket.enabled
+        and link.to_socket.enabled
+        and (link.from_socket.type == "SHADER") == (link.to_socket.type == "SHADER")
+    ]
+
+
+def leave_out_circles(tree: bpy.types.NodeTree | None, ledger: Ledger, name: str, whose: str) -> None:
+    """Note for the object of this name that links of a tree go in a circle, and take them out of Cycles' render.
+
+    whose : how the clause begins that says so.
+    """
+    if versions.CIRCLES_ARE_BLACK and tree and circular_links(tree):
+        ledger.note(name, "approximated", f"{whose} links that go in a circle, which are left out on both sides")
+        ledger.call_for_cycles(tree.original, cut_circles)
+
+
+def cut_circles(overrides: Overrides, tree: bpy.types.NodeTree) -> None:
+    """Take links that go in a circle out of a tree until the overrides end: muting them changes nothing."""
+    for link in circular_links(tree):
+        owner, ends = link.id_data, (link.from_socket, link.to_socket)
+        owner.links.remove(link)
+        overrides.afterwards(owner.links.new, *ends)
 
 
 def override_output(overrides: Overrides, tree: bpy.types.NodeTree, kind: str) -> tuple[bpy.types.Node, "Adder"]:

@@ -34,6 +34,8 @@ def main(library: str, name: str, out: str, width: str, frame: str, subframe: st
     tree = scene.world.node_tree
     for link in list(tree.get_output_node("CYCLES").inputs["Volume"].links):
         tree.links.remove(link)
+    for link in nodes.circular_links(tree):
+        link.id_data.links.remove(link)
     scene.world.cycles.sampling_method = "NONE"  # there is nothing to light
     scene.frame_set(int(frame), subframe=float(subframe))
     eye = _Eye(scene, f"{out}.exr")

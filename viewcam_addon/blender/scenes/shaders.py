@@ -109,6 +109,9 @@ def _shader(ours: str) -> Shader:
 
 
 SHADERS = {ours: _shader(ours) for ours, kind in KINDS.items() if not kind.is_value}
+# What Cycles takes for another shader on a surface, and for none.
+_AS = {"BACKGROUND": "EMISSION"}
+_VOLUMES = ("VOLUME_ABSORPTION", "VOLUME_SCATTER", "VOLUME_COEFFICIENTS", "PRINCIPLED_VOLUME")
 # Blender's words, where they are others than ours in capitals.
 _WORDS = {"multiscatter_ggx": "MULTI_GGX"}
 
@@ -147,16 +150,14 @@ _MOST_DEEP = 100
 class Reading:
     """What a Blender material is to the tracer.
 
-    images : key in `Colour.image` → the image. vertex : the colour attribute that `Colour.vertex` stands for ("" is the one
-    that is active for rendering), or None. texts : of IES files, where nodes are made that show them. renamed : what attributes
-    of these names are called there.
+    images : key in `Colour.image` → the image. texts : of IES files, where nodes are made that show them. renamed : what
+    attributes of these names are called there.
     reasons : why it is approximated, one clause each, about the material. unknown : inputs of
     shaders, in no group, of which one says so. baked : which images stand in for such inputs, one clause each.
     """
 
     material: Material = PLAIN
     images: dict[str, bpy.types.Image] = field(default_factory=dict)
-    vertex: str | None = None
     alphas: set[str] = field(default_factory=set)
     tables: dict[str, Picture] = field(default_factory=dict)
     texts: dict[str, bpy.types.Text] = field(default_factory=dict)
@@ -243,9 +244,12 @@ class Tree:
     def surface(self, of: Input | None) -> Node | None:
         """The tracer's node, or None where there is no surface."""
         source = of and nodes.source(of)
-        if not isinstance(source, Output):
+        if not isinstance(source, Output) or source.node.type in _VOLUMES:
             return None
-        found = next(((ours, shader) for ours, shader in SHADERS.items() if shader.kind == source.node.type), None)
+        if source.socket.type != "SHADER":
+            return Node("emission", (("color", self._shown(of)),))
+        kind = _AS.get(source.node.type, source.node.type)
+        found = next(((ours, shader) for ours, shader in SHADERS.items() if shader.kind == kind), None)
         if found is None:
             self._reason(source, "is not modelled")
             name = next((name for name in ("Base Color", "Color") if name in source.node.inputs), None)
@@ -276,6 +280,11 @@ class Tree:
                 given[name] = self.surface(source.input(shader.inputs[name]))
         return Node(ours, tuple((given | self._words(source, ours)).items()))
 
+    def _shown(self, of: Input) -> Colour | Node:
+        """What a surface shines with whose shader is a colour or a number."""
+        made = self._value_input(of, None)
+        return made if isinstance(made, Colour | Node) else Colour(made) if made and possible(made) else self.viewport
+
     def _colour(self, output: Output, name: str | int) -> Colour:
         rgb = constant_colour(output, name)
         if rgb is not None:
@@ -286,8 +295,8 @@ class Tree:
         node = source.node
         if node.type == "TEX_IMAGE" and source.socket.name == "Color":
             return self._image(source)
-        if node.type == "VERTEX_COLOR" and source.socket.name == "Color" and self._is_first(node.layer_name):
-            return self._vertex(source)
+        if _is_vertex_colour(source):
+            return Colour(_WHITE, vertex=True)
         if node.type == "VECT_MATH" and node.operation == "MULTIPLY":
             return self._product(source)
         self._reason(source, "is not modelled")
@@ -340,14 +349,6 @@ class Tree:
         if vector.node.type == "UVMAP" and not vector.node.from_instancer:
             return not vector.node.uv_map
         return vector.node.type == "TEX_COORD" and vector.socket.name == "UV" and not vector.node.from_instancer
-
-    def _is_first(self, name: str) -> bool:
-        """Whether a colour attribute is the one that `Colour.vertex` stands for; others are attributes like any."""
-        return self.reading.vertex in (None, name)
-
-    def _vertex(self, output: Output) -> Colour:
-        self.reading.vertex = output.node.layer_name
-        return Colour(_WHITE, vertex=True)
 
     def _want(self, output: Output, name: str, wanted: float) -> bool:
         """Whether an input has this value, or is none in this version; a reason is noted where it has another."""
@@ -496,8 +497,8 @@ class Tree:
         if self._is_beside and {node.type, (node.type, output.socket.name)} & _FIXED:
             self._reason(output, "makes a height of what it says here alone")
             return None
-        if node.type == "VERTEX_COLOR" and output.socket.name == "Color" and self._is_first(node.layer_name):
-            return self._vertex(output)
+        if _is_vertex_colour(output):
+            return Colour(_WHITE, vertex=True)
         if node.type == "UVMAP" and self._is_uv(output):
             return Node("texture_coordinate")
         if node.type == "TEX_COORD" and output.socket.name == "Object" and node.object is not None:
@@ -597,8 +598,6 @@ class Tree:
             return "has a Filter Width that varies"
         if ours == "light_path" and self._shines and output.socket.identifier not in _SURE_OF_PATHS:
             return f"says the {output.socket.name} of light"
-        if ours == "attribute" and node.type == "VERTEX_COLOR" and not node.layer_name:
-            return "has an attribute without a name"
         return None
 
     def _of_itself(self, output: Output, known: object) -> Node | None:
@@ -675,6 +674,11 @@ def _is_zero(output: Output, name: str) -> bool:
     if name == "Specular IOR Level" and constant_number(output, "IOR") == 1.0:
         return True
     return constant_number(output, name) == 0.0
+
+
+def _is_vertex_colour(output: Output) -> bool:
+    """Whether an output is the mesh's colour that is active for rendering, as `Colour.vertex` is; others are attributes."""
+    return output.node.type == "VERTEX_COLOR" and output.socket.name == "Color" and not output.node.layer_name
 
 
 def _along_normal(vector: Colour | Node) -> Node:

@@ -49,15 +49,14 @@ class Shading:
             add_pictures(reading, alphas, found)
         return found
 
-    def names(self, slots: tuple[bpy.types.Material | None, ...], are_points: bool = False) -> tuple[str, ...]:
-        """Keys in `materials`; "" is none, but of points what Cycles gives those that have none."""
+    def names(self, slots: tuple[bpy.types.Material | None, ...]) -> tuple[str, ...]:
+        """Keys in `materials`; "" is none, which until 5.0 Cycles draws as we do."""
+        if None in slots and versions.DEFAULT_SURFACE_BENDS_NORMALS:
+            self._readings[_DEFAULT] = shaders.Reading(Material(surface=Node("principled")))
+        default = _DEFAULT if _DEFAULT in self._readings else ""
         for material in filter(None, slots):
             self.reading(material)
-        names = tuple(material.original.name_full if material else "" for material in slots)
-        if not (are_points and versions.DEFAULT_SURFACE_BENDS_NORMALS) or any(names[:1]):
-            return names
-        self._readings[_DEFAULT] = shaders.Reading(Material(surface=Node("principled")))
-        return (_DEFAULT,)
+        return tuple(material.original.name_full if material else default for material in slots)
 
     def attributes(self, slots: tuple[bpy.types.Material | None, ...]) -> set[str]:
         """What a mesh of these materials is asked for by name, as `Mesh.attributes` has it."""
@@ -72,7 +71,7 @@ class Shading:
         """Whether one of these materials gives light."""
         return any(self.reading(material).material.shines for material in filter(None, slots))
 
-    def vertex_colours(self, slots: tuple[bpy.types.Material | None, ...]) -> str | None:
-        """The colour attribute that a mesh of these materials is coloured by, "" being the active one, or None."""
-        readings = (self.reading(material) for material in filter(None, slots))
-        return next((reading.vertex for reading in readings if reading.vertex is not None), None)
+    def asks_for_colours(self, slots: tuple[bpy.types.Material | None, ...]) -> bool:
+        """Whether a mesh of these materials is coloured by its colour attribute that is active for rendering."""
+        materials = [self.reading(material).material for material in filter(None, slots)]
+        return any(colour.vertex for material in materials for _, colour in material.inputs)

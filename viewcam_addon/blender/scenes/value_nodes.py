@@ -9,6 +9,7 @@ import numpy as np
 
 from ...tracer.scene.shader_nodes import KINDS
 from ...tracer.scene.value_nodes import IES, IMAGE, LIGHT_PATH, NAME
+from .cycles_attributes import VERTEX_COLOR
 from .nodes import Output
 
 
@@ -18,7 +19,7 @@ class Value:
 
     kind : its type; class_name : its class. inputs : ours → the identifier of theirs. words, flags, names, numbers : ours → the
     property. outputs : the identifier of theirs → our word for it, None where we have one output. fixed : property → what it
-    must be. before : of inputs that older versions lack, what these compute with.
+    must be. before : of inputs that older versions lack, what these compute with. unnamed : what an empty name stands for.
     """
 
     kind: str
@@ -31,6 +32,7 @@ class Value:
     names: dict[str, str] = field(default_factory=dict)
     numbers: dict[str, str] = field(default_factory=dict)
     before: dict[str, float] = field(default_factory=dict)
+    unnamed: str = ""
 
 
 def _words(*names: str) -> dict[str, str | None]:
@@ -80,7 +82,14 @@ VALUES: tuple[tuple[str, Value], ...] = (
         fixed={"attribute_type": "GEOMETRY"},
         names={"name": "attribute_name"},
     ),
-    _value("attribute", "VERTEX_COLOR", "VertexColor", _words("Color", "Alpha"), names={"name": "layer_name"}),
+    _value(
+        "attribute",
+        "VERTEX_COLOR",
+        "VertexColor",
+        _words("Color", "Alpha"),
+        names={"name": "layer_name"},
+        unnamed=VERTEX_COLOR,
+    ),
     _value("attribute", "UVMAP", "UVMap", {"UV": "vector"}, fixed={"from_instancer": False}, names={"name": "uv_map"}),
     _value("mapping", "MAPPING", "Mapping", {"Vector": None}, words={"kind": "vector_type"}),
     _value(
@@ -308,7 +317,7 @@ def value_of(output: Output) -> tuple[str, Value] | None:
 def given_words(output: Output, ours: str, value: Value) -> dict[str, object] | str:
     """The words and flags of a node; or, where one is not modelled, that clause."""
     found: dict[str, object] = {name: bool(getattr(output.node, theirs)) for name, theirs in value.flags.items()}
-    found |= {name: getattr(output.node, theirs) for name, theirs in value.names.items()}
+    found |= {name: getattr(output.node, theirs) or value.unnamed for name, theirs in value.names.items()}
     found |= {name: (float(getattr(output.node, theirs)),) * 3 for name, theirs in value.numbers.items()}
     for name, theirs in value.words.items():
         word = getattr(output.node, theirs, None)

@@ -42,6 +42,7 @@ def world_of(
     if _has_volume(world):
         ledger.note(world.name, "approximated", "the world has a volume, which is left out on both sides")
         ledger.call_for_cycles(world.original, _leave_out_volume)
+    nodes.leave_out_circles(versions.node_tree(world), ledger, world.name, "the world has")
     missing = images.missing(versions.node_tree(world))
     for each in missing:
         ledger.note(world.name, "exported", f"the world {each}")

@@ -33,7 +33,8 @@ class Mesh:
     corner_uvs : (m, 3, 2) float32, or None where the mesh has no UV map.
     corner_colours : (m, 3, 3) float32, linear, what `Colour.vertex` stands for, or None.
     attributes : name → (m, 3, k) float32, k from 1 to 4, what nodes ask for by name. Those that Cycles makes have its names:
-        "generated", where each corner is in the mesh's texture space; "pointiness"; "random_per_island".
+        "generated", where each corner is in the mesh's texture space; "pointiness"; "random_per_island"; "vertex_color",
+        `corner_colours` with their alpha.
     materials : (m,) int32, the index of each triangle's material in `Object.material_indices`.
     """
 
