@@ -84,7 +84,7 @@ def sky(set_world):
 def test_an_image_is_wrapped_around_the_world(sky, export):
     exported, told = export()
     assert exported.world == World((2.0, 2.0, 2.0), image="Sky") and not told
-    assert exported.images["Sky"].pixels[:, 0].tolist() == [[1.0, 0.0, 0.0], [0.0, 0.5, 0.0]]
+    assert exported.images["Sky"].values[:, 0].tolist() == [[1.0, 0.0, 0.0], [0.0, 0.5, 0.0]]
 
 
 def test_a_mapping_turns_the_image(sky, export):
