@@ -216,10 +216,18 @@ def test_what_is_occluded_is_baked_until_it_is_hardly_noisy(sheet, sides, add, m
 
 
 @pytest.mark.parametrize(
-    "obstacle",
-    ["the way it is seen", "two objects", "an instance", "an object that is edited", "a driver in Python", "no such node"],
+    ("obstacle", "why"),
+    [
+        ("the way it is seen", ""),
+        ("two objects", ", nor baked, since it is shown in several places"),
+        ("an instance", ", nor baked, since what shows it is an instance, linked, being edited, or no mesh"),
+        ("an object that is edited", ", nor baked, since what shows it is an instance, linked, being edited, or no mesh"),
+        ("many faces", ", nor baked, since its mesh has more than 16,384 faces"),
+        ("a driver in Python", ", nor baked, since Python drives something in the file"),
+        ("no such node", ""),
+    ],
 )
-def test_what_an_image_cannot_stand_in_for_is_named(sheet, add, monkeypatch, obstacle):
+def test_what_an_image_cannot_stand_in_for_is_named_with_the_reason(sheet, add, monkeypatch, obstacle, why):
     monkeypatch.setattr(another_blender, "call", lambda *_: pytest.fail("another Blender was asked to bake it"))
     block = sheet(node="ParticleInfo" if obstacle == "no such node" else "TexSky")
     tree = block.active_material.node_tree
@@ -234,13 +242,15 @@ def test_what_an_image_cannot_stand_in_for_is_named(sheet, add, monkeypatch, obs
         collection.objects.link(block)
         bpy.context.scene.collection.objects.unlink(block)
         parent.instance_type, parent.instance_collection = "COLLECTION", collection
+    elif obstacle == "many faces":
+        block.modifiers.new("Many", "SUBSURF").render_levels = block.modifiers["Many"].levels = 6
     elif obstacle == "a driver in Python":
         block.driver_add("location", 2).driver.expression = "noise.random()"
     elif obstacle == "an object that is edited":
         bpy.context.view_layer.objects.active = block
         bpy.ops.object.mode_set(mode="EDIT")
     exported = export()
-    assert "not modelled, and a plain one stands in" in told(exported) and not exported.images
+    assert f"not modelled{why}, and a plain one stands in" in told(exported) and not exported.images
 
 
 @pytest.mark.parametrize("failure", ["time", "no such program", "an error there"])
@@ -254,4 +264,4 @@ def test_where_no_other_blender_bakes_it_the_material_is_a_plain_one(sheet, monk
             raise FileNotFoundError
 
     monkeypatch.setattr(another_blender, "call", fail)
-    assert "can't be baked by another Blender, and a plain one stands in" in told(export())
+    assert "not modelled, nor can another Blender bake it, and a plain one stands in" in told(export())

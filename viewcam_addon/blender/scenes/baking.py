@@ -7,7 +7,6 @@ the places that a formula gives each face (charts.py). What is baked is what a s
 import json
 import subprocess
 import tempfile
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +15,7 @@ import numpy as np
 
 from ...tracer.scene.materials import Picture
 from .. import another_blender, versions
-from . import baker, charts, export_geometry, features, nodes, shaders
+from . import baker, export_geometry, features, nodes, shaders
 from .nodes import Input, Output
 
 _TIMEOUT = 600.0
@@ -34,6 +33,10 @@ _ELSEWHERE = {
 _UVS = {"TEX_IMAGE", "UVMAP", "TANGENT", ("TEX_COORD", "UV")}
 
 
+_Place = tuple[bpy.types.Object, bpy.types.Mesh]
+"""An object, and its evaluated mesh."""
+
+
 @dataclass(frozen=True)
 class _Job:
     """An input to bake, and the evaluated mesh of the only object that shows it."""
@@ -44,14 +47,21 @@ class _Job:
     material: bpy.types.Material
 
 
-def baked_in(depsgraph: bpy.types.Depsgraph) -> dict[str, dict[tuple[str, str], shaders.Baked | None]]:
-    """What was baked for the materials of a depsgraph, by their full names; None of what no other Blender could bake."""
-    jobs = [*_jobs(depsgraph)]
-    if not jobs or _runs_scripts():
-        return {}
-    found: dict[str, dict[tuple[str, str], shaders.Baked | None]] = {}
-    for job in jobs:
-        found.setdefault(job.material.name_full, {})[job.unknown.node, job.unknown.input] = None
+def baked_in(depsgraph: bpy.types.Depsgraph) -> dict[str, dict[tuple[str, str], shaders.Baked | str]]:
+    """What was baked for the materials of a depsgraph, by their full names, or a clause that says why it was not."""
+    found: dict[str, dict[tuple[str, str], shaders.Baked | str]] = {}
+    jobs = []
+    for material, places in _shown(depsgraph).items():
+        place = _only_place(material, places)
+        for unknown in shaders.read(material.evaluated_get(depsgraph)).unknown:
+            if not _is_of_the_place(unknown.of, isinstance(place, str) or bool(place[1].uv_layers)):
+                continue
+            refused = place if isinstance(place, str) else "nor can another Blender bake it"
+            found.setdefault(material.name_full, {})[unknown.node, unknown.input] = refused
+            if not isinstance(place, str):
+                jobs.append(_Job(*place, unknown, material))
+    if not jobs:
+        return found
     with tempfile.TemporaryDirectory(prefix="viewcam-") as folder:
         library, faces, out = (Path(folder, name) for name in ("scene.blend", "faces.npz", "baked.npz"))
         scene = depsgraph.scene
@@ -95,10 +105,10 @@ def _faces(job: _Job, number: int) -> dict[str, np.ndarray]:
     return {f"totals{number}": totals, f"shown{number}": np.array(slots)[materials]}
 
 
-def _jobs(depsgraph: bpy.types.Depsgraph) -> Iterator[_Job]:
-    """What may be baked: of materials that one object of the file's own shows, in one place."""
+def _shown(depsgraph: bpy.types.Depsgraph) -> dict[bpy.types.Material, list[_Place | None]]:
+    """Where each material is shown that may ask for baking; None is an object that can't be given a modifier for a while."""
     suspects = {material for material in bpy.data.materials if not material.library and _has_any(material)}
-    shown: dict[bpy.types.Material, list[tuple[bpy.types.Object, bpy.types.Mesh] | None]] = {}
+    shown: dict[bpy.types.Material, list[_Place | None]] = {}
     for instance in depsgraph.object_instances if suspects else ():
         placed = features.placed_by(instance)
         if not instance.show_self or depsgraph.view_layer_eval.material_override:
@@ -107,16 +117,22 @@ def _jobs(depsgraph: bpy.types.Depsgraph) -> Iterator[_Job]:
         is_own = not instance.is_instance and isinstance(mesh, bpy.types.Mesh) and _may_change(block)
         for material in suspects & {slot.material.original for slot in placed.shown.material_slots if slot.material}:
             shown.setdefault(material, []).append((block, mesh) if is_own else None)
-    for material, where in shown.items():
-        if len(where) == 1 and where[0] is not None:
-            block, mesh = where[0]
-            if material not in [slot.material for slot in block.material_slots]:  # geometry nodes gave it
-                continue
-            if baker.SMALLEST_CELL * 2 * charts.columns(max(len(mesh.polygons), 1)) <= baker.LARGEST:
-                evaluated = material.evaluated_get(depsgraph)
-                for unknown in shaders.read(evaluated).unknown:
-                    if _is_of_the_place(unknown.of, bool(mesh.uv_layers)):
-                        yield _Job(block, mesh, unknown, material)
+    return shown
+
+
+def _only_place(material: bpy.types.Material, places: list[_Place | None]) -> _Place | str:
+    """Where a material can be baked, or a clause that says why not."""
+    if len(places) > 1:
+        return "nor baked, since it is shown in several places"
+    if places[0] is None:
+        return "nor baked, since what shows it is an instance, linked, being edited, or no mesh"
+    block, mesh = places[0]
+    if material not in [slot.material for slot in block.material_slots]:
+        return "nor baked, since geometry nodes gave it to what shows it"
+    most = (baker.LARGEST // (2 * baker.SMALLEST_CELL)) ** 2
+    if len(mesh.polygons) > most:
+        return f"nor baked, since its mesh has more than {most:,} faces"
+    return "nor baked, since Python drives something in the file" if _runs_scripts() else (block, mesh)
 
 
 def _has_any(material: bpy.types.Material) -> bool:

@@ -138,8 +138,8 @@ class Baked(NamedTuple):
     most: float
 
 
-BakedInputs = Mapping[tuple[str, str], Baked | None]
-"""A shader's name and an input's identifier → what was baked, or None where no other Blender could."""
+BakedInputs = Mapping[tuple[str, str], Baked | str]
+"""A shader's name and an input's identifier → what was baked, or a clause that says why it was not."""
 
 
 # Nodes that feed one another in a row. One of them may become two of the tracer's, which may be more (shader_nodes.MOST_DEEP).
@@ -466,8 +466,8 @@ class Tree:
         if (unknown.node, unknown.input) not in self._baked:
             return None
         baked = self._baked[unknown.node, unknown.input]
-        if baked is None:
-            reasons[-1] += ", can't be baked by another Blender"
+        if isinstance(baked, str):
+            reasons[-1] += f", {baked}"
             return None
         width = baked.picture.pixels.shape[1]
         size = f"an image of {width} × {width} that Cycles bakes of it"
