@@ -1,4 +1,4 @@
-"""What Cycles' own baker makes of inputs of shaders, in a Blender that was started for it by baking.py."""
+"""What Cycles' own baker makes of inputs of shaders, in a Blender that was started for it by baked_inputs.py."""
 
 import contextlib
 import json

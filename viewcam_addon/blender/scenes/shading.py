@@ -23,7 +23,7 @@ def add_pictures(reading: shaders.Reading, alphas: set[str], to: dict[str, Pictu
 
 
 class Shading:
-    """baked : of materials by their names (baking.py)."""
+    """baked : of materials by their names (baked_inputs.py)."""
 
     def __init__(self, baked: Mapping[str, shaders.BakedInputs] = MappingProxyType({})) -> None:
         self._baked = baked
