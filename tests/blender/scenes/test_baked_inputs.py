@@ -1,7 +1,5 @@
 """Inputs of shaders that are not modelled: the images that another Blender bakes of them, and where none can stand in."""
 
-import subprocess
-
 import numpy as np
 import pytest
 
@@ -253,15 +251,7 @@ def test_what_an_image_cannot_stand_in_for_is_named_with_the_reason(sheet, add, 
     assert f"not modelled{why}, and a plain one stands in" in told(exported) and not exported.images
 
 
-@pytest.mark.parametrize("failure", ["time", "no such program", "an error there"])
-def test_where_no_other_blender_bakes_it_the_material_is_a_plain_one(sheet, monkeypatch, failure):
+@pytest.mark.usefixtures("other_blender_fails")
+def test_where_no_other_blender_bakes_it_the_material_is_a_plain_one(sheet):
     sheet()
-
-    def fail(*arguments):
-        if failure == "time":
-            raise subprocess.TimeoutExpired("blender", 1.0)
-        if failure == "no such program":
-            raise FileNotFoundError
-
-    monkeypatch.setattr(another_blender, "call", fail)
     assert "not modelled, nor can another Blender bake it, and a plain one stands in" in told(export())

@@ -1,7 +1,6 @@
 """Worlds that are not modelled as they are: the image that another Blender renders of them, and their suns."""
 
 import math
-import subprocess
 
 import numpy as np
 import pytest
@@ -161,17 +160,9 @@ def test_a_transparent_film_shows_no_sun(tree, export, scene):
     assert [lamp.hidden_from for lamp in export()[0].lamps] == [{"camera"}]
 
 
-@pytest.mark.parametrize("failure", ["time", "no such program", "an error there"])
-def test_where_no_other_blender_renders_it_a_constant_world_stands_in(tree, export, monkeypatch, failure):
+@pytest.mark.usefixtures("other_blender_fails")
+def test_where_no_other_blender_renders_it_a_constant_world_stands_in(tree, export):
     tree.colour(tree.add("ShaderNodeTexSky").outputs[0])
-
-    def fail(*arguments):
-        if failure == "time":
-            raise subprocess.TimeoutExpired("blender", 1.0)
-        if failure == "no such program":
-            raise FileNotFoundError
-
-    monkeypatch.setattr(another_blender, "call", fail)
     exported, told = export()
     assert exported.world.image is None and "can't be rendered by another Blender" in told and "constant" in told
 
