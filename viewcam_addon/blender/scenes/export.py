@@ -184,14 +184,15 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
 
 def _note_doubles(objects: list[Object], geometries: dict[str, Mesh | Spheres], ledger: Ledger) -> None:
     """Triangles that lie where others do: which of the two a ray of Cycles leaves or meets is its rounding's choice."""
-    keys, owners = [np.empty(0)], [np.empty(0, np.int64)]
+    keys, owners = [np.empty(0, np.uint64)], [np.empty(0, np.int64)]
     for number, placed in enumerate(objects):
         made = geometries[placed.geometry]
         if isinstance(made, Mesh) and len(placed.matrices) == 1:
             places = (made.vertices @ placed.matrices[0, :3, :3].T + placed.matrices[0, :3, 3]).astype(np.float32)
-            corners = np.sort(_key(places.astype(np.float64))[made.triangles], axis=1)
+            bits = (places + np.float32(0)).view(np.uint32)  # 0 for −0
+            corners = np.sort(_hashed(bits.T.astype(np.uint64))[made.triangles], axis=1)
             corners = corners[(corners[:, :-1] != corners[:, 1:]).all(axis=1)]
-            keys.append(_key(corners))
+            keys.append(_hashed(corners.T))
             owners.append(np.full(len(corners), number))
     key = np.concatenate(keys)
     order = np.argsort(key, kind="stable")
@@ -203,10 +204,18 @@ def _note_doubles(objects: list[Object], geometries: dict[str, Mesh | Spheres], 
         ledger.note(objects[second].name, "approximated", reason)
 
 
-def _key(threes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,) of (n, 3): numbers that are the same only where the three are, but for one pair in 2⁵²."""
-    x, y, z = threes.T
-    return x + y * np.sqrt(2) + z * np.sqrt(3)
+def _hashed(columns: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """(n,) of (k, n): of each k numbers 64 bits, the same for the same ones, and for others in one pair of 2⁶⁴.
+
+    Splitmix64 (Steele, Lea and Flood, Fast Splittable Pseudorandom Number Generators, 2014), number after number.
+    """
+    key = np.zeros(columns.shape[1], np.uint64)
+    for column in columns:
+        key = (key ^ column) + np.uint64(0x9E3779B97F4A7C15)
+        for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
+            key = (key ^ key >> np.uint64(shift)) * np.uint64(factor)
+        key ^= key >> np.uint64(31)
+    return key
 
 
 def _shown_by_light(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading, surfaces: set[str]) -> dict[str, object]:
