@@ -32,7 +32,6 @@ _ELSEWHERE = {
 }
 _UVS = {"TEX_IMAGE", "UVMAP", "TANGENT", ("TEX_COORD", "UV")}
 
-
 _Place = tuple[bpy.types.Object, bpy.types.Mesh]
 """An object, and its evaluated mesh."""
 

@@ -81,15 +81,12 @@ def _by_identifier(node: bpy.types.Node, socket: bpy.types.NodeSocket, groups: t
 def feeding(of: Input) -> set[Output]:
     """All outputs that an input is made of."""
     found: set[Output] = set()
-
-    def follow(of: Input) -> None:
-        output = source(of)
+    left = [of]
+    while left:
+        output = source(left.pop())
         if isinstance(output, Output) and output not in found:
             found.add(output)
-            for socket in output.node.inputs:
-                follow(Input(socket, output.groups))
-
-    follow(of)
+            left += [Input(socket, output.groups) for socket in output.node.inputs]
     return found
 
 

@@ -151,9 +151,9 @@ class Reading:
     """What a Blender material is to the tracer.
 
     images : key in `Colour.image` → the image. texts : of IES files, where nodes are made that show them. renamed : what
-    attributes of these names are called there.
-    reasons : why it is approximated, one clause each, about the material. unknown : inputs of
-    shaders, in no group, of which one says so. baked : which images stand in for such inputs, one clause each.
+    attributes of these names are called there. reasons : why it is approximated, one clause each, about the material.
+    unknown : inputs of shaders, in no group, of which one says so. baked : which images stand in for such inputs, one clause
+    each.
     """
 
     material: Material = PLAIN

@@ -51,9 +51,9 @@ class Shading:
 
     def names(self, slots: tuple[bpy.types.Material | None, ...]) -> tuple[str, ...]:
         """Keys in `materials`; "" is none, which until 5.0 Cycles draws as we do."""
-        if None in slots and versions.DEFAULT_SURFACE_BENDS_NORMALS:
-            self._readings[_DEFAULT] = shaders.Reading(Material(surface=Node("principled")))
-        default = _DEFAULT if _DEFAULT in self._readings else ""
+        default = _DEFAULT if versions.DEFAULT_SURFACE_BENDS_NORMALS else ""
+        if None in slots and default:
+            self._readings[default] = shaders.Reading(Material(surface=Node("principled")))
         for material in filter(None, slots):
             self.reading(material)
         return tuple(material.original.name_full if material else default for material in slots)
