@@ -1,7 +1,6 @@
 """The core as a library of this system: what it asks of the system's loader."""
 
 import importlib.util
-import os
 from pathlib import Path
 
 import lief
