@@ -39,7 +39,7 @@ _NAME = "viewcam batch"
 
 
 class BlenderRenderer:
-    """Renders shots of one .blend (batch.renderer.Renderer); a context manager.
+    """Renders shots of one .blend (jobs.one.Renderer); a context manager.
 
     blend : the file, or None for the one that is open. seed : of Cycles' and our noise, threads : of all engines; as the file
     says where None. trust : whether what is in the file may run and write (opening.py); its File Output nodes never write.
