@@ -100,9 +100,7 @@ def bindings_of(scene: bpy.types.Scene) -> list[tuple[bpy.types.TimelineMarker, 
     return [(marker, marker.camera) for marker in scene.timeline_markers if marker.camera]
 
 
-def bound_camera(
-    bindings: Iterable[tuple[bpy.types.TimelineMarker, bpy.types.Object]], frame: int
-) -> bpy.types.Object | None:
+def bound_camera(bindings: Iterable[tuple[bpy.types.TimelineMarker, bpy.types.Object]], frame: int) -> bpy.types.Object | None:
     """The camera that markers bind at a frame, as Blender has it: the last one's before it, else the first one's of all.
 
     Those that are hidden in renders bind nothing. None where no marker does.

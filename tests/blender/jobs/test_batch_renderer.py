@@ -275,7 +275,7 @@ def test_shots_of_frames_are_taken_by_the_camera_that_blender_chooses_at_each(st
     before = state()
     eyes = {name: tuple(stage.objects[name].location) for name in ("First", "Second")}
     with BlenderRenderer() as renderer:
-        shots = [LEFT, *lists.frames("1..4"), Shot("named", camera="First", frame=9), *lists.frames("7..9")]
+        shots = [LEFT, *makers.frames("1..4"), Shot("named", camera="First", frame=9), *makers.frames("7..9")]
         assert renderer.problems(shots) == ()
         taken = {shot: shoot(renderer, shot)[0] for shot in shots}
     assert_same(state(), before)
@@ -300,8 +300,8 @@ def test_an_orbit_begins_where_the_camera_of_its_frames_marker_stands(stage):
 def test_a_scene_whose_marker_binds_no_pinhole_at_a_frame_is_said_before(stage):
     stage.objects["Second"].data.type = "ORTHO"
     with BlenderRenderer() as renderer:
-        assert renderer.problems(lists.frames("1..7")) == ()
-        (problem,) = renderer.problems(lists.frames("7..8"))
+        assert renderer.problems(makers.frames("1..7")) == ()
+        (problem,) = renderer.problems(makers.frames("7..8"))
     assert "'frame_008': camera 'Second' is orthographic" in problem
 
 

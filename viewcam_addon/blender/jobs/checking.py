@@ -50,8 +50,8 @@ class Checker:
     ) -> dict[str, Any]:
         """Compare what Cycles renders through a camera, as the scene stands, with what `pinhole` sees.
 
-        pinhole : the camera of the picture, as its sidecar has it. stated : the four values it was made from. is_scenes : whether
-        Cycles takes the camera that Blender chooses at this frame, as markers bind it, and not `camera_object`.
+        pinhole : the camera of the picture, as its sidecar has it. stated : the four values it was made from. is_scenes :
+        whether Cycles takes the camera that Blender chooses at this frame, as markers bind it, and not `camera_object`.
 
         Returns `passed`, `verdict` and `figures` as Comparer.verdict does, and `not_modelled`: what both sides leave out, the
         first few of it, a sentence each.
