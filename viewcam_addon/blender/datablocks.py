@@ -95,6 +95,14 @@ def render_camera(scene: bpy.types.Scene) -> bpy.types.Object | None:
     return bound_camera(bindings_of(scene), scene.frame_current) or scene.camera
 
 
+def require_render_camera(scene: bpy.types.Scene) -> bpy.types.Object:
+    """`render_camera`, or InputError where there is none."""
+    camera_object = render_camera(scene)
+    if camera_object is None:
+        raise InputError(f"scene {scene.name!r} has no camera: add one, or name one with --camera")
+    return camera_object
+
+
 def bindings_of(scene: bpy.types.Scene) -> list[tuple[bpy.types.TimelineMarker, bpy.types.Object]]:
     """The markers that are bound to cameras, and these."""
     return [(marker, marker.camera) for marker in scene.timeline_markers if marker.camera]

@@ -194,9 +194,7 @@ def _stage(request: Request) -> Iterator[_Stage]:
 def _camera(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object:
     """The camera object that is meant, checked to be a perspective one."""
     if name is None:
-        camera = datablocks.render_camera(scene)
-        if camera is None:
-            raise InputError(f"scene {scene.name!r} has no camera: add one, or name one with --camera")
+        camera = datablocks.require_render_camera(scene)
     else:
         camera = scene.objects.get(name)
         if camera is None:

@@ -70,7 +70,7 @@ def render(
         for name, value in _RENDER.items():
             if hasattr(scene.render, name):
                 overrides.set(scene.render, name, value)
-        seen_through = camera_object or datablocks.render_camera(scene)
+        seen_through = camera_object or datablocks.require_render_camera(scene)
         overrides.set(view_layer, "use_pass_combined", True)
         overrides.set(scene.render, "use_stamp_note", True)
         overrides.set(scene.render, "stamp_note_text", note(engine, seen_through.data.clip_start))
