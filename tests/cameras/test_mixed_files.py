@@ -54,12 +54,16 @@ def opencv():
 
 def skewed():
     k = {"image_size": [640, 360]}
-    return json.dumps({"good": k | {"K": [[600, 0, 320], [0, 600, 180], [0, 0, 1]]}, "bad": k | {"K": [600, 5, 320, 0, 600, 180, 0, 0, 1]}})
+    return json.dumps(
+        {"good": k | {"K": [[600, 0, 320], [0, 600, 180], [0, 0, 1]]}, "bad": k | {"K": [600, 5, 320, 0, 600, 180, 0, 0, 1]}}
+    )
 
 
 def metashape():
     sphere = '<sensor id="1" type="spherical"><resolution width="8000" height="4000"/></sensor></sensors>'
-    placed = f'<camera id="7" label="bad.jpg" sensor_id="1"><transform>{files.text_of(np.eye(4))}</transform></camera></cameras>'
+    placed = (
+        f'<camera id="7" label="bad.jpg" sensor_id="1"><transform>{files.text_of(np.eye(4))}</transform></camera></cameras>'
+    )
     text = files.metashape(KNOWN, label="good.jpg")
     return text.replace("</sensors>", sphere).replace("</cameras>", placed)
 
@@ -162,7 +166,11 @@ def test_one_camera_that_is_no_pinhole_keeps_none_of_the_others_back(tmp_path, m
 
 def test_where_all_are_no_pinholes_the_first_is_named():
     with pytest.raises(InputError, match="OPENCV_FISHEYE"):
-        cameras.read(transforms().replace("PINHOLE", "OPENCV_FISHEYE").replace('"file_path": "good.png"', '"file_path": "good.png", "camera_model": "OPENCV_FISHEYE"'))
+        cameras.read(
+            transforms()
+            .replace("PINHOLE", "OPENCV_FISHEYE")
+            .replace('"file_path": "good.png"', '"file_path": "good.png", "camera_model": "OPENCV_FISHEYE"')
+        )
 
 
 def test_a_camera_that_is_damaged_is_no_other_kind_of_camera_and_refuses_the_file():

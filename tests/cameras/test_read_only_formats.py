@@ -541,7 +541,7 @@ def ros(form, size, binning, roi):
     ],
 )
 def test_a_window_of_a_sensor_sees_what_the_sensor_sees_there(form, size, binning, roi):
-    """A point that K puts at a place of the sensor is at that place of the window, by ROS' own definition of roi and binning."""
+    """A point that K puts at a place of the sensor is at that place of its window, by ROS' definition of roi and binning."""
     (camera,) = cameras.read(ros(form, size, binning, roi), options=Options(size=(1280, 800)))
     across, down = (max(number, 1) for number in binning)
     wanted = (roi[2] or size[0]) // across, (roi[3] or size[1]) // down

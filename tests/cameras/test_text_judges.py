@@ -339,7 +339,7 @@ def test_what_of_pbrt_is_no_pinhole_or_unsaid_is_refused(text, sentence):
 @pytest.mark.parametrize(
     "text",
     [
-        "ActiveTransform StartTime LookAt 1 2 3 0 0 0 0 0 1 ActiveTransform EndTime LookAt 1 2 3 0 0 0 0 0 1 ActiveTransform All",
+        "ActiveTransform StartTime LookAt 1 2 3 0 0 0 0 0 1 ActiveTransform EndTime LookAt 1 2 3 0 0 0 0 0 1",
         "Scale -1 1 1 ActiveTransform EndTime Translate 1 0 0 ActiveTransform All Identity LookAt 1 2 3 0 0 0 0 0 1",
         "AttributeBegin ActiveTransform EndTime Translate 1 0 0 AttributeEnd LookAt 1 2 3 0 0 0 0 0 1",
     ],
@@ -347,7 +347,9 @@ def test_what_of_pbrt_is_no_pinhole_or_unsaid_is_refused(text, sentence):
 def test_a_camera_of_pbrt_that_stands_still_may_be_said_at_both_times(text):
     still = 'LookAt 1 2 3 0 0 0 0 0 1 Camera "perspective"'
     given = Options(size=(640, 480))
-    assert cameras.read(f'{text} Camera "perspective"', options=given)[0].pinhole == cameras.read(still, options=given)[0].pinhole
+    assert (
+        cameras.read(f'{text} Camera "perspective"', options=given)[0].pinhole == cameras.read(still, options=given)[0].pinhole
+    )
     with pytest.raises(InputError, match="moves while the shutter"):
         cameras.read(f'{text} ActiveTransform StartTime Translate 1 0 0 Camera "perspective"', options=given)
 

@@ -162,8 +162,8 @@ def not_a_pinhole(what: str, kind: str) -> NoReturn:
 class LeftOut:
     """The cameras of a file that are no pinholes, beside which the others are read all the same.
 
-    kind : the error by which a camera is left out. Of a scene, whose cameras have nothing to do with each other, any InputError;
-    of pictures that were measured together NoPinholeError alone, since what else is wrong with one is wrong with all.
+    kind : the error by which a camera is left out. Any InputError in a scene, whose cameras have nothing to do with each other;
+    NoPinholeError alone of pictures that were measured together, where what else is wrong with one is wrong with all.
     """
 
     def __init__(self, kind: type[InputError] = NoPinholeError) -> None:

@@ -67,7 +67,9 @@ def read(source: Source, options: Options) -> list[Camera]:
                 )
             pose = poses[str(view.get("poseId"))].record("pose").record("transform")
             matrix = np.eye(4)
-            matrix[:3, :3] = np.array(pose.numbers("rotation", 9)).reshape(3, 3)  # column by column is its transpose, row by row
+            matrix[:3, :3] = np.array(pose.numbers("rotation", 9)).reshape(
+                3, 3
+            )  # column by column is its transpose, row by row
             matrix[:3, 3] = pose.numbers("center", 3)
             pinhole, more = axes.pinhole(axes.of_opencv(matrix), plane, f"view {checks.shown(name)}")
             cameras.append(Camera(name, pinhole, True, (*told, *notes, *more), path))

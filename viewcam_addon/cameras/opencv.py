@@ -282,8 +282,8 @@ def plane_of_k(values: Sequence[float], size: tuple[int, int], half: float, what
 def of_window(plane: ViewPlane, values: Mapping[str, Any], what: str) -> tuple[ViewPlane, tuple[str, ...]]:
     """The view plane of the pixels that a ROS driver sends, of that of the whole sensor which it calibrates; and notes.
 
-    values : `roi` of ROS' camera_info, a window of the sensor in its own pixels (0 × 0: all of it), and `binning_x`, `binning_y`,
-    how many of these are one of the picture (0: one), with underscores or without.
+    values : `roi` of ROS' camera_info, a window of the sensor in its own pixels (0 × 0: all of it), and `binning_x` and
+    `binning_y`, how many of these are one of the picture (0: one), with underscores or without.
     """
     given = Record({_plain(key): value for key, value in values.items()}, what)
     x, y = (given.number(f"binning{side}", 1.0, 0, 1e4) or 1.0 for side in "xy")
@@ -298,7 +298,9 @@ def of_window(plane: ViewPlane, values: Mapping[str, Any], what: str) -> tuple[V
         raise InputError(f"the roi of {what} has no pixel left once {x:g} × {y:g} are one: correct it")
     (f_x, f_y), (c_x, c_y) = plane.distance, plane.principal_point
     cut = axes.view_plane(f_x / x, f_y / y, (c_x - left) / x, (plane.height - c_y - top) / y, size)
-    told = f"{what} shows the window of its sensor from {left:g}, {top:g} on, {x:g} × {y:g} of its pixels as one: K was taken so"
+    told = (
+        f"{what} shows the window of its sensor from {left:g}, {top:g} on, {x:g} × {y:g} of its pixels as one: K was taken so"
+    )
     return cut, (f"{told}, in a picture of {size[0]} × {size[1]}",)
 
 
@@ -335,7 +337,7 @@ def _camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
 
 
 def _of_infinigen(name: str, values: Mapping[str, Any], what: str, options: Options) -> Camera:
-    """Infinigen's K, T (camera to world, OpenCV's axes) and HW. Its principal point is half the size: it counts from the corner."""
+    """Infinigen's K, T (camera to world, OpenCV's axes) and HW, whose principal point counts from the corner."""
     height, width = (pixels(f"HW of {what}", side) for side in checks.vector(f"HW of {what}", flat("HW", values["hw"]), 2))
     plane = plane_of_k(_numbers("K", _first(values, _K)), (width, height), half_pixel(options, "corner"), what)
     pinhole, notes = axes.pinhole(axes.of_opencv(_four_rows(values["t"], f"T of {what}")), plane, what)

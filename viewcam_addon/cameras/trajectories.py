@@ -38,8 +38,8 @@ def read(source: Source, options: Options) -> list[Camera]:
     kind = _kind(source)
     if kind == "chan":
         raise InputError(
-            f"{source.name} is Nuke's chan, with angles whose order it does not say: import it with Blender's Nuke Animation Format, "
-            "or export cameras in another format"
+            f"{source.name} is Nuke's chan, with angles whose order it does not say: import it with Blender's Nuke Animation "
+            "Format, or export cameras in another format"
         )
     rows = table(source.name, numbered_lines(source))
     if rows.shape[1] < 8:

@@ -1,4 +1,5 @@
-"""The part of YAML in which OpenCV, ROS and Kalibr write cameras: keys, numbers, texts, lists; blocks by indentation, or in brackets.
+"""The part of YAML in which OpenCV, ROS and Kalibr write cameras: keys, numbers, texts, lists; blocks by indentation or in
+brackets.
 
 What is not of it is left out, so that whoever looks for a key does not find it. Rejected: PyYAML, which refuses OpenCV's first
 line and tags, and which Blender's Python has not.
@@ -10,9 +11,7 @@ from typing import Any
 _LINE = re.compile(r"(\s*+)(?:- )?([\"']?)([^:\"'#\[\]{}]++)\2\s*+:(?:\s++(.*))?$")
 _BRACKET = re.compile(r"[\[\]{}]")
 _ITEM = re.compile(r"(\s*+)-\s++(.*)$")
-_FLOW = re.compile(
-    r"""[\[\]{},]|:(?=[\s\[\]{},"']|$)|"[^"]*"|'[^']*'|[^\s\[\]{},:"'](?:[^\[\]{},:]|:(?![\s\[\]{},"']|$))*"""
-)
+_FLOW = re.compile(r"""[\[\]{},]|:(?=[\s\[\]{},"']|$)|"[^"]*"|'[^']*'|[^\s\[\]{},:"'](?:[^\[\]{},:]|:(?![\s\[\]{},"']|$))*""")
 _DEEPEST = 8
 
 
