@@ -27,8 +27,8 @@ from ... import child_process
 from ...comparison.statistics import plain
 from ...errors import InputError
 from ...files import written_whole
+from ...jobs.names import made_fit
 from ...pinhole import Pinhole
-from ...shots.names import made_fit
 from ...tracer.scene.film import LEVELS, SAMPLES, seeds
 from .. import camera as cameras
 from .. import datablocks, preferences
