@@ -1,8 +1,8 @@
 """Make a virtual environment with what pip is asked for: `python .ci/environment.py FOLDER PIP-ARGUMENT…`
 
 Debian gives a Python without `venv`, and wheels need libraries of the system, of the X Window System even where there is no
-window. Which ones the wheels tell (`ldd`), and Debian's policy tells the package of each. What is missing is installed where that
-needs no password (root, in a container or on a build machine); elsewhere one sentence says which command does it. Only the
+window. Which ones, the wheels tell (`ldd`), and Debian's policy tells the package of each. What is missing is installed where
+that needs no password (root, in a container or on a build machine); elsewhere one sentence says which command does it. Only the
 standard library, since this runs before there is anything else. Rejected: a list of libraries, which each new wheel outdated.
 """
 
@@ -17,13 +17,14 @@ from pathlib import Path
 
 # Loaded by name and only when Blender draws, as it does for Grease Pencil, which ends the process where it is missing.
 LOADED_BY_NAME = ["libEGL.so.1"]
+CORE = Path(__file__).resolve().parent.parent / "build" / "core"
 COMPILERS = (os.environ.get("CXX"), "c++", "g++", "clang++")
 
 
 def missing_libraries(folder: Path) -> list[str]:
     """The sonames that the extension modules of a folder need, what Blender loads by name among them, and this machine lacks.
 
-    folder : site-packages; what Blender's wheel holds for a Python of Blender's own (bpy/5.0/python) is not imported and not asked.
+    folder : site-packages; what Blender's wheel holds for a Python of its own (bpy/5.0/python) is not imported, nor asked.
     """
     libraries = [path for path in folder.rglob("*.so*") if path.is_file()]
     modules = [
@@ -46,50 +47,59 @@ def _loads(soname: str) -> bool:
     return True
 
 
-def debian_package(soname: str) -> str:
-    """The Debian package of a library by Debian's policy (8.1): libX11.so.6 is in libx11-6, libatomic.so.1 in libatomic1."""
-    name, _, version = soname.partition(".so.")
-    return f"{name}{'-' if name[-1:].isdigit() and version else ''}{version}".lower().replace("_", "-")
+def debian_packages(sonames: list[str]) -> list[str]:
+    """The Debian packages of libraries by Debian's policy (8.1): libX11.so.6 is in libx11-6, libatomic.so.1 in libatomic1.
 
-
-def install_packages(packages: list[str], optional: bool = False) -> None:
-    """Install Debian packages as root; any other user is told the command.
-
-    optional : leave out those that this Debian does not have, such as a graphics card's.
+    Left out are those that this Debian does not have, such as a graphics card's.
     """
-    command = ["apt-get", "install", "--yes", "--no-install-recommends"]
+    packages = []
+    for soname in sonames:
+        name, _, version = soname.partition(".so.")
+        package = f"{name}{'-' if name[-1:].isdigit() and version else ''}{version}".lower().replace("_", "-")
+        if subprocess.run(["apt-cache", "show", package], capture_output=True).returncode == 0:
+            packages.append(package)
+    return packages
+
+
+def update_lists() -> None:
+    """Let Debian's package manager know today's packages, where this user may."""
+    if os.geteuid() == 0 and shutil.which("apt-get"):
+        subprocess.run(["apt-get", "update", "--quiet=2"], check=True)
+
+
+def install_packages(packages: list[str]) -> None:
+    """Install Debian packages as root; any other user is told the command."""
+    command = ["apt-get", "install", "--yes", "--no-install-recommends", *packages]
     if not shutil.which("apt-get"):
-        if optional:
-            return print(f"Perhaps missing on this machine: what Debian calls {' '.join(packages)}", flush=True)
         sys.exit(f"Missing on this machine: install what Debian calls {' '.join(packages)}, then start again")
-    quiet = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
-    if os.geteuid() == 0:
-        subprocess.run(["apt-get", "update", "--quiet=2"], check=True, env=quiet)
-    if optional:
-        packages = [name for name in packages if subprocess.run(["apt-cache", "show", name], capture_output=True).returncode == 0]
-    if not packages:
-        return None
     if os.geteuid() != 0:
-        sys.exit(f"Missing on this machine: run  sudo {' '.join([*command, *packages])}  then start again")
+        sys.exit(f"Missing on this machine: run  sudo {' '.join(command)}  then start again")
     print(f"Installing {' '.join(packages)}", flush=True)
-    subprocess.run([*command, *packages], check=True, env=quiet, stdout=subprocess.DEVNULL)
-    return None
+    quiet = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
+    subprocess.run(command, check=True, env=quiet, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
 def main(folder: Path, requirements: list[str]) -> None:
     """Make the environment, or bring the one that is there up to date."""
     if not importlib.util.find_spec("ensurepip"):
+        update_lists()
         install_packages([f"python{sys.version_info[0]}.{sys.version_info[1]}-venv"])
     if not (folder / "bin" / "pip").exists():
         print(f"Making the Python {sys.version.split()[0]} environment {folder}", flush=True)
         subprocess.run([sys.executable, "-m", "venv", "--clear", folder], check=True)
     pip = [folder / "bin" / "python", "-m", "pip", "--disable-pip-version-check"]
-    if not any(map(shutil.which, filter(None, COMPILERS))):
-        print("Compiling the tracer's core by ziglang, as there is no C++ compiler: a minute or two, the first time", flush=True)
+    if not CORE.exists() and not any(map(shutil.which, filter(None, COMPILERS))):
+        print("Compiling the tracer's core by ziglang, as there is no C++ compiler: a minute or two", flush=True)
     # Python compiles what it imports, which is a small part of what all these bring along: half a minute an environment.
     subprocess.run([*pip, "install", "--quiet", "--no-compile", *requirements], check=True)
-    if sys.platform == "linux" and (missing := missing_libraries(next((folder / "lib").glob("python3*")) / "site-packages")):
-        install_packages(list(map(debian_package, missing)), optional=True)
+    site = next(folder.glob("lib/python3.*")) / "site-packages"
+    if sys.platform == "linux" and (missing := missing_libraries(site)):
+        if not shutil.which("apt-cache"):
+            print(f"Perhaps missing on this machine: {' '.join(missing)}", flush=True)
+            return
+        update_lists()
+        if packages := debian_packages(missing):
+            install_packages(packages)
 
 
 if __name__ == "__main__":
