@@ -291,8 +291,8 @@ class _Block:
     def _film(self, aspect: float) -> texts.Film:
         """The picture: any, if the text takes the shape of whatever it is; else one of the shape that right and up say.
 
-        A size that was given is the picture's, as in POV-Ray, whose pixels are not square then where right and up are of another
-        shape: +W640 +H480 with right 1.33 makes them 0.25 % too narrow.
+        A size that was given is the picture's, as in POV-Ray, whose pixels are not square then where right and up are of
+        another shape: +W640 +H480 with right 1.33 makes them 0.25 % too narrow.
         """
         if self._aspect_of_film or self._is_given:
             return self._filmed()
