@@ -41,7 +41,7 @@ def read(source: Source, options: Options) -> list[Camera]:
     left_out, lenses = LeftOut(), {}
     for index in placed:
         with left_out.unless_pinhole(names[index]):
-            lenses[index] = _lens(*blocks[index, 0].tolist(), source, paths[index], names[index], options)
+            lenses[index] = _lens(blocks[index, 0].tolist(), source, paths[index], names[index], options)
     turns, translations = blocks[[*lenses], 1:4] * _OPENCV[:, None], blocks[[*lenses], 4] * _OPENCV
     matrices = axes.from_worlds_to_cameras(turns, translations, [names[index] for index in lenses])
     poses = axes.pinholes(matrices, [plane for plane, *_ in lenses.values()], [names[index] for index in lenses])
@@ -57,13 +57,14 @@ def read(source: Source, options: Options) -> list[Camera]:
 
 
 def _lens(
-    f: float, k1: float, k2: float, source: Source, path: str, name: str, options: Options
+    numbers: list[float], source: Source, path: str, name: str, options: Options
 ) -> tuple[ViewPlane, bool, tuple[str, ...]]:
-    """The view plane, whether its size is the picture's, and notes."""
+    """The view plane, whether its size is the picture's, and notes. numbers : f, k1, k2."""
+    f, k1, k2 = numbers
     if f < 0:
         raise InputError(f"{name} of {source.name} has the focal length {f:g}: give one above 0")
     size = image_size(source.path.parent / path) if source.path else None
     width, height = size or options.size_or_refuse(name)
     plane = axes.view_plane(f, f, width / 2, height / 2, (width, height))
-    numbers = {"k1": k1, "k2": k2}
-    return plane, size is not None, distortion.settle(numbers, distortion.opencv(numbers), plane, name, options)
+    lens = {"k1": k1, "k2": k2}
+    return plane, size is not None, distortion.settle(lens, distortion.opencv(lens), plane, name, options)
