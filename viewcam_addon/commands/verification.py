@@ -109,7 +109,7 @@ def compare(options: argparse.Namespace) -> Result:
         result["difference"] = difference.write(comparison, options.difference)
     if options.sides:
         difference.write_sides(comparison, reference, tests if is_light else [tests], options.sides)
-    return 0 if comparison.passed else 1, result
+    return comparison.answer.exit_status(options.strict), result
 
 
 def _stated(channels: Sequence[tuple[str, list[str]]]) -> dict[str, list[str]]:
@@ -151,6 +151,7 @@ def check(options: argparse.Namespace) -> Result:
             if (to := getattr(options, flag))
             for word in (f"--{flag}", str(to))
         ]
+        outputs += ["--strict"] if options.strict else []
         outputs += ["--test-samples", str(max(options.samples // count, 1)), "--repeat", options.repeat or options.words]
         if level == "geometry":
             tests = tests[:1]
@@ -227,8 +228,8 @@ def _request(options: argparse.Namespace, **more: Any) -> Any:
 
 
 def _ledger_lines(ledger: Sequence[Any]) -> list[str]:
-    exported = sum(entry.status == "exported" for entry in ledger)
-    rest = [f"  {entry.status}: {entry.object}: {entry.reason}" for entry in ledger if entry.status != "exported"]
+    exported = sum(entry.is_modelled for entry in ledger)
+    rest = [f"  {entry.status}: {entry.object}: {entry.reason}" for entry in ledger if not entry.is_modelled]
     return [f"{exported} of {len(ledger)} objects exported whole", *rest] if ledger else []
 
 
