@@ -33,7 +33,7 @@ demo: .venv/demo
 
 # For the inner loop. What a version of NumPy or Python may change stands in these, so that the matrix has them, too.
 QUICK := $(shell grep -rLE --include='test_*.py' 'importorskip\("bpy"\)|fresh_blender|stand_in|subprocess' \
-	tests/cameras tests/commands tests/comparison tests/datasets tests/shots tests/tracer tests/test_*.py \
+	tests/cameras tests/commands tests/comparison tests/datasets tests/jobs tests/tracer tests/test_*.py \
 	| grep -vE 'adaptive|audit|hostile|hypothesis|noise|project|roll|sabotage|sampler|test_text\.py' | sort)
 
 quick: .venv/test
@@ -106,11 +106,11 @@ test-matrix: $(MATRIX:%=test-wheel-%)
 # test-light what Cycles shades.
 TOUCHING_BLENDER = tests/blender tests/test_crashes.py \
 	$(shell grep -lE 'importorskip\("bpy"\)' tests/test_*.py tests/commands/test_*.py tests/comparison/test_*.py | grep -v test_project)
-tests-4.5 = $(TOUCHING_BLENDER) --ignore=tests/blender/batch --ignore=tests/blender/light
+tests-4.5 = $(TOUCHING_BLENDER) --ignore=tests/blender/jobs --ignore=tests/blender/light
 without-4.5 = $(empty) and not slow
 tests-5.0 = $(TOUCHING_BLENDER)
 tests-4.2 = $(TOUCHING_BLENDER) $(QUICK)
-tests-5.2 = tests/blender/light tests/blender/test_light_by_light.py $(filter-out tests/blender,$(TOUCHING_BLENDER)) $(QUICK) tests/batch
+tests-5.2 = tests/blender/light tests/blender/test_light_by_light.py $(filter-out tests/blender,$(TOUCHING_BLENDER)) $(QUICK) tests/jobs
 
 # Few examples of each property: make test has the many, and what a version changes, it changes for most of them. What is slow
 # begins first (tests/conftest.py), so that no process ends with it alone.

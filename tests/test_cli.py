@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from viewcam_addon import cameras, image
-from viewcam_addon.batch.folder import Folder
 from viewcam_addon.cli import main
 from viewcam_addon.commands import batch, chart, verification
 from viewcam_addon.commands.verification import DEMO_SCENE
+from viewcam_addon.jobs.folder import Folder
 from viewcam_addon.pinhole import Pinhole
 
 CAMERA = {"eye": [0, -5, 0], "look_at": [0, 0, 0], "up": [0, 0, 1], "distance": 100, "width": 64, "height": 48}
@@ -53,9 +53,7 @@ def test_a_command_imports_what_other_commands_need_for_no_one(tmp_path):
     words = ["render", str(write_scene(tmp_path)), str(tmp_path / "out.exr")]
     code = f"import sys; from viewcam_addon.cli import main; assert main({words}) == 0; print(*sys.modules, sep='\\n')"
     imported = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
-    needless = [
-        name for name in imported if name.startswith(("viewcam_addon.cameras", "viewcam_addon.batch", "viewcam_addon.shots"))
-    ]
+    needless = [name for name in imported if name.startswith(("viewcam_addon.cameras", "viewcam_addon.jobs"))]
     assert not needless, f"viewcam render has imported {', '.join(needless)}, which takes time at every start"
 
 

@@ -31,7 +31,7 @@ def export(options: argparse.Namespace) -> Result:
     from ..tracer.scene import scene_file
 
     with silent_libraries():
-        scene = blender_room("rendering.job").export(_request(options))
+        scene = blender_room("rendering.job").export(_request(options, options.strict))
     scene_file.write(scene, options.scene)
     say(*_ledger_lines(scene.ledger))
     result = {"scene": str(options.scene), "ledger": _ledger_json(scene.ledger)}
@@ -75,7 +75,7 @@ def render(options: argparse.Namespace) -> Result:
 
 def cycles(options: argparse.Namespace) -> Result:
     with silent_libraries():
-        ledger = blender_room("rendering.job").render(_request(options), options.image)
+        ledger = blender_room("rendering.job").render(_request(options, options.strict), options.image)
     say(*_ledger_lines(ledger))
     return 0, {"image": str(options.image), "ledger": _ledger_json(ledger)}
 
@@ -209,13 +209,14 @@ def _told_level(scene: Any) -> dict[str, str]:
     return {"level": level, "reason": reason}
 
 
-def _request(options: argparse.Namespace, **more: Any) -> Any:
+def _request(options: argparse.Namespace, strict: bool = False, **more: Any) -> Any:
+    """strict : whether anything of the file that is not modelled ends it; where pictures are compared, theirs alone counts."""
     return blender_room("rendering.job").Request(
         blend=options.blend,
         camera=options.camera,
         frame=options.frame,
         size=options.size,
-        strict=options.strict,
+        strict=strict,
         recenter=options.recenter,
         threads=options.threads,
         level=options.level,
