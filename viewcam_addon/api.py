@@ -155,7 +155,7 @@ def compare(
         found = geometry.compare(of, pictures[0], camera, renderer=by, partial=partial)
     else:
         tracer = tracing.Tracer(shown, threads)
-        stated = shown.stated_camera if camera == scene.camera else None
+        stated = shown.stated_camera if scene and camera == scene.camera else None
         found = geometry.compare(of, pictures[0], camera, tracer.surface_at, stated, shown.origin, by, partial)
         found = replace(found, not_modelled=_not_modelled(shown, threads, tracer))
     if found.shows_nothing:
@@ -188,7 +188,7 @@ class Check:
 
     @property
     def answer(self) -> str:
-        return self.figures["answer"]
+        return str(self.figures["answer"])
 
 
 def check(blend: File, *options: File) -> Check:

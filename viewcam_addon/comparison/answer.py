@@ -1,9 +1,9 @@
 """The answer of a comparison, one of three: the same, the same but for what is not modelled, or different.
 
-Every place that tells it (shell, panel, report, contact sheet, JSON, JUnit, Python) has it from an `Answer`. What is not modelled
-both sides leave out or replace alike, so that the rest can be compared: then two equal pictures are not yet the artist's. It
-counts where it is in the picture: by the pixels that show it (tracer), and by those where Cycles' picture with everything is
-another than the one with stand-ins, because it hides them, or lights them, or stands in their light.
+Every place that tells it (shell, panel, report, contact sheet, JSON, JUnit, Python) has it from an `Answer`. Both sides leave
+out or replace alike what is not modelled, so that the rest can be compared: two pictures that are the same need not be the
+artist's then. It counts as far as it is in the picture: by the pixels that show it, and by those where Cycles' picture with
+everything is another than the one with stand-ins, because it hides them, lights them or stands in their light.
 """
 
 from collections.abc import Mapping, Sequence
@@ -94,10 +94,12 @@ def in_the_picture(
 ) -> NotModelled:
     """What of a picture is not modelled.
 
-    names : of the objects that are not. shown : name → (height, width), the pixels that show those of them that have a surface in
-    the scene. changed : (height, width), the pixels where the picture with everything is another than the one with stand-ins, or
+    names : of the objects that are not. shown : name → (height, width), the pixels that show it, of those that are surfaces
+    in the scene. changed : (height, width), those where the picture with everything is another than the one with stand-ins;
     None where there is none. is_lit : whether light is compared, so that what is not seen may still light what is.
     """
+    if changed is not None and not is_lit:  # bits tell what a stand-in changes, where there is no noise
+        shown = {name: pixels & changed for name, pixels in shown.items()}
     seen = [name for name in names if name in shown and shown[name].any()]
     pixels = np.logical_or.reduce([shown[name] for name in seen]) if seen else np.False_
     unseen = [name for name in names if name not in seen and (is_lit or name not in shown)]
@@ -111,7 +113,8 @@ def in_the_picture(
 
 def but_for(names: Sequence[str]) -> str:
     """but for 2 objects that are not modelled"""
-    return "but for 1 object that is not modelled" if len(names) == 1 else f"but for {len(names):,} objects that are not modelled"
+    which = "1 object that is" if len(names) == 1 else f"{len(names):,} objects that are"
+    return f"but for {which} not modelled"
 
 
 def percent_of(share: float) -> str:

@@ -17,7 +17,8 @@ from .tolerances import PERCENTILES, Array
 _MOST_FAULTS = 2
 
 NOTHING_TO_COMPARE = (
-    "no pixel of either picture shows an object; point the camera at one, and see that frame, view layer and clipping leave it there"
+    "no pixel of either picture shows an object: point the camera at one, and see that frame, view layer and clipping leave "
+    "it there"
 )
 
 

@@ -58,8 +58,9 @@ class Comparer(TracingServer):
         stated : the four values that it was made from, if it was.
 
         Returns `passed`, `answer` (as comparison/answer.py has them), `verdict` (the sentence of `viewcam compare`),
-        `not_modelled` and `figures`, the few of its figures that a sidecar keeps: `pixels` compared, `position` in pixels, `share_of_tolerance` of each pass where it is largest, `mismatches`,
-        and `conversion`, the stated camera against this one, None where none is stated. None is what was not compared, too.
+        `not_modelled` (as in its JSON) and `figures`, the few of its figures that a sidecar keeps: `pixels` compared,
+        `position` in pixels, `share_of_tolerance` of each pass where it is largest, `mismatches`, and `conversion`, the stated
+        camera against this one, None where none is stated. None is what was not compared, too.
 
         Raises
         ------

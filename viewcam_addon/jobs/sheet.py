@@ -35,7 +35,7 @@ def picture(result: Result) -> str:
         shot=result,
         file=quote(result.name),
         facts=facts(result.record or {}),
-        verdict=verdict(result.check),
+        verdict=verdict(result),
     )
 
 
@@ -61,16 +61,17 @@ def facts(record: Mapping[str, Any]) -> list[str]:
     return told
 
 
-def verdict(check: Mapping[str, Any] | None) -> str:
+def verdict(result: Result) -> str:
     """What became of a shot's check, in the words of the panel's proof."""
+    check = result.check
     if not check:
         return "not checked"
-    if not check.get("passed"):
+    if result.answer == DIFFERENT:
         return "differs"
     largest = _part(_part(check, "figures"), "position").get("max")
     words = f"identical to {plain(largest)} px" if isinstance(largest, float) else "identical"
     names = _part(check, "not_modelled").get("names")
-    return f"{words}, {but_for(names)}" if check.get("answer") == SAME_BUT and isinstance(names, list) else words
+    return f"{words}, {but_for(names)}" if result.answer == SAME_BUT and isinstance(names, list) else words
 
 
 def _part(record: Mapping[str, Any], name: str) -> Mapping[str, Any]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
-from ..comparison.answer import DIFFERENT, SAME_BUT
+from ..comparison.answer import ANSWERS, DIFFERENT, SAME, SAME_BUT
 from .folder import Folder, Outputs
 
 
@@ -27,10 +27,18 @@ class Result:
         """What the check found; None where there was none."""
         return self.record.get("check") if self.record else None
 
+    @property
+    def answer(self) -> str | None:
+        """What the check came to, one of comparison/answer.py's; None where there was none. Older sidecars have none."""
+        if not self.check:
+            return None
+        answer = self.check.get("answer")
+        return answer if answer in ANSWERS else SAME if self.check["passed"] else DIFFERENT
+
     def to_json(self) -> dict[str, Any]:
         told: dict[str, Any] = {"name": self.name, "state": self.state}
         if self.check:
-            told |= {name: self.check[name] for name in ("passed", "answer", "verdict")}
+            told |= {"passed": self.check["passed"], "answer": self.answer, "verdict": self.check["verdict"]}
         if self.error:
             told["error"] = self.error
         if self.record and self.record.get("warnings"):

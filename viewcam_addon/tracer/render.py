@@ -128,8 +128,9 @@ class Tracer:
         return depth, objects.view(np.int32).astype(np.int64), primitives.view(np.int32).astype(np.int64), passes
 
     def pixels_of(self, names: Collection[str]) -> dict[str, NDArray[np.bool_]]:
-        """(height, width) for each of these names that objects have: the pixels whose centres show one of them."""
-        owners = np.repeat([placed.name for placed in self._scene.objects], [len(each.matrices) for each in self._scene.objects])
+        """For each of these names that objects have, (height, width): the pixels whose centres show one of them."""
+        objects = self._scene.objects
+        owners = np.repeat([placed.name for placed in objects], [len(placed.matrices) for placed in objects])
         there = [name for name in names if name in owners]
         instances = self.hits()[1] if there else None
         return {name: np.isin(instances, np.flatnonzero(owners == name)) for name in there}

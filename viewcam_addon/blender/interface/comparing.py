@@ -44,7 +44,8 @@ class Outcome:
     """What a comparison has come to.
 
     what : of what it was: camera, frame and level. camera : the camera's name. seen : the camera then, None if it was none.
-    answer : one of comparison/answer.py's, None where there is none. verdict : one sentence. headline : a few words of it. rows : (label, text) of the figures. lacking : (object, sentence) of what is not modelled as it is.
+    answer : one of comparison/answer.py's, None where there is none. verdict : one sentence. headline : a few words of it.
+    rows : (label, text) of the figures. lacking : (object, sentence) of what is not modelled as it is.
     folder : that of the report. colours : what those of the difference say. scale : their ends, as difference.write has them.
     temporary : what `discard` removes.
     """
@@ -253,8 +254,7 @@ def headline(result: dict[str, Any]) -> str:
     if result["answer"] == DIFFERENT:
         return "Cycles renders another picture"
     words = _agreement(result)
-    names = result["not_modelled"]["names"]
-    return f"{words}, {but_for(names)}" if result["answer"] == SAME_BUT else words
+    return f"{words}, {but_for(result['not_modelled']['names'])}" if result["answer"] == SAME_BUT else words
 
 
 def _agreement(result: dict[str, Any]) -> str:

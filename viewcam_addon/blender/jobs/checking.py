@@ -47,8 +47,8 @@ class Checker:
 
         pinhole : the camera of the picture, as its sidecar has it. stated : the four values it was made from.
 
-        Returns what Comparer.verdict does, and in `ledger` what both sides leave out or replace, the first few of it, a sentence
-        each.
+        Returns what Comparer.verdict does, and in `ledger` what both sides leave out or replace, a sentence for each of the
+        first few.
 
         Raises
         ------
