@@ -113,8 +113,8 @@ def test_a_link_stays_in_the_folder(name):
 
 def test_each_shot_says_what_it_is_of_by_which_lens_and_at_what_angle():
     record = {
-        "shot": {"name": "a", "camera": "Hero <1>"},
-        "rendered": {"file": "film.blend", "width": 1000, "height": 500, "frame": 12},
+        "shot": {"name": "a"},
+        "rendered": {"file": "film.blend", "camera": "Hero <1>", "width": 1000, "height": 500, "frame": 12},
         "camera": {"distance": [500.0, 500.0], "width": 1000},
         "blender": {"lens": 18.0},
     }

@@ -256,12 +256,12 @@ def _shots(options: argparse.Namespace, renderer: Any) -> Sequence[Shot]:
     if options.cameras is not None:
         return makers.from_cameras(options.cameras, renderer.cameras, spaces=not options.transforms)
     if options.orbit is not None:
-        return makers.orbit(renderer.pinhole(options.camera, options.size), options.orbit)
-    camera = options.camera or renderer.scene_camera
+        return makers.orbit(renderer.pinhole(options.camera, options.size, options.frame), options.orbit)
+    camera = renderer.scene_camera if options.camera is None else options.camera
     if camera not in renderer.cameras:
         wrong = "the scene has no camera" if camera is None else f"the file has no camera {camera!r}"
         raise InputError(f"{wrong}: name one with --camera, of {', '.join(renderer.cameras) or 'none'}")
-    return makers.frames(options.frames, camera)
+    return makers.frames(options.frames, options.camera)
 
 
 def _completed(shot: Shot, options: argparse.Namespace) -> Shot:

@@ -62,8 +62,10 @@ def orbit(pinhole: Pinhole, count: int) -> Sequence[Shot]:
     return _Made(view, range(count))
 
 
-def frames(text: str, camera: str) -> Sequence[Shot]:
+def frames(text: str, camera: str | None = None) -> Sequence[Shot]:
     """A shot of the camera at each frame of a range "A..B", both included.
+
+    camera : its name; the scene's own at each frame where None, which markers may bind.
 
     Raises
     ------

@@ -76,8 +76,8 @@ class ServedRenderer:
     def scene_camera(self) -> str | None:
         return self._ask({"scene_camera": {}})
 
-    def pinhole(self, camera: str | None, size: tuple[int, int] | None) -> Pinhole:
-        return Pinhole(**self._ask({"pinhole": {"camera": camera, "size": size}}))
+    def pinhole(self, camera: str | None, size: tuple[int, int] | None, frame: int | None) -> Pinhole:
+        return Pinhole(**self._ask({"pinhole": {"camera": camera, "size": size, "frame": frame}}))
 
     def made_from(self) -> dict[str, Any]:
         return self._ask({"made_from": {}})

@@ -57,8 +57,8 @@ class _Served:
     def scene_camera(self) -> str | None:
         return self._renderer.scene_camera
 
-    def pinhole(self, camera: str | None, size: tuple[int, int] | None) -> dict[str, Any]:
-        return dataclasses.asdict(self._renderer.pinhole(camera, size and tuple(size)))
+    def pinhole(self, camera: str | None, size: tuple[int, int] | None, frame: int | None) -> dict[str, Any]:
+        return dataclasses.asdict(self._renderer.pinhole(camera, size and tuple(size), frame))
 
     def made_from(self) -> dict[str, Any]:
         return self._renderer.made_from()

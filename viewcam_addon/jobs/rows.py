@@ -108,7 +108,8 @@ def shots_of(rows: Iterable[Row], problems: Problems, cameras: Collection[str] |
     taken: dict[str, tuple[str, str]] = {}  # one_file(name) → (name, place)
     for row in rows:
         values = _values(row, problems)
-        for fields, sentence in conflicts(values):
+        refused = conflicts(values, names_camera=True)
+        for fields, sentence in refused:
             if left := [name for name in fields if name not in row.excused]:
                 problems.add(f"{row.place_of(left)}: {sentence}")
         _check_name(row, values, taken, problems)
@@ -116,7 +117,7 @@ def shots_of(rows: Iterable[Row], problems: Problems, cameras: Collection[str] |
             guesses -= 1  # a guess looks at every camera, and nobody reads those behind the problems that are shown
             close = ", ".join(difflib.get_close_matches(camera, cameras)) if guesses >= 0 else ""
             problems.add(f"{row.cells['camera'].place}: the file has no camera {checks.shown(camera)}, but {close or first}")
-        if None not in values.values() and not conflicts(values):
+        if None not in values.values() and not refused:
             shots.append(Shot(**values))
     return shots
 

@@ -43,7 +43,7 @@ def facts(record: Mapping[str, Any]) -> list[str]:
     """What a shot's sidecar says of it, a few words each: file, camera, frame, size, lens and angle of view."""
     rendered, camera, blender = (_part(record, name) for name in ("rendered", "camera", "blender"))
     told = [str(rendered["file"])] if rendered.get("file") else []
-    name = _part(record, "shot").get("camera")
+    name = rendered.get("camera")
     told += [str(name)] if name else []
     frame, width, height = (rendered.get(key) for key in ("frame", "width", "height"))
     told += [f"frame {frame}"] if isinstance(frame, int) else []

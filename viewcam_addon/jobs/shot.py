@@ -37,7 +37,8 @@ class Shot:
     ----------
     name : of its files, without a suffix.
     eye, look_at, up : three floats, world space; d : view-plane distance in pixels, > 0. All four, or `camera`.
-    camera : the name of a camera of the .blend, in place of the four values.
+    camera : the name of a camera of the .blend, in place of the four values. Without either it is the scene's own at the frame,
+        which markers may bind.
     principal_point : (c_x, c_y), where the view axis meets the picture, pixels from its left and bottom edge; its middle where
         None. pixel_aspect : width of a pixel over its height, from 1/200 to 200. mirrored : whether the picture is. These go
         with the four values, `principal_point` with a size as well.
@@ -76,10 +77,11 @@ class Shot:
             raise InputError(f"{', '.join(fields)} of the shot {checks.shown(self.name)}: {sentence}")
 
 
-def conflicts(values: Mapping[str, object]) -> list[tuple[tuple[str, ...], str]]:
+def conflicts(values: Mapping[str, object], names_camera: bool = False) -> list[tuple[tuple[str, ...], str]]:
     """What the values of one shot can't be together: (fields, sentence) of each problem.
 
-    values : what is said, by field; None where it is wrong already, and no more is to be said of it.
+    values : what is said, by field; None where it is wrong already, and no more is to be said of it. names_camera : whether the
+    scene's own camera won't do.
     """
     found = []
     if "name" not in values:
@@ -88,7 +90,7 @@ def conflicts(values: Mapping[str, object]) -> list[tuple[tuple[str, ...], str]]
     missing = tuple(field for field in FOUR_VALUES if field not in values)
     if "camera" in values and given:
         found.append((("camera", *given), "a shot has either a camera of the file or the four values, leave one of them out"))
-    elif "camera" not in values and missing:
+    elif "camera" not in values and missing and (given or names_camera):
         found.append((missing, "missing, give eye, look_at, up and d, or the name of a camera of the file"))
     if "principal_point" in values and "width" not in values:
         found.append((("width", "height"), "missing, the principal point counts pixels of a picture: give its size"))

@@ -11,10 +11,11 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon import cli
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender import versions
+from viewcam_addon.blender import datablocks, versions
 from viewcam_addon.blender.jobs import checking, scene_files
 from viewcam_addon.blender.jobs.renderer import BlenderRenderer
 from viewcam_addon.errors import InputError
+from viewcam_addon.jobs import makers
 from viewcam_addon.jobs.comparer import Comparer
 from viewcam_addon.jobs.shot import Shot
 
@@ -324,6 +325,21 @@ def test_the_camera_of_a_shot_by_eevee_is_checked_with_cycles(stage):
         assert checker.check(stage, stage.camera, camera)["passed"]
         assert not checker.check(stage, stage.camera, replace(camera, distance=1.001 * camera.distance[0]))["passed"]
     assert stage.render.engine == versions.EEVEE
+
+
+def test_a_frame_taken_by_another_camera_than_its_markers_is_caught(stage, batch, monkeypatch):
+    """Cycles and tracer took the same wrong camera, and the check passed."""
+    other = bpy.data.objects.new("Other", stage.camera.data)
+    stage.collection.objects.link(other)
+    other.location, other.rotation_euler = (1, -7, 2), (math.radians(80), 0, 0.1)
+    for frame, camera_object in ((1, stage.camera), (8, other)):
+        stage.timeline_markers.new(camera_object.name, frame=frame).camera = camera_object
+    shots = makers.frames("7..8")
+    assert all(check["passed"] for check in verdicts(batch(*shots)).values())
+    for wrong in (lambda bindings, _: bindings[0][1], lambda *_: None):
+        monkeypatch.setattr(datablocks, "bound_camera", wrong)
+        found = verdicts(batch(*shots))
+        assert found["frame_007"]["passed"] and not found["frame_008"]["passed"], found
 
 
 def test_a_failed_check_is_exit_status_1_and_one_that_passes_after_it_is_0(stage, spoil, monkeypatch, tmp_path, capfd):

@@ -15,6 +15,7 @@ bpy = pytest.importorskip("bpy")
 from viewcam_addon.blender.jobs import pictures
 from viewcam_addon.blender.jobs.renderer import BlenderRenderer
 from viewcam_addon.blender.rendering import exr, graphics
+from viewcam_addon.blender.scenes import depsgraph
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs import comparer, makers
 from viewcam_addon.jobs.folder import Outputs
@@ -261,6 +262,47 @@ def test_cameras_are_told_by_name_without_the_batchs_own(stage):
     with BlenderRenderer() as renderer:
         assert renderer.cameras == ("First", "Second") and renderer.scene_camera == "First"
         assert len(bpy.data.cameras) == 3
+
+
+def chosen_by_blender(scene, frame):
+    """The name of the camera that `blender -b FILE -f frame` renders, as an engine is told."""
+    scene.frame_set(frame)
+    return depsgraph.visit(scene, lambda rendered: rendered.scene.camera.name)
+
+
+def test_shots_of_frames_are_taken_by_the_camera_that_blender_chooses_at_each(stage, shoot):
+    """Those of the frame at which the file was saved took them all, and a check passed over it."""
+    before = state()
+    eyes = {name: tuple(stage.objects[name].location) for name in ("First", "Second")}
+    with BlenderRenderer() as renderer:
+        shots = [LEFT, *makers.frames("1..4"), Shot("named", camera="First", frame=9), *makers.frames("7..9")]
+        assert renderer.problems(shots) == ()
+        taken = {shot: shoot(renderer, shot)[0] for shot in shots}
+    assert_same(state(), before)
+    for shot, said in taken.items():
+        if shot.eye is None:
+            chosen = shot.camera or chosen_by_blender(stage, shot.frame)
+            assert said["camera"]["eye"] == pytest.approx(eyes[chosen]), (shot, said["camera"])
+            assert said["rendered"]["camera"] == chosen, (shot, said["rendered"])
+    assert [said["rendered"]["camera"] for said in taken.values() if "stated" not in said] == [
+        *["First"] * 4,
+        "First",
+        *["First", "Second", "Second"],
+    ]
+
+
+def test_an_orbit_begins_where_the_camera_of_its_frames_marker_stands(stage):
+    with BlenderRenderer() as renderer:
+        eyes = [renderer.pinhole(name, None, frame).eye for name, frame in ((None, None), (None, 9), ("First", 9))]
+    assert [eye == pytest.approx(tuple(stage.objects["Second"].location)) for eye in eyes] == [False, True, False]
+
+
+def test_a_scene_whose_marker_binds_no_pinhole_at_a_frame_is_said_before(stage):
+    stage.objects["Second"].data.type = "ORTHO"
+    with BlenderRenderer() as renderer:
+        assert renderer.problems(makers.frames("1..7")) == ()
+        (problem,) = renderer.problems(makers.frames("7..8"))
+    assert "'frame_008': camera 'Second' is orthographic" in problem
 
 
 def test_a_pinhole_of_another_size_has_the_same_view(stage):

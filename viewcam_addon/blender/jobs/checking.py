@@ -41,11 +41,17 @@ class Checker:
         self._files = self._ends.enter_context(SceneFiles())
 
     def check(
-        self, scene: bpy.types.Scene, camera_object: bpy.types.Object, pinhole: Pinhole, stated: Pinhole | None = None
+        self,
+        scene: bpy.types.Scene,
+        camera_object: bpy.types.Object,
+        pinhole: Pinhole,
+        stated: Pinhole | None = None,
+        is_scenes: bool = False,
     ) -> dict[str, Any]:
         """Compare what Cycles renders through a camera, as the scene stands, with what `pinhole` sees.
 
-        pinhole : the camera of the picture, as its sidecar has it. stated : the four values it was made from.
+        pinhole : the camera of the picture, as its sidecar has it. stated : the four values it was made from. is_scenes :
+        whether Cycles takes the camera that Blender chooses at this frame, as markers bind it, and not `camera_object`.
 
         Returns what Comparer.verdict does, and in `ledger` what both sides leave out or replace, a sentence for each of the
         first few.
@@ -60,7 +66,8 @@ class Checker:
             if not scene.render.use_crop_to_border:  # the picture is of the whole frame then
                 overrides.set(scene.render, "use_border", False)
             export = self._files.exported(scene, layer, camera_object)
-            cycles.render(scene, layer, camera_object, image, export.remedies, self._threads, keep=True)
+            of = None if is_scenes else camera_object
+            cycles.render(scene, layer, of, image, export.remedies, self._threads, keep=True)
         data = camera_object.evaluated_get(datablocks.depsgraph_of(scene)).data
         clip = data.clip_start, data.clip_end
         said = self._comparer.verdict(self._files.file_of(export.scene), image, pinhole, clip, stated)

@@ -39,11 +39,11 @@ def obstacles(
     read: set[str] = set()
     for shot in shots:
         try:
-            if shot.camera is not None:
-                camera_object = camera_named(shot.camera, scene, among)
-                if shot.frame is None and shot.camera not in read:  # at other frames it may be another
+            if shot.eye is None:
+                camera_object = camera_of(shot, scene, among, settings)
+                if shot.frame is None and camera_object.name not in read:  # at other frames it may be another
                     cameras.read(camera_object, scene)
-                    read.add(shot.camera)
+                    read.add(camera_object.name)
             else:
                 _check_storable(stated(shot, settings.frame_of(shot)), settings.frame_of(shot), own.data)
         except InputError as error:
@@ -56,14 +56,17 @@ def cameras_of(scene: bpy.types.Scene, own: bpy.types.Object) -> dict[str, bpy.t
     return dict(sorted(found.items()))
 
 
-def camera_named(name: str | None, scene: bpy.types.Scene, among: Mapping[str, bpy.types.Object]) -> bpy.types.Object:
-    """A camera of the scene. name : None where the scene has none to render with. among : cameras_of(scene).
+def camera_of(
+    shot: Shot, scene: bpy.types.Scene, among: Mapping[str, bpy.types.Object], settings: ShotSettings
+) -> bpy.types.Object:
+    """The camera of the file that takes a shot without the four values. among : cameras_of(scene).
 
     Raises
     ------
     InputError
-        if none is called so, or if it is no perspective camera.
+        if none is called so, if the scene has none of its own, or if it is no perspective camera.
     """
+    name = settings.scene_camera(shot.frame) if shot.camera is None else shot.camera
     camera_object = among.get(name)
     if camera_object is None:
         lacking = "no camera of its own" if name is None else f"no camera {name!r}"

@@ -65,9 +65,8 @@ class BlenderRenderer:
         with contextlib.ExitStack() as stack:
             overrides, off = stack.enter_context(opened(self._blend, self._trust))
             self.scene = bpy.context.scene
-            self._of_file = datablocks.render_camera(self.scene)
             self._settings = ShotSettings(overrides, self.scene, self._threads, self._seed, off)
-            self._own = _own_camera(overrides, self.scene, self._of_file)
+            self._own = _own_camera(overrides, self.scene, self.scene.objects.get(self.scene_camera or ""))
             self._checker = stack.enter_context(Checker(self._threads))
             self._labels = stack.enter_context(ShotLabels(self._threads))
             self._loan = stack.pop_all()
@@ -83,8 +82,8 @@ class BlenderRenderer:
 
     @property
     def scene_camera(self) -> str | None:
-        """The name of the camera that a render of the file takes."""
-        return self._of_file.name if self._of_file else None
+        """The name of the camera that a render of the file takes, at the file's frame."""
+        return self._settings.scene_camera()
 
     @property
     def blend(self) -> Path | None:
@@ -96,26 +95,25 @@ class BlenderRenderer:
         """The Blender that this process is; None where it is a Python module."""
         return bpy.app.binary_path or None
 
-    def pinhole(self, name: str | None, size: tuple[int, int] | None = None) -> Pinhole:
-        """A camera of the file as it stands at the file's frame, with a look-at point as people choose it.
+    def pinhole(self, name: str | None, size: tuple[int, int] | None = None, frame: int | None = None) -> Pinhole:
+        """A camera of the file as it stands at a frame, with a look-at point as people choose it.
 
-        name : that of the scene's camera where None. size : of the picture, the file's where None. A border counts for nothing:
-        the pinhole is that of the whole picture.
+        name : the scene's own at the frame where None. size, frame : the file's where None. A border counts for nothing: the
+        pinhole is that of the whole picture.
 
         Raises
         ------
         InputError
             if there is none of that name, or if it is no pinhole.
         """
-        among = obstacles.cameras_of(self.scene, self._own)
-        camera_object = obstacles.camera_named(self.scene_camera if name is None else name, self.scene, among)
         width, height = size or (None, None)
-        shot = Shot("pinhole", camera=camera_object.name, width=width, height=height)
+        shot = Shot("pinhole", camera=name, width=width, height=height, frame=frame)
+        camera_object = obstacles.camera_of(shot, self.scene, obstacles.cameras_of(self.scene, self._own), self._settings)
         self._settings.set(shot)
         found = cameras.as_it_stands(camera_object, self.scene, in_use=camera_object.virtual_pinhole.enabled)
-        frame = self._settings.frame_of(shot)
-        column, row, _, _ = frame.window
-        return found.cropped(-column, -row, *frame.size)
+        picture = self._settings.frame_of(shot)
+        column, row, _, _ = picture.window
+        return found.cropped(-column, -row, *picture.size)
 
     def made_from(self) -> dict[str, Any]:
         """What the pictures are made from, beside the shots: hashes of the .blend and of all that it links; versions; the seed;
@@ -157,7 +155,7 @@ class BlenderRenderer:
         return {
             **record(self._taken, datablocks.camera_data_of(evaluated)),
             **({"stated": record(self._stated)["camera"]} if self._stated else {}),
-            "rendered": self._settings.rendered(bool(image)),
+            "rendered": self._settings.rendered(bool(image)) | ({} if self._stated else {"camera": self.scene.camera.name}),
             "warnings": [*self._settings.warnings, *warnings],
             "versions": origins.versions(),
         }
@@ -170,34 +168,42 @@ class BlenderRenderer:
         InputError
             if the scene can't be exported, or the labels not be written.
         """
-        is_still = shot.camera is None
+        is_still = shot.eye is not None
         names = self._labels.write(self.scene, self.scene.camera, self._taken, picture, kinds, depth_steps, is_still)
         if "flow" in kinds:  # other frames were looked at
             persistent_data.drop(self.scene)
         return names
 
-    def check(self, _shot: Shot) -> dict[str, Any]:
+    def check(self, shot: Shot) -> dict[str, Any]:
         """Compare the shot that was just rendered with the tracer (checking.py).
+
+        Of the scene's own camera Blender chooses once more which that is: a picture of another one is a difference.
 
         Raises
         ------
         InputError
             if Cycles can't render the scene, or if the two can't be compared.
         """
-        return self._checker.check(self.scene, self.scene.camera, self._taken, self._stated)
+        camera_object = self.scene.camera
+        return self._checker.check(self.scene, camera_object, self._taken, self._stated, is_scenes=_is_scenes(shot))
 
     def _aim(self, shot: Shot) -> list[str]:
         """Make the shot's camera the scene's; what a reader should know of it."""
-        if shot.camera is not None:
+        if shot.eye is None:
             among = obstacles.cameras_of(self.scene, self._own)
-            camera_object = obstacles.camera_named(shot.camera, self.scene, among)
+            camera_object = obstacles.camera_of(shot, self.scene, among, self._settings)
             self._stated, warnings = None, datablocks.beyond_pinhole(camera_object, self.scene)
         else:
             camera_object, self._stated = self._own, obstacles.stated(shot, self._settings.frame_of(shot))
             warnings = cameras.apply(camera_object, self._stated, self.scene)
             warnings += datablocks.beyond_pinhole(camera_object, self.scene)
-        self._settings.look_through(camera_object)
+        self._settings.look_through(camera_object, _is_scenes(shot))
         return warnings
+
+
+def _is_scenes(shot: Shot) -> bool:
+    """Whether the scene's own camera takes the shot."""
+    return shot.camera is None and shot.eye is None
 
 
 def _own_camera(overrides: Overrides, scene: bpy.types.Scene, like: bpy.types.Object | None) -> bpy.types.Object:

@@ -1,6 +1,7 @@
 """What of the file's settings a batch changes for its time, and why.
 
-**For all of it.** One camera must be had: markers bound to cameras, stereoscopy and the sequencer's strips would choose others.
+**For all of it.** One camera must be had: stereoscopy and the sequencer's strips would choose others, and markers are bound to
+cameras only while the scene's own is wanted, which Blender then chooses as it does in an animation.
 Files are the batch's own: the compositor's File Output nodes are muted. What Blender and Cycles have built is kept between
 shots (persistent_data.py), and no camera of the file follows a picture of another size (resolution.py).
 
@@ -17,7 +18,7 @@ from ... import intrinsics
 from ...jobs.shot import Shot
 from .. import datablocks, resolution, versions
 from ..rendering.engine import VIEWCAM_RenderEngine
-from ..temporary_settings import Overrides, cameras_unbound
+from ..temporary_settings import Overrides
 from . import origins, persistent_data, pictures
 
 _ENGINES = {"CYCLES": "CYCLES", "EEVEE": versions.EEVEE, "VIEWCAM": "VIEWCAM"}
@@ -42,7 +43,10 @@ class ShotSettings:
         self._scene = scene
         self.warnings = (*_warnings(scene), *(f"{sentence[:1].upper()}{sentence[1:]}" for sentence in off))
         render = scene.render
-        cameras_unbound(overrides, scene)
+        overrides.afterwards(setattr, scene, "camera", scene.camera)
+        self._camera_of_file = scene.camera
+        self._bindings = datablocks.bindings_of(scene)
+        overrides.afterwards(self._bind_markers, True)
         for name in ("use_multiview", "use_sequencer", "use_stamp"):
             overrides.set(render, name, False)
         overrides.set(render, "use_persistent_data", True)
@@ -95,12 +99,23 @@ class ShotSettings:
             persistent_data.drop(self._scene)
         self._go_to(*(self._time_of_file if shot.frame is None else (shot.frame, 0.0)))
 
-    def look_through(self, camera_object: bpy.types.Object) -> None:
-        """Make it the camera that renders."""
+    def scene_camera(self, frame: int | None = None) -> str | None:
+        """The name of the scene's own camera at a frame, that of the file where None; None if it has none."""
+        of_markers = datablocks.bound_camera(self._bindings, self._time_of_file[0] if frame is None else frame)
+        camera_object = of_markers or self._camera_of_file
+        return camera_object.name if camera_object else None
+
+    def look_through(self, camera_object: bpy.types.Object, is_scenes: bool = False) -> None:
+        """Make it the camera that renders. is_scenes : whether it is the scene's own, so that markers have their say."""
+        self._bind_markers(is_scenes)
         if self._scene.camera != camera_object:
             self._scene.camera = camera_object
             if self._drop_at_cameras:
                 persistent_data.drop(self._scene)
+
+    def _bind_markers(self, are_bound: bool) -> None:
+        for marker, camera_object in self._bindings:
+            marker.camera = camera_object if are_bound else None
 
     def _go_to(self, frame: int, subframe: float) -> None:
         if (self._scene.frame_current, self._scene.frame_subframe) != (frame, subframe):
