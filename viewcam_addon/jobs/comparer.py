@@ -57,9 +57,10 @@ class Comparer(TracingServer):
         camera : the camera that is said to have taken the picture, whatever the scene's is; clip : what it sees, as in Scene.
         stated : the four values that it was made from, if it was.
 
-        Returns `passed`, `verdict` (the sentence of `viewcam compare`) and `figures`, the few of its figures that a sidecar
-        keeps: `pixels` compared, `position` in pixels, `share_of_tolerance` of each pass where it is largest, `mismatches`,
-        and `conversion`, the stated camera against this one, None where none is stated. None is what was not compared, too.
+        Returns `passed`, `answer` (as comparison/answer.py has them), `verdict` (the sentence of `viewcam compare`),
+        `not_modelled` (as in its JSON) and `figures`, the few of its figures that a sidecar keeps: `pixels` compared,
+        `position` in pixels, `share_of_tolerance` of each pass where it is largest, `mismatches`, and `conversion`, the stated
+        camera against this one, None where none is stated. None is what was not compared, too.
 
         Raises
         ------
@@ -88,6 +89,7 @@ class _Scenes:
     def answer(self, request: dict[str, Any]) -> dict[str, Any]:
         from .. import image
         from ..comparison import geometry
+        from ..comparison.answer import in_the_picture
         from ..tracer.scene import scene_file
 
         if request["scene"] != self._path:
@@ -98,7 +100,16 @@ class _Scenes:
         tracer = self._keeper.tracer(scene, request["threads"])
         reference = image.Image(tracer.render(), camera)
         comparison = geometry.compare(reference, test, camera, tracer.surface_at, stated, scene.origin)
-        return {"passed": comparison.passed, "verdict": comparison.sentence, "figures": _figures(comparison)}
+        names = scene.not_modelled
+        not_modelled = in_the_picture(names, tracer.pixels_of(names), None, is_lit=False)
+        answer = dataclasses.replace(comparison, not_modelled=not_modelled).answer
+        return {
+            "passed": answer.passed,
+            "answer": answer.answer,
+            "verdict": answer.sentence,
+            "not_modelled": answer.not_modelled.to_json(),
+            "figures": _figures(comparison),
+        }
 
 
 def _figures(comparison: "GeometryComparison") -> dict[str, Any]:

@@ -53,8 +53,8 @@ class Checker:
         pinhole : the camera of the picture, as its sidecar has it. stated : the four values it was made from. is_scenes :
         whether Cycles takes the camera that Blender chooses at this frame, as markers bind it, and not `camera_object`.
 
-        Returns `passed`, `verdict` and `figures` as Comparer.verdict does, and `not_modelled`: what both sides leave out, the
-        first few of it, a sentence each.
+        Returns what Comparer.verdict does, and in `ledger` what both sides leave out or replace, a sentence for each of the
+        first few.
 
         Raises
         ------
@@ -71,7 +71,7 @@ class Checker:
         data = camera_object.evaluated_get(datablocks.depsgraph_of(scene)).data
         clip = data.clip_start, data.clip_end
         said = self._comparer.verdict(self._files.file_of(export.scene), image, pinhole, clip, stated)
-        return said | {"not_modelled": _told(export.scene.ledger)}
+        return said | {"ledger": _told(export.scene.ledger)}
 
     def __enter__(self) -> "Checker":
         return self
@@ -81,6 +81,6 @@ class Checker:
 
 
 def _told(ledger: tuple[LedgerEntry, ...]) -> list[str]:
-    lacking = [f"{entry.object}: {entry.reason}" for entry in ledger if entry.status != "exported"]
+    lacking = [f"{entry.object}: {entry.reason}" for entry in ledger if not entry.is_modelled]
     more = [f"and {len(lacking) - _MOST_TOLD} more, which viewcam check tells"] if len(lacking) > _MOST_TOLD else []
     return lacking[:_MOST_TOLD] + more
