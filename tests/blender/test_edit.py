@@ -73,14 +73,14 @@ def test_an_edit_passes_few_functions_and_none_calls_upward(posed_camera, name, 
     assert len(functions) <= MOST, sorted(functions)
 
 
-def first_calls_of(action):
-    """The rooms of blender/, and camera_values, in the order in which a call enters them first."""
+def calls_of(action):
+    """(module, function) of this package as a call enters them, in order."""
     entered = []
 
     def note(frame, event, _argument):
         path = Path(frame.f_code.co_filename)
-        if event == "call" and PACKAGE in path.parents and path.stem not in entered:
-            entered.append(path.stem)
+        if event == "call" and PACKAGE in path.parents:
+            entered.append((path.stem, frame.f_code.co_name))
 
     sys.setprofile(note)
     try:
@@ -90,15 +90,16 @@ def first_calls_of(action):
     return entered
 
 
-def test_an_edit_enters_the_rooms_in_the_order_in_which_contributing_names_them(posed_camera):
+def test_an_edit_goes_the_way_that_contributing_says(posed_camera):
     posed_camera.virtual_pinhole.eye = (7, -6, 5.5)
     bpy.context.view_layer.update()
-    entered = first_calls_of(lambda: setattr(posed_camera.virtual_pinhole, "eye", (7, -6, 6)))
     page = (PACKAGE.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
-    lines = re.findall(r"^\d\. (.*)$", page[page.index("An edit of a value") :].split("\n\n")[1], re.MULTILINE)
-    named = ["camera_values" if "CameraValues.pinhole" in line else re.search(r"(\w+)\.py", line)[1] for line in lines]
-    assert named == ["properties", "camera", "storage", "camera_values", "conversion"]
-    assert [room for room in entered if room in named] == named
+    lines = page[page.index("An edit of a value") :].split("\n\n")[1].splitlines()
+    way = [re.search(r"(\w+)\.py`: `(\w+)`", line).groups() for line in lines]
+    assert len(way) == 5 and way[0][0] == "properties"
+    entered = calls_of(lambda: setattr(posed_camera.virtual_pinhole, "eye", (7, -6, 6)))
+    firsts = [entered.index(step) for step in way]
+    assert firsts == sorted(firsts), f"{way} are entered at {firsts}"
 
 
 def test_a_move_in_blender_comes_back_without_a_call_upward(posed_camera):

@@ -106,7 +106,7 @@ def store(block: bpy.types.bpy_struct, **properties: float | tuple[float, ...]) 
     """Set what Blender does not hold already. It evaluates and draws anew what is set, and for a lens looks at all objects."""
     for name, value in properties.items():
         held = getattr(block, name)
-        if np.float32(value).tolist() != (held if isinstance(held, float) else list(held)):
+        if np.array(value, dtype=np.float32).tolist() != (held if isinstance(held, float) else list(held)):
             setattr(block, name, value)
 
 
