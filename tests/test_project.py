@@ -35,6 +35,7 @@ ROOMS = {
     "junit": "checks files",
     "png": "",
     "child_process": "errors events",
+    "usd_stage": "errors child_process",
     "crashes": "",
     "exact": "",
     "pinhole": "errors checks exact",
@@ -46,21 +47,22 @@ ROOMS = {
     "image": "errors memory files terminal pinhole",
     "intrinsics": "errors checks pinhole",
     "camera_values": "errors checks pinhole roll intrinsics",
-    "cameras": "errors checks files pinhole intrinsics",
+    "cameras": "errors checks files usd_stage pinhole intrinsics",
     "comparison": "errors files html_page pinhole image png",
     "tracer": "errors checks memory files pinhole image",
     "labels": "errors files png pinhole image cameras tracer",
     "api": "errors child_process image comparison tracer labels",
     "pytest_plugin": "errors junit api",
-    "shots": "errors checks files terminal pinhole moves tracer",
-    "batch": ("errors checks files events html_page child_process pinhole image cameras comparison tracer labels shots"),
+    "jobs": (
+        "errors checks files terminal events html_page child_process pinhole moves image cameras comparison tracer labels"
+    ),
     "blender": (
         "errors checks files terminal html_page child_process png pinhole roll rotation moves diagram photo_match image "
-        "intrinsics camera_values cameras comparison tracer labels shots batch"
+        "intrinsics camera_values cameras comparison tracer labels jobs"
     ),
     "commands": (
         "errors files terminal argument_types events crashes child_process pinhole image cameras comparison tracer labels "
-        "api shots batch"
+        "api jobs"
     ),
     "cli": "errors checks files junit events argument_types tracer commands",
 }
@@ -74,24 +76,25 @@ BLENDER_ROOMS = {
     "render_settings": "",
     "preferences": "render_settings",
     "datablocks": "versions",
-    "storage": "versions datablocks",
-    "targets": "versions datablocks storage",
-    "hold": "versions storage targets",
     "pose": "",
+    "conversion": "findings datablocks pose",
+    "storage": "versions datablocks",
+    "targets": "versions datablocks pose storage",
+    "hold": "versions storage targets",
     "causes": "versions findings datablocks storage pose",
-    "camera": "findings preferences datablocks storage targets hold pose causes",
+    "camera": "findings preferences datablocks pose conversion storage targets hold causes",
     "properties": "datablocks storage targets camera",
     "resolution": "datablocks storage camera",
     "dataset_cameras": "opening datablocks camera",
     "own_picture": "",
-    "animation": "versions datablocks storage targets camera resolution",
-    "scenes": "versions temporary_settings another_blender picture findings datablocks pose camera",
+    "animation": "datablocks storage targets camera resolution",
+    "scenes": "versions temporary_settings another_blender picture findings datablocks pose conversion camera",
     "rendering": "versions temporary_settings another_blender opening datablocks resolution scenes",
     "interface": (
         "versions temporary_settings picture findings render_settings preferences datablocks storage targets hold causes "
-        "pose camera own_picture scenes rendering"
+        "pose conversion camera own_picture scenes rendering"
     ),
-    "batch": "versions temporary_settings opening datablocks camera resolution scenes rendering",
+    "jobs": "versions temporary_settings opening datablocks camera resolution scenes rendering",
 }
 # Inside the tracer a room may import from all those before it.
 TRACER_FLOORS = ["scene", "tiles", "native", "render"]

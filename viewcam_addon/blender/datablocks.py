@@ -2,6 +2,7 @@
 
 import functools
 import math
+from collections.abc import Iterable
 
 import bpy
 
@@ -28,10 +29,29 @@ def _no_perspective(camera_object: bpy.types.Object) -> InputError:
     return InputError(f"camera {camera_object.name!r} is {kind}, no pinhole: set its lens type to Perspective")
 
 
+_VALUES = "virtual_pinhole."
+
+
 def is_animated(camera_object: bpy.types.Object) -> bool:
     """Whether a keyframe, an NLA strip or a driver changes one of the values of the Virtual Pinhole, or a target does."""
     curves = [*versions.animation_curves(camera_object), *versions.drivers(camera_object)]
-    return any(curve.data_path.startswith("virtual_pinhole.") for curve in curves)
+    return any(curve.data_path.startswith(_VALUES) for curve in curves)
+
+
+def animated_values(camera_object: bpy.types.Object) -> set[str]:
+    """The names of the values that keyframes, NLA strips or drivers change; a point that follows a target is one of them."""
+    curves = [*versions.animation_curves(camera_object), *versions.drivers(camera_object)]
+    found = {(curve.data_path.removeprefix(_VALUES), curve.array_index) for curve in curves if _counts(curve)}
+    return {("eye", "look_at")[index] if name == "followed" else name for name, index in found}
+
+
+def has_driven_values(camera_object: bpy.types.Object) -> bool:
+    """Whether a driver, such as that of a target, has a say in the values."""
+    return any(curve.data_path.startswith(_VALUES) for curve in versions.drivers(camera_object))
+
+
+def _counts(curve: bpy.types.FCurve) -> bool:
+    return curve.data_path.startswith(_VALUES) and not versions.is_muted(curve)
 
 
 # What is checked once is not checked again as a camera moves.
@@ -84,23 +104,43 @@ def length(value: float, scene: bpy.types.Scene, digits: int = 6) -> str:
     """A length in world units as the scene's units say it; a bare number without them, and where Blender would say zero."""
     units = scene.unit_settings
     metres = value * units.scale_length
-    if units.system == "NONE" or not _SHORTEST_WORD <= metres < math.inf:
+    if units.system == "NONE" or not _SHORTEST_WORD <= abs(metres) < math.inf:
         return f"{value:.{digits}g}"
     return bpy.utils.units.to_string(units.system, "LENGTH", metres, precision=digits)
 
 
 def render_camera(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """The camera that a render of the current frame takes: where markers are bound to cameras, theirs and not the scene's."""
-    bound = [marker for marker in scene.timeline_markers if marker.camera and not marker.camera.hide_render]
+    return bound_camera(bindings_of(scene), scene.frame_current) or scene.camera
+
+
+def require_render_camera(scene: bpy.types.Scene) -> bpy.types.Object:
+    """`render_camera`, or InputError where there is none."""
+    camera_object = render_camera(scene)
+    if camera_object is None:
+        raise InputError(f"scene {scene.name!r} has no camera: add one, or name one with --camera")
+    return camera_object
+
+
+def bindings_of(scene: bpy.types.Scene) -> list[tuple[bpy.types.TimelineMarker, bpy.types.Object]]:
+    """The markers that are bound to cameras, and these."""
+    return [(marker, marker.camera) for marker in scene.timeline_markers if marker.camera]
+
+
+def bound_camera(bindings: Iterable[tuple[bpy.types.TimelineMarker, bpy.types.Object]], frame: int) -> bpy.types.Object | None:
+    """The camera that markers bind at a frame, as Blender has it: the last one's before it, else the first one's of all.
+
+    Those that are hidden in renders bind nothing. None where no marker does.
+    """
+    bound = [(marker.frame, camera_object) for marker, camera_object in bindings if not camera_object.hide_render]
+    before = [each for each in bound if each[0] <= frame]
     if not bound:
-        return scene.camera
-    # As Blender has it: the last one before the frame, else the first of all.
-    before = [marker for marker in bound if marker.frame <= scene.frame_current]
-    return (max(before, key=_frame) if before else min(bound, key=_frame)).camera
+        return None
+    return (max(before, key=_frame) if before else min(bound, key=_frame))[1]
 
 
-def _frame(marker: bpy.types.TimelineMarker) -> int:
-    return marker.frame
+def _frame(binding: tuple[int, bpy.types.Object]) -> int:
+    return binding[0]
 
 
 def depsgraph_of(scene: bpy.types.Scene) -> bpy.types.Depsgraph:

@@ -157,6 +157,8 @@ def test_two_cameras_of_one_distance_share_their_data(posed_camera, scene, odd):
 
 
 def keep_above(camera_object, height):
+    """Though the values say otherwise, at every frame."""
+    camera_object.virtual_pinhole.keyframe_insert("eye", frame=1)
     constraint = camera_object.constraints.new("LIMIT_LOCATION")
     constraint.use_min_z, constraint.min_z = True, height
 
@@ -235,6 +237,20 @@ def test_a_marker_chooses_the_camera_of_its_frame(both_sides, posed_camera, add_
     assert [marker.camera for marker in scene.timeline_markers] == [other, posed_camera]
     scene.frame_set(4)
     odd.check(posed_camera)
+
+
+def test_a_camera_that_blender_would_not_choose_at_its_marker_is_a_difference(
+    both_sides, posed_camera, add_camera, scene, monkeypatch
+):
+    """Cycles was given the camera that the tracer had."""
+    other = add_camera("Other")
+    other.location = (0, 0, 8)
+    bpy.ops.mesh.primitive_monkey_add(size=3)
+    scene.timeline_markers.new("Other", frame=1).camera = other
+    both_sides().check()
+    monkeypatch.setattr(datablocks, "bound_camera", lambda *_: posed_camera)
+    with pytest.raises(AssertionError):
+        both_sides().check()
 
 
 def test_a_camera_that_is_named_is_rendered_though_a_marker_chooses_another(both_sides, posed_camera, add_camera, scene):

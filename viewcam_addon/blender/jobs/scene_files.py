@@ -1,0 +1,87 @@
+"""The scene as files for processes beside this one, which check and label a batch's shots.
+
+It is exported anew for another frame, camera object or size of the picture, and for each shot where more may change: in a batch
+nothing else does. It is written when other things are in it than in those that are there already.
+"""
+
+import contextlib
+import functools
+import tempfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import bpy
+
+from ...tracer.scene import Scene, scene_file
+from ...tracer.scene.sameness import same_things
+from .. import datablocks
+from ..scenes.export import export_scene
+from ..scenes.ledger import Ledger
+from . import persistent_data
+
+
+@dataclass(frozen=True, eq=False)
+class Export:
+    """state : of Blender, when the scene was exported. ledger : what it found, with the remedies for Cycles."""
+
+    state: tuple
+    scene: Scene
+    ledger: Ledger
+
+
+class SceneFiles:
+    """Scenes of one file, the last few of them kept; a context manager. most : how many.
+
+    The file must stay as it is between two exports but for cameras and what shots say.
+    """
+
+    def __init__(self, most: int = 1) -> None:
+        self._most = most
+        self._ends = contextlib.ExitStack()
+        self._exports: list[Export] = []
+        self._files: list[tuple[Scene, Path]] = []
+        self._written = 0
+
+    def exported(self, scene: bpy.types.Scene, layer: bpy.types.ViewLayer, camera_object: bpy.types.Object) -> Export:
+        """The scene as it is now, from a former shot if it can be no other."""
+        state = scene.frame_current, scene.frame_subframe, camera_object.name, datablocks.frame_of(scene)
+        if self._changes:
+            self._exports.clear()
+        found = next((each for each in self._exports if each.state == state), None)
+        if found is None:
+            ledger = Ledger()
+            seen = export_scene(scene, layer, camera_object, ledger)
+            found = Export(state, seen, ledger)
+            self._exports = [*self._exports[-self._most + 1 :], found] if self._most > 1 else [found]
+        return found
+
+    def file_of(self, scene: Scene) -> Path:
+        """A file of the scene, one that is there if the same things are in it; cameras don't count."""
+        for known, path in self._files:
+            if same_things(scene, known):
+                return path
+        while len(self._files) >= self._most:
+            _, former = self._files.pop(0)
+            former.unlink(missing_ok=True)
+            former.with_suffix(".npz").unlink(missing_ok=True)
+        self._written += 1
+        path = self.folder / f"scene-{self._written}.json"
+        scene_file.write(replace(scene, ledger=()), path)
+        self._files.append((scene, path))
+        return path
+
+    @functools.cached_property
+    def folder(self) -> Path:
+        """A temporary one, made when it is first needed: most batches need none."""
+        made = tempfile.TemporaryDirectory(prefix="viewcam-", ignore_cleanup_errors=True)
+        return Path(self._ends.enter_context(made))
+
+    @functools.cached_property
+    def _changes(self) -> bool:
+        return persistent_data.changes_between_renders()
+
+    def __enter__(self) -> "SceneFiles":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ends.close()
