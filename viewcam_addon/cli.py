@@ -222,6 +222,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
             "--scene", metavar="SCENE.json", type=Path, help="the reference's scene: explains silhouettes, brings the ledger"
         )
         strict(added, "if anything in the picture is not modelled")
+        added.add_argument("--everything", type=Path, help=argparse.SUPPRESS)  # Cycles' picture without stand-ins
         # Cycles' file counts one that is left out.
         added.add_argument("--test-samples", type=types.positive, help=argparse.SUPPRESS)
         words = "what TEST.exr holds, made elsewhere: position=P.X,P.Y,P.Z depth=Z; also distance, normal, uv, object-index"
