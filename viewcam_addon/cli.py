@@ -388,7 +388,9 @@ def _write_result(options: argparse.Namespace, status: int, result: dict[str, An
             from . import checks
 
             with written_whole(options.json) as temporary:
-                temporary.write_text(json.dumps(checks.for_json(result), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+                temporary.write_text(
+                    json.dumps(checks.for_json(result), indent=2, allow_nan=False) + "\n", encoding="utf-8", newline="\n"
+                )
         if path := getattr(options, "junit", None):
             from . import junit
 

@@ -131,7 +131,11 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     with _in_a_sentence(path):
         file = _replaceable(path)
         if file:
-            folder = next(folder for folder in file.absolute().parents if os.path.lexists(folder))
+            folder = next((folder for folder in file.absolute().parents if os.path.lexists(folder)), None)
+            if folder is None:  # of Windows alone
+                raise InputError(
+                    f"{path} is on the drive or share {file.absolute().anchor}, which is not there: choose another"
+                )
             temporary = _beside(file, folder)
             try:
                 temporary.touch(exist_ok=False)
@@ -169,6 +173,8 @@ def _replaceable(path: Path) -> Path | None:
         there = os.stat(path)
     except FileNotFoundError:
         there = None
+    except ValueError as error:  # a character 0; on Windows, one that is too long, too
+        raise InputError(f"{ascii(str(path))[:100]} is no name that a file can have: give another") from error
     if there is not None:
         kind = stat.S_IFMT(there.st_mode)
         if kind == stat.S_IFDIR:

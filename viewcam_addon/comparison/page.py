@@ -82,7 +82,7 @@ def write(folder: str | os.PathLike[str], template: str, values: Mapping[str, An
         raise InputError(f"{path.parent} is a file: give a folder for the report")
     text = html_page.filled(f"comparison/{template}", **values)
     with written_whole(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8", newline="\n")
     return path
 
 
