@@ -1,4 +1,5 @@
-"""What all formats of a camera's text share: the place of an error, comments, numbers in any punctuation, the picture.
+"""Functions that all formats of a camera's text share: the place of an error, comments, numbers in any punctuation, the
+picture.
 
 Every expression goes over the text once: where one of its parts ends, what comes next is of other characters, so that nothing
 is tried twice and no text takes long.
