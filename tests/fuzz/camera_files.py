@@ -107,7 +107,8 @@ def files() -> dict[str, Mapping[str, str | bytes]]:
     xml += "</K><image_width>640</image_width><image_height>480</image_height></opencv_storage>"
     dictionary = "{'type': 'perspective', 'fov': 40, 'to_world': mi.ScalarTransform4f().look_at(origin=[1, 2, 3], "
     dictionary += "target=[0, 0, 0], up=[0, 0, 1]), 'film': {'type': 'hdrfilm', 'width': 640, 'height': 360}}"
-    pov = "#version 3.7;\n#declare E = <7,-6,4>;\ncamera { location E right -x*4/3 up y angle 40 sky z look_at <0,0,1> rotate 5*y }"
+    pov = "#version 3.7;\n#declare E = <7,-6,4>;\n"
+    pov += "camera { location E right -x*4/3 up y angle 40 sky z look_at <0,0,1> rotate 5*y }"
     written = {
         name: {f"a{cameras.FORMATS[name].SUFFIX}": _several(name, SHIFTED, PLAIN)}
         for name in ("transforms", "bop", "usd", "three_js", "matrices", "look_at")

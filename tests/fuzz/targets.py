@@ -372,6 +372,17 @@ def cameras_of(name: str) -> Feed:
     return feed
 
 
+def cameras_of_all() -> Feed:
+    """One mutant of each format after another, but for those that take their time in a process of their own."""
+    names = [name for name in CAMERAS if f"cameras-{name}" not in IN_A_PROCESS]
+    feeds = [cameras_of(name) for name in names]
+
+    def feed(chance: random.Random, folder: Path) -> None:
+        feeds[int(folder.name.rpartition("-")[2]) % len(feeds)](chance, folder)
+
+    return feed
+
+
 def _mutant(data: bytes, other: bytes, chance: random.Random) -> bytes:
     if data[:2] == b"PK":
         return mutants.of_zip(data, other, chance)
@@ -461,7 +472,7 @@ CAMERAS = (
 )
 """The kinds of camera_files.py, which makes them only when it is asked."""
 
-KINDS |= {f"cameras-{name}": partial(cameras_of, name) for name in CAMERAS}
+KINDS |= {f"cameras-{name}": partial(cameras_of, name) for name in CAMERAS} | {"cameras-all": cameras_of_all}
 KINDS |= {kind: partial(broken, kind) for kind in ("bug", "crash", "hang", "greedy")}
 
 
