@@ -8,6 +8,10 @@
 #   make test-matrix   the tests with Blender 4.2 (and 5.2 where there is a Python 3.13) as wheels; those of Blender with 4.5 and 5.0
 #   make test-light    whole pictures of light, 1024 samples a pixel, against Cycles of each of these
 #   make test-blender  the extension in a real Blender 5.2: $BLENDER, or blender on the PATH, or Debian's in a folder of its own
+#   make test-windows  the add-on on Windows, which wine stands for: with Blender 4.2 and 5.0 for Windows, and the suite inside
+#   make test-windows-smoke  what is quick of it: the core's pictures, and the wheels of the zip in 4.2
+#   make test-arm64    the core's bits on Linux for arm64, under qemu
+#   make test-zips     all zips and the libraries in them against what their platforms' loaders and Blenders' installers ask
 #   make extension     dist/virtual_pinhole-VERSION-PLATFORM.zip for artists, built by that Blender
 #   make artist-pictures  docs/images/artists anew, by a tour in that Blender's window
 #   make scenes        sample_scenes/*.blend anew, by Blender 4.2
@@ -16,7 +20,7 @@
 #   make bench-guard   whether the tracer has become slower than it was, as a share of bare Embree's speed; a minute or two
 #   make clean         removes all that these made, but for ~/.cache/virtual-pinhole
 
-.PHONY: demo quick test test-fresh test-exhaustive test-sanitizers lint test-matrix test-light test-blender extension artist-pictures scenes charts bench bench-guard clean
+.PHONY: demo quick test test-fresh test-exhaustive test-sanitizers lint test-matrix test-light test-blender test-windows test-windows-smoke test-windows-suite test-arm64 test-zips extension artist-pictures scenes charts bench bench-guard clean
 .DELETE_ON_ERROR:
 
 # bpy has wheels for these two only.
@@ -87,6 +91,11 @@ lint: .venv/test
 	.venv/bin/python -c 'import bpy'
 	touch $@ .venv/demo
 
+# What makes zips, beside the tests of them.
+.venv/zips: .venv/test
+	$(PYTHON_FOUND) .ci/environment.py .venv --editable '.[extension]'
+	touch $@
+
 # One environment for each Blender, with the NumPy that this Blender brings along where the wheel leaves it open.
 wheel-4.2 = bpy==4.2.23 numpy==1.24.*
 wheel-4.5 = bpy==4.5.15
@@ -140,9 +149,35 @@ test-light-%: .venvs/%/ready
 .PRECIOUS: .venvs/%/ready
 
 # The zip built by a real Blender, in that Blender and in those that are wheels; and the panel in a window.
-test-blender: .venv/test $(WHEELS:%=.venvs/%/ready)
+test-blender: .venv/zips $(WHEELS:%=.venvs/%/ready)
 	BLENDER=$$(.ci/find-blender) || exit 1; export BLENDER; \
 	.venv/bin/python -m pytest --numprocesses=2 --dist=loadfile --no-loadscope-reorder tests/real_blender
+
+# Python for Windows and for arm64 lie in ~/.cache/virtual-pinhole/emulated, made once: .ci/emulated.py.
+PLATFORMS = $(call PYTEST,.venv) -m platforms
+
+test-windows: .venv/zips
+	$(PLATFORMS) tests/platforms/test_windows.py
+	$(MAKE) test-windows-suite
+
+test-windows-smoke: .venv/zips
+	$(PLATFORMS) tests/platforms/test_windows.py -k smoke
+
+# What touches Blender with both; with the newer one also what is quick and what of files, processes and consoles is Windows' own.
+WINDOWS_PYTEST = -m pytest -p no:cacheprovider --numprocesses=2 --dist=loadfile --hypothesis-profile=quick
+WINDOWS_OWN = tests/tracer/test_c_interface.py tests/test_files.py tests/test_child_process.py tests/test_terminal.py tests/test_cli.py \
+	tests/test_crashes.py tests/jobs tests/labels tests/commands
+test-windows-suite: .venv/zips
+	status=0; \
+	.venv/bin/python .ci/emulated.py windows-5.0 $(WINDOWS_PYTEST) $(sort $(QUICK) $(WINDOWS_OWN) tests/blender) || status=1; \
+	.venv/bin/python .ci/emulated.py windows-4.2 $(WINDOWS_PYTEST) tests/blender || status=1; \
+	exit $$status
+
+test-arm64: .venv/zips
+	$(PLATFORMS) tests/platforms/test_arm64.py
+
+test-zips: .venv/zips extension
+	$(PLATFORMS) tests/platforms/test_wheels.py tests/platforms/test_libraries.py tests/platforms/test_zips.py
 
 extension: .venv/extension
 	blender=$$(.ci/find-blender) || exit 1; \

@@ -4,9 +4,10 @@ The core (viewcam_addon/tracer/core) is a library with a plain C interface: it k
 It travels as a package of its own, `viewcam_core`, which holds nothing else: inside the project's wheel when pip installs that,
 editable or not, and as a wheel beside the extension's others, since Blender takes binaries as wheels only.
 
-The system's C++20 compiler ($CXX, c++, g++, clang++) compiles for this machine; where there is none, and for other platforms,
-ziglang does, a clang with the headers of every system that pip installs. Compiled once for each instruction set of x86-64 that
-it chooses among at run time; a library is kept in build/core/ under a name that tells what it was made from.
+The system's C++20 compiler ($CXX, c++, g++, clang++) compiles for this machine; where there is none, and for other machines,
+ziglang does, a clang with the headers of every system that pip installs: what GCC links here asks for this machine's C library,
+and Blender itself asks for that of 2018. Compiled once for each instruction set of x86-64 that it chooses among at run time; a
+library is kept in build/core/ under a name that tells what it was made from.
 
 Rejected: an extension module (one for each Python and platform), CMake and scikit-build-core (a dozen lines of build rules, and
 a second tool where there is no compiler), -ffast-math and -march=native (pictures' bits would depend on the machine).
@@ -17,6 +18,7 @@ import base64
 import concurrent.futures
 import functools
 import hashlib
+import inspect
 import os
 import platform as machine
 import shutil
@@ -70,13 +72,16 @@ def system_compiler() -> str | None:
     return None
 
 
-def build_core(platform: str, flags: tuple[str, ...] = ()) -> Path:
-    """The library for a platform, compiled where it is not there yet. flags : more of them, as sanitizers need."""
-    compiler = system_compiler() if platform == this_platform() else None
+def build_core(platform: str, flags: tuple[str, ...] = (), travels: bool = False) -> Path:
+    """The library for a platform, compiled where it is not there yet.
+
+    flags : more of them, as sanitizers need. travels : by ziglang, for machines whose C library is older than this one's.
+    """
+    compiler = system_compiler() if platform == this_platform() and not travels else None
     target, _, name = PLATFORMS[platform]
     command = [compiler] if compiler else [sys.executable, "-m", "ziglang", "c++", "-target", target]
     command += [*FLAGS, *([] if platform.startswith("windows") else ["-fPIC"]), *flags]
-    made_from = hashlib.sha256(repr(command).encode() + Path(__file__).read_bytes())
+    made_from = hashlib.sha256((repr(command) + inspect.getsource(_compiled)).encode())
     for path in sorted(path for path in CORE.rglob("*") if path.suffix in (".h", ".cpp")):
         made_from.update(f"{path.relative_to(CORE)}\0".encode() + path.read_bytes())
     library = ROOT / "build" / "core" / f"{platform}-{made_from.hexdigest()[:16]}" / name
@@ -124,7 +129,7 @@ def _run(command: list[str]) -> None:
 
 def core_wheel(platform: str, folder: Path) -> Path:
     """A wheel that holds the library and nothing else, for all Pythons of a platform; what Blender's extension brings along."""
-    library = build_core(platform)
+    library = build_core(platform, travels=True)
     version = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))["version"]
     tag = f"py3-none-{PLATFORMS[platform][1]}"
     info = f"{PACKAGE}-{version}.dist-info"

@@ -3,7 +3,6 @@
 import importlib.util
 import json
 import os
-import resource
 import shutil
 import signal
 import subprocess
@@ -238,6 +237,8 @@ def test_wrong_usage_is_one_line_that_says_where_help_is(capfd, words, expected)
 
 
 def limit_files_to_4_kilobytes():
+    import resource
+
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
 

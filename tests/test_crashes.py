@@ -80,8 +80,9 @@ def test_a_status_of_its_own_is_passed_on(run):
 WAIT = "import os, time\nopen('waits', 'w').write(str(os.getpid()))\nos.replace('waits', 'waiting')\ntime.sleep(600)"
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
-def test_whoever_ends_the_command_ends_blender(run, tmp_path, number):
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGKILL"])
+def test_whoever_ends_the_command_ends_blender(run, tmp_path, name):
+    number = getattr(signal, name)
     if number == signal.SIGKILL and sys.platform != "linux":
         pytest.skip("only Linux tells a process that its parent was killed")
     child = run(WAIT, "check", "file.blend")

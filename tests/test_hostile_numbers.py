@@ -70,7 +70,7 @@ class Random:
 
     def __init__(self, seed, count=1 << 16):
         random = np.random.default_rng(seed)
-        sized = np.ldexp(random.uniform(-1, 1, count), random.integers(-1022, 1024, count))
+        sized = np.ldexp(random.uniform(-1, 1, count), random.integers(-1022, 1024, count, np.int32))
         kinds = random.random(count)
         usual = random.normal(size=count) * 10
         numbers = np.where(kinds < 0.33, usual, np.where(kinds < 0.66, sized, random.choice(EXTREMES, count))).tolist()

@@ -120,13 +120,12 @@ def poses_apart(random, exponents):
 
     def vectors(exponents):
         mixed = random.integers(0, 2, (len(exponents), 1)) * random.integers(-300, 1, (len(exponents), 3))
-        return np.ldexp(random.uniform(-1, 1, (len(exponents), 3)), exponents[:, None] + mixed)
+        return np.ldexp(random.uniform(-1, 1, (len(exponents), 3)), (exponents[:, None] + mixed).astype(np.int32))
 
     apart, up = vectors(exponents), vectors(random.integers(-1074, 1024, len(exponents)))
     near_up = random.integers(0, 3, (len(exponents), 1)) == 0  # a third of the views is close to up
-    up = np.where(
-        near_up, np.ldexp(apart * random.uniform(1, 1 + 1e-12, apart.shape), np.where(exponents > 0, -1000, 1000)[:, None]), up
-    )
+    moved = np.where(exponents > 0, -1000, 1000)[:, None].astype(np.int32)
+    up = np.where(near_up, np.ldexp(apart * random.uniform(1, 1 + 1e-12, apart.shape), moved), up)
     halved = random.integers(0, 2, (len(exponents), 1)) == 1
     eye = np.where(halved, apart / 2, apart)
     look_at = np.where(halved, -apart / 2, random.choice([0.0, 5e-324], apart.shape))

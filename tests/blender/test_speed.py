@@ -6,7 +6,6 @@ machines count on both sides; what matters is counted.
 
 import gc
 import itertools
-import resource
 import sys
 import time
 from dataclasses import replace
@@ -298,7 +297,11 @@ def kept():
 
 
 def largest_memory():
-    """Bytes: the most that this process has ever had."""
+    """Bytes: the most that this process has ever had. 0 on Windows, where nothing can be said of it."""
+    if sys.platform == "win32":
+        return 0
+    import resource
+
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
 
 

@@ -11,6 +11,8 @@ import pytest
 from viewcam_addon import child_process
 
 pytest.importorskip("distributed")
+if sys.platform == "win32":
+    pytest.skip("Windows has neither groups of processes nor SIGKILL, and /proc is Linux's", allow_module_level=True)
 
 # A batch on two workers in a process that can be killed. Arguments: the file, the folder, names of shots.
 COORDINATOR = """

@@ -13,9 +13,8 @@ def this_library() -> Path:
     return library
 
 
-def thread_storage(library: Path) -> tuple[int, int]:
-    """(bytes, alignment) of the thread_local objects that each thread of the process is given with an ELF or PE library."""
-    binary = lief.parse(library)
+def thread_storage(binary: lief.ELF.Binary | lief.PE.Binary) -> tuple[int, int]:
+    """(bytes, alignment) of the thread_local objects that each thread of the process is given with a library."""
     if isinstance(binary, lief.PE.Binary):
         if not binary.has_tls:
             return 0, 1
@@ -28,6 +27,6 @@ def thread_storage(library: Path) -> tuple[int, int]:
 
 def test_no_thread_local_object_of_the_core_asks_for_more_than_malloc_aligns_to():
     """wine 8's loader and that of Windows before 8.1 place thread storage at 16 bytes, whatever it asks for."""
-    size, alignment = thread_storage(this_library())
+    size, alignment = thread_storage(lief.parse(this_library()))
     assert alignment <= 16, f"{alignment} bytes"
     assert 0 < size <= 4096, f"every thread of Blender is given {size} bytes"

@@ -79,7 +79,7 @@ def test_the_mass_is_the_integral_of_the_density_from_0_to_1():
 
 def test_numbers_become_places_up_to_which_the_mass_is_the_number():
     """Exactly at the ends of the steps, the halvings' 64ths; between them by how far a cubic is off."""
-    ends = np.ldexp(1 + np.arange(64) / 64, np.arange(16)[:, None] - 17).ravel() - 2.0**-17
+    ends = np.ldexp(1 + np.arange(64) / 64, np.arange(16, dtype=np.int32)[:, None] - 17).ravel() - 2.0**-17
     np.testing.assert_allclose(mass(places(ends)), ends, atol=2e-15)
     np.testing.assert_allclose(mass(places(1 - ends[1:])), 1 - ends[1:], atol=2e-15)
     between = np.random.default_rng(1).random(100_000)
@@ -116,7 +116,7 @@ def test_a_gaussian_reaches_one_and_a_half_widths_to_either_side_and_is_symmetri
 
 def test_a_gaussian_is_cycles_own():
     """exp(−8 (v/f)²), where its mass is on paper; and no other: a hundredth wider is found."""
-    ends = np.ldexp(1 + np.arange(64) / 64, np.arange(16)[:, None] - 17).ravel() - 2.0**-17
+    ends = np.ldexp(1 + np.arange(64) / 64, np.arange(16, dtype=np.int32)[:, None] - 17).ravel() - 2.0**-17
     x = gaussian_places(ends)
     np.testing.assert_allclose(gaussian_mass(x), ends, atol=2e-15)
     np.testing.assert_allclose(gaussian_mass(gaussian_places(1 - ends[1:])), 1 - ends[1:], atol=2e-15)
