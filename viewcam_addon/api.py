@@ -114,6 +114,7 @@ def compare(
     test_samples: int | None = None,
     renderer: "Renderer | None" = None,
     partial: bool = False,
+    everything: Image | File | None = None,
 ) -> "GeometryComparison | RadianceComparison":
     """What a picture differs from the tracer's by, how much, and whether it is explained.
 
@@ -121,37 +122,52 @@ def compare(
     scene : what the reference shows, with which pixels on edges are traced again. Without it none of them is explained.
     test_samples : of each test picture, where that is not what its file tells. renderer : who made it, one of
     comparison.renderers; Cycles by default. partial : of geometry, whether it may lack passes: Depth, Distance or Position is
-    enough.
+    enough. everything : Cycles' picture with all that the scene's ledger says is not modelled, of the first test's seed; it
+    tells on how much of the picture that is.
 
-    Returns geometry's comparison or that of light: `.passed`, `.sentence`, `.lines()`, `.to_json()`.
+    Returns geometry's comparison or that of light: `.answer`, `.passed`, `.sentence`, `.lines()`, `.to_json()`.
 
     Raises
     ------
     InputError
-        if sizes differ, a pass is missing, the camera is not known, or several pictures have no noise to tell.
+        if sizes differ, a pass is missing, the camera is not known, several pictures have no noise to tell, or no pixel of
+        either picture shows an object.
     """
     from .comparison import geometry, radiance, renderers
+    from .comparison.everything import not_modelled
 
     several = tests if isinstance(tests, Sequence) and not isinstance(tests, str) else [tests]
     if files := [each for each in (reference, *several) if not isinstance(each, Image)]:
         images.check_same_frames(files)
     of = reference if isinstance(reference, Image) else images.read(reference)
+    whole = everything if everything is None or isinstance(everything, Image) else images.read(everything)
     pictures = [each if isinstance(each, Image) else images.read(each) for each in several]
     scene = scene if scene is None or isinstance(scene, Scene) else read_scene(scene)
     camera = of.camera or (scene.camera if scene else None)
     if camera is None:
         raise InputError(f"{of.source} does not tell its camera: give its scene with --scene, or trace it with viewcam render")
+    # The picture may be of another size than the scene says, or of the stated camera.
+    shown = scene and replace(scene, camera=camera)
     if radiance.carries_light(of):
-        return radiance.compare(of, pictures, camera, test_samples)
+        lit = radiance.compare(of, pictures, camera, test_samples)
+        if shown is None or not (names := shown.not_modelled):
+            return lit
+        surfaces = tracing.Tracer(shown, threads).pixels_of(names)
+        return replace(lit, not_modelled=not_modelled(names, surfaces, of, pictures, whole, camera))
     if len(pictures) != 1:
         raise InputError(f"{of.source} has no noise that several pictures could tell: compare it with one")
     by = renderer or renderers.CYCLES
-    if scene is None:
-        return geometry.compare(of, pictures[0], camera, renderer=by, partial=partial)
-    # The picture may be of another size than the scene says, or of the stated camera.
-    surface_at = tracing.Tracer(replace(scene, camera=camera), threads).surface_at
-    stated = scene.stated_camera if camera == scene.camera else None
-    return geometry.compare(of, pictures[0], camera, surface_at, stated, scene.origin, by, partial)
+    if shown is None:
+        found = geometry.compare(of, pictures[0], camera, renderer=by, partial=partial)
+    else:
+        tracer = tracing.Tracer(shown, threads)
+        stated = shown.stated_camera if scene and camera == scene.camera else None
+        found = geometry.compare(of, pictures[0], camera, tracer.surface_at, stated, shown.origin, by, partial)
+        names = shown.not_modelled
+        found = replace(found, not_modelled=not_modelled(names, tracer.pixels_of(names), of, pictures, whole))
+    if found.shows_nothing:
+        raise InputError(found.sentence)
+    return found
 
 
 @dataclass(frozen=True)
@@ -159,16 +175,20 @@ class Check:
     """What `check` has found, or a comparison of files.
 
     passed : whether Cycles renders the camera, or the pictures are the same. sentence : by how much. figures : all that --json
-    writes.
+    writes. answer : one of "same", "same_but" (the same, but for objects that are not modelled) and "different".
     """
 
     passed: bool
     sentence: str
     figures: dict[str, Any]
 
+    @property
+    def answer(self) -> str:
+        return str(self.figures["answer"])
+
 
 def check(blend: File, *options: File) -> Check:
-    """Whether Cycles renders the camera of a .blend file, by `viewcam check` in a process of its own.
+    """True if Cycles renders the camera of a .blend file, by `viewcam check` in a process of its own.
 
     options : those of the command, as in `check("shot.blend", "--camera", "Camera", "--level", "direct")`.
 
@@ -188,9 +208,8 @@ def run(command: str, *words: File) -> Check:
         result, errors = Path(folder) / "result.json", _Errors()
         given = [str(word) for word in (*words, "--json", result)]
         status = child_process.run_viewcam(command, *given, tell_on=errors, apart_from=child_process.blender_scripts())
-        if status not in (0, 1):
+        if not result.exists() or "answer" not in (figures := json.loads(result.read_text(encoding="utf-8"))):
             raise InputError(errors.last or f"viewcam {command} ended with status {status} and without a word")
-        figures = json.loads(result.read_text(encoding="utf-8"))
     return Check(status == 0, figures["sentence"], figures)
 
 

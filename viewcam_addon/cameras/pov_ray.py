@@ -31,12 +31,12 @@ from .source import Source
 TITLE = "POV-Ray camera"
 SUFFIX = ".pov"
 
-_CAMERA = re.compile(r"\bcamera\s*+\{")
-_COMMENT = r"//[^\n]*+|/\*.*?(?:\*/|\Z)"
-_DECLARE = re.compile(r"#\s*+(?:declare|local)\s++(\w++)\s*+=\s*+")
-_CONDITION = re.compile(r"#\s*+(if|ifdef|ifndef|while|for|switch|macro|end)\b")
-_VERSION = re.compile(r"#\s*+version\s++(\d++(?:\.\d++)?+)")
-_WORD = re.compile(r"\s*+([A-Za-z_]\w*+)")
+_CAMERA = re.compile(r"\bcamera\s*\{")
+_COMMENT = r"//[^\n]*|/\*.*?(?:\*/|\Z)"
+_DECLARE = re.compile(r"#\s*(?:declare|local)\s+(\w+)\s*=\s*")
+_CONDITION = re.compile(r"#\s*(if|ifdef|ifndef|while|for|switch|macro|end)\b")
+_VERSION = re.compile(r"#\s*version\s+(\d+(?:\.\d+)?)")
+_WORD = re.compile(r"\s*([A-Za-z_]\w*)")
 _VECTORS = ("location", "right", "up", "direction", "sky", "look_at")
 _SIZE = (800, 600)
 _PARALLEL = 1e-10  # POV-Ray's EPSILON
@@ -47,7 +47,7 @@ _KINDS = (
 )
 _BLUR = ("blur_samples", "focal_point", "confidence", "variance", "bokeh", "aperture")
 _WORDS = "|".join((*_VECTORS, *_MOVES, *_KINDS, *_BLUR, "perspective", "angle"))
-_SAYS_CAMERA = re.compile(rf"\bcamera\s*+\{{\s*+(?:(?:{_WORDS})\b|(\w++)\s*+((?:{_WORDS})\b)?+)")
+_SAYS_CAMERA = re.compile(rf"\bcamera\s*\{{\s*(?:(?:{_WORDS})\b|(\w+)\s*((?:{_WORDS})\b)?)")
 _PIXELS = re.compile(r"\+([WwHh])(\d{1,6})\b")
 _UNITS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
@@ -258,7 +258,8 @@ class _Block:
         film = self._film(lengths[0] / lengths[1])
         size = (film.width, film.height)
         # A picture whose pixels nobody said has square ones, and a width that is whole: half a pixel may be missing there.
-        exact = size[0] if film.is_stated or self._aspect_of_film else size[1] * lengths[0] / lengths[1] / film.pixel_aspect
+        is_known = film.is_stated or self._aspect_of_film or self._is_given
+        exact = size[0] if is_known else size[1] * lengths[0] / lengths[1] / film.pixel_aspect
         if "look_at" in said:
             look_at = said["look_at"]
             plane = axes.view_plane(
@@ -282,9 +283,18 @@ class _Block:
         camera = Camera("Camera", pinhole, film.is_stated, (*film.notes, *notes))
         return texts.mirroring(camera, "POV-Ray")
 
+    @property
+    def _is_given(self) -> bool:
+        """True if somebody said which picture this camera is for."""
+        return self.size is None and self.options.size is not None and not self.options.size_fits
+
     def _film(self, aspect: float) -> texts.Film:
-        """The picture: any, if the text takes the shape of whatever it is; else one of the shape that right and up say."""
-        if self._aspect_of_film:
+        """The picture: any, if the text takes the shape of whatever it is; else one of the shape that right and up say.
+
+        A size that was given is the picture's, as in POV-Ray, whose pixels are not square then where right and up are of
+        another shape: +W640 +H480 with right 1.33 makes them 0.25 % too narrow.
+        """
+        if self._aspect_of_film or self._is_given:
             return self._filmed()
         return texts.film(self.options, "POV-Ray's camera", self.size, aspect, _SIZE)
 

@@ -1,4 +1,5 @@
-"""The part of YAML in which OpenCV, ROS and Kalibr write cameras: keys, numbers, texts, lists; blocks by indentation.
+"""The part of YAML in which OpenCV, ROS and Kalibr write cameras: keys, numbers, texts, lists; blocks by indentation or in
+brackets.
 
 What is not of it is left out, so that whoever looks for a key does not find it. Rejected: PyYAML, which refuses OpenCV's first
 line and tags, and which Blender's Python has not.
@@ -7,11 +8,10 @@ line and tags, and which Blender's Python has not.
 import re
 from typing import Any
 
-from ..errors import InputError
-
-_LINE = re.compile(r"(\s*+)(?:- )?([\"']?)([^:\"'#\[\]{}]++)\2\s*+:(?:\s++(.*))?$")
+_NO_KEY = re.compile(r"[\"'#\[\]{}]")
 _BRACKET = re.compile(r"[\[\]{}]")
-_ITEM = re.compile(r"(\s*+)-\s++(.*)$")
+_ITEM = re.compile(r"(\s*)-\s+(.*)$")
+_FLOW = re.compile(r"""[\[\]{},]|:(?=[\s\[\]{},"']|$)|"[^"]*"|'[^']*'|[^\s\[\]{},:"'](?:[^\[\]{},:]|:(?![\s\[\]{},"']|$))*""")
 _DEEPEST = 8
 
 
@@ -24,10 +24,9 @@ def read(text: str) -> dict[str, Any]:
         if (item := _ITEM.match(line)) and block is not None and len(item[1]) >= block[0]:
             block[1].append(_value(item[2].strip()))
             continue
-        found = _LINE.match(line)
-        if not found:
+        if not (found := _key(line)):
             continue
-        indent, key, value = len(found[1]), found[3].strip(), _without_tag((found[4] or "").strip())
+        indent, key, value = found
         while indent <= stack[-1][0]:
             stack.pop()
         holder, block = stack[-1][1], None
@@ -41,6 +40,17 @@ def read(text: str) -> dict[str, Any]:
     return _settled_blocks(root)
 
 
+def _key(line: str) -> tuple[int, str, str] | None:
+    """The blanks before a key, the key, and the value behind it; None if the line has no key."""
+    written = line.lstrip()
+    key, colon, value = written.removeprefix("- ").partition(":")
+    if key[:1] in ("'", '"') and key.rstrip()[1:].endswith(key[0]):
+        key = key.rstrip()[1:-1]
+    if not colon or not key or _NO_KEY.search(key) or not (value[:1].isspace() or not value):
+        return None
+    return len(line) - len(written), key.strip(), _without_tag(value.strip())
+
+
 def _settled_blocks(values: dict[str, Any]) -> dict[str, Any]:
     """The blocks as what they turned out to be: objects, or lists."""
     return {
@@ -50,7 +60,7 @@ def _settled_blocks(values: dict[str, Any]) -> dict[str, Any]:
 
 
 class _Block(dict):
-    """What stands below a key: keys of its own, or the items of a list."""
+    """The block below a key: keys of its own, or the items of a list."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -80,10 +90,10 @@ def _without_tag(value: str) -> str:
 
 
 def _value(text: str) -> Any:
-    if text.startswith("["):
+    if text[:1] in ("[", "{"):
         try:
-            return _list(text)
-        except InputError:
+            return _flow(text)
+        except ValueError:
             return text
     try:
         return float(text) if "_" not in text else text.strip("\"'")
@@ -91,5 +101,47 @@ def _value(text: str) -> Any:
         return text.strip("\"'")
 
 
-def _list(text: str) -> list:
-    return [_value(part.strip()) for part in re.sub(r"[\[\]]", " ", text).split(",") if part.strip()]
+def _flow(text: str) -> Any:
+    """The value of what stands in brackets, [a, b] or {a: b}, which may be nested.
+
+    Raises
+    ------
+    ValueError
+        if the brackets do not fit together, or are nested too deeply.
+    """
+    opened: list[list | dict] = []
+    keys: list[str | None] = []  # of each object, the one whose value comes next
+    whole: Any = None
+    for token in _FLOW.findall(text):
+        if whole is not None or (not opened and token not in ("[", "{")) or len(opened) > _DEEPEST:
+            raise ValueError
+        if token in ("[", "{"):
+            opened.append([] if token == "[" else {})
+            keys.append(None)
+        elif token in ("]", "}"):
+            value, _ = opened.pop(), keys.pop()
+            if isinstance(value, list) != (token == "]"):
+                raise ValueError
+            if opened:
+                _put(opened[-1], keys, value)
+            else:
+                whole = value
+        elif token in (",", ":"):
+            continue
+        elif isinstance(opened[-1], dict) and keys[-1] is None:
+            keys[-1] = token.strip("\"' ")
+        else:
+            _put(opened[-1], keys, _value(_without_tag(token.strip())))
+    if whole is None:
+        raise ValueError
+    return whole
+
+
+def _put(holder: list | dict, keys: list[str | None], value: Any) -> None:
+    if isinstance(holder, list):
+        holder.append(value)
+    elif keys[-1] is None:
+        raise ValueError
+    else:
+        holder[keys[-1]] = value
+        keys[-1] = None

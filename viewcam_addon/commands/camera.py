@@ -55,7 +55,7 @@ def add_reading_options(added: argparse._ActionsContainer, size: bool = True) ->
 
 
 def options_of(options: argparse.Namespace) -> Options:
-    """What the options on reading say, which `viewcam batch` has, too."""
+    """The choices of the options on reading, which `viewcam batch` has, too."""
     plane = None
     if options.distance is not None:
         if options.size is None:
@@ -115,7 +115,7 @@ def _said(camera: Camera) -> dict:
 
 def _line(camera: Camera) -> str:
     pinhole = camera.pinhole
-    e, l = (", ".join(f"{number:.6g}" for number in point) for point in (pinhole.eye, pinhole.look_at))
+    e, l = (", ".join(f"{number + 0.0:.6g}" for number in point) for point in (pinhole.eye, pinhole.look_at))
     d = " × ".join(f"{number:.6g}" for number in dict.fromkeys(pinhole.distance))
     c = ", ".join(f"{number:.6g}" for number in pinhole.principal_point)
     shifted = "" if pinhole.principal_point == (pinhole.width / 2, pinhole.height / 2) else f", principal point {c}"

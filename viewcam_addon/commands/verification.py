@@ -31,7 +31,7 @@ def export(options: argparse.Namespace) -> Result:
     from ..tracer.scene import scene_file
 
     with silent_libraries():
-        scene = blender_room("rendering.job").export(_request(options))
+        scene = blender_room("rendering.job").export(_request(options, options.strict))
     scene_file.write(scene, options.scene)
     say(*_ledger_lines(scene.ledger))
     result = {"scene": str(options.scene), "ledger": _ledger_json(scene.ledger)}
@@ -75,7 +75,7 @@ def render(options: argparse.Namespace) -> Result:
 
 def cycles(options: argparse.Namespace) -> Result:
     with silent_libraries():
-        ledger = blender_room("rendering.job").render(_request(options), options.image)
+        ledger = blender_room("rendering.job").render(_request(options, options.strict), options.image)
     say(*_ledger_lines(ledger))
     return 0, {"image": str(options.image), "ledger": _ledger_json(ledger)}
 
@@ -95,7 +95,8 @@ def compare(options: argparse.Namespace) -> Result:
         tests, (renderer, *_) = zip(*map(renderers.read, options.tests), strict=True)
     partial = bool(options.channels) or renderer is not renderers.CYCLES
     scene = api.read_scene(options.scene) if options.scene else None
-    comparison = api.compare(reference, tests, scene, options.threads, options.test_samples, renderer, partial)
+    of = reference, tests, scene, options.threads, options.test_samples, renderer, partial
+    comparison = api.compare(*of, everything=options.everything)
     if partial:
         tests = [renderers.completed(test, comparison.pinhole) for test in tests]
     ledger = scene.ledger if scene else ()
@@ -109,7 +110,7 @@ def compare(options: argparse.Namespace) -> Result:
         result["difference"] = difference.write(comparison, options.difference)
     if options.sides:
         difference.write_sides(comparison, reference, tests if is_light else [tests], options.sides)
-    return 0 if comparison.passed else 1, result
+    return comparison.answer.exit_status(options.strict), result
 
 
 def _stated(channels: Sequence[tuple[str, list[str]]]) -> dict[str, list[str]]:
@@ -133,7 +134,9 @@ def check(options: argparse.Namespace) -> Result:
         name = options.engine.lower()
         tests = [folder / f"{name}-{i + 1}.exr" for i in range(count)] if count > 1 else [folder / f"{name}.exr"]
         numbered = {} if options.scene is None else {"numbered": _numbered(options.scene)}
-        level = _export_and_render(options, scene, tests, engine=options.engine, device=options.device, **numbered)
+        everything = folder / "everything.exr"
+        everything.unlink(missing_ok=True)
+        level = _export_and_render(options, scene, tests, everything, engine=options.engine, device=options.device, **numbered)
         size = []
         if options.scene:
             scene, size = options.scene, ["--size", "x".join(map(str, options.size))] if options.size else []
@@ -151,6 +154,8 @@ def check(options: argparse.Namespace) -> Result:
             if (to := getattr(options, flag))
             for word in (f"--{flag}", str(to))
         ]
+        outputs += ["--strict"] if options.strict else []
+        outputs += ["--everything", str(everything)] if everything.exists() else []
         outputs += ["--test-samples", str(max(options.samples // count, 1)), "--repeat", options.repeat or options.words]
         if level == "geometry":
             tests = tests[:1]
@@ -180,20 +185,22 @@ def _numbered(scene_path: Path) -> tuple[str, ...]:
     return tuple(kind for kind, has in has_numbers.items() if has)
 
 
-def _export_and_render(options: argparse.Namespace, scene_path: Path, image_paths: Sequence[Path], **more: Any) -> str:
+def _export_and_render(
+    options: argparse.Namespace, scene_path: Path, image_paths: Sequence[Path], everything: Path, **more: Any
+) -> str:
     """What of a check needs Blender: both sides from one evaluated state, under one numbering of the indices.
 
-    more : of the request. Returns the level, the least one where that is asked for.
+    everything : as in job.export_and_render. more : of the request. Returns the level, the least one where that is asked for.
     """
     from ..tracer.scene import scene_file
 
     started = time.perf_counter()
 
     def rendering(number: int) -> None:
-        options.events.tell("step", name="rendering", number=number, of=len(image_paths))
+        options.events.tell("step", name="rendering", number=number, of=max(number, len(image_paths)))
 
     with silent_libraries():
-        scene = blender_room("rendering.job").export_and_render(_request(options, **more), image_paths, rendering)
+        scene = blender_room("rendering.job").export_and_render(_request(options, **more), image_paths, rendering, everything)
     scene_file.write(scene, scene_path)
     say(f"exported and rendered with {options.engine.capitalize()} in {time.perf_counter() - started:.1f} s")
     return _told_level(scene)["level"] if options.level == "auto" else options.level
@@ -208,13 +215,14 @@ def _told_level(scene: Any) -> dict[str, str]:
     return {"level": level, "reason": reason}
 
 
-def _request(options: argparse.Namespace, **more: Any) -> Any:
+def _request(options: argparse.Namespace, strict: bool = False, **more: Any) -> Any:
+    """strict : whether anything of the file that is not modelled ends it; where pictures are compared, theirs alone counts."""
     return blender_room("rendering.job").Request(
         blend=options.blend,
         camera=options.camera,
         frame=options.frame,
         size=options.size,
-        strict=options.strict,
+        strict=strict,
         recenter=options.recenter,
         threads=options.threads,
         level=options.level,
@@ -227,8 +235,8 @@ def _request(options: argparse.Namespace, **more: Any) -> Any:
 
 
 def _ledger_lines(ledger: Sequence[Any]) -> list[str]:
-    exported = sum(entry.status == "exported" for entry in ledger)
-    rest = [f"  {entry.status}: {entry.object}: {entry.reason}" for entry in ledger if entry.status != "exported"]
+    exported = sum(entry.is_modelled for entry in ledger)
+    rest = [f"  {entry.status}: {entry.object}: {entry.reason}" for entry in ledger if not entry.is_modelled]
     return [f"{exported} of {len(ledger)} objects exported whole", *rest] if ledger else []
 
 

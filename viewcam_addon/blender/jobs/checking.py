@@ -12,6 +12,7 @@ once more; and to ask Blender what has changed, as our engine does, since giving
 """
 
 import contextlib
+import functools
 from typing import Any
 
 import bpy
@@ -53,8 +54,8 @@ class Checker:
         pinhole : the camera of the picture, as its sidecar has it. stated : the four values it was made from. is_scenes :
         whether Cycles takes the camera that Blender chooses at this frame, as markers bind it, and not `camera_object`.
 
-        Returns `passed`, `verdict` and `figures` as Comparer.verdict does, and `not_modelled`: what both sides leave out, the
-        first few of it, a sentence each.
+        Returns what Comparer.verdict does, and in `ledger` what both sides leave out or replace, a sentence for each of the
+        first few.
 
         Raises
         ------
@@ -67,11 +68,17 @@ class Checker:
                 overrides.set(scene.render, "use_border", False)
             export = self._files.exported(scene, layer, camera_object)
             of = None if is_scenes else camera_object
-            cycles.render(scene, layer, of, image, export.remedies, self._threads, keep=True)
+            ledger, render = export.ledger, functools.partial(cycles.render, scene, layer, of)
+            render(image, ledger.remedies.values(), self._threads, keep=True)
+            names, everything = export.scene.not_modelled, None
+            if names:
+                everything = self._files.folder / "everything.exr"
+                render(everything, ledger.remedies_of_everything, self._threads, keep=True, everything=True)
         data = camera_object.evaluated_get(datablocks.depsgraph_of(scene)).data
         clip = data.clip_start, data.clip_end
-        said = self._comparer.verdict(self._files.file_of(export.scene), image, pinhole, clip, stated)
-        return said | {"not_modelled": _told(export.scene.ledger)}
+        path = self._files.file_of(export.scene)
+        said = self._comparer.verdict(path, image, pinhole, clip, stated, names, everything)
+        return said | {"ledger": _told(export.scene.ledger)}
 
     def __enter__(self) -> "Checker":
         return self
@@ -81,6 +88,6 @@ class Checker:
 
 
 def _told(ledger: tuple[LedgerEntry, ...]) -> list[str]:
-    lacking = [f"{entry.object}: {entry.reason}" for entry in ledger if entry.status != "exported"]
+    lacking = [f"{entry.object}: {entry.reason}" for entry in ledger if not entry.is_modelled]
     more = [f"and {len(lacking) - _MOST_TOLD} more, which viewcam check tells"] if len(lacking) > _MOST_TOLD else []
     return lacking[:_MOST_TOLD] + more

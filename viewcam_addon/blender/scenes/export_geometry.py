@@ -11,7 +11,8 @@ corner. Blender's corner normals also stop at an edge whose faces are wound agai
 not: there no vertex is split.
 """
 
-from collections.abc import Collection
+import contextlib
+from collections.abc import Collection, Iterator
 
 import bpy
 import numpy as np
@@ -70,6 +71,25 @@ def mesh_of(mesh: bpy.types.Mesh, slot_count: int, has_colours: bool = False, at
     )
 
 
+@contextlib.contextmanager
+def mesh_shown(shown: bpy.types.Object, split: bool = False) -> Iterator[bpy.types.Mesh]:
+    """The mesh of an object or an instance in a depsgraph, as it is there, or a copy that lasts as long as the context.
+
+    What is edited is no mesh before it is copied. split : copies one that Cycles splits, too, and splits the copy.
+    """
+    mesh = shown.data
+    if not (mesh.is_editmode or (split and is_split(mesh))):
+        yield mesh
+        return
+    copy = shown.to_mesh()
+    try:
+        if split and is_split(copy):
+            copy.split_faces()
+        yield copy
+    finally:
+        shown.to_mesh_clear()
+
+
 def spheres_of(points: bpy.types.PointCloud) -> Spheres:
     """The points of an evaluated point cloud, object space. Cycles gives all of them the first material."""
     centers = _attribute(points, "position", "vector", np.float32, 3)
@@ -93,10 +113,7 @@ def materials_of(mesh: bpy.types.Mesh, slot_count: int) -> Array:
 
 
 def is_split(mesh: bpy.types.Mesh) -> bool:
-    """Whether Cycles splits the vertices of an evaluated mesh, as `mesh.split_faces()` does, before it reads anything of it.
-
-    Of a mesh that is split already this is true, too.
-    """
+    """True if Cycles splits the vertices of an evaluated mesh, as `mesh.split_faces()` does, or would if they were not yet."""
     return versions.CYCLES_HAS_VERTEX_NORMALS and mesh.normals_domain == "CORNER" and not _only_faces_are_sharp(mesh)
 
 
@@ -127,7 +144,7 @@ def _last_of_each(numbers: Array) -> Array:
 
 
 def _only_faces_are_sharp(mesh: bpy.types.Mesh) -> bool:
-    """Whether in a mesh of corner normals flat faces stand beside smooth ones, without sharp edges and custom normals."""
+    """True if in a mesh of corner normals flat faces stand beside smooth ones, without sharp edges and custom normals."""
     if mesh.has_custom_normals:
         return False
     edges = _attribute(mesh, "sharp_edge", "value", np.bool_, domain="EDGE")
