@@ -23,7 +23,8 @@ def choose_the_unit():
     place = yield from find("virtual_pinhole.focal_length")
     for unit in UNITS:
         assert values().lens_unit == unit and camera().data.lens == lens
-        field = {"MILLIMETERS": "focal_length", "PIXELS": "distance"}.get(unit, "field_of_view")
+        sides = {"HORIZONTAL": "horizontal_fov", "VERTICAL": "vertical_fov", "DIAGONAL": "diagonal_fov"}
+        field = {"MILLIMETERS": "focal_length", "PIXELS": "distance", **sides}[unit]
         assert (yield from look(*place, SIDEBAR)) == f"virtual_pinhole.{field}"
         yield from picture(f"lens_{unit.lower()}", SIDEBAR)
         if unit != UNITS[-1]:
