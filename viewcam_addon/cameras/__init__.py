@@ -261,7 +261,7 @@ def _to_the_bit(cameras: list[Camera], stated: list[Pinhole], module: ModuleType
 
 
 def _read_again(pinholes: list[Pinhole], writer: ModuleType, reader: ModuleType, options: Options) -> list[Camera]:
-    """What is read of these pinholes where they are written; nothing if they can't be."""
+    """The cameras that are read of these pinholes once they are written; nothing if they can't be."""
     if not hasattr(writer, "write"):
         return []
     try:

@@ -202,7 +202,7 @@ class _Code:
         self.reader = Expressions(self.text, self._name)
 
     def _may_say(self, parts: list[str], sign: str) -> bool:
-        """Whether a statement has a role, is one coordinate of what has one, or is a call that changes what others say."""
+        """True if a statement has a role, is one coordinate of what has one, or is a call that changes what others say."""
         if self._role(parts, sign):
             return True
         if len(parts) > 1 and parts[-1] in _COORDINATES and self._role(parts[:-1], sign) in _VECTORS:
@@ -385,7 +385,7 @@ class _Code:
         return said
 
     def _adds_camera(self, parts: list[str], sign: str, at: int) -> bool:
-        """Whether the statement makes a camera part of something else than the scene."""
+        """True if the statement makes a camera part of something else than the scene."""
         if sign != "(" or len(parts) < 2 or parts[-1] != "add" or "scene" in parts[-2].lower():
             return False
         added = re.match(r"\s*+([\w$.]++)\s*+[,)]", self.text[at : at + 200])
@@ -495,7 +495,7 @@ def _is_unknown(value: object) -> bool:
 
 
 def _looks_declared(text: str, opened: int) -> bool:
-    """Whether the brackets are the head of a function's definition."""
+    """True if the brackets are the head of a function's definition."""
     head = text[opened : opened + 2_000]
     try:
         end = texts.closing(head, 0, "()")

@@ -49,7 +49,7 @@ _SCALED = 1e-3  # of squared lengths, as Mitsuba's has_scale
 
 
 class _Sensor:
-    """What a sensor says, keys without capitals and underscores: `values` texts or numbers, `film` likewise, `to_world`."""
+    """The values of a sensor, keys without capitals and underscores: `values` texts or numbers, `film` likewise, `to_world`."""
 
     def __init__(self, kind: str, name: str, values: Mapping, film: Mapping | None, pose: "np.ndarray | _Look | None") -> None:
         self.kind, self.name, self.values, self.film, self.pose = kind, name, values, film, pose
@@ -223,7 +223,7 @@ def _in_xml(root: ElementTree.Element) -> Iterator[_Sensor]:
 
 
 def _elements(root: ElementTree.Element, tag: str) -> list[ElementTree.Element]:
-    """Those with the tag; in a sensor, as in a batch, only the outer one."""
+    """The elements with the tag; in a sensor, as in a batch, only the outer one."""
     if root.tag.lower() == tag:
         return [root]
     return [element for child in root for element in _elements(child, tag)]

@@ -57,7 +57,7 @@ def recognises(source: Source) -> bool:
 
 
 def _has_statement(text: str) -> bool:
-    """Whether a LookAt is followed by a number, or a Camera by the name of one."""
+    """True if a LookAt is followed by a number, or a Camera by the name of one."""
     return ("LookAt" in text or "Camera" in text) and bool(_STATEMENT.search(texts.without(_COMMENT, text[: 2**20])))
 
 
@@ -84,7 +84,7 @@ class _Transform(NamedTuple):
 
 
 class _Scene:
-    """What stands before WorldBegin."""
+    """The statements before WorldBegin."""
 
     def __init__(self, text: str) -> None:
         self.text = text

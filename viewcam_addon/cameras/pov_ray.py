@@ -285,7 +285,7 @@ class _Block:
 
     @property
     def _is_given(self) -> bool:
-        """Whether somebody said which picture this camera is for."""
+        """True if somebody said which picture this camera is for."""
         return self.size is None and self.options.size is not None and not self.options.size_fits
 
     def _film(self, aspect: float) -> texts.Film:

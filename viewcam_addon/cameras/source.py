@@ -1,4 +1,4 @@
-"""What cameras are read from: a text, a file or a folder, and safe ways into JSON, XML and YAML.
+"""Sources that cameras are read from: a text, a file or a folder, and safe ways into JSON, XML and YAML.
 
 Each is parsed once, whoever asks. JSON may have comments, as instant-ngp's has; keys that appear twice are refused, since
 nobody knows which counts. XML is read without a document type, entities or anything outside, and no deeper than 100 elements:
@@ -30,7 +30,7 @@ _TRAILING_COMMA = re.compile(r'"(?:[^"\\]|\\.)*+"|,(?=\s*+[\]}])')
 
 
 class Source:
-    """What was given: `path` of a file or folder, or None for a text; `data`, its bytes; `text`, its characters.
+    """A source that was given: `path` of a file or folder, or None for a text; `data`, its bytes; `text`, its characters.
 
     `parsed` is for formats whose content takes its time: what one has made of it, by its title.
 

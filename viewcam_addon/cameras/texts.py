@@ -1,4 +1,5 @@
-"""What all formats of a camera's text share: the place of an error, comments, numbers in any punctuation, the picture.
+"""Functions that all formats of a camera's text share: the place of an error, comments, numbers in any punctuation, the
+picture.
 
 Every pattern runs once over the text (possessive, or starting from a word), so that no text takes long.
 """

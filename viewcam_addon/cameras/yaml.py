@@ -50,7 +50,7 @@ def _settled_blocks(values: dict[str, Any]) -> dict[str, Any]:
 
 
 class _Block(dict):
-    """What stands below a key: keys of its own, or the items of a list."""
+    """The block below a key: keys of its own, or the items of a list."""
 
     def __init__(self) -> None:
         super().__init__()
