@@ -18,7 +18,7 @@ def tick_the_box():
 
 
 def choose_the_unit():
-    """Beside the lens, by the wheel over it: each unit has its field, which takes what is typed. A unit changes no lens."""
+    """Beside the lens, by the wheel over it: each unit has its field, which takes keyframes and what is typed. A unit changes no lens."""
     lens = camera().data.lens
     place = yield from find("virtual_pinhole.focal_length")
     for unit in UNITS:
@@ -27,18 +27,18 @@ def choose_the_unit():
         field = {"MILLIMETERS": "focal_length", "PIXELS": "distance", **sides}[unit]
         assert (yield from look(*place, SIDEBAR)) == f"virtual_pinhole.{field}"
         yield from picture(f"lens_{unit.lower()}", SIDEBAR)
+        press("I", *place)
+        yield
+        yield
+        keyed = [curve.data_path for curve in room("versions").action_curves(camera())]
+        assert keyed == [f"virtual_pinhole.{field}"], f"I over the field has keyed {keyed}"
+        yield from picture(f"lens_{unit.lower()}_keyed", SIDEBAR)
+        camera().animation_data_clear()
         if unit != UNITS[-1]:
             x = yield from _unit_in_row(place[1])
             window().event_simulate(type="WHEELDOWNMOUSE", value="PRESS", x=int(x), y=int(place[1]), ctrl=True)
             yield
             yield
-    yield from look(*place, SIDEBAR)
-    press("I", *place)
-    yield
-    yield
-    keyed = [curve.data_path for curve in room("versions").action_curves(camera())]
-    assert keyed == ["virtual_pinhole.distance"], f"I over the field has keyed {keyed}"
-    camera().animation_data_clear()
     values().lens_unit = "HORIZONTAL"
     yield
     yield from click(*place)

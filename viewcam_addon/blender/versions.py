@@ -60,8 +60,9 @@ def without_first_sample(samples: int) -> dict[str, object]:
     return {"use_sample_subset": True, "sample_offset": 1, "sample_subset_length": samples, "samples": samples + 1}
 
 
-def stored_properties(group: bpy.types.PropertyGroup) -> Any:
-    """What a property group stores, by name. What is set here calls nothing, and no evaluation follows it."""
+def stored_values(camera_object: bpy.types.Object) -> Any:
+    """What `virtual_pinhole` stores, by name. What is set here calls nothing, and no evaluation follows it."""
+    group = camera_object.virtual_pinhole
     return group if bpy.app.version < (5, 0) else group.bl_system_properties_get(do_create=True)
 
 
