@@ -36,7 +36,7 @@ SUFFIX = ".yml"
 
 _K = ("k", "cameramatrix", "intrinsicmatrix", "intrinsics", "intrinsic", "mtx", "cammatrix", "camk", "kmatrix")
 _R = ("r", "rot", "rotation", "rmat", "rotationmatrix", "rw2c")
-_SAYS_K = re.compile(r"(?:k|matrix|intrinsics?|mtx)[\s_$\"'-]*+:", re.IGNORECASE)  # each of these
+_SAYS_K = re.compile(r"(?:k|matrix|intrinsics?|mtx)[\s_$\"'-]*:", re.IGNORECASE)  # each of these
 _RVEC = ("rvec", "rodrigues", "rotationvector", "rvecs")
 _T = ("t", "tvec", "translation", "translationvector", "trans", "tw2c")
 _EXTRINSIC = (
