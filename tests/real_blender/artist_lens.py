@@ -18,7 +18,7 @@ def tick_the_box():
 
 
 def choose_the_unit():
-    """Beside the lens, by the wheel over it: each unit has its field, which takes keyframes and what is typed. A unit changes no lens."""
+    """Beside the lens, by the wheel over it: each unit has its field, which takes keyframes. A unit changes no lens."""
     lens = camera().data.lens
     place = yield from find("virtual_pinhole.focal_length")
     for unit in UNITS:
