@@ -134,4 +134,4 @@ def test_auto_keying_keys_the_lens_in_the_unit_in_which_it_is_keyed(posed_camera
 
 def test_what_is_asked_of_a_look_is_saved_as_its_value_alone(posed_camera):
     posed_camera.virtual_pinhole.focal_length = 42.0
-    assert "asked" not in versions.stored_values(posed_camera)
+    assert "asked" not in versions.stored_properties(posed_camera.virtual_pinhole)

@@ -96,7 +96,7 @@ def ask(camera_object: bpy.types.Object, look: str, number: float) -> None:
 
     Blender sets curves and drivers as it evaluates them, in any order, when nothing may be computed: the value follows later.
     """
-    stored = versions.stored_values(camera_object)
+    stored = versions.stored_properties(camera_object.virtual_pinhole)
     if _ASKED not in stored:
         stored[_ASKED] = {}
     stored[_ASKED][look] = number
@@ -104,13 +104,13 @@ def ask(camera_object: bpy.types.Object, look: str, number: float) -> None:
 
 def asked_of(camera_object: bpy.types.Object) -> dict[str, float]:
     """The looks at values that have been asked for and not been answered yet. The evaluated object may be given as well."""
-    stored = versions.stored_values(camera_object)
+    stored = versions.stored_properties(camera_object.virtual_pinhole)
     return stored[_ASKED].to_dict() if _ASKED in stored else {}
 
 
 def forget_asked(camera_object: bpy.types.Object, names: Collection[str]) -> None:
     """Take it that the looks at these values have been answered, or that the values themselves were set since."""
-    stored = versions.stored_values(camera_object)
+    stored = versions.stored_properties(camera_object.virtual_pinhole)
     if _ASKED in stored:
         left = {look: number for look, number in stored[_ASKED].items() if datablocks.LOOKS[look] not in names}
         del stored[_ASKED]

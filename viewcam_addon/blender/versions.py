@@ -60,10 +60,9 @@ def without_first_sample(samples: int) -> dict[str, object]:
     return {"use_sample_subset": True, "sample_offset": 1, "sample_subset_length": samples, "samples": samples + 1}
 
 
-def stored_values(camera_object: bpy.types.Object) -> Any:
-    """What `virtual_pinhole` stores, by name. What is set here calls nothing, and no evaluation follows it."""
-    group = camera_object.virtual_pinhole
-    return group if bpy.app.version < (5, 0) else group.bl_system_properties_get(do_create=True)
+def stored_properties(owner: bpy.types.bpy_struct) -> Any:
+    """What the add-on's properties of an owner hold, by name. What is set here calls nothing, and no evaluation follows it."""
+    return owner if bpy.app.version < (5, 0) else owner.bl_system_properties_get(do_create=True)
 
 
 def drivers(block: bpy.types.ID) -> list[bpy.types.FCurve]:
