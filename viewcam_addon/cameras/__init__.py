@@ -47,6 +47,7 @@ from ..files import written_whole
 from ..pinhole import Pinhole
 from . import (
     arkit,
+    arrays,
     bop,
     bundler,
     colmap,
@@ -78,7 +79,7 @@ from . import (
     vtk,
 )
 from .axes import moved, moved_back
-from .camera import ANGLES, AXES, PIXELS, Camera, Options, choose
+from .camera import ANGLES, AXES, PIXELS, POSES, Camera, Options, choose
 from .source import Source
 
 __all__ = [
@@ -86,6 +87,7 @@ __all__ = [
     "AXES",
     "FORMATS",
     "PIXELS",
+    "POSES",
     "Camera",
     "Options",
     "choose",
@@ -127,6 +129,7 @@ FORMATS: dict[str, ModuleType] = {
     "pbrt": pbrt,
     "matrices": matrices,
     "look_at": look_at,
+    "arrays": arrays,
     "text": own,
 }
 """Name → module, in the order in which they are asked."""
