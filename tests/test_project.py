@@ -50,20 +50,18 @@ ROOMS = {
     "comparison": "errors files html_page pinhole image png",
     "tracer": "errors checks memory files pinhole image",
     "labels": "errors files png pinhole image cameras tracer",
-    "api": "errors child_process image comparison tracer labels",
-    "pytest_plugin": "errors junit api",
+    "api": "errors image comparison tracer labels",
+    "pytest_plugin": "errors junit jobs",
     "jobs": (
-        "errors checks files terminal events html_page child_process pinhole moves image cameras comparison tracer labels"
+        "errors checks files terminal events argument_types html_page child_process pinhole moves image cameras comparison "
+        "tracer labels api"
     ),
     "blender": (
-        "errors checks files terminal html_page child_process png pinhole roll rotation moves diagram photo_match image "
+        "errors checks files terminal events html_page child_process png pinhole roll rotation moves diagram photo_match image "
         "intrinsics camera_values cameras comparison tracer labels jobs"
     ),
-    "commands": (
-        "errors files terminal argument_types events crashes child_process pinhole image cameras comparison tracer labels "
-        "api jobs"
-    ),
-    "cli": "errors checks files junit events argument_types tracer commands",
+    "commands": ("errors files terminal argument_types events crashes pinhole image cameras tracer labels api jobs"),
+    "cli": "errors checks files junit events argument_types tracer jobs commands",
 }
 BLENDER_ROOMS = {
     "versions": "",
@@ -87,10 +85,10 @@ BLENDER_ROOMS = {
     "own_picture": "",
     "animation": "versions datablocks storage targets camera resolution",
     "scenes": "versions temporary_settings another_blender picture findings datablocks pose camera",
-    "rendering": "versions temporary_settings another_blender opening datablocks resolution scenes",
+    "rendering": "versions temporary_settings another_blender datablocks scenes",
     "interface": (
         "versions temporary_settings picture findings render_settings preferences datablocks storage targets hold causes "
-        "pose camera own_picture scenes rendering"
+        "pose camera own_picture scenes rendering jobs"
     ),
     "jobs": "versions temporary_settings opening datablocks camera resolution scenes rendering",
 }

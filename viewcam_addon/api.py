@@ -1,17 +1,15 @@
 """What `import viewcam_addon as vp` gives: a camera, a picture traced of a scene, and what two pictures differ by.
 
 Everything here takes what is in memory or the path of a file, and gives what is in memory; the command line is made of the same
-functions. Nothing needs Blender but `check`, which runs it in a process of its own. Where Blender is a module of this process,
+functions. Nothing here needs Blender. Where Blender is a module of this process,
 no picture may be read from a file in it or written (image.py says why): those in memory may be compared.
 """
 
-import json
 import os
-import tempfile
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from . import image as images
 from .errors import InputError
@@ -49,6 +47,7 @@ def render(
     threads: int | None = None,
     error: float | None = None,
     watcher: tracing.Watcher | None = None,
+    keeper: tracing.Keeper | None = None,
 ) -> Image:
     """Trace a scene with the reference tracer.
 
@@ -56,7 +55,7 @@ def render(
     level : "geometry", "direct", "path", or "auto" for the least one that leaves nothing out.
     samples : of each pixel, at the levels of light. seed : another for other noise. threads : all cores where None.
     error : the standard error of each pixel, scene-linear, instead of a number of samples.
-    watcher : is told of rows that are done, and may stop it.
+    watcher : is told of rows that are done, and may stop it. keeper : of what scenes share that are traced one after another.
 
     Returns the passes by name, (height, width, channels) float32, rows from the bottom, with the camera.
 
@@ -67,7 +66,7 @@ def render(
     """
     scene = scene if isinstance(scene, Scene) else read_scene(scene)
     level = least_level(scene)[0] if level == "auto" else level
-    passes = tracing.render(scene, level, MOST_SAMPLES if error else samples, seed, threads, watcher, error)
+    passes = tracing.render(scene, level, MOST_SAMPLES if error else samples, seed, threads, watcher, error, keeper)
     attributes = {"software": "Virtual Pinhole", "level": level}
     if level != "geometry":
         if error:
@@ -114,6 +113,7 @@ def compare(
     test_samples: int | None = None,
     renderer: "Renderer | None" = None,
     partial: bool = False,
+    keeper: tracing.Keeper | None = None,
 ) -> "GeometryComparison | RadianceComparison":
     """What a picture differs from the tracer's by, how much, and whether it is explained.
 
@@ -121,7 +121,7 @@ def compare(
     scene : what the reference shows, with which pixels on edges are traced again. Without it none of them is explained.
     test_samples : of each test picture, where that is not what its file tells. renderer : who made it, one of
     comparison.renderers; Cycles by default. partial : of geometry, whether it may lack passes: Depth, Distance or Position is
-    enough.
+    enough. keeper : as of `render`.
 
     Returns geometry's comparison or that of light: `.passed`, `.sentence`, `.lines()`, `.to_json()`.
 
@@ -149,56 +149,6 @@ def compare(
     if scene is None:
         return geometry.compare(of, pictures[0], camera, renderer=by, partial=partial)
     # The picture may be of another size than the scene says, or of the stated camera.
-    surface_at = tracing.Tracer(replace(scene, camera=camera), threads).surface_at
+    surface_at = (keeper or tracing.Keeper()).tracer(replace(scene, camera=camera), threads).surface_at
     stated = scene.stated_camera if camera == scene.camera else None
     return geometry.compare(of, pictures[0], camera, surface_at, stated, scene.origin, by, partial)
-
-
-@dataclass(frozen=True)
-class Check:
-    """What `check` has found, or a comparison of files.
-
-    passed : whether Cycles renders the camera, or the pictures are the same. sentence : by how much. figures : all that --json
-    writes.
-    """
-
-    passed: bool
-    sentence: str
-    figures: dict[str, Any]
-
-
-def check(blend: File, *options: File) -> Check:
-    """Whether Cycles renders the camera of a .blend file, by `viewcam check` in a process of its own.
-
-    options : those of the command, as in `check("shot.blend", "--camera", "Camera", "--level", "direct")`.
-
-    Raises
-    ------
-    InputError
-        as the command does: no Blender, no such file or camera, no such option.
-    """
-    return run("check", blend, *options)
-
-
-def run(command: str, *words: File) -> Check:
-    """What `viewcam check` or `viewcam compare` finds, in a process of its own; raises as `check` does."""
-    from . import child_process
-
-    with tempfile.TemporaryDirectory(prefix="viewcam-") as folder:
-        result, errors = Path(folder) / "result.json", _Errors()
-        given = [str(word) for word in (*words, "--json", result)]
-        status = child_process.run_viewcam(command, *given, tell_on=errors, apart_from=child_process.blender_scripts())
-        if status not in (0, 1):
-            raise InputError(errors.last or f"viewcam {command} ended with status {status} and without a word")
-        figures = json.loads(result.read_text(encoding="utf-8"))
-    return Check(status == 0, figures["sentence"], figures)
-
-
-class _Errors:
-    """The last sentence of what goes wrong."""
-
-    last = ""
-
-    def tell(self, event: str, **fields: Any) -> None:
-        if event == "error":
-            self.last = fields["text"]

@@ -1,9 +1,9 @@
 """The contact sheet: every shot of a batch in one HTML page, in the folder beside the pictures.
 
 Thumbnails are the previews themselves, loaded when they come into view, and are shown larger by a click; EXR and sidecar are
-linked. The page holds no times, so that the same batch gives the same page; when it was made, the browser knows and says.
-Rejected: thumbnails inside the page, as reports have their pictures (ten thousand shots make a page that no browser opens), and
-smaller copies (a third file a shot).
+linked, and of a check without a picture its report. The page holds no times, so that the same batch gives the same page; when
+it was made, the browser knows and says. Rejected: thumbnails inside the page, as reports have their pictures (ten thousand
+shots make a page that no browser opens), and smaller copies (a third file a shot).
 
 A sidecar may be anybody's: all that it says is text here and nothing else, and no link leads out of the folder.
 """
@@ -61,7 +61,10 @@ def verdict(check: Mapping[str, Any] | None) -> str:
         return "not checked"
     if not check.get("passed"):
         return "differs"
-    largest = _part(_part(check, "figures"), "position").get("max")
+    figures = _part(check, "figures")
+    if figures.get("noisy"):
+        return "the same within noise"
+    largest = _part(figures, "position").get("max")
     return f"identical to {plain(largest)} px" if isinstance(largest, float) else "identical"
 
 
