@@ -35,6 +35,7 @@ ROOMS = {
     "junit": "checks files",
     "png": "",
     "child_process": "errors events",
+    "usd_stage": "errors child_process",
     "crashes": "",
     "exact": "",
     "pinhole": "errors checks exact",
@@ -46,7 +47,7 @@ ROOMS = {
     "image": "errors memory files terminal pinhole",
     "intrinsics": "errors checks pinhole",
     "camera_values": "errors checks pinhole roll intrinsics",
-    "cameras": "errors checks files pinhole intrinsics",
+    "cameras": "errors checks files usd_stage pinhole intrinsics",
     "comparison": "errors files html_page pinhole image png",
     "tracer": "errors checks memory files pinhole image",
     "labels": "errors files png pinhole image cameras tracer",
@@ -73,22 +74,23 @@ BLENDER_ROOMS = {
     "render_settings": "",
     "preferences": "render_settings",
     "datablocks": "versions",
-    "storage": "versions datablocks",
-    "targets": "versions datablocks storage",
-    "hold": "versions storage targets",
     "pose": "",
+    "conversion": "findings datablocks pose",
+    "storage": "versions datablocks",
+    "targets": "versions datablocks pose storage",
+    "hold": "versions storage targets",
     "causes": "versions findings datablocks storage pose",
-    "camera": "findings preferences datablocks storage targets hold pose causes",
+    "camera": "findings preferences datablocks pose conversion storage targets hold causes",
     "properties": "datablocks storage targets camera",
     "resolution": "datablocks storage camera",
     "dataset_cameras": "opening datablocks camera",
     "own_picture": "",
-    "animation": "versions datablocks storage targets camera resolution",
-    "scenes": "versions temporary_settings another_blender picture findings datablocks pose camera",
+    "animation": "datablocks storage targets camera resolution",
+    "scenes": "versions temporary_settings another_blender picture findings datablocks pose conversion camera",
     "rendering": "versions temporary_settings another_blender datablocks scenes",
     "interface": (
         "versions temporary_settings picture findings render_settings preferences datablocks storage targets hold causes "
-        "pose camera own_picture scenes rendering jobs"
+        "pose conversion camera own_picture scenes rendering jobs"
     ),
     "jobs": "versions temporary_settings opening datablocks camera resolution scenes rendering",
 }
@@ -202,7 +204,7 @@ def test_the_table_has_no_circle_and_no_arrow_that_nothing_uses():
         ("if TYPE_CHECKING:\n    from .blender import camera", "roll.py"),
         ("from .render import Tracer", "tracer/native.py"),
         ("from ..native import CoreScene", "tracer/scene/lamps.py"),
-        ("from .rendering import job", "blender/camera.py"),
+        ("from .rendering import cycles", "blender/camera.py"),
     ],
 )
 def test_an_import_that_is_not_in_the_table_is_seen(source, path):

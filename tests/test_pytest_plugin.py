@@ -47,7 +47,8 @@ def asked(monkeypatch):
             if "none.blend" in str(paths[0]):
                 raise InputError("none.blend is not there: give another")
             passed = "blue" not in str(paths[0])
-            figures = {"passed": passed, "passes": [{"name": "Depth", "max": 0.5}]}
+            answer = "same" if passed else "different"
+            figures = {"answer": answer, "passed": passed, "passes": [{"name": "Depth", "max": 0.5}]}
             return checks.Check(passed, "fine" if passed else VERDICT, figures)
 
         return call

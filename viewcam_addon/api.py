@@ -113,7 +113,9 @@ def compare(
     test_samples: int | None = None,
     renderer: "Renderer | None" = None,
     partial: bool = False,
+    everything: Image | File | None = None,
     keeper: tracing.Keeper | None = None,
+    may_be_empty: bool = False,
 ) -> "GeometryComparison | RadianceComparison":
     """What a picture differs from the tracer's by, how much, and whether it is explained.
 
@@ -121,34 +123,50 @@ def compare(
     scene : what the reference shows, with which pixels on edges are traced again. Without it none of them is explained.
     test_samples : of each test picture, where that is not what its file tells. renderer : who made it, one of
     comparison.renderers; Cycles by default. partial : of geometry, whether it may lack passes: Depth, Distance or Position is
-    enough. keeper : as of `render`.
+    enough. everything : Cycles' picture with all that the scene's ledger says is not modelled, of the first test's seed; it
+    tells on how much of the picture that is. keeper : as of `render`. may_be_empty : whether pictures that show no object are
+    different, and no error.
 
-    Returns geometry's comparison or that of light: `.passed`, `.sentence`, `.lines()`, `.to_json()`.
+    Returns geometry's comparison or that of light: `.answer`, `.passed`, `.sentence`, `.lines()`, `.to_json()`.
 
     Raises
     ------
     InputError
-        if sizes differ, a pass is missing, the camera is not known, or several pictures have no noise to tell.
+        if sizes differ, a pass is missing, the camera is not known, several pictures have no noise to tell, or no pixel of
+        either picture shows an object.
     """
     from .comparison import geometry, radiance, renderers
+    from .comparison.everything import not_modelled
 
     several = tests if isinstance(tests, Sequence) and not isinstance(tests, str) else [tests]
     if files := [each for each in (reference, *several) if not isinstance(each, Image)]:
         images.check_same_frames(files)
     of = reference if isinstance(reference, Image) else images.read(reference)
+    whole = everything if everything is None or isinstance(everything, Image) else images.read(everything)
     pictures = [each if isinstance(each, Image) else images.read(each) for each in several]
     scene = scene if scene is None or isinstance(scene, Scene) else read_scene(scene)
     camera = of.camera or (scene.camera if scene else None)
     if camera is None:
         raise InputError(f"{of.source} does not tell its camera: give its scene with --scene, or trace it with viewcam render")
+    # The picture may be of another size than the scene says, or of the stated camera.
+    shown = scene and replace(scene, camera=camera)
     if radiance.carries_light(of):
-        return radiance.compare(of, pictures, camera, test_samples)
+        lit = radiance.compare(of, pictures, camera, test_samples)
+        if shown is None or not (names := shown.not_modelled):
+            return lit
+        surfaces = (keeper or tracing.Keeper()).tracer(shown, threads).pixels_of(names)
+        return replace(lit, not_modelled=not_modelled(names, surfaces, of, pictures, whole, camera))
     if len(pictures) != 1:
         raise InputError(f"{of.source} has no noise that several pictures could tell: compare it with one")
     by = renderer or renderers.CYCLES
-    if scene is None:
-        return geometry.compare(of, pictures[0], camera, renderer=by, partial=partial)
-    # The picture may be of another size than the scene says, or of the stated camera.
-    surface_at = (keeper or tracing.Keeper()).tracer(replace(scene, camera=camera), threads).surface_at
-    stated = scene.stated_camera if camera == scene.camera else None
-    return geometry.compare(of, pictures[0], camera, surface_at, stated, scene.origin, by, partial)
+    if shown is None:
+        found = geometry.compare(of, pictures[0], camera, renderer=by, partial=partial)
+    else:
+        tracer = (keeper or tracing.Keeper()).tracer(shown, threads)
+        stated = shown.stated_camera if scene and camera == scene.camera else None
+        found = geometry.compare(of, pictures[0], camera, tracer.surface_at, stated, shown.origin, by, partial)
+        names = shown.not_modelled
+        found = replace(found, not_modelled=not_modelled(names, tracer.pixels_of(names), of, pictures, whole))
+    if found.shows_nothing and not may_be_empty:
+        raise InputError(found.sentence)
+    return found

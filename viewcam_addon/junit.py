@@ -44,7 +44,8 @@ def write(path: Path, words: str, status: int, result: Mapping[str, Any], second
     """Write one suite: one test, or one for each of the result's `shots`.
 
     path : the file. words : those of the command, the test's name, or the suite's of several. status : its exit status: 0
-    passed, 1 failed, another one an error. result : what --json writes, with `sentence` or `error`. seconds : it took.
+    passed, 1 failed, 3 failed where there is an `answer`, another one an error. result : what --json writes, with `sentence` or
+    `error`. seconds : it took.
 
     Raises
     ------
@@ -52,9 +53,14 @@ def write(path: Path, words: str, status: int, result: Mapping[str, Any], second
         if it can't be written.
     """
     if shots := result.get("shots"):
-        cases = [_case(shot["name"], *_outcome_of(shot), shot, shot.get("timing", {}).get("seconds", 0.0)) for shot in shots]
+        cases = [
+            _case(
+                shot["name"], *_outcome_of(shot, result.get("strict", False)), shot, shot.get("timing", {}).get("seconds", 0.0)
+            )
+            for shot in shots
+        ]
     else:
-        kind = {0: None, 1: "failure"}.get(status, "error")
+        kind = {0: None, 1: "failure", 3: "failure" if "answer" in result else "error"}.get(status, "error")
         cases = [_case(words, kind, result.get("error") or result.get("sentence") or f"exit status {status}", result, seconds)]
     kinds = [child.tag for case in cases for child in case]
     counts = {"errors": kinds.count("error"), "failures": kinds.count("failure"), "skipped": kinds.count("skipped")}
@@ -78,13 +84,18 @@ def _case(name: str, kind: str | None, sentence: str, figures: Mapping[str, Any]
     return case
 
 
-def _outcome_of(shot: Mapping[str, Any]) -> tuple[str | None, str]:
-    """What became of a shot of a summary, and why."""
+def _seconds(shot: Mapping[str, Any]) -> float:
+    return float(shot.get("timing", {}).get("seconds", 0.0))
+
+
+def _outcome_of(shot: Mapping[str, Any], strict: bool) -> tuple[str | None, str]:
+    """What became of a shot of a summary, and why. strict : whether what is not modelled fails it."""
     if shot["state"] == "failed":
         return "error", shot["error"]
     if shot["state"] == "left":
         return "skipped", "left to check"
-    return (None if shot.get("passed", True) else "failure"), shot.get("verdict", "")
+    passed = shot.get("passed", True) and not (strict and shot.get("answer") == "same_but")
+    return (None if passed else "failure"), shot.get("verdict", "")
 
 
 def _text(text: str) -> str:

@@ -44,7 +44,7 @@ NOT_RUN = {
     "viewcam chart scaling --only triangles": _LONG,
     "viewcam chart speed": _LONG,
     "viewcam chart stability --only roll spheres": _LONG,
-    "pip install 'virtual-pinhole[cluster]'": "what it installs is there where this test runs",
+    "pip install '/path/to/virtual-pinhole[cluster]'": "what it installs is there where this test runs",
     "dask scheduler --port 8786": "it does not end; tests/jobs/test_farm.py runs it",
     f"{_WITH} dask worker tcp://farm:8786 --nworkers 1 --nthreads 1": _FARM,
     f"{_WITH} viewcam batch /shared/shot.blend /shared/shots.csv --out /shared/renders --scheduler tcp://farm:8786": _FARM,

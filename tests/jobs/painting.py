@@ -65,7 +65,8 @@ class Painter:
 
     def check(self, shot, has_picture=True, written=None, keep=None):
         passed = shot.name not in self.unlike
-        return {"passed": passed, "verdict": "as stated" if passed else "the left half is < the right half"}
+        verdict = "as stated" if passed else "the left half is < the right half"
+        return {"passed": passed, "answer": "same" if passed else "different", "verdict": verdict}
 
 
 class Listener:

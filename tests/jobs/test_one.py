@@ -33,7 +33,7 @@ def test_a_shot_is_three_files_and_the_sidecar_says_what_they_are(folder, painti
     }
     assert (record["settings"], record["image"], record["preview"]) == ("a hash", "left.v2.exr", "left.v2.png")
     assert record["bytes"] == {"image": 192, "preview": 64}
-    assert record["check"] == {"passed": True, "verdict": "as stated"}
+    assert record["check"] == {"passed": True, "answer": "same", "verdict": "as stated"}
     assert record["rendered"] == {"width": 4, "height": 3}
     assert set(record["timing"]) == {"seconds", "finished"}
 

@@ -48,13 +48,28 @@ def test_each_shot_is_a_thumbnail_that_leads_to_its_files(tmp_path, painting):
     assert "3 shots" in found.text and "All are there." in found.text and "Only what went wrong" not in found.text
 
 
+def test_pictures_that_were_not_checked_have_no_tick_on_the_page(tmp_path, painting):
+    painting.paint(tmp_path / "unchecked", 2)
+    painting.paint(tmp_path / "checked", 2, check=True)
+    heads = {name: (tmp_path / name / "contact-sheet.html").read_text() for name in ("unchecked", "checked")}
+    assert 'class="unasked"' in heads["unchecked"] and 'aria-hidden="true"><path' not in heads["unchecked"]
+    assert 'class="same"' in heads["checked"] and 'aria-hidden="true"><path' in heads["checked"]
+
+
+def test_a_picture_of_which_not_all_is_modelled_makes_the_page_amber(tmp_path):
+    counts = {"shots": 2, "done": 2, "failed": 0, "left": 0, "checked": 2, "checks_failed": 0, "not_all_modelled": 1}
+    sheet.write(tmp_path / "sheet.html", [], counts)
+    text = (tmp_path / "sheet.html").read_text()
+    assert 'class="same_but"' in text and "1 the same but for objects that are not modelled" in text
+
+
 def test_what_went_wrong_is_told_by_name(tmp_path, painting):
     broken = {"shot_001": InputError("the lamp <Key & Fill> is broken: mend it")}
     painting.paint(tmp_path, 4, painter=painting.Painter(broken=broken, unlike=["shot_002"]), check=True)
     found = page(tmp_path)
     assert "3 are there, 1 failed, 1 not what the reference tracer sees." in found.text
     assert "the lamp <Key & Fill> is broken: mend it" in found.text and "the left half is < the right half" in found.text
-    assert "Only what went wrong" in found.text and "failed" in (tmp_path / "contact-sheet.html").read_text().split("\n")[1]
+    assert "Only what went wrong" in found.text and 'class="different"' in (tmp_path / "contact-sheet.html").read_text()
 
 
 def test_the_same_batch_gives_the_same_page(tmp_path, painting):
@@ -126,6 +141,9 @@ def test_each_picture_has_its_verdict_or_says_that_it_was_not_checked():
     assert "identical to 0.0003 px" in said(passed) and "not checked" not in said(passed)
     assert "identical" in said({**passed, "figures": {"position": {}}})
     assert "differs Another picture." in said({"passed": False, "verdict": "Another picture."})
+    but = {**passed, "answer": "same_but", "not_modelled": {"count": 2, "names": ["Hair", "Fog"], "share": 0.25}}
+    assert "identical to 0.0003 px, but for 2 objects that are not modelled" in said(but)
+    assert "class=but" in sheet.picture(Result("a", {**record, "check": but}))
     without_picture = {key: value for key, value in record.items() if key != "image"}
     assert "not checked" not in Page(sheet.picture(Result("a", without_picture))).text, "labels alone are no picture"
 
@@ -167,10 +185,11 @@ def test_whatever_a_sidecar_says_it_is_text_in_the_page(tmp_path, painting):
 
 
 def test_counts_are_what_the_exit_status_goes_by():
-    done, wrong = {"state": "done", "passed": True}, {"state": "done", "passed": False}
+    done, wrong = {"state": "done", "answer": "same"}, {"state": "done", "answer": "different"}
     failed, left = {"state": "failed"}, {"state": "left"}
     for shots, signal, status in [
         ([done], None, 0),
+        ([done, {"state": "done", "answer": "same_but"}], None, 0),
         ([done, wrong], None, 1),
         ([done, wrong, failed], None, 4),
         ([left], None, 4),

@@ -32,12 +32,15 @@ _TRAILING_COMMA = re.compile(r'"(?:[^"\\]|\\.)*+"|,(?=\s*+[\]}])')
 class Source:
     """What was given: `path` of a file or folder, or None for a text; `data`, its bytes; `text`, its characters.
 
+    `parsed` is for formats whose content takes its time: what one has made of it, by its title.
+
     given : a text or its bytes, the Path of a file or folder, or the files of a folder by their names.
     """
 
     def __init__(self, given: "str | bytes | Path | Mapping[str, str | bytes]") -> None:
         self.path = given if isinstance(given, Path) else None
         self._given = given
+        self.parsed: dict[str, Any] = {}
 
     @property
     def name(self) -> str:

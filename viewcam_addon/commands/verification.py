@@ -75,6 +75,7 @@ def cycles(options: argparse.Namespace) -> Result:
 
 
 def compare(options: argparse.Namespace) -> Result:
+    from ..comparison.answer import exit_status
     from ..jobs.tracing import Written, compare_files
 
     report, difference = (path and str(path) for path in (options.report, options.difference))
@@ -82,7 +83,7 @@ def compare(options: argparse.Namespace) -> Result:
     channels = dict(options.channels) if options.channels else None
     found = compare_files(options.reference, options.tests, options.scene, options.threads, channels, written)
     say(*ledger_lines(found["result"]["ledger"]), *found["lines"])
-    return 0 if found["passed"] else 1, found["result"]
+    return exit_status(found["answer"], options.strict), found["result"]
 
 
 def check(options: argparse.Namespace) -> Result:
@@ -107,6 +108,7 @@ def check_one(
     command: str = "",
 ) -> Result:
     """Check one job. report, difference, sides, command : as of tracing.Written; the report's folder keeps all pictures."""
+    from ..comparison.answer import exit_status
     from ..jobs.plan import Plan
     from ..jobs.tracing import Written
     from . import carry_out
@@ -122,7 +124,7 @@ def check_one(
     say(f"exported and rendered with {job.engine.capitalize()} in {seconds['rendered']:.1f} s")
     say(f"traced {width} × {height} pixels in {seconds['traced']:.2f} s")
     say(*ledger_lines(found["result"]["ledger"]), *found["lines"])
-    return 0 if found["passed"] else 1, found["result"]
+    return exit_status(found["answer"], job.strict), found["result"]
 
 
 def _check_many(options: argparse.Namespace, job: Any) -> Result:
@@ -159,7 +161,8 @@ def _check_many(options: argparse.Namespace, job: Any) -> Result:
             command="check",
         )
         summary = carry_out(plan, jobs_of, options.events, complete)
-    return summary.exit_status, summary.to_json()
+    status = summary.exit_status or (3 if options.strict and summary.counts["not_all_modelled"] else 0)
+    return status, {**summary.to_json(), "exit_status": status, "strict": options.strict}
 
 
 def _refuse_of_many(options: argparse.Namespace) -> None:

@@ -129,7 +129,7 @@ def worst_channel(errors: Array) -> Array:
     return np.take_along_axis(errors, np.abs(errors).argmax(axis=-1)[..., None], axis=-1)[..., 0]
 
 
-def over_pixels(tiles: Array, shape: tuple[int, int], size: int) -> Array:
+def over_pixels(tiles: NDArray, shape: tuple[int, int], size: int) -> NDArray:
     """(height, width): each tile's value in all of its pixels."""
     for axis, length in enumerate(shape):
         tiles = np.repeat(tiles, np.diff([*noise.tile_starts(length, size), length]), axis=axis)

@@ -16,7 +16,7 @@ Doing it, many shots of one file, each as a picture, a preview and a sidecar
     dataset               what it came to, as those read it who learn a scene from its pictures
 
 On child processes (../child_process.py)
-    comparer, labeller              is what was rendered what the sidecar says; ground truth beside it
+    tracing                         renders the reference, compares, writes reports and labels
     render_server, render_client    a renderer in a process of its own
     cluster, worker                 shots on several workers, each of which keeps such a process
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import argument_types
+from ..comparison.answer import exit_status
 from ..errors import InputError
 from .job import Job
 from .render_client import ServedRenderer
@@ -25,12 +26,16 @@ class Check:
     """What `check` has found, or a comparison of files.
 
     passed : whether Cycles renders the camera, or the pictures are the same. sentence : by how much. figures : all that --json
-    writes.
+    writes. answer : one of "same", "same_but" (the same, but for objects that are not modelled) and "different".
     """
 
     passed: bool
     sentence: str
     figures: dict[str, Any]
+
+    @property
+    def answer(self) -> str:
+        return str(self.figures["answer"])
 
 
 def check(
@@ -76,7 +81,7 @@ def check(
     )
     with ServedRenderer(Path(blend).absolute(), job.trust) as renderer:
         found = renderer.check(job, has_picture=False, written=written, keep=folder)
-    return _check_of(found)
+    return _check_of(found, job.strict)
 
 
 def compare(
@@ -87,10 +92,12 @@ def compare(
     channels: str | Sequence[str] | Mapping[str, Sequence[str]] | None = None,
     report: File | None = None,
     difference: File | None = None,
+    strict: bool = False,
 ) -> Check:
     """Whether EXRs of one camera are the same picture, in a process of its own; see tracing.compare_files.
 
     channels : by pass, or as the command line has them. report : a folder for the HTML page. difference : a PNG.
+    strict : whether pictures that are the same but for what is not modelled fail.
 
     Raises
     ------
@@ -111,7 +118,7 @@ def compare(
             channels=named and dict(named),
             written={**files, "command": "viewcam compare"},
         )
-    return _check_of(found)
+    return _check_of(found, strict)
 
 
 def argument_type(parse: Any, text: str) -> Any:
@@ -122,9 +129,10 @@ def argument_type(parse: Any, text: str) -> Any:
         raise InputError(str(error)) from error
 
 
-def _check_of(found: Mapping[str, Any]) -> Check:
+def _check_of(found: Mapping[str, Any], strict: bool) -> Check:
     result = found["result"]
-    return Check(result["passed"], result["sentence"], {"exit_status": int(not result["passed"]), **result})
+    status = exit_status(result["answer"], strict)
+    return Check(status == 0, result["sentence"], {"exit_status": status, **result})
 
 
 def _options_of(words: Sequence[str]) -> dict[str, Any]:

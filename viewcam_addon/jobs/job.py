@@ -70,7 +70,7 @@ class Job:
     device : one of DEVICES, what Cycles renders on.
     clay : whether one matte material covers everything, on both sides.
     recenter : whether both sides see the scene with its origin at the eye.
-    strict : whether what can't be modelled is an error.
+    strict : whether anything that is not modelled is an error; of a check, anything in the picture.
     scene : the path of the scene file that the engine must show, in place of what the .blend holds.
 
     None stands for what the .blend or the command line says.

@@ -24,7 +24,7 @@ and ask again.
 """
 
 _MOMENT = 0.2  # seconds
-_KEPT = ("passed", "verdict", "figures", "not_modelled", "level")
+_KEPT = ("passed", "answer", "verdict", "figures", "not_modelled", "ledger", "level")
 """What a sidecar keeps of a check."""
 
 

@@ -15,11 +15,17 @@ from typing import Any
 from urllib.parse import quote
 
 from .. import html_page
+from ..comparison.answer import DIFFERENT, SAME, SAME_BUT, but_for
 from ..comparison.statistics import plain
 from ..files import written_whole
 from .summary import Result
 
-_WORDS = {"failed": "failed", "left": "left to render", "checks_failed": "not what the reference tracer sees"}
+_WORDS = {
+    "failed": "failed",
+    "left": "left to render",
+    "checks_failed": "not what the reference tracer sees",
+    "not_all_modelled": "the same but for objects that are not modelled",
+}
 
 
 def picture(result: Result) -> str:
@@ -29,7 +35,7 @@ def picture(result: Result) -> str:
         shot=result,
         file=quote(result.name),
         facts=facts(result.record or {}),
-        verdict=verdict(result.check),
+        verdict=verdict(result),
     )
 
 
@@ -55,17 +61,19 @@ def facts(record: Mapping[str, Any]) -> list[str]:
     return told
 
 
-def verdict(check: Mapping[str, Any] | None) -> str:
+def verdict(result: Result) -> str:
     """What became of a shot's check, in the words of the panel's proof."""
+    check = result.check
     if not check:
         return "not checked"
-    if not check.get("passed"):
+    if result.answer == DIFFERENT:
         return "differs"
     figures = _part(check, "figures")
-    if figures.get("noisy"):
-        return "the same within noise"
     largest = _part(figures, "position").get("max")
-    return f"identical to {plain(largest)} px" if isinstance(largest, float) else "identical"
+    words = f"identical to {plain(largest)} px" if isinstance(largest, float) else "identical"
+    words = "the same within noise" if figures.get("noisy") else words
+    names = _part(check, "not_modelled").get("names")
+    return f"{words}, {but_for(names)}" if result.answer == SAME_BUT and isinstance(names, list) else words
 
 
 def _part(record: Mapping[str, Any], name: str) -> Mapping[str, Any]:
@@ -83,7 +91,7 @@ def write(path: Path, pictures: Sequence[str], counts: Mapping[str, int]) -> Non
     """
     page = html_page.filled(
         "jobs/sheet.html",
-        passed=counts["done"] == counts["shots"] and not counts["checks_failed"],
+        answer=_answer(counts),
         about="batch",
         title=(title := "1 shot" if counts["shots"] == 1 else f"{counts['shots']:,} shots"),
         headline=title,
@@ -92,6 +100,15 @@ def write(path: Path, pictures: Sequence[str], counts: Mapping[str, int]) -> Non
     )
     with written_whole(path) as temporary:
         temporary.write_text(page, encoding="utf-8", newline="\n")
+
+
+def _answer(counts: Mapping[str, int]) -> str | None:
+    """What the page's head shows: the worst of all answers, or none where nothing went wrong and nothing was checked."""
+    if counts["done"] < counts["shots"] or counts["checks_failed"]:
+        return DIFFERENT
+    if counts["not_all_modelled"]:
+        return SAME_BUT
+    return SAME if counts["checked"] == counts["shots"] else None
 
 
 def _intro(counts: Mapping[str, int]) -> str:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
+from ..comparison.answer import ANSWERS, DIFFERENT, SAME, SAME_BUT
 from .folder import Folder, Outputs
 
 
@@ -26,10 +27,18 @@ class Result:
         """What the check found; None where there was none."""
         return self.record.get("check") if self.record else None
 
+    @property
+    def answer(self) -> str | None:
+        """What the check came to, one of comparison/answer.py's; None where there was none. Older sidecars have none."""
+        if not self.check:
+            return None
+        answer = self.check.get("answer")
+        return answer if answer in ANSWERS else SAME if self.check["passed"] else DIFFERENT
+
     def to_json(self) -> dict[str, Any]:
         told: dict[str, Any] = {"name": self.name, "state": self.state}
         if self.check:
-            told |= {"passed": self.check["passed"], "verdict": self.check["verdict"]}
+            told |= {"passed": self.check["passed"], "answer": self.answer, "verdict": self.check["verdict"]}
         if self.error:
             told["error"] = self.error
         if self.record and self.record.get("warnings"):
@@ -63,13 +72,16 @@ class Summary:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Of the shots: all, done, failed, left, and those whose check failed."""
+        """Of the shots: all, done, failed, left, those that were checked, those whose check failed, and those of which it says
+        that not all in the picture is modelled."""
         states = Counter(shot["state"] for shot in self.shots)
-        unlike = sum(shot.get("passed") is False for shot in self.shots)
+        answers = Counter(shot["answer"] for shot in self.shots if "answer" in shot)
         return {
             "shots": len(self.shots),
             **{state: states[state] for state in ("done", "failed", "left")},
-            "checks_failed": unlike,
+            "checked": answers.total(),
+            "checks_failed": answers[DIFFERENT],
+            "not_all_modelled": answers[SAME_BUT],
         }
 
     @property

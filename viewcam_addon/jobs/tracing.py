@@ -79,6 +79,8 @@ class Tracing(child_process.ServerOnDemand):
         stated: Pinhole | None = None,
         ledger: "Sequence[LedgerEntry]" = (),
         written: Written | None = None,
+        everything: Path | None = None,
+        may_be_empty: bool = False,
     ) -> dict[str, Any]:
         """The comparison of an engine's pictures with what the tracer makes of a scene.
 
@@ -91,11 +93,14 @@ class Tracing(child_process.ServerOnDemand):
             made from, in place of the scene's.
         ledger : what is told of the scene.
         written : files beside.
+        everything : Cycles' picture with all that is not modelled, where there is any.
+        may_be_empty : whether pictures that show no object are different, and no error.
 
-        Returns `passed`; `sentence`; `lines` for a terminal; `seconds`, how long it was traced; `result`, all that --json has;
-        and `figures`, the few of them that a sidecar keeps: of geometry `pixels` compared, `position` in pixels,
-        `share_of_tolerance` of each pass where it is largest, `mismatches`, and `conversion`, the stated camera against this
-        one; of light its `samples` and `quantities`. None is what was not compared.
+        Returns `passed`, `answer`, `sentence` and `not_modelled` as comparison/answer.py has them; `lines` for a terminal;
+        `seconds`, how long it was traced; `result`, all that --json has; and `figures`, the few of them that a sidecar keeps:
+        of geometry `pixels` compared, `position` in pixels, `share_of_tolerance` of each pass where it is largest,
+        `mismatches`, and `conversion`, the stated camera against this one; of light its `samples` and `quantities`. None is
+        what was not compared.
 
         Raises
         ------
@@ -111,6 +116,8 @@ class Tracing(child_process.ServerOnDemand):
             "stated": stated and dataclasses.asdict(stated),
             "ledger": [dataclasses.asdict(entry) for entry in ledger],
             "written": dataclasses.asdict(written or Written()),
+            "everything": everything and str(everything),
+            "may_be_empty": may_be_empty,
         }
         return self.ask({"compare": request})
 
@@ -216,6 +223,8 @@ class _Server:
         stated: dict[str, Any] | None,
         ledger: list[dict[str, str]],
         written: dict[str, Any],
+        everything: str | None,
+        may_be_empty: bool,
         tell: Callable[..., None],
     ) -> dict[str, Any]:
         from .. import api, image
@@ -229,12 +238,14 @@ class _Server:
             seen = dataclasses.replace(seen, camera=Pinhole(**camera), clip=(clip[0], clip[1]), stated_camera=given or None)
         elif wanted.size:
             seen = dataclasses.replace(seen, camera=seen.camera.resized(*wanted.size))
+        entries = tuple(LedgerEntry(**entry) for entry in ledger)
+        seen = dataclasses.replace(seen, ledger=entries)
         level, samples = wanted.level or LEVELS[0], wanted.samples or SAMPLES
         tell("step", name="tracing")
         watcher = Progress(tell, seen.camera.height)
-        how = (level, samples, wanted.seed or 0, wanted.threads, wanted.error)
+        spent = (level, samples, wanted.seed or 0, wanted.threads, wanted.error)
         started = time.perf_counter()
-        reference = api.render(seen, *how, watcher, self._keeper)
+        reference = api.render(seen, *spent, watcher, self._keeper)
         seconds = time.perf_counter() - started
         if files.reference:
             image.write(files.reference, reference)
@@ -247,10 +258,11 @@ class _Server:
             pictures = [dataclasses.replace(picture, source=Path(picture.source).name) for picture in pictures]
         partial = renderer is not renderers.CYCLES
         share = max(samples // len(tests), 1)  # Cycles' file counts one that is left out
-        comparison = api.compare(reference, pictures, seen, wanted.threads, share, renderer, partial, self._keeper)
+        how = (seen, wanted.threads, share, renderer, partial, everything, self._keeper, may_be_empty)
+        comparison = api.compare(reference, pictures, *how)
         if partial:
             pictures = [renderers.completed(picture, comparison.pinhole) for picture in pictures]
-        told = _told(comparison, reference, pictures, [LedgerEntry(**entry) for entry in ledger], files)
+        told = _told(comparison, reference, pictures, entries, files)
         return {**told, "seconds": seconds}
 
     def _label(
@@ -307,7 +319,7 @@ def _told(
         result["difference"] = difference.write(comparison, written.difference)
     if written.sides:
         difference.write_sides(comparison, reference, tests, written.sides)
-    told = {"passed": comparison.passed, "sentence": comparison.sentence, "lines": lines}
+    told = {**comparison.answer.to_json(), "lines": lines}
     return {**told, "result": checks.for_json(result), "figures": checks.for_json(figures)}
 
 

@@ -153,7 +153,9 @@ def test_shots_of_four_values_and_of_a_camera_pass_and_their_figures_say_so(stag
     assert all(each["passed"] for each in found.values()), found
     assert all(each["verdict"].startswith("The same picture") for each in found.values())
     bent = ["Suzanne: material 'Bumpy' turns the normals, and a plain one stands in"]
-    assert [each["not_modelled"] for each in found.values()] == [bent] * 3
+    assert [each["ledger"] for each in found.values()] == [bent] * 3
+    assert all(each["answer"] == "same_but" and each["not_modelled"]["names"] == ["Suzanne"] for each in found.values()), found
+    assert all(0.01 < each["not_modelled"]["share"] < 0.9 for each in found.values()), found
     assert found["left"]["figures"]["conversion"]["share"] <= 1
     assert found["as it stands"]["figures"]["conversion"] is None, "nobody stated it"
 
@@ -314,7 +316,7 @@ def test_what_both_sides_leave_out_is_told_in_a_few_words(stage, batch):
     for number in range(8):
         curve = bpy.data.objects.new(f"Hair {number}", bpy.data.hair_curves.new("Hair"))
         stage.collection.objects.link(curve)
-    told = verdicts(batch(LEFT))["left"]["not_modelled"]
+    told = verdicts(batch(LEFT))["left"]["ledger"]
     assert len(told) == 6 and "hair and curves" in told[0] and told[-1] == "and 4 more, which viewcam check tells", told
 
 

@@ -14,6 +14,7 @@ a change, too.
 
 import contextlib
 import dataclasses
+import functools
 import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -64,8 +65,8 @@ class Checker:
         pinhole : the camera of the picture, as its sidecar has it. stated : the four values it was made from. Of the scene's
         own camera Blender chooses once more which that is: a picture of another one is a difference.
 
-        Returns `passed`, `verdict` and `figures` as Tracing.compare does, and `not_modelled`: what both sides leave out, the
-        first few of it, a sentence each.
+        Returns `passed`, `answer`, `verdict`, `not_modelled` and `figures` as Tracing.compare has them, and in `ledger` what
+        both sides leave out or replace, a sentence for each of the first few.
 
         Raises
         ------
@@ -79,11 +80,18 @@ class Checker:
         with numbered_indices(), staged(of, scene, camera_object, whole=True) as stage:
             export = self._files.exported(stage)
             camera = None if job.is_of_scenes_camera else camera_object
-            cycles.render(scene, stage.view_layer, camera, image, export.remedies, job.threads, keep=True)
+            ledger, render = export.ledger, functools.partial(cycles.render, scene, stage.view_layer, camera)
+            render(image, ledger.remedies.values(), job.threads, keep=True)
+            everything = self._files.folder / "everything.exr" if export.scene.not_modelled else None
+            if everything:
+                render(everything, ledger.remedies_of_everything, job.threads, keep=True, everything=True)
         data = camera_object.evaluated_get(datablocks.depsgraph_of(scene)).data
         clip = data.clip_start, data.clip_end
-        found = self._tracing.compare(self._files.file_of(export.scene), [image], of, pinhole, clip, stated)
-        return _brief(found, export.scene.ledger)
+        entries, path = export.scene.ledger, self._files.file_of(export.scene)
+        found = self._tracing.compare(
+            path, [image], of, pinhole, clip, stated, entries, everything=everything, may_be_empty=True
+        )
+        return _brief(found, entries)
 
     def check(
         self,
@@ -106,8 +114,6 @@ class Checker:
         ------
         InputError
             as `check_picture` does.
-        NotModelledError
-            if `strict` and anything is approximated or left out.
         """
         job.refuse_unchecked()
         count = seeds(job.level or LEVELS[0], job.samples or SAMPLES)
@@ -117,36 +123,43 @@ class Checker:
         tests = [folder / (f"{engine}-{i + 1}.exr" if count > 1 else f"{engine}.exr") for i in range(count)]
         started = time.perf_counter()
         with numbered_indices(_numbered(job.scene)), staged(job, scene, camera_object, notes) as stage:
-            exported = self.both_sides(stage, job, tests)
+            everything = folder / "everything.exr"
+            everything.unlink(missing_ok=True)
+            exported = self.both_sides(stage, job, tests, everything)
         level, rendered = stage.level, time.perf_counter() - started
         path = Path(job.scene) if job.scene else self._files.file_of(exported)
         if keep:
             scene_file.write(exported, keep / "scene.json")
         if level == LEVELS[0]:
             tests = tests[:1]
+        whole = everything if everything.exists() else None
         approved = scene_file.read(path) if job.scene else None
         of, ledger = dataclasses.replace(job, level=level), (approved or exported).ledger
         if approved:
-            found = self._tracing.compare(path, tests, of, ledger=ledger, written=written)
+            found = self._tracing.compare(path, tests, of, ledger=ledger, written=written, everything=whole)
         else:
             camera, clip, stated = exported.camera, exported.clip, exported.stated_camera
-            found = self._tracing.compare(path, tests, of, camera, clip, stated, ledger, written)
+            found = self._tracing.compare(path, tests, of, camera, clip, stated, ledger, written, whole)
         told = {"result": found["result"], "lines": found["lines"], "level": level}
         told["seconds"] = {"rendered": rendered, "traced": found["seconds"]}
         if job.level == "auto":
             told["reason"] = least_level(exported)[1]
         return _brief(found, ledger) | told
 
-    def both_sides(self, stage: Stage, job: Job, paths: Sequence[Path]) -> Scene:
-        """The scene for the tracer, and the engine's pictures at these paths, from one state of the file."""
+    def both_sides(self, stage: Stage, job: Job, paths: Sequence[Path], everything: Path | None = None) -> Scene:
+        """The scene for the tracer, and the engine's pictures at these paths, from one state of the file.
+
+        everything : as of Stage.render, written where there is any such thing. A recentred scene has none of it.
+        """
 
         def rendering(number: int) -> None:
             if self._events:
-                self._events.tell("step", name="rendering", number=number, of=len(paths))
+                self._events.tell("step", name="rendering", number=number, of=max(number, len(paths)))
 
-        exported = stage.export(job.strict)
+        exported = stage.export()
         lighting = Lighting(exported.lamps, exported.world, exported.film, exported.bounces)
-        stage.render(job, paths, lighting, rendering, keep=True)
+        has_more = exported.not_modelled and job.engine not in ("EEVEE", "WORKBENCH") and not job.recenter
+        stage.render(job, paths, lighting, rendering, keep=True, everything=everything if has_more else None)
         return exported
 
     def __enter__(self) -> "Checker":
@@ -170,7 +183,7 @@ def _numbered(scene_path: str | None) -> tuple[str, ...]:
 
 def _brief(found: dict[str, Any], ledger: Sequence[LedgerEntry]) -> dict[str, Any]:
     """What a sidecar keeps of a comparison."""
-    lacking = [f"{entry.object}: {entry.reason}" for entry in ledger if entry.status != "exported"]
+    lacking = [f"{entry.object}: {entry.reason}" for entry in ledger if not entry.is_modelled]
     more = [f"and {len(lacking) - _MOST_TOLD} more, which viewcam check tells"] if len(lacking) > _MOST_TOLD else []
-    told = {"passed": found["passed"], "verdict": found["sentence"], "figures": found["figures"]}
-    return {**told, "not_modelled": lacking[:_MOST_TOLD] + more}
+    told = {key: found[key] for key in ("passed", "answer", "not_modelled", "figures")}
+    return {**told, "verdict": found["sentence"], "ledger": lacking[:_MOST_TOLD] + more}

@@ -14,7 +14,7 @@ from ...tracer.scene import Scene, scene_file
 from ...tracer.scene.sameness import same
 from .. import datablocks
 from ..scenes.export import export_scene
-from ..scenes.ledger import Remedy
+from ..scenes.ledger import Ledger
 from . import persistent_data
 from .stage import Stage
 
@@ -23,11 +23,11 @@ _THINGS = [each.name for each in fields(Scene) if each.name not in ("camera", "s
 
 @dataclass(frozen=True, eq=False)
 class Export:
-    """state : of Blender, when the scene was exported. remedies : for Cycles (ledger.py)."""
+    """state : of Blender, when the scene was exported. ledger : what it found, with the remedies for Cycles."""
 
     state: tuple
     scene: Scene
-    remedies: tuple[Remedy, ...]
+    ledger: Ledger
 
 
 class SceneFiles:
@@ -52,7 +52,7 @@ class SceneFiles:
         found = next((each for each in self._exports if each.state == state), None)
         if found is None:
             seen = export_scene(scene, stage.view_layer, camera_object, stage.ledger)
-            found = Export(state, seen, tuple(stage.ledger.remedies.values()))
+            found = Export(state, seen, stage.ledger)
             self._exports = [*self._exports[-self._most + 1 :], found] if self._most > 1 else [found]
         return found
 

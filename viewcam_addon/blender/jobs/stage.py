@@ -72,25 +72,30 @@ class Stage:
         light: Lighting | None,
         rendering: Callable[[int], None] = lambda number: None,
         keep: bool = False,
+        everything: str | os.PathLike[str] | None = None,
     ) -> None:
         """Write the pictures of the job's engine.
 
         paths : of several, which share the samples; their seeds count from that of the job. light : as exported, of a stage
         that is lit. rendering : is told of each, by its number from 1 on, before it is rendered. keep : as of cycles.render.
+        everything : for one more picture of Cycles, like the first but with all that has a stand-in, or is left out, in the
+        others.
         """
         camera = self.camera if self.is_chosen or self.told else None
         share = max((job.samples or SAMPLES) // len(paths), 1)
-        for number, path in enumerate(paths):
+        for number, path in enumerate([*paths, *([everything] if everything is not None else [])]):
             rendering(number + 1)
+            is_of_everything, seed = number == len(paths), number % len(paths)
             settings = None
             if self.is_lit and light:
                 bounces = light.bounces.none if self.level == "direct" else light.bounces
-                settings = cycles.LightSettings(light.film, bounces, share, (job.seed or 0) + number)
-            of, remedies = (self.scene, self.view_layer, camera, path), self.ledger.remedies.values()
+                settings = cycles.LightSettings(light.film, bounces, share, (job.seed or 0) + seed)
+            remedies = self.ledger.remedies_of_everything if is_of_everything else self.ledger.remedies.values()
+            of = self.scene, self.view_layer, camera, path
             if job.engine in ("EEVEE", "WORKBENCH"):
                 rasters.render(*of, job.engine, remedies, job.threads)
             else:
-                cycles.render(*of, remedies, job.threads, settings, keep and not self.told, job.device)
+                cycles.render(*of, remedies, job.threads, settings, keep and not self.told, job.device, is_of_everything)
 
 
 @contextlib.contextmanager

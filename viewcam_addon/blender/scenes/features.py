@@ -122,12 +122,12 @@ def note_object(
         ledger.note(name, "approximated", "adaptive subdivision is subdivision at the render level on both sides")
         ledger.set_for_cycles(*adaptive, False)
     if not shading and versions.DEFAULT_SURFACE_BENDS_NORMALS and _shows_empty_slot(shown.data, slots):
-        ledger.call_for_cycles(real.original, materials.fill_empty_slots)
+        ledger.call_for_cycles(real.original, materials.fill_empty_slots, stands_in=False)
         if any(modifier.type == "NODES" and modifier.show_render for modifier in real.modifiers):
             ledger.note(name, "approximated", "has no material, and Cycles may bend its normals where they graze")
     for material in filter(None, slots):
         if not shading:  # the Normal pass; mirrors and glass bend normals on both sides (scattering.specular_normal)
-            ledger.call_for_cycles(material.original, materials.keep_normals)
+            ledger.call_for_cycles(material.original, materials.keep_normals, stands_in=False)
         reasons = materials.departures(material, lit=shading is not None)
         if shading:
             reading = shading.reading(material)
@@ -167,9 +167,9 @@ def _note_light(placed: Placed, slots: list[bpy.types.Material | None], ledger: 
             )
     for each in (real.original, parent.original):
         for owner, name in versions.shadow_terminator(each):
-            ledger.set_for_cycles(owner, name, 0.0)
-        ledger.set_for_cycles(each.cycles, "is_caustics_caster", False)
-        ledger.set_for_cycles(each.cycles, "is_caustics_receiver", False)
+            ledger.set_for_cycles(owner, name, 0.0, stands_in=False)
+        ledger.set_for_cycles(each.cycles, "is_caustics_caster", False, stands_in=False)
+        ledger.set_for_cycles(each.cycles, "is_caustics_receiver", False, stands_in=False)
 
 
 def _shows_empty_slot(data: bpy.types.ID, slots: list[bpy.types.Material | None]) -> bool:

@@ -281,7 +281,7 @@ def _note(name: str, light: bpy.types.Light, bounces: Bounces, ledger: Ledger) -
     if light.cycles.max_bounces < bounces.total:
         ledger.note(name, "approximated", "its bounces are limited, and are not on both sides")
         ledger.set_for_cycles(settings, "max_bounces", 1024)
-    ledger.set_for_cycles(settings, "is_caustics_light", False)
+    ledger.set_for_cycles(settings, "is_caustics_light", False, stands_in=False)
 
 
 def _times(rgb: RGB, factor: float) -> RGB:

@@ -53,7 +53,7 @@ def world_of(
         (original.cycles, "use_shadows", True),
     ):
         if hasattr(owner, name):  # versions know fewer of them
-            ledger.set_for_cycles(owner, name, value)
+            ledger.set_for_cycles(owner, name, value, stands_in=False)
     hidden_from = frozenset(ray for ray in _RAYS if not getattr(world.cycles_visibility, ray))
     made = _rendered(scene, world, reasons, ledger, render) if reasons else None
     if made:

@@ -1,4 +1,5 @@
-"""What the tracer traces: meshes and spheres, the objects that place them in the world, the camera, and what gives light.
+"""The scene that the tracer traces: meshes and spheres, the objects that place them in the world, the camera, and what gives
+light.
 
 A geometry is stored once, in its object's space, and placed by any number of objects. Nothing here knows files (scene_file.py)
 or rays (visibility.py, surface.py); the classes hold arrays and check their shapes. Materials, images, lamps, world, film and
@@ -144,7 +145,7 @@ class Object:
 
 @dataclass(frozen=True)
 class LedgerEntry:
-    """What became of one thing that the exporter met.
+    """The fate of one thing that the exporter met.
 
     object : its name in Blender.
     status : "exported", "approximated" or "skipped".
@@ -154,6 +155,11 @@ class LedgerEntry:
     object: str
     status: str
     reason: str = ""
+
+    @property
+    def is_modelled(self) -> bool:
+        """True if it was exported whole, as it is."""
+        return self.status == "exported"
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,6 +189,11 @@ class Scene:
     film: Film = field(default_factory=Film)
     bounces: Bounces = field(default_factory=Bounces)
     cycles: tuple[int, int] = (5, 2)
+
+    @property
+    def not_modelled(self) -> tuple[str, ...]:
+        """The names of what its ledger has as approximated or skipped."""
+        return tuple(entry.object for entry in self.ledger if not entry.is_modelled)
 
     def __post_init__(self) -> None:
         if len(self.origin) != 3 or not np.isfinite(self.origin).all():
