@@ -61,7 +61,7 @@ ROOMS = {
         "errors checks files terminal events html_page child_process png pinhole roll rotation moves diagram photo_match image "
         "intrinsics camera_values cameras comparison tracer labels jobs"
     ),
-    "commands": ("errors files terminal argument_types events crashes pinhole image cameras tracer labels api jobs"),
+    "commands": ("errors files terminal argument_types events crashes pinhole image cameras comparison tracer labels api jobs"),
     "cli": "errors checks files junit events argument_types tracer jobs commands",
 }
 BLENDER_ROOMS = {
