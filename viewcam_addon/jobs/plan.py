@@ -75,7 +75,7 @@ def write(path: Path, jobs: Sequence[Job], plan: Plan | None = None, files: Mapp
     """
     document = {"jobs": [job.to_json() for job in jobs], "plan": plan and plan.to_json(), "files": dict(files or {})}
     with written_whole(path) as temporary:
-        temporary.write_text(json.dumps(document), encoding="utf-8")
+        temporary.write_text(json.dumps(document), encoding="utf-8", newline="\n")
 
 
 def read(path: Path) -> tuple[list[Job], Plan | None, dict[str, str]]:
