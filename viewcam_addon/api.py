@@ -149,9 +149,9 @@ def compare(
     if scene is None:
         return geometry.compare(of, pictures[0], camera, renderer=by, partial=partial)
     # The picture may be of another size than the scene says, or of the stated camera.
-    surface_at = tracing.Tracer(replace(scene, camera=camera), threads).surface_at
+    surfaces_at = tracing.Tracer(replace(scene, camera=camera), threads).surfaces_at
     stated = scene.stated_camera if camera == scene.camera else None
-    return geometry.compare(of, pictures[0], camera, surface_at, stated, scene.origin, by, partial)
+    return geometry.compare(of, pictures[0], camera, surfaces_at, stated, scene.origin, by, partial)
 
 
 @dataclass(frozen=True)

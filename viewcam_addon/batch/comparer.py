@@ -97,7 +97,7 @@ class _Scenes:
         test = image.read(request["image"])
         tracer = self._keeper.tracer(scene, request["threads"])
         reference = image.Image(tracer.render(), camera)
-        comparison = geometry.compare(reference, test, camera, tracer.surface_at, stated, scene.origin)
+        comparison = geometry.compare(reference, test, camera, tracer.surfaces_at, stated, scene.origin)
         return {"passed": comparison.passed, "verdict": comparison.sentence, "figures": _figures(comparison)}
 
 

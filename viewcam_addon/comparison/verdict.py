@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 from ..pinhole import Pinhole
 from .cameras import ConversionError, Systematic
 from .far_from_origin import FarFromOrigin
-from .mismatches import PIXELS_PER_UNEXPLAINED, Mismatches
+from .mismatches import NOWHERE, PIXELS_PER_UNEXPLAINED, InOnePlace, Mismatches
 from .statistics import PassErrors, percentile_name
 from .tolerances import PERCENTILES, Array
 
 # A sentence with more faults is not read; the table has them all.
 _MOST_FAULTS = 2
+_MOST_PAIRS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +33,7 @@ class GeometryComparison:
     far_from_origin : what the distance from the origin costs, None where that is nothing to speak of.
     origin : the point of the world from which the coordinates of both pictures are counted.
     lacking : passes that only the reference has.
+    in_one_place : pixels that show another of several surfaces in one place, which is as right as the reference's.
     """
 
     pinhole: Pinhole
@@ -46,6 +48,7 @@ class GeometryComparison:
     far_from_origin: FarFromOrigin | None = None
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     lacking: tuple[str, ...] = ()
+    in_one_place: InOnePlace = NOWHERE
 
     @property
     def pixels(self) -> int:
@@ -110,6 +113,8 @@ class GeometryComparison:
             )
         if self.lacking:
             table.append(f"{'Not compared':<16}{'':>11}  {', '.join(self.lacking)}: the test picture has none")
+        if len(self.in_one_place.columns):
+            table.append(f"{'In one place':<16}{len(self.in_one_place.columns):>11,}  {in_one_place_text(self.in_one_place)}")
         if self.far_from_origin:
             table.append(self.far_from_origin.sentence)
         return [*table, self.sentence]
@@ -132,12 +137,20 @@ class GeometryComparison:
             "far_from_origin": self.far_from_origin and self.far_from_origin.to_json(),
             "origin": list(self.origin),
             "not_compared": list(self.lacking),
+            "in_one_place": self.in_one_place.to_json(),
         }
 
 
 def allowed_unexplained(pinhole: Pinhole) -> int:
     """How many mismatches may stay unexplained in a picture of this size."""
     return pinhole.width * pinhole.height // PIXELS_PER_UNEXPLAINED
+
+
+def in_one_place_text(in_one_place: InOnePlace) -> str:
+    """Who: pixels show another of several surfaces in one place: 'Floor' and 'Carpet', and 2 more pairs."""
+    pairs = [f"two of {a!r}" if a == b else f"{a!r} and {b!r}" for a, b in in_one_place.pairs()]
+    more = f", and {len(pairs) - _MOST_PAIRS} more pairs" if len(pairs) > _MOST_PAIRS else ""
+    return f"pixels show another of several surfaces in one place: {', '.join(pairs[:_MOST_PAIRS])}{more}"
 
 
 def _row_line(row: PassErrors) -> str:
@@ -153,6 +166,8 @@ def _agreement(comparison: GeometryComparison) -> str:
     first = comparison.rows[0]
     count = len(comparison.mismatches.kinds)
     edges = f"; {count:,} on edges, {_explained(comparison)}" if count else ""
+    if shown := len(comparison.in_one_place.columns):
+        edges += f"; {shown:,} {in_one_place_text(comparison.in_one_place)}"
     median, nearly_all = (first.values[PERCENTILES.index(p)] for p in (50.0, 99.9))
     unit = first.unit if first.name == "Position" else "of the depth"
     return (

@@ -162,6 +162,10 @@ class _Core(Structure):
         ("render_hits", _function(c_int, c_void_p, c_uint32, c_uint32, c_void_p, c_size_t, *[c_void_p] * 4)),
         ("silhouette", _function(c_int, c_void_p, POINTER(_Camera), c_void_p)),
         ("surface_at", _function(c_int, c_void_p, c_size_t, c_void_p, c_void_p, c_void_p)),
+        (
+            "surfaces_at",
+            _function(c_int, c_void_p, c_size_t, c_void_p, c_void_p, c_double, *[c_void_p] * 2, c_size_t, *[c_void_p] * 2),
+        ),
         ("closest", _function(c_int, c_void_p, c_size_t, c_void_p, c_uint32, c_int, c_void_p, c_void_p, c_void_p)),
         ("occluded", _function(c_int, c_void_p, c_size_t, c_void_p, c_int, c_void_p)),
         ("clear_light", _function(c_int, c_void_p)),
@@ -482,6 +486,33 @@ class CoreScene:
         columns, rows = array(columns, np.float64, (None,)), array(rows, np.float64, (len(columns),))
         planes = _planes(passes, len(columns))
         self.check(self.core.surface_at(self.handle, len(columns), _address(columns), _address(rows), planes))
+
+    def surface_counts(self, columns: NDArray, rows: NDArray, within: float) -> NDArray[np.int64]:
+        """(n,): how many surfaces `surfaces_at` finds at each place."""
+        columns, rows = array(columns, np.float64, (None,)), array(rows, np.float64, (len(columns),))
+        counts = np.empty(len(columns), np.uint32)
+        places = len(columns), _address(columns), _address(rows), within, _address(counts)
+        self.check(self.core.surfaces_at(self.handle, *places, None, 0, None, None))
+        return counts.astype(np.int64)
+
+    def surfaces_at(
+        self, passes: Passes, columns: NDArray, rows: NDArray, within: float, counts: NDArray
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """All surfaces at n places in the picture that lie up to `within` times the nearest one's depth beyond it.
+
+        passes : (m, channels) each, of the first place's surfaces, the nearest first, then the next one's. counts : (n,), how
+        many each has, of `surface_counts`.
+
+        Returns (m,) objects, −1 where nothing is, and (2, m) how much UV and normal change there with each pixel.
+        """
+        columns, rows = array(columns, np.float64, (None,)), array(rows, np.float64, (len(columns),))
+        counts = array(counts, np.uint32, (len(columns),))
+        total = int(counts.sum(dtype=np.int64))
+        objects, slopes = np.empty(total, np.uint32), np.empty((2, total))
+        places = len(columns), _address(columns), _address(rows), within, _address(counts)
+        planes = _planes(passes, total)
+        self.check(self.core.surfaces_at(self.handle, *places, planes, total, _address(slopes), _address(objects)))
+        return objects.view(np.int32).astype(np.int64), slopes
 
     def rays(
         self, origins: NDArray, directions: NDArray, nearest: float | NDArray = 0.0, farthest: float | NDArray = math.inf
