@@ -2,6 +2,7 @@
 #   make demo          the sample scene rendered by Cycles and by the tracer, compared; ends with the report
 #   make quick         lint and the tests that need neither Blender nor processes nor many samples; under a minute
 #   make test          lint and the tests that are quick to run, with the newest bpy wheel for the Python found; below five minutes
+#   make test-fresh    make demo and make test on a bare Debian 12 of its own, as a newcomer has them; needs root
 #   make test-exhaustive  the rest of them: whole pictures, whole clusters, and what takes minutes: 10⁸ rays, a million hostile numbers
 #   make test-sanitizers  the core compiled with sanitizers, and what its tests find of addresses, undefined behaviour and threads
 #   make test-matrix   the tests with Blender 4.2 (and 5.2 where there is a Python 3.13) as wheels; those of Blender with 4.5 and 5.0
@@ -15,7 +16,7 @@
 #   make bench-guard   whether the tracer has become slower than it was, as a share of bare Embree's speed; a minute or two
 #   make clean         removes all that these made, but for ~/.cache/virtual-pinhole
 
-.PHONY: demo quick test test-exhaustive test-sanitizers lint test-matrix test-light test-blender extension artist-pictures scenes charts bench bench-guard clean
+.PHONY: demo quick test test-fresh test-exhaustive test-sanitizers lint test-matrix test-light test-blender extension artist-pictures scenes charts bench bench-guard clean
 .DELETE_ON_ERROR:
 
 # bpy has wheels for these two only.
@@ -33,7 +34,7 @@ demo: .venv/demo
 
 # For the inner loop. What a version of NumPy or Python may change stands in these, so that the matrix has them, too.
 QUICK := $(shell grep -rLE --include='test_*.py' 'importorskip\("bpy"\)|fresh_blender|stand_in|subprocess' \
-	tests/cameras tests/commands tests/comparison tests/datasets tests/shots tests/tracer tests/test_*.py \
+	tests/cameras tests/commands tests/comparison tests/datasets tests/jobs tests/tracer tests/test_*.py \
 	| grep -vE 'adaptive|audit|hostile|hypothesis|noise|project|roll|sabotage|sampler|test_text\.py' | sort)
 
 quick: .venv/test
@@ -43,6 +44,9 @@ quick: .venv/test
 
 test: lint
 	$(call PARALLEL,.venv)
+
+test-fresh:
+	.ci/fresh-machine "make demo" "make test"
 
 test-exhaustive: .venv/test
 	$(call PARALLEL,.venv) --numprocesses=3 --dist=worksteal -m "slow or exhaustive"
@@ -106,11 +110,11 @@ test-matrix: $(MATRIX:%=test-wheel-%)
 # test-light what Cycles shades.
 TOUCHING_BLENDER = tests/blender tests/test_crashes.py \
 	$(shell grep -lE 'importorskip\("bpy"\)' tests/test_*.py tests/commands/test_*.py tests/comparison/test_*.py | grep -v test_project)
-tests-4.5 = $(TOUCHING_BLENDER) --ignore=tests/blender/batch --ignore=tests/blender/light
+tests-4.5 = $(TOUCHING_BLENDER) --ignore=tests/blender/jobs --ignore=tests/blender/light
 without-4.5 = $(empty) and not slow
 tests-5.0 = $(TOUCHING_BLENDER)
 tests-4.2 = $(TOUCHING_BLENDER) $(QUICK)
-tests-5.2 = tests/blender/light tests/blender/test_light_by_light.py $(filter-out tests/blender,$(TOUCHING_BLENDER)) $(QUICK) tests/batch
+tests-5.2 = tests/blender/light tests/blender/test_light_by_light.py $(filter-out tests/blender,$(TOUCHING_BLENDER)) $(QUICK) tests/jobs
 
 # Few examples of each property: make test has the many, and what a version changes, it changes for most of them. What is slow
 # begins first (tests/conftest.py), so that no process ends with it alone.

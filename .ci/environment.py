@@ -1,45 +1,70 @@
-"""A virtual environment with what pip is asked for: `python .ci/environment.py FOLDER PIP-ARGUMENT…`
+"""Make a virtual environment with what pip is asked for: `python .ci/environment.py FOLDER PIP-ARGUMENT…`
 
-Debian gives a Python without `venv`, and bpy's wheels need a few libraries of the X Window System even where there is no
-window. What is missing is installed where that needs no password (root, in a container or on a build machine); elsewhere one
-sentence says which command does it. Only the standard library, since this runs before there is anything else.
+Debian gives a Python without `venv`, and wheels need libraries of the system, of the X Window System even where there is no
+window. Which ones, the wheels tell (`ldd`), and Debian's policy tells the package of each. What is missing is installed where
+that needs no password (root, in a container or on a build machine); elsewhere one sentence says which command does it. Only the
+standard library, since this runs before there is anything else. Rejected: a list of libraries, which each new wheel outdated.
 """
 
 import ctypes
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-# What Linux's bpy wheels of 4.2 to 5.2 load and don't bring along, by Debian's package. EGL is loaded only when Blender draws,
-# as it does for Grease Pencil, and ends the process where it is missing.
-LIBRARIES = {
-    "libEGL.so.1": "libegl1",
-    "libGL.so.1": "libgl1",
-    "libICE.so.6": "libice6",
-    "libSM.so.6": "libsm6",
-    "libX11.so.6": "libx11-6",
-    "libXfixes.so.3": "libxfixes3",
-    "libXi.so.6": "libxi6",
-    "libXrender.so.1": "libxrender1",
-    "libXxf86vm.so.1": "libxxf86vm1",
-    "libgomp.so.1": "libgomp1",
-    "libxkbcommon.so.0": "libxkbcommon0",
-}
+# Loaded by name and only when Blender draws, as it does for Grease Pencil, which ends the process where it is missing.
+LOADED_BY_NAME = ["libEGL.so.1"]
+CORE = Path(__file__).resolve().parent.parent / "build" / "core"
+COMPILERS = (os.environ.get("CXX"), "c++", "g++", "clang++")
 
 
-def missing_packages() -> list[str]:
-    """Debian's names of what this machine lacks."""
-    packages = [] if importlib.util.find_spec("ensurepip") else [f"python{sys.version_info[0]}.{sys.version_info[1]}-venv"]
-    if sys.platform == "linux":
-        for library, package in LIBRARIES.items():
-            try:
-                ctypes.CDLL(library)
-            except OSError:
-                packages.append(package)
+def missing_libraries(folder: Path) -> list[str]:
+    """The sonames that the extension modules of a folder need, what Blender loads by name among them, and this machine lacks.
+
+    folder : site-packages; what Blender's wheel holds for a Python of its own (bpy/5.0/python) is not imported, nor asked.
+    """
+    libraries = [path for path in folder.rglob("*.so*") if path.is_file()]
+    modules = [
+        str(path)
+        for path in libraries
+        if path.suffix == ".so" and not path.name.startswith("lib") and "python" not in path.relative_to(folder).parts
+    ]
+    needed = subprocess.run(["ldd", *modules], capture_output=True, text=True).stdout if modules else ""
+    missing = set(re.findall(r"^\s(\S+) => not found", needed, re.MULTILINE))
+    if any(name.startswith("bpy") for name in os.listdir(folder)):
+        missing |= {name for name in LOADED_BY_NAME if not _loads(name)}
+    return sorted(missing - {path.name for path in libraries})
+
+
+def _loads(soname: str) -> bool:
+    try:
+        ctypes.CDLL(soname)
+    except OSError:
+        return False
+    return True
+
+
+def debian_packages(sonames: list[str]) -> list[str]:
+    """The Debian packages of libraries by Debian's policy (8.1): libX11.so.6 is in libx11-6, libatomic.so.1 in libatomic1.
+
+    Left out are those that this Debian does not have, such as a graphics card's.
+    """
+    packages = []
+    for soname in sonames:
+        name, _, version = soname.partition(".so.")
+        package = f"{name}{'-' if name[-1:].isdigit() and version else ''}{version}".lower().replace("_", "-")
+        if subprocess.run(["apt-cache", "show", package], capture_output=True).returncode == 0:
+            packages.append(package)
     return packages
+
+
+def update_lists() -> None:
+    """Let Debian's package manager know today's packages, where this user may."""
+    if os.geteuid() == 0 and shutil.which("apt-get"):
+        subprocess.run(["apt-get", "update", "--quiet=2"], check=True)
 
 
 def install_packages(packages: list[str]) -> None:
@@ -51,20 +76,30 @@ def install_packages(packages: list[str]) -> None:
         sys.exit(f"Missing on this machine: run  sudo {' '.join(command)}  then start again")
     print(f"Installing {' '.join(packages)}", flush=True)
     quiet = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
-    subprocess.run(["apt-get", "update", "--quiet=2"], check=True, env=quiet)
-    subprocess.run(command, check=True, env=quiet, stdout=subprocess.DEVNULL)
+    subprocess.run(command, check=True, env=quiet, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
 def main(folder: Path, requirements: list[str]) -> None:
     """Make the environment, or bring the one that is there up to date."""
-    if packages := missing_packages():
-        install_packages(packages)
+    if not importlib.util.find_spec("ensurepip"):
+        update_lists()
+        install_packages([f"python{sys.version_info[0]}.{sys.version_info[1]}-venv"])
     if not (folder / "bin" / "pip").exists():
         print(f"Making the Python {sys.version.split()[0]} environment {folder}", flush=True)
         subprocess.run([sys.executable, "-m", "venv", "--clear", folder], check=True)
     pip = [folder / "bin" / "python", "-m", "pip", "--disable-pip-version-check"]
+    if not CORE.exists() and not any(map(shutil.which, filter(None, COMPILERS))):
+        print("Compiling the tracer's core by ziglang, as there is no C++ compiler: a minute or two", flush=True)
     # Python compiles what it imports, which is a small part of what all these bring along: half a minute an environment.
     subprocess.run([*pip, "install", "--quiet", "--no-compile", *requirements], check=True)
+    site = next(folder.glob("lib/python3.*")) / "site-packages"
+    if sys.platform == "linux" and (missing := missing_libraries(site)):
+        if not shutil.which("apt-cache"):
+            print(f"Perhaps missing on this machine: {' '.join(missing)}", flush=True)
+            return
+        update_lists()
+        if packages := debian_packages(missing):
+            install_packages(packages)
 
 
 if __name__ == "__main__":

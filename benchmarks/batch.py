@@ -25,8 +25,9 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 
+from viewcam_addon.jobs.makers import orbit
+from viewcam_addon.jobs.shot import Shot
 from viewcam_addon.pinhole import Pinhole
-from viewcam_addon.shots import Shot, orbit
 
 Seconds = np.ndarray
 """Two numbers: seconds on the clock, and of all processors. The second hardly depends on what else a machine has to do."""

@@ -38,9 +38,10 @@ from benchmarks import race
 from benchmarks.batch import STILL, STUDIO
 from viewcam_addon import image
 from viewcam_addon.files import written_whole
+from viewcam_addon.jobs.makers import orbit
+from viewcam_addon.jobs.shot import Shot
 from viewcam_addon.labels import DEPTH_STEPS, files, masks
 from viewcam_addon.png import encoded
-from viewcam_addon.shots import Shot, orbit
 
 KINDS = "depth,normals,position,masks"
 PASSES = ("Depth", "Normal", "Position", "Object Index", "Material Index")

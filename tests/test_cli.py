@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from viewcam_addon import cameras, image
-from viewcam_addon.batch.folder import Folder
 from viewcam_addon.cli import main
 from viewcam_addon.commands import batch, chart, verification
 from viewcam_addon.commands.verification import DEMO_SCENE
+from viewcam_addon.jobs.folder import Folder
 from viewcam_addon.pinhole import Pinhole
 
 CAMERA = {"eye": [0, -5, 0], "look_at": [0, 0, 0], "up": [0, 0, 1], "distance": 100, "width": 64, "height": 48}
@@ -53,9 +53,7 @@ def test_a_command_imports_what_other_commands_need_for_no_one(tmp_path):
     words = ["render", str(write_scene(tmp_path)), str(tmp_path / "out.exr")]
     code = f"import sys; from viewcam_addon.cli import main; assert main({words}) == 0; print(*sys.modules, sep='\\n')"
     imported = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
-    needless = [
-        name for name in imported if name.startswith(("viewcam_addon.cameras", "viewcam_addon.batch", "viewcam_addon.shots"))
-    ]
+    needless = [name for name in imported if name.startswith(("viewcam_addon.cameras", "viewcam_addon.jobs"))]
     assert not needless, f"viewcam render has imported {', '.join(needless)}, which takes time at every start"
 
 
@@ -93,6 +91,36 @@ def test_two_cameras_a_pixel_apart_are_not_the_same_picture(tmp_path, capfd):
     assert "Not the same picture" in capfd.readouterr().out
     assert json.loads(result.read_text())["exit_status"] == 1
     assert "Not the same picture" in (report / "index.html").read_text(encoding="utf-8")
+
+
+def test_what_is_not_modelled_is_named_with_its_share_and_fails_under_strict(tmp_path, capfd):
+    ledger = [
+        {"object": "Ball", "status": "approximated", "reason": "is made of jelly"},
+        {"object": "Sun", "status": "exported"},
+    ]
+    scene, picture = write_scene(tmp_path, ledger=ledger), str(tmp_path / "a.exr")
+    assert main(["render", str(scene), picture]) == 0
+    words = ["compare", picture, picture, "--scene", str(scene), "--json", str(tmp_path / "a.json")]
+    words += ["--junit", str(tmp_path / "a.xml"), "--report", str(tmp_path / "report")]
+    for strict, status in (([], 0), (["--strict"], 3)):
+        assert main(words + strict) == status
+        told = json.loads((tmp_path / "a.json").read_text())
+        assert (told["exit_status"], told["answer"], told["passed"]) == (status, "same_but", True)
+        seen = (image.read(picture)["Object Index"] == 3).mean()
+        assert told["not_modelled"] == {"count": 1, "names": ["Ball"], "share": seen, "shown": seen}
+        assert f"but for 1 object that is not modelled (Ball; {100 * seen:.2g} % of the picture)" in capfd.readouterr().out
+        page = (tmp_path / "report" / "index.html").read_text(encoding="utf-8")
+        assert 'class="same_but"' in page and "but for 1 object that is not modelled" in page
+        assert ("<failure" in (tmp_path / "a.xml").read_text()) == bool(strict)
+
+
+def test_a_picture_of_nothing_is_no_answer_and_says_what_to_look_for(tmp_path, capfd):
+    scene, picture = write_scene(tmp_path, camera=CAMERA | {"look_at": [0, -9, 0]}), tmp_path / "a.exr"
+    assert main(["render", str(scene), str(picture)]) == 0
+    capfd.readouterr()
+    line = fails(capfd, "compare", picture, picture, "--scene", scene, "--report", tmp_path / "report")
+    assert "Nothing to compare" in line and all(word in line for word in ("frame", "view layer", "clipping")), line
+    assert not (tmp_path / "report").exists()
 
 
 def test_the_size_and_the_stated_camera_can_be_chosen(tmp_path, capfd):

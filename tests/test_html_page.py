@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from viewcam_addon import html_page
 from viewcam_addon.errors import InputError
 
-SHOT = "batch/sheet_picture.html"
+SHOT = "jobs/sheet_picture.html"
 
 
 @given(st.text())

@@ -52,15 +52,16 @@ ROOMS = {
     "labels": "errors files png pinhole image cameras tracer",
     "api": "errors child_process image comparison tracer labels",
     "pytest_plugin": "errors junit api",
-    "shots": "errors checks files terminal pinhole moves tracer",
-    "batch": ("errors checks files events html_page child_process pinhole image cameras comparison tracer labels shots"),
+    "jobs": (
+        "errors checks files terminal events html_page child_process pinhole moves image cameras comparison tracer labels"
+    ),
     "blender": (
         "errors checks files terminal html_page child_process png pinhole roll rotation moves diagram photo_match image "
-        "intrinsics camera_values cameras comparison tracer labels shots batch"
+        "intrinsics camera_values cameras comparison tracer labels jobs"
     ),
     "commands": (
         "errors files terminal argument_types events crashes child_process pinhole image cameras comparison tracer labels "
-        "api shots batch"
+        "api jobs"
     ),
     "cli": "errors checks files junit events argument_types tracer commands",
 }
@@ -91,7 +92,7 @@ BLENDER_ROOMS = {
         "versions temporary_settings picture findings render_settings preferences datablocks storage targets hold causes "
         "pose camera own_picture scenes rendering"
     ),
-    "batch": "versions temporary_settings opening datablocks camera resolution scenes rendering",
+    "jobs": "versions temporary_settings opening datablocks camera resolution scenes rendering",
 }
 # Inside the tracer a room may import from all those before it.
 TRACER_FLOORS = ["scene", "tiles", "native", "render"]

@@ -22,6 +22,7 @@ from .tracer.scene.film import MOST_SAMPLES, SAMPLES
 from .tracer.scene.levels import least_level
 
 if TYPE_CHECKING:  # each function imports what no other needs: a picture is traced before half of it would be loaded
+    from .comparison.answer import NotModelled
     from .comparison.light_verdict import RadianceComparison
     from .comparison.renderers import Renderer
     from .comparison.verdict import GeometryComparison
@@ -123,12 +124,13 @@ def compare(
     comparison.renderers; Cycles by default. partial : of geometry, whether it may lack passes: Depth, Distance or Position is
     enough.
 
-    Returns geometry's comparison or that of light: `.passed`, `.sentence`, `.lines()`, `.to_json()`.
+    Returns geometry's comparison or that of light: `.answer`, `.passed`, `.sentence`, `.lines()`, `.to_json()`.
 
     Raises
     ------
     InputError
-        if sizes differ, a pass is missing, the camera is not known, or several pictures have no noise to tell.
+        if sizes differ, a pass is missing, the camera is not known, several pictures have no noise to tell, or no pixel of
+        either picture shows an object.
     """
     from .comparison import geometry, radiance, renderers
 
@@ -141,17 +143,35 @@ def compare(
     camera = of.camera or (scene.camera if scene else None)
     if camera is None:
         raise InputError(f"{of.source} does not tell its camera: give its scene with --scene, or trace it with viewcam render")
+    # The picture may be of another size than the scene says, or of the stated camera.
+    shown = scene and replace(scene, camera=camera)
     if radiance.carries_light(of):
-        return radiance.compare(of, pictures, camera, test_samples)
+        lit = radiance.compare(of, pictures, camera, test_samples)
+        return replace(lit, not_modelled=_not_modelled(shown, threads)) if shown else lit
     if len(pictures) != 1:
         raise InputError(f"{of.source} has no noise that several pictures could tell: compare it with one")
     by = renderer or renderers.CYCLES
-    if scene is None:
-        return geometry.compare(of, pictures[0], camera, renderer=by, partial=partial)
-    # The picture may be of another size than the scene says, or of the stated camera.
-    surfaces_at = tracing.Tracer(replace(scene, camera=camera), threads).surfaces_at
-    stated = scene.stated_camera if camera == scene.camera else None
-    return geometry.compare(of, pictures[0], camera, surfaces_at, stated, scene.origin, by, partial)
+    if shown is None:
+        found = geometry.compare(of, pictures[0], camera, renderer=by, partial=partial)
+    else:
+        tracer = tracing.Tracer(shown, threads)
+        stated = shown.stated_camera if scene and camera == scene.camera else None
+        found = geometry.compare(of, pictures[0], camera, tracer.surfaces_at, stated, shown.origin, by, partial)
+        found = replace(found, not_modelled=_not_modelled(shown, threads, tracer))
+    if found.shows_nothing:
+        raise InputError(found.sentence)
+    return found
+
+
+def _not_modelled(scene: Scene, threads: int | None, tracer: tracing.Tracer | None = None) -> "NotModelled":
+    """What of a scene's picture is not modelled. tracer : the scene's, of a picture of geometry."""
+    from .comparison.answer import NotModelled, in_the_picture
+
+    names = scene.not_modelled
+    if not names:
+        return NotModelled()
+    shown = (tracer or tracing.Tracer(scene, threads)).pixels_of(names)
+    return in_the_picture(names, shown, None, is_lit=tracer is None)
 
 
 @dataclass(frozen=True)
@@ -159,12 +179,16 @@ class Check:
     """What `check` has found, or a comparison of files.
 
     passed : whether Cycles renders the camera, or the pictures are the same. sentence : by how much. figures : all that --json
-    writes.
+    writes. answer : one of "same", "same_but" (the same, but for objects that are not modelled) and "different".
     """
 
     passed: bool
     sentence: str
     figures: dict[str, Any]
+
+    @property
+    def answer(self) -> str:
+        return str(self.figures["answer"])
 
 
 def check(blend: File, *options: File) -> Check:
@@ -188,9 +212,8 @@ def run(command: str, *words: File) -> Check:
         result, errors = Path(folder) / "result.json", _Errors()
         given = [str(word) for word in (*words, "--json", result)]
         status = child_process.run_viewcam(command, *given, tell_on=errors, apart_from=child_process.blender_scripts())
-        if status not in (0, 1):
+        if not result.exists() or "answer" not in (figures := json.loads(result.read_text(encoding="utf-8"))):
             raise InputError(errors.last or f"viewcam {command} ended with status {status} and without a word")
-        figures = json.loads(result.read_text(encoding="utf-8"))
     return Check(status == 0, figures["sentence"], figures)
 
 

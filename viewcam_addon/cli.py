@@ -131,11 +131,14 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
             "--trust", action="store_true", help="let what is in the file run and write: Python, shaders, caches"
         )
 
+    def strict(added: argparse.ArgumentParser, when: str) -> None:
+        added.add_argument("--strict", action="store_true", help=f"exit with 3 {when}")
+
     def scene_choices(added: argparse.ArgumentParser) -> None:
         added.add_argument("--camera", metavar="NAME", help="the camera object (default: the scene's)")
         added.add_argument("--frame", type=int, metavar="N", help="the frame (default: the file's current one)")
         added.add_argument("--size", type=types.size, metavar="WxH", help="pixels of the picture (default: the scene's)")
-        added.add_argument("--strict", action="store_true", help="exit with 3 if anything can not be modelled")
+        strict(added, "if anything is not modelled: of the picture where one is compared, else of the file")
         added.add_argument("--recenter", action="store_true", help="put the origin at the eye: for scenes far from it")
         added.add_argument("--clay", action="store_true", help="the same matte material on everything, on both sides")
         light(added)
@@ -218,6 +221,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         added.add_argument(
             "--scene", metavar="SCENE.json", type=Path, help="the reference's scene: explains silhouettes, brings the ledger"
         )
+        strict(added, "if anything in the picture is not modelled")
         # Cycles' file counts one that is left out.
         added.add_argument("--test-samples", type=types.positive, help=argparse.SUPPRESS)
         words = "what TEST.exr holds, made elsewhere: position=P.X,P.Y,P.Z depth=Z; also distance, normal, uv, object-index"

@@ -18,7 +18,7 @@ passed_on: dict[int, int] = {}
 """In a batch that is waited for: the signals by which it hears of those that the waiting process is sent → what these were.
 
 A terminal sends a signal to both, `kill` to one. By numbers of their own, one that comes both ways is not counted as two,
-the second of which ends a batch at once (batch/interruption.py).
+the second of which ends a batch at once (jobs/interruption.py).
 """
 
 _ASKED_FOR = (signal.SIGINT, signal.SIGTERM)

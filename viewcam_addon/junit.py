@@ -43,15 +43,15 @@ def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
 def write(path: Path, words: str, status: int, result: Mapping[str, Any], seconds: float) -> None:
     """Write one test of one suite.
 
-    path : the file. words : those of the command, the test's name. status : its exit status: 0 passed, 1 failed, another one an
-    error. result : what --json writes, with `sentence` or `error`. seconds : it took.
+    path : the file. words : those of the command, the test's name. status : its exit status: 0 passed, 1 failed, 3 failed where
+    there is an `answer`, another one an error. result : what --json writes, with `sentence` or `error`. seconds : it took.
 
     Raises
     ------
     InputError
         if it can't be written.
     """
-    kind = {0: None, 1: "failure"}.get(status, "error")
+    kind = {0: None, 1: "failure", 3: "failure" if "answer" in result else "error"}.get(status, "error")
     counts = {"errors": kind == "error", "failures": kind == "failure", "skipped": False, "tests": True}
     took = f"{seconds:.3f}"
     suites = ElementTree.Element("testsuites", name="viewcam")

@@ -43,7 +43,7 @@ def charts(quick: bool) -> tuple[Chart, ...]:
     if LLVM not in variants:
         print(
             "speed-mitsuba: left out, since Mitsuba's llvm variant does not run here: "
-            "pip install virtual-pinhole[mitsuba], and LLVM 16 or newer"
+            "pip install '.[mitsuba]' in a clone, and LLVM 16 or newer"
         )
         return ()
     still = STILL.small() if quick else STILL

@@ -16,10 +16,10 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon import child_process
 from viewcam_addon.blender import dataset_cameras, opening, versions
-from viewcam_addon.blender.batch.renderer import BlenderRenderer
+from viewcam_addon.blender.jobs.renderer import BlenderRenderer
 from viewcam_addon.blender.rendering import job
 from viewcam_addon.errors import InputError, NotModelledError
-from viewcam_addon.shots import Shot
+from viewcam_addon.jobs.shot import Shot
 
 pytestmark = pytest.mark.slow
 

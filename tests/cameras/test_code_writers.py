@@ -119,3 +119,17 @@ def test_any_camera_comes_back(eye, view, size, d, shift):
     shifted = Pinhole(eye, look_at, (0, 0, 1), d, *size, tuple(a * b for a, b in zip(shift, size, strict=True)))
     (read,) = cameras.read(cameras.write([Camera("a", shifted)], "vtk"))
     same(read.pinhole, shifted, exact=False)
+
+
+def test_unreals_quaternions_go_on_from_row_to_row():
+    """A pan and a dive all around: with a sign that jumps, whatever goes from one row to the next spins."""
+    rotation = pytest.importorskip("scipy.spatial.transform").Rotation
+    eyes = [(5 * math.cos(a), 5 * math.sin(a), 3 * math.sin(2 * a)) for a in np.linspace(0, 4 * math.pi, 73)]
+    given = [Camera(f"{number}", Pinhole(eye, (0, 0, 0.2), (0, 0, 1), 500, 640, 360)) for number, eye in enumerate(eyes)]
+    rows = [line.split(",") for line in cameras.write(given, "unreal").splitlines()[1:]]
+    turns = np.array([[float(part) for part in row[4:8]] for row in rows])
+    assert (turns[1:] * turns[:-1]).sum(axis=1).min() > 0.9
+    forward = rotation.from_quat(turns).apply([1, 0, 0])
+    assert np.abs(forward * [1, -1, 1] + np.array([camera.pinhole.axes()[2] for camera in given])).max() < 1e-12
+    alone = cameras.write(given[:1], "unreal").splitlines()[1].split(",")
+    assert float(alone[7]) >= 0

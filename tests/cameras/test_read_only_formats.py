@@ -301,9 +301,19 @@ def test_what_was_tracked_stands_on_euroc_s_body_as_its_own_sensor_says(tmp_path
 
 
 def test_eight_numbers_without_a_quaternion_are_no_trajectory_of_tum():
-    """Nuke's .chan has as many: frame, place, three angles in degrees, field of view."""
     with pytest.raises(InputError, match="quaternion of pose 0 has the length 46"):
-        cameras.read("1 0.1 1.5 5 -10 2 0 45\n2 0.2 1.5 5 -10 4 0 45\n", options=Options(base=CAMERAS["plain"]))
+        cameras.read("1.5 0.1 1.5 5 -10 2 0 45\n2.5 0.2 1.5 5 -10 4 0 45\n", options=Options(base=CAMERAS["plain"]))
+
+
+@pytest.mark.parametrize("angles", ["-10 2 0 45", "0 0 0 45", "0 0 0 1", "-10 2 0"])
+def test_nukes_chan_is_no_trajectory_of_tum(tmp_path, angles):
+    """It has as many numbers: frame, place, three angles in degrees, and perhaps the field of view."""
+    (tmp_path / "a.chan").write_text(f"1\t0.1 1.5 5 {angles}\n2\t0.2 1.5 5 {angles}\n")
+    with pytest.raises(InputError, match="Nuke's chan"):
+        cameras.read(tmp_path / "a.chan", options=Options(base=CAMERAS["plain"]))
+    if angles.endswith("45"):  # told by its numbers alone
+        with pytest.raises(InputError, match="Nuke's chan"):
+            cameras.read((tmp_path / "a.chan").read_text(), options=Options(base=CAMERAS["plain"]))
 
 
 def test_euroc_cameras_that_are_fisheyes_are_refused_even_without_coefficients(tmp_path):
@@ -438,7 +448,7 @@ K = {"K": [[500, 0, 320], [0, 500, 240], [0, 0, 1]], "image_size": [640, 480]}
         ({"camera_model": "pinhole", "distortion_model": "equidistant", "distortion_coeffs": [0, 0, 0, 0]}, "equidistant"),
         ({"distortion_model": "fov"}, "fov"),
         ({"cam_to_robot_transform": np.eye(4).tolist()}, "whose axes"),
-        ({"binning_x": 2}, "divide K"),
+        ({"binning_x": 1.5}, "whole number of pixels"),
         ({"K": [[1.2, 0, 0.5], [0, 1.6, 0.5], [0, 0, 1]]}, "widths of the picture"),
     ],
 )
@@ -494,3 +504,91 @@ def test_an_animation_of_gltf_by_a_pointer_is_told(pointer):
     for animations, is_told in (([], False), ([{"channels": [{"sampler": 0, "target": target}]}], True)):
         (camera,) = cameras.read(json.dumps(document | {"animations": animations}), options=Options(size=(640, 480)))
         assert any("animated" in note for note in camera.notes) == is_told
+
+
+# ---- a window of a sensor
+
+
+K_OF_SENSOR = [410.5, 0, 633.25, 0, 410.5, 372.75, 0, 0, 1]
+
+
+def ros(form, size, binning, roi):
+    """ROS camera_info, as a message is printed or as camera_calibration writes it."""
+    names = ("width", "height") if form == "message" else ("image_width", "image_height")
+    lines = [f"{name}: {side}" for name, side in zip(names, size, strict=True)] + ["distortion_model: plumb_bob"]
+    if form == "message":
+        lines += ["D: [0.0, 0.0, 0.0, 0.0, 0.0]", f"K: {K_OF_SENSOR}"]
+    elif form == "flow":
+        lines += [f"camera_matrix: {{rows: 3, cols: 3, data: {K_OF_SENSOR}}}"]
+    else:
+        lines += ["camera_matrix:", "  rows: 3", "  cols: 3", f"  data: {K_OF_SENSOR}"]
+    lines += [f"binning_{side}: {number}" for side, number in zip("xy", binning, strict=True)]
+    keys = dict(zip(("x_offset", "y_offset", "width", "height"), roi, strict=True))
+    if form == "flow":
+        return "\n".join([*lines, f"roi: {keys}".replace("'", ""), ""])
+    return "\n".join([*lines, "roi:", *(f"  {key}: {number}" for key, number in keys.items()), ""])
+
+
+@pytest.mark.parametrize("form", ["message", "calibration", "flow"])
+@pytest.mark.parametrize(
+    ("size", "binning", "roi"),
+    [
+        ((1280, 800), (1, 1), (320, 200, 640, 480)),
+        ((640, 480), (0, 0), (320, 200, 640, 480)),
+        ((1280, 800), (4, 4), (0, 0, 0, 0)),
+        ((1280, 800), (2, 4), (320, 200, 640, 480)),
+        ((1280, 800), (1, 1), (0, 0, 0, 0)),
+    ],
+)
+def test_a_window_of_a_sensor_sees_what_the_sensor_sees_there(form, size, binning, roi):
+    """A point that K puts at a place of the sensor is at that place of its window, by ROS' definition of roi and binning."""
+    (camera,) = cameras.read(ros(form, size, binning, roi), options=Options(size=(1280, 800)))
+    across, down = (max(number, 1) for number in binning)
+    wanted = (roi[2] or size[0]) // across, (roi[3] or size[1]) // down
+    assert (camera.pinhole.width, camera.pinhole.height) == wanted
+    points = np.array([[0.3, -0.2, 2.0], [-0.1, 0.05, 1.0], [0, 0, 1.0]])
+    column, row, _ = camera.pinhole.project(points)
+    f, _, c_x, _, _, c_y, *_ = K_OF_SENSOR
+    sensor = points[:, :2] / points[:, 2:] * f + [c_x + 0.5, c_y + 0.5]  # from the corner of the sensor
+    there = (sensor - roi[:2]) / [across, down]
+    assert np.abs(np.column_stack([column, wanted[1] - row]) - there).max() < 1e-9
+    told = any("window of its sensor" in note for note in camera.notes)
+    assert told == ((across, down, *roi) != (1, 1, 0, 0, 0, 0))
+
+
+def test_yaml_in_brackets_is_read_as_pyyaml_reads_it():
+    from viewcam_addon.cameras import yaml as ours
+
+    theirs = pytest.importorskip("yaml")
+    text = "a: {rows: 3, 'b c': [1.5, 2, [x y, 4]], d: {e: http://f/g, h: {}}}\nk: [[1, 2], [3, -4.0e-3]]\n"
+    assert ours.read(text) == theirs.safe_load(text)
+    for broken in ("[1, 2", "[1 2]]", "{a: 1", "{a: 1]", "[" * 50 + "]" * 50, "{[1]: 2}"):
+        assert ours.read(f"k: {broken}\nl: 1\n").get("k") in (broken, f"{broken} l: 1", None)
+
+
+def test_infinigens_t_is_the_camera_in_the_world_and_its_k_counts_from_the_corner(tmp_path):
+    known = Known("pixels_not_square")
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = known.opencv.T, known.e
+    k = np.array([[known.f_x, 0, known.c_x], [0, known.f_y, known.c_y], [0, 0, 1]])
+    np.savez(tmp_path / "camview_0_0_0001_0.npz", K=k, T=pose, HW=np.array([known.height, known.width]))
+    the_same(cameras.read(tmp_path / "camview_0_0_0001_0.npz"), known)
+
+
+def test_metashapes_slave_camera_stands_on_its_master(tmp_path):
+    """Its eye is the location in its master's axes, its view the rotation's last column there, whatever the chunk does."""
+    turn = Known("rolled").opencv.T
+    sensor = '<sensor id="1" type="frame" master_id="0"><calibration><resolution width="640" height="360"/><f>500</f>'
+    sensor += f"</calibration><rotation>{text_of(turn)}</rotation><location>0.25 0.01 -0.02</location></sensor>"
+    slave = '<camera id="9" sensor_id="1" master_id="0" label="right.jpg"/>'
+    text = metashape(Known("plain")).replace("</sensors>", f"{sensor}</sensors>").replace("</cameras>", f"{slave}</cameras>")
+    master, other = cameras.read(text)
+    away = np.array(other.pinhole.eye) - master.pinhole.eye
+    axes_of_master = np.array(master.pinhole.axes()) * [[1], [-1], [-1]]
+    u, v, w = np.array(other.pinhole.axes())
+    assert other.name == "right" and any("of a rig" in note for note in other.notes)
+    scale = np.linalg.norm(away) / np.linalg.norm([0.25, 0.01, -0.02])
+    assert np.abs(axes_of_master @ away / scale - [0.25, 0.01, -0.02]).max() < 1e-12
+    assert np.abs(axes_of_master @ np.column_stack([u, -v, -w]) - turn).max() < 1e-12
+    with pytest.raises(InputError, match="of a rig"):
+        cameras.read(text.replace("<rotation>" + text_of(turn) + "</rotation><location>0.25 0.01 -0.02</location>", ""))

@@ -336,6 +336,24 @@ def test_what_of_pbrt_is_no_pinhole_or_unsaid_is_refused(text, sentence):
         cameras.read(text, options=Options(size=(640, 480)))
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "ActiveTransform StartTime LookAt 1 2 3 0 0 0 0 0 1 ActiveTransform EndTime LookAt 1 2 3 0 0 0 0 0 1",
+        "Scale -1 1 1 ActiveTransform EndTime Translate 1 0 0 ActiveTransform All Identity LookAt 1 2 3 0 0 0 0 0 1",
+        "AttributeBegin ActiveTransform EndTime Translate 1 0 0 AttributeEnd LookAt 1 2 3 0 0 0 0 0 1",
+    ],
+)
+def test_a_camera_of_pbrt_that_stands_still_may_be_said_at_both_times(text):
+    still = 'LookAt 1 2 3 0 0 0 0 0 1 Camera "perspective"'
+    given = Options(size=(640, 480))
+    assert (
+        cameras.read(f'{text} Camera "perspective"', options=given)[0].pinhole == cameras.read(still, options=given)[0].pinhole
+    )
+    with pytest.raises(InputError, match="moves while the shutter"):
+        cameras.read(f'{text} ActiveTransform StartTime Translate 1 0 0 Camera "perspective"', options=given)
+
+
 # ---- POV-Ray: the documented ray through each place of the picture
 
 
@@ -395,6 +413,19 @@ def test_pov_rays_vectors_are_read_as_its_formula_has_them(text, right, up, dire
     assert camera.pinhole.mirrored == mirrored
 
 
+@pytest.mark.parametrize("size", [(320, 240), (640, 480), (1920, 1080), (480, 640)])
+@pytest.mark.parametrize("pose", ["", "sky z location <7,-6,4> look_at <0,0,1>", "sky z look_at y rotate 30*z"])
+def test_a_size_that_is_given_is_pov_rays_and_its_pixels_are_what_right_and_up_make_of_it(size, pose):
+    """`povray +W320 +H240` of right 1.33 shoots its rays through 320 columns of 1.33, though 319.2 of them would be square."""
+    text = f"camera {{ right <-1.33,0,0> up y direction z {pose} }}"
+    (camera,) = cameras.read(text, options=Options(size=size))
+    assert (camera.pinhole.width, camera.pinhole.height) == size
+    assert camera.pinhole.distance == pytest.approx((size[0] / 1.33, size[1]), rel=1e-12)
+    assert camera.pinhole.principal_point == pytest.approx((size[0] / 2, size[1] / 2), abs=1e-9)
+    (commented,) = cameras.read(f"// +W{size[0]} +H{size[1]}\n{text}")
+    assert commented.pinhole == camera.pinhole
+
+
 @pytest.mark.parametrize(
     ("text", "size", "mirrored"),
     [
@@ -418,7 +449,7 @@ def test_pov_rays_vectors_are_read_as_its_formula_has_them(text, right, up, dire
     ],
 )
 def test_pov_ray_turns_its_camera_by_the_sky(text, size, mirrored):
-    (camera,) = cameras.read(text, options=Options(size=(640, 360)))
+    (camera,) = cameras.read(text, options=Options(size=(640, 360), size_fits=True))
     pinhole = camera.pinhole
     assert (pinhole.eye, pinhole.look_at, pinhole.up) == ((7, -6, 4), (0, 0, 1), (0, 0, 1))
     assert (pinhole.width, pinhole.height) == size and pinhole.mirrored == mirrored

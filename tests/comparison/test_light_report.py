@@ -79,7 +79,7 @@ def passed(tmp_path_factory):
 
 def test_the_report_of_noise_says_what_the_comparison_says(passed):
     comparison, text, page = passed
-    assert '<html lang="en" class="passed">' in text
+    assert '<html lang="en" class="same">' in text
     for words in (
         "The same within noise at 256 samples.",
         "tiles of 32 × 32",
@@ -110,7 +110,7 @@ def test_a_failed_comparison_shows_the_place_under_the_loupe(tmp_path):
     wrong = np.ones((48, 64, 1))
     wrong[8:16, 16:24] = 1.4
     _, text, page = written(tmp_path, *noisy(wrong, 256))
-    assert '<html lang="en" class="failed">' in text
+    assert '<html lang="en" class="different">' in text
     assert "Different here. In columns 16 to 23, rows 8 to 15 Combined" in page.text
     assert "Under the loupe" in page.text and "beyond" not in page.tabs
 

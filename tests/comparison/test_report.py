@@ -79,7 +79,7 @@ def test_a_failed_comparison_says_so_at_the_top(paper_scene, tmp_path):
     reference, test = paper_scene.picture(), paper_scene.picture(1.0, 0.5)
     text, page = written(tmp_path, compare(reference, test, paper_scene.pinhole, paper_scene.surfaces_at), reference, test)
     assert "Not the same picture." in page.text and "shifted by (+0.5" in page.text
-    assert '<html lang="en" class="failed">' in text
+    assert '<html lang="en" class="different">' in text
 
 
 def test_the_report_is_called_by_file_camera_and_frame(compared, tmp_path):

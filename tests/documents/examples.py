@@ -28,7 +28,7 @@ SHOWN = ("text",)
 """Languages of blocks that show what a program says."""
 
 _LONG = "it takes minutes or hours; tests/benchmarks measures all of it in small"
-_FARM = "there is no such host; tests/batch/test_farm.py does the same on this machine"
+_FARM = "there is no such host; tests/jobs/test_farm.py does the same on this machine"
 _WITH = "VIEWCAM_BLENDER=/opt/blender/blender"
 
 NOT_RUN = {
@@ -44,8 +44,8 @@ NOT_RUN = {
     "viewcam chart scaling --only triangles": _LONG,
     "viewcam chart speed": _LONG,
     "viewcam chart stability --only roll spheres": _LONG,
-    "pip install 'virtual-pinhole[cluster]'": "what it installs is there where this test runs",
-    "dask scheduler --port 8786": "it does not end; tests/batch/test_farm.py runs it",
+    "pip install '/path/to/virtual-pinhole[cluster]'": "what it installs is there where this test runs",
+    "dask scheduler --port 8786": "it does not end; tests/jobs/test_farm.py runs it",
     f"{_WITH} dask worker tcp://farm:8786 --nworkers 1 --nthreads 1": _FARM,
     f"{_WITH} viewcam batch /shared/shot.blend /shared/shots.csv --out /shared/renders --scheduler tcp://farm:8786": _FARM,
     "blender -b --disable-autoexec /shared/shot.blend --command viewcam batch /shared/shots.csv --out /shared/renders "
@@ -60,7 +60,7 @@ ONLY_REAL = {f"blender --command extension install-file -r user_default -e {ZIP}
 ONLY_WHEEL = "vp.check("  # which runs a Python that has bpy; Blender's own has none
 
 WRITTEN = {
-    ("docs/farm.md", "yaml"): "tests/batch/test_cluster.py has a farm that is configured so",
+    ("docs/farm.md", "yaml"): "tests/jobs/test_cluster.py has a farm that is configured so",
     ("docs/ci.md", "yaml"): "tests/test_pytest_plugin.py does what its steps do",
     ("docs/datasets.md", "json"): "its program writes them, as tests/datasets/test_documentation.py compares",
 }

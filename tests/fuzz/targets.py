@@ -252,8 +252,9 @@ b,3,-6.5,2.5,"0,0,1","0 0 1",40.5e1,320,180,2,VIEWCAM,16,path
 
 def shots() -> Feed:
     """Lists of shots, in every format."""
-    from viewcam_addon import shots as lists
     from viewcam_addon.errors import InputError
+    from viewcam_addon.jobs import lists
+    from viewcam_addon.jobs.settings import settings_hash
 
     lines = b"".join(json.dumps(shot).encode() + b"\n" for shot in SHOTS["shots"])
 
@@ -267,7 +268,7 @@ def shots() -> Feed:
         path.write_bytes(data)
         try:
             for shot in lists.read(path, ["Camera"] if chance.random() < 0.5 else None):
-                lists.settings_hash(shot, {})
+                settings_hash(shot, {})
         except InputError as error:
             for sentence in getattr(error, "problems", [str(error)]):
                 judge(sentence)
@@ -279,19 +280,20 @@ def sidecar() -> Feed:
     """Sidecars in the folder of a batch that is continued, with its page, its summary and its dataset."""
     import painting
 
-    from viewcam_addon import shots as lists
-    from viewcam_addon.batch import dataset, one, run
-    from viewcam_addon.batch.folder import Folder, Outputs
     from viewcam_addon.cameras.sidecar import record
     from viewcam_addon.errors import InputError, told
+    from viewcam_addon.jobs import dataset, one, run
+    from viewcam_addon.jobs.folder import Folder, Outputs
+    from viewcam_addon.jobs.settings import settings_hash
+    from viewcam_addon.jobs.shot import Shot
     from viewcam_addon.pinhole import Pinhole
 
     class Painter(painting.Painter):
         def render(self, *given: object) -> dict:
             return {**super().render(*given), **record(Pinhole(**CAMERA))}
 
-    wanted = [lists.Shot("one", camera="Camera"), lists.Shot("two", camera="Camera")]
-    settings = {shot.name: lists.settings_hash(shot, {}) for shot in wanted}
+    wanted = [Shot("one", camera="Camera"), Shot("two", camera="Camera")]
+    settings = {shot.name: settings_hash(shot, {}) for shot in wanted}
     made: dict[str, bytes] = {}
 
     def batch(folder: Path) -> Folder:

@@ -2,6 +2,7 @@
 
 import functools
 import math
+from collections.abc import Iterable
 
 import bpy
 
@@ -91,16 +92,36 @@ def length(value: float, scene: bpy.types.Scene, digits: int = 6) -> str:
 
 def render_camera(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """The camera that a render of the current frame takes: where markers are bound to cameras, theirs and not the scene's."""
-    bound = [marker for marker in scene.timeline_markers if marker.camera and not marker.camera.hide_render]
+    return bound_camera(bindings_of(scene), scene.frame_current) or scene.camera
+
+
+def require_render_camera(scene: bpy.types.Scene) -> bpy.types.Object:
+    """`render_camera`, or InputError where there is none."""
+    camera_object = render_camera(scene)
+    if camera_object is None:
+        raise InputError(f"scene {scene.name!r} has no camera: add one, or name one with --camera")
+    return camera_object
+
+
+def bindings_of(scene: bpy.types.Scene) -> list[tuple[bpy.types.TimelineMarker, bpy.types.Object]]:
+    """The markers that are bound to cameras, and these."""
+    return [(marker, marker.camera) for marker in scene.timeline_markers if marker.camera]
+
+
+def bound_camera(bindings: Iterable[tuple[bpy.types.TimelineMarker, bpy.types.Object]], frame: int) -> bpy.types.Object | None:
+    """The camera that markers bind at a frame, as Blender has it: the last one's before it, else the first one's of all.
+
+    Those that are hidden in renders bind nothing. None where no marker does.
+    """
+    bound = [(marker.frame, camera_object) for marker, camera_object in bindings if not camera_object.hide_render]
+    before = [each for each in bound if each[0] <= frame]
     if not bound:
-        return scene.camera
-    # As Blender has it: the last one before the frame, else the first of all.
-    before = [marker for marker in bound if marker.frame <= scene.frame_current]
-    return (max(before, key=_frame) if before else min(bound, key=_frame)).camera
+        return None
+    return (max(before, key=_frame) if before else min(bound, key=_frame))[1]
 
 
-def _frame(marker: bpy.types.TimelineMarker) -> int:
-    return marker.frame
+def _frame(binding: tuple[int, bpy.types.Object]) -> int:
+    return binding[0]
 
 
 def depsgraph_of(scene: bpy.types.Scene) -> bpy.types.Depsgraph:

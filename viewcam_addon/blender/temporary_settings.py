@@ -61,14 +61,14 @@ def still_of_one_layer(
     overrides: Overrides,
     scene: bpy.types.Scene,
     view_layer: bpy.types.ViewLayer,
-    camera_object: bpy.types.Object,
+    camera_object: bpy.types.Object | None,
     keep: bool = False,
 ) -> None:
     """Make `bpy.ops.render.render` render this view layer through this camera, sharp, and nothing after it.
 
     What both sides of a comparison have in common: compositor and sequencer, motion blur, stereo and Freestyle are off, and a
-    render border is cropped to. Simplify stays as the artist has it. keep : whether what Blender and Cycles have built is kept,
-    for the next render.
+    render border is cropped to. Simplify stays as the artist has it. camera_object : the one that Blender chooses itself, as
+    markers bind it, where None. keep : whether what Blender and Cycles have built is kept, for the next render.
     """
     render = scene.render
     overrides.set(render, "use_persistent_data", keep)
@@ -83,8 +83,11 @@ def still_of_one_layer(
     ):
         overrides.set(render, name, False)
     overrides.set(render, "use_crop_to_border", render.use_border)
-    cameras_unbound(overrides, scene)
-    scene.camera = camera_object
+    if camera_object is None:
+        overrides.afterwards(setattr, scene, "camera", scene.camera)  # a marker may change it
+    else:
+        cameras_unbound(overrides, scene)
+        scene.camera = camera_object
     for each in scene.view_layers:
         overrides.set(each, "use", each == view_layer)
 

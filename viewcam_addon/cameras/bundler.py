@@ -9,8 +9,9 @@ Source: Bundler's README.md.
 import numpy as np
 
 from ..errors import InputError
+from ..pinhole import ViewPlane
 from . import axes, distortion, naming
-from .camera import Camera, Options
+from .camera import Camera, LeftOut, Options
 from .source import Source, flat, image_size, numbered_lines, table
 
 TITLE = "Bundler"
@@ -37,24 +38,33 @@ def read(source: Source, options: Options) -> list[Camera]:
     paths = paths if len(paths) == len(blocks) else [f"camera {index}" for index in range(len(blocks))]
     names = naming.distinct(paths)
     placed = [index for index, (f, _, _) in enumerate(blocks[:, 0].tolist()) if f]
-    turns, translations = blocks[placed, 1:4] * _OPENCV[:, None], blocks[placed, 4] * _OPENCV
-    matrices = axes.from_worlds_to_cameras(turns, translations, [names[index] for index in placed])
-    planes, told = [], []
+    left_out, lenses = LeftOut(), {}
     for index in placed:
-        f, k1, k2 = blocks[index, 0].tolist()
-        if f < 0:
-            raise InputError(f"{names[index]} of {source.name} has the focal length {f:g}: give one above 0")
-        size = image_size(source.path.parent / paths[index]) if source.path else None
-        width, height = size or options.size_or_refuse(names[index])
-        planes.append(axes.view_plane(f, f, width / 2, height / 2, (width, height)))
-        lens = {"k1": k1, "k2": k2}
-        told.append((size is not None, distortion.settle(lens, distortion.opencv(lens), planes[-1], names[index], options)))
-    found = zip(placed, told, axes.pinholes(matrices, planes, [names[index] for index in placed]), strict=True)
+        with left_out.unless_pinhole(names[index]):
+            lenses[index] = _lens(blocks[index, 0].tolist(), source, paths[index], names[index], options)
+    turns, translations = blocks[[*lenses], 1:4] * _OPENCV[:, None], blocks[[*lenses], 4] * _OPENCV
+    matrices = axes.from_worlds_to_cameras(turns, translations, [names[index] for index in lenses])
+    poses = axes.pinholes(matrices, [plane for plane, *_ in lenses.values()], [names[index] for index in lenses])
     cameras = [
         Camera(names[index], pinhole, stated, (*notes, *more), paths[index] if naming.has_suffix(paths[index]) else None)
-        for index, (stated, notes), (pinhole, more) in found
+        for (index, (_, stated, notes)), (pinhole, more) in zip(lenses.items(), poses, strict=True)
     ]
-    lost = len(blocks) - len(cameras)
-    if lost and not cameras:
+    lost = len(blocks) - len(placed)
+    if lost and not placed:
         raise InputError(f"none of the {lost} cameras of {source.name} was placed: let Bundler place them first")
-    return [camera.noted(f"{lost} cameras that were not placed were left out") for camera in cameras] if lost else cameras
+    told = (f"{lost} cameras that were not placed were left out",) if lost else ()
+    return [camera.noted(*told) for camera in left_out.told(cameras)]
+
+
+def _lens(
+    numbers: list[float], source: Source, path: str, name: str, options: Options
+) -> tuple[ViewPlane, bool, tuple[str, ...]]:
+    """The view plane, whether its size is the picture's, and notes. numbers : f, k1, k2."""
+    f, k1, k2 = numbers
+    if f < 0:
+        raise InputError(f"{name} of {source.name} has the focal length {f:g}: give one above 0")
+    size = image_size(source.path.parent / path) if source.path else None
+    width, height = size or options.size_or_refuse(name)
+    plane = axes.view_plane(f, f, width / 2, height / 2, (width, height))
+    lens = {"k1": k1, "k2": k2}
+    return plane, size is not None, distortion.settle(lens, distortion.opencv(lens), plane, name, options)

@@ -1,5 +1,7 @@
 """A camera that came from somewhere, or goes there, and what is chosen where a format leaves a choice."""
 
+import contextlib
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NoReturn
 
@@ -26,7 +28,8 @@ class Camera:
     name : as the file has it, or made from its number. pinhole : all of it. size_stated : whether the file says how many
     pixels the picture has, or tells it by the picture itself; else they are those of `Options`. notes : sentences on what was
     in the file and did not come along, or how it was taken. image : the picture's path, as the file has it. picture : the
-    picture itself, encoded, where the file holds it. time : seconds, where the file says when.
+    picture itself, encoded, where the file holds it. time : seconds, where the file says when. left_out : (name, sentence) of
+    each camera of the same file that is no pinhole.
     """
 
     name: str
@@ -36,6 +39,7 @@ class Camera:
     image: str | None = None
     picture: bytes | None = field(default=None, repr=False)
     time: float | None = None
+    left_out: tuple[tuple[str, str], ...] = field(default=(), repr=False)
 
     def noted(self, *notes: str) -> "Camera":
         """The same camera with more notes, each of them once."""
@@ -51,7 +55,8 @@ class Options:
     file says none. base : the camera whose values stand where a text says only some. angle_unit : one of ANGLES, where a text
     says none. pixel : one of PIXELS, in place of what the format has by habit. without_distortion : take a camera without its
     distortion. unmirrored : take a camera that mirrors its picture without that. original_world : undo the turn and scale
-    that a file says were applied to its world.
+    that a file says were applied to its world. size_fits : whether the size is that of whatever scene is open, whose shape
+    gives way to that of a text's camera, and not the picture's own.
 
     Raises
     ------
@@ -70,6 +75,7 @@ class Options:
     without_distortion: bool = False
     unmirrored: bool = False
     original_world: bool = False
+    size_fits: bool = False
 
     def __post_init__(self) -> None:
         _choice("axes", self.axes, AXES)
@@ -78,7 +84,7 @@ class Options:
                 _choice(name, getattr(self, name), among)
         for name in ("scale", "pixel_aspect"):
             object.__setattr__(self, name, checks.number(name, getattr(self, name), 1e-12, 1e12))
-        for name in ("without_distortion", "unmirrored", "original_world"):
+        for name in ("without_distortion", "unmirrored", "original_world", "size_fits"):
             checks.truth(name, getattr(self, name))
         if self.size is not None:
             width, height = self.size
@@ -135,15 +141,63 @@ def choose(cameras: list[Camera], name: str | None = None) -> Camera:
     if len(found) == 1:
         return found[0]
     if not found:
+        for left_out, sentence in (each for camera in cameras[:1] for each in camera.left_out):
+            if left_out == name:
+                raise InputError(sentence)
         raise InputError(f"there is no camera {checks.shown(name)}: name one of {names}")
     if name is None:
         raise InputError(f"there are {len(found)} cameras and one is wanted: name one of {names}")
     raise InputError(f"{len(found)} cameras are called {checks.shown(name)}: rename all but one")
 
 
+class NoPinholeError(InputError):
+    """A camera is well said, and is no pinhole: a fisheye, a panorama, a lens that bends, skew."""
+
+
 def not_a_pinhole(what: str, kind: str) -> NoReturn:
     """Refuse what is no pinhole by its name."""
-    raise InputError(f"{what} is {kind}, which is no pinhole camera: only straight perspective can be taken")
+    raise NoPinholeError(f"{what} is {kind}, which is no pinhole camera: only straight perspective can be taken")
+
+
+class LeftOut:
+    """The cameras of a file that are no pinholes, beside which the others are read all the same.
+
+    kind : the error by which a camera is left out. Any InputError in a scene, whose cameras have nothing to do with each other;
+    NoPinholeError alone of pictures that were measured together, where what else is wrong with one is wrong with all.
+    """
+
+    def __init__(self, kind: type[InputError] = NoPinholeError) -> None:
+        self._kind, self._sentences = kind, dict[str, str]()
+
+    @contextlib.contextmanager
+    def unless_pinhole(self, name: str) -> Iterator[None]:
+        """The block makes one camera. name : by which it would be chosen."""
+        try:
+            yield
+        except self._kind as error:
+            self._sentences.setdefault(name, str(error))
+
+    def told(self, cameras: Sequence[Camera]) -> list[Camera]:
+        """The cameras, which know and tell those that were left out.
+
+        Raises
+        ------
+        InputError
+            if all of the file's cameras were left out.
+        """
+        if not self._sentences:
+            return [*cameras]
+        if not cameras:
+            raise self._kind(next(iter(self._sentences.values())))
+        names_by_sentence: dict[str, list[str]] = {}
+        for name, sentence in self._sentences.items():
+            names_by_sentence.setdefault(sentence, []).append(checks.shown(name))
+        notes = [
+            f"Left out: {', '.join(names[:_NAMED])}{' …' if len(names) > _NAMED else ''}, since {sentence}"
+            for sentence, names in names_by_sentence.items()
+        ]
+        left_out = tuple(self._sentences.items())
+        return [replace(camera.noted(*notes), left_out=(*camera.left_out, *left_out)) for camera in cameras]
 
 
 def _choice(name: str, value: object, among: dict[str, str]) -> None:

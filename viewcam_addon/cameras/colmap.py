@@ -31,7 +31,7 @@ from ..errors import InputError
 from ..pinhole import Pinhole, ViewPlane
 from . import axes, distortion, naming, own
 from .axes import intrinsics, quaternion, world_to_camera
-from .camera import Camera, Options, not_a_pinhole
+from .camera import Camera, LeftOut, Options, not_a_pinhole
 from .source import Source, flat, pixels
 
 TITLE = "COLMAP model (cameras, images)"
@@ -62,7 +62,7 @@ MODELS: dict[str, tuple[int, tuple[str, ...]]] = {
 _STRAIGHT = ("f", "fx", "fy", "cx", "cy")
 _FILES = ("cameras", "images")
 NOTES = "virtual_pinhole.txt"
-_FOLDERS = ((), ("sparse", "0"), ("sparse",), ("colmap", "sparse", "0"))
+_FOLDERS = ((), ("0",), ("sparse", "0"), ("sparse",), ("colmap", "sparse", "0"))
 
 
 class _Intrinsics(NamedTuple):
@@ -107,17 +107,21 @@ def read(source: Source, options: Options) -> list[Camera]:
         intrinsic, images = _text_cameras(files[0]), [*_text_images(files[1])]
     told = suffix == ".bin" and _files(source, folder, ".txt")
     notes = ("The folder has the model as text, too: the binary one counts",) if told else ()
-    planes = {}
-    for image in images:
+    planes: dict[int, tuple[ViewPlane, tuple[str, ...]]] = {}
+    left_out, taken = LeftOut(), []
+    for image, name in zip(images, naming.distinct([image.name for image in images]), strict=True):
         if image.camera not in intrinsic:
             raise InputError(f"{source.name}: image {checks.shown(image.name)} is of camera {image.camera}, which is not there")
-        if image.camera not in planes:
-            planes[image.camera] = _plane(intrinsic[image.camera], f"camera {image.camera}", options)
-    found = zip(images, naming.distinct([image.name for image in images]), _poses(images, planes), strict=True)
-    cameras = []
-    for image, name, (pinhole, more) in found:
-        cameras.append(Camera(name, pinhole, True, (*notes, *planes[image.camera][1], *more), image.name))
-    return cameras
+        with left_out.unless_pinhole(name):
+            if image.camera not in planes:
+                planes[image.camera] = _plane(intrinsic[image.camera], f"camera {image.camera}", options)
+            taken.append((image, name))
+    poses = _poses([image for image, _ in taken], planes)
+    cameras = [
+        Camera(name, pinhole, True, (*notes, *planes[image.camera][1], *more), image.name)
+        for (image, name), (pinhole, more) in zip(taken, poses, strict=True)
+    ]
+    return left_out.told(cameras)
 
 
 def _poses(images: Sequence[_Image], planes: dict) -> list[tuple[Pinhole, tuple[str, ...]]]:

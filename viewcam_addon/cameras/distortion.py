@@ -7,9 +7,8 @@ altogether (fisheyes, panoramas) is refused by name, in camera.py.
 import math
 from collections.abc import Callable, Mapping
 
-from ..errors import InputError
 from ..pinhole import ViewPlane
-from .camera import Options
+from .camera import NoPinholeError, Options
 
 _UNSEEN = 1e-3  # pixels: what this project calls the same camera
 Point = tuple[float, float]
@@ -64,7 +63,7 @@ def settle(coefficients: Mapping[str, float], lens: Lens, plane: ViewPlane, what
 
     Raises
     ------
-    InputError
+    NoPinholeError
         if there is one that a picture can show and `options.without_distortion` is not chosen.
     """
     given = {name: value for name, value in coefficients.items() if value}
@@ -75,7 +74,7 @@ def settle(coefficients: Mapping[str, float], lens: Lens, plane: ViewPlane, what
     terms = ", ".join(f"{name} = {value:.6g}" for name, value in given.items())
     if options.without_distortion or pixels < _UNSEEN:
         return (f"The lens distortion of {what} ({terms}) was left out: it moves the picture's corner by {size}",)
-    raise InputError(
+    raise NoPinholeError(
         f"{what} has lens distortion ({terms}) that moves the picture's corner by {size}, which no pinhole has: "
         "undistort the pictures, or choose to take it without distortion"
     )

@@ -19,7 +19,7 @@ import numpy as np
 from .. import checks
 from ..errors import InputError
 from . import axes, naming, own
-from .camera import Camera, Options, not_a_pinhole
+from .camera import Camera, LeftOut, Options, not_a_pinhole
 from .source import Record, Source
 
 TITLE = "glTF and GLB"
@@ -40,7 +40,7 @@ def read(source: Source, options: Options) -> list[Camera]:
     nodes = document.records("nodes", "node") if "nodes" in document else []
     worlds = _Worlds(nodes)
     moving = _moving(document)
-    found, refused = [], []
+    left_out, found = LeftOut(InputError), []
     for index, node in enumerate(nodes):
         if "camera" not in node:
             continue
@@ -48,18 +48,12 @@ def read(source: Source, options: Options) -> list[Camera]:
         name = next(
             (text for text in (node.get("name"), camera.get("name")) if isinstance(text, str) and text), f"node {index}"
         )
-        try:
+        with left_out.unless_pinhole(name):
             found.append(_camera(name, camera, worlds.of(index), options))
-        except InputError as error:
-            refused.append(error)
-            continue
-        if moving & {index, *worlds.above(index)}:
-            found[-1] = found[-1].noted(f"{name} is animated: it was taken as it stands without its animation")
-    if refused and not found:
-        raise refused[0]
-    told = tuple(f"Left out: {error}" for error in refused)
+            if moving & {index, *worlds.above(index)}:
+                found[-1] = found[-1].noted(f"{name} is animated: it was taken as it stands without its animation")
     names = naming.distinct([camera.name for camera in found])
-    return [_renamed(camera, name).noted(*told) for camera, name in zip(found, names, strict=True)]
+    return left_out.told([_renamed(camera, name) for camera, name in zip(found, names, strict=True)])
 
 
 def write(cameras: Sequence[Camera], options: Options) -> str:

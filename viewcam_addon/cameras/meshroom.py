@@ -15,7 +15,7 @@ from .. import checks
 from ..errors import InputError
 from ..pinhole import ViewPlane
 from . import axes, distortion, naming
-from .camera import Camera, Options, not_a_pinhole
+from .camera import Camera, LeftOut, Options, not_a_pinhole
 from .source import Record, Source, number
 
 TITLE = "Meshroom and AliceVision .sfm"
@@ -54,23 +54,26 @@ def read(source: Source, options: Options) -> list[Camera]:
     told = (f"{len(views) - len(placed)} views without a pose were left out",) if len(placed) < len(views) else ()
     paths = [str(view.get("path") or f"view {view.get('viewId')}") for view in placed]
     planes: dict[str, tuple[ViewPlane, tuple[str, ...]]] = {}
-    cameras = []
+    left_out, cameras = LeftOut(), []
     for view, path, name in zip(placed, paths, naming.distinct(paths), strict=True):
-        intrinsic = str(view.get("intrinsicId"))
-        if intrinsic not in planes:
-            planes[intrinsic] = _plane(intrinsics[intrinsic], version, options)
-        plane, notes = planes[intrinsic]
-        if "rigId" in view and str(view.get("isPoseIndependant")).lower() in ("false", "0"):
-            raise InputError(
-                f"view {checks.shown(name)} is of a rig, on whose pose its cameras stand: give each a pose of its own"
-            )
-        pose = poses[str(view.get("poseId"))].record("pose").record("transform")
-        matrix = np.eye(4)
-        matrix[:3, :3] = np.array(pose.numbers("rotation", 9)).reshape(3, 3)  # column by column is its transpose, row by row
-        matrix[:3, 3] = pose.numbers("center", 3)
-        pinhole, more = axes.pinhole(axes.of_opencv(matrix), plane, f"view {checks.shown(name)}")
-        cameras.append(Camera(name, pinhole, True, (*told, *notes, *more), path))
-    return cameras
+        with left_out.unless_pinhole(name):
+            intrinsic = str(view.get("intrinsicId"))
+            if intrinsic not in planes:
+                planes[intrinsic] = _plane(intrinsics[intrinsic], version, options)
+            plane, notes = planes[intrinsic]
+            if "rigId" in view and str(view.get("isPoseIndependant")).lower() in ("false", "0"):
+                raise InputError(
+                    f"view {checks.shown(name)} is of a rig, on whose pose its cameras stand: give each a pose of its own"
+                )
+            pose = poses[str(view.get("poseId"))].record("pose").record("transform")
+            matrix = np.eye(4)
+            matrix[:3, :3] = np.array(pose.numbers("rotation", 9)).reshape(
+                3, 3
+            )  # column by column is its transpose, row by row
+            matrix[:3, 3] = pose.numbers("center", 3)
+            pinhole, more = axes.pinhole(axes.of_opencv(matrix), plane, f"view {checks.shown(name)}")
+            cameras.append(Camera(name, pinhole, True, (*told, *notes, *more), path))
+    return left_out.told(cameras)
 
 
 def _key(record: Record, key: str) -> str:

@@ -6,7 +6,11 @@ point is an offset from the picture's middle, whose first pixel's centre is (0.5
 than the other, b2 is skew, which no pinhole has. P1 and P2 are OpenCV's p2 and p1. Skew is told and left out as lens distortion
 is.
 
-Source: the Metashape manual's camera model, and its exported files. nerfstudio's reader leaves out the chunk's transform.
+A camera of a rig that has no transform of its own has a master, whose axes are those of its sensor's rotation and location: the
+rotation takes its axes to the master's, the location is its eye there.
+
+Source: the Metashape manual's camera model, and its exported files; of rigs the photogrammetry community's expert manual
+(slave-sensor transform). nerfstudio's reader leaves out the chunk's transform and rigs.
 """
 
 import contextlib
@@ -18,7 +22,7 @@ from .. import checks
 from ..errors import InputError
 from ..pinhole import ViewPlane
 from . import axes, distortion, naming
-from .camera import Camera, Options, not_a_pinhole
+from .camera import Camera, LeftOut, Options, not_a_pinhole
 from .source import Source, flat, number, pixels
 
 TITLE = "Agisoft Metashape XML"
@@ -32,7 +36,7 @@ def recognises(source: Source) -> bool:
 
 
 def read(source: Source, options: Options) -> list[Camera]:
-    found, lost = [], 0
+    left_out, found, lost = LeftOut(), [], 0
     for chunk in source.xml.iter("chunk"):
         whole = _placed(chunk.find("transform"), "the chunk")
         components = {  # in the world, as the chunk's own transform repeats of the active one
@@ -42,33 +46,57 @@ def read(source: Source, options: Options) -> list[Camera]:
         }
         planes: dict[str | None, tuple[ViewPlane, tuple[str, ...]]] = {}
         sensors = {sensor.get("id"): sensor for sensor in chunk.iter("sensor")}
+        cameras = {camera.get("id"): camera for camera in chunk.iter("camera")}
         for camera in chunk.iter("camera"):
-            transform = camera.find("transform")
-            if transform is None or not (transform.text or "").strip():
-                lost += 1
-                continue
             label = camera.get("label") or f"camera {camera.get('id')}"
             what = f"camera {checks.shown(label)}"
+            master = cameras.get(camera.get("master_id")) if _transform(camera) is None else None
+            if (own := _transform(camera if master is None else master)) is None:
+                lost += 1
+                continue
             sensor = camera.get("sensor_id")
             if sensor not in sensors:
                 raise InputError(f"{what} is of the sensor {checks.shown(sensor)}, which is not there: export the XML again")
-            if sensor not in planes:
-                planes[sensor] = _plane(sensors[sensor], options)
-            plane, notes = planes[sensor]
-            numbers = flat(f"the transform of {what}", (transform.text or ""))
-            if len(numbers) != 16:
-                raise InputError(f"the transform of {what} has {len(numbers)} numbers: it should have 16")
-            belongs = camera.get("component_id")
-            if components and belongs is not None and belongs not in components:
-                raise InputError(f"component {checks.shown(belongs)}, of which {what} is, has no transform: align it first")
-            matrix = axes.of_opencv(components.get(belongs, whole) @ np.array(numbers).reshape(4, 4))
-            pinhole, more = axes.pinhole(_without_scale(matrix), plane, what)
-            image = label if naming.has_suffix(label) else None
-            found.append(Camera(naming.stem(label), pinhole, True, (*notes, *more), image))
+            with left_out.unless_pinhole(naming.stem(label)):
+                if sensor not in planes:
+                    planes[sensor] = _plane(sensors[sensor], options)
+                plane, notes = planes[sensor]
+                numbers = flat(f"the transform of {what}", own)
+                if len(numbers) != 16:
+                    raise InputError(f"the transform of {what} has {len(numbers)} numbers: it should have 16")
+                belongs = camera.get("component_id")
+                if components and belongs is not None and belongs not in components:
+                    raise InputError(f"component {checks.shown(belongs)}, of which {what} is, has no transform: align it first")
+                matrix = components.get(belongs, whole) @ np.array(numbers).reshape(4, 4)
+                if master is not None:
+                    matrix = matrix @ _on_rig(sensors[sensor], what)
+                    notes = (*notes, f"{what} is of a rig: it was placed on its master {checks.shown(master.get('label'))}")
+                pinhole, more = axes.pinhole(_without_scale(axes.of_opencv(matrix)), plane, what)
+                image = label if naming.has_suffix(label) else None
+                found.append(Camera(naming.stem(label), pinhole, True, (*notes, *more), image))
+    found = left_out.told(found)
     if lost and not found:
         raise InputError(f"none of the {lost} cameras of {source.name} is aligned: align them in Metashape first")
     told = (f"{lost} cameras that are not aligned were left out",) if lost else ()
     return [camera.noted(*told) for camera in found]
+
+
+def _transform(camera: ElementTree.Element) -> str | None:
+    """The numbers of the camera's own transform as they stand there; None if it has none."""
+    return camera.findtext("transform", "").strip() or None
+
+
+def _on_rig(sensor: ElementTree.Element, what: str) -> np.ndarray:
+    """4 × 4, from the axes of a rig's sensor to those of its master."""
+    if sensor.find("rotation") is None and sensor.find("location") is None:
+        raise InputError(f"{what} is of a rig and has no pose, and where its sensor stands there is not said: export it again")
+    matrix = np.eye(4)
+    turn = flat(f"the rotation of {what} on its rig", sensor.findtext("rotation") or "1 0 0 0 1 0 0 0 1")
+    place = flat(f"the location of {what} on its rig", sensor.findtext("location") or "0 0 0")
+    if len(turn) != 9 or len(place) != 3:
+        raise InputError(f"where {what} stands on its rig should be 9 and 3 numbers: export the XML again")
+    matrix[:3, :3], matrix[:3, 3] = np.array(turn).reshape(3, 3), place
+    return matrix
 
 
 def _placed(transform: ElementTree.Element | None, what: str) -> np.ndarray:

@@ -22,7 +22,7 @@ import numpy as np
 from .. import checks
 from ..errors import InputError
 from . import axes, own, texts
-from .camera import Camera, Options, not_a_pinhole
+from .camera import Camera, LeftOut, Options, not_a_pinhole
 from .expressions import Expressions, Unknown, numbers
 from .source import Source
 from .texts import turn
@@ -95,14 +95,15 @@ def read(source: Source, options: Options) -> list[Camera]:
     sensors = list(itertools.islice(_in_xml(root) if root is not None else _in_python(source.text), _MOST + 1))
     if len(sensors) > _MOST:
         raise InputError(f"{source.name} has more than {_MOST} sensors: copy those that are meant")
-    pinholes = [sensor for sensor in sensors if sensor.kind == "perspective"]
-    if not pinholes:
-        if sensors:
-            not_a_pinhole(f"Mitsuba's sensor {sensors[0].name}", f"a {sensors[0].kind}")
+    if not sensors:
         raise InputError(f"{source.name} has no sensor, which is Mitsuba's word for a camera: copy the sensor")
-    others = [sensor for sensor in sensors if sensor.kind != "perspective"]
-    left_out = tuple(f"The sensor {sensor.name} is a {sensor.kind}, no pinhole, and was left out" for sensor in others)
-    return [_camera(sensor, options).noted(*left_out) for sensor in pinholes]
+    left_out, cameras = LeftOut(), []
+    for sensor in sensors:
+        with left_out.unless_pinhole(sensor.name):
+            if sensor.kind != "perspective":
+                not_a_pinhole(f"Mitsuba's sensor {sensor.name}", f"a {sensor.kind}")
+            cameras.append(_camera(sensor, options))
+    return left_out.told(cameras)
 
 
 def _camera(sensor: _Sensor, options: Options) -> Camera:

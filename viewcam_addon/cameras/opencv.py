@@ -28,7 +28,7 @@ from .. import checks
 from ..errors import InputError
 from ..pinhole import ViewPlane
 from . import axes, distortion, naming, own
-from .camera import Camera, Options, not_a_pinhole
+from .camera import Camera, LeftOut, NoPinholeError, Options, not_a_pinhole
 from .source import Record, Source, flat, number, pixels
 
 TITLE = "OpenCV K, R, t (FileStorage YAML, JSON or XML; NPZ)"
@@ -68,13 +68,14 @@ def recognises(source: Source) -> bool:
 
 
 def read(source: Source, options: Options) -> list[Camera]:
-    cameras, before = [], np.eye(4)
+    left_out, cameras, before = LeftOut(), [], np.eye(4)
     for name, values in _found(source):
         if "tcncnm1" in values:  # Kalibr's: from the camera before to this one
             before = _four_rows(values["tcncnm1"], f"T_cn_cnm1 of camera {checks.shown(name)}") @ before
             values |= {"r": before[:3, :3].tolist(), "t": before[:3, 3].tolist()}
-        cameras.append(_camera(name, values, options))
-    return cameras
+        with left_out.unless_pinhole(name):
+            cameras.append(_camera(name, values, options))
+    return left_out.told(cameras)
 
 
 def _four_rows(value: Any, name: str) -> np.ndarray:
@@ -225,8 +226,10 @@ def _numbers(name: str, value: Any) -> tuple[float, ...]:
     if isinstance(value, dict):
         rows, columns = (value.get(key) for key in ("rows", "cols"))
         found = flat(name, value.get("data", []))
-        if rows is not None and columns is not None and len(found) != pixels("rows", rows) * pixels("cols", columns):
-            raise InputError(f"{name} has {len(found)} numbers: its rows and cols say {rows:g} × {columns:g}")
+        if rows is not None and columns is not None:
+            rows, columns = pixels(f"rows of {name}", rows), pixels(f"cols of {name}", columns)
+            if len(found) != rows * columns:
+                raise InputError(f"{name} has {len(found)} numbers: its rows and cols say {rows} × {columns}")
         return found
     return flat(name, value)
 
@@ -237,7 +240,7 @@ def matrix_of_k(values: Sequence[float], what: str) -> tuple[float, float, float
     Raises
     ------
     InputError
-        if it has skew, no last row 0 0 1, or a focal length that is not above 0.
+        if it has no last row 0 0 1, or a focal length that is not above 0; NoPinholeError if it has skew.
     """
     if len(values) == 4:
         f_x, f_y, c_x, c_y = values
@@ -251,7 +254,7 @@ def matrix_of_k(values: Sequence[float], what: str) -> tuple[float, float, float
             hint = "transpose it" if [values[1], values[2], values[5]] == [0, 0, 0] else "its last row should be 0 0 1"
             raise InputError(f"K of {what} is {checks.shown([*values])}: {hint}")
         if abs(skew) > 1e-9 * abs(f_x):
-            raise InputError(
+            raise NoPinholeError(
                 f"K of {what} has a skew of {skew:g} pixels, which no pinhole camera here has: rectify the pictures"
             )
     if not (f_x > 0 and f_y > 0):
@@ -276,6 +279,31 @@ def plane_of_k(values: Sequence[float], size: tuple[int, int], half: float, what
     return axes.view_plane(f_x, f_y, c_x + half, c_y + half, size)
 
 
+def of_window(plane: ViewPlane, values: Mapping[str, Any], what: str) -> tuple[ViewPlane, tuple[str, ...]]:
+    """The view plane of the pixels that a ROS driver sends, of that of the whole sensor which it calibrates; and notes.
+
+    values : `roi` of ROS' camera_info, a window of the sensor in its own pixels (0 × 0: all of it), and `binning_x` and
+    `binning_y`, how many of these are one of the picture (0: one), with underscores or without.
+    """
+    given = Record({_plain(key): value for key, value in values.items()}, what)
+    x, y = (given.number(f"binning{side}", 1.0, 0, 1e4) or 1.0 for side in "xy")
+    roi = given.record("roi") if "roi" in given else Record({}, f"roi of {what}")
+    left, top, width, height = (roi.number(key, 0.0, 0, 1e9) for key in ("x_offset", "y_offset", "width", "height"))
+    if (x, y, left, top, width, height) == (1, 1, 0, 0, 0, 0):
+        return plane, ()
+    if not all(map(float.is_integer, (x, y, left, top, width, height))):
+        raise InputError(f"the roi or binning of {what} is no whole number of pixels: correct it")
+    size = int((width or plane.width) // x), int((height or plane.height) // y)
+    if min(size) < 1:
+        raise InputError(f"the roi of {what} has no pixel left once {x:g} × {y:g} are one: correct it")
+    (f_x, f_y), (c_x, c_y) = plane.distance, plane.principal_point
+    cut = axes.view_plane(f_x / x, f_y / y, (c_x - left) / x, (plane.height - c_y - top) / y, size)
+    told = (
+        f"{what} shows the window of its sensor from {left:g}, {top:g} on, {x:g} × {y:g} of its pixels as one: K was taken so"
+    )
+    return cut, (f"{told}, in a picture of {size[0]} × {size[1]}",)
+
+
 def coefficients(numbers: Sequence[float], what: str) -> dict[str, float]:
     """OpenCV's distortion coefficients by name.
 
@@ -297,17 +325,24 @@ def settled(numbers: dict[str, float], plane: ViewPlane, what: str, options: Opt
 def _camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
     what = f"camera {checks.shown(name)}"
     refuse_other_lens(values, what)
-    for key in ("binningx", "binningy"):
-        if values.get(key) not in (None, 0, 1):
-            raise InputError(
-                f"{what} has {key} {checks.shown(values[key])}, and its K counts the pixels before that: divide K by it"
-            )
+    if {"t", "hw"} <= values.keys():
+        return _of_infinigen(name, values, what, options)
     size, stated = _size(values, what, options)
     plane = plane_of_k(_numbers("K", _first(values, _K)), size, half_pixel(options), what)
-    notes = told_of_half_pixel(options, "OpenCV") + settled(_coefficients(values, what), plane, what, options)
+    plane, windowed = of_window(plane, values, what)
+    notes = told_of_half_pixel(options, "OpenCV") + windowed + settled(_coefficients(values, what), plane, what, options)
     turn, translation, more = _pose(values, what)
     pinhole, more_of_pose = axes.pinhole(axes.from_world_to_camera(turn, translation, what), plane, what)
     return Camera(name, pinhole, stated, (*notes, *more, *more_of_pose))
+
+
+def _of_infinigen(name: str, values: Mapping[str, Any], what: str, options: Options) -> Camera:
+    """Infinigen's K, T (camera to world, OpenCV's axes) and HW, whose principal point counts from the corner."""
+    height, width = (pixels(f"HW of {what}", side) for side in checks.vector(f"HW of {what}", flat("HW", values["hw"]), 2))
+    plane = plane_of_k(_numbers("K", _first(values, _K)), (width, height), half_pixel(options, "corner"), what)
+    pinhole, notes = axes.pinhole(axes.of_opencv(_four_rows(values["t"], f"T of {what}")), plane, what)
+    told = f"K, T and HW of {what} were taken as Infinigen's: T from the camera to the world, x right, y down, z into the view"
+    return Camera(name, pinhole, True, (told, *notes))
 
 
 def refuse_other_lens(values: Mapping[str, Any], what: str) -> None:

@@ -13,7 +13,7 @@ from .. import checks
 from ..errors import InputError
 from ..pinhole import ViewPlane
 from . import axes, distortion, naming, opencv
-from .camera import Camera, Options, not_a_pinhole
+from .camera import Camera, LeftOut, Options, not_a_pinhole
 from .source import Record, Source
 
 TITLE = "OpenMVG sfm_data.json"
@@ -54,18 +54,19 @@ def read(source: Source, options: Options) -> list[Camera]:
     if not options.pixel:
         told += ("OpenMVG does not say from where it counts pixels: the principal point was taken from the picture's corner",)
     planes: dict[int, tuple[ViewPlane, tuple[str, ...]]] = {}
-    cameras = []
+    left_out, cameras = LeftOut(), []
     for (path, pose, kind, data), name in zip(found, naming.distinct([path for path, *_ in found]), strict=True):
-        if id(data) not in planes:
-            planes[id(data)] = _plane(data, kind, options)
-        plane, notes = planes[id(data)]
-        matrix = np.eye(4)
-        matrix[:3, :3] = np.array(pose.numbers("rotation", 9)).reshape(3, 3).T
-        matrix[:3, 3] = pose.numbers("center", 3)
-        pinhole, more = axes.pinhole(axes.of_opencv(matrix), plane, f"view {checks.shown(name)}")
-        image = f"{root}/{path}" if isinstance(root, str) and root else path
-        cameras.append(Camera(name, pinhole, True, (*told, *notes, *more), image))
-    return cameras
+        with left_out.unless_pinhole(name):
+            if id(data) not in planes:
+                planes[id(data)] = _plane(data, kind, options)
+            plane, notes = planes[id(data)]
+            matrix = np.eye(4)
+            matrix[:3, :3] = np.array(pose.numbers("rotation", 9)).reshape(3, 3).T
+            matrix[:3, 3] = pose.numbers("center", 3)
+            pinhole, more = axes.pinhole(axes.of_opencv(matrix), plane, f"view {checks.shown(name)}")
+            image = f"{root}/{path}" if isinstance(root, str) and root else path
+            cameras.append(Camera(name, pinhole, True, (*told, *notes, *more), image))
+    return left_out.told(cameras)
 
 
 def _plane(data: Record, kind: str, options: Options) -> tuple[ViewPlane, tuple[str, ...]]:

@@ -18,9 +18,11 @@ Include, since a paste has no folder.
 import math
 import re
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
+from .. import checks
 from ..errors import InputError
 from ..pinhole import Pinhole
 from . import axes, naming, own, texts
@@ -43,6 +45,7 @@ _MOVES = {"LookAt": 9, "Translate": 3, "Scale": 3, "Rotate": 4, "Transform": 16,
 _NOT_READ = {"Include", "Import"}
 _SIZE = (1280, 720)
 _MOST_MOVES = 1_000
+_TIMES = {"All": (0, 1), "StartTime": (0,), "EndTime": (1,)}
 _HARMLESS = {"shutteropen", "shutterclose", "focaldistance", "lensradius", "medium", "hither", "yon"}
 
 # A parameter: its name, its values (numbers or texts), and where it stands.
@@ -69,19 +72,29 @@ def read(source: Source, options: Options) -> list[Camera]:
         return [scene.camera(options)]
 
 
+_NOTHING, _MIRROR = np.eye(4), np.diag([-1.0, 1.0, 1.0, 1.0])
+
+
+class _Transform(NamedTuple):
+    """A current transform. look : the numbers of a LookAt that alone, but for a mirror before it, is the transform."""
+
+    matrix: np.ndarray = _NOTHING
+    look: Sequence[float] | None = None
+    mirrored: bool = True
+
+
 class _Scene:
     """What stands before WorldBegin."""
 
     def __init__(self, text: str) -> None:
         self.text = text
-        self.transform = _NOTHING
+        self.transforms = _Transform(), _Transform()  # as the shutter opens, and as it closes
+        self.active = (0, 1)
         self.moves = self.cameras = 0
-        self.kept: list[np.ndarray] = []
-        self.named: dict[str, np.ndarray] = {}
+        self.kept: list[tuple[tuple[_Transform, _Transform], tuple[int, ...]]] = []
+        self.named: dict[str, tuple[_Transform, _Transform]] = {}
         self.is_lux = bool(_LUX.search(text))
-        self.look: Sequence[float] | None = None  # of a LookAt that alone, but for a mirror before it, is the transform
-        self.mirrored = True
-        self.at_camera: tuple | None = None
+        self.at_camera: tuple[_Transform, _Transform] | None = None
         self.lens: tuple[str, int, _Parameters] | None = None
         self.film: _Parameters | None = None
 
@@ -89,20 +102,24 @@ class _Scene:
         if word in _MOVES:
             self._move(word, at, arguments)
         elif word in ("AttributeBegin", "TransformBegin"):
-            self.kept.append(self.transform)
+            self.kept.append((self.transforms, self.active))
         elif word in ("AttributeEnd", "TransformEnd"):
-            self.transform = self.kept.pop() if self.kept else self.transform
-            self.look = None
+            if self.kept:
+                self.transforms, self.active = self.kept.pop()
         elif word == "CoordinateSystem" and arguments:
-            self.named[str(arguments[0])] = self.transform
+            self.named[str(arguments[0])] = self.transforms
         elif word == "CoordSysTransform":
             if arguments == ["camera"] and self.at_camera:
-                self.named["camera"] = np.linalg.inv(self._invertible(self.at_camera[0], at))
-            if not arguments or arguments[0] not in self.named:
+                self.named["camera"] = tuple(
+                    _Transform(np.linalg.inv(self._invertible(each.matrix, at))) for each in self.at_camera
+                )
+            if not arguments or not isinstance(arguments[0], str) or arguments[0] not in self.named:
                 texts.fail(self.text, at, "name a CoordinateSystem that stands before it")
-            self.transform, self.look = self.named[arguments[0]], None
-        elif word == "ActiveTransform" and arguments[:1] not in (["All"], []):
-            texts.fail(self.text, at, "the camera moves while the shutter is open, give one transform for All")
+            self.transforms = self.named[arguments[0]]
+        elif word == "ActiveTransform":
+            if arguments[:1] and arguments[0] not in _TIMES:
+                texts.fail(self.text, at, f"give one of {', '.join(_TIMES)}")
+            self.active = _TIMES[arguments[0]] if arguments else (0, 1)
         elif word in _NOT_READ and self.lens is None:
             texts.fail(self.text, at, "other files are not read, copy the camera out of that one")
         elif word == "Camera":
@@ -110,7 +127,9 @@ class _Scene:
             if not arguments or not isinstance(arguments[0], str):
                 texts.fail(self.text, at, 'give its kind, as in Camera "perspective"')
             self.lens = (arguments[0], at, parameters)
-            self.at_camera = (self.transform, self.look, self.mirrored)
+            self.at_camera = self.transforms
+            if not np.array_equal(*(each.matrix for each in self.transforms)):
+                texts.fail(self.text, at, "the camera moves while the shutter is open, give one transform for All")
         elif word == "Film":
             self.film = parameters
 
@@ -120,23 +139,27 @@ class _Scene:
         self.moves += 1
         if self.moves > _MOST_MOVES:
             raise InputError(f"the text has more than {_MOST_MOVES} transforms before WorldBegin: copy one camera")
-        if word == "LookAt":
-            before = self.transform.tolist()
-            mirrors = before == _MIRROR.tolist()
-            alone = mirrors or before == _NOTHING.tolist()
-            self.look, self.mirrored = (given if alone else None), mirrors == self.is_lux
-        else:
-            self.look = None
         step = _matrix(word, given, self.text, at)
         if word == "LookAt" and self.is_lux:
             step = _MIRROR @ step
-        self.transform = step if word in ("Transform", "Identity") else self.transform @ step
+        self.transforms = tuple(
+            self._moved(each, word, given, step) if time in self.active else each for time, each in enumerate(self.transforms)
+        )
+
+    def _moved(self, before: "_Transform", word: str, given: list, step: np.ndarray) -> "_Transform":
+        matrix = step if word in ("Transform", "Identity") else before.matrix @ step
+        if word != "LookAt":
+            return _Transform(matrix)
+        mirrors = np.array_equal(before.matrix, _MIRROR)
+        alone = mirrors or np.array_equal(before.matrix, _NOTHING)
+        return _Transform(matrix, given if alone else None, mirrors == self.is_lux)
 
     def camera(self, options: Options) -> Camera:
         kind, at, parameters = self.lens or ("perspective", 0, {})
         if kind != "perspective":
-            not_a_pinhole(f"pbrt's Camera {kind[:40]!r}", f"{'of a real lens' if kind == 'realistic' else kind[:40]}")
-        matrix, look, mirrored = self.at_camera or (self.transform, self.look, self.mirrored)
+            said = checks.shown(kind)
+            not_a_pinhole(f"pbrt's Camera {said}", "of a real lens" if kind == "realistic" else said.strip("'"))
+        matrix, look, mirrored = (self.at_camera or self.transforms)[0]
         notes = [f"pbrt's {name} was not taken" for name in parameters if name not in (*_HARMLESS, *_OF_LENS)]
         if self.cameras > 1:
             notes.append(f"The text has {self.cameras} Cameras, of which pbrt uses the last: so did this")
@@ -200,7 +223,6 @@ class _Scene:
         return film, crop
 
 
-_NOTHING, _MIRROR = np.eye(4), np.diag([-1.0, 1.0, 1.0, 1.0])
 _OF_LENS = {"fov", "halffov", "screenwindow", "frameaspectratio", "lensradius"}
 
 

@@ -258,7 +258,8 @@ class _Block:
         film = self._film(lengths[0] / lengths[1])
         size = (film.width, film.height)
         # A picture whose pixels nobody said has square ones, and a width that is whole: half a pixel may be missing there.
-        exact = size[0] if film.is_stated or self._aspect_of_film else size[1] * lengths[0] / lengths[1] / film.pixel_aspect
+        is_known = film.is_stated or self._aspect_of_film or self._is_given
+        exact = size[0] if is_known else size[1] * lengths[0] / lengths[1] / film.pixel_aspect
         if "look_at" in said:
             look_at = said["look_at"]
             plane = axes.view_plane(
@@ -282,9 +283,18 @@ class _Block:
         camera = Camera("Camera", pinhole, film.is_stated, (*film.notes, *notes))
         return texts.mirroring(camera, "POV-Ray")
 
+    @property
+    def _is_given(self) -> bool:
+        """Whether somebody said which picture this camera is for."""
+        return self.size is None and self.options.size is not None and not self.options.size_fits
+
     def _film(self, aspect: float) -> texts.Film:
-        """The picture: any, if the text takes the shape of whatever it is; else one of the shape that right and up say."""
-        if self._aspect_of_film:
+        """The picture: any, if the text takes the shape of whatever it is; else one of the shape that right and up say.
+
+        A size that was given is the picture's, as in POV-Ray, whose pixels are not square then where right and up are of
+        another shape: +W640 +H480 with right 1.33 makes them 0.25 % too narrow.
+        """
+        if self._aspect_of_film or self._is_given:
             return self._filmed()
         return texts.film(self.options, "POV-Ray's camera", self.size, aspect, _SIZE)
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import InputError
 from . import axes, distortion, naming
-from .camera import Camera, Options
+from .camera import Camera, LeftOut, NoPinholeError, Options
 from .source import Source, flat, image_size, number
 
 TITLE = "RealityCapture XMP"
@@ -31,7 +31,11 @@ def recognises(source: Source) -> bool:
 
 def read(source: Source, options: Options) -> list[Camera]:
     files = [file for file in source.files("*.xmp") if recognises(file)] if source.is_folder else [source]
-    return [_camera(file, options) for file in files]
+    left_out, cameras = LeftOut(), []
+    for file in files:
+        with left_out.unless_pinhole(naming.stem(file.path.stem) if file.path else "RealityCapture"):
+            cameras.append(_camera(file, options))
+    return left_out.told(cameras)
 
 
 def _camera(source: Source, options: Options) -> Camera:
@@ -55,7 +59,7 @@ def _camera(source: Source, options: Options) -> Camera:
     aspect = number(f"AspectRatio of {what}", values.get("AspectRatio") or "1", 1e-6)
     skew = number(f"Skew of {what}", values.get("Skew") or "0")
     if abs(skew) > 1e-9:
-        raise InputError(f"{what} has a skew of {skew:g}, which no pinhole camera here has: undistort the pictures")
+        raise NoPinholeError(f"{what} has a skew of {skew:g}, which no pinhole camera here has: undistort the pictures")
     right, down = (number(f"PrincipalPoint{side} of {what}", values.get(f"PrincipalPoint{side}") or "0") for side in "UV")
     plane = axes.view_plane(d, d * aspect, width / 2 + right * longer, height / 2 + down * longer, (width, height))
     notes: tuple[str, ...] = ()

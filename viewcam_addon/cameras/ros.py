@@ -3,6 +3,7 @@
 K is of the raw picture, P of the rectified one; without distortion and rectification they are one camera, and where P differs
 the raw picture's K counts, since its pixels are those that exist. It has no pose, which ROS keeps in tf: the camera stands at
 the origin and looks along z (the optical frame), and a note says so. Pixels count from the first one's centre, as OpenCV's.
+K, P and the size are those of the whole sensor; `roi` and `binning_x`, `binning_y` say which of its pixels the pictures are.
 
 Source: sensor_msgs/CameraInfo.msg.
 """
@@ -12,6 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .. import checks
 from ..errors import InputError
 from . import axes, naming, opencv
 from .camera import Camera, Options
@@ -30,14 +32,15 @@ def recognises(source: Source) -> bool:
 def read(source: Source, options: Options) -> list[Camera]:
     document = Record(source.yaml, source.name)
     name = str(document.values.get("camera_name") or "camera")
-    what = f"camera {name}"
+    what = f"camera {checks.shown(name)}"
     opencv.refuse_other_lens(document.values, what)
     k = document.record("camera_matrix").numbers("data", 9)
     if k[0] == 0:
         raise InputError(f"{what} is not calibrated, its K[0] is 0: calibrate it")
     size = (document.size("image_width"), document.size("image_height"))
     plane = opencv.plane_of_k(k, size, opencv.half_pixel(options), what)
-    notes = opencv.told_of_half_pixel(options, "ROS")
+    plane, windowed = opencv.of_window(plane, document.values, what)
+    notes = opencv.told_of_half_pixel(options, "ROS") + windowed
     if "distortion_coefficients" in document:
         inner = document.record("distortion_coefficients")
         numbers = inner.get("data") if "data" in inner else []

@@ -13,9 +13,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from .. import checks
 from ..errors import InputError
 from . import axes, own, texts
-from .camera import Camera, Options, not_a_pinhole
+from .camera import Camera, LeftOut, Options, not_a_pinhole
 from .source import Record, Source
 
 TITLE = "three.js JSON"
@@ -37,15 +38,16 @@ def _tops(source: Source) -> list[dict]:
 
 def read(source: Source, options: Options) -> list[Camera]:
     found = [camera for top in _tops(source) for camera in _cameras(top, np.eye(4), 0)]
-    pinholes = [(item, matrix) for item, matrix in found if item.get("type") == "PerspectiveCamera"]
-    if not pinholes:
-        if found:
-            not_a_pinhole("three.js' camera", f"an {found[0][0].get('type')}")
+    if not found:
         raise InputError(f"{source.name} has no PerspectiveCamera: give a file with one")
-    return [
-        _camera(Record(item, f"the camera {item.get('name') or number + 1}"), matrix, number, options)
-        for number, (item, matrix) in enumerate(pinholes)
-    ]
+    left_out, cameras = LeftOut(), []
+    for number, (item, matrix) in enumerate(found):
+        name = str(item.get("name") or f"camera {number + 1}")
+        with left_out.unless_pinhole(name):
+            if item.get("type") != "PerspectiveCamera":
+                not_a_pinhole(f"the camera {checks.shown(name)}", f"an {checks.shown(item.get('type'))}")
+            cameras.append(_camera(Record(item, f"the camera {checks.shown(name)}"), matrix, name, options))
+    return left_out.told(cameras)
 
 
 def _cameras(item: object, parent: np.ndarray, depth: int) -> Iterator[tuple[dict, np.ndarray]]:
@@ -53,17 +55,19 @@ def _cameras(item: object, parent: np.ndarray, depth: int) -> Iterator[tuple[dic
         return
     if depth > _DEEPEST:
         raise InputError(f"the scene is nested more than {_DEEPEST} objects deep: give the camera alone")
-    record = Record(item, f"the object {str(item.get('name'))[:40]!r}")
+    record = Record(item, f"the object {checks.shown(item.get('name'))}")
     matrix = parent @ np.array(record.numbers("matrix", 16)).reshape(4, 4).T if "matrix" in record else parent
     if str(item.get("type", "")).endswith("Camera"):
         yield item, matrix
-    for child in item.get("children") or ():
+    children = item.get("children")
+    for child in children if isinstance(children, list) else ():
         yield from _cameras(child, matrix, depth + 1)
 
 
-def _camera(record: Record, matrix: np.ndarray, number: int, options: Options) -> Camera:
+def _camera(record: Record, matrix: np.ndarray, name: str, options: Options) -> Camera:
     half = math.tan(math.radians(record.number("fov", 50.0, 1e-9, 180 - 1e-9)) / 2) / record.number("zoom", 1.0, 1e-9)
-    view = record.record("view") if record.get("view") and record.get("view").get("enabled") else None
+    view = record.record("view") if "view" in record else None
+    view = view if view and view.get("enabled") else None
     aspect = record.number("aspect", 1.0, 1e-4, 1e4)
     size = (view.size("width"), view.size("height")) if view else None
     film = texts.film(options, record.place, size, None if size else aspect)
@@ -84,7 +88,7 @@ def _camera(record: Record, matrix: np.ndarray, number: int, options: Options) -
     c_x = -left * d_x + (film.width - exact) / 2
     plane = axes.view_plane(d_x, d_y, c_x, top * d_y, (film.width, film.height))
     pinhole, notes = axes.pinhole(matrix, plane, record.place)
-    return Camera(str(record.get("name") or f"camera {number + 1}"), pinhole, film.is_stated, (*film.notes, *notes))
+    return Camera(name, pinhole, film.is_stated, (*film.notes, *notes))
 
 
 def write(cameras: Sequence[Camera], options: Options) -> str:

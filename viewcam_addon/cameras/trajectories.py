@@ -11,6 +11,7 @@ they make one animation.
 Sources: the data sets' own pages, and evo's file_interface.py for the order of numbers.
 """
 
+import math
 import re
 
 import numpy as np
@@ -35,6 +36,11 @@ def recognises(source: Source) -> bool:
 
 def read(source: Source, options: Options) -> list[Camera]:
     kind = _kind(source)
+    if kind == "chan":
+        raise InputError(
+            f"{source.name} is Nuke's chan, with angles whose order it does not say: import it with Blender's Nuke Animation "
+            "Format, or export cameras in another format"
+        )
     rows = table(source.name, numbered_lines(source))
     if rows.shape[1] < 8:
         raise InputError(f"{source.name} has {rows.shape[1]} numbers in a line: a pose has at least 8")
@@ -64,19 +70,32 @@ def read(source: Source, options: Options) -> list[Camera]:
 
 
 def _kind(source: Source) -> str | None:
-    """Which of them it is, by its first lines that are none of comments."""
+    """Which of them it is, by its first lines that are none of comments; "chan" if it is Nuke's, which looks alike."""
     if source.is_folder or source.is_binary or source.text[:1] in "{[<%":
         return None
     if re.match(r"#\s*timestamp.*p_(?:RS_)?R_?", source.text[:400]):
         return "EuRoC"
-    counts = set()
+    counts: set[tuple[int, bool]] = set()
+    rows: list[list[float]] = []
     for line in source.text[:20000].split("\n")[:-1][:20] or [source.text[:20000]]:
         if line.strip() and not line.lstrip().startswith("#"):
             words = re.split(r"[\s,]+", line.strip())
             if not all(re.fullmatch(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", word) for word in words):
                 return None
             counts.add((len(words), "," in line))
+            rows.append([*map(float, words)])
+    if counts <= {(7, False), (8, False)} and rows and (_is_named_chan(source) or all(map(_is_of_chan, rows))):
+        return "chan"
     return {(8, False): "TUM", (12, False): "KITTI"}.get(*counts) if len(counts) == 1 else None
+
+
+def _is_named_chan(source: Source) -> bool:
+    return source.path is not None and source.path.suffix.lower() == ".chan"
+
+
+def _is_of_chan(row: list[float]) -> bool:
+    """Whether it is a frame, a position, three angles and the field of view in degrees, where a pose has a quaternion."""
+    return len(row) == 8 and row[0].is_integer() and math.hypot(*row[4:]) > 1.1 and 1.1 < row[7] < 180
 
 
 def _sensor(source: Source, options: Options) -> tuple[np.ndarray, ViewPlane | None, tuple[str, ...]]:

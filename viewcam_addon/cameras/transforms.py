@@ -32,7 +32,7 @@ from .. import checks
 from ..errors import InputError
 from ..pinhole import Pinhole, ViewPlane
 from . import axes, distortion, naming, own
-from .camera import Camera, Options, not_a_pinhole
+from .camera import Camera, LeftOut, Options, not_a_pinhole
 from .source import Record, Source, image_size
 
 TITLE = "transforms.json (NeRF, instant-ngp, nerfstudio)"
@@ -138,24 +138,25 @@ def _cameras(source: Source, options: Options) -> list[Camera]:
     undone = _applied(top) if options.original_world else None
     told = () if options.original_world else _told_of_world(top)
     planes: dict[object, tuple[ViewPlane, bool, tuple[str, ...]]] = {}
-    cameras = []
+    left_out, cameras = LeftOut(), []
     for frame, path, name in zip(frames, paths, naming.distinct(paths), strict=True):
         both = _merged(top, frame)
         known = tuple(
             (key, str(value)) for key, value in both.values.items() if key not in ("frames", "file_path", own.KEY, *_POSES)
         )
         key = known if "w" in both and "h" in both else (known, path)
-        if key not in planes:
-            planes[key] = _plane(both, source, path, options)
-        plane, stated, notes = planes[key]
-        matrix = _matrix(frame)
-        pinhole, more = axes.pinhole(matrix if undone is None else undone(matrix), plane, frame.place)
-        image = path if naming.has_suffix(path) or "file_path" not in frame else f"{path}.png"
-        time = frame.number("time") if "time" in frame else None
-        cameras.append(
-            Camera(name, pinhole, stated, (*told, *notes, *more), image if "file_path" in frame else None, time=time)
-        )
-    return cameras
+        with left_out.unless_pinhole(name):
+            if key not in planes:
+                planes[key] = _plane(both, source, path, options)
+            plane, stated, notes = planes[key]
+            matrix = _matrix(frame)
+            pinhole, more = axes.pinhole(matrix if undone is None else undone(matrix), plane, frame.place)
+            image = path if naming.has_suffix(path) or "file_path" not in frame else f"{path}.png"
+            time = frame.number("time") if "time" in frame else None
+            cameras.append(
+                Camera(name, pinhole, stated, (*told, *notes, *more), image if "file_path" in frame else None, time=time)
+            )
+    return left_out.told(cameras)
 
 
 def _merged(top: Record, frame: Record) -> Record:

@@ -27,18 +27,28 @@ def write(cameras: Sequence[Camera], options: Options) -> str:
     InputError
         if a camera is shifted, mirrored or has pixels that are not square: then no field of view says it.
     """
-    return "\n".join(["name,tx,ty,tz,qx,qy,qz,qw,fov,width,height", *map(_line, cameras), ""])
+    lines, before = [], (1.0, 0.0, 0.0, 0.0)
+    for camera in cameras:
+        u, v, w = camera.pinhole.axes()
+        forward, right, up = ((a, -b, c) for a, b, c in (tuple(-x for x in w), u, v))
+        before = _continued(axes.quaternion([*zip(forward, right, up, strict=True)]), before)
+        lines.append(_line(camera, before))
+    return "\n".join(["name,tx,ty,tz,qx,qy,qz,qw,fov,width,height", *lines, ""])
 
 
-def _line(camera: Camera) -> str:
+def _continued(quaternion: axes.Quaternion, before: axes.Quaternion) -> axes.Quaternion:
+    """Of the two quaternions of a rotation the one that is nearer to the row before: else what goes from row to row spins."""
+    opposed = sum(a * b for a, b in zip(quaternion, before, strict=True)) < 0
+    return tuple(0.0 - part for part in quaternion) if opposed else quaternion
+
+
+def _line(camera: Camera, quaternion: axes.Quaternion) -> str:
     pinhole = camera.pinhole
-    u, v, w = pinhole.axes()
-    forward, right, up = ((a, -b, c) for a, b, c in (tuple(-x for x in w), u, v))
-    qw, qx, qy, qz = axes.quaternion([*zip(forward, right, up, strict=True)])
+    qw, qx, qy, qz = quaternion
     place = [_CENTIMETRES * part for part in (pinhole.eye[0], -pinhole.eye[1], pinhole.eye[2])]
     fov = centred_field_of_view(camera, "Unreal")[0]
     name = camera.name.replace('"', '""')
-    name = f'"{name}"' if any(sign in name for sign in ',"\n') else name
+    name = f'"{name}"' if any(sign in name for sign in ',"\n\r') else name
     return ",".join([name, texts.listed([*place, qx, qy, qz, qw, fov, pinhole.width, pinhole.height], ",")])
 
 

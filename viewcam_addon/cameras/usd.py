@@ -20,7 +20,7 @@ from .. import checks
 from ..errors import InputError
 from ..pinhole import ViewPlane
 from . import axes, own
-from .camera import Camera, Options, not_a_pinhole
+from .camera import Camera, LeftOut, Options, not_a_pinhole
 from .source import Source
 
 TITLE = "USD"
@@ -49,16 +49,12 @@ def read(source: Source, options: Options) -> list[Camera]:
         raise InputError(f"{source.name} is no stage that USD can open ({reason}): export it again") from None
     y_up = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.y
     told = (_Y_UP,) if y_up and options.axes != "y_up" else ()
-    found, refused = [], []
+    left_out, found = LeftOut(InputError), []
     for prim in stage.Traverse():
         if prim.IsA(UsdGeom.Camera):
-            try:
+            with left_out.unless_pinhole(prim.GetDisplayName() or prim.GetName()):
                 found += [camera.noted(*told) for camera in _cameras(prim, stage, options, Usd, UsdGeom)]
-            except InputError as error:
-                refused.append(error)
-    if refused and not found:
-        raise refused[0]
-    return [camera.noted(*(f"Left out: {error}" for error in refused)) for camera in found]
+    return left_out.told(found)
 
 
 def write(cameras: Sequence[Camera], options: Options) -> str:

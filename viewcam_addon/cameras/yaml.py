@@ -1,4 +1,5 @@
-"""The part of YAML in which OpenCV, ROS and Kalibr write cameras: keys, numbers, texts, lists; blocks by indentation.
+"""The part of YAML in which OpenCV, ROS and Kalibr write cameras: keys, numbers, texts, lists; blocks by indentation or in
+brackets.
 
 What is not of it is left out, so that whoever looks for a key does not find it. Rejected: PyYAML, which refuses OpenCV's first
 line and tags, and which Blender's Python has not.
@@ -7,11 +8,10 @@ line and tags, and which Blender's Python has not.
 import re
 from typing import Any
 
-from ..errors import InputError
-
 _LINE = re.compile(r"(\s*+)(?:- )?([\"']?)([^:\"'#\[\]{}]++)\2\s*+:(?:\s++(.*))?$")
 _BRACKET = re.compile(r"[\[\]{}]")
 _ITEM = re.compile(r"(\s*+)-\s++(.*)$")
+_FLOW = re.compile(r"""[\[\]{},]|:(?=[\s\[\]{},"']|$)|"[^"]*"|'[^']*'|[^\s\[\]{},:"'](?:[^\[\]{},:]|:(?![\s\[\]{},"']|$))*""")
 _DEEPEST = 8
 
 
@@ -80,10 +80,10 @@ def _without_tag(value: str) -> str:
 
 
 def _value(text: str) -> Any:
-    if text.startswith("["):
+    if text[:1] in ("[", "{"):
         try:
-            return _list(text)
-        except InputError:
+            return _flow(text)
+        except ValueError:
             return text
     try:
         return float(text) if "_" not in text else text.strip("\"'")
@@ -91,5 +91,47 @@ def _value(text: str) -> Any:
         return text.strip("\"'")
 
 
-def _list(text: str) -> list:
-    return [_value(part.strip()) for part in re.sub(r"[\[\]]", " ", text).split(",") if part.strip()]
+def _flow(text: str) -> Any:
+    """The value of what stands in brackets, [a, b] or {a: b}, which may be nested.
+
+    Raises
+    ------
+    ValueError
+        if the brackets do not fit together, or are nested too deeply.
+    """
+    opened: list[list | dict] = []
+    keys: list[str | None] = []  # of each object, the one whose value comes next
+    whole: Any = None
+    for token in _FLOW.findall(text):
+        if whole is not None or (not opened and token not in ("[", "{")) or len(opened) > _DEEPEST:
+            raise ValueError
+        if token in ("[", "{"):
+            opened.append([] if token == "[" else {})
+            keys.append(None)
+        elif token in ("]", "}"):
+            value, _ = opened.pop(), keys.pop()
+            if isinstance(value, list) != (token == "]"):
+                raise ValueError
+            if opened:
+                _put(opened[-1], keys, value)
+            else:
+                whole = value
+        elif token in (",", ":"):
+            continue
+        elif isinstance(opened[-1], dict) and keys[-1] is None:
+            keys[-1] = token.strip("\"' ")
+        else:
+            _put(opened[-1], keys, _value(_without_tag(token.strip())))
+    if whole is None:
+        raise ValueError
+    return whole
+
+
+def _put(holder: list | dict, keys: list[str | None], value: Any) -> None:
+    if isinstance(holder, list):
+        holder.append(value)
+    elif keys[-1] is None:
+        raise ValueError
+    else:
+        holder[keys[-1]] = value
+        keys[-1] = None

@@ -15,15 +15,18 @@ from typing import Any
 
 from .. import argument_types as types
 from .. import cameras, crashes
-from .. import shots as lists
-from ..batch import cluster, dataset, one, render_client, render_server
-from ..batch import run as running
-from ..batch.folder import Folder, Outputs
-from ..batch.interruption import Interruption
-from ..batch.summary import Summary
 from ..errors import InputError
+from ..jobs import cluster, dataset, lists, makers, one, render_client, render_server
+from ..jobs import run as running
+from ..jobs.folder import Folder, Outputs
+from ..jobs.interruption import Interruption
+from ..jobs.names import one_file
+from ..jobs.problems import ShotsError
+from ..jobs.settings import settings_hash
+from ..jobs.shards import shard
+from ..jobs.shot import ENGINES, LEVELS, Shot
+from ..jobs.summary import Summary
 from ..labels import KINDS
-from ..shots import ENGINES, LEVELS, Shot, ShotsError
 from ..terminal import say, silent_libraries
 from . import Result, blender_room
 from .camera import add_reading_options, options_of
@@ -163,7 +166,7 @@ def run(options: argparse.Namespace) -> Result:
 
 def serve(options: argparse.Namespace) -> Result:
     """`viewcam serve`: a Blender that renders the shots of a batch for the process that started it. No command for people."""
-    render_server.serve(options.handle, blender_room("batch.renderer").BlenderRenderer)
+    render_server.serve(options.handle, blender_room("jobs.renderer").BlenderRenderer)
     return 0, {}
 
 
@@ -196,7 +199,7 @@ def _outputs(options: argparse.Namespace) -> Outputs:
 
 def _refuse_names_of_labels(shots: Sequence[Shot]) -> None:
     """Labels of a shot a are called a.labels.exr and the like, and so would be the picture of a shot a.labels."""
-    names = {lists.one_file(shot.name): shot.name for shot in shots}
+    names = {one_file(shot.name): shot.name for shot in shots}
     for name in names:
         stem, _, rest = name.partition(".")
         while rest:
@@ -222,13 +225,13 @@ def _renderer(options: argparse.Namespace) -> contextlib.AbstractContextManager:
         return render_client.ServedRenderer(options.blend, options.seed, options.threads, options.trust, options.time_limit)
     if options.time_limit and not _on_cluster(options):
         raise InputError("--time-limit ends the Blender of a shot, and here that is this one: give --workers 1 as well")
-    return blender_room("batch.renderer").BlenderRenderer(options.blend, options.seed, options.threads, options.trust)
+    return blender_room("jobs.renderer").BlenderRenderer(options.blend, options.seed, options.threads, options.trust)
 
 
 def _job(options: argparse.Namespace, renderer: Any, outputs: Outputs) -> _Job:
     """All that is to be rendered, once nothing is wrong with it."""
     listed = _shots(options, renderer)
-    shots = [_completed(shot, options) for shot in (lists.shard(listed, options.shard) if options.shard else listed)]
+    shots = [_completed(shot, options) for shot in (shard(listed, options.shard) if options.shard else listed)]
     all_shots = [_completed(shot, options) for shot in listed] if options.shard and options.transforms else shots
     if problems := renderer.problems(all_shots, outputs):
         raise ShotsError(str(options.shots or options.blend or renderer.blend), tuple(problems))
@@ -239,7 +242,7 @@ def _job(options: argparse.Namespace, renderer: Any, outputs: Outputs) -> _Job:
     if options.transforms:
         dataset.refuse(all_shots, options.transforms)
     made_from = renderer.made_from()
-    return _Job(all_shots, shots, made_from, {shot.name: lists.settings_hash(shot, made_from) for shot in all_shots})
+    return _Job(all_shots, shots, made_from, {shot.name: settings_hash(shot, made_from) for shot in all_shots})
 
 
 def _shots(options: argparse.Namespace, renderer: Any) -> Sequence[Shot]:
@@ -249,16 +252,16 @@ def _shots(options: argparse.Namespace, renderer: Any) -> Sequence[Shot]:
         found = cameras.read(options.shots, options=options_of(options))
         for note in dict.fromkeys(note for camera in found for note in camera.notes):
             options.events.tell("note", command=options.command, text=note)
-        return lists.from_pinholes((camera.name, camera.pinhole) for camera in found)
+        return makers.from_pinholes((camera.name, camera.pinhole) for camera in found)
     if options.cameras is not None:
-        return lists.from_cameras(options.cameras, renderer.cameras, spaces=not options.transforms)
+        return makers.from_cameras(options.cameras, renderer.cameras, spaces=not options.transforms)
     if options.orbit is not None:
-        return lists.orbit(renderer.pinhole(options.camera, options.size), options.orbit)
-    camera = options.camera or renderer.scene_camera
+        return makers.orbit(renderer.pinhole(options.camera, options.size, options.frame), options.orbit)
+    camera = renderer.scene_camera if options.camera is None else options.camera
     if camera not in renderer.cameras:
         wrong = "the scene has no camera" if camera is None else f"the file has no camera {camera!r}"
         raise InputError(f"{wrong}: name one with --camera, of {', '.join(renderer.cameras) or 'none'}")
-    return lists.frames(options.frames, camera)
+    return makers.frames(options.frames, options.camera)
 
 
 def _completed(shot: Shot, options: argparse.Namespace) -> Shot:

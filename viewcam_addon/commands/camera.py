@@ -115,7 +115,7 @@ def _said(camera: Camera) -> dict:
 
 def _line(camera: Camera) -> str:
     pinhole = camera.pinhole
-    e, l = (", ".join(f"{number:.6g}" for number in point) for point in (pinhole.eye, pinhole.look_at))
+    e, l = (", ".join(f"{number + 0.0:.6g}" for number in point) for point in (pinhole.eye, pinhole.look_at))
     d = " × ".join(f"{number:.6g}" for number in dict.fromkeys(pinhole.distance))
     c = ", ".join(f"{number:.6g}" for number in pinhole.principal_point)
     shifted = "" if pinhole.principal_point == (pinhole.width / 2, pinhole.height / 2) else f", principal point {c}"

@@ -31,7 +31,7 @@ def export(options: argparse.Namespace) -> Result:
     from ..tracer.scene import scene_file
 
     with silent_libraries():
-        scene = blender_room("rendering.job").export(_request(options))
+        scene = blender_room("rendering.job").export(_request(options, options.strict))
     scene_file.write(scene, options.scene)
     say(*_ledger_lines(scene.ledger))
     result = {"scene": str(options.scene), "ledger": _ledger_json(scene.ledger)}
@@ -75,7 +75,7 @@ def render(options: argparse.Namespace) -> Result:
 
 def cycles(options: argparse.Namespace) -> Result:
     with silent_libraries():
-        ledger = blender_room("rendering.job").render(_request(options), options.image)
+        ledger = blender_room("rendering.job").render(_request(options, options.strict), options.image)
     say(*_ledger_lines(ledger))
     return 0, {"image": str(options.image), "ledger": _ledger_json(ledger)}
 
@@ -109,7 +109,7 @@ def compare(options: argparse.Namespace) -> Result:
         result["difference"] = difference.write(comparison, options.difference)
     if options.sides:
         difference.write_sides(comparison, reference, tests if is_light else [tests], options.sides)
-    return 0 if comparison.passed else 1, result
+    return comparison.answer.exit_status(options.strict), result
 
 
 def _stated(channels: Sequence[tuple[str, list[str]]]) -> dict[str, list[str]]:
@@ -151,6 +151,7 @@ def check(options: argparse.Namespace) -> Result:
             if (to := getattr(options, flag))
             for word in (f"--{flag}", str(to))
         ]
+        outputs += ["--strict"] if options.strict else []
         outputs += ["--test-samples", str(max(options.samples // count, 1)), "--repeat", options.repeat or options.words]
         if level == "geometry":
             tests = tests[:1]
@@ -208,13 +209,14 @@ def _told_level(scene: Any) -> dict[str, str]:
     return {"level": level, "reason": reason}
 
 
-def _request(options: argparse.Namespace, **more: Any) -> Any:
+def _request(options: argparse.Namespace, strict: bool = False, **more: Any) -> Any:
+    """strict : whether anything of the file that is not modelled ends it; where pictures are compared, theirs alone counts."""
     return blender_room("rendering.job").Request(
         blend=options.blend,
         camera=options.camera,
         frame=options.frame,
         size=options.size,
-        strict=options.strict,
+        strict=strict,
         recenter=options.recenter,
         threads=options.threads,
         level=options.level,
@@ -227,8 +229,8 @@ def _request(options: argparse.Namespace, **more: Any) -> Any:
 
 
 def _ledger_lines(ledger: Sequence[Any]) -> list[str]:
-    exported = sum(entry.status == "exported" for entry in ledger)
-    rest = [f"  {entry.status}: {entry.object}: {entry.reason}" for entry in ledger if entry.status != "exported"]
+    exported = sum(entry.is_modelled for entry in ledger)
+    rest = [f"  {entry.status}: {entry.object}: {entry.reason}" for entry in ledger if not entry.is_modelled]
     return [f"{exported} of {len(ledger)} objects exported whole", *rest] if ledger else []
 
 

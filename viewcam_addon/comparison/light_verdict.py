@@ -1,12 +1,13 @@
 """What a comparison of light has found, as figures, as one sentence, and as aligned lines for the shell."""
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..pinhole import Pinhole
+from .answer import Answer, NotModelled, answered
 from .hypothesis_tests import CONTOURS, PIXELS, WHOLE, HypothesisTest, Place
 from .noise_free import Edges
 from .perception import Appearance
@@ -82,6 +83,7 @@ class RadianceComparison:
     is_noisy : whether chance had a part in it. rows : one for each quantity, Combined first. equal : further quantities, the
     same to the last bit. appearance : relMSE and FLIP. test : the mean of the test pictures' Combined, (height, width, 3).
     maps : name to (height, width) float32, rows from the bottom: what differs in Combined and in quantities that fail.
+    not_modelled : what of the picture neither side models as it is.
     """
 
     pinhole: Pinhole
@@ -93,31 +95,35 @@ class RadianceComparison:
     appearance: Appearance
     test: Array
     maps: dict[str, NDArray[np.float32]]
+    not_modelled: NotModelled = field(default_factory=NotModelled)
 
     @property
-    def passed(self) -> bool:
-        """Whether nothing differs by more than chance and rounding."""
-        return all(row.ok for row in self.rows)
-
-    @property
-    def sentence(self) -> str:
-        """The verdict in one sentence, which says where and by how much where there is a difference."""
+    def answer(self) -> Answer:
+        """Whether the light is the same, in one sentence, which says where and by how much where it is not."""
         combined = self.rows[0]
-        if not self.passed:
-            worst = [row for row in self.rows if not row.ok]
+        worst = [row for row in self.rows if not row.ok]
+        if worst:
             others = f"; {_listed([row.name for row in worst[1:]])} too" if len(worst) > 1 else ""
-            return f"Different here: {_difference(worst[0])}{_hint(worst[0])}{others}."
+            return answered(False, "Different here", f"{_difference(worst[0])}{_hint(worst[0])}{others}.", self.not_modelled)
         if not self.is_noisy:
             row = combined.noise_free
-            return (
-                f"The same picture: over {row.count:,} pixels without noise the light differs by {row.values[0]:.1e} of its "
+            text = (
+                f"over {row.count:,} pixels without noise the light differs by {row.values[0]:.1e} of its "
                 f"value in the median and by at most {row.values[-1]:.1e}, {percent(row.worst[1])} of what float32 allows"
                 f"{_edges(combined)}."
             )
-        return (
-            f"The same within noise at {samples_text(self)}: no pixel and no tile differs by more than chance; "
-            f"{_mean_text(combined)}."
-        )
+            return answered(True, "The same picture", text, self.not_modelled)
+        text = f"no pixel and no tile differs by more than chance; {_mean_text(combined)}."
+        return answered(True, f"The same within noise at {samples_text(self)}", text, self.not_modelled)
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing of what is modelled differs by more than chance and rounding."""
+        return self.answer.passed
+
+    @property
+    def sentence(self) -> str:
+        return self.answer.sentence
 
     def lines(self) -> list[str]:
         """A line for each quantity, aligned, what an eye sees, and the verdict last."""
@@ -126,15 +132,14 @@ class RadianceComparison:
             table.append(f"{'To the last bit':<17}{', '.join(self.equal)}")
         seen = self.appearance
         expected = "" if seen.expected_relmse is None else f", of which noise explains {seen.expected_relmse:.2e}"
-        flip = "needs the package flip-evaluator" if seen.flip is None else f"{seen.flip:.4f}"
-        table.append(f"{'To the eye':<17}relMSE {seen.relmse:.2e}{expected}; FLIP {flip}")
+        flip = "" if seen.flip is None else f"; FLIP {seen.flip:.4f}"
+        table.append(f"{'To the eye':<17}relMSE {seen.relmse:.2e}{expected}{flip}")
         return [*table, self.sentence]
 
     def to_json(self) -> dict:
         """Everything but the pictures, as plain JSON values."""
         return {
-            "passed": self.passed,
-            "sentence": self.sentence,
+            **self.answer.to_json(),
             "size": [self.pinhole.width, self.pinhole.height],
             "samples": {"reference": self.samples[0], "test": self.samples[1]},
             "seeds": self.seeds,

@@ -97,20 +97,20 @@ def common(
 ) -> dict[str, Any]:
     """What report.html is given by both reports; the views, the crops and their own parts are added to it.
 
-    comparison : what `passed` and `sentence` are asked of. ledger : the scene's entries, with `object`, `status` and `reason`.
+    comparison : whose `answer` is told. ledger : the scene's entries, with `object`, `status` and `reason`.
     command : what repeats the comparison. pinhole : the camera that is told. origin : the point of the world that its
     coordinates are counted from.
     """
-    headline, _, rest = comparison.sentence.partition(": ")
+    answer = comparison.answer
     names = [Path(image.source).name for image in (reference, test)]
     width, height = reference.size
     return {
         "comparison": comparison,
-        "passed": comparison.passed,
-        "title": f"{headline} · {_subject(test)}",
+        "answer": answer.answer,
+        "title": f"{answer.headline} · {_subject(test)}",
         "about": _subject(test),
-        "headline": f"{headline}.",
-        "intro": with_powers(rest[:1].upper() + rest[1:]),
+        "headline": f"{answer.headline}.",
+        "intro": with_powers(answer.text[:1].upper() + answer.text[1:]),
         "plates": {"reference": f"reference · {names[0]}", "test": f"test · {names[1]}"},
         "width": width,
         "height": height,

@@ -1,11 +1,12 @@
 """What a comparison of geometry has found, as figures, as one sentence, and as aligned lines for the shell."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..pinhole import Pinhole
+from .answer import Answer, NotModelled, answered
 from .cameras import ConversionError, Systematic
 from .far_from_origin import FarFromOrigin
 from .mismatches import NOWHERE, PIXELS_PER_UNEXPLAINED, InOnePlace, Mismatches
@@ -15,6 +16,11 @@ from .tolerances import PERCENTILES, Array
 # A sentence with more faults is not read; the table has them all.
 _MOST_FAULTS = 2
 _MOST_PAIRS = 3
+
+NOTHING_TO_COMPARE = (
+    "no pixel of either picture shows an object: point the camera at one, and see that frame, view layer and clipping leave "
+    "it there"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +38,8 @@ class GeometryComparison:
     roundings : (n,) float64, the error of each compared position over what one rounding of float32 causes there.
     far_from_origin : what the distance from the origin costs, None where that is nothing to speak of.
     origin : the point of the world from which the coordinates of both pictures are counted.
-    lacking : passes that only the reference has.
-    in_one_place : pixels that show another of several surfaces in one place, which is as right as the reference's.
+    lacking : passes that only the reference has. in_one_place : pixels that show another of several surfaces in one place,
+    which is as right as the reference's. not_modelled : what of the picture neither side models as it is.
     """
 
     pinhole: Pinhole
@@ -49,6 +55,7 @@ class GeometryComparison:
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     lacking: tuple[str, ...] = ()
     in_one_place: InOnePlace = NOWHERE
+    not_modelled: NotModelled = field(default_factory=NotModelled)
 
     @property
     def pixels(self) -> int:
@@ -65,20 +72,30 @@ class GeometryComparison:
         return not_a_number == 0 and self.mismatches.unexplained_count <= self.allowed_unexplained
 
     @property
-    def passed(self) -> bool:
-        """Whether the two are the same picture. False, too, where there was nothing to compare."""
+    def shows_nothing(self) -> bool:
+        """Whether no pixel of either picture shows an object, so that there is nothing to compare."""
+        return self.hits == (0, 0)
+
+    @property
+    def answer(self) -> Answer:
+        """Whether the two are the same picture, in one sentence, which names the gravest fault where there is one."""
+        if self.shows_nothing:
+            return answered(False, "Nothing to compare", NOTHING_TO_COMPARE, self.not_modelled)
         systematic_ok = self.systematic is None or self.systematic.ok  # where nothing is compared no row is
         conversion_ok = self.conversion is None or self.conversion.ok
-        return systematic_ok and conversion_ok and self.mismatches_ok and all(row.ok for row in self.rows)
+        same = systematic_ok and conversion_ok and self.mismatches_ok and all(row.ok for row in self.rows)
+        if same:
+            return answered(True, "The same picture", _agreement(self), self.not_modelled)
+        return answered(False, "Not the same picture", "; ".join(_faults(self)[:_MOST_FAULTS]) + ".", self.not_modelled)
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing differs of what is modelled. False, too, where there was nothing to compare."""
+        return self.answer.passed
 
     @property
     def sentence(self) -> str:
-        """The verdict in one sentence, which names the gravest fault where there is one."""
-        if self.passed:
-            return _agreement(self)
-        if self.hits == (0, 0):
-            return "Nothing to compare: no pixel of either picture shows an object, point the camera at something."
-        return "Not the same picture: " + "; ".join(_faults(self)[:_MOST_FAULTS]) + "."
+        return self.answer.sentence
 
     def lines(self) -> list[str]:
         """One line for each pass, aligned, and the verdict last."""
@@ -122,8 +139,7 @@ class GeometryComparison:
     def to_json(self) -> dict:
         """Everything but the maps, as plain JSON values."""
         return {
-            "passed": self.passed,
-            "sentence": self.sentence,
+            **self.answer.to_json(),
             "size": [self.pinhole.width, self.pinhole.height],
             "hits": {"reference": self.hits[0], "test": self.hits[1]},
             "passes": [row.to_json() for row in self.rows],
@@ -171,7 +187,7 @@ def _agreement(comparison: GeometryComparison) -> str:
     median, nearly_all = (first.values[PERCENTILES.index(p)] for p in (50.0, 99.9))
     unit = first.unit if first.name == "Position" else "of the depth"
     return (
-        f"The same picture: over {first.count:,} pixels the median is {median:.1e} {unit} off and 99.9 % are within "
+        f"over {first.count:,} pixels the median is {median:.1e} {unit} off and 99.9 % are within "
         f"{nearly_all:.1e} {unit}; every one stays within {percent(first.worst[1])} of what float32 allows there{edges}."
     )
 

@@ -132,6 +132,14 @@ class Tracer:
         # −1 is what NO_HIT is as a number with a sign; no scene has 2³¹ of either.
         return depth, objects.view(np.int32).astype(np.int64), primitives.view(np.int32).astype(np.int64), passes
 
+    def pixels_of(self, names: Collection[str]) -> dict[str, NDArray[np.bool_]]:
+        """For each of these names that objects have, (height, width): the pixels whose centres show one of them."""
+        objects = self._scene.objects
+        owners = np.repeat([placed.name for placed in objects], [len(placed.matrices) for placed in objects])
+        there = [name for name in names if name in owners]
+        instances = self.hits()[1] if there else None
+        return {name: np.isin(instances, np.flatnonzero(owners == name)) for name in there}
+
     def closest(self, origins: ArrayLike, directions: ArrayLike) -> tuple[NDArray, NDArray, NDArray]:
         """What rays meet first within the clip range, in lengths of their directions; the rest as in `hits`, each (n,).
 

@@ -15,6 +15,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender.interface import comparing, proof, proof_image
+from viewcam_addon.comparison.answer import DIFFERENT, SAME
 from viewcam_addon.errors import InputError
 
 pytestmark = pytest.mark.slow
@@ -40,7 +41,7 @@ TOLD = {
 }
 for name in ("report/cycles.exr", "report/scene.json", "report/reference.exr", "report/index.html", *PICTURES):
     step(name)
-result = {"passed": True, "sentence": "The same picture: as told.", "passes": [], "ledger": []}
+result = {"passed": True, "answer": "same", "sentence": "The same picture: as told.", "passes": [], "ledger": []}
 step("result.json", json.dumps(result))
 """
 
@@ -136,7 +137,7 @@ def test_the_same_picture_is_the_verdict_and_the_file_stays_as_it_is(seen):
         told.append(comparison.progress())
         time.sleep(0.01)
     assert changed(before, state(seen)) == {}
-    assert outcome.passed and outcome.verdict.startswith("The same picture: over "), outcome.verdict
+    assert outcome.answer == SAME and outcome.verdict.startswith("The same picture: over "), outcome.verdict
     assert [share for share, _ in told] == sorted(share for share, _ in told) and told[0][0] == 0
     assert told[0][1] == "Rendering with Cycles" and told[-1][1] == "Comparing"
     rows = dict(outcome.rows)
@@ -161,14 +162,14 @@ def test_a_camera_that_is_not_where_it_was_put_differs_and_then_is_mended(seen):
     bpy.context.view_layer.update()
     assert bpy.ops.viewcam.compare_with_cycles() == {"FINISHED"}
     first = proof.background.latest
-    assert first.passed is False and "from the stated one" in first.verdict
+    assert first.answer == DIFFERENT and "from the stated one" in first.verdict
     image = bpy.data.images["Virtual Pinhole Proof"]
     bytes_before = image.packed_file.data
     assert tuple(image.size) == (3 * 64 + 2 * proof_image._GAP, 48)
     seen.camera.constraints.remove(limit)
     assert bpy.ops.viewcam.compare_with_cycles(camera="Camera") == {"FINISHED"}
     second = proof.background.latest
-    assert second.passed and not first.temporary.exists() and second.report.is_file()
+    assert second.answer == SAME and not first.temporary.exists() and second.report.is_file()
     assert image.packed_file.data == bytes_before, "a pass shows nothing that nobody asked for"
     assert bpy.ops.viewcam.show_difference() == {"FINISHED"}
     (again,) = [each for each in bpy.data.images if each.name.startswith("Virtual Pinhole Proof")]
@@ -187,7 +188,7 @@ def test_light_is_compared_with_as_many_samples_as_said(seen, add_lamp):
         for name in ("level", "said", "samples", "clay"):
             settings.property_unset(name)
     outcome = proof.background.latest
-    assert outcome.passed, outcome.verdict
+    assert outcome.answer == SAME, outcome.verdict
     assert outcome.what == "Camera, frame 1, direct" and "Light, to Tracer's" in dict(outcome.rows)
     assert "Orange where Cycles is brighter" in outcome.colours
     assert "--samples 4 --clay" in outcome.report.read_text()
@@ -259,7 +260,7 @@ def test_where_the_report_can_not_be_kept_a_sentence_says_so(stand_in, tmp_path)
     comparison = stand_in(keep_in=tmp_path / "file" / "report")
     comparison.let(8)
     outcome = wait_for(comparison.poll)
-    assert outcome.passed is None and "can't be kept in" in outcome.verdict and not comparison.folder.exists()
+    assert outcome.answer is None and "can't be kept in" in outcome.verdict and not comparison.folder.exists()
 
 
 def test_a_full_disk_leaves_no_half_of_a_report_s_file(stand_in, tmp_path, monkeypatch):
@@ -271,7 +272,7 @@ def test_a_full_disk_leaves_no_half_of_a_report_s_file(stand_in, tmp_path, monke
     comparison = stand_in(keep_in=tmp_path / "new")
     comparison.let(8)
     outcome = wait_for(comparison.poll)
-    assert outcome.passed is None and "No space left" in outcome.verdict and "free some space" in outcome.verdict
+    assert outcome.answer is None and "No space left" in outcome.verdict and "free some space" in outcome.verdict
     assert [path for path in (tmp_path / "new").rglob("*") if path.is_file()] == [] and not comparison.folder.exists()
 
 
@@ -306,7 +307,7 @@ def test_a_child_that_dies_is_told_with_its_last_words(monkeypatch, seen):
     with pytest.raises(RuntimeError, match="was ended by signal 11 after saying: out of memory"):
         bpy.ops.viewcam.compare_with_cycles()
     outcome = proof.background.latest
-    assert outcome.passed is None and outcome.report is None and outcome.rows == ()
+    assert outcome.answer is None and outcome.report is None and outcome.rows == ()
     assert not bpy.ops.viewcam.open_report.poll() and not bpy.ops.viewcam.show_difference.poll()
     assert list(Path(bpy.app.tempdir).glob("viewcam-*")) == []
 

@@ -49,7 +49,7 @@ def outcome(tmp_path, fresh_blender):
     for name, colour in (("test", (255, 0, 0)), ("reference", (0, 255, 0)), ("difference", (0, 0, 255))):
         (tmp_path / f"{name}.png").write_bytes(pictures.png(np.full((HEIGHT, WIDTH, 3), colour, np.uint8)))
     proof_image._pixels.cache_clear()
-    yield comparing.Outcome("", "Camera", None, True, "The same picture: so it is.", folder=tmp_path)
+    yield comparing.Outcome("", "Camera", None, "same", "The same picture: so it is.", folder=tmp_path)
     proof_image._pixels.cache_clear()
 
 
@@ -142,19 +142,27 @@ def test_escape_during_playback_ends_the_playback_and_not_the_comparison(monkeyp
     ("result", "words"),
     [
         (
-            {"passed": True, "passes": [{"name": "Position", "percentiles": {"max": {"value": 3.04e-4}}}]},
+            {"answer": "same", "passes": [{"name": "Position", "percentiles": {"max": {"value": 3.04e-4}}}]},
             "Identical to 0.0003 px",
         ),
-        ({"passed": True, "passes": [{"name": "Position", "percentiles": {}}]}, "Identical"),
+        ({"answer": "same", "passes": [{"name": "Position", "percentiles": {}}]}, "Identical"),
         (
-            {"passed": True, "quantities": [{"noise_free": None, "ratio_error": 3e-4}]},
+            {"answer": "same", "quantities": [{"noise_free": None, "ratio_error": 3e-4}]},
             "The same light, but for noise of 0.03 %",
         ),
         (
-            {"passed": True, "quantities": [{"noise_free": {"percentiles": {"max": {"value": 2e-7}}}}]},
+            {"answer": "same", "quantities": [{"noise_free": {"percentiles": {"max": {"value": 2e-7}}}}]},
             "Identical to 0.00002 % of the light",
         ),
-        ({"passed": False}, "Cycles renders another picture"),
+        (
+            {
+                "answer": "same_but",
+                "not_modelled": {"names": ["Hair"]},
+                "quantities": [{"noise_free": None, "ratio_error": 3e-4}],
+            },
+            "The same light, but for noise of 0.03 %, but for 1 object that is not modelled",
+        ),
+        ({"answer": "different"}, "Cycles renders another picture"),
     ],
 )
 def test_the_first_line_says_it_in_words(result, words):
@@ -164,7 +172,7 @@ def test_the_first_line_says_it_in_words(result, words):
 @pytest.mark.parametrize("width", [150, 202, 260, 600])
 def test_the_green_line_is_read_whole_in_a_sidebar_of_any_width(posed_camera, monkeypatch, width):
     """At the mean width of a character, by which all sentences of the panel are wrapped."""
-    monkeypatch.setattr(proof.icons, "tick", lambda: 7)
+    monkeypatch.setattr(proof.icons, "mark", lambda answer: 7)
     layout, column = MagicMock(), MagicMock()
     layout.column.return_value = column
     context = SimpleNamespace(
@@ -173,7 +181,7 @@ def test_the_green_line_is_read_whole_in_a_sidebar_of_any_width(posed_camera, mo
         preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
     )
     seen = comparing.camera_seen(posed_camera, context.scene)
-    passed = comparing.Outcome("", "Camera", seen, True, "The same picture: so it is.", "Identical to 0.000086 px")
+    passed = comparing.Outcome("", "Camera", seen, "same", "The same picture: so it is.", "Identical to 0.000086 px")
     proof._draw_outcome(layout, passed, posed_camera, context)
     first, *more = [call.kwargs for call in column.label.call_args_list]
     assert first["icon_value"] == 7 and all(line["icon"] == "BLANK1" for line in more)

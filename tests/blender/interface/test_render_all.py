@@ -8,10 +8,10 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon import shots as shot_lists
 from viewcam_addon.blender import own_picture
 from viewcam_addon.blender.interface import comparing, render_all
 from viewcam_addon.errors import InputError
+from viewcam_addon.jobs.shot import Shot
 
 # In place of `viewcam batch`: it makes a picture, tells so, and waits until it may make the other and the contact sheet.
 STAND_IN = """
@@ -73,7 +73,7 @@ def test_every_camera_is_a_shot_in_its_own_picture(two):
     own_picture.switch(two)
     assert render_all.shots(two, animation=False) == rows, "whichever is active"
     for row in rows:
-        shot_lists.Shot(**row)
+        Shot(**row)
 
 
 def test_an_animation_has_each_camera_s_own_frames(two):

@@ -237,6 +237,20 @@ def test_a_marker_chooses_the_camera_of_its_frame(both_sides, posed_camera, add_
     odd.check(posed_camera)
 
 
+def test_a_camera_that_blender_would_not_choose_at_its_marker_is_a_difference(
+    both_sides, posed_camera, add_camera, scene, monkeypatch
+):
+    """Cycles was given the camera that the tracer had."""
+    other = add_camera("Other")
+    other.location = (0, 0, 8)
+    bpy.ops.mesh.primitive_monkey_add(size=3)
+    scene.timeline_markers.new("Other", frame=1).camera = other
+    both_sides().check()
+    monkeypatch.setattr(datablocks, "bound_camera", lambda *_: posed_camera)
+    with pytest.raises(AssertionError):
+        both_sides().check()
+
+
 def test_a_camera_that_is_named_is_rendered_though_a_marker_chooses_another(both_sides, posed_camera, add_camera, scene):
     other = add_camera("Other")
     bpy.ops.mesh.primitive_monkey_add(size=3)

@@ -15,7 +15,7 @@ import bpy
 
 from ... import child_process
 from ...errors import InputError
-from ...shots.names import made_fit
+from ...jobs.names import made_fit
 from .. import own_picture
 from . import comparing
 

@@ -139,7 +139,7 @@ def read(
             raise InputError(f"{path.name} says where the camera is but not how it sees: give the Distance in pixels")
         base = cameras.read(camera_object, scene)
         notes.append(f"Where the file does not say how the camera sees, it sees as {camera_object.name}")
-    options = properties.chosen(size=size, pixel_aspect=aspect, view_plane=plane, base=base)
+    options = properties.chosen(size=size, size_fits=True, pixel_aspect=aspect, view_plane=plane, base=base)
     found = formats.read(path, options=options)
     if base is None and plane is None and not all(camera.size_stated for camera in found):
         notes.append(f"The file does not say how many pixels its pictures have: {width} × {height} of the scene were taken")

@@ -162,6 +162,7 @@ class VIEWCAM_OT_paste_camera(ReadingOptions, CameraOperator, bpy.types.Operator
         frame = datablocks.frame_of(scene)
         options = self.chosen(
             size=(frame.resolution_x, frame.resolution_y),
+            size_fits=True,
             pixel_aspect=frame.pixel_aspect_x / frame.pixel_aspect_y,
             base=picture.at_full_size(_present(camera_object, scene), frame),
         )

@@ -24,11 +24,12 @@ from typing import Any
 import bpy
 
 from ... import child_process
+from ...comparison.answer import DIFFERENT, SAME_BUT, but_for
 from ...comparison.statistics import plain
 from ...errors import InputError
 from ...files import written_whole
+from ...jobs.names import made_fit
 from ...pinhole import Pinhole
-from ...shots.names import made_fit
 from ...tracer.scene.film import LEVELS, SAMPLES, seeds
 from .. import camera as cameras
 from .. import datablocks, preferences
@@ -43,8 +44,8 @@ class Outcome:
     """What a comparison has come to.
 
     what : of what it was: camera, frame and level. camera : the camera's name. seen : the camera then, None if it was none.
-    passed : whether both sides are the same picture, None where there are none. verdict : one sentence. headline : a few words
-    of it. rows : (label, text) of the figures. lacking : (object, sentence) of what is not modelled as it is.
+    answer : one of comparison/answer.py's, None where there is none. verdict : one sentence. headline : a few words of it.
+    rows : (label, text) of the figures. lacking : (object, sentence) of what is not modelled as it is.
     folder : that of the report. colours : what those of the difference say. scale : their ends, as difference.write has them.
     temporary : what `discard` removes.
     """
@@ -52,7 +53,7 @@ class Outcome:
     what: str
     camera: str
     seen: Pinhole | None
-    passed: bool | None
+    answer: str | None
     verdict: str
     headline: str = ""
     rows: tuple[tuple[str, str], ...] = ()
@@ -186,7 +187,7 @@ class RunningComparison:
     def _outcome(self, status: int) -> Outcome:
         of = (self._what, self._camera, self._seen)
         result = _read(self.folder / _RESULT)
-        if status not in (0, 1) or "passed" not in result:
+        if "answer" not in result:
             return Outcome(*of, None, failure(self._said(), status))
         folder, temporary = self.folder / _REPORT, self.folder
         if self._keep_in:
@@ -196,7 +197,7 @@ class RunningComparison:
             except (OSError, InputError) as error:
                 return Outcome(*of, None, f"The report can't be kept in {self._keep_in} ({error}): choose another folder")
         drawn = result.get("difference", {})
-        told = result["passed"], result["sentence"], headline(result), tuple(figures(result)), tuple(lacking(result["ledger"]))
+        told = result["answer"], result["sentence"], headline(result), tuple(figures(result)), tuple(lacking(result["ledger"]))
         return Outcome(*of, *told, folder, drawn.get("colours", ""), drawn.get("scale", {}), temporary)
 
     def _said(self) -> str:
@@ -250,8 +251,13 @@ def camera_seen(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinh
 
 def headline(result: dict[str, Any]) -> str:
     """The verdict in a few words, for a panel."""
-    if not result["passed"]:
+    if result["answer"] == DIFFERENT:
         return "Cycles renders another picture"
+    words = _agreement(result)
+    return f"{words}, {but_for(result['not_modelled']['names'])}" if result["answer"] == SAME_BUT else words
+
+
+def _agreement(result: dict[str, Any]) -> str:
     for row in (row for row in result.get("passes", ()) if row["name"] == "Position"):
         if row["percentiles"]:
             return f"Identical to {plain(row['percentiles']['max']['value'])} px"

@@ -12,8 +12,8 @@ from pathlib import Path
 import bpy
 
 from ...errors import InputError
+from ...jobs.names import made_fit
 from ...labels import DEPTH_STEPS, KINDS, PASSES, endings
-from ...shots.names import made_fit
 from .. import datablocks
 from . import panel_rows
 from .background import Background, Cancels, StartsForCamera

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import bpy
 
+from ...comparison.answer import DIFFERENT, SAME
 from ...errors import InputError
 from ...tracer.scene.film import SAMPLES
 from .. import datablocks, preferences
@@ -156,11 +157,11 @@ class VIEWCAM_OT_compare_with_cycles(StartsForCamera, bpy.types.Operator):
         _redraw(context)
 
     def _tells(self, outcome: Outcome, context: bpy.types.Context) -> set[str]:
-        if outcome.passed is None:
+        if outcome.answer is None:
             self.report({"ERROR"}, outcome.verdict)
             return {"CANCELLED"}
-        self.report({"INFO" if outcome.passed else "WARNING"}, outcome.verdict)
-        if not outcome.passed:
+        self.report({"INFO" if outcome.answer == SAME else "WARNING"}, outcome.verdict)
+        if outcome.answer == DIFFERENT:
             proof_image.show(outcome, context)
         return {"FINISHED"}
 
@@ -243,8 +244,8 @@ def _draw_progress(layout: bpy.types.UILayout, timed: bool = True) -> None:
 def _draw_outcome(
     layout: bpy.types.UILayout, outcome: Outcome, camera_object: bpy.types.Object, context: bpy.types.Context
 ) -> None:
-    lines = [(outcome.headline or outcome.verdict, icons.tick() if outcome.passed else "ERROR")]
-    if outcome.passed is False:
+    lines = [(outcome.headline or outcome.verdict, icons.mark(outcome.answer) if outcome.answer else "ERROR")]
+    if outcome.answer == DIFFERENT:
         rest = outcome.verdict.partition(": ")[2]
         lines.append((rest[:1].upper() + rest[1:], "BLANK1"))
     column = layout.column(align=True)

@@ -12,7 +12,7 @@ from typing import Any
 import bpy
 
 from ...errors import InputError
-from ...shots.names import made_fit, one_file
+from ...jobs.names import made_fit, one_file
 from .. import own_picture
 from . import scene_cameras
 from .background import Background, Cancels

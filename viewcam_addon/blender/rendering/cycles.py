@@ -78,7 +78,7 @@ class LightSettings:
 def render(
     scene: bpy.types.Scene,
     view_layer: bpy.types.ViewLayer,
-    camera_object: bpy.types.Object,
+    camera_object: bpy.types.Object | None,
     path: str | os.PathLike[str],
     remedies: Iterable[Remedy] = (),
     threads: int | None = None,
@@ -88,8 +88,9 @@ def render(
 ) -> None:
     """Render one view layer at the current frame to a multilayer EXR, whole or not at all.
 
-    remedies : what to take out for the time of the render (ledger.py). threads : all by default. light : for a picture of
-        light in place of the passes of geometry. keep : whether Cycles keeps what it has built, for the next render.
+    camera_object : the one that Blender chooses itself, as markers bind it, where None. remedies : what to take out for the
+        time of the render (ledger.py). threads : all by default. light : for a picture of light in place of the passes of
+        geometry. keep : whether Cycles keeps what it has built, for the next render.
 
     Raises
     ------
@@ -109,7 +110,7 @@ def render_file(
     overrides: Overrides,
     scene: bpy.types.Scene,
     view_layer: bpy.types.ViewLayer,
-    camera_object: bpy.types.Object,
+    camera_object: bpy.types.Object | None,
     path: str | os.PathLike[str],
     remedies: Iterable[Remedy] = (),
     threads: int | None = None,

@@ -152,7 +152,11 @@ def _render(
     light: Lighting | None,
     rendering: Callable[[int], None] = lambda number: None,
 ) -> None:
-    """Cycles' pictures. light : as exported, of a stage that is lit."""
+    """Cycles' pictures. light : as exported, of a stage that is lit.
+
+    Unless a camera is named, Blender chooses it once more: one that we took for the scene's and is not is a difference then.
+    """
+    camera = stage.camera if request.camera is not None or stage.told else None
     share = max(request.samples // len(paths), 1)
     for number, path in enumerate(paths):
         rendering(number + 1)
@@ -160,7 +164,7 @@ def _render(
         if stage.is_lit:
             bounces = light.bounces.none if stage.level == "direct" else light.bounces
             picture = cycles.LightSettings(light.film, bounces, share, request.seed + number)
-        of, remedies = (stage.scene, stage.view_layer, stage.camera, path), stage.ledger.remedies.values()
+        of, remedies = (stage.scene, stage.view_layer, camera, path), stage.ledger.remedies.values()
         if request.engine == "CYCLES":
             cycles.render(*of, remedies, request.threads, picture, device=request.device)
         else:
@@ -190,9 +194,7 @@ def _stage(request: Request) -> Iterator[_Stage]:
 def _camera(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object:
     """The camera object that is meant, checked to be a perspective one."""
     if name is None:
-        camera = datablocks.render_camera(scene)
-        if camera is None:
-            raise InputError(f"scene {scene.name!r} has no camera: add one, or name one with --camera")
+        camera = datablocks.require_render_camera(scene)
     else:
         camera = scene.objects.get(name)
         if camera is None:

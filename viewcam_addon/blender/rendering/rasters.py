@@ -13,7 +13,7 @@ import bpy
 
 from ...comparison.renderers import DIGITS, PARTS, note, part_names
 from ...errors import InputError
-from .. import versions
+from .. import datablocks, versions
 from ..scenes.ledger import Remedy
 from ..temporary_settings import Overrides, overridden
 from . import cycles, graphics
@@ -46,7 +46,7 @@ _WORKBENCH = {
 def render(
     scene: bpy.types.Scene,
     view_layer: bpy.types.ViewLayer,
-    camera_object: bpy.types.Object,
+    camera_object: bpy.types.Object | None,
     path: str | os.PathLike[str],
     engine: str,
     remedies: Iterable[Remedy] = (),
@@ -54,7 +54,7 @@ def render(
 ) -> None:
     """Render one view layer at the current frame to a multilayer EXR, whole or not at all.
 
-    engine : "EEVEE" or "WORKBENCH". remedies, threads : as cycles.render has them.
+    engine : "EEVEE" or "WORKBENCH". camera_object, remedies, threads : as cycles.render has them.
 
     Raises
     ------
@@ -70,9 +70,10 @@ def render(
         for name, value in _RENDER.items():
             if hasattr(scene.render, name):
                 overrides.set(scene.render, name, value)
+        seen_through = camera_object or datablocks.require_render_camera(scene)
         overrides.set(view_layer, "use_pass_combined", True)
         overrides.set(scene.render, "use_stamp_note", True)
-        overrides.set(scene.render, "stamp_note_text", note(engine, camera_object.data.clip_start))
+        overrides.set(scene.render, "stamp_note_text", note(engine, seen_through.data.clip_start))
         if engine == "EEVEE":
             overrides.set(scene.render, "engine", versions.EEVEE)
             cycles.override_all(overrides, scene.eevee, _EEVEE)

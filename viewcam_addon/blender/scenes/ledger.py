@@ -67,7 +67,7 @@ class Ledger:
 
     def check_strict(self) -> None:
         """Raise NotModelledError, naming the first of them, if anything is approximated or skipped."""
-        lacking = [entry for entry in self.entries() if entry.status != "exported"]
+        lacking = [entry for entry in self.entries() if not entry.is_modelled]
         if lacking:
             others = f" (and {len(lacking) - 1} more)" if len(lacking) > 1 else ""
             raise NotModelledError(

@@ -8,6 +8,7 @@
 // hierarchy was built once.
 #pragma once
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -313,7 +314,7 @@ class Scene {
     template <bool ANY> static void intersect_packets(const TriangleBvh& triangles, const Ray* rays, int count, Nearest* nearest) {
         constexpr int FEW = 4;
         if (triangles.bvh.root == NOTHING || !count) return;
-        static thread_local Packet all, some;
+        auto& [all, some] = of_this_thread<std::array<Packet, 2>>();
         enter(triangles.bvh, rays, nearest, count, all);
         auto trace = [&](Packet& packet) {
             packet.close();

@@ -155,6 +155,11 @@ class LedgerEntry:
     status: str
     reason: str = ""
 
+    @property
+    def is_modelled(self) -> bool:
+        """Whether it was exported whole, as it is."""
+        return self.status == "exported"
+
 
 @dataclass(frozen=True, eq=False)
 class Scene:
@@ -183,6 +188,11 @@ class Scene:
     film: Film = field(default_factory=Film)
     bounces: Bounces = field(default_factory=Bounces)
     cycles: tuple[int, int] = (5, 2)
+
+    @property
+    def not_modelled(self) -> tuple[str, ...]:
+        """The names of what its ledger has as approximated or skipped."""
+        return tuple(entry.object for entry in self.ledger if not entry.is_modelled)
 
     def __post_init__(self) -> None:
         if len(self.origin) != 3 or not np.isfinite(self.origin).all():

@@ -1,10 +1,11 @@
-// Loops over threads, and arrays that are not written before they are filled.
+// Loops over threads, what each thread keeps for itself, and arrays that are not written before they are filled.
 #pragma once
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <cstdlib>
 #include <exception>
+#include <memory>
 #include <mutex>
 #include <new>
 #include <system_error>
@@ -49,6 +50,14 @@ template <class Work> void parallel_for(int threads, size_t count, const Work& w
 template <class Work> void parallel_pieces(int threads, size_t count, size_t piece, const Work& work) {
     parallel_for(threads, (count + piece - 1) / piece,
                  [&](size_t i) { work(i * piece, std::min(count, (i + 1) * piece)); });
+}
+
+// One object for each thread and type, made when the thread first asks for it and never cleared: what is too large for a stack.
+// On the heap, since not every loader aligns thread_local objects as their types ask (wine 8, Windows before 8.1), and every
+// thread of the process would get the space of them, though it never traces a ray.
+template <class T> T& of_this_thread() {
+    static thread_local const std::unique_ptr<T> object = std::make_unique<T>();
+    return *object;
 }
 
 // An array on whole cache lines that holds whatever was there, until it is written: std::vector would write it twice. A large one

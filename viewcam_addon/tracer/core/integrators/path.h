@@ -88,7 +88,7 @@ class PathIntegrator {
 
     // The light of up to 64 paths, each with its ray from the eye.
     void trace(const CameraSample* samples, const Ray* rays, int count, PathLight* light) const {
-        static thread_local Block block;  // too large for a stack, and to be cleared for nothing
+        Block& block = of_this_thread<Block>();
         block.light = light;
         block.live = 0;
         std::fill_n(light, count, PathLight{});

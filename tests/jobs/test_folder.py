@@ -1,0 +1,151 @@
+"""What stands in a batch's folder: when a shot counts as done, and what of a killed batch is swept away."""
+
+import json
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from viewcam_addon.errors import FullDiskError, InputError
+from viewcam_addon.files import written_whole
+from viewcam_addon.jobs.folder import Folder, Outputs, write_json
+
+plain = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
+    max_leaves=8,
+)
+
+
+@pytest.fixture
+def folder(tmp_path, painting):
+    painting.paint(tmp_path, 2, check=True)
+    return Folder(tmp_path)
+
+
+def made_from(painting):
+    return painting.hashes(painting.shots(2))["shot_000"]
+
+
+def test_a_shot_that_was_rendered_is_finished(folder, painting):
+    record = folder.finished("shot_000", made_from(painting), Outputs(check=True))
+    assert record["image"] == "shot_000.exr" and record["check"]["passed"]
+    assert record == json.loads(folder.sidecar("shot_000").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(
+    "harm",
+    [
+        lambda folder: folder.sidecar("shot_000").unlink(),
+        lambda folder: folder.image("shot_000").unlink(),
+        lambda folder: folder.preview("shot_000").unlink(),
+        lambda folder: folder.image("shot_000").write_bytes(b"shorter"),
+        lambda folder: folder.preview("shot_000").write_bytes(b""),
+        lambda folder: folder.sidecar("shot_000").write_text(folder.sidecar("shot_000").read_text()[:-3]),
+        lambda folder: folder.sidecar("shot_000").write_bytes(b"\xff"),
+        lambda folder: folder.sidecar("shot_000").write_text("[" * 200_000),
+        lambda folder: folder.sidecar("shot_000").write_text("[]"),
+        lambda folder: folder.sidecar("shot_000").write_text("{}"),
+    ],
+    ids=["no sidecar", "no image", "no preview", "short image", "empty preview", "half", "no UTF-8", "deep", "list", "empty"],
+)
+def test_a_shot_that_is_not_whole_is_not_finished(folder, painting, harm):
+    harm(folder)
+    assert folder.finished("shot_000", made_from(painting)) is None
+    other = painting.hashes(painting.shots(2))["shot_001"]
+    assert folder.finished("shot_001", other), "the other shot is as it was"
+
+
+@pytest.mark.parametrize("value", [None, {"a": 1}, [5], "gone"])
+@pytest.mark.parametrize(
+    "path", ["rendered", "rendered.width", "warnings", "timing", "timing.seconds", "check", "check.verdict"]
+)
+def test_a_sidecar_that_lacks_a_key_or_has_it_otherwise_is_not_finished(folder, painting, path, value):
+    """Nor does it stop the summary and the contact sheet of all the others."""
+    sidecar = folder.sidecar("shot_000")
+    record = json.loads(sidecar.read_text(encoding="utf-8"))
+    *outer, key = path.split(".")
+    owner = record[outer[0]] if outer else record
+    if value == "gone":
+        del owner[key]
+    else:
+        owner[key] = value
+    write_json(sidecar, record)
+    assert folder.finished("shot_000", made_from(painting), Outputs(check=True)) is None
+
+
+def test_a_shot_of_other_settings_is_not_finished(folder):
+    assert folder.finished("shot_000", "0" * 64) is None
+
+
+def test_a_shot_that_was_not_checked_is_finished_only_where_no_check_is_asked_for(tmp_path, painting):
+    painting.paint(tmp_path, 2)
+    folder = Folder(tmp_path)
+    assert folder.finished("shot_000", made_from(painting))
+    assert folder.finished("shot_000", made_from(painting), Outputs(check=True)) is None
+
+
+@settings(max_examples=20)  # each waits for the disk
+@given(st.dictionaries(st.text(), plain | st.lists(st.dictionaries(st.text(), plain))))
+def test_a_document_is_read_as_it_was_written(tmp_path_factory, document):
+    path = tmp_path_factory.getbasetemp() / "document.json"
+    write_json(path, document)
+    assert json.loads(path.read_text(encoding="utf-8")) == document
+
+
+def test_a_document_has_a_key_a_line_and_an_object_a_line(tmp_path):
+    write_json(tmp_path / "a.json", {"one": [1, 2], "two": [{"a": 1}, {"b": 2}]})
+    assert (tmp_path / "a.json").read_bytes().count(b"\n") == 7
+
+
+def test_leftovers_of_this_batch_are_removed_and_nothing_else(tmp_path):
+    shots = ["a", "b.c", "a-0123abcd"]
+    ours = [".a-0123abcd.exr", ".a-01234567.png", ".a-89abcdef.json", ".b.c-0123abcd.exr", ".a-0123abcd-0123abcd.exr"]
+    ours += [".summary-0123abcd.json", ".contact-sheet-0123abcd.html"]
+    others = [".other-0123abcd.exr", "a-0123abcd.exr", ".a-0123abcd.blend", ".a-0123.exr", "a.exr", ".viewcam.lock"]
+    others += [".summary-1-of-2-0123abcd.json", ".a-0123abcd.exr.bak"]
+    for name in [*ours, *others]:
+        (tmp_path / name).touch()
+    Folder(tmp_path).remove_leftovers(shots)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(others)
+
+
+@pytest.mark.parametrize("part", ["", "2-of-8"])
+def test_what_a_killed_process_leaves_of_any_file_is_a_leftover(tmp_path, part):
+    """written_whole chooses the temporary names: here they are those that are looked for."""
+    folder = Folder(tmp_path, part)
+    files = [folder.image("a"), folder.preview("a"), folder.sidecar("a"), folder.summary, folder.contact_sheet]
+    for file in files:
+        with written_whole(file) as temporary:
+            temporary.touch()
+            left = temporary.name
+        (tmp_path / left).touch()  # as if the process had ended in the block
+        file.unlink()
+    assert len(list(tmp_path.iterdir())) == len(files)
+    folder.remove_leftovers(["a"])
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_part_of_a_batch_has_files_of_its_own(tmp_path):
+    whole, part = Folder(tmp_path), Folder(tmp_path, "2-of-8")
+    assert part.summary.name == "summary-2-of-8.json" and part.contact_sheet.name == "contact-sheet-2-of-8.html"
+    assert part.image("a") == whole.image("a") and part.lock == whole.lock
+
+
+def test_a_name_with_dots_loses_none_of_them(tmp_path):
+    assert Folder(tmp_path).image("shot.v2").name == "shot.v2.exr"
+
+
+def test_a_file_in_the_place_of_the_folder_is_named_in_one_sentence(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match=r"file can't be a folder of pictures .*: give another for --out"):
+        Folder(tmp_path / "file")
+
+
+def test_a_full_disk_is_an_error_of_its_own(tmp_path):
+    with pytest.raises(FullDiskError, match="No space left"), written_whole(tmp_path / "a") as temporary:
+        temporary.touch()
+        raise OSError(28, "No space left on device")
+    with pytest.raises(InputError) as caught, written_whole(tmp_path / "a"):
+        raise OSError(5, "Input/output error")
+    assert type(caught.value) is InputError

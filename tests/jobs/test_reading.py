@@ -1,0 +1,192 @@
+"""Lists of shots as files: each format says the same, to the last bit, and the page on them is right."""
+
+import dataclasses
+import json
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from viewcam_addon.errors import InputError
+from viewcam_addon.jobs import lists
+from viewcam_addon.jobs.problems import ShotsError
+from viewcam_addon.jobs.shot import ENGINES, LEVELS, Shot
+
+PAGE = Path(__file__).parents[2].joinpath("docs", "batch.md").read_text(encoding="utf-8")
+LARGEST_FLOAT32 = (2.0 - 2.0**-23) * 2.0**127
+
+coordinates = st.floats(-LARGEST_FLOAT32, LARGEST_FLOAT32)
+triples = st.tuples(coordinates, coordinates, coordinates)
+
+
+def maybe(strategy):
+    return st.none() | strategy
+
+
+@st.composite
+def lists_of_shots(draw):
+    """Shots of every kind, with names of letters that spreadsheets don't take for something else."""
+    result = []
+    for i in range(draw(st.integers(1, 3))):
+        eye, look_at = draw(st.lists(triples, min_size=2, max_size=2, unique=True))
+        four = (eye, look_at, draw(triples.filter(any)), draw(st.floats(2.0**-126, LARGEST_FLOAT32)))
+        camera = draw(maybe(st.sampled_from(["Camera", "Camera.001", "a, b", 'the "best"'])))
+        size = draw(maybe(st.tuples(st.integers(4, 65536), st.integers(4, 65536)))) or (None, None)
+        shot = Shot(
+            f"{draw(st.sampled_from(['left', 'Überblick, eins', '左']))} {i}",
+            *([None] * 4 if camera else four),
+            camera,
+            *size,
+            draw(maybe(st.integers(-1048574, 1048574))),
+            draw(maybe(st.sampled_from(ENGINES))),
+            draw(maybe(st.integers(1, 2**24))),
+            draw(maybe(st.sampled_from(LEVELS))),
+        )
+        result.append(shot)
+    return result
+
+
+def as_cells(shot, in_parts):
+    """A shot's values as texts, by column."""
+    cells = {}
+    for key, value in vars(shot).items():
+        if value is None:
+            texts = ["", "", ""]
+        else:
+            texts = [repr(number) for number in value] if isinstance(value, tuple) else [str(value)]
+        if key in ("eye", "look_at", "up") and in_parts:
+            cells |= {f"{key}_{axis}": text for axis, text in zip("xyz", texts, strict=True)}
+        else:
+            cells[key] = ", ".join(texts) if value is not None else ""
+    return cells
+
+
+def as_objects(listed):
+    return [{key: value for key, value in vars(shot).items() if value is not None} for shot in listed]
+
+
+def read(folder, name, text, cameras=None):
+    path = folder / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return lists.read(path, cameras)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("shots")
+
+
+@settings(max_examples=50)
+@given(
+    lists_of_shots(),
+    st.booleans(),
+    st.sampled_from(",;\t|"),
+    st.sampled_from(["\n", "\r\n", "\r", "\n\n", "\r\n \r\n"]),
+    st.booleans(),
+)
+def test_a_csv_of_any_dialect_gives_every_bit_back(folder, listed, in_parts, separator, line_end, marked):
+    table = [as_cells(shot, in_parts) for shot in listed]
+    quoted = [['"' + text.replace('"', '""') + '"' for text in row.values()] for row in table]
+    lines = [separator.join(row) for row in [list(table[0]), *quoted]]
+    text = line_end.join(lines).encode("utf-8-sig" if marked else "utf-8")
+    assert read(folder, "list.csv", text) == listed
+
+
+@settings(max_examples=50)
+@given(lists_of_shots(), st.booleans())
+def test_json_and_json_lines_give_every_bit_back(folder, listed, with_nulls):
+    objects = [vars(shot) for shot in listed] if with_nulls else as_objects(listed)
+    assert read(folder, "list.json", json.dumps(objects)) == listed
+    assert read(folder, "list.json", json.dumps({"shots": objects}, indent=1)) == listed
+    assert read(folder, "list.JSONL", "\n".join(map(json.dumps, objects))) == listed
+
+
+@settings(max_examples=50)
+@given(lists_of_shots(), lists_of_shots())
+def test_defaults_are_what_a_shot_does_not_say(folder, listed, others):
+    defaults = as_objects(others[:1])[0]
+    del defaults["name"]
+    for width in ("width", "height"):
+        defaults.setdefault(width, 64)
+    four = {"eye", "look_at", "up", "d"}
+    expected = []
+    for row in as_objects(listed):
+        other_kind = four if "camera" in row else {"camera"}
+        expected.append(Shot(**{key: value for key, value in defaults.items() if key not in other_kind} | row))
+    document = json.dumps({"defaults": defaults, "shots": as_objects(listed)})
+    assert read(folder, "list.json", document) == expected
+
+
+def test_a_default_and_a_shot_may_write_a_value_in_different_ways(folder):
+    document = (
+        '{"defaults": {"up_x": 0, "up_y": 0, "up_z": 1, "distance": 5, "eye": [1, 2, 3]}, "shots": [{"name": "a", "d": 7, '
+    )
+    document += '"up": [0, 1, 0], "look_at_x": 1, "look_at_y": 0, "look_at_z": 0}]}'
+    assert read(folder, "list.json", document) == [Shot("a", (1, 2, 3), (1, 0, 0), (0, 1, 0), 7)]
+
+
+@given(st.binary(max_size=300), st.sampled_from(["list.csv", "list.json", "list.jsonl"]))
+@example(b"[" * 100_000, "list.json")
+@example(b"[" + b"9" * 5000 + b"]", "list.json")
+@example(b'"', "list.csv")
+@example(b"a" * 200_000, "list.csv")
+@example(b'sep="\nname', "list.csv")
+@example(b'{"shots": 1, "shots": [], "defaults": null}', "list.json")
+def test_whatever_a_file_holds_it_is_shots_or_a_sentence(folder, data, name):
+    with pytest.raises(InputError) as raised:
+        read(folder, name, data)
+    assert str(raised.value).isprintable() or isinstance(raised.value, ShotsError), str(raised.value)
+
+
+def test_each_list_of_the_page_is_the_same_two_shots(folder):
+    four = {"look_at": (0, 0, 1), "up": (0, 0, 1), "d": 400, "width": 320, "height": 180}
+    two = [Shot("left", eye=(-3, -6, 2.5), frame=12, **four), Shot("right", eye=(3, -6, 2.5), **four)]
+    examples = re.findall(r"```(csv|jsonl?)\n(.*?)```", PAGE.split("## What is wrong")[0], re.DOTALL)
+    assert [suffix for suffix, _ in examples] == ["csv"] * 3 + ["json"] * 2 + ["jsonl"]
+    for suffix, text in examples:
+        assert read(folder, f"page.{suffix}", text) == two, text
+
+
+def test_the_page_shows_the_problems_as_they_are_told(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ((_, table), (_, told)) = re.findall(r"```(csv|text)\n(.*?)```", PAGE.split("## What is wrong")[1], re.DOTALL)
+    Path("shots.csv").write_text(table, encoding="utf-8")
+    with pytest.raises(ShotsError) as raised:
+        lists.read("shots.csv")
+    assert f"{raised.value}\n" == told
+
+
+def test_the_page_has_every_key_and_every_choice():
+    table = PAGE.split("| key | value |")[1].split("\n\n")[0]
+    keys = {key for cell in re.findall(r"(?m)^\| (`.*?) \|", table) for key in re.findall(r"`(\w+)`", cell)}
+    assert keys == {field.name for field in dataclasses.fields(Shot)}
+    assert {*ENGINES, *LEVELS} <= {*re.findall(r"`(\w+)`", table)}
+
+
+@pytest.mark.parametrize("name", ["list.txt", "list", "list.xlsx"])
+def test_a_suffix_of_no_list_is_refused(folder, name):
+    with pytest.raises(InputError, match=r"\.csv"):
+        read(folder, name, "[]")
+
+
+@pytest.mark.parametrize(
+    ("name", "text"), [("a.csv", "name,camera\n,,\n"), ("a.csv", ""), ("a.json", "[]"), ("a.jsonl", "\n\n")]
+)
+def test_a_list_of_none_is_refused(folder, name, text):
+    with pytest.raises(InputError, match="holds no shots"):
+        read(folder, name, text)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32"])
+def test_a_list_that_is_not_utf_8_is_refused(folder, encoding):
+    with pytest.raises(InputError, match="save it as UTF-8"):
+        read(folder, "list.csv", "name,camera\na,b\n".encode(encoding))
+
+
+def test_a_list_that_is_not_there_or_a_folder_is_refused(tmp_path):
+    (tmp_path / "folder.csv").mkdir()
+    for name in ("none.csv", "folder.csv"):
+        with pytest.raises(InputError, match="can't be read"):
+            lists.read(tmp_path / name)

@@ -1,0 +1,88 @@
+"""Why a shot can't be rendered, known before anything is: of a batch of a thousand, the last one counts as well."""
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+
+import bpy
+
+from ... import checks, html_page, intrinsics
+from ...errors import InputError
+from ...jobs import comparer
+from ...jobs.folder import Outputs
+from ...jobs.shot import Shot
+from ...pinhole import Pinhole
+from .. import camera as cameras
+from .. import datablocks, versions
+from ..rendering import graphics
+from .shot_settings import ShotSettings, engine_name
+
+_DRAWN = (versions.EEVEE, "BLENDER_WORKBENCH")
+
+
+def obstacles(
+    shots: Sequence[Shot], outputs: Outputs, scene: bpy.types.Scene, own: bpy.types.Object, settings: ShotSettings
+) -> Iterator[str]:
+    """One sentence for each obstacle. outputs : what is wanted of each shot. own : the camera for the four values."""
+    if not any(layer.use for layer in scene.view_layers):
+        yield f"scene {scene.name!r} renders nothing: all of its view layers are off, let one render"
+    engines = sorted({settings.engine_of(shot) for shot in shots}) if outputs.picture else []
+    if ("CYCLES" in engines or outputs.check) and not hasattr(scene, "cycles"):
+        yield "Cycles is disabled: enable the add-on Cycles Render Engine in Blender's preferences"
+    for engine in engines:
+        if engine in _DRAWN and not graphics.are_there():
+            needs = f"{engine_name(engine)} draws with a GPU, and Blender can't open one here"
+            yield f"{needs}: choose CYCLES or VIEWCAM, or start a display"
+    for lacking in (html_page.lacking(), comparer.lacking() if outputs.check or outputs.labels else None):
+        if lacking:
+            yield lacking
+    among = cameras_of(scene, own)
+    read: set[str] = set()
+    for shot in shots:
+        try:
+            if shot.eye is None:
+                camera_object = camera_of(shot, scene, among, settings)
+                if shot.frame is None and camera_object.name not in read:  # at other frames it may be another
+                    cameras.read(camera_object, scene)
+                    read.add(camera_object.name)
+            else:
+                _check_storable(stated(shot, settings.frame_of(shot)), settings.frame_of(shot), own.data)
+        except InputError as error:
+            yield f"the shot {checks.shown(shot.name)}: {error}"
+
+
+def cameras_of(scene: bpy.types.Scene, own: bpy.types.Object) -> dict[str, bpy.types.Object]:
+    """The scene's cameras but for the batch's own, by name, sorted."""
+    found = {each.name: each for each in scene.objects if each.type == "CAMERA" and each != own}
+    return dict(sorted(found.items()))
+
+
+def camera_of(
+    shot: Shot, scene: bpy.types.Scene, among: Mapping[str, bpy.types.Object], settings: ShotSettings
+) -> bpy.types.Object:
+    """The camera of the file that takes a shot without the four values. among : cameras_of(scene).
+
+    Raises
+    ------
+    InputError
+        if none is called so, if the scene has none of its own, or if it is no perspective camera.
+    """
+    name = settings.scene_camera(shot.frame) if shot.camera is None else shot.camera
+    camera_object = among.get(name)
+    if camera_object is None:
+        lacking = "no camera of its own" if name is None else f"no camera {name!r}"
+        some = ", ".join(itertools.islice(among, 8))
+        raise InputError(f"scene {scene.name!r} has {lacking}: choose from {some or 'none, and add one'}")
+    datablocks.check_perspective(camera_object)
+    return camera_object
+
+
+def stated(shot: Shot, frame: intrinsics.Frame) -> Pinhole:
+    """The pinhole that a shot's values ask for in the picture of `frame`."""
+    distance = (shot.d, shot.d * (frame.pixel_aspect_x / frame.pixel_aspect_y))
+    whole = Pinhole(shot.eye, shot.look_at, shot.up, distance, *frame.size, shot.principal_point, bool(shot.mirrored))
+    return whole.cropped(*frame.window) if frame.crop else whole
+
+
+def _check_storable(pinhole: Pinhole, frame: intrinsics.Frame, camera: bpy.types.Camera) -> None:
+    """Raise InputError if Blender's numbers hold no such camera."""
+    intrinsics.camera_data(pinhole.plane, frame, *datablocks.own_sensor(camera), camera.sensor_fit)

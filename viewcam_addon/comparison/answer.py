@@ -1,0 +1,133 @@
+"""The answer of a comparison, one of three: the same, the same but for what is not modelled, or different.
+
+Every place that tells it (shell, panel, report, contact sheet, JSON, JUnit, Python) has it from an `Answer`. Both sides leave
+out or replace alike what is not modelled, so that the rest can be compared: two pictures that are the same need not be the
+artist's then. It counts as far as it is in the picture: by the pixels that show it, and by those where Cycles' picture with
+everything is another than the one with stand-ins, because it hides them, lights them or stands in their light.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+SAME, SAME_BUT, DIFFERENT = "same", "same_but", "different"
+ANSWERS = (SAME, SAME_BUT, DIFFERENT)
+
+COLORS = {SAME: "green", SAME_BUT: "amber", DIFFERENT: "red"}
+
+_MOST_NAMED = 3
+
+
+@dataclass(frozen=True)
+class NotModelled:
+    """What of a picture is not modelled.
+
+    names : of the objects, those that the ledger has as approximated or skipped and that are in the picture, or may be.
+    share : of the pixels, 0 to 1: those that show them or differ by them; None where that was not measured. shown : those that
+    show them alone.
+    """
+
+    names: tuple[str, ...] = ()
+    share: float | None = 0.0
+    shown: float = 0.0
+
+    def to_json(self) -> dict[str, Any]:
+        return {"count": len(self.names), "names": list(self.names), "share": self.share, "shown": self.shown}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What two pictures came to.
+
+    answer : one of ANSWERS. headline : a few words. text : the figures that stand for it, or what differs.
+    not_modelled : of the picture, whatever the answer.
+    """
+
+    answer: str
+    headline: str
+    text: str
+    not_modelled: NotModelled = field(default_factory=NotModelled)
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing differs of what is modelled."""
+        return self.answer != DIFFERENT
+
+    @property
+    def color(self) -> str:
+        return COLORS[self.answer]
+
+    @property
+    def sentence(self) -> str:
+        return f"{self.headline}: {self.text}"
+
+    def exit_status(self, strict: bool) -> int:
+        """0, 1 where something differs, and 3 where that can't be said of all of the picture and `strict` asks for it."""
+        return 1 if not self.passed else 3 if strict and self.answer == SAME_BUT else 0
+
+    def to_json(self) -> dict[str, Any]:
+        return {
+            "passed": self.passed,
+            "answer": self.answer,
+            "sentence": self.sentence,
+            "not_modelled": self.not_modelled.to_json(),
+        }
+
+
+def answered(same: bool, headline: str, text: str, not_modelled: NotModelled) -> Answer:
+    """The answer, whose headline names what is not modelled where the rest is the same.
+
+    same : whether nothing differs. headline : without what is not modelled.
+    """
+    if not same:
+        return Answer(DIFFERENT, headline, text, not_modelled)
+    if not not_modelled.names:
+        return Answer(SAME, headline, text, not_modelled)
+    return Answer(SAME_BUT, f"{headline}, {but_for(not_modelled.names)} ({_named(not_modelled)})", text, not_modelled)
+
+
+def in_the_picture(
+    names: Sequence[str], shown: Mapping[str, NDArray[np.bool_]], changed: NDArray[np.bool_] | None, is_lit: bool
+) -> NotModelled:
+    """What of a picture is not modelled.
+
+    names : of the objects that are not. shown : name → (height, width), the pixels that show it, of those that are surfaces
+    in the scene. changed : (height, width), those where the picture with everything is another than the one with stand-ins;
+    None where there is none. is_lit : whether light is compared, so that what is not seen may still light what is.
+    """
+    if changed is not None and not is_lit:  # bits tell what a stand-in changes, where there is no noise
+        shown = {name: pixels & changed for name, pixels in shown.items()}
+    seen = [name for name in names if name in shown and shown[name].any()]
+    pixels = np.logical_or.reduce([shown[name] for name in seen]) if seen else np.False_
+    unseen = [name for name in names if name not in seen and (is_lit or name not in shown)]
+    share = float(np.mean(pixels))
+    if changed is None:
+        return NotModelled((*seen, *unseen), None if unseen else share, share)
+    if not (changed & ~pixels).any():
+        unseen = []
+    return NotModelled((*seen, *unseen), float(np.mean(changed | pixels)), share)
+
+
+def but_for(names: Sequence[str]) -> str:
+    """but for 2 objects that are not modelled"""
+    which = "1 object that is" if len(names) == 1 else f"{len(names):,} objects that are"
+    return f"but for {which} not modelled"
+
+
+def percent_of(share: float) -> str:
+    """12 %; 0.02 %; less than 0.01 %."""
+    percent = 100.0 * share
+    if 0.0 < percent < 0.01:
+        return "less than 0.01 %"
+    return f"{percent:.2g} %" if percent < 99.5 else f"{percent:.4g} %" if percent < 100.0 else "100 %"
+
+
+def _named(not_modelled: NotModelled) -> str:
+    names = not_modelled.names
+    named = ", ".join(names[:_MOST_NAMED]) + (f" and {len(names) - _MOST_NAMED:,} more" if len(names) > _MOST_NAMED else "")
+    if not_modelled.share is None:
+        return f"{named}; on how much of the picture was not measured"
+    return f"{named}; {percent_of(not_modelled.share)} of the picture"

@@ -1,0 +1,30 @@
+"""Work on one .blend: what is to be rendered and checked, and all that carries it out, with nothing lost on the way.
+
+What is to be done
+    shot                  one picture, checked
+    lists                 CSV, JSON and JSON Lines (docs/batch.md) → shots, by documents, table, rows, problems
+    makers                shots by rule: an orbit, frames, cameras
+    names                 what a shot may be called: its name is that of its files
+    settings, shards      what a picture was made from; which of many machines makes it
+
+Doing it, many shots of one file, each as a picture, a preview and a sidecar
+    folder                what stands where, and whether a shot is there already
+    one                   one shot, rendered and written; what a renderer is
+    run                   all of them: claimed, rendered, counted, through failures, full disks, signals and other batches
+    locks, interruption   shared work; the first signal and the second
+    summary, sheet        what it came to, as JSON and as a page of thumbnails
+    dataset               what it came to, as those read it who learn a scene from its pictures
+
+On child processes (../child_process.py)
+    comparer, labeller              is what was rendered what the sidecar says; ground truth beside it
+    render_server, render_client    a renderer in a process of its own
+    cluster, worker                 shots on several workers, each of which keeps such a process
+
+**Nothing lost.** A file appears whole or not at all (files.py), and a shot's sidecar is written last and taken away first: a
+shot is there if its sidecar is, whatever was killed when. All that a run decides it reads from the folder, so there is no
+journal that could be wrong. Locks only share the work out; without them two batches would do it twice, and end with the same
+bytes.
+
+Nothing here knows Blender: what the .blend says (its cameras' names, a camera's pinhole, its content's hash) is handed in.
+Rejected: a database of states (a second truth beside the files), and a folder per shot.
+"""

@@ -1,0 +1,182 @@
+"""The folder of a batch: what stands where, and which shots are there already.
+
+A shot NAME is three files, NAME.exr, NAME.png and NAME.json, and those of its labels. NAME.json, its sidecar, is written when
+the others stand, and taken away before they are replaced. It says how many bytes they have, and from what they were made
+(settings.settings_hash).
+Rejected: to hash the pictures as well; each was written whole, and to read them all again would cost more than it finds.
+"""
+
+import json
+import re
+import shutil
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..files import read_bytes, written_whole
+
+_TEMPORARY = re.compile(r"\.(.+)-[0-9a-f]{8}\.(?:exr|png|json|html|txt|labels)")
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """What a batch makes of each shot, beside its sidecar.
+
+    picture : EXR and preview. check : whether its geometry is compared with the tracer. labels : kinds of labels.KINDS.
+    depth_steps : of the labels' 16-bit depth, in a scene unit.
+    """
+
+    picture: bool = True
+    check: bool = False
+    labels: tuple[str, ...] = ()
+    depth_steps: float = 1000.0
+
+
+class Folder:
+    """The files of a batch, or of a part of one.
+
+    part : "2-of-8" for a shard, which has a summary and a contact sheet of its own.
+
+    Raises
+    ------
+    InputError
+        if the folder can't be made.
+    """
+
+    def __init__(self, path: Path, part: str = "") -> None:
+        suffix = f"-{part}" if part else ""
+        self.path = path
+        self.lock = path / ".viewcam.lock"
+        self.summary = path / f"summary{suffix}.json"
+        self.contact_sheet = path / f"contact-sheet{suffix}.html"
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{path} can't be a folder of pictures ({error.strerror}): give another for --out") from error
+
+    def image(self, name: str) -> Path:
+        return self.path / f"{name}.exr"
+
+    def preview(self, name: str) -> Path:
+        return self.path / f"{name}.png"
+
+    def sidecar(self, name: str) -> Path:
+        return self.path / f"{name}.json"
+
+    def finished(self, name: str, settings: str, outputs: Outputs | None = None) -> dict[str, Any] | None:
+        """The sidecar of the shot, if all that it tells of is there whole and made from these settings, else None.
+
+        outputs : what it must tell of; by default the picture alone.
+        """
+        outputs, record = outputs or Outputs(), self.told(name)
+        try:
+            if record is None or record.get("settings") != settings or record.get("bytes") != self._sizes(name, record):
+                return None
+        except OSError:  # one is missing
+            return None
+        labels = record.get("labels", {})
+        is_all = (
+            ("image" in record or not outputs.picture)
+            and ("check" in record or not outputs.check)
+            and set(outputs.labels) <= set(labels.get("kinds", ()))
+            and (not outputs.labels or labels["depth_steps"] == outputs.depth_steps)
+        )
+        return record if is_all else None
+
+    def told(self, name: str) -> dict[str, Any] | None:
+        """The sidecar of the shot, whatever it was made from; None where it is missing, or somebody else's."""
+        try:
+            record = json.loads(read_bytes(self.sidecar(name)).decode("utf-8"))
+        except (OSError, ValueError, RecursionError):
+            return None
+        return record if _is_sidecar(record, name) else None
+
+    def _sizes(self, name: str, record: Mapping[str, Any]) -> dict[str, int]:
+        """Of the files that a sidecar tells of, by what `bytes` calls them."""
+        paths = {"image": self.image(name), "preview": self.preview(name)} if "image" in record else {}
+        paths |= {file: self.path / file for file in record.get("labels", {}).get("files", ())}
+        return {key: path.stat().st_size for key, path in paths.items()}
+
+    def remove_former(self, name: str, record: Mapping[str, Any], of_labels_only: bool) -> None:
+        """Remove what a former sidecar tells of, and the sidecar first. of_labels_only : all but the picture."""
+        self.sidecar(name).unlink(missing_ok=True)
+        files = list(record.get("labels", {}).get("files", ()))
+        for path in (
+            *(self.path / file for file in reversed(files)),  # the JSON first, which says that the others are there
+            *(() if of_labels_only or "image" not in record else (self.image(name), self.preview(name))),
+        ):
+            path.unlink(missing_ok=True)
+
+    def remove_leftovers(self, shots: Iterable[str]) -> None:
+        """Remove what a batch that was killed wrote halfway; nobody may be writing here.
+
+        shots : names of the shots whose leftovers they may be; those of the batch's own files go as well.
+        """
+        ours = {*shots, self.summary.stem, self.contact_sheet.stem}
+        for path in self.path.iterdir():
+            found = _TEMPORARY.fullmatch(path.name)
+            if found and found[1] in ours and path.is_dir():
+                shutil.rmtree(path, ignore_errors=True)
+            elif found and found[1] in ours:
+                path.unlink(missing_ok=True)
+
+
+def _is_sidecar(record: Any, name: str) -> bool:
+    """Whether it says all that the summary and the contact sheet tell of a shot; else it is somebody else's, or damaged."""
+
+    def has(owner: Any, **kinds: type | tuple[type, ...]) -> bool:
+        return isinstance(owner, dict) and all(isinstance(owner.get(key), kind) for key, kind in kinds.items())
+
+    return (
+        has(record, rendered=dict, warnings=list, timing=dict)
+        and has(record["rendered"], width=int, height=int)
+        and has(record["timing"], seconds=(int, float))
+        and all(isinstance(warning, str) for warning in record["warnings"])
+        and ("check" not in record or has(record["check"], passed=bool, verdict=str))
+        and ("labels" not in record or _are_labels(record["labels"], name))
+    )
+
+
+def _are_labels(told: Any, name: str) -> bool:
+    """Whether a sidecar's labels are files of its shot, which no other folder has."""
+    return (
+        isinstance(told, dict)
+        and isinstance(told.get("depth_steps"), int | float)
+        and all(
+            isinstance(told.get(key), list) and all(isinstance(each, str) for each in told[key]) for key in ("kinds", "files")
+        )
+        and all(file.startswith(f"{name}.") and _is_file_name(file) for file in told["files"])
+    )
+
+
+def _is_file_name(text: str) -> bool:
+    """Whether it is one of a file in the folder, which text of a damaged sidecar need not be."""
+    return not set(text) & {"/", "\\", "\0"} and text.encode("utf-8", "replace").decode("utf-8") == text
+
+
+def write_json(path: Path, document: Mapping[str, Any]) -> None:
+    """Write a document whole or not at all, a key a line, and of a list of objects an object a line.
+
+    Raises
+    ------
+    InputError
+        if it can't be written; FullDiskError if the disk is full.
+    """
+    with written_whole(path) as temporary:
+        temporary.write_text(_text(document), encoding="utf-8", newline="\n")
+
+
+def _text(document: Mapping[str, Any]) -> str:
+    return "{\n" + ",\n".join(f" {_compact(key)}: {_lines(value)}" for key, value in document.items()) + "\n}\n"
+
+
+def _lines(value: Any) -> str:
+    if isinstance(value, list) and value and all(isinstance(item, Mapping) for item in value):
+        return "[\n" + ",\n".join(f"  {_compact(item)}" for item in value) + "\n ]"
+    return _compact(value)
+
+
+def _compact(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)

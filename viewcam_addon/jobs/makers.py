@@ -1,0 +1,174 @@
+"""Shots by rule: around a point, through an animation, one for each camera of the file."""
+
+import fnmatch
+import math
+import re
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+from .. import checks, moves
+from ..errors import InputError
+from ..pinhole import Pinhole
+from . import names
+from .problems import Problems
+from .shot import Shot
+
+_MOST = 1_000_000
+_RANGE = re.compile(r"([-+]?\d{1,9})\.\.([-+]?\d{1,9})", re.ASCII)
+
+
+class _Made(Sequence[Shot]):
+    """Shots that are made when they are asked for: of a million views, one of many machines renders a few.
+
+    make : a number → its shot. numbers : those of the shots, in their order.
+    """
+
+    def __init__(self, make: Callable[[int], Shot], numbers: range) -> None:
+        self._make, self._numbers = make, numbers
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    def __getitem__(self, index: int | slice) -> Any:
+        numbers = self._numbers[index]
+        return _Made(self._make, numbers) if isinstance(index, slice) else self._make(numbers)
+
+
+def orbit(pinhole: Pinhole, count: int) -> Sequence[Shot]:
+    """`count` views of the pinhole's look-at point, evenly around up from the pinhole itself on, towards u.
+
+    The shots have the pinhole's size, principal point and mirroring and, as d, its distance in pixel widths; pixel aspect stays
+    the scene's.
+
+    Raises
+    ------
+    InputError
+        if the count is not from 1 to a million.
+    """
+    count = _count(checks.whole("orbit's number of shots", count))
+    middle = (pinhole.width / 2, pinhole.height / 2)
+    beside = {
+        "width": pinhole.width,
+        "height": pinhole.height,
+        "principal_point": None if pinhole.principal_point == middle else pinhole.principal_point,
+        "mirrored": pinhole.mirrored or None,
+    }
+
+    def view(i: int) -> Shot:
+        moved = moves.orbited(pinhole, math.tau * i / count, 0.0)
+        name = f"orbit_{i:0{_digits(count - 1)}d}"
+        return Shot(name, moved.eye, moved.look_at, moved.up, moved.distance[0], **beside)
+
+    return _Made(view, range(count))
+
+
+def frames(text: str, camera: str | None = None) -> Sequence[Shot]:
+    """A shot of the camera at each frame of a range "A..B", both included.
+
+    camera : its name; the scene's own at each frame where None, which markers may bind.
+
+    Raises
+    ------
+    InputError
+        if the text is none, runs backwards or beyond Blender's frames, or has more than a million.
+    """
+    found = _RANGE.fullmatch(text.strip())
+    if not found:
+        raise InputError(f"frames {checks.shown(text)} are no range: write 1..250")
+    first, last = int(found[1]), int(found[2])
+    if first > last:
+        raise InputError(f"frames {text} run backwards: write {last}..{first}")
+    _count(last - first + 1)
+    digits = _digits(max(abs(first), abs(last)))
+
+    def still(frame: int) -> Shot:
+        return Shot(f"frame_{'-' * (frame < 0)}{abs(frame):0{digits}d}", camera=camera, frame=frame)
+
+    for end in (first, last):  # Blender's limits: what lies between them is within, too
+        still(end)
+    return _Made(still, range(first, last + 1))
+
+
+def from_cameras(pattern: str, cameras: Iterable[str], spaces: bool = True) -> list[Shot]:
+    """A shot, of the camera's own name, of each camera whose name fits a pattern of *, ? and [abc]; sorted.
+
+    Case counts on every system. spaces : whether the shots' names may have some; else each is an underscore there.
+
+    Raises
+    ------
+    ShotsError
+        if such a camera's name can't be a file's, or two would be one file; it has all of them.
+    InputError
+        if no name fits.
+    """
+    cameras = sorted(cameras)
+    chosen = [name for name in cameras if fnmatch.fnmatchcase(name, pattern)]
+    if not chosen:
+        raise InputError(f"no camera is called {checks.shown(pattern)}: the file has {', '.join(cameras[:8]) or 'none'}")
+    problems = Problems(f"the cameras {checks.shown(pattern)}")
+    files: dict[str, str] = {}  # one_file(name of the shot) → camera
+    shots = {}
+    for camera in chosen:
+        name = camera if spaces else "".join("_" if character.isspace() else character for character in camera)
+        with problems.caught():
+            names.check("a camera", name)
+        other = files.setdefault(names.one_file(name), camera)
+        if camera in shots or other != camera:
+            both = f"{checks.shown(other)} and {checks.shown(camera)}"
+            problems.add(
+                f"the cameras {both} would have one file, here or on another system: rename one, or list shots in a file"
+            )
+        shots[camera] = name
+    problems.raise_any()
+    return [Shot(name, camera=camera) for camera, name in shots.items()]
+
+
+def from_pinholes(pinholes: Iterable[tuple[str, Pinhole]]) -> list[Shot]:
+    """A shot of each named pinhole, with its size, principal point, pixel aspect and mirroring.
+
+    Names that can't be a file's are made so: what may not stand in them is an underscore.
+
+    Raises
+    ------
+    ShotsError
+        if two would be one file, or a camera is beyond Blender's limits; it has all of them.
+    """
+    problems = Problems("the cameras")
+    files: dict[str, str] = {}
+    shots = []
+    for given, pinhole in pinholes:
+        name = names.made_fit(given)
+        other = files.setdefault(names.one_file(name), given)
+        if other != given or len(files) <= len(shots):
+            problems.add(f"the cameras {checks.shown(other)} and {checks.shown(given)} would have one file: rename one")
+            continue
+        (d_x, d_y), (width, height) = pinhole.distance, (pinhole.width, pinhole.height)
+        middle = (width / 2, height / 2)
+        with problems.caught():
+            shots.append(
+                Shot(
+                    name,
+                    pinhole.eye,
+                    pinhole.look_at,
+                    pinhole.up,
+                    d_x,
+                    width=width,
+                    height=height,
+                    principal_point=None if pinhole.principal_point == middle else pinhole.principal_point,
+                    pixel_aspect=d_y / d_x,
+                    mirrored=pinhole.mirrored or None,
+                )
+            )
+    problems.raise_any()
+    return shots
+
+
+def _count(count: int) -> int:
+    if count > _MOST:
+        raise InputError(f"these are {count} shots: make at most {_MOST} at a time")
+    return count
+
+
+def _digits(largest: int) -> int:
+    """Of the numbers in names, so that files sort as these do."""
+    return max(3, len(str(largest)))

@@ -1,0 +1,126 @@
+"""One shot: rendered, labelled or checked, and written with its sidecar. And the shots of a batch one after another."""
+
+import contextlib
+import dataclasses
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Protocol
+
+from ..files import written_together, written_whole
+from ..labels import KINDS
+from .folder import Folder, Outputs, write_json
+from .shot import Shot
+
+Outcome = dict[str, Any] | Exception
+"""The sidecar of a shot, or why there is none."""
+
+Work = Callable[[Iterator[Shot | None]], Iterator[tuple[Shot, Outcome]]]
+"""Renders shots: takes them one by one as it can use them, and yields each with its outcome, in any order.
+
+None in place of a shot says that another batch works on all that are left: look after what is under way, wait for a moment,
+and ask again.
+"""
+
+_MOMENT = 0.2  # seconds
+
+
+class Renderer(Protocol):
+    """Holds one scene open, and renders its shots one after another.
+
+    All methods raise InputError if this shot can't be had, and FullDiskError if nothing more can be written; the next shot
+    may then still be asked for.
+    """
+
+    def render(self, shot: Shot, image: Path | None, preview: Path | None) -> dict[str, Any]:
+        """Write the picture (EXR) and its preview (PNG) to these two paths; None for both makes ready for the rest alone.
+
+        Both paths are temporary, in the batch's folder: the caller renames them, and removes them after an error.
+
+        Returns what the sidecar says of it: the keys of cameras/sidecar.py, and `stated`, `rendered`, `warnings`, `versions`.
+        The same shot gives the same bytes and the same values each time.
+        """
+        ...
+
+    def label(self, shot: Shot, picture: Path, kinds: Sequence[str], depth_steps: float) -> list[str]:
+        """Write the labels of the shot that was just rendered beside where its picture would be; the names of their files.
+
+        kinds : of labels.KINDS. depth_steps : of their 16-bit depth, in a scene unit. The same shot gives the same bytes.
+        """
+        ...
+
+    def check(self, shot: Shot) -> dict[str, Any]:
+        """Compare the shot that was just rendered with the tracer: `passed` (bool), `verdict` (a sentence), and figures."""
+        ...
+
+
+def in_turn(folder: Folder, renderer: Renderer, settings: Mapping[str, str], outputs: Outputs) -> Work:
+    """The work of one process: a shot after another. settings : their hashes by the shot's name."""
+
+    def work(shots: Iterator[Shot | None]) -> Iterator[tuple[Shot, Outcome]]:
+        for shot in shots:
+            if shot is None:
+                time.sleep(_MOMENT)
+                continue
+            try:
+                outcome: Outcome = render_one(shot, folder, renderer, settings[shot.name], outputs)
+            except Exception as error:  # a shot that fails is reported, and the rest go on
+                outcome = error
+            yield shot, outcome
+
+    return work
+
+
+def render_one(shot: Shot, folder: Folder, renderer: Renderer, settings: str, outputs: Outputs) -> dict[str, Any]:
+    """Render a shot into the folder; its sidecar, as it was written. `timing` is all in it that differs from run to run.
+
+    settings : the hash of what it is made from. outputs : what of it is wanted. A picture and labels that stand there
+    and were made from the same settings stay: labels may come to a picture that was rendered before, and a picture to labels.
+
+    Raises
+    ------
+    InputError
+        if the shot can't be rendered, labelled or checked, or the files not be written; FullDiskError if the disk is full.
+    """
+    started = time.monotonic()
+    image, preview, sidecar = folder.image(shot.name), folder.preview(shot.name), folder.sidecar(shot.name)
+    former = folder.told(shot.name) or {}
+    kept = folder.finished(shot.name, settings, Outputs(picture=False)) or {}
+    is_kept = "image" in kept and ("check" in kept or not outputs.check)
+    kinds = [kind for kind in KINDS if kind in {*outputs.labels, *kept.get("labels", {}).get("kinds", ())}]
+    steps = outputs.depth_steps if outputs.labels else kept["labels"]["depth_steps"] if kinds else 0.0
+    with contextlib.ExitStack() as files:
+        new_image = new_preview = None
+        if outputs.picture and not is_kept:
+            new_preview, new_image = (files.enter_context(written_whole(path)) for path in (preview, image))
+        said = renderer.render(shot, new_image, new_preview)
+        if is_kept:
+            said = {key: kept[key] for key in said if key in kept}
+        sizes = {}
+        if outputs.picture or is_kept:
+            sizes = {"image": (new_image or image).stat().st_size, "preview": (new_preview or preview).stat().st_size}
+        labels: dict[str, Any] = {}
+        if kinds:
+            beside = files.enter_context(written_together(folder.path, shot.name))
+            names = renderer.label(shot, beside / image.name, kinds, steps)
+            sizes |= {name: (beside / name).stat().st_size for name in names}
+            labels = {"labels": {"kinds": kinds, "depth_steps": steps, "files": names}}
+        verdict = {"check": renderer.check(shot)} if outputs.check else {key: kept[key] for key in ("check",) if key in kept}
+        sidecar.unlink(missing_ok=True)
+        folder.remove_former(shot.name, former, of_labels_only="image" in sizes)
+    record = {
+        "shot": {key: value for key, value in dataclasses.asdict(shot).items() if value is not None},
+        "settings": settings,
+        **({"image": image.name, "preview": preview.name} if "image" in sizes else {}),
+        "bytes": sizes,
+        **said,
+        **labels,
+        **verdict,
+        "timing": {
+            "seconds": round(time.monotonic() - started, 3),
+            "finished": datetime.now(UTC).isoformat(timespec="seconds"),
+        },
+    }
+    write_json(sidecar, record)
+    return record

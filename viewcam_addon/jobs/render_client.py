@@ -1,0 +1,153 @@
+"""A renderer in a process of its own, as the one who asks has it: what BlenderRenderer is, without Blender in this process.
+
+The Blender is the one that VIEWCAM_BLENDER names, with the extension installed; without it the bpy module does. A Blender that
+crashes is started again, and what it was doing is done again, a few times.
+"""
+
+import dataclasses
+import importlib.util
+import math
+import os
+import platform
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from .. import child_process
+from ..child_process import AnswerTimeout, ProcessEnded, ServerProcess
+from ..errors import InputError
+from ..pinhole import Pinhole
+from .folder import Outputs
+from .shot import Shot
+
+BLENDER = "VIEWCAM_BLENDER"
+"""The variable that names the Blender."""
+
+ATTEMPTS = 3
+"""How many Blenders may crash in one shot until it counts as failed."""
+
+
+class ServedRenderer:
+    """A scene held open by a Blender in another process, which is started when it is first needed. See BlenderRenderer.
+
+    blend : the file. seed, threads, trust : as the command line has them. program : that of this process, which is no Blender.
+    time_limit : seconds that a shot may take, rendered, labelled and checked, once the file is open.
+
+    Every method raises InputError, also if that Blender can't be started or ends again and again, and OSError where it could
+    not write.
+    """
+
+    def __init__(
+        self,
+        blend: Path,
+        seed: int | None = None,
+        threads: int | None = None,
+        trust: bool = False,
+        time_limit: float | None = None,
+    ) -> None:
+        self.blend, self.program = blend, None
+        self._opening = {"open": {"blend": str(blend), "seed": seed, "threads": threads, "trust": trust}}
+        self._server: ServerProcess | None = None
+        self._limit, self._ends = time_limit, math.inf
+        self._rendering: dict[str, Any] = {}
+
+    def open(self) -> None:
+        """Start the Blender and open the file, unless that is done."""
+        self._ask()
+
+    def render(self, shot: Shot, image: Path | None, preview: Path | None) -> dict[str, Any]:
+        paths = {"image": image and str(image), "preview": preview and str(preview)}
+        self._rendering = {"render": {"shot": dataclasses.asdict(shot), **paths}}
+        return self._ask(self._rendering)
+
+    def label(self, shot: Shot, picture: Path, kinds: Sequence[str], depth_steps: float) -> list[str]:
+        said = {"picture": str(picture), "kinds": list(kinds), "depth_steps": depth_steps}
+        return self._ask(self._rendering, {"label": {"shot": dataclasses.asdict(shot), **said}})
+
+    def check(self, shot: Shot) -> dict[str, Any]:
+        return self._ask(self._rendering, {"check": {"shot": dataclasses.asdict(shot)}})
+
+    @property
+    def cameras(self) -> tuple[str, ...]:
+        return tuple(self._ask({"cameras": {}}))
+
+    @property
+    def scene_camera(self) -> str | None:
+        return self._ask({"scene_camera": {}})
+
+    def pinhole(self, camera: str | None, size: tuple[int, int] | None, frame: int | None) -> Pinhole:
+        return Pinhole(**self._ask({"pinhole": {"camera": camera, "size": size, "frame": frame}}))
+
+    def made_from(self) -> dict[str, Any]:
+        return self._ask({"made_from": {}})
+
+    def problems(self, shots: Iterable[Shot], outputs: Outputs | None = None) -> tuple[str, ...]:
+        said = [dataclasses.asdict(shot) for shot in shots]
+        return tuple(self._ask({"problems": {"shots": said, "outputs": dataclasses.asdict(outputs or Outputs())}}))
+
+    def close(self) -> None:
+        """End the Blender."""
+        if self._server is not None:
+            self._server.close()
+            self._server = None
+
+    def __enter__(self) -> "ServedRenderer":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _ask(self, *requests: dict[str, Any]) -> Any:
+        """The answer to the last of the requests; those before it are repeated to a Blender that is new."""
+        for attempt in range(1, ATTEMPTS + 1):
+            try:
+                return self._answer(requests)
+            except ProcessEnded as gone:
+                self.close()
+                if attempt == ATTEMPTS:
+                    raise InputError(f"{ATTEMPTS} times in a row {gone}") from gone
+        raise AssertionError("unreachable")
+
+    def _answer(self, requests: tuple[dict[str, Any], ...]) -> Any:
+        if self._server is not None and not self._server.is_there():  # it was idle for long
+            self.close()
+        if self._server is None:
+            self._start()
+        else:
+            requests = requests[-1:]
+        answer = None
+        for request in requests:
+            if "render" in request:
+                self._ends = time.monotonic() + self._limit if self._limit else math.inf
+            try:
+                answer = self._server.ask(request, self._ends if request.keys() & {"render", "label", "check"} else math.inf)
+            except AnswerTimeout as late:
+                self.close()
+                limit = f"the shot took longer than the time limit of {self._limit:g} s, and its Blender was ended"
+                raise InputError(f"{limit}: give --time-limit more, or the shot fewer samples") from late
+        return answer
+
+    def _start(self) -> None:
+        name, command, variables = _blender()
+        self._server = ServerProcess(name, command, variables)
+        try:
+            self._server.ask(self._opening)
+        except ProcessEnded as gone:
+            raise ProcessEnded(
+                f"{gone.what} as it opened {self.blend}: see that the file is whole, that this is Blender 4.2 or newer with "
+                "the extension Virtual Pinhole, and that there is memory enough"
+            ) from gone
+        except InputError:
+            self.close()
+            raise
+
+
+def _blender() -> tuple[str, list[str], Mapping[str, str]]:
+    """What sentences call the Blender, the command that makes it serve, and its variables."""
+    program = os.environ.get(BLENDER)
+    if program:
+        return program, [program, "-b", "--disable-autoexec", "--command", "viewcam", "serve"], os.environ
+    if importlib.util.find_spec("bpy") is None:
+        raise InputError(f"there is no Blender on {platform.node()}: name one in {BLENDER}, or pip install bpy")
+    return "Blender", child_process.viewcam("serve"), child_process.environment(apart_from=child_process.blender_scripts())
