@@ -134,17 +134,21 @@ def core_wheel(platform: str, folder: Path) -> Path:
         f"{info}/METADATA": f"Metadata-Version: 2.1\nName: {PACKAGE}\nVersion: {version}\nLicense: GPL-3.0-or-later\n".encode(),
         f"{info}/WHEEL": f"Wheel-Version: 1.0\nGenerator: {PACKAGE}\nRoot-Is-Purelib: false\nTag: {tag}\n".encode(),
     }
+    path = folder / f"{PACKAGE}-{version}-{tag}.whl"
+    write_wheel(path, info, contents)
+    return path
+
+
+def write_wheel(path: Path, info: str, contents: dict[str, bytes]) -> None:
+    """Write a wheel of files by name and a RECORD of them. info : NAME-VERSION.dist-info."""
     record = "".join(
         f"{name},sha256={base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b'=').decode()},{len(data)}\n"
         for name, data in contents.items()
     )
-    contents[f"{info}/RECORD"] = f"{record}{info}/RECORD,,\n".encode()
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{PACKAGE}-{version}-{tag}.whl"
+    path.parent.mkdir(parents=True, exist_ok=True)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, data in contents.items():
+        for name, data in [*contents.items(), (f"{info}/RECORD", f"{record}{info}/RECORD,,\n".encode())]:
             archive.writestr(zipfile.ZipInfo(name), data, zipfile.ZIP_DEFLATED)
-    return path
 
 
 class CoreBuildHook(BuildHookInterface):

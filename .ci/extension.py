@@ -10,11 +10,12 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
-from hatch_build import core_wheel  # noqa: E402 - only now is it known where that is
+from hatch_build import core_wheel, write_wheel  # noqa: E402 - only now is it known where that is
 
 CONTENTS = ["__init__.py", "viewcam_addon", "README.md", "LICENSE"]
 
@@ -56,7 +57,35 @@ def _wheels(folder_name: str, package: str, version: str, tag: str, *target: str
         print(f"Downloading {package} {version}, {folder_name}, {tag}", flush=True)
         pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "download", "--quiet", "--no-deps"]
         subprocess.run([*pip, "--only-binary=:all:", *target, f"--dest={folder}", f"{package}=={version}"], check=True)
-    return list(folder.glob(pattern))
+    return [importable(wheel) for wheel in folder.glob(pattern)]
+
+
+def importable(wheel: Path) -> Path:
+    """A wheel whose every module and library lies where it is imported from: the given one, or its copy as a local version.
+
+    Pip moves what a wheel keeps in NAME-VERSION.data/platlib or purelib to the top. The installers of Blender 4.2 and 4.3 leave
+    it where it is, and no loader finds it: OpenEXR's C++ library on Windows (PEP 427; Blender's wheel_manager.py).
+    The version is another, since an installer keeps what it has of the same version, from whichever add-on.
+    """
+    name, version, tags = wheel.stem.split("-", 2)
+    old, new = f"{name}-{version}", f"{name}-{version}+importable"
+    with zipfile.ZipFile(wheel) as archive:
+        if not any(entry.startswith(f"{old}.data/") for entry in archive.namelist()):
+            return wheel
+        contents = {}
+        for entry in archive.infolist():
+            if entry.is_dir() or entry.filename == f"{old}.dist-info/RECORD":
+                continue
+            place = entry.filename.removeprefix(f"{old}.data/platlib/").removeprefix(f"{old}.data/purelib/")
+            if place.startswith(f"{old}.dist-info/"):
+                place = new + place.removeprefix(old)
+            contents[place] = archive.read(entry)
+    metadata = f"{new}.dist-info/METADATA"
+    line = f"\nVersion: {version}".encode()
+    contents[metadata] = contents[metadata].replace(line, line + b"+importable", 1)
+    path = wheel.with_name(f"{new}-{tags}.whl")
+    write_wheel(path, f"{new}.dist-info", contents)
+    return path
 
 
 def stage(folder: Path, platforms: list[str]) -> None:

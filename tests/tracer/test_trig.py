@@ -57,6 +57,19 @@ def test_powers_are_right_to_two_roundings_of_their_logarithm():
     assert (off <= allowed).all(), f"{(off / allowed).max():.2f} of what is allowed, at {x[(off / allowed).argmax()]!r}"
 
 
+def test_powers_beyond_what_float64_holds_are_0_or_infinite():
+    """Also what is given no number for a power: below the least normal number, 2⁻¹⁰²², and from 2¹⁰²³·⁵ on."""
+    power = np.array([1021, 1022.001, 1023, 2000, 1e5, 2.0**62, 2.0**63, 2.0**70, 1e300, np.inf])
+    small, large = function("pow", 0.5, power), function("pow", 0.5, -power)
+    np.testing.assert_array_equal(small, [2.0**-1021, *np.zeros(9)])
+    assert large[0] == 2.0**1021 and large[2] == 2.0**1023
+    assert abs(large[1] / 2.0**1022 - 2**0.001) < 1023 * 2.0**-52 * 1.001
+    np.testing.assert_array_equal(large[3:], np.inf)
+    np.testing.assert_array_equal(function("pow", 2.0, power), large)
+    np.testing.assert_array_equal(function("pow", 1.0, power[:-1]), 1)
+    assert np.isnan(function("pow", 2.0, np.nan))
+
+
 def test_an_error_of_three_units_would_be_told():
     turns = np.array([0.1])
     off = off_by(function("sin of turns", turns) + 4 * UNIT, lambda x: mpmath.sin(2 * mpmath.pi * x), turns)

@@ -144,3 +144,23 @@ def test_a_constant_colour_is_a_number_by_its_luminance():
     luminance = np.dot((0.2126390, 0.7151687, 0.0721923), (0.5, 0.25, 1.0))
     for colour in ((0.5, 0.25, 1.0), node("gamma", color=(0.5, 0.25, 1.0))):
         assert constant_value(node("math", operation="add", a=colour, b=0.0))[1] == pytest.approx(luminance, rel=1e-12)
+
+
+@pytest.mark.parametrize("version", [402, 502])
+def test_a_tinted_coat_that_bends_no_light_is_black_toward_grazing(version):
+    """Its way through is 1/cos, so that the tint's power leaves float64's range; a coat of IOR 1 reflects nothing."""
+    cosines = np.array([1.0, 0.5, 0.1, 0.01, 1e-3, 9e-4, 1e-4, 1e-9, 1e-160])
+    came = np.stack([np.sqrt(1 - cosines**2), 0 * cosines, -cosines])
+    tint = (1.0, 0.5, 1e-30)
+
+    def light(coat_tint):
+        shader = node("principled", base_color=WHITE, coat_weight=1.0, coat_ior=1.0, coat_tint=coat_tint)
+        return ScatteredBy(shader, came, (0, 0, 1), numbers(len(cosines)), version=version).light
+
+    expected = np.array([np.exp(np.maximum(np.log(each) / cosines, -800)) for each in tint])
+    bare, coated = light(WHITE), light(tint)
+    assert (bare > 0).all()
+    # cos² is had from 1 − cos², to 2⁻⁵³: of 0.01 and a power of 7, 4e-14. Lobes that bring next to nothing are left out.
+    np.testing.assert_allclose(coated / bare, expected, rtol=1e-12, atol=1e-15)
+    brighter = light((1.5, 1.0, 1.0))
+    assert np.isfinite(brighter).all() and (brighter >= bare).all()

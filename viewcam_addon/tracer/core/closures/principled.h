@@ -74,7 +74,7 @@ struct PrincipledClosure {
     }
 
    private:
-    static constexpr double NEGLIGIBLE = 1e-5, LEAST_IOR = 1e-5;
+    static constexpr double NEGLIGIBLE = 1e-5, LEAST_IOR = 1e-5, MOST_TINT = 1e40;
 
     // What scattering more than once multiplies an albedo and a lobe by.
     struct Scattering {
@@ -115,8 +115,9 @@ struct PrincipledClosure {
         add_reflection(bsdf, at, weight * share * scattered.lobe, normal, facets, DielectricFresnel{eta});
         Vec3 left = below(weight, weight * share * scattered.albedo * reflected), tint = not_negative(at.color(coat_tint));
         if (tint.x == 1 && tint.y == 1 && tint.z == 1) return left;
-        double depth = 1 / std::sqrt(1 - (1 - cosine * cosine) / (eta * eta));  // the way through it, both ways as one
-        auto absorbed = [&](double t) { return mix(1, t > 0 ? pow(t, depth) : 0, share); };
+        // The way through it, both ways as one: without end along a coat that does not bend light.
+        double depth = 1 / std::sqrt(larger(1 - (1 - cosine * cosine) / (eta * eta), 1e-300));
+        auto absorbed = [&](double t) { return mix(1, t > 0 ? smaller(pow(t, depth), MOST_TINT) : 0, share); };
         return left * Vec3{absorbed(tint.x), absorbed(tint.y), absorbed(tint.z)};
     }
 

@@ -8,6 +8,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "vec.h"
 
@@ -105,7 +106,7 @@ inline double log2(double x) {
 }
 inline double log(double x) { return log2(x) * 0.6931471805599453; }
 
-// x^power of 1e-300 < x < 1e300 with a result in that range.
+// x^power of 1e-300 < x < 1e300: 0 where that is less than float64's normal numbers, infinite above 2^1023.5, no number for none.
 inline double pow(double x, double power) {
     static constexpr double EXP2[] = {1.0,
                                       0.6931471805599453,
@@ -120,7 +121,12 @@ inline double pow(double x, double power) {
                                       7.054894386348348e-09,
                                       4.456675341049206e-10,
                                       2.5733568308756892e-11};
-    double wanted = power * log2(x), whole = std::floor(wanted + 0.5), rest = polynomial(wanted - whole, EXP2);
+    double wanted = power * log2(x);
+    if (!(std::fabs(wanted) < 1022)) {
+        if (wanted <= -1022) return 0;
+        if (!(wanted < 1023.5)) return wanted * std::numeric_limits<double>::infinity();
+    }
+    double whole = std::floor(wanted + 0.5), rest = polynomial(wanted - whole, EXP2);
     return rest * std::bit_cast<double>(uint64_t(int64_t(whole) + 1023) << 52);
 }
 
