@@ -23,6 +23,7 @@ from .tracer.scene.levels import least_level
 
 if TYPE_CHECKING:  # each function imports what no other needs: a picture is traced before half of it would be loaded
     from .comparison.answer import NotModelled
+    from .comparison.coincident import TakenOut
     from .comparison.light_verdict import RadianceComparison
     from .comparison.renderers import Renderer
     from .comparison.verdict import GeometryComparison
@@ -133,6 +134,9 @@ def compare(
         either picture shows an object.
     """
     from .comparison import geometry, radiance, renderers
+    from .comparison.coincident import SAMPLES as SAMPLES_OF_COINCIDENT
+    from .comparison.coincident import CoincidentLight
+    from .comparison.tolerances import ROUNDINGS
 
     several = tests if isinstance(tests, Sequence) and not isinstance(tests, str) else [tests]
     if files := [each for each in (reference, *several) if not isinstance(each, Image)]:
@@ -146,8 +150,17 @@ def compare(
     # The picture may be of another size than the scene says, or of the stated camera.
     shown = scene and replace(scene, camera=camera)
     if radiance.carries_light(of):
-        lit = radiance.compare(of, pictures, camera, test_samples)
-        return replace(lit, not_modelled=_not_modelled(shown, threads)) if shown else lit
+        if shown is None:
+            return radiance.compare(of, pictures, camera, test_samples)
+        tracer = tracing.Tracer(shown, threads)
+
+        def coincident() -> CoincidentLight:
+            level = of.attributes.get("level", "path")
+            light, pairs = tracer.coincident_light(level, SAMPLES_OF_COINCIDENT, 0, ROUNDINGS[-1])
+            return CoincidentLight(Image(light), pairs)
+
+        lit = radiance.compare(of, pictures, camera, test_samples, coincident)
+        return replace(lit, not_modelled=_not_modelled(shown, tracer, True, lit.taken_out))
     if len(pictures) != 1:
         raise InputError(f"{of.source} has no noise that several pictures could tell: compare it with one")
     by = renderer or renderers.CYCLES
@@ -157,21 +170,23 @@ def compare(
         tracer = tracing.Tracer(shown, threads)
         stated = shown.stated_camera if scene and camera == scene.camera else None
         found = geometry.compare(of, pictures[0], camera, tracer.surfaces_at, stated, shown.origin, by, partial)
-        found = replace(found, not_modelled=_not_modelled(shown, threads, tracer))
+        found = replace(found, not_modelled=_not_modelled(shown, tracer, False))
     if found.shows_nothing:
         raise InputError(found.sentence)
     return found
 
 
-def _not_modelled(scene: Scene, threads: int | None, tracer: tracing.Tracer | None = None) -> "NotModelled":
-    """What of a scene's picture is not modelled. tracer : the scene's, of a picture of geometry."""
+def _not_modelled(scene: Scene, tracer: tracing.Tracer, is_lit: bool, taken_out: "TakenOut | None" = None) -> "NotModelled":
+    """What of a scene's picture is not modelled. is_lit : whether light is compared. taken_out : of it, and whose it is."""
     from .comparison.answer import NotModelled, in_the_picture
 
-    names = scene.not_modelled
+    names = tuple(dict.fromkeys((*scene.not_modelled, *(taken_out.names if taken_out else ()))))
     if not names:
         return NotModelled()
-    shown = (tracer or tracing.Tracer(scene, threads)).pixels_of(names)
-    return in_the_picture(names, shown, None, is_lit=tracer is None)
+    shown = tracer.pixels_of(scene.not_modelled)
+    for name in taken_out.names if taken_out else ():
+        shown[name] = shown.get(name, False) | taken_out.pixels
+    return in_the_picture(names, shown, None, is_lit)
 
 
 @dataclass(frozen=True)

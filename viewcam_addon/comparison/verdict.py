@@ -1,5 +1,6 @@
 """What a comparison of geometry has found, as figures, as one sentence, and as aligned lines for the shell."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -164,9 +165,14 @@ def allowed_unexplained(pinhole: Pinhole) -> int:
 
 def in_one_place_text(in_one_place: InOnePlace) -> str:
     """Who: pixels show another of several surfaces in one place: 'Floor' and 'Carpet', and 2 more pairs."""
-    pairs = [f"two of {a!r}" if a == b else f"{a!r} and {b!r}" for a, b in in_one_place.pairs()]
-    more = f", and {len(pairs) - _MOST_PAIRS} more pairs" if len(pairs) > _MOST_PAIRS else ""
-    return f"pixels show another of several surfaces in one place: {', '.join(pairs[:_MOST_PAIRS])}{more}"
+    return f"pixels show another of several surfaces in one place: {pairs_text(in_one_place.pairs())}"
+
+
+def pairs_text(pairs: Iterable[tuple[str, str]]) -> str:
+    """'Floor' and 'Carpet', two of 'Leaves', and 2 more pairs."""
+    named = [f"two of {first!r}" if first == second else f"{first!r} and {second!r}" for first, second in pairs]
+    more = f", and {len(named) - _MOST_PAIRS:,} more pairs" if len(named) > _MOST_PAIRS else ""
+    return ", ".join(named[:_MOST_PAIRS]) + more
 
 
 def _row_line(row: PassErrors) -> str:

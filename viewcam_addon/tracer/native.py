@@ -134,7 +134,13 @@ class _Film(Structure):
 
 
 class _LightSettings(Structure):
-    _fields_ = [("bounces", c_int32 * 5), ("seed", c_uint32), ("samples", c_uint32), ("error", c_double)]
+    _fields_ = [
+        ("bounces", c_int32 * 5),
+        ("seed", c_uint32),
+        ("samples", c_uint32),
+        ("error", c_double),
+        ("coincident", c_double),
+    ]
 
 
 class _LightPasses(Structure):
@@ -177,6 +183,7 @@ class _Core(Structure):
         ("set_film", _function(c_int, c_void_p, POINTER(_Film))),
         ("light_create", _function(c_int, c_void_p, POINTER(_LightSettings), POINTER(c_void_p))),
         ("light_free", _function(None, c_void_p)),
+        ("light_pairs", _function(c_size_t, c_void_p, c_size_t, c_void_p, c_void_p)),
         ("trace_light", _function(c_int, c_void_p, c_uint32, c_uint32, POINTER(_LightPasses), c_void_p)),
         (
             "probe_sobol",
@@ -584,13 +591,26 @@ def constant_value(node: Node) -> tuple[tuple[float, float, float], float] | Non
 
 
 class CoreLight:
-    """Light in a scene of the core, which must not change before it is traced. The rest as in render.render."""
+    """Light in a scene of the core, which must not change before it is traced.
 
-    def __init__(self, scene: CoreScene, given: Scene, level: str, samples: int, seed: int, error: float | None) -> None:
+    coincident : 0 for all light, or how many of float32's roundings apart surfaces are in one place, for the light alone that
+    comes by these. The rest as in render.render.
+    """
+
+    def __init__(
+        self,
+        scene: CoreScene,
+        given: Scene,
+        level: str,
+        samples: int,
+        seed: int,
+        error: float | None,
+        coincident: float = 0.0,
+    ) -> None:
         self._scene, self._handle = scene, c_void_p()
         scene.illuminate(given)
         bounces = given.bounces if level == "path" else given.bounces.none
-        settings = _LightSettings(seed=seed & 0xFFFFFFFF, samples=samples, error=error or 0.0)
+        settings = _LightSettings(seed=seed & 0xFFFFFFFF, samples=samples, error=error or 0.0, coincident=coincident)
         settings.bounces[:] = astuple(bounces)
         scene.check(scene.core.light_create(scene.handle, settings, ctypes.byref(self._handle)))
 
@@ -602,6 +622,13 @@ class CoreLight:
         """Write a tile, by its lowest row and first column, into `LIGHT`'s passes, (height, width, channels), C-contiguous."""
         addresses = _LightPasses(*(_address(passes.get(name)) for name in LIGHT))
         self._scene.check(self._scene.core.trace_light(self._handle, row, column, addresses, stop))
+
+    def pairs(self) -> list[tuple[int, int, int]]:
+        """Two objects, which may be one, that paths have met in one place, and how often; the most frequent first, of 1,000."""
+        objects, counts = np.empty((1000, 2), np.uint32), np.empty(1000, np.uint64)
+        found = min(self._scene.core.light_pairs(self._handle, len(counts), _address(objects), _address(counts)), len(counts))
+        order = np.argsort(-counts[:found].astype(np.float64), kind="stable")
+        return [(int(first), int(second), int(counts[i])) for i in order for first, second in (objects[i],)]
 
 
 class StopFlag:

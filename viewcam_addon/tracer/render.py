@@ -110,6 +110,27 @@ class Tracer:
                 watcher.tile(passes, range(row, min(row + native.TILE, height)))
         return passes
 
+    def coincident_light(
+        self, level: str, samples: int, seed: int, roundings: float
+    ) -> tuple[Passes, dict[tuple[str, str], int]]:
+        """The light that depends on surfaces in one place, as much as any choice among them may bring: passes as of
+        `render_light`. And the names of two objects each that were found in one place, in order of the alphabet, with how
+        often; the same one twice where they are faces of one.
+
+        roundings : of float32, how far apart surfaces are in one place.
+        """
+        passes = self._blank(lambda shape: _dark(shape, LIGHT_PASSES))
+        light = CoreLight(self._core, self._scene, level, samples, seed, None, roundings)
+        width, height = self._camera.width, self._camera.height
+        tiles = ((row, column) for row in range(0, height, native.TILE) for column in range(0, width, native.TILE))
+        for _ in self._in_threads(lambda tile, stop: light.trace(passes, *tile, stop), tiles, None):
+            pass
+        pairs: dict[tuple[str, str], int] = {}
+        for first, second, count in light.pairs():
+            pair = tuple(sorted((self._names[first], self._names[second])))
+            pairs[pair] = pairs.get(pair, 0) + count
+        return passes, pairs
+
     def hits(
         self, names: Collection[str] = (), place: tuple[float, float] = (0.5, 0.5)
     ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], Passes]:

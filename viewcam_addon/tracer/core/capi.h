@@ -115,6 +115,8 @@ typedef struct {
     /* What is made must be freed before its scene, or what gives light there, changes. */
     int (*light_create)(const ViewcamScene*, const ViewcamLightSettings*, ViewcamLight** made);
     void (*light_free)(ViewcamLight*);
+    /* The objects, two and two, that paths have met in one place, and how often: the first `most`. Returns how many there are. */
+    size_t (*light_pairs)(const ViewcamLight*, size_t most, uint32_t* objects, uint64_t* counts);
     /* A tile of 32 × 32 pixels, by its lowest row and its first column. */
     int (*trace_light)(const ViewcamLight*, uint32_t row, uint32_t column, const ViewcamLightPasses*, const volatile int* stop);
 

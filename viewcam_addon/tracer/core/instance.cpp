@@ -266,6 +266,15 @@ const ViewcamCore core = {
             });
         },
     .light_free = [](ViewcamLight* light) { delete &light_of(light); },
+    .light_pairs = [](const ViewcamLight* light, size_t most, uint32_t* objects, uint64_t* counts) -> size_t {
+        auto pairs = light_of(light).integrator().coincident_pairs();
+        size_t i = 0;
+        for (auto& [pair, count] : pairs) {
+            if (i == most) break;
+            objects[2 * i] = pair.first, objects[2 * i + 1] = pair.second, counts[i++] = count;
+        }
+        return pairs.size();
+    },
     .trace_light =
         [](const ViewcamLight* light, uint32_t row, uint32_t column, const ViewcamLightPasses* passes, const volatile int* stop) {
             return guarded([&] {
