@@ -22,8 +22,6 @@ from .tracer.scene.film import MOST_SAMPLES, SAMPLES
 from .tracer.scene.levels import least_level
 
 if TYPE_CHECKING:  # each function imports what no other needs: a picture is traced before half of it would be loaded
-    from .comparison.answer import NotModelled
-    from .comparison.coincident import TakenOut
     from .comparison.light_verdict import RadianceComparison
     from .comparison.renderers import Renderer
     from .comparison.verdict import GeometryComparison
@@ -116,6 +114,7 @@ def compare(
     test_samples: int | None = None,
     renderer: "Renderer | None" = None,
     partial: bool = False,
+    everything: Image | File | None = None,
 ) -> "GeometryComparison | RadianceComparison":
     """What a picture differs from the tracer's by, how much, and whether it is explained.
 
@@ -123,7 +122,8 @@ def compare(
     scene : what the reference shows, with which pixels on edges are traced again. Without it none of them is explained.
     test_samples : of each test picture, where that is not what its file tells. renderer : who made it, one of
     comparison.renderers; Cycles by default. partial : of geometry, whether it may lack passes: Depth, Distance or Position is
-    enough.
+    enough. everything : Cycles' picture with all that the scene's ledger says is not modelled, of the first test's seed; it
+    tells on how much of the picture that is.
 
     Returns geometry's comparison or that of light: `.answer`, `.passed`, `.sentence`, `.lines()`, `.to_json()`.
 
@@ -136,12 +136,14 @@ def compare(
     from .comparison import geometry, radiance, renderers
     from .comparison.coincident import SAMPLES as SAMPLES_OF_COINCIDENT
     from .comparison.coincident import CoincidentLight
+    from .comparison.everything import not_modelled
     from .comparison.tolerances import ROUNDINGS
 
     several = tests if isinstance(tests, Sequence) and not isinstance(tests, str) else [tests]
     if files := [each for each in (reference, *several) if not isinstance(each, Image)]:
         images.check_same_frames(files)
     of = reference if isinstance(reference, Image) else images.read(reference)
+    whole = everything if everything is None or isinstance(everything, Image) else images.read(everything)
     pictures = [each if isinstance(each, Image) else images.read(each) for each in several]
     scene = scene if scene is None or isinstance(scene, Scene) else read_scene(scene)
     camera = of.camera or (scene.camera if scene else None)
@@ -160,7 +162,12 @@ def compare(
             return CoincidentLight(Image(light), pairs)
 
         lit = radiance.compare(of, pictures, camera, test_samples, coincident)
-        return replace(lit, not_modelled=_not_modelled(shown, tracer, True, lit.taken_out))
+        names = tuple(dict.fromkeys((*shown.not_modelled, *lit.taken_out.names)))
+        if not names:
+            return lit
+        surfaces = tracer.pixels_of(shown.not_modelled)
+        surfaces |= {name: surfaces.get(name, False) | lit.taken_out.pixels for name in lit.taken_out.names}
+        return replace(lit, not_modelled=not_modelled(names, surfaces, of, pictures, whole, camera))
     if len(pictures) != 1:
         raise InputError(f"{of.source} has no noise that several pictures could tell: compare it with one")
     by = renderer or renderers.CYCLES
@@ -170,23 +177,11 @@ def compare(
         tracer = tracing.Tracer(shown, threads)
         stated = shown.stated_camera if scene and camera == scene.camera else None
         found = geometry.compare(of, pictures[0], camera, tracer.surfaces_at, stated, shown.origin, by, partial)
-        found = replace(found, not_modelled=_not_modelled(shown, tracer, False))
+        names = shown.not_modelled
+        found = replace(found, not_modelled=not_modelled(names, tracer.pixels_of(names), of, pictures, whole))
     if found.shows_nothing:
         raise InputError(found.sentence)
     return found
-
-
-def _not_modelled(scene: Scene, tracer: tracing.Tracer, is_lit: bool, taken_out: "TakenOut | None" = None) -> "NotModelled":
-    """What of a scene's picture is not modelled. is_lit : whether light is compared. taken_out : of it, and whose it is."""
-    from .comparison.answer import NotModelled, in_the_picture
-
-    names = tuple(dict.fromkeys((*scene.not_modelled, *(taken_out.names if taken_out else ()))))
-    if not names:
-        return NotModelled()
-    shown = tracer.pixels_of(scene.not_modelled)
-    for name in taken_out.names if taken_out else ():
-        shown[name] = shown.get(name, False) | taken_out.pixels
-    return in_the_picture(names, shown, None, is_lit)
 
 
 @dataclass(frozen=True)
@@ -207,7 +202,7 @@ class Check:
 
 
 def check(blend: File, *options: File) -> Check:
-    """Whether Cycles renders the camera of a .blend file, by `viewcam check` in a process of its own.
+    """True if Cycles renders the camera of a .blend file, by `viewcam check` in a process of its own.
 
     options : those of the command, as in `check("shot.blend", "--camera", "Camera", "--level", "direct")`.
 

@@ -22,7 +22,7 @@ from functools import partial
 from pathlib import Path
 
 TESTS = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(TESTS / "fuzz"), str(TESTS / "batch"), str(TESTS.parent)]
+sys.path[:0] = [str(TESTS / "fuzz"), str(TESTS / "jobs"), str(TESTS.parent)]
 
 import mutants
 import numpy as np

@@ -20,6 +20,8 @@ A format is a module in `FORMATS` with
     SUFFIX                          of the file that it writes; "" where these are several in a folder
     READER                          of what only writes: the module that reads it
     notes_in(source) → texts        where a file that it wrote has this project's notes, if that is not its text
+    read_again(cameras, options) → list[Camera]     where it takes its time: what `read` makes of what `write` gives
+    in_world(source, options) → Options             where a file says its own axes and unit: the options with these
 
 **To the bit.** A matrix or an angle holds fewer digits than the values of which it was made. So a writer puts these beside
 (own.py's `document`, in a comment or wherever the format lets programs keep what is theirs), and here, for all formats alike, a
@@ -167,8 +169,9 @@ def read(given: str | Path, *, format: str | None = None, options: Options | Non
         raise InputError(f"{source.name} holds no camera: give another file")
     notes = module.notes_in(source) if hasattr(module, "notes_in") else [source.text]
     cameras = _to_the_bit(cameras, [pinhole for text in notes for pinhole in own.pinholes_in(text)], module, options)
-    told = _told_of_world(notes, options)
-    found = [_doubted(_unmirrored(moved(camera, options), options)) for camera in cameras]
+    world = module.in_world(source, options) if hasattr(module, "in_world") else options
+    told = _told_of_world(notes, world)
+    found = [_doubted(_unmirrored(moved(camera, world), options)) for camera in cameras]
     return [camera.noted(*told) for camera in found] if told else found
 
 
@@ -258,13 +261,15 @@ def _to_the_bit(cameras: list[Camera], stated: list[Pinhole], module: ModuleType
 
 
 def _read_again(pinholes: list[Pinhole], writer: ModuleType, reader: ModuleType, options: Options) -> list[Camera]:
-    """What is read of these pinholes where they are written; nothing if they can't be."""
+    """The cameras that are read of these pinholes once they are written; nothing if they can't be."""
     if not hasattr(writer, "write"):
         return []
     try:
         with np.errstate(all="ignore"):  # anything may stand in a file
-            written = writer.write([Camera(f"{number}", pinhole) for number, pinhole in enumerate(pinholes)], options)
-            again = reader.read(Source(written), options)
+            cameras = [Camera(f"{number}", pinhole) for number, pinhole in enumerate(pinholes)]
+            if hasattr(writer, "read_again"):
+                return [*writer.read_again(cameras, options)]
+            again = reader.read(Source(writer.write(cameras, options)), options)
     except InputError:
         return []
     return again if len(again) == len(pinholes) else []

@@ -36,7 +36,7 @@ SUFFIX = ".yml"
 
 _K = ("k", "cameramatrix", "intrinsicmatrix", "intrinsics", "intrinsic", "mtx", "cammatrix", "camk", "kmatrix")
 _R = ("r", "rot", "rotation", "rmat", "rotationmatrix", "rw2c")
-_SAYS_K = re.compile(r"(?:k|matrix|intrinsics?|mtx)[\s_$\"'-]*+:", re.IGNORECASE)  # each of these
+_SAYS_K = re.compile(r"(?:k|matrix|intrinsics?|mtx)[\s_$\"'-]*:", re.IGNORECASE)  # each of these
 _RVEC = ("rvec", "rodrigues", "rotationvector", "rvecs")
 _T = ("t", "tvec", "translation", "translationvector", "trans", "tw2c")
 _EXTRINSIC = (
@@ -58,7 +58,7 @@ _WIDTH = ("imagewidth", "width", "w", "resx")
 _HEIGHT = ("imageheight", "height", "h", "resy")
 _SIZE = ("imagesize", "size", "resolution", "imgsize", "imagesizewh")
 NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tx", "ty")
-"""Of the distortion's coefficients, in OpenCV's order."""
+"""The names of the distortion's coefficients, in OpenCV's order."""
 _WIDEST = 50  # widths of the picture to a focal length, which are 177.7°
 _WAY = "R and t were taken as from world to camera, x right, y down, z into the view"
 
@@ -91,7 +91,8 @@ def write(cameras: Sequence[Camera], options: Options) -> str | dict[str, str]:
 
 
 def half_pixel(options: Options, habit: str = "center") -> float:
-    """What to add to a format's principal point to count it from the picture's corner. habit : of the format, one of PIXELS."""
+    """The amount to add to a format's principal point to count it from the picture's corner. habit : of the format, one of
+    PIXELS."""
     return 0.5 if (options.pixel or habit) == "center" else 0.0
 
 

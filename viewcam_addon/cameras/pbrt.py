@@ -32,15 +32,14 @@ from .source import Source
 TITLE = "pbrt scene"
 SUFFIX = ".pbrt"
 
-_COMMENT = r"#[^\n]*+"
+_COMMENT = r"#[^\n]*"
 _WORDS = re.compile(
-    r"\"((?:[^\"\\]|\\.){0,1000}+)\"|([A-Za-z]\w*+)|([-+]?+(?:\d++(?:\.\d*+)?+|\.\d++)(?:[eE][-+]?+\d++)?+(?![\w.]))|([][])|(\S)"
+    r"\"([^\"\\]*(?:\\.[^\"\\]*)*)\"|([A-Za-z]\w*)|([-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?(?![\w.]))|([][])"
+    r"|(\"[^\"\\]*(?:\\.[^\"\\]*)*|[-+.\d][\w.]*|\S)"
 )
 _KINDS = ("perspective", "orthographic", "environment", "spherical", "realistic")
-_STATEMENT = re.compile(
-    rf'\bLookAt\s++[-+.\d\[]|\bCamera\s*+"(?:{"|".join(_KINDS)})"|^[ \t]*+Camera[ \t]*+"\w++"', re.MULTILINE
-)
-_LUX = re.compile(r'\bFilm\s*+"(?:fleximage|multiimage)"|^[ \t]*+SearchPath[ \t]*+"', re.MULTILINE)
+_STATEMENT = re.compile(rf'\bLookAt\s+[-+.\d\[]|\bCamera\s*"(?:{"|".join(_KINDS)})"|^[ \t]*Camera[ \t]*"\w+"', re.MULTILINE)
+_LUX = re.compile(r'\bFilm\s*"(?:fleximage|multiimage)"|^[ \t]*SearchPath[ \t]*"', re.MULTILINE)
 _MOVES = {"LookAt": 9, "Translate": 3, "Scale": 3, "Rotate": 4, "Transform": 16, "ConcatTransform": 16, "Identity": 0}
 _NOT_READ = {"Include", "Import"}
 _SIZE = (1280, 720)
@@ -57,7 +56,7 @@ def recognises(source: Source) -> bool:
 
 
 def _has_statement(text: str) -> bool:
-    """Whether a LookAt is followed by a number, or a Camera by the name of one."""
+    """True if a LookAt is followed by a number, or a Camera by the name of one."""
     return ("LookAt" in text or "Camera" in text) and bool(_STATEMENT.search(texts.without(_COMMENT, text[: 2**20])))
 
 
@@ -84,7 +83,7 @@ class _Transform(NamedTuple):
 
 
 class _Scene:
-    """What stands before WorldBegin."""
+    """The statements before WorldBegin."""
 
     def __init__(self, text: str) -> None:
         self.text = text

@@ -1,7 +1,9 @@
 """USD: cameras of a stage, read by OpenUSD itself (`pxr`: in a Blender built with its Python modules, else usd-core of
-the package index).
+the package index), in a process of its own (usd_stage.py).
 
-The camera's axes are x right, y up, z away from the view, whatever the stage's upAxis is; matrices are for row vectors. Lens,
+The camera's axes are x right, y up, z away from the view, whatever the stage's upAxis is; matrices are for row vectors. The
+world is brought to z up and to metres by what the stage says of its own, as Blender's importer does it: a stage that says
+nothing counts in centimetres and has y up. Lens,
 apertures and their offsets count in tenths of a scene unit, of which only ratios decide the picture. A stage says no number of
 pixels; what is written here has it as userProperties of the camera, and else it is given. Where the apertures' aspect is not
 the picture's, the aperture grows to fit, which is UsdRender's rule. Written as text, so that writing needs no library; lens and
@@ -10,25 +12,27 @@ apertures are float32 there, by the schema.
 Source: OpenUSD's pxr/usd/usdGeom/schema.usda, pxr/base/gf/camera.cpp and usdRender/schema.usda (aspectRatioConformPolicy).
 """
 
+import dataclasses
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from .. import checks
+from .. import checks, usd_stage
 from ..errors import InputError
-from ..pinhole import ViewPlane
+from ..pinhole import Pinhole, ViewPlane
 from . import axes, own
 from .camera import Camera, LeftOut, Options, not_a_pinhole
-from .source import Source
+from .source import Record, Source, pixels
 
 TITLE = "USD"
 SUFFIX = ".usda"
 
 _SIZE = "userProperties:viewcam_resolution"
-_MOST_SAMPLES = 100_000
-_Y_UP = "The stage's y points up: the numbers stay as they are unless the axes Y up → Z up are chosen"
+_SIDES = ("Horizontal", "Vertical")
+_MOST_NAMED = 3
 
 
 def recognises(source: Source) -> bool:
@@ -38,23 +42,34 @@ def recognises(source: Source) -> bool:
 
 
 def read(source: Source, options: Options) -> list[Camera]:
-    try:
-        from pxr import Tf, Usd, UsdGeom
-    except ImportError:
-        raise InputError("USD is read by OpenUSD, which is not here: read it inside Blender, or pip install usd-core") from None
-    try:
-        stage = _stage(source, Usd)
-    except (Tf.ErrorException, RuntimeError) as error:
-        reason = " ".join(str(error).split())[:200]
-        raise InputError(f"{source.name} is no stage that USD can open ({reason}): export it again") from None
-    y_up = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.y
-    told = (_Y_UP,) if y_up and options.axes != "y_up" else ()
+    stage = _stage(source)
+    told = _told(stage)
     left_out, found = LeftOut(InputError), []
-    for prim in stage.Traverse():
-        if prim.IsA(UsdGeom.Camera):
-            with left_out.unless_pinhole(prim.GetDisplayName() or prim.GetName()):
-                found += [camera.noted(*told) for camera in _cameras(prim, stage, options, Usd, UsdGeom)]
+    for camera in stage["cameras"]:
+        with left_out.unless_pinhole(camera["name"]):
+            if "error" in camera:
+                raise InputError(f"camera {checks.shown(camera['name'])} can't be read ({camera['error']}): export it again")
+            found += [_camera(camera["name"], sample, options).noted(*told) for sample in camera["samples"]]
     return left_out.told(found)
+
+
+def _told(stage: dict[str, Any]) -> tuple[str, ...]:
+    unit, notes = stage["metres_per_unit"], []
+    if stage["y_up"] or unit != 1:
+        turned = "y up was turned to z up" if stage["y_up"] else "its z points up"
+        scaled = f"one unit of it is {unit:g} m" if unit != 1 else "it counts in metres"
+        notes.append(f"The world was taken as the stage says it, as Blender's importer does: {turned}, {scaled}")
+    if others := stage["left_out"]:
+        names = ", ".join(map(checks.shown, others[:_MOST_NAMED])) + (" …" if len(others) > _MOST_NAMED else "")
+        notes.append(f"Not read, since nothing but layers in the file's own folder is: {names}")
+    return tuple(notes)
+
+
+def in_world(source: Source, options: Options) -> Options:
+    """The options, with the axes and the unit that the stage says."""
+    stage = _stage(source)
+    unit = checks.number(f"metersPerUnit of {source.name}", stage["metres_per_unit"], 1e-12, 1e12)
+    return dataclasses.replace(options, axes="y_up" if stage["y_up"] else options.axes, scale=options.scale * unit)
 
 
 def write(cameras: Sequence[Camera], options: Options) -> str:
@@ -67,73 +82,37 @@ def write(cameras: Sequence[Camera], options: Options) -> str:
 
 
 def notes_in(source: Source) -> list[str]:
-    if source.text:
-        return [source.text]
-    from pxr import Usd
-
-    stage = _stage(source, Usd)
-    notes = (prim.GetCustomDataByKey(own.KEY) for prim in stage.Traverse())
-    return [stage.GetRootLayer().documentation, *(f"{own.KEY} {note}" for note in notes if note)]
+    stage = _stage(source)
+    return [stage["documentation"], *(f"{own.KEY} {note}" for note in stage["values"])]
 
 
-def _stage(source: Source, usd):
-    if source.path:
-        return usd.Stage.Open(str(source.path))
-    from pxr import Sdf
-
-    layer = Sdf.Layer.CreateAnonymous(".usda")
-    if not layer.ImportFromString(source.text):
-        raise RuntimeError("its text is not understood")
-    return usd.Stage.Open(layer)
+def _stage(source: Source) -> dict[str, Any]:
+    """The result of `usd_stage.read`, asked once."""
+    if TITLE not in source.parsed:
+        source.parsed[TITLE] = usd_stage.read(source.name, source.path, source.text, _SIZE, own.KEY)
+    return source.parsed[TITLE]
 
 
-def _cameras(prim, stage, options: Options, usd, usd_geom) -> Iterator[Camera]:
-    camera = usd_geom.Camera(prim)
-    name = prim.GetDisplayName() or prim.GetName()
-    times = {time for attribute in _attributes(prim, camera, usd_geom) for time in attribute.GetTimeSamples()[:_MOST_SAMPLES]}
-    varying = sorted(times) or [0.0]
-    for time in varying:
-        code = usd.TimeCode(time) if len(varying) > 1 or time else usd.TimeCode.EarliestTime()
-        called = f"{name} {time:g}" if len(varying) > 1 else name
-        yield _camera(camera, called, code, time / stage.GetTimeCodesPerSecond() if len(varying) > 1 else None, options)
-
-
-def _attributes(prim, camera, usd_geom) -> Iterator:
-    """The attributes on which the picture depends: the camera's own, and the transforms of all above it."""
-    for name in ("FocalLength", "HorizontalAperture", "VerticalAperture", "HorizontalApertureOffset", "VerticalApertureOffset"):
-        yield getattr(camera, f"Get{name}Attr")()
-    while prim and not prim.IsPseudoRoot():
-        if prim.IsA(usd_geom.Xformable):
-            for operation in usd_geom.Xformable(prim).GetOrderedXformOps():
-                yield operation.GetAttr()
-        prim = prim.GetParent()
-
-
-def _camera(camera, name: str, code, seconds: float | None, options: Options) -> Camera:
+def _camera(name: str, sample: dict[str, Any], options: Options) -> Camera:
+    name = name if sample["time"] is None else f"{name} {sample['time']:g}"
     what = f"camera {checks.shown(name)}"
-    if camera.GetProjectionAttr().Get(code) == "orthographic":
+    values = Record(sample, what)
+    if sample["Projection"] == "orthographic":
         not_a_pinhole(what, "orthographic")
     focal, across, upwards, right, up = (
-        checks.number(f"{key} of {what}", getattr(camera, f"Get{key}Attr")().Get(code))
-        for key in (
-            "FocalLength",
-            "HorizontalAperture",
-            "VerticalAperture",
-            "HorizontalApertureOffset",
-            "VerticalApertureOffset",
-        )
+        values.number(key)
+        for key in ("FocalLength", *(f"{side}Aperture{which}" for which in ("", "Offset") for side in _SIDES))
     )
     if min(focal, across, upwards) <= 0:
         raise InputError(f"{what} has a focal length or aperture that is not above 0: correct it")
-    said = camera.GetPrim().GetAttribute(_SIZE).Get() if camera.GetPrim().HasAttribute(_SIZE) else None
-    stated = said is not None
-    width, height = (int(said[0]), int(said[1])) if stated else options.size_or_refuse(what)
+    stated = sample["size"] is not None
+    width, height = _size(sample["size"], what) if stated else options.size_or_refuse(what)
     notes: tuple[str, ...] = ()
     aspect = width / height * options.pixel_aspect
     if not stated and abs(across / upwards / aspect - 1) > 1e-3:
         notes += (f"{what} is made for an aspect of {across / upwards:.6g} and the picture's is {aspect:.6g}: it grew to fit",)
         across, upwards = (across, across / aspect) if across / upwards > aspect else (upwards * aspect, upwards)
-    if camera.GetFStopAttr().Get(code):
+    if sample["FStop"]:
         notes += (f"{what} has depth of field, which was left out",)
     plane = ViewPlane(
         (focal / across * width, focal / upwards * height),
@@ -141,9 +120,16 @@ def _camera(camera, name: str, code, seconds: float | None, options: Options) ->
         width,
         height,
     )
-    matrix = np.array(camera.ComputeLocalToWorldTransform(code)).T
+    matrix = np.array(sample["matrix"]).reshape(4, 4).T
     pinhole, more = axes.pinhole(matrix, plane, what, scaled=True)
-    return Camera(name, pinhole, stated, (*notes, *more), time=seconds)
+    return Camera(name, pinhole, stated, (*notes, *more), time=sample["seconds"])
+
+
+def _size(said: object, what: str) -> tuple[int, int]:
+    if not isinstance(said, list) or len(said) != 2:
+        raise InputError(f"{_SIZE} of {what} is {checks.shown(said)}: it should be two numbers of pixels")
+    width, height = (pixels(f"{_SIZE} of {what}", side) for side in said)
+    return width, height
 
 
 def _identifier(name: str, taken: set[str]) -> str:
@@ -156,12 +142,35 @@ def _identifier(name: str, taken: set[str]) -> str:
     return result
 
 
-def _prim(camera: Camera, identifier: str) -> str:
-    pinhole = camera.pinhole
+def read_again(cameras: Sequence[Camera], options: Options) -> list[Camera]:
+    """The cameras that `read` makes of these once they are written, without OpenUSD."""
+    found = []
+    for camera in cameras:
+        lens, pinhole = _lens(camera.pinhole), camera.pinhole
+        sample: dict[str, Any] = {key: float(np.float32(value)) for key, value in lens.items()}
+        matrix = [number for column in zip(*axes.camera_to_world(pinhole), strict=True) for number in column]
+        sample |= {"Projection": "perspective", "FStop": 0.0, "size": [pinhole.width, pinhole.height], "matrix": matrix}
+        found.append(_camera(camera.name, sample | {"time": None, "seconds": None}, options))
+    return found
+
+
+def _lens(pinhole: Pinhole) -> dict[str, float]:
+    """The attributes of the lens by the schema's names, which are float32 there."""
     (d_x, d_y), (c_x, c_y), width, height = pinhole.distance, pinhole.principal_point, pinhole.width, pinhole.height
     across = 36.0
     focal = across * d_x / width
     upwards = focal * height / d_y
+    return {
+        "FocalLength": focal,
+        "HorizontalAperture": across,
+        "VerticalAperture": upwards,
+        "HorizontalApertureOffset": (width / 2 - c_x) / width * across,
+        "VerticalApertureOffset": (height / 2 - c_y) / height * upwards,
+    }
+
+
+def _prim(camera: Camera, identifier: str) -> str:
+    pinhole = camera.pinhole
     columns = zip(*axes.camera_to_world(pinhole), strict=True)
     rows = ", ".join(f"({', '.join(map(repr, column))})" for column in columns)
     lines = [
@@ -173,12 +182,8 @@ def _prim(camera: Camera, identifier: str) -> str:
         ")",
         "{",
         '    token projection = "perspective"',
-        f"    float focalLength = {focal!r}",
-        f"    float horizontalAperture = {across!r}",
-        f"    float verticalAperture = {upwards!r}",
-        f"    float horizontalApertureOffset = {(width / 2 - c_x) / width * across!r}",
-        f"    float verticalApertureOffset = {(height / 2 - c_y) / height * upwards!r}",
-        f"    custom int2 {_SIZE} = ({width}, {height})",
+        *(f"    float {key[0].lower()}{key[1:]} = {value!r}" for key, value in _lens(pinhole).items()),
+        f"    custom int2 {_SIZE} = ({pinhole.width}, {pinhole.height})",
         f"    matrix4d xformOp:transform = ( {rows} )",
         '    uniform token[] xformOpOrder = ["xformOp:transform"]',
         "}",

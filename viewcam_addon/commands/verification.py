@@ -83,6 +83,7 @@ def cycles(options: argparse.Namespace) -> Result:
 def compare(options: argparse.Namespace) -> Result:
     from .. import api, image
     from ..comparison import difference, light_report, radiance, renderers, report
+    from ..tracer.scene import with_pairs
 
     image.check_same_frames([options.reference, *options.tests])
     reference = image.read(options.reference)
@@ -95,10 +96,12 @@ def compare(options: argparse.Namespace) -> Result:
         tests, (renderer, *_) = zip(*map(renderers.read, options.tests), strict=True)
     partial = bool(options.channels) or renderer is not renderers.CYCLES
     scene = api.read_scene(options.scene) if options.scene else None
-    comparison = api.compare(reference, tests, scene, options.threads, options.test_samples, renderer, partial)
+    of = reference, tests, scene, options.threads, options.test_samples, renderer, partial
+    comparison = api.compare(*of, everything=options.everything)
     if partial:
         tests = [renderers.completed(test, comparison.pinhole) for test in tests]
-    ledger = scene.ledger if scene else ()
+    pairs = comparison.taken_out.pairs if is_light else comparison.in_one_place.pairs()
+    ledger = with_pairs(scene.ledger, pairs) if scene else ()
     words = f"viewcam {options.repeat or options.words}"
     write_report, tests = (light_report.write_report, tests) if is_light else (report.write_report, tests[0])
     say(*_ledger_lines(ledger), *comparison.lines())
@@ -133,7 +136,9 @@ def check(options: argparse.Namespace) -> Result:
         name = options.engine.lower()
         tests = [folder / f"{name}-{i + 1}.exr" for i in range(count)] if count > 1 else [folder / f"{name}.exr"]
         numbered = {} if options.scene is None else {"numbered": _numbered(options.scene)}
-        level = _export_and_render(options, scene, tests, engine=options.engine, device=options.device, **numbered)
+        everything = folder / "everything.exr"
+        everything.unlink(missing_ok=True)
+        level = _export_and_render(options, scene, tests, everything, engine=options.engine, device=options.device, **numbered)
         size = []
         if options.scene:
             scene, size = options.scene, ["--size", "x".join(map(str, options.size))] if options.size else []
@@ -152,6 +157,7 @@ def check(options: argparse.Namespace) -> Result:
             for word in (f"--{flag}", str(to))
         ]
         outputs += ["--strict"] if options.strict else []
+        outputs += ["--everything", str(everything)] if everything.exists() else []
         outputs += ["--test-samples", str(max(options.samples // count, 1)), "--repeat", options.repeat or options.words]
         if level == "geometry":
             tests = tests[:1]
@@ -181,20 +187,22 @@ def _numbered(scene_path: Path) -> tuple[str, ...]:
     return tuple(kind for kind, has in has_numbers.items() if has)
 
 
-def _export_and_render(options: argparse.Namespace, scene_path: Path, image_paths: Sequence[Path], **more: Any) -> str:
+def _export_and_render(
+    options: argparse.Namespace, scene_path: Path, image_paths: Sequence[Path], everything: Path, **more: Any
+) -> str:
     """What of a check needs Blender: both sides from one evaluated state, under one numbering of the indices.
 
-    more : of the request. Returns the level, the least one where that is asked for.
+    everything : as in job.export_and_render. more : of the request. Returns the level, the least one where that is asked for.
     """
     from ..tracer.scene import scene_file
 
     started = time.perf_counter()
 
     def rendering(number: int) -> None:
-        options.events.tell("step", name="rendering", number=number, of=len(image_paths))
+        options.events.tell("step", name="rendering", number=number, of=max(number, len(image_paths)))
 
     with silent_libraries():
-        scene = blender_room("rendering.job").export_and_render(_request(options, **more), image_paths, rendering)
+        scene = blender_room("rendering.job").export_and_render(_request(options, **more), image_paths, rendering, everything)
     scene_file.write(scene, scene_path)
     say(f"exported and rendered with {options.engine.capitalize()} in {time.perf_counter() - started:.1f} s")
     return _told_level(scene)["level"] if options.level == "auto" else options.level

@@ -81,6 +81,7 @@ class TakenOut:
         return tuple(dict.fromkeys(name for pair in self.pairs for name in pair))
 
     def to_json(self) -> dict:
+        """As InOnePlace of geometry."""
         return {
             "pixels": self.count,
             "share": float(self.pixels.mean()),

@@ -11,7 +11,7 @@ only. It is no part of Blender's process, where there must be no second copy of 
 import dataclasses
 import importlib.util
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -49,13 +49,21 @@ class Comparer(TracingServer):
     name = "comparer"
 
     def verdict(
-        self, scene: Path, image: Path, camera: Pinhole, clip: tuple[float, float], stated: Pinhole | None = None
+        self,
+        scene: Path,
+        image: Path,
+        camera: Pinhole,
+        clip: tuple[float, float],
+        stated: Pinhole | None = None,
+        not_modelled: Sequence[str] = (),
+        everything: Path | None = None,
     ) -> dict[str, Any]:
-        """Whether a picture shows what a camera sees.
+        """True if a picture shows what a camera sees.
 
         scene : a scene file; the same path is the same scene, and is not read again. image : Cycles' passes of geometry.
         camera : the camera that is said to have taken the picture, whatever the scene's is; clip : what it sees, as in Scene.
-        stated : the four values that it was made from, if it was.
+        stated : the four values that it was made from, if it was. not_modelled : names of objects that are not. everything :
+        Cycles' passes with all of them, if there are any.
 
         Returns `passed`, `answer` (as comparison/answer.py has them), `verdict` (the sentence of `viewcam compare`),
         `not_modelled` (as in its JSON) and `figures`, the few of its figures that a sidecar keeps: `pixels` compared,
@@ -73,6 +81,8 @@ class Comparer(TracingServer):
             "camera": dataclasses.asdict(camera),
             "clip": list(clip),
             "stated": stated and dataclasses.asdict(stated),
+            "not_modelled": list(not_modelled),
+            "everything": everything and str(everything),
         }
         return self.ask(request)
 
@@ -89,7 +99,7 @@ class _Scenes:
     def answer(self, request: dict[str, Any]) -> dict[str, Any]:
         from .. import image
         from ..comparison import geometry
-        from ..comparison.answer import in_the_picture
+        from ..comparison.everything import not_modelled
         from ..tracer.scene import scene_file
 
         if request["scene"] != self._path:
@@ -100,9 +110,10 @@ class _Scenes:
         tracer = self._keeper.tracer(scene, request["threads"])
         reference = image.Image(tracer.render(), camera)
         comparison = geometry.compare(reference, test, camera, tracer.surfaces_at, stated, scene.origin)
-        names = scene.not_modelled
-        not_modelled = in_the_picture(names, tracer.pixels_of(names), None, is_lit=False)
-        answer = dataclasses.replace(comparison, not_modelled=not_modelled).answer
+        names, everything = request["not_modelled"], request["everything"]
+        shown, whole = tracer.pixels_of(names), everything and image.read(everything)
+        told = not_modelled(names, shown, reference, [test], whole)
+        answer = dataclasses.replace(comparison, not_modelled=told).answer
         return {
             "passed": answer.passed,
             "answer": answer.answer,

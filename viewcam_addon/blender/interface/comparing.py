@@ -74,7 +74,7 @@ class Outcome:
         return found if all(found.values()) else {}
 
     def is_of(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> bool:
-        """Whether the camera is still the one that was compared."""
+        """True if the camera is still the one that was compared."""
         return camera_object.name == self.camera and camera_seen(camera_object, scene) == self.seen
 
     def discard(self) -> None:
@@ -208,6 +208,8 @@ def _step(event: Mapping[str, Any], pictures: int) -> tuple[int, str]:
     """How many steps are done before one of them, and what it is called. pictures : of Cycles."""
     if event["name"] == "rendering":
         number = event["number"]
+        if number > pictures:
+            return pictures, "Rendering what is not modelled"
         return number - 1, "Rendering with Cycles" + (f", {number} of {pictures}" if pictures > 1 else "")
     return (pictures, "Tracing") if event["name"] == "tracing" else (pictures + 1, "Comparing")
 

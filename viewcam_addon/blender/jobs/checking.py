@@ -12,6 +12,7 @@ once more; and to ask Blender what has changed, as our engine does, since giving
 """
 
 import contextlib
+import functools
 from typing import Any
 
 import bpy
@@ -67,10 +68,16 @@ class Checker:
                 overrides.set(scene.render, "use_border", False)
             export = self._files.exported(scene, layer, camera_object)
             of = None if is_scenes else camera_object
-            cycles.render(scene, layer, of, image, export.remedies, self._threads, keep=True)
+            ledger, render = export.ledger, functools.partial(cycles.render, scene, layer, of)
+            render(image, ledger.remedies.values(), self._threads, keep=True)
+            names, everything = export.scene.not_modelled, None
+            if names:
+                everything = self._files.folder / "everything.exr"
+                render(everything, ledger.remedies_of_everything, self._threads, keep=True, everything=True)
         data = camera_object.evaluated_get(datablocks.depsgraph_of(scene)).data
         clip = data.clip_start, data.clip_end
-        said = self._comparer.verdict(self._files.file_of(export.scene), image, pinhole, clip, stated)
+        path = self._files.file_of(export.scene)
+        said = self._comparer.verdict(path, image, pinhole, clip, stated, names, everything)
         return said | {"ledger": _told(export.scene.ledger)}
 
     def __enter__(self) -> "Checker":

@@ -16,17 +16,17 @@ from ...tracer.scene import Scene, scene_file
 from ...tracer.scene.sameness import same_things
 from .. import datablocks
 from ..scenes.export import export_scene
-from ..scenes.ledger import Ledger, Remedy
+from ..scenes.ledger import Ledger
 from . import persistent_data
 
 
 @dataclass(frozen=True, eq=False)
 class Export:
-    """state : of Blender, when the scene was exported. remedies : for Cycles (ledger.py)."""
+    """state : of Blender, when the scene was exported. ledger : what it found, with the remedies for Cycles."""
 
     state: tuple
     scene: Scene
-    remedies: tuple[Remedy, ...]
+    ledger: Ledger
 
 
 class SceneFiles:
@@ -51,7 +51,7 @@ class SceneFiles:
         if found is None:
             ledger = Ledger()
             seen = export_scene(scene, layer, camera_object, ledger)
-            found = Export(state, seen, tuple(ledger.remedies.values()))
+            found = Export(state, seen, ledger)
             self._exports = [*self._exports[-self._most + 1 :], found] if self._most > 1 else [found]
         return found
 

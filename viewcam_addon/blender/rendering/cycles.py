@@ -52,17 +52,16 @@ _LIGHT = {
     "auto_scrambling_distance": False,
     "min_light_bounces": 0,
     "min_transparent_bounces": 1024,
-    "volume_bounces": 0,
     "sample_clamp_direct": 0.0,
     "sample_clamp_indirect": 0.0,
     "blur_glossy": 0.0,
-    "caustics_reflective": True,
-    "caustics_refractive": True,
     "direct_light_sampling_type": "MULTIPLE_IMPORTANCE_SAMPLING",
     "use_fast_gi": False,
     "use_guiding": False,
     "film_transparent_glass": False,
 }
+# What the tracer has no choice about, and a picture with everything in it has as the scene does.
+_LIGHT_OF_SURFACES = {"volume_bounces": 0, "caustics_reflective": True, "caustics_refractive": True}
 
 
 @dataclass(frozen=True)
@@ -85,12 +84,14 @@ def render(
     light: LightSettings | None = None,
     keep: bool = False,
     device: str = "CPU",
+    everything: bool = False,
 ) -> None:
     """Render one view layer at the current frame to a multilayer EXR, whole or not at all.
 
     camera_object : the one that Blender chooses itself, as markers bind it, where None. remedies : what to take out for the
         time of the render (ledger.py). threads : all by default. light : for a picture of light in place of the passes of
-        geometry. keep : whether Cycles keeps what it has built, for the next render.
+        geometry. keep : whether Cycles keeps what it has built, for the next render. everything : with hair, volumes and
+        whatever else the tracer does not model.
 
     Raises
     ------
@@ -100,7 +101,7 @@ def render(
     if not hasattr(scene, "cycles"):
         raise InputError("Cycles is disabled: enable the add-on Cycles Render Engine in Blender's preferences")
     with overridden() as overrides:
-        override_settings(overrides, scene, view_layer, light)
+        override_settings(overrides, scene, view_layer, light, everything)
         if device != "CPU":
             _override_device(overrides, scene, device)
         render_file(overrides, scene, view_layer, camera_object, path, remedies, threads, keep)
@@ -131,9 +132,13 @@ def render_file(
 
 
 def override_settings(
-    overrides: Overrides, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, light: LightSettings | None = None
+    overrides: Overrides,
+    scene: bpy.types.Scene,
+    view_layer: bpy.types.ViewLayer,
+    light: LightSettings | None = None,
+    everything: bool = False,
 ) -> None:
-    """Everything but the file; benchmarks render without one."""
+    """All settings but the file's; benchmarks render without one. light, everything : as of `render`."""
     overrides.set(scene.render, "engine", "CYCLES")
     override_all(overrides, scene.cycles, _SAMPLING)
     passes = GEOMETRY_PASSES
@@ -142,6 +147,9 @@ def override_settings(
         override_all(overrides, scene.cycles, _LIGHT | _settings_of(light))
         passes = LIGHT_PASSES + (_PASSES_OF_CENTRES if light.samples == 1 else ())
     _override_passes(overrides, view_layer, passes)
+    if not everything:
+        override_all(overrides, scene.cycles, _LIGHT_OF_SURFACES if light else {})
+        override_all(overrides, view_layer, {"use_strand": False, "use_volumes": False})
 
 
 def _override_device(overrides: Overrides, scene: bpy.types.Scene, device: str) -> None:
@@ -175,11 +183,9 @@ def override_all(overrides: Overrides, owner: bpy.types.bpy_struct, settings: Ma
 
 
 def _override_passes(overrides: Overrides, view_layer: bpy.types.ViewLayer, passes: Iterable[str]) -> None:
-    """Passes beside those that are on; surfaces, without hair and volumes."""
+    """Passes beside those that are on."""
     for setting in ("use_pass_combined", *(SETTINGS[name] for name in passes if name in SETTINGS)):
         overrides.set(view_layer, setting, True)
-    overrides.set(view_layer, "use_strand", False)
-    overrides.set(view_layer, "use_volumes", False)
 
 
 def _override_file(overrides: Overrides, scene: bpy.types.Scene, path: os.PathLike[str]) -> None:

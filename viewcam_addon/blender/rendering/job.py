@@ -115,16 +115,25 @@ def render(request: Request, path: str | os.PathLike[str]) -> tuple[LedgerEntry,
 
 
 def export_and_render(
-    request: Request, paths: Sequence[str | os.PathLike[str]], rendering: Callable[[int], None] = lambda number: None
+    request: Request,
+    paths: Sequence[str | os.PathLike[str]],
+    rendering: Callable[[int], None] = lambda number: None,
+    everything: str | os.PathLike[str] | None = None,
 ) -> Scene:
     """Both sides of one state of the file, objects and materials numbered alike. Raises as `render` does.
 
     paths : for several pictures of Cycles, which share the samples; their seeds count from that of the request. rendering : is
-    told of each, by its number from 1 on, before it is rendered.
+    told of each, by its number from 1 on, before it is rendered. everything : for one more picture of Cycles, like the first
+    but with all that has a stand-in, or is left out, in the others; written where there is any such thing. A recentred scene
+    has none of it.
     """
     with _stage(request) as stage, numbered_indices(request.numbered), _seen_from(stage, request) as stage:
         scene = _export(stage, request)
-        _render(stage, request, paths, Lighting(scene.lamps, scene.world, scene.film, scene.bounces), rendering)
+        light = Lighting(scene.lamps, scene.world, scene.film, scene.bounces)
+        _render(stage, request, paths, light, rendering)
+        if everything is not None and scene.not_modelled and request.engine == "CYCLES" and not request.recenter:
+            rendering(len(paths) + 1)
+            _render_with_cycles(stage, request, 0, len(paths), everything, light, everything=True)
         return scene
 
 
@@ -156,19 +165,37 @@ def _render(
 
     Unless a camera is named, Blender chooses it once more: one that we took for the scene's and is not is a difference then.
     """
-    camera = stage.camera if request.camera is not None or stage.told else None
-    share = max(request.samples // len(paths), 1)
     for number, path in enumerate(paths):
         rendering(number + 1)
-        picture = None
-        if stage.is_lit:
-            bounces = light.bounces.none if stage.level == "direct" else light.bounces
-            picture = cycles.LightSettings(light.film, bounces, share, request.seed + number)
-        of, remedies = (stage.scene, stage.view_layer, camera, path), stage.ledger.remedies.values()
         if request.engine == "CYCLES":
-            cycles.render(*of, remedies, request.threads, picture, device=request.device)
+            _render_with_cycles(stage, request, number, len(paths), path, light)
         else:
-            rasters.render(*of, request.engine, remedies, request.threads)
+            of = stage.scene, stage.view_layer, _camera_of(stage, request), path
+            rasters.render(*of, request.engine, stage.ledger.remedies.values(), request.threads)
+
+
+def _render_with_cycles(
+    stage: _Stage,
+    request: Request,
+    number: int,
+    count: int,
+    path: str | os.PathLike[str],
+    light: Lighting | None,
+    everything: bool = False,
+) -> None:
+    """One of Cycles' pictures, of so many."""
+    picture = None
+    if stage.is_lit:
+        bounces = light.bounces.none if stage.level == "direct" else light.bounces
+        share = max(request.samples // count, 1)
+        picture = cycles.LightSettings(light.film, bounces, share, request.seed + number)
+    remedies = stage.ledger.remedies_of_everything if everything else stage.ledger.remedies.values()
+    of = stage.scene, stage.view_layer, _camera_of(stage, request), path
+    cycles.render(*of, remedies, request.threads, picture, device=request.device, everything=everything)
+
+
+def _camera_of(stage: _Stage, request: Request) -> bpy.types.Object | None:
+    return stage.camera if request.camera is not None or stage.told else None
 
 
 @contextlib.contextmanager

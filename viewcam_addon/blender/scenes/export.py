@@ -64,7 +64,7 @@ class Surface:
 
     @property
     def used_slots(self) -> list[bpy.types.Material | None]:
-        """Those of `slots` that some face, or the points, have."""
+        """The materials of `slots` that some face, or the points, have."""
         if not isinstance(self.data, bpy.types.Mesh):
             return [self.slots[0]]
         return [self.slots[index] for index in sorted(export_geometry.used_slots(self.data, len(self.slots)))]
@@ -72,7 +72,7 @@ class Surface:
 
 @dataclass(frozen=True)
 class Lighting:
-    """What of a Scene gives light, and makes a picture of it."""
+    """The part of a Scene that gives light, and makes a picture of it."""
 
     lamps: tuple[Lamp, ...]
     world: World
@@ -138,7 +138,7 @@ def level_needed(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera
 def light_in(
     depsgraph: bpy.types.Depsgraph, ledger: Ledger, images: dict[str, Picture] | None = None, render: bool = True
 ) -> Lighting:
-    """What gives light in a depsgraph, and how it becomes a picture.
+    """The light of a depsgraph, and how it becomes a picture.
 
     images : receives the world's and the lamps'. render : as in world_of.
     """
@@ -170,7 +170,7 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
         links = source.receivers, source.blockers
         matrix = matrices if len(matrices) > 1 else matrices[0]
         objects.append(Object(source.name, names[source.key], matrix, *placed, *links))
-    _note_doubles(objects, geometries, ledger, lit)
+    _note_doubles(objects, geometries, ledger)
     surfaces = {placed.name for placed in objects}
     return Scene(
         **_view_in(depsgraph, camera_object),
@@ -181,7 +181,7 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
     )
 
 
-def _note_doubles(objects: list[Object], geometries: dict[str, Mesh | Spheres], ledger: Ledger, lit: bool) -> None:
+def _note_doubles(objects: list[Object], geometries: dict[str, Mesh | Spheres], ledger: Ledger) -> None:
     """What lies exactly where something else does: which of the two a ray of Cycles meets or leaves is its rounding's choice.
 
     Triangles of what stands in the scene once are sought in the world; those of instances, and points, among their own;
@@ -203,7 +203,7 @@ def _note_doubles(objects: list[Object], geometries: dict[str, Mesh | Spheres], 
             owners.append(np.full(len(keys[-1]), number))
         elif within[placed.geometry]:
             what = "triangles" if isinstance(geometry, Mesh) else "points"
-            _note_double(ledger, lit, placed.name, f"{within[placed.geometry]} {what}", "others of it")
+            _note_double(ledger, placed.name, f"{within[placed.geometry]} {what}", "others of it")
     for found, owner, what in (keys, owners, "triangles"), (places, placed_by, "instances"):
         number = np.concatenate([np.empty(0, np.int64), *owner])
         pairs = _pairs(np.concatenate([np.empty(0, np.uint64), *found]))
@@ -211,12 +211,14 @@ def _note_doubles(objects: list[Object], geometries: dict[str, Mesh | Spheres], 
             if what == "instances" and all(len(objects[i].matrices) == 1 for i in (first, second)):
                 continue  # its triangles tell
             whose = "others of it" if first == second else f"those of {objects[first].name!r}"
-            _note_double(ledger, lit, objects[second].name, f"{count} {what}", whose)
+            _note_double(ledger, objects[second].name, f"{count} {what}", whose)
 
 
-def _note_double(ledger: Ledger, lit: bool, name: str, what: str, whose: str) -> None:
-    status, so = ("approximated", "in Cycles one shadows the other") if lit else ("exported", "either of them may be seen")
-    ledger.note(name, status, f"{what} lie exactly where {whose} do: {so}")
+def _note_double(ledger: Ledger, name: str, what: str, whose: str) -> None:
+    # All of it comes along: where it matters to a picture is the comparison's to find.
+    ledger.note(
+        name, "exported", f"{what} lie exactly where {whose} do: either may be seen, and in Cycles one shadows the other"
+    )
 
 
 def _keys(geometry: Mesh | Spheres, matrix: Matrix | None = None) -> NDArray[np.uint64]:
@@ -255,7 +257,7 @@ def _hashed(columns: NDArray[np.uint64]) -> NDArray[np.uint64]:
 
 
 def _shown_by_light(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading, surfaces: set[str]) -> dict[str, object]:
-    """What of a Scene makes its light, and what shows it. surfaces : the names of its objects."""
+    """The part of a Scene that makes its light, and what shows it. surfaces : the names of its objects."""
     images = shading.pictures()
     light = light_in(depsgraph, ledger, images)
     return vars(light) | {"lamps": linking.among(light.lamps, surfaces), "materials": shading.materials, "images": images}
@@ -267,7 +269,7 @@ def seen_from(scene: Scene, depsgraph: bpy.types.Depsgraph, camera_object: bpy.t
 
 
 def _view_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) -> dict[str, object]:
-    """What of a Scene is its camera's."""
+    """The part of a Scene that is its camera's."""
     camera = camera_object.evaluated_get(depsgraph)
     return {
         "camera": cameras.read(camera, depsgraph.scene),
@@ -322,7 +324,7 @@ def placements(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading 
 
 
 def _draws(depsgraph: bpy.types.Depsgraph) -> tuple[NDArray[np.bool_], NDArray[np.uint32]]:
-    """Whether what the depsgraph shows is an instance, and what Cycles draws for it then."""
+    """True if what the depsgraph shows is an instance, and what Cycles draws for it then."""
     instances = depsgraph.object_instances
     return export_geometry.read(instances, "is_instance", bool), export_geometry.read(instances, "random_id", np.int32).view(
         "u4"
@@ -338,7 +340,7 @@ def random_number(name: str) -> int:
 
 
 def _drawn(placed: list[Placement], ledger: Ledger) -> Iterator[Placement]:
-    """Those that no scale of 0 flattens, of which Cycles draws only meshes that no other object uses."""
+    """The placements that no scale of 0 flattens, of which Cycles draws only meshes that no other object uses."""
     users: Counter[tuple[int, int]] = Counter()
     for source, matrices, _ in placed:
         users[source.key] += len(matrices)
@@ -366,7 +368,7 @@ def _source(
     shading: Shading | None,
     links: linking.Links | None,
 ) -> Surface | None:
-    """What one object shows, or None if nothing of it is seen."""
+    """The source of what one object shows, or None if nothing of it is seen."""
     if not features.is_surface(placed, ledger, shading):
         return None
     shown, real, _ = placed

@@ -1,4 +1,5 @@
-"""What of a scene the tracer does not model, found and named: each with the remedy that takes it out of Cycles' render too.
+"""Parts of a scene that the tracer does not model, found and named: each with the remedy that takes it out of Cycles' render
+too.
 
 Hair and volumes need no remedy: the view layer is told to leave them out (cycles.py).
 """
@@ -31,7 +32,7 @@ def note_render(
     ledger: Ledger,
     light: bool = False,
 ) -> None:
-    """What the camera and the render settings do beyond a pinhole. To be asked before the settings are overridden."""
+    """Note what the camera and the render settings do beyond a pinhole. To be asked before the settings are overridden."""
     for sentence in datablocks.beyond_pinhole(camera_object, scene):
         ledger.note(camera_object.name, "approximated", f"{sentence} (off on both sides)")
     ledger.set_for_cycles(camera_object.data.dof, "use_dof", False)
@@ -65,7 +66,7 @@ class Placed(NamedTuple):
 
 
 def placed_by(instance: bpy.types.DepsgraphObjectInstance) -> Placed:
-    """What a depsgraph's instance is."""
+    """The object that a depsgraph's instance places, and how."""
     shown = instance.object
     real, parent = (instance.instance_object, instance.parent) if instance.is_instance else (shown, shown)
     return Placed(shown, real, parent)
@@ -81,7 +82,7 @@ def hidden_from(placed: Placed, layer: bpy.types.ViewLayer) -> frozenset[str]:
 
 
 def is_surface(placed: Placed, ledger: Ledger, shading: Shading | None) -> bool:
-    """Whether this is a mesh or a point cloud; what is drawn but is neither is noted."""
+    """True if this is a mesh or a point cloud; what is drawn but is neither is noted."""
     shown, real, _ = placed
     name = placed.name
     if shown.type in _NO_SURFACE:
@@ -105,7 +106,7 @@ def note_object(
     ledger: Ledger,
     shading: Shading | None,
 ) -> None:
-    """What a visible surface is beyond its geometry. slots : its materials."""
+    """Note what a visible surface is beyond its geometry. slots : its materials."""
     shown, real, parent = placed
     name = placed.name
     if parent.holdout_get(view_layer=depsgraph.view_layer_eval):
@@ -122,12 +123,12 @@ def note_object(
         ledger.note(name, "approximated", "adaptive subdivision is subdivision at the render level on both sides")
         ledger.set_for_cycles(*adaptive, False)
     if not shading and versions.DEFAULT_SURFACE_BENDS_NORMALS and _shows_empty_slot(shown.data, slots):
-        ledger.call_for_cycles(real.original, materials.fill_empty_slots)
+        ledger.call_for_cycles(real.original, materials.fill_empty_slots, stands_in=False)
         if any(modifier.type == "NODES" and modifier.show_render for modifier in real.modifiers):
             ledger.note(name, "approximated", "has no material, and Cycles may bend its normals where they graze")
     for material in filter(None, slots):
         if not shading:  # the Normal pass; mirrors and glass bend normals on both sides (scattering.specular_normal)
-            ledger.call_for_cycles(material.original, materials.keep_normals)
+            ledger.call_for_cycles(material.original, materials.keep_normals, stands_in=False)
         reasons = materials.departures(material, lit=shading is not None)
         if shading:
             reading = shading.reading(material)
@@ -158,7 +159,7 @@ def note_object(
 
 
 def _note_light(placed: Placed, slots: list[bpy.types.Material | None], ledger: Ledger, shading: Shading) -> None:
-    """What matters as soon as there is light."""
+    """Note what matters as soon as there is light."""
     shown, real, parent = placed
     if isinstance(shown.data, bpy.types.PointCloud):
         for asked in sorted(shading.attributes(tuple(slots))):
@@ -167,9 +168,9 @@ def _note_light(placed: Placed, slots: list[bpy.types.Material | None], ledger: 
             )
     for each in (real.original, parent.original):
         for owner, name in versions.shadow_terminator(each):
-            ledger.set_for_cycles(owner, name, 0.0)
-        ledger.set_for_cycles(each.cycles, "is_caustics_caster", False)
-        ledger.set_for_cycles(each.cycles, "is_caustics_receiver", False)
+            ledger.set_for_cycles(owner, name, 0.0, stands_in=False)
+        ledger.set_for_cycles(each.cycles, "is_caustics_caster", False, stands_in=False)
+        ledger.set_for_cycles(each.cycles, "is_caustics_receiver", False, stands_in=False)
 
 
 def _shows_empty_slot(data: bpy.types.ID, slots: list[bpy.types.Material | None]) -> bool:

@@ -1,7 +1,8 @@
-"""What became of each thing that the exporter met, and what Cycles must leave out so that both sides show the same.
+"""The ledger: what became of each thing that the exporter met, and what Cycles must leave out so that both sides show the same.
 
 One entry an object, however often it is placed; its worst finding decides the status. A remedy is a change that, made for
-Cycles' render, takes out of it what the tracer does not model, so that the rest can be compared.
+Cycles' render, takes out of it what the tracer does not model, so that the rest can be compared. Some only make Cycles exact
+(shadow terminators, bent normals): a picture with everything in it has these, and none of the stand-ins.
 """
 
 from collections.abc import Callable, Mapping
@@ -23,6 +24,7 @@ class Ledger:
         self._findings: dict[str, dict[str, str]] = {}
         self._placed: dict[str, int] = {}
         self.remedies: dict[tuple, Remedy] = {}
+        self._stand_ins: set[tuple] = set()
 
     def placed(self, name: str, times: int = 1) -> None:
         """The object is in the scene once more, or so many times."""
@@ -39,13 +41,21 @@ class Ledger:
         if stored != value and stored != float(np.float32(value)):
             self.note(name, "approximated", f"its {property.replace('_', ' ')} is {value:g}, and Blender makes it {stored:g}")
 
-    def set_for_cycles(self, owner: bpy.types.bpy_struct, attribute: str, value: object) -> None:
-        """The remedy is a property of an original datablock."""
-        self.remedies[owner.as_pointer(), attribute] = lambda overrides: overrides.set(owner, attribute, value)
+    def set_for_cycles(self, owner: bpy.types.bpy_struct, attribute: str, value: object, stands_in: bool = True) -> None:
+        """The remedy is a property of an original datablock. stands_in : whether it changes what is in the picture."""
+        self._remedy((owner.as_pointer(), attribute), lambda overrides: overrides.set(owner, attribute, value), stands_in)
 
-    def call_for_cycles(self, owner: bpy.types.bpy_struct, remedy: Callable[..., None], *arguments: object) -> None:
-        """The remedy is a function (overrides, owner, *arguments)."""
-        self.remedies[owner.as_pointer(), remedy.__name__] = lambda overrides: remedy(overrides, owner, *arguments)
+    def call_for_cycles(
+        self, owner: bpy.types.bpy_struct, remedy: Callable[..., None], *arguments: object, stands_in: bool = True
+    ) -> None:
+        """The remedy is a function (overrides, owner, *arguments). stands_in : whether it changes what is in the picture."""
+        key = owner.as_pointer(), remedy.__name__
+        self._remedy(key, lambda overrides: remedy(overrides, owner, *arguments), stands_in)
+
+    @property
+    def remedies_of_everything(self) -> list[Remedy]:
+        """The remedies for a picture with everything in it: all but the stand-ins."""
+        return [remedy for key, remedy in self.remedies.items() if key not in self._stand_ins]
 
     def add(self, other: "Ledger", names: Mapping[str, str]) -> None:
         """Note what another ledger found of objects that stand for these. names : object there → object here."""
@@ -73,6 +83,11 @@ class Ledger:
             raise NotModelledError(
                 f"{lacking[0].object!r} can't be modelled{others}, {lacking[0].reason}: take it out, or leave --strict out"
             )
+
+    def _remedy(self, key: tuple, remedy: Remedy, stands_in: bool) -> None:
+        self.remedies[key] = remedy
+        if stands_in:
+            self._stand_ins.add(key)
 
     def _status(self, name: str, statuses: set[str]) -> str:
         worst = max(statuses, key=_WORSE.index, default="exported")

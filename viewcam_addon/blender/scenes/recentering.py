@@ -34,7 +34,7 @@ from ...pinhole import Pinhole
 from ...tracer.scene import Object
 from ...tracer.scene.shader_nodes import KINDS
 from .. import camera as cameras
-from .. import datablocks, findings, pose
+from .. import conversion, datablocks, findings, pose
 from ..temporary_settings import Overrides, overridden
 from . import baked_inputs, features, linking, materials
 from .depsgraph import visit_still
@@ -167,7 +167,7 @@ def as_in_file(objects: Iterable[Object], names: Mapping[str, str]) -> tuple[Obj
 def _seen(
     depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, ledger: Ledger, overrides: Overrides, lit: bool
 ) -> tuple[_View, list[_Placed], dict[bpy.types.ID, _Copy]]:
-    """What of the file is rendered; geometries are copied, and the copies gone when the overrides end."""
+    """The objects of the file that are rendered; geometries are copied, and the copies gone when the overrides end."""
     if lit:
         light_in(depsgraph, ledger, render=False)  # for what the ledger tells of the file's own lamps
     view = _view(depsgraph, camera_object)
@@ -317,15 +317,15 @@ def _camera(overrides: Overrides, temporary: bpy.types.Scene, view: _View) -> bp
     data.sensor_fit, (data.sensor_width, data.sensor_height) = view.sensor_fit, view.sensor
     data.clip_start, data.clip_end = view.clip
     shown, claimed = (_relative(pinhole, view.shown.eye) for pinhole in (view.shown, view.claimed))
-    cameras.place(block, shown, temporary, datablocks.depsgraph_of(temporary))
+    conversion.place(block, shown, temporary, datablocks.depsgraph_of(temporary))
     frame = datablocks.frame_of(temporary)
     distance = claimed.distance[0] * frame.resolution_x / frame.size[0]
-    cameras.state(block, claimed.eye, claimed.look_at, claimed.up, distance, frame)
+    cameras.CameraSync.of(block).state(claimed.eye, claimed.look_at, claimed.up, distance, frame)
     return block
 
 
 def _relative(pinhole: Pinhole, origin: tuple[float, ...]) -> Pinhole:
-    """The same pinhole where `origin` is (0, 0, 0)."""
+    """The pinhole where `origin` is (0, 0, 0)."""
     eye, look_at = (tuple(a - b for a, b in zip(point, origin, strict=True)) for point in (pinhole.eye, pinhole.look_at))
     return replace(pinhole, eye=eye, look_at=look_at)
 

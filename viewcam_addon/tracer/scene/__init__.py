@@ -1,11 +1,13 @@
-"""What the tracer traces: meshes and spheres, the objects that place them in the world, the camera, and what gives light.
+"""The scene that the tracer traces: meshes and spheres, the objects that place them in the world, the camera, and what gives
+light.
 
 A geometry is stored once, in its object's space, and placed by any number of objects. Nothing here knows files (scene_file.py)
 or rays (visibility.py, surface.py); the classes hold arrays and check their shapes. Materials, images, lamps, world, film and
 bounces matter from level `direct` on; a scene of level `geometry` leaves them out.
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,7 +146,7 @@ class Object:
 
 @dataclass(frozen=True)
 class LedgerEntry:
-    """What became of one thing that the exporter met.
+    """The fate of one thing that the exporter met.
 
     object : its name in Blender.
     status : "exported", "approximated" or "skipped".
@@ -157,8 +159,24 @@ class LedgerEntry:
 
     @property
     def is_modelled(self) -> bool:
-        """Whether it was exported whole, as it is."""
+        """True if it was exported whole, as it is."""
         return self.status == "exported"
+
+
+def with_pairs(ledger: Sequence[LedgerEntry], pairs: Iterable[tuple[str, str]]) -> tuple[LedgerEntry, ...]:
+    """A ledger in which each object tells with which others it lies in one place. pairs : the names of two each."""
+    others: dict[str, list[str]] = {}
+    for first, second in pairs:
+        others.setdefault(first, []).append("itself" if first == second else repr(second))
+        if first != second:
+            others.setdefault(second, []).append(repr(first))
+    told = []
+    for entry in ledger:
+        if entry.object in others:
+            shares = f"lies in one place with {', '.join(others[entry.object])} where pixels show it"
+            entry = replace(entry, reason="; ".join(filter(None, (entry.reason, shares))))
+        told.append(entry)
+    return tuple(told)
 
 
 @dataclass(frozen=True, eq=False)

@@ -242,7 +242,11 @@ def _beside(scene_path: Path, field: Field) -> Path:
     """The path of a file in the scene file's own folder."""
     folder = scene_path.resolve().parent
     path = folder / field.text()
-    if "\0" in field.value or path.resolve().parent != folder or path.name != field.value:
+    try:
+        inside = "\0" not in field.value and path.resolve().parent == folder and path.name == field.value
+    except (OSError, ValueError):  # too long for the system to tell
+        inside = False
+    if not inside:
         field.fail(f"is {checks.shown(field.value)}, which leaves the scene file's folder: give the name of a file in it")
     return path
 

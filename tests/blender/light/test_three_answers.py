@@ -1,0 +1,129 @@
+"""A check of files that hold what is not modelled: amber where it is in the picture or lights it, green where it is not."""
+
+import math
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from viewcam_addon import api
+
+pytestmark = pytest.mark.slow
+
+SIZE = "96x54"
+BEHIND = (0.0, -60.0, 1.0)
+
+
+@pytest.fixture
+def stage(fresh_blender, tmp_path):
+    """A ball on a floor below a lamp; a function that saves it and checks it."""
+    scene = bpy.context.scene
+    for _ in range(len(bpy.data.objects)):
+        bpy.data.objects.remove(bpy.data.objects[0])
+    bpy.ops.mesh.primitive_plane_add(size=20)
+    bpy.context.object.data.materials.append(_material("Floor"))
+    bpy.ops.mesh.primitive_uv_sphere_add(location=(0, 0, 1))
+    bpy.context.object.name = "Ball"
+    bpy.context.object.data.materials.append(_material("Skin"))
+    bpy.ops.object.light_add(type="AREA", location=(2, -2, 5))
+    bpy.context.object.data.energy = 500
+    bpy.ops.object.camera_add(location=(0, -7, 2.5), rotation=(math.radians(78), 0, 0))
+    scene.camera = bpy.context.object
+
+    def check(level, *options):
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "stage.blend"))
+        return api.check(tmp_path / "stage.blend", "--size", SIZE, "--level", level, "--samples", "32", *options)
+
+    return check
+
+
+def _material(name):
+    material = bpy.data.materials.new(name)
+    if not material.node_tree:  # new materials have one from 5.0 on
+        material.use_nodes = True
+    return material
+
+
+def subsurface():
+    shader = bpy.data.materials["Skin"].node_tree.nodes["Principled BSDF"]
+    shader.inputs["Subsurface Weight"].default_value = 0.5
+
+
+def hair():
+    settings = bpy.data.objects["Ball"].modifiers.new("Hair", "PARTICLE_SYSTEM").particle_system.settings
+    settings.type, settings.count, settings.hair_length = "HAIR", 300, 0.6
+
+
+def fog():
+    bpy.ops.mesh.primitive_cube_add(size=2, location=(1.5, -1, 1))
+    bpy.context.object.name = "Fog"
+    material = _material("Fog")
+    tree = material.node_tree
+    tree.nodes.clear()
+    output, volume = tree.nodes.new("ShaderNodeOutputMaterial"), tree.nodes.new("ShaderNodeVolumePrincipled")
+    volume.inputs["Density"].default_value = 0.5
+    tree.links.new(volume.outputs[0], output.inputs["Volume"])
+    bpy.context.object.data.materials.append(material)
+
+
+def focus():
+    lens = bpy.context.scene.camera.data.dof
+    lens.use_dof, lens.aperture_fstop, lens.focus_distance = True, 0.05, 4.0
+
+
+@pytest.mark.parametrize(
+    ("change", "level", "name"),
+    [
+        (subsurface, "path", "Ball"),
+        (hair, "geometry", "Ball"),
+        (hair, "path", "Ball"),
+        (fog, "path", "Fog"),
+        (focus, "geometry", "Camera"),
+        (focus, "path", "Camera"),
+    ],
+)
+def test_what_is_not_modelled_and_in_the_picture_makes_it_amber(stage, change, level, name):
+    change()
+    check = stage(level)
+    assert (check.answer, check.passed) == ("same_but", True), check.sentence
+    told = check.figures["not_modelled"]
+    assert told["names"] == [name] and 0.01 < told["share"] < 0.9, told
+    assert f"but for 1 object that is not modelled ({name}; " in check.sentence
+
+
+@pytest.mark.parametrize(
+    ("change", "name", "level"), [(subsurface, "Ball", "path"), (hair, "Ball", "path"), (fog, "Fog", "path")]
+)
+def test_what_is_not_modelled_and_neither_seen_nor_lights_what_is_leaves_it_green(stage, change, name, level):
+    change()
+    bpy.data.objects[name].location = BEHIND
+    check = stage(level)
+    assert check.answer == "same" and check.figures["not_modelled"]["share"] == 0.0, check.sentence
+    assert any(entry["status"] != "exported" for entry in check.figures["ledger"]), "it is in the ledger all the same"
+
+
+def test_hair_that_is_not_seen_and_casts_a_shadow_into_the_picture_makes_it_amber(stage):
+    hair()
+    ball, lamp = bpy.data.objects["Ball"], bpy.data.objects["Area"]
+    ball.location, lamp.location, lamp.data.size = (0, 0, 6), (0, 0, 9), 0.1  # above what the camera sees
+    bpy.context.view_layer.update()
+    told = stage("path").figures
+    assert told["answer"] == "same_but" and told["not_modelled"]["names"] == ["Ball"], told["sentence"]
+    assert told["not_modelled"]["shown"] == 0.0 and told["not_modelled"]["share"] > 0.01
+
+
+def test_surface_scattering_below_the_skin_is_no_matter_of_geometry(stage):
+    subsurface()
+    assert stage("geometry").answer == "same"
+
+
+def test_strict_fails_what_is_amber_and_lets_pass_what_is_green(stage):
+    hair()
+    assert not stage("geometry", "--strict").passed
+    bpy.data.objects["Ball"].location = BEHIND
+    assert stage("geometry", "--strict").passed
+
+
+def test_all_that_is_modelled_is_green_and_rendered_once(stage, tmp_path):
+    assert stage("path", "--report", str(tmp_path / "report")).answer == "same"
+    assert not (tmp_path / "report" / "everything.exr").exists()

@@ -1,0 +1,228 @@
+"""USD: the stage's own unit and axes count, and no stage takes more time, memory or files than it may."""
+
+import math
+import os
+import time
+
+import numpy as np
+import pytest
+
+from viewcam_addon import cameras, usd_stage
+from viewcam_addon.cameras import Camera, Options
+from viewcam_addon.errors import InputError
+
+from .conftest import CAMERAS
+
+pytest.importorskip("pxr")
+
+GIVEN = Options(size=(640, 360))
+SECONDS = 20
+"""What a busy machine may take to answer; a stage without bounds takes minutes."""
+
+
+def stage(inside="", head='metersPerUnit = 1\n    upAxis = "Z"', name="Cam", at="(3, -1.5, -4.5)"):
+    return f"""#usda 1.0
+(
+    {head}
+)
+def Camera "{name}" (
+    {inside}
+)
+{{
+    float focalLength = 35
+    float horizontalAperture = 36
+    float verticalAperture = 20.25
+    double3 xformOp:translate = {at}
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+}}
+"""
+
+
+def read(text, options=GIVEN):
+    return cameras.read(text, options=options)
+
+
+@pytest.mark.parametrize(
+    ("head", "eye", "right"),
+    [
+        ("", (0.03, 0.045, -0.015), (1, 0, 0)),  # nothing is said: centimetres, y up
+        ('metersPerUnit = 0.01\n upAxis = "Y"', (0.03, 0.045, -0.015), (1, 0, 0)),
+        ('metersPerUnit = 1\n upAxis = "Z"', (3, -1.5, -4.5), (1, 0, 0)),
+        ('metersPerUnit = 0.0254\n upAxis = "Z"', (0.0762, -0.0381, -0.1143), (1, 0, 0)),
+        ("metersPerUnit = 1000", (3000, 4500, -1500), (1, 0, 0)),
+    ],
+)
+def test_a_stage_says_its_unit_and_what_points_up(head, eye, right):
+    (camera,) = read(stage(head=head))
+    assert camera.pinhole.eye == pytest.approx(eye, rel=1e-15)
+    assert camera.pinhole.axes()[0] == pytest.approx(right, abs=1e-15)
+    assert any("as Blender's importer does" in note for note in camera.notes) == (eye != (3, -1.5, -4.5))
+    assert camera.pinhole.distance == pytest.approx((35 / 36 * 640,) * 2, rel=1e-6)  # which counts in no unit
+
+
+def test_what_is_chosen_comes_on_top_of_what_the_stage_says():
+    text = stage(head='metersPerUnit = 0.01\n upAxis = "Y"')
+    (twice,) = read(text, Options(size=(640, 360), scale=1000, axes="y_up"))
+    assert twice.pinhole.eye == pytest.approx((30, 45, -15), rel=1e-15)
+    (turned,) = read(stage(), Options(size=(640, 360), axes="y_up"))
+    assert turned.pinhole.eye == pytest.approx((3, 4.5, -1.5), rel=1e-15)
+
+
+@pytest.mark.parametrize("name", ["plain", "shifted_and_not_square", "telephoto"])
+def test_what_was_written_with_y_up_is_the_same_camera_whether_that_is_chosen_or_not(name):
+    given = [Camera("a", CAMERAS[name])]
+    for options in (Options(), Options(axes="y_up")):
+        text = cameras.write(given, "usd", options)
+        assert read(text)[0].pinhole == read(text, Options(axes="y_up"))[0].pinhole == CAMERAS[name] or options.axes == "as_is"
+        assert read(text)[0].pinhole == CAMERAS[name] and not any("written with" in note for note in read(text)[0].notes)
+
+
+# ---- hostile stages
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder for stages, beside a file that is none of theirs."""
+    (tmp_path / "secret.usda").write_text(stage(name="secret"))
+    os.mkfifo(tmp_path / "pipe.usda")
+    inside = tmp_path / "inside"
+    (inside / "parts").mkdir(parents=True)
+    (inside / "parts" / "part.usda").write_text(stage(name="part"))
+    (inside / "link.usda").symlink_to(tmp_path / "secret.usda")
+    os.mkfifo(inside / "pipe.usda")
+    return inside
+
+
+OUTSIDE = {
+    "an absolute path": "/etc/passwd",
+    "a device": "/dev/zero",
+    "an absolute path of a stage": "{folder}/../secret.usda",
+    "a path that leaves the folder": "../secret.usda",
+    "a path that leaves it on its way": "parts/../../secret.usda",
+    "a link that leads out": "link.usda",
+    "a pipe": "pipe.usda",
+    "an address": "https://example.org/a.usda",
+    "an expression": "`'../secret.usda'`",
+    "a package": "a.usdz[secret.usda]",
+    "what is not there": "nothing.usda",
+    "a layer with arguments": "../secret.usda:SDF_FORMAT_ARGS:a=b",
+}
+ARCS = {
+    "references": ("prepend references = @{0}@</secret>", ""),
+    "payloads": ("prepend payload = @{0}@</secret>", ""),
+    "layers": ("", "subLayers = [@{0}@]"),
+    "variants": ('variants = {{ string v = "a" }}\n prepend variantSets = "v"', ""),
+}
+
+
+@pytest.mark.parametrize("arc", ARCS)
+@pytest.mark.parametrize("outside", OUTSIDE)
+def test_no_stage_opens_what_lies_outside_of_its_folder_or_is_no_file(folder, outside, arc):
+    named = OUTSIDE[outside].format(folder=folder)
+    inside, head = (part.format(named) for part in ARCS[arc])
+    text = stage(inside, f'metersPerUnit = 1\n upAxis = "Z"\n {head}')
+    if arc == "variants":
+        text = (
+            text[: text.rindex("}")] + f'variantSet "v" = {{\n"a" ( prepend references = @{named}@</secret> ) {{\n}}\n}}\n}}\n'
+        )
+    (folder / "a.usda").write_text(text)
+    started = time.monotonic()
+    found = cameras.read(folder / "a.usda", options=GIVEN)
+    assert time.monotonic() - started < SECONDS
+    assert [camera.name for camera in found] == ["Cam"]
+    (note,) = (note for note in found[0].notes if note.startswith("Not read"))
+    assert named[:20] in note
+
+
+@pytest.mark.parametrize("arc", ["references", "layers"])
+def test_a_stage_is_composed_of_the_layers_in_its_folder(folder, arc):
+    head = "subLayers = [@parts/part.usda@]" if arc == "layers" else ""
+    body = "" if arc == "layers" else 'def "group" (\n prepend references = @./parts/part.usda@</part>\n)\n{\n}\n'
+    (folder / "a.usda").write_text(stage(head=f'metersPerUnit = 1\n upAxis = "Z"\n {head}') + body)
+    found = cameras.read(folder / "a.usda", options=GIVEN)
+    assert {camera.name for camera in found} == {"Cam", "part" if arc == "layers" else "group"}
+    assert not any(note.startswith("Not read") for camera in found for note in camera.notes)
+
+
+def test_value_clips_are_left_out(folder):
+    clips = f"""clips = {{
+        dictionary default = {{
+            double2[] active = [(0, 0)]
+            asset[] assetPaths = [@{folder}/pipe.usda@]
+            string primPath = "/Cam"
+            double2[] times = [(0, 0)]
+        }}
+    }}"""
+    (folder / "a.usda").write_text(stage(clips))
+    (camera,) = cameras.read(folder / "a.usda", options=GIVEN)
+    assert camera.pinhole.eye == (3, -1.5, -4.5) and any("value clips of /Cam" in note for note in camera.notes)
+
+
+def test_a_package_is_read_from_its_first_file_on_with_the_layers_in_it(tmp_path):
+    from pxr import UsdUtils
+
+    (tmp_path / "part.usda").write_text(stage(name="part"))
+    (tmp_path / "a.usda").write_text(stage(head='metersPerUnit = 1\n upAxis = "Z"\n subLayers = [@./part.usda@]'))
+    assert UsdUtils.CreateNewUsdzPackage(str(tmp_path / "a.usda"), str(tmp_path / "a.usdz"))
+    found = cameras.read(tmp_path / "a.usdz", options=GIVEN)
+    assert {camera.name for camera in found} == {"Cam", "part"}
+
+
+def doubling(times):
+    """Each prim is twice the one before: 2 to the power of so many cameras."""
+    prims = ['def "L0"\n{\ndef Camera "c"\n{\n}\n}']
+    for i in range(1, times):
+        prims.append(
+            "\n".join([f'def "L{i}"\n{{', *(f'def "{name}" (references = </L{i - 1}>)\n{{\n}}' for name in "ab"), "}"])
+        )
+    return "#usda 1.0\n" + "\n".join(prims)
+
+
+HOSTILE = {
+    "references to references": (doubling(30).encode(), "more time or memory"),
+    "a turn of no kind": (stage().replace('["xformOp:translate"]', '["xformOp:foo"]').encode(), "can't be read"),
+    "a size of no pixels": (
+        stage().replace("float focal", "custom int2 userProperties:viewcam_resolution = (640, 0)\n float focal").encode(),
+        "resolution",
+    ),
+    "a size that is none": (
+        stage().replace("float focal", 'custom string userProperties:viewcam_resolution = "x"\n float focal').encode(),
+        "two numbers of pixels",
+    ),
+    "a name in no encoding": (stage().replace('"Cam"', '"C\xfcm"').encode("latin-1"), "no stage that USD can open"),
+    "a unit of 0": (stage(head="metersPerUnit = 0").encode(), "metersPerUnit"),
+    "a unit beyond all numbers": (stage(head="metersPerUnit = inf").encode(), "metersPerUnit"),
+    "a place beyond all numbers": (stage(at="(inf, nan, 0)").encode(), "finite"),
+    "a beginning alone": (b"PXR-USDC" + bytes(200), "no stage that USD can open"),
+    "noise": (b"PXR-USDC" + np.random.default_rng(1).bytes(3000), "no stage that"),
+    "words": (b"#usda 1.0\n" + b"{" * 100_000, "no stage that"),
+    "no camera": (b'#usda 1.0\ndef Xform "x" {}\n', "holds no camera"),
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_stage_is_refused_in_a_sentence_in_time(tmp_path, name):
+    data, sentence = HOSTILE[name]
+    (tmp_path / "a.usd").write_bytes(data)
+    started = time.monotonic()
+    with pytest.raises(InputError, match=sentence) as refused:
+        cameras.read(tmp_path / "a.usd", options=GIVEN)
+    assert time.monotonic() - started < SECONDS
+    assert "bug" not in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_a_time_of_a_camera_that_moves_is_what_the_stage_counts_by():
+    text = stage(head='metersPerUnit = 1\n upAxis = "Z"\n timeCodesPerSecond = 25')
+    moving = "double3 xformOp:translate.timeSamples = { 0: (0, 0, 5), 50: (3, 0, 5) }"
+    found = read(text.replace("double3 xformOp:translate = (3, -1.5, -4.5)", moving))
+    assert [(camera.name, camera.time, camera.pinhole.eye) for camera in found] == [
+        ("Cam 0", 0.0, (0, 0, 5)),
+        ("Cam 50", 2.0, (3, 0, 5)),
+    ]
+    assert all(math.isfinite(camera.pinhole.distance[0]) for camera in found)
+
+
+def test_where_openusd_is_not_here_a_sentence_says_what_to_do(monkeypatch):
+    monkeypatch.setattr(usd_stage.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(InputError, match="pip install usd-core"):
+        read(stage())
