@@ -140,6 +140,8 @@ def _projected(to_pixels: np.ndarray, size: tuple[int, int]) -> tuple[Pinhole, t
 def _posed(view: np.ndarray, options: Options) -> Camera:
     """A view matrix alone: OpenGL's, whose camera looks along −z."""
     plane = options.plane_or_refuse("the view matrix")
+    if abs(np.linalg.det(view)) < 1e-30:
+        raise InputError("the view matrix is flat: copy the camera's view and projection")
     pinhole, notes = axes.pinhole(np.linalg.inv(view), plane, "the view matrix")
     return Camera("Camera", pinhole, False, ("A view matrix alone is taken as OpenGL's, whose camera looks along −z", *notes))
 

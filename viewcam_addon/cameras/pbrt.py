@@ -44,6 +44,7 @@ _MOVES = {"LookAt": 9, "Translate": 3, "Scale": 3, "Rotate": 4, "Transform": 16,
 _NOT_READ = {"Include", "Import"}
 _SIZE = (1280, 720)
 _MOST_MOVES = 1_000
+_NARROWEST = 1e-9  # degrees
 _TIMES = {"All": (0, 1), "StartTime": (0,), "EndTime": (1,)}
 _HARMLESS = {"shutteropen", "shutterclose", "focaldistance", "lensradius", "medium", "hither", "yon"}
 
@@ -242,7 +243,7 @@ def _angle(parameters: _Parameters, text: str) -> float:
     degrees = _number(parameters, "fov", 90.0, text)
     half = _number(parameters, "halffov", -1.0, text)
     degrees = 2 * half if half > 0 else degrees
-    if not 0 < degrees < 180:
+    if not _NARROWEST < degrees < 180:
         at = parameters["halffov" if half > 0 else "fov"][1]
         texts.fail(text, at, f"the field of view is {degrees:g}°, give an angle between 0 and 180")
     return math.radians(degrees)

@@ -100,6 +100,11 @@ class RadianceComparison:
     taken_out: TakenOut = field(default_factory=TakenOut)
 
     @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """The names of two objects each that were found in one place."""
+        return tuple(self.taken_out.pairs)
+
+    @property
     def answer(self) -> Answer:
         """True if the light is the same, in one sentence, which says where and by how much where it is not."""
         combined = self.rows[0]

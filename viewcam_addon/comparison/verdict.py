@@ -59,6 +59,11 @@ class GeometryComparison:
     not_modelled: NotModelled = field(default_factory=NotModelled)
 
     @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """The names of two objects each that were found in one place."""
+        return tuple(self.in_one_place.pairs())
+
+    @property
     def pixels(self) -> int:
         return self.pinhole.width * self.pinhole.height
 

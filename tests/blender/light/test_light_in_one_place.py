@@ -7,8 +7,9 @@ bpy = pytest.importorskip("bpy")
 from dataclasses import replace
 
 from viewcam_addon import api
-from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.image import Image
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer import render
 
 
@@ -45,7 +46,7 @@ def room(scene, camera, add, add_lamp, mesh_from):
 def test_light_on_surfaces_in_one_place_is_taken_out_and_named(room, tmp_path, read_passes, kind, level):
     room(kind)
     paths = [tmp_path / f"cycles-{number}.exr" for number in range(4)]
-    exported = job.export_and_render(job.Request(threads=2, level=level, samples=64), paths)
+    exported = jobs.both_sides(Job(threads=2, level=level, samples=64), paths)
     tests = [Image(passes, exported.camera) for passes in read_passes(paths)]
 
     def compared(scene):

@@ -288,10 +288,11 @@ def test_an_empty_slot_that_no_face_uses_is_not_told(monkey, both_sides, node_gr
 
 @pytest.mark.parametrize("kind", ["shared data", "copied data", "one mesh"])
 def test_triangles_that_lie_exactly_where_others_do_are_told(monkey, scene, add_lamp, kind):
-    from viewcam_addon.blender.rendering import job
+    from viewcam_addon.blender.jobs import renderer as jobs
+    from viewcam_addon.jobs.job import Job
 
     def told(level="direct"):
-        ledger = job.export(job.Request(level=level)).ledger
+        ledger = jobs.export(Job(level=level)).ledger
         assert all(entry.status == "exported" for entry in ledger), "where it matters is the comparison's to find"
         return [entry.reason for entry in ledger if "lie exactly" in entry.reason]
 
@@ -313,10 +314,11 @@ def test_triangles_that_lie_exactly_where_others_do_are_told(monkey, scene, add_
 
 
 def test_instances_in_one_place_and_doubles_within_them_are_told(monkey, scene, add):
-    from viewcam_addon.blender.rendering import job
+    from viewcam_addon.blender.jobs import renderer as jobs
+    from viewcam_addon.jobs.job import Job
 
     def told():
-        reasons = [entry.reason for entry in job.export(job.Request(level="geometry")).ledger]
+        reasons = [entry.reason for entry in jobs.export(Job(level="geometry")).ledger]
         return [clause.partition(":")[0] for reason in reasons for clause in reason.split("; ") if "lie exactly" in clause]
 
     def instance(number, location):
@@ -348,7 +350,8 @@ def test_instances_in_one_place_and_doubles_within_them_are_told(monkey, scene, 
 
 def test_triangles_of_a_lattice_are_no_doubles_of_one_another(scene, add_lamp, add):
     """Sums of their coordinates, weighted by the roots of 2 and 3, are the same for 1,442 of these."""
-    from viewcam_addon.blender.rendering import job
+    from viewcam_addon.blender.jobs import renderer as jobs
+    from viewcam_addon.jobs.job import Job
 
     random = np.random.default_rng(7)
     corners = random.integers(0, 20, (40_000, 1, 3)) + random.integers(-1, 2, (40_000, 3, 3))
@@ -362,6 +365,6 @@ def test_triangles_of_a_lattice_are_no_doubles_of_one_another(scene, add_lamp, a
     add_lamp("SUN")
 
     def told():
-        return [entry.reason for entry in job.export(job.Request(level="direct")).ledger if "lie exactly" in entry.reason]
+        return [entry.reason for entry in jobs.export(Job(level="direct")).ledger if "lie exactly" in entry.reason]
 
     assert len(mesh.polygons) > 30_000 and not told()
