@@ -48,10 +48,8 @@ def convert_keyframes(camera_object: bpy.types.Object, scene: bpy.types.Scene, f
         off = [frame for frame, one in zip(frames, seen, strict=True) if _differs_at(camera_object, scene, frame, one.pinhole)]
     finally:
         scene.frame_set(before[0], subframe=before[1])
-    words = f"{len(frames)} frames of {camera_object.name} are keyframes of the values"
-    return (
-        f"{words}; the camera differs at {len(off)} of them, first at {off[0]}" if off else f"{words}, and it stands the same"
-    )
+    what = f"the camera differs at {len(off)} of them, first at {off[0]}" if off else "the camera stands the same at each"
+    return f"{len(frames)} frames of {camera_object.name} are keyframes of the values: {what}"
 
 
 class _Seen:
@@ -133,9 +131,8 @@ def _check_keyed(camera_object: bpy.types.Object) -> list[tuple[bpy.types.ID, st
     for block in (camera_object, camera_object.data):
         for curve in versions.drivers(block):
             if not curve.data_path.startswith("virtual_pinhole.") and not versions.is_muted(curve):
-                raise InputError(
-                    f"a driver sets {curve.data_path!r} of {block.name!r}, and would win over the values: remove it"
-                )
+                path = curve.data_path
+                raise InputError(f"a driver sets {path!r} of {block.name!r}, and would win over the values: remove it")
     return keyed
 
 
@@ -167,8 +164,9 @@ def convert_track_to(camera_object: bpy.types.Object, scene: bpy.types.Scene) ->
         group.up = (0.0, 0.0, 1.0)
         group.look_at_bone = part if target.type == "ARMATURE" else ""
         group.look_at_group = part if target.type == "MESH" else ""
+    group.look_at_target = target  # while the constraint still holds the camera there
     camera_object.constraints.remove(track)
-    group.look_at_target = target
+    cameras.CameraSync.of(camera_object).edited(scene)
 
 
 def _obstacles(track: bpy.types.Constraint) -> Iterator[str]:
