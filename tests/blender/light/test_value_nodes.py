@@ -13,8 +13,9 @@ import pytest
 bpy = pytest.importorskip("bpy")
 bmesh = pytest.importorskip("bmesh")
 
-from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.scenes import cycles_attributes
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer import native, render
 from viewcam_addon.tracer.scene.shader_nodes import KINDS
 
@@ -315,7 +316,7 @@ def floor(scene, strewn, make_material, set_world, read_passes, tmp_path):
                 bpy.context.view_layer.update()
                 mesh.transform(block.matrix_world.inverted())
         path = tmp_path / "floor.exr"
-        exported = job.export_and_render(job.Request(threads=2, level="direct", samples=1), [path])
+        exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [path])
         assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
         (theirs,) = read_passes([path])
         ours = render.render(exported, "direct", 1, threads=2)
@@ -437,7 +438,7 @@ def test_generated_coordinates_are_those_of_the_mesh_before_it_was_deformed(
             bend = block.modifiers.new("Bend", "SIMPLE_DEFORM")
             bend.deform_method, bend.angle, bend.deform_axis = "TWIST", 0.7, "X"
     path = tmp_path / "generated.exr"
-    exported = job.export_and_render(job.Request(threads=2, level="direct", samples=1), [path])
+    exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [path])
     assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
     (theirs,) = read_passes([path])
     ours = render.render(exported, "direct", 1, threads=2)
@@ -467,7 +468,7 @@ def thrown(scene, camera, add, mesh_from, make_material, set_world, images, read
         monkey = add(mesh, "Monkey", pass_index=1)
         monkey.scale, monkey.rotation_euler = (1.2, 0.8, 1.0), (0.2, 0.1, 0.4)
         path = tmp_path / "thrown.exr"
-        exported = job.export_and_render(job.Request(threads=2, level="direct", samples=1), [path])
+        exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [path])
         assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
         (theirs,) = read_passes([path])
         ours = render.render(exported, "direct", 1, threads=2)
@@ -521,7 +522,7 @@ def test_each_instance_has_a_random_number_and_the_color_of_what_places_it(
         block.data.materials.append(material)
     camera.location, camera.rotation_euler, camera.data.lens = (0, 0, 5), (0, 0, 0), 36
     path = tmp_path / "instances.exr"
-    exported = job.export_and_render(job.Request(threads=2, level="direct", samples=1), [path])
+    exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [path])
     assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
     (theirs,) = read_passes([path])
     ours = render.render(exported, "direct", 1, threads=2)
@@ -545,7 +546,7 @@ def test_generated_coordinates_of_a_point_cloud_are_named_since_they_do_not_come
     for output, goal in ((source, points), (points, paint), (paint, target)):
         tree.links.new(output.outputs[0], goal.inputs[0])
     add(data, "Drop").modifiers.new("Nodes", "NODES").node_group = tree
-    (entry,) = job.export(job.Request(level="direct")).ledger
+    (entry,) = jobs.export(Job(level="direct")).ledger
     assert (entry.object, entry.status) == ("Drop", "approximated") and "'generated'" in entry.reason, entry
 
 
@@ -579,7 +580,7 @@ def pointed(scene, camera, add, mesh_from, make_material, set_world, read_passes
         split = block.modifiers.new("Split", "EDGE_SPLIT")
         split.split_angle = 0.4
         path = tmp_path / "pointed.exr"
-        exported = job.export_and_render(job.Request(threads=2, level="direct", samples=1), [path])
+        exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [path])
         assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
         (theirs,) = read_passes([path])
         ours = render.render(exported, "direct", 1, threads=2)
