@@ -304,8 +304,10 @@ def _told(
     """What is told of a comparison, once its files are written."""
     from ..comparison import difference, light_report, report
     from ..comparison.light_verdict import RadianceComparison
+    from ..tracer.scene import with_pairs
 
     lines, result = comparison.lines(), comparison.to_json()
+    ledger = with_pairs(ledger, comparison.pairs)
     about = (written.report or "", ledger, written.command)
     if isinstance(comparison, RadianceComparison):
         figures = _light_figures(result)
