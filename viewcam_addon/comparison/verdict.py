@@ -9,7 +9,7 @@ from ..pinhole import Pinhole
 from .answer import Answer, NotModelled, answered
 from .cameras import ConversionError, Systematic
 from .far_from_origin import FarFromOrigin
-from .mismatches import PIXELS_PER_UNEXPLAINED, Mismatches
+from .mismatches import KINDS, PIXELS_PER_UNEXPLAINED, Mismatches
 from .statistics import PassErrors, percentile_name
 from .tolerances import PERCENTILES, Array
 
@@ -237,6 +237,8 @@ def _explained(comparison: GeometryComparison) -> str:
 
 
 def _why_unexplained(comparison: GeometryComparison) -> str:
+    if (comparison.mismatches.kinds == KINDS.index("not a number")).all():
+        return "where the test picture holds no number"
     if not comparison.mismatches.retraced:
         return "which may be edges: give the scene too, so that they can be re-traced"
     return "and no shift within tolerance explains it"
