@@ -76,22 +76,23 @@ BLENDER_ROOMS = {
     "render_settings": "",
     "preferences": "render_settings",
     "datablocks": "versions",
-    "storage": "versions datablocks",
-    "targets": "versions datablocks storage",
-    "hold": "versions storage targets",
     "pose": "",
+    "conversion": "findings datablocks pose",
+    "storage": "versions datablocks",
+    "targets": "versions datablocks pose storage",
+    "hold": "versions storage targets",
     "causes": "versions findings datablocks storage pose",
-    "camera": "findings preferences datablocks storage targets hold pose causes",
+    "camera": "findings preferences datablocks pose conversion storage targets hold causes",
     "properties": "datablocks storage targets camera",
     "resolution": "datablocks storage camera",
     "dataset_cameras": "opening datablocks camera",
     "own_picture": "",
-    "animation": "versions datablocks storage targets camera resolution",
-    "scenes": "versions temporary_settings another_blender picture findings datablocks pose camera",
+    "animation": "datablocks storage targets camera resolution",
+    "scenes": "versions temporary_settings another_blender picture findings datablocks pose conversion camera",
     "rendering": "versions temporary_settings another_blender opening datablocks resolution scenes",
     "interface": (
         "versions temporary_settings picture findings render_settings preferences datablocks storage targets hold causes "
-        "pose camera own_picture scenes rendering"
+        "pose conversion camera own_picture scenes rendering"
     ),
     "jobs": "versions temporary_settings opening datablocks camera resolution scenes rendering",
 }

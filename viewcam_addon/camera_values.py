@@ -29,7 +29,7 @@ CANONICAL, HOLD = "CANONICAL", "HOLD"
 
 @dataclass(frozen=True)
 class CameraValues:
-    """What an artist or a script says of a camera, in float64 where that is known. Points and up in world space.
+    """The values that an artist or a script gives a camera, in float64 where that is known. Points and up in world space.
 
     eye, look_at : a followed point is where its target stands. distance : pixels of the picture at 100 %, without zoom.
     enabled : whether they place the camera.
@@ -122,11 +122,11 @@ class CameraValues:
         return replace(self, view_when_set=(self.eye, self.look_at, self.up))
 
     def counted_anew(self, frame: Frame, sensor_fit: str) -> "CameraValues":
-        """The same camera with its distance in the pixels of the picture of `frame`."""
+        """This camera with its distance in the pixels of the picture of `frame`."""
         return replace(self, distance=self.growth(frame, sensor_fit) * self.distance, counted_in=without_border(frame))
 
     def seeing(self, distance: float, frame: Frame, sensor_fit: str) -> "CameraValues":
-        """The same view by another lens; the zoom stays. distance : the effective one in the picture of `frame` at 100 %."""
+        """This view by another lens; the zoom stays. distance : the effective one in the picture of `frame` at 100 %."""
         return replace(self, distance=distance / self.growth(frame, sensor_fit) / self.zoom)
 
     def moved_to(
@@ -176,11 +176,11 @@ class CameraValues:
 
 
 def without_border(frame: Frame) -> Frame:
-    """What values tell of a picture: resolution, percentage and pixel aspect."""
+    """The parts of a frame that values tell: resolution, percentage and pixel aspect."""
     return frame if frame.border is None and not frame.crop else replace(frame, border=None, crop=False)
 
 
 def _can_divide(zoom: float, distance: float) -> bool:
-    """Whether a zoom is a factor above 0 that leaves of the distance a number which Blender stores with all its digits."""
+    """True if a zoom is a factor above 0 that leaves of the distance a number which Blender stores with all its digits."""
     float32 = np.finfo(np.float32)
     return 0 < zoom < math.inf and float(float32.tiny) <= distance / zoom <= float(float32.max)

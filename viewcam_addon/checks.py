@@ -1,4 +1,4 @@
-"""What a number must be before anyone computes with it: the one place where hostile input becomes a sentence.
+"""Checks of numbers before anyone computes with them: the one place where hostile input becomes a sentence.
 
 A number is real and finite: no text, no truth value, no complex or masked one, whatever `float()` would make of it. NumPy's
 scalars, arrays without axes and fractions are numbers. Everything below raises InputError with the name that it is given.

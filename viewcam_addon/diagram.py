@@ -1,4 +1,4 @@
-"""What the text's figure draws of a pinhole: view plane, pixels, pyramid, axes, up and the line to the look-at point.
+"""The lines of the text's figure of a pinhole: view plane, pixels, pyramid, axes, up and the line to the look-at point.
 
 All of it is relative to the eye, so that a drawing in float32 keeps its shape far from the origin. Pixels have no length in the
 world: the view plane is drawn at a share of the way to the look-at point, where its rectangle covers what the picture shows.
@@ -42,7 +42,7 @@ class Diagram:
     up: Array
 
     def is_drawable(self) -> bool:
-        """Whether float32 holds it, squared. A d of 1e-30 puts the picture's corners beyond everything."""
+        """True if float32 holds it, squared. A d of 1e-30 puts the picture's corners beyond everything."""
         parts = (self.plane, self.grid, self.pyramid, self.view, self.axes, self.up)
         return all(bool((np.abs(part) < 1e18).all()) for part in parts)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 
 class InputError(ValueError):
-    """What was given can't be used. The message is one sentence: what is wrong (object, key, value), what to do."""
+    """An error of input that can't be used. The message is one sentence: what is wrong (object, key, value), what to do."""
 
     exit_status = 2
 
@@ -26,7 +26,7 @@ class NotModelledError(InputError):
 
 
 def told(error: Exception) -> str:
-    """What a user is told of any error, in one sentence or, of a list of shots, in a list of them."""
+    """The message of any error for a user, in one sentence or, of a list of shots, in a list of them."""
     return str(error) if isinstance(error, InputError) else bug(error)
 
 

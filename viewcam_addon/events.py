@@ -1,4 +1,4 @@
-"""What a command tells while it runs: errors as sentences, a bar on a terminal, or a line of JSON for each event.
+"""Events that a command tells while it runs: errors as sentences, a bar on a terminal, or a line of JSON for each event.
 
 An event is a name and fields. Of every command are told `started` (command, words), `message` (text: a line that it would have
 printed), `error` (command, text, and `problems` where there are several), `note` (command, text: how something was taken, or
@@ -43,7 +43,7 @@ class Sentences:
 
 
 class Bar(Sentences):
-    """The same, above a bar of a batch's shots or of the rows of a picture."""
+    """Sentences above a bar of a batch's shots or of the rows of a picture."""
 
     def __init__(self, stream: TextIO) -> None:
         super().__init__(stream)
@@ -152,7 +152,7 @@ def _tqdm() -> type | None:
 
 
 def _sentence(event: str, fields: dict[str, Any]) -> str:
-    """What is to be said of an event where nobody reads JSON, plain; mostly nothing."""
+    """The sentence of an event where nobody reads JSON, plain; mostly none."""
     if event == "error":
         command = f"viewcam {fields['command']}".rstrip()  # none where there is no such command
         lines = fields["text"].split("\n") if fields.get("problems") else [fields["text"]]

@@ -149,7 +149,7 @@ def largest_component(a: Vector) -> Number:
 
 
 def are_factors(vector: Vector, scaled: Vector) -> bool | NDArray[np.bool_]:
-    """Whether every component of `scaled`, which was `vector` before, is 0 or large enough for `cross`."""
+    """True where every component of `scaled`, which was `vector` before, is 0 or large enough for `cross`."""
     x, y, z = ((before == 0) | (abs(after) >= SMALLEST_FACTOR) for before, after in zip(vector, scaled, strict=True))
     return x & y & z
 

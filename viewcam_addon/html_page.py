@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def lacking() -> str | None:
-    """What pages need and is not here, as a sentence."""
+    """The package that pages need and is not here, as a sentence."""
     if importlib.util.find_spec("jinja2") is None:
         return "HTML pages need Jinja2: install the extension from its zip, or pip install Jinja2"
     return None

@@ -98,7 +98,7 @@ SETTINGS = {name: each.setting for name, each in _RENDERED.items() if each.setti
 
 GEOMETRY_PASSES = tuple(_GEOMETRY)
 LIGHT_PASSES = tuple(_LIGHT)
-"""What a picture shows: where things are, and what light comes from them."""
+"""The two kinds of passes of a picture: where things are, and what light comes from them."""
 
 BACKGROUND_DEPTH = 1e10
 """The Depth pass where there is nothing: Cycles' value."""
@@ -232,7 +232,7 @@ def _pixels(path: Path) -> tuple[dict[str, NDArray[Any]], Pinhole | None, dict[s
 
 @dataclass(frozen=True)
 class FrameSize:
-    """What the pixels of a file are, by its header alone. size : width and height. aspect : of a pixel, width over height."""
+    """The size of a file's pixels, by its header alone. size : width and height. aspect : of a pixel, width over height."""
 
     size: tuple[int, int]
     aspect: float

@@ -202,7 +202,7 @@ def growth(sensor_fit: str, before: Frame, after: Frame) -> float:
 
 
 def lens_in(unit: str, distance: float, frame: Frame, sensor: tuple[float, float], sensor_fit: str) -> float:
-    """What a distance is as a lens, in one of LENS_UNITS: millimeters, or an angle in radians of the whole picture, unshifted.
+    """The lens that a distance is, in one of LENS_UNITS: millimeters, or an angle in radians of the whole picture, unshifted.
 
     distance : pixels of the picture of `frame` at 100 %. sensor : width and height in mm.
     """
@@ -233,7 +233,7 @@ def distance_by_lens(unit: str, value: float, frame: Frame, sensor: tuple[float,
 
 
 def _scale(unit: str, frame: Frame, sensor: tuple[float, float], sensor_fit: str) -> float:
-    """What a distance of one pixel is: in the unit of a length, or for an angle as a part of the picture's side."""
+    """The lens of a distance of one pixel: in the unit of a length, or for an angle as a part of the picture's side."""
     whole = replace(frame, percentage=100)
     if unit == "PIXELS":
         return 1.0
@@ -257,7 +257,8 @@ def own_sensor(current: tuple[float, float], before: tuple[float, float]) -> tup
 
 
 def lens_and_sensor(data: CameraData, own: tuple[float, float]) -> dict[str, float | tuple[float, float]]:
-    """What Blender is to store, by its names: lens and sensor, and beside them the artist's own sensor if it had to grow."""
+    """The values that Blender is to store, by its names: lens and sensor, and beside them the artist's own sensor if it had to
+    grow."""
     before = own if data.sensor_width != own[0] else (0.0, 0.0)
     found = {name: getattr(data, name) for name in ("lens", "sensor_width", "sensor_height")}
     return found | {"virtual_pinhole_sensor": before}

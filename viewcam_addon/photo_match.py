@@ -386,7 +386,7 @@ def _pose_of_a_plane(points: Array, pixels: Array) -> tuple[Array, Array, Array]
 
 
 def _pose_in_space(points: Array, pixels: Array) -> tuple[Array, Array, Array]:
-    """The same of points in space, from the direct linear transform."""
+    """The pose from points in space, from the direct linear transform."""
     matrix = _null(_direct_rows(points, pixels)).reshape(*points.shape[:-2], 3, 4)
     ones = np.ones((*points.shape[:-1], 1))
     behind = np.einsum("...j,...nj->...n", matrix[..., 2, :], np.concatenate([points, ones], axis=-1)).sum(axis=-1) < 0.0

@@ -200,7 +200,7 @@ class Pinhole:
 
     @property
     def is_singular(self) -> bool:
-        """Whether the view is exactly parallel to up, so that the axes are the canonical ones."""
+        """True if the view is exactly parallel to up, so that the axes are the canonical ones."""
         return not any(self._view[1][0])
 
     @property
@@ -319,7 +319,7 @@ class Pinhole:
         return (half + self.principal_point[axis] / 2) * 2
 
     def resized(self, width: int, height: int) -> "Pinhole":
-        """The same picture in another number of pixels."""
+        """This camera with its picture in another number of pixels."""
         scale_x, scale_y = checks.whole("width", width) / self.width, checks.whole("height", height) / self.height
         return replace(
             self,
@@ -450,7 +450,7 @@ def _view(e: tuple, l: tuple, up: tuple) -> tuple[tuple, Pair, Pair, bool | Arra
 
 
 def _is_moderate(e: tuple, l: tuple) -> bool | Array:
-    """Whether e − l can't overflow."""
+    """True where e − l can't overflow."""
     return (exact.largest_component(e) < exact.LARGEST_PART) & (exact.largest_component(l) < exact.LARGEST_PART)
 
 

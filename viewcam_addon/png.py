@@ -42,7 +42,7 @@ def encoded(pixels: NDArray[np.uint8] | NDArray[np.uint16], palette: bytes | Non
 
 
 def is_whole(path: str | os.PathLike[str]) -> bool:
-    """Whether the file has all of its chunks."""
+    """True if the file has all of its chunks."""
     try:
         content = Path(path).read_bytes()
     except OSError:

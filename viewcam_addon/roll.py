@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 
 def turned(pinhole: Pinhole, angle: float) -> Pinhole:
-    """The same view with its picture turned by `angle` radians, from u towards v; at 0 the very same up.
+    """A pinhole with its picture turned by `angle` radians, from u towards v; at 0 with the very same up.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def angle_from(up: Triple, pinhole: Pinhole) -> float:
 
 
 def rolled(pinhole: Pinhole, up: Triple, angle: float) -> Pinhole:
-    """The same view with its picture turned by `angle` radians from what another up gives: the way back from `angle_from`.
+    """A pinhole with its picture turned by `angle` radians from what another up gives: the way back from `angle_from`.
 
     At 0 its up is that very one, unless the view is parallel to it: then v, which gives the same picture for certain.
 
@@ -74,7 +74,7 @@ def rolled(pinhole: Pinhole, up: Triple, angle: float) -> Pinhole:
 
 
 def steps(eye: ArrayLike, look_at: ArrayLike, up: ArrayLike, within: float) -> tuple[Array, NDArray[np.bool_]]:
-    """What carrying the axes along does to the roll, from each of n poses to the next.
+    """The change of the roll by carrying the axes along, from each of n poses to the next.
 
     eye, look_at, up : (n, 3) float64, world space. within : radians, how near to up or its opposite a step counts as near.
 
@@ -114,7 +114,7 @@ def _rotated(vectors: Array, start: Array, end: Array) -> Array:
 
 
 def _passes_near(start: Array, end: Array, pole: Array, within: float) -> NDArray[np.bool_]:
-    """Whether the arcs from `start` to `end` come within an angle of ±`pole`; unit vectors, (n, 3) each."""
+    """True where the arcs from `start` to `end` come within an angle of ±`pole`; unit vectors, (n, 3) each."""
     cosine, at_start, at_end = _dot(start, end), _dot(start, pole), _dot(end, pole)
     # The great circle's nearest point to the pole is a sum of both ends. It lies on the arc if their shares have one sign, and
     # being such a sum, rounding can't put it elsewhere, however short the arc is.

@@ -111,7 +111,7 @@ def axis_angle(rotation: Array) -> tuple[float, float, float, float]:
 
 
 def numbers(rotation: Array, mode: str, before: Sequence[float] | None = None) -> tuple[float, ...]:
-    """What a rotation is in one of Blender's modes: an order of Euler angles, "QUATERNION" or "AXIS_ANGLE".
+    """The numbers of a rotation in one of Blender's modes: an order of Euler angles, "QUATERNION" or "AXIS_ANGLE".
 
     before : the numbers of another rotation. Those nearest to them are given then, so that what is interpolated between the two
         neither flips nor takes the long way round: the other triple of Euler angles, the quaternion of the other sign, the
@@ -176,13 +176,13 @@ def float64(numbers: Iterable) -> Array:
 
 
 def mirrors(matrix: Iterable) -> bool:
-    """Whether a (4, 4) matrix of float32 numbers mirrors; one that is not finite does nothing."""
+    """True if a (4, 4) matrix of float32 numbers mirrors; one that is not finite does nothing."""
     (a, b, c, _), (d, e, f, _), (g, h, i, _), _ = matrix
     return -math.inf < a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g) < 0
 
 
 def has_inverse(matrix: Array) -> bool:
-    """Whether a matrix is finite and not singular."""
+    """True if a matrix is finite and not singular."""
     return bool(np.isfinite(matrix).all() and np.linalg.det(matrix) != 0)
 
 

@@ -7,11 +7,34 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import findings
+from viewcam_addon.pinhole import Pinhole
 
 
 def pose(camera_object):
     bpy.context.view_layer.update()
     return [tuple(row) for row in camera_object.matrix_world], camera_object.data.lens
+
+
+def test_adopting_keeps_the_digits_of_values_that_the_camera_has(posed_camera, scene):
+    posed_camera.virtual_pinhole.look_at = (0.1, 0.2, 0.3)
+    before = posed_camera.virtual_pinhole.numbers()
+    cameras.adopt(posed_camera, scene)
+    assert posed_camera.virtual_pinhole.numbers() == before
+
+
+def test_no_number_that_is_nothing_but_rounding_is_shown_as_minus_zero(camera_object, scene):
+    """Such a remainder is kept where it is known, and the field shows 0."""
+    pinhole = Pinhole((7, -1e-9, -0.0), (0, 3e-8, -1e-10), (-4.4e-8, 0, 1), 1000.0, 1920, 1080)
+    cameras.apply(camera_object, pinhole, scene)
+    group = camera_object.virtual_pinhole
+    shown = [*group.eye, *group.up]
+    assert [math.copysign(1, number) for number in shown if number == 0] == [1, 1, 1, 1]
+    assert cameras.stated(camera_object, scene) == pinhole
+    camera_object.rotation_euler = (math.pi / 2, 0, math.pi)
+    bpy.context.view_layer.update()
+    cameras.adopt(camera_object, scene)
+    for number in (*group.eye, *group.look_at, *group.up):
+        assert number == 0 or abs(number) > 1e-6, f"{number} is shown as a zero with a sign"
 
 
 @pytest.mark.parametrize("seed", range(10))

@@ -5,8 +5,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender import animation, findings
 from viewcam_addon.blender import camera as cameras
+from viewcam_addon.blender import datablocks, findings
 
 
 @pytest.fixture
@@ -106,7 +106,7 @@ def test_a_camera_whose_values_stand_still_is_left_to_its_artist(posed_camera, s
     posed_camera.location = (1, 1, 1)
     scene.frame_set(5)
     assert tuple(posed_camera.location) == (1, 1, 1)
-    assert not animation.is_animated(posed_camera)
+    assert not datablocks.is_animated(posed_camera)
 
 
 def test_a_camera_that_is_not_enabled_is_left_alone(flying_camera, scene):

@@ -46,15 +46,19 @@ def test_far_from_the_origin_more_is_rounding():
     assert differences(WANTED, found, reach=1e5) == {}
 
 
+def told(differing, causes):
+    return [finding.sentence for finding in explain(differing, causes)]
+
+
 def test_only_a_suspect_that_acts_on_a_difference_is_blamed():
     track = Cause("The constraint 'Track' moves 'Camera'", POSE, "disable it")
     driver = Cause("A driver sets 'lens'", frozenset({DISTANCE}), "remove it")
-    found = explain({VIEW: "the view is turned by 3°"}, [track, driver])
+    found = told({VIEW: "the view is turned by 3°"}, [track, driver])
     assert found == ["The constraint 'Track' moves 'Camera', the view is turned by 3°: disable it"]
 
 
 def test_a_difference_that_nobody_explains_is_told_with_what_to_do():
-    (eye, lens, shift) = explain({EYE: "the eye is 1 away", DISTANCE: "d is 5", CENTRE: "off"}, [])
+    (eye, lens, shift) = told({EYE: "the eye is 1 away", DISTANCE: "d is 5", CENTRE: "off"}, [])
     assert "moved since, the eye is 1 away" in eye
     assert "lens" in lens
     assert "shift" in shift
@@ -63,5 +67,5 @@ def test_a_difference_that_nobody_explains_is_told_with_what_to_do():
 
 def test_what_will_act_later_is_told_though_nothing_differs():
     later = Cause("'lens' is animated", frozenset({DISTANCE}), "animate the four values instead", always=True)
-    assert explain({}, [later]) == ["'lens' is animated: animate the four values instead"]
-    assert explain({}, [Cause("The constraint", POSE, "disable it")]) == []
+    assert told({}, [later]) == ["'lens' is animated: animate the four values instead"]
+    assert told({}, [Cause("The constraint", POSE, "disable it")]) == []

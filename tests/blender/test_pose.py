@@ -8,7 +8,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon import rotation
-from viewcam_addon.blender import camera as cameras
+from viewcam_addon.blender import conversion
 from viewcam_addon.pinhole import Pinhole
 
 MODES = ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX", "QUATERNION", "AXIS_ANGLE"]
@@ -66,7 +66,7 @@ KINDS = [random_poses, poses_close_to_up, poses_in_gimbal_lock]
 
 def check(camera_object, scene, poses, limit=LARGEST_ROLL):
     for pinhole in poses:
-        cameras.place(camera_object, pinhole, scene, bpy.context.evaluated_depsgraph_get())
+        conversion.place(camera_object, pinhole, scene, bpy.context.evaluated_depsgraph_get())
         error = roll_error(camera_object, pinhole)
         assert error <= limit, f"{camera_object.rotation_mode}: {error:.2e} rad for {pinhole}"
 
@@ -150,6 +150,6 @@ def test_a_rotation_that_plain_rounding_spoils_is_stored_well(camera_object, sce
 def test_a_roll_that_is_off_is_seen(camera_object, scene, roll):
     pinhole = next(random_poses(np.random.default_rng(5), 1))
     u, v, _ = pinhole.basis()
-    cameras.place(camera_object, pinhole, scene, bpy.context.evaluated_depsgraph_get())
+    conversion.place(camera_object, pinhole, scene, bpy.context.evaluated_depsgraph_get())
     other = looking(pinhole.eye, pinhole.look_at, math.cos(roll) * v + math.sin(roll) * u)
     assert abs(roll_error(camera_object, other) - roll) <= LARGEST_ROLL

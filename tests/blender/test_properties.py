@@ -8,6 +8,7 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import findings, preferences
+from viewcam_addon.blender.interface import panel
 from viewcam_addon.errors import InputError
 from viewcam_addon.pinhole import Pinhole
 
@@ -28,6 +29,53 @@ def test_enabling_for_the_first_time_moves_nothing(camera_object):
     camera_object.virtual_pinhole.enabled = True
     assert pose(camera_object) == before
     assert tuple(camera_object.virtual_pinhole.eye) == (3, -4, 2)
+
+
+@pytest.mark.parametrize("times", [1, 3])
+def test_enabling_again_reads_the_values_off_the_camera_each_time(posed_camera, times):
+    group = posed_camera.virtual_pinhole
+    for i in range(times):
+        group.enabled = False
+        posed_camera.location, posed_camera.rotation_euler, posed_camera.data.lens = (3, -4, i), (1.2, 0.3, i), 35 + i
+        before = pose(posed_camera)
+        group.enabled = True
+        assert pose(posed_camera) == before, f"the {i + 1}th time"
+        assert tuple(group.eye) == (3, -4, i) and group.distance == pytest.approx((35 + i) * 1920 / 36)
+
+
+def test_enabling_again_a_camera_that_has_not_moved_keeps_every_digit(posed_camera):
+    group = posed_camera.virtual_pinhole
+    group.eye = (7.1, -6, 5)
+    before = group.exact, tuple(group.eye), tuple(group.look_at), tuple(group.up), group.distance
+    group.enabled = False
+    group.enabled = True
+    assert (group.exact, tuple(group.eye), tuple(group.look_at), tuple(group.up), group.distance) == before
+
+
+def test_what_is_stated_while_the_values_are_off_counts_and_the_rest_is_read_off_the_camera(posed_camera):
+    group = posed_camera.virtual_pinhole
+    group.enabled = False
+    posed_camera.location, posed_camera.data.lens = (3, -4, 2), 35
+    group.look_at = (0, 0, 0)
+    group.enabled = True
+    bpy.context.view_layer.update()
+    assert tuple(group.eye) == (3, -4, 2) and group.distance == pytest.approx(35 * 1920 / 36)
+    w = np.array((3, -4, 2)) / math.sqrt(29)
+    np.testing.assert_allclose(axes(posed_camera)[:, 2], w, atol=findings.LARGEST_TURN)
+
+
+def test_a_camera_that_is_no_pinhole_can_not_be_enabled_and_the_reason_stays_the_same(camera_object, scene, empty):
+    camera_object.parent = empty("Stretched", (1, 2, 3), rotation_euler=(0.1, 0.2, 0.3), scale=(1, 1, 3))
+    camera_object.rotation_euler = (1, 0.5, 0.2)
+    bpy.context.view_layer.update()
+    before = [notice.sentence for notice in panel.notices(camera_object, scene)]
+    assert before == [
+        "Camera 'Camera' is oblique, its parent 'Stretched' is scaled non-uniformly: apply the scale of 'Stretched'"
+    ]
+    camera_object.virtual_pinhole.enabled = True
+    bpy.context.view_layer.update()
+    assert not camera_object.virtual_pinhole.enabled
+    assert [notice.sentence for notice in panel.notices(camera_object, scene)] == before
 
 
 def test_values_that_were_stated_before_enabling_are_applied(camera_object):

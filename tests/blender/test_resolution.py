@@ -24,7 +24,8 @@ def change(scene, picture):
 
 
 def warnings(camera_object, scene):
-    return cameras.check(camera_object, cameras.stated(camera_object, scene), scene)
+    found = cameras.check(camera_object, cameras.stated(camera_object, scene), scene)
+    return [finding.sentence for finding in found]
 
 
 @pytest.fixture

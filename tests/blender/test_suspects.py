@@ -5,15 +5,21 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as cameras
+from viewcam_addon.pinhole import Pinhole
 
 
 def findings_after_setting(camera_object, scene):
     return cameras.apply(camera_object, cameras.stated(camera_object, scene), scene)
 
 
+def findings_after_moving(camera_object, scene):
+    """What is told of a camera that is set elsewhere; the values follow afterwards."""
+    return cameras.apply(camera_object, Pinhole((7, -6, 5), (0, 0, 1), (0, 0, 1), 1500, 1920, 1080), scene)
+
+
 def findings_later(camera_object, scene):
     bpy.context.view_layer.update()
-    return cameras.check(camera_object, cameras.stated(camera_object, scene), scene)
+    return [finding.sentence for finding in cameras.check(camera_object, cameras.stated(camera_object, scene), scene)]
 
 
 def add_empty(scene, name, location=(0, 0, 0)):
@@ -31,7 +37,7 @@ def test_a_camera_that_nothing_disturbs_has_no_findings(posed_camera, scene):
 def test_a_constraint_is_named(posed_camera, scene):
     constraint = posed_camera.constraints.new("TRACK_TO")
     constraint.target, constraint.name = add_empty(scene, "Target", (5, 5, 5)), "Watch the target"
-    (finding,) = findings_after_setting(posed_camera, scene)
+    (finding,) = findings_after_moving(posed_camera, scene)
     assert finding.startswith("The constraint 'Watch the target' moves 'Camera', the view is turned by ")
 
 
@@ -46,36 +52,51 @@ def test_a_constraint_that_does_nothing_is_not_accused(posed_camera, scene, how)
 
 def test_a_driver_on_the_location_is_named(posed_camera, scene):
     posed_camera.driver_add("location", 0).driver.expression = "1.0 + 1.0"
-    (finding,) = findings_after_setting(posed_camera, scene)
+    (finding,) = findings_after_moving(posed_camera, scene)
     assert finding.startswith("A driver sets the location of 'Camera', the eye is 5 m away")
 
 
 def test_a_driver_on_the_lens_is_named(posed_camera, scene):
     posed_camera.data.driver_add("lens").driver.expression = "20.0 + 1.0"
-    (finding,) = findings_after_setting(posed_camera, scene)
+    (finding,) = findings_after_moving(posed_camera, scene)
     assert finding.startswith("A driver sets the focal length of 'Camera', the view plane is 1120 px away and not 1500")
 
 
-def test_a_keyframe_on_the_location_is_named_before_it_acts(posed_camera, scene):
-    posed_camera.keyframe_insert("location", frame=1)
+@pytest.mark.parametrize(
+    ("path", "value", "words"),
+    [("location", "eye", "location"), ("rotation_euler", "look_at", "rotation"), ("scale", "up", "scale")],
+)
+def test_keyframes_of_what_the_values_keyframes_decide_are_named(posed_camera, scene, path, value, words):
+    posed_camera.keyframe_insert(path, frame=1)
+    assert findings_after_setting(posed_camera, scene) == [], "the values follow them"
+    posed_camera.virtual_pinhole.keyframe_insert(value, frame=1)
     (finding,) = findings_after_setting(posed_camera, scene)
-    assert finding.startswith("Keyframes set the location of 'Camera', and in a render they win over the four values")
+    assert finding.startswith(f"Keyframes set the {words} of 'Camera', and in a render they win over the four values")
 
 
-def test_a_keyframe_on_the_lens_is_named_when_it_has_acted(posed_camera, scene):
+def test_keyframes_of_the_lens_are_named_beside_those_of_the_distance_and_not_of_the_eye(posed_camera, scene):
+    posed_camera.data.keyframe_insert("lens", frame=1)
+    posed_camera.virtual_pinhole.keyframe_insert("eye", frame=1)
+    assert findings_after_setting(posed_camera, scene) == []
+    posed_camera.virtual_pinhole.keyframe_insert("zoom", frame=1)
+    (finding,) = findings_after_setting(posed_camera, scene)
+    assert "Keyframes set the focal length of 'Camera'" in finding
+
+
+def test_the_values_follow_keyframes_of_the_lens(posed_camera, scene):
     posed_camera.data.keyframe_insert("lens", frame=1)
     posed_camera.virtual_pinhole.distance = 3000.0
     scene.frame_set(2)
-    (finding,) = findings_later(posed_camera, scene)
-    assert "Keyframes set the focal length of 'Camera'" in finding
-    assert posed_camera.virtual_pinhole.distance == 1500, "the values follow the keyframes"
+    assert findings_later(posed_camera, scene) == []
+    assert posed_camera.virtual_pinhole.distance == 1500
 
 
-def test_a_keyframe_in_the_nla_is_named(posed_camera, scene):
+def test_keyframes_in_the_nla_are_named(posed_camera, scene):
     posed_camera.keyframe_insert("rotation_euler", frame=1)
     data = posed_camera.animation_data
     data.nla_tracks.new().strips.new("Strip", 1, data.action)
     data.action = None
+    posed_camera.virtual_pinhole.keyframe_insert("look_at", frame=1)
     (finding,) = findings_after_setting(posed_camera, scene)
     assert finding.startswith("Keyframes set the rotation of 'Camera'")
 

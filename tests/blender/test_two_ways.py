@@ -176,15 +176,25 @@ def test_where_the_eye_follows_an_object_a_move_comes_back_and_a_turn_stays(pose
     assert differences(posed_camera, scene) == {}
 
 
-def test_what_a_constraint_or_a_driver_sets_is_not_adopted(posed_camera, scene):
+def test_the_values_follow_what_a_constraint_or_a_driver_sets(posed_camera, scene):
+    constraint = posed_camera.constraints.new("LIMIT_LOCATION")
+    constraint.use_min_x, constraint.min_x = True, 9
+    update()
+    assert tuple(posed_camera.virtual_pinhole.eye) == (9, -6, 5)
+    posed_camera.data.driver_add("lens").driver.expression = "20.0 + 1.0"
+    scene.frame_set(2)
+    assert posed_camera.virtual_pinhole.distance == pytest.approx(21 * 1920 / 36)
+    assert differences(posed_camera, scene) == {}
+
+
+def test_where_the_eye_is_keyed_and_constrained_alike_the_values_stay_and_the_constraint_is_named(posed_camera, scene):
+    posed_camera.virtual_pinhole.keyframe_insert("eye", frame=1)
     constraint = posed_camera.constraints.new("LIMIT_LOCATION")
     constraint.use_min_x, constraint.min_x = True, 9
     update()
     assert tuple(posed_camera.virtual_pinhole.eye) == (7, -6, 5)
-    posed_camera.data.driver_add("lens").driver.expression = "20.0 + 1.0"
-    scene.frame_set(2)
-    assert posed_camera.virtual_pinhole.distance == 1500
-    assert {"eye", "distance"} <= differences(posed_camera, scene).keys()
+    (notice,) = panel.notices(posed_camera, scene)
+    assert notice.sentence.startswith("The constraint 'Limit Location' moves 'Camera', the eye is 2 m away")
 
 
 def test_a_roll_that_is_held_takes_a_turn_about_the_view(posed_camera, scene):

@@ -6,12 +6,12 @@ the tag the camera's other animated channels would stay at the last frame. Drive
 well. Rejected: `frame_change_pre` and `depsgraph_update_post` alone (the camera stands still in a render), writing to evaluated
 copies (children do not follow), drivers (without the add-on the camera falls to the origin).
 
-Only the cameras that Blender has just evaluated are looked at, of whichever scene, so that the others cost nothing. Cameras
-whose values are not animated are left alone: their artist may have moved them.
+Only the cameras that Blender has just evaluated are looked at, of whichever scene, so that the others cost nothing.
 """
 
 import contextlib
 import sys
+from collections.abc import Iterator
 
 import bpy
 from bpy.app.handlers import persistent
@@ -19,53 +19,45 @@ from bpy.app.handlers import persistent
 from ..errors import InputError
 from ..terminal import plain
 from . import camera as cameras
-from . import resolution, storage, targets, versions
-from .datablocks import is_animated
+from . import datablocks, resolution, storage, targets
+from .camera import CameraSync
 
 
 @persistent
 def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
     depsgraph = depsgraph or bpy.context.evaluated_depsgraph_get()
     targets.forget_shapes(depsgraph)
-    for block in [update.id.original for update in depsgraph.updates]:
-        if _is_camera(block) and is_animated(block):
-            _follow(block, scene, depsgraph)
-        elif _is_camera(block) and depsgraph.mode != "RENDER":
-            _adopt_move(block, scene, depsgraph)
+    for block in _evaluated_cameras(depsgraph):
+        if not resolution.is_paused or datablocks.is_animated(block):
+            _at_frame(block, scene, depsgraph)
     resolution.on_frame_change(scene, depsgraph)
 
 
 @persistent
 def on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """Values with a driver or a target change between frames too, as what they depend on is moved.
-
-    Blender evaluates what this sets without calling it again, so that a constraint in the way makes no endless loop.
-    """
+    """Blender evaluates what this sets without calling it again, so that a constraint in the way makes no endless loop."""
     targets.forget_shapes(depsgraph)
     if depsgraph.id_type_updated("SCENE"):
         resolution.follow(scene)
-    for block in [update.id.original for update in depsgraph.updates]:
-        if _is_camera(block):
-            is_driven = bool(block.animation_data) and _is_driven(block)
-            is_moved = False
-            if cameras.is_untouched(block, by_values=is_driven):
-                cameras.end_move(block)
-            else:
-                is_moved = _adopt_move(block, scene, depsgraph)
-            if is_driven and not is_moved:
-                _follow(block, scene, depsgraph)
+    for block in _evaluated_cameras(depsgraph):
+        if not resolution.is_paused:
+            with _errors_told(block, scene):
+                CameraSync.of(block).updated(scene, depsgraph)
+        elif datablocks.has_driven_values(block):
+            _at_frame(block, scene, depsgraph)
 
 
 @persistent
 def on_load(_path: str, _more: object = None) -> None:
     """Targets may have moved where the add-on was not, and Blender does not save the drivers of an override's own targets."""
     targets.forget_shapes()
+    cameras.forget_all()
     scene = bpy.context.scene
     watching = [each for each in scene.objects if each.type == "CAMERA" and targets.names(each)]
     for camera_object in watching:
         targets.connect(camera_object)
     for camera_object in watching:
-        _follow(camera_object, scene, bpy.context.evaluated_depsgraph_get())
+        _at_frame(camera_object, scene, bpy.context.evaluated_depsgraph_get())
 
 
 @persistent
@@ -73,8 +65,8 @@ def on_undo(_scene: bpy.types.Scene, _more: object = None) -> None:
     """Undo may bring back a camera's channels and not evaluate them, so that its values would follow where it was before."""
     targets.forget_shapes()
     for block in bpy.data.objects:
-        if _is_camera(block) and not cameras.is_untouched(block, by_values=False):
-            cameras.forget(block)
+        if _is_camera(block) and not CameraSync.of(block).is_untouched(by_values=False):
+            CameraSync.of(block).forget()
             block.update_tag(refresh={"OBJECT", "DATA"})
 
 
@@ -82,34 +74,24 @@ def _is_camera(block: bpy.types.ID) -> bool:
     return isinstance(block, bpy.types.Object) and block.type == "CAMERA" and storage.is_enabled(block)
 
 
-def _adopt_move(camera_object: bpy.types.Object, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> bool:
-    if resolution.is_paused or cameras.is_being_set(camera_object):
-        return False
-    with contextlib.suppress(InputError):  # the panel finds the same error and shows it
-        return cameras.adopt_move(camera_object, scene, depsgraph)
-    return False
+def _evaluated_cameras(depsgraph: bpy.types.Depsgraph) -> list[bpy.types.Object]:
+    """The enabled cameras, originals, that Blender has just evaluated and that nobody is about to set."""
+    blocks = [update.id.original for update in depsgraph.updates]
+    return [block for block in blocks if _is_camera(block) and not CameraSync.of(block).is_being_set]
 
 
-def _is_driven(camera_object: bpy.types.Object) -> bool:
-    return any(curve.data_path.startswith("virtual_pinhole.") for curve in versions.drivers(camera_object))
+def _at_frame(camera_object: bpy.types.Object, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    with _errors_told(camera_object, scene):
+        CameraSync.of(camera_object).at_frame(scene, depsgraph)
 
 
-def _follow(camera_object: bpy.types.Object, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    evaluated = camera_object.evaluated_get(depsgraph)
-    if not evaluated.is_evaluated or not storage.is_enabled(evaluated):
-        return
+@contextlib.contextmanager
+def _errors_told(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[None]:
+    """An error of a camera that goes on as it is, in the console: the panel shows it of the one that it is about alone."""
     try:
-        cameras.place(camera_object, cameras.stated(evaluated, scene), scene, depsgraph)
+        yield
     except InputError as error:
         print(plain(f"viewcam: frame {scene.frame_current}: {camera_object.name}: {error}"), file=sys.stderr)
-        return
-    if depsgraph.mode == "RENDER":
-        camera_object.update_tag(refresh={"OBJECT", "DATA", "TIME"})
-        camera_object.data.update_tag(refresh={"TIME"})
-    else:
-        targets.connect(camera_object)  # one that was removed from the file leaves its driver
-        targets.mirror(camera_object, evaluated)
-        cameras.agree(camera_object)
 
 
 def register() -> None:
@@ -124,7 +106,7 @@ def unregister() -> None:
     bpy.app.handlers.redo_post.remove(on_undo)
     bpy.app.handlers.undo_post.remove(on_undo)
     bpy.app.handlers.load_post.remove(on_load)
-    cameras.forget()
+    cameras.forget_all()
     targets.forget_shapes()
     bpy.app.handlers.depsgraph_update_post.remove(on_update)
     bpy.app.handlers.frame_change_post.remove(on_frame_change)

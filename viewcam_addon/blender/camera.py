@@ -1,29 +1,30 @@
-"""Blender's camera from a Pinhole, and a Pinhole from Blender's camera.
+"""A camera's four values and Blender's camera, kept together: values in, camera out; camera moved, values back.
 
-`apply` states a Pinhole on a camera object and moves the camera there; `read` says which Pinhole the camera is as Cycles
-renders it; `stated` says which Pinhole the four values of `object.virtual_pinhole` ask for, and `follow` moves the camera
-there. findings.py compares `stated` with `read`.
+`CameraSync` owns, one for each camera, what is known of it between two calls of Blender: where it was placed last, where values
+and camera were last seen to agree, and whether it is on its way. Whoever edits, moves or shows a camera calls it; it calls
+storage.py (the values as Blender keeps them) and conversion.py (Blender's camera), and nothing that is above it.
 
-**Two ways.** An edited value moves the camera at once, in its callback. So where camera and values differ when Blender has
-evaluated the camera, it was Blender that moved it, and `adopt_move` brings the values there. What differs by no more than
-float32 storage is no move: the values keep every bit, however often this is asked. Rejected: to keep in the file what was set
-last, which undo, linking and scripts would make stale.
+**Values in, camera out.** `edited` moves the camera to its values, `apply` states a Pinhole in them first. `stated` is the
+Pinhole that the values ask for, and `check` says where the camera is another.
 
-**How the pose is set.** As location and rotation, in whatever rotation mode the artist has, computed in float64 relative to the
-parent, with delta transforms taken off: within 1.6e-7 of a matrix entry, and without trouble in gimbal lock. Rejected:
-`matrix_parent_inverse` (3e-8, but the location and rotation in the sidebar would say nothing, and the camera would not be where
-its channels say), `matrix_world =` (4.9e-7; 2.5e-3 in gimbal lock; wrong by whole units under a non-uniformly scaled parent),
-`to_track_quat` (an arbitrary roll near vertical) and a TRACK_TO constraint (another object, and its own pole).
+**Camera moved, values back.** An edited value moves the camera at once, in its callback. So where camera and values differ when
+Blender has evaluated the camera, it was Blender that moved it, and `updated` brings the values there. What differs by no more
+than float32 storage is no move: the values keep every bit, however often this is asked. Rejected: to keep in the file what was
+set last, which undo, linking and scripts would make stale.
 
-**What is left alone.** The scene, always. Of the camera its sensor fit, and its sensor unless the lens would fall below
-Blender's 1 mm: then lens and sensor double together, and the artist's sensor comes back as soon as the distance allows. A
-negative scale mirrors the picture, as in Cycles; its sign changes only if the Pinhole asks for the other picture. The focus
-distance, unless the camera is told to keep it on the look-at point: that lies on the view's axis, so that |e − l| is its depth.
+**Who decides.** What is animated of the values (keyframes, drivers, targets) places its part of the camera at every frame; the
+values of all other parts follow the camera, whether a hand, keyframes, a constraint, a driver or a parent places it. So an eye
+on a path and a look-at target go together.
+
+The focus distance is left alone, unless the camera is told to keep it on the look-at point: that lies on the view's axis, so
+that |e − l| is its depth.
 """
 
 import contextlib
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import ClassVar
 
 import bpy
 import numpy as np
@@ -34,39 +35,388 @@ from .. import roll as rolls
 from ..camera_values import HOLD, CameraValues, without_border
 from ..errors import InputError
 from ..pinhole import Pinhole, Triple
-from . import causes, datablocks, findings, hold, pose, preferences, storage, targets
+from . import causes, conversion, datablocks, findings, hold, pose, preferences, storage, targets
+from .conversion import read, takes_part
+
+__all__ = [
+    "ALL",
+    "CameraSync",
+    "adopt",
+    "apply",
+    "as_it_stands",
+    "check",
+    "forget_all",
+    "lens",
+    "read",
+    "roll",
+    "simplest_up",
+    "stated",
+    "takes_part",
+]
 
 Array = NDArray[np.float64]
 
 # A turn by less is lost in the float32 matrix in which a camera is stored, and would be shown as −0°.
 _UNSEEN = 2.0**-24
 
-# What `place` was asked for lately, with the state that it left: Blender tells of each edit once more when it evaluates it, and
-# a camera that follows something would be placed where it stands already.
-_in_place: set[tuple] = set()
-_MOST_IN_PLACE = 256
-
 # The values that a camera's move can change.
 ALL = frozenset({"eye", "look_at", "up", "distance", "held_roll"})
 
 
-@dataclass(frozen=True)
-class _Agreement:
-    """A camera's state (`_state_of`) and stored values as they were last seen to agree.
+class CameraSync:
+    """One camera's state between Blender's calls. There is one for each camera: `CameraSync.of(camera_object)`.
 
-    rests : both as they were before each of the last moves since the values were edited: a move that is canceled gives the
-        values back to the bit. is_moving : whether the last update that Blender made of the camera has moved it.
+    camera_object : the original.
     """
 
-    state: tuple
-    values: CameraValues
-    rests: tuple[tuple[tuple, CameraValues], ...] = ()
-    is_moving: bool = False
+    _known: ClassVar[dict[int, "CameraSync"]] = {}  # by the camera's session_uid
+    _MOST_KNOWN = 4096
+    _MOST_RESTS = 16
+
+    def __init__(self) -> None:
+        self.camera_object: bpy.types.Object = None
+        self.is_being_set = False  # the values were edited, and the camera does not stand there yet: neither has been moved
+        # What was placed last, with the state that it left. Blender tells of each edit once more when it evaluates it, and a
+        # camera that follows something would be placed where it stands already.
+        self._placed: tuple = ()
+        # The camera's state and its stored values as they were last seen to agree; None where nobody has looked.
+        self._state: tuple | None = None
+        self._values: CameraValues | None = None
+        # Both as they were before each of the last moves since the values were edited: a move that is canceled gives the
+        # values back to the bit.
+        self._rests: tuple[tuple[tuple, CameraValues], ...] = ()
+        self._is_moving = False  # the last update that Blender made of the camera has moved it
+
+    @classmethod
+    def of(cls, camera_object: bpy.types.Object) -> "CameraSync":
+        """The one of a camera, original or evaluated."""
+        camera_object = camera_object.original
+        known = cls._known.get(camera_object.session_uid)
+        if known is None:
+            if len(cls._known) >= cls._MOST_KNOWN:
+                forget_all()
+            known = cls._known[camera_object.session_uid] = cls()
+        known.camera_object = camera_object  # Blender may have moved it in memory
+        return known
+
+    # Values in, camera out.
+
+    def apply(self, pinhole: Pinhole, scene: bpy.types.Scene) -> list[findings.Finding]:
+        """State `pinhole` in the values, enable them, move the camera there, and read it back: as the function `apply`."""
+        camera_object = self.camera_object
+        with self._being_set():
+            datablocks.check_perspective(camera_object)
+            exact = {"look_at": pinhole.look_at, "up": pinhole.up, "distance": pinhole.distance}
+            intrinsics.check_storable(camera_object.name, **exact)
+            free = _free(camera_object)
+            self._place(pinhole, scene, parts=free)
+            frame = datablocks.frame_of(scene)
+            followed = targets.names(camera_object)
+            at_full_size = pinhole.distance[0] * (frame.resolution_x / frame.size[0])
+            self.state(pinhole.eye, pinhole.look_at, pinhole.up, at_full_size, frame)
+            if followed:  # being asked where these are, Blender has brought the camera back to them
+                self._place(pinhole, scene, parts=free)
+        self._agree()
+        kept = targets.names(camera_object)
+        left = [
+            findings.Finding(f"The {words} no longer follows {name!r}") for words, name in followed.items() if words not in kept
+        ]
+        return left + check(camera_object, pinhole, scene)
+
+    def state(self, eye: Triple, look_at: Triple, up: Triple, distance: float, frame: intrinsics.Frame) -> None:
+        """Set the four values in float64 and enable them; the camera stays where it is.
+
+        distance : the effective one in the picture of `frame` at 100 %, zoom included.
+        A target that stands exactly where the point is stated stays, any other is cleared.
+        """
+        camera_object = self.camera_object
+        released = [
+            point for point, at in (("eye", eye), ("look_at", look_at)) if targets.place(camera_object, point) != tuple(at)
+        ]
+        for point in released:
+            targets.release(camera_object, point)
+        before = storage.load(camera_object)
+        if not storage.is_counted_in_earlier(camera_object, before):
+            before = replace(before, counted_in=without_border(frame))
+        said = before.stating(eye, look_at, up, distance, frame, camera_object.data.sensor_fit)
+        names = [*storage.EXACT, "counted_in", "enabled", *(["zoom"] if said.zoom != before.zoom else [])]
+        storage.store(camera_object, said, *names)
+        storage.settle(camera_object, said, frame)
+
+    def edited(self, scene: bpy.types.Scene, names: frozenset[str] = ALL) -> None:
+        """Move an enabled camera to where its values, edited or not, say; a held roll is carried along (hold.py).
+
+        names : of the values that count, wherever Blender has moved the camera since its last update; the others follow it.
+
+        Raises
+        ------
+        InputError
+            as `stated` and `apply` do. Nothing has changed then.
+        """
+        camera_object = self.camera_object
+        with self._being_set():
+            if names != ALL and self._state and self._state != conversion.state_of(camera_object):
+                with contextlib.suppress(InputError):
+                    self._adopt_move(scene, datablocks.depsgraph_of(scene), self._values, names)
+            values, wanted = _level(camera_object, scene)
+            picture = without_border(datablocks.frame_of(scene))
+            if values.pole == HOLD:
+                angle = hold.roll(camera_object, values, scene)
+                if not datablocks.is_animated(camera_object):  # in an animation the curves say what is held
+                    if before := _stood_at(camera_object, values, scene):
+                        angle = hold.after_edit(before, wanted, values.held_roll, values.hold_within)
+                    values = replace(values, held_roll=angle)
+                wanted = rolls.turned(wanted, angle)
+            self._place(wanted, scene, parts=_free(camera_object))
+            if values.pole == HOLD or not values.set_for == values.counted_in == picture:
+                storage.settle(camera_object, values.as_set(), picture)
+            self._agree()
+
+    def resized(self, scene: bpy.types.Scene) -> None:
+        """Set the lens anew, which the values ask for in the picture as the scene renders it now; the pose stays as it is.
+
+        Raises
+        ------
+        InputError
+            as `edited` does. Nothing has changed then.
+        """
+        frame = datablocks.frame_of(scene)
+        distances = targets.values(self.camera_object).distances(frame, self.camera_object.data.sensor_fit)
+        conversion.place_lens(self.camera_object, distances, scene)
+
+    def settled(self, frame: intrinsics.Frame) -> None:
+        """Take note that the lens is set for the picture of `frame`."""
+        storage.settle(self.camera_object, storage.load(self.camera_object), frame)
+
+    # Camera moved, values back.
+
+    def adopt(self, scene: bpy.types.Scene, keep: frozenset[str] = frozenset()) -> None:
+        """State the four values that make the camera as it stands, and enable them: as the function `adopt`.
+
+        keep : names of values that stay as they are; the others follow the camera.
+        """
+        camera_object = self.camera_object
+        was_in_use = storage.load(camera_object).set_for is not None and not keep
+        standing = as_it_stands(camera_object, scene, in_use=was_in_use)
+        if was_in_use and _agrees(camera_object, scene):
+            storage.enable(camera_object)
+            return
+        storage.begin(camera_object)
+        values, frame = targets.values(camera_object), datablocks.frame_of(scene)
+        eye, look_at, up = values.eye, values.look_at, values.up
+        if "eye" not in keep:
+            eye = standing.eye
+        if "look_at" not in keep:
+            look_at = standing.look_at
+        eye, look_at = _as_followed(camera_object, eye, look_at)
+        if "up" not in keep:
+            up = simplest_up(eye, look_at, read(camera_object, scene).basis()[1])
+        distance = standing.distance[0] * frame.resolution_x / frame.size[0]
+        if "distance" in keep:
+            distance = values.distance_at_full_size(frame, camera_object.data.sensor_fit)
+        self.state(eye, look_at, up, distance, frame)
+
+    def updated(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+        """Blender has evaluated an enabled camera, at no new frame: what has moved it moves the values.
+
+        Values with a driver or a target change between frames too, as what they depend on is moved.
+        """
+        camera_object = self.camera_object
+        is_driven = bool(camera_object.animation_data) and datablocks.has_driven_values(camera_object)
+        is_moved = False
+        if self.is_untouched(by_values=is_driven):
+            self._is_moving = False  # what moves it next is another move
+        else:
+            with contextlib.suppress(InputError):  # the panel finds the same error and shows it
+                is_moved = self._adopt_move(scene, depsgraph)
+        if is_driven and not is_moved:
+            self.at_frame(scene, depsgraph)
+
+    def at_frame(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+        """Blender has evaluated an enabled camera at another frame: what the values decide there places it, the rest follows.
+
+        In a render's dependency graph nothing is stored but the camera itself, which is tagged with its animation (TIME).
+
+        Raises
+        ------
+        InputError
+            if the values make no camera, or the camera is no pinhole.
+        """
+        camera_object, is_render = self.camera_object, depsgraph.mode == "RENDER"
+        names = datablocks.animated_values(camera_object)
+        if not names:
+            if not is_render:
+                with contextlib.suppress(InputError):
+                    self._adopt_move(scene, depsgraph)
+            return
+        evaluated = camera_object.evaluated_get(depsgraph)
+        if not evaluated.is_evaluated or not storage.is_enabled(evaluated):
+            return
+        decided = causes.decided_by(names)
+        values, level = _level(evaluated, scene)
+        if decided != conversion.PARTS:
+            values, level = self._carried(evaluated, values, level, decided, scene, depsgraph)
+        self._place(rolls.turned(level, hold.roll(evaluated, values, scene)), scene, depsgraph, decided)
+        if is_render:
+            camera_object.update_tag(refresh={"OBJECT", "DATA", "TIME"})
+            camera_object.data.update_tag(refresh={"TIME"})
+        else:
+            targets.connect(camera_object)  # one that was removed from the file leaves its driver
+            targets.mirror(camera_object, evaluated)
+            self._store_changed(storage.load(camera_object), values)
+            self._agree()
+
+    def is_untouched(self, by_values: bool) -> bool:
+        """Whether neither the camera nor, unless by_values, its values have changed since they were last seen to agree."""
+        camera_object = self.camera_object
+        if camera_object.parent or camera_object.constraints or self._state != conversion.state_of(camera_object):
+            return False
+        return by_values or self._values == storage.load(camera_object)
+
+    def forget(self) -> None:
+        """Undo has brought back other values, or another camera."""
+        self._known.pop(self.camera_object.session_uid, None)
+
+    @contextlib.contextmanager
+    def _being_set(self) -> Iterator[None]:
+        before, self.is_being_set = self.is_being_set, True
+        try:
+            yield
+        finally:
+            self.is_being_set = before
+
+    def _place(
+        self,
+        pinhole: Pinhole,
+        scene: bpy.types.Scene,
+        depsgraph: bpy.types.Depsgraph | None = None,
+        parts: frozenset[str] = conversion.PARTS,
+    ) -> None:
+        """conversion.place, but a camera that stands where it was placed by the same pinhole is left there; and the focus."""
+        camera_object = self.camera_object
+        parent = conversion.parent_matrix(camera_object, scene, depsgraph)
+        order = (pinhole, datablocks.frame_of(scene), parts, parent.tobytes())
+        if self._placed != (*order, conversion.state_of(camera_object)):
+            conversion.place(camera_object, pinhole, scene, depsgraph, parts, parent)
+            self._placed = (*order, conversion.state_of(camera_object))
+        if storage.is_focused_on_look_at(camera_object):
+            conversion.store(camera_object.data.dof, focus_distance=math.dist(pinhole.eye, pinhole.look_at))
+
+    def _adopt_move(
+        self,
+        scene: bpy.types.Scene,
+        depsgraph: bpy.types.Depsgraph,
+        since: CameraValues | None = None,
+        edited: frozenset[str] = frozenset(),
+    ) -> bool:
+        """State in an enabled camera's values where Blender has moved it since: by hand or script, its parent, its lens, a rig.
+
+        The look-at point keeps its distance to the eye, and up stays where it gives the picture. What follows an object or has
+        a driver stays as that says, and the camera is brought back to it.
+
+        depsgraph : in which the camera was evaluated just now. since : the values before some were edited, where the camera
+            does not stand there yet. edited : the names of these, which stay. Returns whether there was anything to adopt.
+
+        Raises
+        ------
+        InputError
+            as `read` and `stated` do. Nothing has changed then.
+        """
+        camera_object = self.camera_object
+        frame, state = datablocks.frame_of(scene), conversion.state_of(camera_object)
+        evaluated = camera_object.evaluated_get(depsgraph)
+        values, level = _level(evaluated, scene)
+        base, bound = since or values, {(name, i) for name in edited for i in range(3)}
+        if since:
+            level = since.pinhole(level.plane, frame, camera_object.data.sensor_fit, level.mirrored)
+        wanted = rolls.turned(level, hold.roll(evaluated, base, scene))
+        is_carried = bool(camera_object.parent or camera_object.constraints)
+        found = read(evaluated, scene)
+        bound |= targets.bound(evaluated)
+        moved = _moved(camera_object, wanted, found, depsgraph)
+        names = {name for name, _ in bound}
+        if "eye" in names and not since and self._state in (None, state):
+            moved -= {findings.VIEW}  # it is what the eye follows that has moved
+        if values.set_for != without_border(frame):
+            moved -= {findings.DISTANCE}  # the lens is that of another picture
+        if not moved:
+            self._agree()
+            return False
+        rests = self._rests_before() if self._state and not since else ()
+        canceled = () if bound or is_carried else [rested for where, rested in rests if where == state]
+        if canceled:
+            said = canceled[-1]
+        else:
+            said = self._moved_to(base, found, moved, bound, frame)
+            said = values.with_unbound(said, bound)
+        if values.pole == HOLD and findings.VIEW in moved:
+            more = rolls.angle_from(said.up, found) - hold.roll(evaluated, said, scene)
+            more = math.remainder(more, 2 * math.pi)
+            if abs(more) > findings.LARGEST_TURN:
+                said = replace(said, held_roll=float(np.float32(said.held_roll + more)))
+        if not self._store_changed(values, said):
+            return False
+        storage.settle(camera_object, said.as_set(), frame)
+        if bound:
+            level = said.pinhole(found.plane, frame, camera_object.data.sensor_fit, found.mirrored)
+            turned = rolls.turned(level, hold.roll(evaluated, said, scene))
+            self._place(turned, scene, depsgraph, causes.decided_by(names) & _free(camera_object))
+        self._agree(rests, is_moving=True)
+        return True
+
+    def _carried(
+        self,
+        evaluated: bpy.types.Object,
+        values: CameraValues,
+        level: Pinhole,
+        decided: frozenset[str],
+        scene: bpy.types.Scene,
+        depsgraph: bpy.types.Depsgraph,
+    ) -> tuple[CameraValues, Pinhole]:
+        """Values of a frame, and what they ask for, with all that they do not decide as it is in the camera there."""
+        found, frame = read(evaluated, scene), datablocks.frame_of(scene)
+        wanted = rolls.turned(level, hold.roll(evaluated, values, scene))
+        moved = _moved(self.camera_object, wanted, found, depsgraph) - decided
+        if values.set_for != without_border(frame):
+            moved -= {findings.DISTANCE}
+        if not moved:
+            return values, level
+        bound = {(name, i) for name in datablocks.animated_values(self.camera_object) for i in range(3)}
+        values = self._moved_to(values, found, moved, bound, frame)
+        return values, values.pinhole(level.plane, frame, self.camera_object.data.sensor_fit, level.mirrored)
+
+    def _moved_to(
+        self, base: CameraValues, found: Pinhole, moved: set[str], bound: set[tuple[str, int]], frame: intrinsics.Frame
+    ) -> CameraValues:
+        """The values of a camera as it was moved, but the numbers that something else decides."""
+        said = base.moved_to(found, moved, bound, preferences.up_axis(), findings.LARGEST_TURN)
+        if findings.DISTANCE in moved:
+            at_full_size = found.distance[0] * (frame.resolution_x / frame.size[0])
+            said = base.with_unbound(said.seeing(at_full_size, frame, self.camera_object.data.sensor_fit), bound)
+        return said
+
+    def _store_changed(self, before: CameraValues, after: CameraValues) -> bool:
+        """Store what has changed of the values; whether anything has."""
+        names = [name for name in ALL if getattr(after, name) != getattr(before, name)]
+        if names:
+            exact = {"eye": after.eye, "look_at": after.look_at, "distance": (after.distance,)}
+            intrinsics.check_storable(self.camera_object.name, **exact)
+            storage.store(self.camera_object, after, *names)
+        return bool(names)
+
+    def _rests_before(self) -> tuple[tuple[tuple, CameraValues], ...]:
+        """The rests of a camera that is moved from where it was last seen."""
+        return self._rests if self._is_moving else (*self._rests, (self._state, self._values))[-self._MOST_RESTS :]
+
+    def _agree(self, rests: tuple[tuple[tuple, CameraValues], ...] = (), is_moving: bool = False) -> None:
+        """Take note that the camera is where its values say."""
+        self._state, self._values = conversion.state_of(self.camera_object), storage.load(self.camera_object)
+        self._rests, self._is_moving = rests, is_moving
 
 
-_MOST_RESTS = 16
-_agreed: dict[int, _Agreement] = {}  # by the camera's session_uid
-_being_set: list[int] = []  # session_uid of cameras whose values were edited, until they stand there: neither has been moved
+def forget_all() -> None:
+    """Forget all cameras: another file is open."""
+    CameraSync._known.clear()
 
 
 def apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene) -> list[str]:
@@ -82,204 +432,34 @@ def apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Sc
         if the object is no perspective camera, if the pinhole has another size or pixel aspect than the scene renders, or if
         a number is too large for Blender. Nothing has changed then.
     """
-    _being_set.append(camera_object.session_uid)
-    try:
-        left = _apply(camera_object, pinhole, scene)
-    finally:
-        _being_set.pop()
-    agree(camera_object)
-    return left + check(camera_object, pinhole, scene)
+    return [finding.sentence for finding in CameraSync.of(camera_object).apply(pinhole, scene)]
 
 
-def _apply(camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene) -> list[str]:
-    datablocks.check_perspective(camera_object)
-    intrinsics.check_storable(camera_object.name, look_at=pinhole.look_at, up=pinhole.up, distance=pinhole.distance)
-    place(camera_object, pinhole, scene)
-    frame = datablocks.frame_of(scene)
-    followed = targets.names(camera_object)
-    at_full_size = pinhole.distance[0] * (frame.resolution_x / frame.size[0])
-    state(camera_object, pinhole.eye, pinhole.look_at, pinhole.up, at_full_size, frame)
-    if followed:  # being asked where these are, Blender has brought the camera back to them
-        place(camera_object, pinhole, scene)
-    kept = targets.names(camera_object)
-    return [f"The {words} no longer follows {name!r}" for words, name in followed.items() if words not in kept]
+def adopt(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
+    """State the four values that make the camera as it stands, and enable them. The camera does not move.
 
-
-def state(
-    camera_object: bpy.types.Object, eye: Triple, look_at: Triple, up: Triple, distance: float, frame: intrinsics.Frame
-) -> None:
-    """Set the four values in float64 and enable them; the camera stays where it is.
-
-    distance : the effective one in the picture of `frame` at 100 %, zoom included.
-    A target that stands exactly where the point is stated stays, any other is cleared.
-    """
-    released = [point for point, at in (("eye", eye), ("look_at", look_at)) if targets.place(camera_object, point) != tuple(at)]
-    for point in released:
-        targets.release(camera_object, point)
-    before = storage.load(camera_object)
-    if not storage.is_counted_in_earlier(camera_object, before):
-        before = replace(before, counted_in=without_border(frame))
-    said = before.stating(eye, look_at, up, distance, frame, camera_object.data.sensor_fit)
-    storage.store(camera_object, said, *storage.EXACT, "counted_in", "enabled", *(["zoom"] if said.zoom != before.zoom else []))
-    storage.settle(camera_object, said, frame)
-
-
-def follow(camera_object: bpy.types.Object, scene: bpy.types.Scene, edited: frozenset[str] = ALL) -> None:
-    """Move an enabled camera to where its values, edited or not, say; a held roll is carried along (hold.py).
-
-    edited : names of the values that count, wherever Blender has moved the camera since its last update; the others follow it.
+    Values that say so already keep every digit. The look-at point keeps its distance to the eye if values have ever been in
+    use; else it lies in the plane of focus (that of the focus object, if it stands before the camera, or the focus distance,
+    10 m in a new camera). Up is the world's Z where this gives the same picture, else v.
 
     Raises
     ------
     InputError
-        as `stated` and `apply` do. Nothing has changed then.
+        as `read` does.
     """
-    _being_set.append(camera_object.session_uid)
-    try:
-        last = _agreed.get(camera_object.session_uid)
-        if edited != ALL and last and last.state != _state_of(camera_object):
-            with contextlib.suppress(InputError):
-                adopt_move(camera_object, scene, datablocks.depsgraph_of(scene), last.values, edited)
-        values, wanted = _level(camera_object, scene)
-        picture = without_border(datablocks.frame_of(scene))
-        if values.pole == HOLD:
-            angle = hold.roll(camera_object, values, scene)
-            if not datablocks.is_animated(camera_object):  # in an animation the curves say what is held
-                if before := _stood_at(camera_object, values, scene):
-                    angle = hold.after_edit(before, wanted, values.held_roll, values.hold_within)
-                values = replace(values, held_roll=angle)
-            wanted = rolls.turned(wanted, angle)
-        place(camera_object, wanted, scene)
-        if values.pole == HOLD or not values.set_for == values.counted_in == picture:
-            storage.settle(camera_object, values.as_set(), picture)
-        agree(camera_object)
-    finally:
-        _being_set.pop()
+    CameraSync.of(camera_object).adopt(scene)
 
 
-def place(
-    camera_object: bpy.types.Object, pinhole: Pinhole, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None
-) -> None:
-    """Move a perspective camera to `pinhole` without stating it and without reading back; otherwise as `apply`.
-
-    depsgraph : where to look up what carries the camera; None: that of the scene. A camera whose pose tells what carries it
-        is then placed once more from there, since it may have been far away.
-    """
-    camera, frame = camera_object.data, datablocks.frame_of(scene)
-    is_carried = bool(camera_object.parent or camera_object.constraints)
-    parent = rotation.IDENTITY
-    if is_carried:
-        parent = pose.parent_matrix(camera_object, depsgraph or datablocks.depsgraph_of(scene))
-    before = _state_of(camera_object)
-    channels, _, grown_from = before
-    order = (pinhole, frame, parent.tobytes())
-    if (*order, *before) not in _in_place:
-        sensor = intrinsics.own_sensor((camera.sensor_width, camera.sensor_height), grown_from)
-        data = datablocks.camera_data(pinhole.plane, frame, *sensor, camera.sensor_fit)
-        if not np.isfinite(channels.delta_rotation).all():
-            raise pose.no_size(camera_object)
-        location, turn, scale = channels.bringing_to(pinhole, parent)
-        lens, shift = (data.lens, data.sensor_width), (data.shift_x, data.shift_y)
-        intrinsics.check_storable(camera_object.name, distance=lens, shift=shift, eye=location)
-        # Nothing fails from here on.
-        _store(camera_object, location=location, scale=scale)
-        pose.set_rotation(camera_object, turn)
-        _store(camera, shift_x=data.shift_x, shift_y=data.shift_y, **intrinsics.lens_and_sensor(data, sensor))
-        if len(_in_place) == _MOST_IN_PLACE:
-            _in_place.clear()
-        _in_place.add((*order, *_state_of(camera_object)))
-    if storage.is_focused_on_look_at(camera_object):
-        _store(camera.dof, focus_distance=math.dist(pinhole.eye, pinhole.look_at))
-    if is_carried and depsgraph is None and pose.is_told_by_its_pose(camera_object):
-        place(camera_object, pinhole, scene, datablocks.depsgraph_of(scene))
-
-
-def _state_of(camera_object: bpy.types.Object) -> tuple:
-    """All of the camera that `place` reads or sets, what carries it aside."""
-    camera = camera_object.data
-    lens = (camera.lens, camera.shift_x, camera.shift_y, camera.sensor_width, camera.sensor_height, camera.sensor_fit)
-    return pose.channels_of(camera_object), lens, tuple(camera.virtual_pinhole_sensor)
-
-
-def refit(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
-    """Set the lens anew, which the values ask for in the picture as the scene renders it now; the pose stays as it is.
-
-    Raises
-    ------
-    InputError
-        as `follow` does. Nothing has changed then.
-    """
-    camera, frame = camera_object.data, datablocks.frame_of(scene)
-    plane = datablocks.view_plane(datablocks.camera_data_of(camera_object), frame)
-    distance = targets.values(camera_object).distances(frame, camera.sensor_fit)
-    sensor = datablocks.own_sensor(camera)
-    data = datablocks.camera_data(replace(plane, distance=distance), frame, *sensor, camera.sensor_fit)
-    intrinsics.check_storable(camera_object.name, distance=(data.lens, data.sensor_width))
-    _store(camera, **intrinsics.lens_and_sensor(data, sensor))
-
-
-def _store(block: bpy.types.ID, **properties: float | tuple[float, ...]) -> None:
-    """Set what Blender does not hold already. It evaluates and draws anew what is set, and for a lens looks at all objects."""
-    for name, value in properties.items():
-        held = getattr(block, name)
-        if np.float32(value).tolist() != (held if isinstance(held, float) else list(held)):
-            setattr(block, name, value)
-
-
-def check(camera_object: bpy.types.Object, wanted: Pinhole, scene: bpy.types.Scene) -> list[str]:
-    """One sentence for each thing that keeps the camera from being `wanted`, or will; empty where all is well."""
+def check(camera_object: bpy.types.Object, wanted: Pinhole, scene: bpy.types.Scene) -> list[findings.Finding]:
+    """A finding for each thing that keeps the camera from being `wanted`, or will; empty where all is well."""
     possible = list(causes.causes(camera_object, scene))
     try:
         found = read(camera_object, scene)
     except InputError as error:
-        return [datablocks.sentence(error), *findings.explain({}, possible)]
+        return [findings.Finding(datablocks.sentence(error)), *findings.explain({}, possible)]
     reach = pose.reach(camera_object, datablocks.depsgraph_of(scene))
     differing = findings.differences(wanted, found, reach, lambda value: datablocks.length(value, scene, digits=3))
     return findings.explain(differing, possible)
-
-
-def read(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole:
-    """The Pinhole as which Cycles renders this camera: its evaluated matrix with normalised columns, and its evaluated lens.
-
-    The look-at point is any point on the view axis, up is v. The evaluated object of another depsgraph may be given as well.
-
-    Raises
-    ------
-    InputError
-        if the object is no perspective camera, or takes no part in the scene, is sheared or scaled to zero.
-    """
-    datablocks.check_perspective(camera_object)
-    evaluated = camera_object if camera_object.is_evaluated else camera_object.evaluated_get(datablocks.depsgraph_of(scene))
-    if not evaluated.is_evaluated:
-        raise InputError(
-            f"camera {camera_object.name!r} takes no part in scene {scene.name!r}: "
-            "enable it and its collection in the viewport, or make it the scene's camera"
-        )
-    matrix = rotation.float64(evaluated.matrix_world)
-    sizes = np.linalg.norm(matrix[:3, :3], axis=0)
-    if not np.isfinite(matrix).all() or not sizes.all():
-        raise pose.no_size(camera_object)
-    axes = matrix[:3, :3] / sizes
-    if abs(np.linalg.det(axes)) <= pose.LARGEST_SKEW:  # flat, but for rounding
-        raise pose.no_size(camera_object)
-    if rotation.skew(axes) > pose.LARGEST_SKEW:
-        raise InputError(f"camera {camera_object.name!r} is oblique, {pose.who_shears(camera_object)}")
-    mirrored = bool(np.linalg.det(axes) < 0)
-    _, v, w = rotation.nearest(axes).T
-    eye = matrix[:3, 3]
-    # As far away as the eye's largest coordinate: then eye − reach · w loses none of w's digits.
-    reach = 2.0 ** math.ceil(math.log2(max(1.0, np.abs(eye).max())))
-    plane = datablocks.view_plane(datablocks.camera_data_of(evaluated), datablocks.frame_of(scene))
-    return Pinhole(
-        tuple(eye.tolist()),
-        tuple((eye - reach * w).tolist()),
-        tuple(v.tolist()),
-        plane.distance,
-        plane.width,
-        plane.height,
-        plane.principal_point,
-        mirrored,
-    )
 
 
 def stated(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole | None:
@@ -301,7 +481,7 @@ def stated(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Pinhole |
 
 def _level(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> tuple[CameraValues, Pinhole]:
     """The values, and the Pinhole that they ask for, whatever the roll is."""
-    evaluated = camera_object if camera_object.is_evaluated else camera_object.evaluated_get(datablocks.depsgraph_of(scene))
+    evaluated = conversion.evaluated(camera_object, scene)
     frame = datablocks.frame_of(scene)
     plane = datablocks.view_plane(datablocks.camera_data_of(evaluated), frame)
     values = storage.load(camera_object)
@@ -322,152 +502,28 @@ def _stood_at(camera_object: bpy.types.Object, values: CameraValues, scene: bpy.
     return before if np.abs(off).max() <= findings.LARGEST_TURN else None
 
 
-def adopt(camera_object: bpy.types.Object, scene: bpy.types.Scene, keep: frozenset[str] = frozenset()) -> None:
-    """State the four values that make the camera as it stands, and enable them. The camera does not move.
-
-    The look-at point keeps its distance to the eye if the values were in use before; else it lies in the plane of focus (that
-    of the focus object, if it stands before the camera, or the focus distance, 10 m in a new camera). Up is the world's Z where
-    this gives the same picture, else v.
-
-    keep : names of values that stay as they are; the others follow the camera.
-
-    Raises
-    ------
-    InputError
-        as `read` does.
-    """
-    standing = as_it_stands(camera_object, scene, in_use=storage.is_enabled(camera_object) and not keep)
-    storage.begin(camera_object)
-    values, frame = targets.values(camera_object), datablocks.frame_of(scene)
-    eye, look_at, up = values.eye, values.look_at, values.up
-    if "eye" not in keep:
-        eye = standing.eye
-    if "look_at" not in keep:
-        look_at = standing.look_at
-    eye, look_at = _as_followed(camera_object, eye, look_at)
-    if "up" not in keep:
-        up = simplest_up(eye, look_at, read(camera_object, scene).basis()[1])
-    distance = standing.distance[0] * frame.resolution_x / frame.size[0]
-    if "distance" in keep:
-        distance = values.distance_at_full_size(frame, camera_object.data.sensor_fit)
-    state(camera_object, eye, look_at, up, distance, frame)
+def _agrees(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> bool:
+    """Whether the camera stands where its values, in use or not, say."""
+    with contextlib.suppress(InputError):
+        values, level = _level(camera_object, scene)
+        wanted = rolls.turned(level, hold.roll(camera_object, values, scene))
+        reach = pose.reach(camera_object, datablocks.depsgraph_of(scene))
+        return not findings.differences(wanted, read(camera_object, scene), reach)
+    return False
 
 
-def is_being_set(camera_object: bpy.types.Object) -> bool:
-    """Whether the camera is on its way to its values, as Blender evaluates it."""
-    return camera_object.session_uid in _being_set
-
-
-def is_untouched(camera_object: bpy.types.Object, by_values: bool) -> bool:
-    """Whether neither the camera nor, unless by_values, its values have changed since they were last seen to agree."""
-    last = _agreed.get(camera_object.session_uid)
-    if last is None or camera_object.parent or camera_object.constraints or last.state != _state_of(camera_object):
-        return False
-    return by_values or last.values == storage.load(camera_object)
-
-
-def adopt_move(
-    camera_object: bpy.types.Object,
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    since: CameraValues | None = None,
-    edited: frozenset[str] = frozenset(),
-) -> bool:
-    """State in an enabled camera's values where Blender has moved it since: by hand or by script, its parent or its lens.
-
-    The look-at point keeps its distance to the eye, and up stays where it gives the picture. What follows an object or has a
-    driver stays as that says, and the camera is brought back to it. Nothing is adopted of what a constraint, a driver or a
-    library sets in the camera itself: these win, and `check` names them.
-
-    depsgraph : in which the camera was evaluated just now. since : the values before some were edited, where the camera does
-        not stand there yet. edited : the names of these, which stay. Returns whether there was anything to adopt.
-
-    Raises
-    ------
-    InputError
-        as `read` and `stated` do. Nothing has changed then.
-    """
-    frame, state = datablocks.frame_of(scene), _state_of(camera_object)
-    evaluated = camera_object.evaluated_get(depsgraph)
-    values, level = _level(evaluated, scene)
-    base, bound = since or values, {(name, i) for name in edited for i in range(3)}
-    if since:
-        level = since.pinhole(level.plane, frame, camera_object.data.sensor_fit, level.mirrored)
-    wanted = rolls.turned(level, hold.roll(evaluated, base, scene))
-    is_carried = bool(camera_object.parent or camera_object.constraints)
-    found = read(evaluated, scene)
-    bound |= targets.bound(evaluated)
-    moved = _moved(camera_object, wanted, found, depsgraph)
-    last = _agreed.get(camera_object.session_uid)
-    if "eye" in {name for name, _ in bound} and not since and (last is None or last.state == state):
-        moved -= {findings.VIEW}  # it is what the eye follows that has moved
-    if values.set_for != without_border(frame):
-        moved -= {findings.DISTANCE}  # the lens is that of another picture
-    if not moved:
-        agree(camera_object)
-        return False
-    rests = _rests(last) if last and not since else ()
-    canceled = () if bound or is_carried else [rested for where, rested in rests if where == state]
-    if canceled:
-        said = canceled[-1]
-    else:
-        said = base.moved_to(found, moved, bound, preferences.up_axis(), findings.LARGEST_TURN)
-        if findings.DISTANCE in moved:
-            at_full_size = found.distance[0] * (frame.resolution_x / frame.size[0])
-            said = base.with_unbound(said.seeing(at_full_size, frame, camera_object.data.sensor_fit), bound)
-        said = values.with_unbound(said, bound)
-    if values.pole == HOLD and findings.VIEW in moved:
-        more = rolls.angle_from(said.up, found) - hold.roll(evaluated, said, scene)
-        more = math.remainder(more, 2 * math.pi)
-        if abs(more) > findings.LARGEST_TURN:
-            said = replace(said, held_roll=float(np.float32(said.held_roll + more)))
-    stored = [name for name in ALL if getattr(said, name) != getattr(values, name)]
-    if not stored:
-        return False
-    intrinsics.check_storable(camera_object.name, eye=said.eye, look_at=said.look_at, distance=(said.distance,))
-    storage.store(camera_object, said, *stored)
-    storage.settle(camera_object, said.as_set(), frame)
-    if bound:
-        level = said.pinhole(found.plane, frame, camera_object.data.sensor_fit, found.mirrored)
-        place(camera_object, rolls.turned(level, hold.roll(evaluated, said, scene)), scene, depsgraph)
-    agree(camera_object, rests, is_moving=True)
-    return True
-
-
-def end_move(camera_object: bpy.types.Object) -> None:
-    """Take note that Blender has made an update of a camera and not moved it: what moves it next is another move."""
-    last = _agreed.get(camera_object.session_uid)
-    if last and last.is_moving:
-        _agreed[camera_object.session_uid] = replace(last, is_moving=False)
-
-
-def _rests(last: _Agreement) -> tuple[tuple[tuple, CameraValues], ...]:
-    """Those of a camera that is moved from where it was last seen."""
-    return last.rests if last.is_moving else (*last.rests, (last.state, last.values))[-_MOST_RESTS:]
+def _free(camera_object: bpy.types.Object) -> frozenset[str]:
+    """The parts of the camera that can be set: a constraint that adds to the others would only be fed."""
+    return conversion.PARTS - causes.fed(camera_object) if camera_object.constraints else conversion.PARTS
 
 
 def _moved(camera_object: bpy.types.Object, wanted: Pinhole, found: Pinhole, depsgraph: bpy.types.Depsgraph) -> set[str]:
     """Which of EYE, VIEW and DISTANCE Blender has moved by more than a rounding, and nobody holds where they are."""
     differing = findings.differences(wanted, found, pose.reach(camera_object, depsgraph)).keys()
-    moved = {findings.EYE, findings.VIEW, findings.DISTANCE} & differing
+    moved = set(conversion.PARTS & differing)
     if findings.EYE in moved and np.array_equal(np.float32(wanted.eye), np.float32(found.eye)):
         moved.remove(findings.EYE)
     return moved - causes.held(camera_object) if moved else moved
-
-
-def agree(camera_object: bpy.types.Object, rests: tuple[tuple[tuple, CameraValues], ...] = (), is_moving: bool = False) -> None:
-    """Take note that the camera is where its values say. rests, is_moving : as an _Agreement has them."""
-    if len(_agreed) >= _MOST_IN_PLACE:
-        _agreed.clear()
-    _agreed[camera_object.session_uid] = _Agreement(_state_of(camera_object), storage.load(camera_object), rests, is_moving)
-
-
-def forget(camera_object: bpy.types.Object | None = None) -> None:
-    """Forget that a camera, or all, agreed: undo has brought back other values."""
-    if camera_object is None:
-        _agreed.clear()
-    else:
-        _agreed.pop(camera_object.session_uid, None)
 
 
 def _as_followed(camera_object: bpy.types.Object, eye: Triple, look_at: Triple) -> tuple[Triple, Triple]:

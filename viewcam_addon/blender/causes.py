@@ -1,18 +1,18 @@
 """Who in a .blend may keep a camera from being what its four values say. Reads Blender, changes nothing."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 
 import bpy
 
 from . import datablocks, pose, storage, versions
-from .findings import APPLY_AGAIN, CENTRE, DELETE_KEYFRAMES, DISTANCE, EYE, LENS, POSE, REMEDY, VIEW, Cause
+from .findings import APPLY_OR_ADOPT, CENTRE, DISTANCE, EYE, LENS, POSE, VIEW, Button, Cause
 
 
 def causes(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[Cause]:
     yield from _constraints(camera_object)
     yield from _drivers(camera_object)
     yield from _animation(camera_object)
-    yield from _ancestors(camera_object)
     yield from _libraries(camera_object)
     yield from _locks(camera_object)
     yield from _sensor(camera_object.data)
@@ -20,23 +20,85 @@ def causes(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[
     yield from _sharers(camera_object)
 
 
-def held(camera_object: bpy.types.Object) -> set[str]:
-    """What of EYE, VIEW, DISTANCE and CENTRE is decided by a constraint, a driver or a library, whatever the artist does.
+# What each value decides where it is animated: a moving eye turns the view, since the look-at point stands still.
+_DECIDES = {
+    "eye": POSE,
+    "look_at": frozenset({VIEW}),
+    "up": frozenset({VIEW}),
+    "held_roll": frozenset({VIEW}),
+    "distance": frozenset({DISTANCE}),
+    "zoom": frozenset({DISTANCE}),
+}
 
-    And by keyframes, where the four values have some as well.
+
+def decided_by(names: Iterable[str]) -> frozenset[str]:
+    """Those of EYE, VIEW and DISTANCE that values, by their names, decide."""
+    return frozenset().union(*(_DECIDES.get(name, frozenset()) for name in names))
+
+
+def decided_by_values(camera_object: bpy.types.Object) -> frozenset[str]:
+    """Those of EYE, VIEW and DISTANCE that keyframes, drivers or targets of the four values decide at every frame."""
+    return decided_by(datablocks.animated_values(camera_object))
+
+
+def held(camera_object: bpy.types.Object) -> set[str]:
+    """Those of EYE, VIEW, DISTANCE and CENTRE that the values can't follow as the camera is moved.
+
+    A library's, which would not be saved, and what the animation of the values decides and something else as well.
     """
-    holding = [*_libraries(camera_object), *_drivers(camera_object)]
-    if not pose.is_carried_by_constraints(camera_object):
-        holding += _constraints(camera_object)
-    if datablocks.is_animated(camera_object):
-        holding += _animation(camera_object)
+    holding = [*_libraries(camera_object)]
+    if decided := decided_by_values(camera_object):
+        others = [*_drivers(camera_object), *_animation(camera_object)]
+        if not pose.is_carried_by_constraints(camera_object):
+            others += _constraints(camera_object)
+        holding += [replace(cause, acts_on=cause.acts_on & decided) for cause in others]
     return set().union(*(cause.acts_on for cause in holding))
+
+
+def followed(camera_object: bpy.types.Object) -> dict[str, str]:
+    """Those of EYE, VIEW and DISTANCE that something else than the artist places at every frame: the name → one word why.
+
+    The values follow it there, and an edit of them would not last.
+    """
+    placing = [("Parent", POSE)] if any(map(_is_moving, pose.ancestors(camera_object))) else []
+    for constraint in pose.active_constraints(camera_object):
+        if _places(constraint, camera_object):
+            placing.append(("Constraint", _CONSTRAINTS.get(constraint.type, POSE)))
+    placing += [("Driver", cause.acts_on) for cause in _drivers(camera_object)]
+    decided = decided_by_values(camera_object) | {CENTRE}
+    return {name: word for word, acts_on in placing for name in acts_on if name not in decided}
 
 
 # Constraints that leave the eye or the view alone; all others act on both.
 _MOVING = ("COPY_LOCATION", "LIMIT_LOCATION", "LIMIT_DISTANCE", "FLOOR")
 _TURNING = ("TRACK_TO", "DAMPED_TRACK", "LOCKED_TRACK", "COPY_ROTATION", "LIMIT_ROTATION", "COPY_SCALE", "LIMIT_SCALE")
 _CONSTRAINTS = dict.fromkeys(_MOVING, frozenset({EYE})) | dict.fromkeys(_TURNING, frozenset({VIEW}))
+# Those of them that leave a camera within their limits to who moves it.
+_LIMITING = ("LIMIT_LOCATION", "LIMIT_ROTATION", "LIMIT_SCALE", "LIMIT_DISTANCE", "FLOOR", "COPY_SCALE")
+
+
+def fed(camera_object: bpy.types.Object) -> frozenset[str]:
+    """Those of EYE and VIEW that a constraint makes of the camera's own channels and adds to: to set them would move it on."""
+    adding = [
+        constraint
+        for constraint in pose.active_constraints(camera_object)
+        if not pose.carries(constraint)
+        and (constraint.type not in (*_CONSTRAINTS, "COPY_TRANSFORMS") or constraint.influence < 1)
+    ]
+    return frozenset().union(*(_CONSTRAINTS.get(constraint.type, POSE) for constraint in adding))
+
+
+def _places(constraint: bpy.types.Constraint, camera_object: bpy.types.Object) -> bool:
+    """Whether a constraint decides at every frame where the camera is: one that carries it, only if it moves itself."""
+    goals = list(pose.targets_of(constraint))
+    if constraint.type in _LIMITING or (hasattr(constraint, "target") and not goals):
+        return False
+    if not pose.carries(constraint):
+        return True
+    own = f"{constraint.path_from_id()}."
+    curves = [*versions.animation_curves(camera_object), *versions.drivers(camera_object)]
+    moving = any(_is_moving(each) for goal in goals for each in (goal, *pose.ancestors(goal)))
+    return moving or any(path.startswith(own) for path in _paths(curves))
 
 
 def _constraints(camera_object: bpy.types.Object) -> Iterator[Cause]:
@@ -44,7 +106,8 @@ def _constraints(camera_object: bpy.types.Object) -> Iterator[Cause]:
     for constraint in pose.active_constraints(camera_object):
         name, camera = repr(constraint.name), repr(camera_object.name)
         if is_carried:  # what is set now takes it into account
-            yield Cause(f"The constraint {name} has carried {camera} along", POSE, f"{APPLY_AGAIN}, or animate them")
+            remedy = "apply the values again, or animate them"
+            yield Cause(f"The constraint {name} has carried {camera} along", POSE, remedy, mended_by=Button.APPLY_AGAIN)
         else:
             acts_on = _CONSTRAINTS.get(constraint.type, POSE)
             yield Cause(f"The constraint {name} moves {camera}", acts_on, "disable it, or the Virtual Pinhole")
@@ -91,30 +154,23 @@ def keyed(
 
 
 def _animation(camera_object: bpy.types.Object) -> Iterator[Cause]:
-    if found := keyed(camera_object, versions.animation_curves):
-        channels = [_channel(path) for _, path in found]
+    """Keyframes of what the four values' own animation decides as well. Others move the values along, as a hand does."""
+    decided = decided_by_values(camera_object)
+    channels = [_channel(path) for _, path in keyed(camera_object, versions.animation_curves)]
+    if channels := [(quantity, words) for quantity, words in channels if quantity in decided]:
         words = list(dict.fromkeys(words for _, words in channels))
         which = f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0]
         clause = f"Keyframes set the {which} of {camera_object.name!r}, and in a render they win over the four values"
-        yield Cause(clause, frozenset(quantity for quantity, _ in channels), DELETE_KEYFRAMES, always=True)
+        acts_on, remedy = frozenset(quantity for quantity, _ in channels), "delete them, and key the four values instead"
+        is_deletable = bool(keyed(camera_object, versions.action_curves))
+        yield Cause(clause, acts_on, remedy, always=True, mended_by=Button.DELETE_KEYFRAMES if is_deletable else None)
 
 
-def _ancestors(camera_object: bpy.types.Object) -> Iterator[Cause]:
-    """Who carries the camera away. Where the four values are animated they are set anew at every frame, and nobody can."""
-    if datablocks.is_animated(camera_object):
-        return
-    remedy = "animate the four values instead, or disable the Virtual Pinhole"
-    for ancestor in pose.ancestors(camera_object):
-        if _is_moved_by_animation(ancestor):
-            clause = f"{ancestor.name!r} is animated and carries {camera_object.name!r} along"
-            yield Cause(clause, POSE, remedy, always=True)
-        elif any(pose.active_constraints(ancestor)):
-            clause = f"{ancestor.name!r} is moved by its constraints and carries {camera_object.name!r} along"
-            yield Cause(clause, POSE, remedy)
-
-
-def _is_moved_by_animation(block: bpy.types.Object) -> bool:
-    """Its own channels, the bones of an armature, or the time on a path."""
+def _is_moving(block: bpy.types.Object) -> bool:
+    """Whether constraints, keyframes or drivers move an object, the bones of an armature, or what is on a path."""
+    bones = block.pose.bones if block.pose else ()
+    if any(True for each in (block, *bones) for _ in pose.active_constraints(each)):
+        return True
     blocks = filter(None, (block, block.data))
     paths = [path for each in blocks for path in _paths([*versions.animation_curves(each), *versions.drivers(each)])]
     return any(_channel(path)[0] in POSE or path.startswith("pose.bones") or path == "eval_time" for path in paths)
@@ -161,7 +217,7 @@ def _render_size(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> Ite
         yield Cause(clause, LENS, "give both scenes the same resolution, or each a camera of its own")
     else:
         clause = f"The picture was {before[0]} × {before[1]} px and is {now[0]} × {now[1]} now"
-        yield Cause(clause, LENS, REMEDY)
+        yield Cause(clause, LENS, APPLY_OR_ADOPT, mended_by=Button.APPLY_AGAIN)
 
 
 def _sharers(camera_object: bpy.types.Object) -> Iterator[Cause]:

@@ -29,10 +29,29 @@ def _no_perspective(camera_object: bpy.types.Object) -> InputError:
     return InputError(f"camera {camera_object.name!r} is {kind}, no pinhole: set its lens type to Perspective")
 
 
+_VALUES = "virtual_pinhole."
+
+
 def is_animated(camera_object: bpy.types.Object) -> bool:
     """Whether a keyframe, an NLA strip or a driver changes one of the values of the Virtual Pinhole, or a target does."""
     curves = [*versions.animation_curves(camera_object), *versions.drivers(camera_object)]
-    return any(curve.data_path.startswith("virtual_pinhole.") for curve in curves)
+    return any(curve.data_path.startswith(_VALUES) for curve in curves)
+
+
+def animated_values(camera_object: bpy.types.Object) -> set[str]:
+    """The names of the values that keyframes, NLA strips or drivers change; a point that follows a target is one of them."""
+    curves = [*versions.animation_curves(camera_object), *versions.drivers(camera_object)]
+    found = {(curve.data_path.removeprefix(_VALUES), curve.array_index) for curve in curves if _counts(curve)}
+    return {("eye", "look_at")[index] if name == "followed" else name for name, index in found}
+
+
+def has_driven_values(camera_object: bpy.types.Object) -> bool:
+    """Whether a driver, such as that of a target, has a say in the values."""
+    return any(curve.data_path.startswith(_VALUES) for curve in versions.drivers(camera_object))
+
+
+def _counts(curve: bpy.types.FCurve) -> bool:
+    return curve.data_path.startswith(_VALUES) and not versions.is_muted(curve)
 
 
 # What is checked once is not checked again as a camera moves.
@@ -85,7 +104,7 @@ def length(value: float, scene: bpy.types.Scene, digits: int = 6) -> str:
     """A length in world units as the scene's units say it; a bare number without them, and where Blender would say zero."""
     units = scene.unit_settings
     metres = value * units.scale_length
-    if units.system == "NONE" or not _SHORTEST_WORD <= metres < math.inf:
+    if units.system == "NONE" or not _SHORTEST_WORD <= abs(metres) < math.inf:
         return f"{value:.{digits}g}"
     return bpy.utils.units.to_string(units.system, "LENGTH", metres, precision=digits)
 

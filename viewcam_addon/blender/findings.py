@@ -6,6 +6,7 @@ where it belongs is never named; some (animation, libraries, locks) are told of 
 remember what was set and when, which undo, linking and scripts would make stale.
 """
 
+import enum
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -28,9 +29,14 @@ _SHIFT_ROUNDINGS = 2
 
 EYE, VIEW, DISTANCE, CENTRE = "eye", "view", "distance", "centre"
 POSE, LENS = frozenset({EYE, VIEW}), frozenset({DISTANCE, CENTRE})
-APPLY_AGAIN = "apply the values again"
-DELETE_KEYFRAMES = "delete them, and key the four values instead"
-REMEDY = f"{APPLY_AGAIN}, or adopt the camera as it stands"
+APPLY_OR_ADOPT = "apply the values again, or adopt the camera as it stands"
+
+
+class Button(enum.Enum):
+    """What a button of the panel can do about a cause."""
+
+    APPLY_AGAIN = enum.auto()
+    DELETE_KEYFRAMES = enum.auto()
 
 
 @dataclass(frozen=True)
@@ -38,13 +44,39 @@ class Cause:
     """Something that may keep a camera from being what its four values say.
 
     clause : who does what, in words. acts_on : some of EYE, VIEW, DISTANCE, CENTRE.
-    remedy : what to do. always : told even where nothing differs yet.
+    remedy : what to do. always : told even where nothing differs yet. mended_by : the button that does it, if there is one.
     """
 
     clause: str
     acts_on: frozenset[str]
     remedy: str
     always: bool = False
+    mended_by: Button | None = None
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What is told of a camera. cause : None where the words say all. differing : in words, what of the camera it explains."""
+
+    words: str = ""
+    cause: Cause | None = None
+    differing: tuple[str, ...] = ()
+
+    @property
+    def sentence(self) -> str:
+        """The finding as it is printed."""
+        if self.cause is None:
+            return self.words
+        figures = f", {' and '.join(self.differing)}" if self.differing else ""
+        return f"{self.cause.clause}{figures}: {self.cause.remedy}"
+
+
+# What has moved a camera where nothing that is known did.
+_MOVED = Cause("The camera or its parent was moved since", POSE, APPLY_OR_ADOPT, mended_by=Button.APPLY_AGAIN)
+_LENS = Cause(
+    "The lens, sensor or pixel aspect was changed since", frozenset({DISTANCE}), APPLY_OR_ADOPT, mended_by=Button.APPLY_AGAIN
+)
+_SHIFT = Cause("The shift was changed since", frozenset({CENTRE}), APPLY_OR_ADOPT, mended_by=Button.APPLY_AGAIN)
 
 
 def differences(
@@ -73,26 +105,17 @@ def differences(
     return result
 
 
-def explain(differing: dict[str, str], causes: Iterable[Cause]) -> list[str]:
-    """One sentence for each cause that explains a difference, and for each difference that none explains. Pure."""
-    sentences, unexplained = [], dict(differing)
+def explain(differing: dict[str, str], causes: Iterable[Cause]) -> list[Finding]:
+    """A finding for each cause that explains a difference, and for each difference that none explains. Pure."""
+    found, unexplained = [], dict(differing)
     for cause in causes:
         explained = [name for name in differing if name in cause.acts_on]
-        if explained:
-            sentences.append(f"{cause.clause}, {_and(differing[name] for name in explained)}: {cause.remedy}")
-        elif cause.always:
-            sentences.append(f"{cause.clause}: {cause.remedy}")
+        if explained or cause.always:
+            found.append(Finding(cause=cause, differing=tuple(differing[name] for name in explained)))
         for name in explained:
             unexplained.pop(name, None)
-    if POSE & unexplained.keys():
-        words = _and(unexplained[name] for name in (EYE, VIEW) if name in unexplained)
-        sentences.append(f"The camera or its parent was moved since, {words}: {REMEDY}")
-    if DISTANCE in unexplained:
-        sentences.append(f"The lens, sensor or pixel aspect was changed since, {unexplained[DISTANCE]}: {REMEDY}")
-    if CENTRE in unexplained:
-        sentences.append(f"The shift was changed since, {unexplained[CENTRE]}: {REMEDY}")
-    return sentences
-
-
-def _and(clauses: Iterable[str]) -> str:
-    return " and ".join(clauses)
+    for cause in (_MOVED, _LENS, _SHIFT):
+        left = [name for name in (EYE, VIEW, DISTANCE, CENTRE) if name in cause.acts_on & unexplained.keys()]
+        if left:
+            found.append(Finding(cause=cause, differing=tuple(unexplained[name] for name in left)))
+    return found

@@ -119,13 +119,19 @@ def active_constraints(block: bpy.types.Object) -> Iterator[bpy.types.Constraint
     return (constraint for constraint in block.constraints if constraint.enabled and constraint.influence > 0)
 
 
+def targets_of(constraint: bpy.types.Constraint) -> Iterator[bpy.types.Object]:
+    """The objects by which a constraint places another."""
+    several = getattr(constraint, "targets", ())
+    yield from filter(None, (getattr(each, "target", None) for each in (constraint, *several)))
+
+
 def is_carried_by_constraints(camera_object: bpy.types.Object) -> bool:
     """Whether it has constraints, and each of them moves it as a parent does."""
     constraints = list(active_constraints(camera_object))
-    return bool(constraints) and all(map(_carries, constraints))
+    return bool(constraints) and all(map(carries, constraints))
 
 
-def _carries(constraint: bpy.types.Constraint) -> bool:
+def carries(constraint: bpy.types.Constraint) -> bool:
     """Whether a constraint moves an object as a parent does: it multiplies its matrix by one that does not depend on it."""
     if constraint.type == "COPY_LOCATION":
         return constraint.use_offset and constraint.owner_space == "WORLD"

@@ -23,19 +23,27 @@ from ..camera_values import CANONICAL, FIELD_OF_VIEW, HOLD, PIXELS, without_bord
 from ..errors import InputError
 from . import camera as cameras
 from . import datablocks, storage, targets
+from .camera import CameraSync
 
 
 def _on_enabled(group: "VirtualPinhole", context: bpy.types.Context) -> None:
-    """What nobody has stated yet follows the camera, so that enabling for the first time moves nothing."""
-    if storage.is_storing or not group.enabled:
+    """The values are read off the camera, each time; but what was stated while they were off, or is animated, moves it."""
+    if storage.is_storing:
+        return
+    keep = storage.stated(group.id_data) | (datablocks.animated_values(group.id_data) & storage.EXACT)
+    storage.forget_stated(group.id_data)
+    if not group.enabled:
         return
     storage.begin(group.id_data)
-    keep = frozenset(filter(group.is_property_set, storage.EXACT))
     if keep != storage.EXACT:
         with storage.without_callbacks():
             group.enabled = False  # else a target would move the camera before it is read
-        with contextlib.suppress(InputError):
-            cameras.adopt(group.id_data, datablocks.scene_of(group.id_data), keep)
+        scene = datablocks.scene_of(group.id_data)
+        try:
+            CameraSync.of(group.id_data).adopt(scene, keep)
+        except InputError:
+            if cameras.takes_part(group.id_data, scene):
+                return  # it is no pinhole: the panel says why
         with storage.without_callbacks():
             group.enabled = True
     if keep:
@@ -47,10 +55,13 @@ def _edit_of(*names: str) -> Callable[["VirtualPinhole", bpy.types.Context], Non
     edited = frozenset(names)
 
     def on_edited(group: "VirtualPinhole", _context: bpy.types.Context) -> None:
-        if storage.is_storing or not group.enabled:
+        if storage.is_storing:
+            return
+        if not group.enabled:
+            storage.state(group.id_data, edited & storage.EXACT)
             return
         with contextlib.suppress(InputError):  # the panel finds the same error and shows it
-            cameras.follow(group.id_data, datablocks.scene_of(group.id_data), edited)
+            CameraSync.of(group.id_data).edited(datablocks.scene_of(group.id_data), edited)
 
     return on_edited
 
@@ -71,7 +82,14 @@ def _on_distance(group: "VirtualPinhole", _context: bpy.types.Context) -> None:
         if values.counted_in != picture and not storage.is_counted_in_earlier(camera_object, values):
             storage.store(camera_object, replace(values, counted_in=picture), "counted_in")
         if group.enabled:
-            cameras.follow(camera_object, scene, frozenset({"distance"}))
+            CameraSync.of(camera_object).edited(scene, frozenset({"distance"}))
+        else:
+            storage.state(camera_object, frozenset({"distance"}))
+
+
+def _on_zoom(group: "VirtualPinhole", context: bpy.types.Context) -> None:
+    if group.enabled:  # else it says nothing of the distance
+        _on_lens(group, context)
 
 
 def _on_keeps(group: "VirtualPinhole", context: bpy.types.Context) -> None:
@@ -79,7 +97,7 @@ def _on_keeps(group: "VirtualPinhole", context: bpy.types.Context) -> None:
         with contextlib.suppress(InputError):
             picture = without_border(datablocks.frame_of(datablocks.scene_of(group.id_data)))
             storage.store(group.id_data, replace(storage.load(group.id_data), counted_in=picture), "counted_in")
-    _on_lens(group, context)
+    _on_zoom(group, context)
 
 
 def _on_pole(group: "VirtualPinhole", context: bpy.types.Context) -> None:
@@ -89,12 +107,18 @@ def _on_pole(group: "VirtualPinhole", context: bpy.types.Context) -> None:
     _edit_of("held_roll")(group, context)
 
 
-def _on_target(group: "VirtualPinhole", context: bpy.types.Context) -> None:
-    if storage.is_storing:
-        return
-    targets.connect(group.id_data)
-    targets.mirror(group.id_data, group.id_data)
-    _edit_of()(group, context)
+def _on_target(point: str) -> Callable[["VirtualPinhole", bpy.types.Context], None]:
+    """The callback of what says which object a point follows."""
+    on_edited, on_stated = _edit_of(), _edit_of(point)
+
+    def on_target(group: "VirtualPinhole", context: bpy.types.Context) -> None:
+        if storage.is_storing:
+            return
+        targets.connect(group.id_data)
+        targets.mirror(group.id_data, group.id_data)
+        (on_edited if group.enabled else on_stated)(group, context)
+
+    return on_target
 
 
 def _on_shown(_group: "VirtualPinhole", _context: bpy.types.Context) -> None:
@@ -142,7 +166,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
 
     enabled: bpy.props.BoolProperty(
         name="Virtual Pinhole",
-        description="Set this camera by eye, look-at, up and view-plane distance. The first time, the values are taken from it",
+        description="Set this camera by eye, look-at, up and view-plane distance. The values are read off it as it stands",
         update=_on_enabled,
         override={"LIBRARY_OVERRIDABLE"},
     )
@@ -179,20 +203,20 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         description="An object in whose origin the camera stands, wherever it is moved. Empty: the point above counts",
         type=bpy.types.Object,
         poll=_can_be_target,
-        update=_on_target,
+        update=_on_target("eye"),
         override={"LIBRARY_OVERRIDABLE"},
     )
     eye_bone: bpy.props.StringProperty(
         name="Eye Bone",
         description="A bone of the armature, in whose head the camera stands. Empty: the armature's origin",
-        update=_on_target,
+        update=_on_target("eye"),
         override={"LIBRARY_OVERRIDABLE"},
     )
     eye_group: bpy.props.StringProperty(
         name="Eye Vertex Group",
         description="A vertex group of the mesh, in whose middle the camera stands: its vertices' mean by weight, deformed as "
         "they are. Empty: the mesh's origin",
-        update=_on_target,
+        update=_on_target("eye"),
         override={"LIBRARY_OVERRIDABLE"},
     )
     look_at_target: bpy.props.PointerProperty(
@@ -200,20 +224,20 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         description="An object at whose origin the camera looks, wherever it is moved. Empty: the point above counts",
         type=bpy.types.Object,
         poll=_can_be_target,
-        update=_on_target,
+        update=_on_target("look_at"),
         override={"LIBRARY_OVERRIDABLE"},
     )
     look_at_bone: bpy.props.StringProperty(
         name="Look-At Bone",
         description="A bone of the armature, at whose head the camera looks. Empty: the armature's origin",
-        update=_on_target,
+        update=_on_target("look_at"),
         override={"LIBRARY_OVERRIDABLE"},
     )
     look_at_group: bpy.props.StringProperty(
         name="Look-At Vertex Group",
         description="A vertex group of the mesh, at whose middle the camera looks: its vertices' mean by weight, deformed as "
         "they are. Empty: the mesh's origin",
-        update=_on_target,
+        update=_on_target("look_at"),
         override={"LIBRARY_OVERRIDABLE"},
     )
     followed: bpy.props.FloatVectorProperty(
@@ -284,7 +308,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         soft_max=10.0,
         step=1,
         precision=3,
-        update=_edit_of("distance"),
+        update=_on_zoom,
         override={"LIBRARY_OVERRIDABLE"},
     )
     keeps: bpy.props.EnumProperty(
@@ -390,6 +414,11 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         override={"LIBRARY_OVERRIDABLE"},
     )
     exact: bpy.props.StringProperty(options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE"})
+    stated: bpy.props.StringProperty(
+        description="The names of the values that were edited while the Virtual Pinhole was off",
+        options={"HIDDEN"},
+        override={"LIBRARY_OVERRIDABLE"},
+    )
     when_set: bpy.props.StringProperty(options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE"})
     picture: bpy.props.FloatVectorProperty(
         description="Resolution, percentage and pixel aspect of the picture for which the camera was set",

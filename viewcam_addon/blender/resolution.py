@@ -18,8 +18,8 @@ import bpy
 from .. import intrinsics
 from ..camera_values import FIELD_OF_VIEW, PIXELS, without_border
 from ..errors import InputError
-from . import camera as cameras
 from . import datablocks, storage
+from .camera import CameraSync
 
 # The picture for which all cameras of a scene have been looked at, by the scene's name, with the scene's address: it is another
 # scene after undo and in another file. Without it every change of a scene's settings would look at every object.
@@ -54,8 +54,9 @@ def follow(scene: bpy.types.Scene) -> None:
             _seen[scene.name_full] = now
             for camera_object in _set_for_another(scene, frame):
                 with contextlib.suppress(InputError):
-                    cameras.refit(camera_object, scene)
-                    storage.settle(camera_object, storage.load(camera_object), frame)
+                    sync = CameraSync.of(camera_object)
+                    sync.resized(scene)
+                    sync.settled(frame)
 
 
 def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
@@ -65,7 +66,7 @@ def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> N
     with contextlib.suppress(InputError):
         for camera_object in _set_for_another(scene, datablocks.frame_of(scene)):
             with contextlib.suppress(InputError):
-                cameras.refit(camera_object, scene)
+                CameraSync.of(camera_object).resized(scene)
                 camera_object.data.update_tag()
 
 

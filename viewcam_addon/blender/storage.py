@@ -23,6 +23,7 @@ from ..intrinsics import Frame
 from . import datablocks, versions
 
 EXACT = frozenset({"eye", "look_at", "up", "distance"})  # of these `exact` has the digits
+_VECTORS = ("eye", "look_at", "up")
 # What is noted of a camera once it has been set.
 _NOTED = ("distance", "counted_in", "set_for", "view_when_set", "held_roll")
 is_storing = False  # else the artist or a script sets a property, and the camera moves
@@ -44,6 +45,12 @@ def is_enabled(camera_object: bpy.types.Object) -> bool:
     return camera_object.virtual_pinhole.enabled
 
 
+def enable(camera_object: bpy.types.Object) -> None:
+    """Let the values place the camera, which stands there already."""
+    with without_callbacks():
+        camera_object.virtual_pinhole.enabled = True
+
+
 def is_focused_on_look_at(camera_object: bpy.types.Object) -> bool:
     """Whether the focus distance stays on the look-at point."""
     return camera_object.virtual_pinhole.focus_on_look_at
@@ -58,7 +65,8 @@ def load(camera_object: bpy.types.Object) -> CameraValues:
     exact, shown = _parsed(group.exact, 10), (*group.eye, *group.look_at, *group.up, group.distance)
     numbers = shown
     if exact:
-        numbers = tuple([full if short == value else value for full, short, value in zip(*exact, shown, strict=True)])
+        columns = zip(*exact, _shown_values(exact[0]), shown, strict=True)
+        numbers = tuple([full if value in (short, zeroed) else value for full, short, zeroed, value in columns])
     follows = tuple(name for name in ("eye", "look_at") if getattr(group, f"{name}_target"))
     when_set = _parsed(group.when_set, 9) if group.pole == HOLD else None  # nobody else asks
     return CameraValues(
@@ -87,7 +95,9 @@ def store(camera_object: bpy.types.Object, values: CameraValues, *names: str) ->
     try:
         for name in names:
             value = getattr(values, name)
-            if name == "view_when_set":
+            if name in _VECTORS:
+                setattr(group, name, _as_shown(value))
+            elif name == "view_when_set":
                 group.when_set = json.dumps([*value[0], *value[1], *value[2]])
             elif isinstance(value, Frame):
                 shape = (value.resolution_x, value.resolution_y, value.percentage, value.pixel_aspect_x, value.pixel_aspect_y)
@@ -98,6 +108,23 @@ def store(camera_object: bpy.types.Object, values: CameraValues, *names: str) ->
             group.exact = json.dumps([*values.eye, *values.look_at, *values.up, values.distance])
     finally:
         is_storing = before
+
+
+def stated(camera_object: bpy.types.Object) -> frozenset[str]:
+    """The names of the values that were edited while they did not place the camera."""
+    return frozenset(camera_object.virtual_pinhole.stated.split())
+
+
+def state(camera_object: bpy.types.Object, names: frozenset[str]) -> None:
+    """Note that values were edited while they do not place the camera: once they do, it is brought there."""
+    if camera_object.type == "CAMERA" and not names <= stated(camera_object):
+        camera_object.virtual_pinhole.stated = " ".join(sorted(stated(camera_object) | names))
+
+
+def forget_stated(camera_object: bpy.types.Object) -> None:
+    """Note that the values are in use, or no longer."""
+    if camera_object.virtual_pinhole.stated:
+        camera_object.virtual_pinhole.stated = ""
 
 
 def begin(camera_object: bpy.types.Object) -> None:
@@ -143,6 +170,23 @@ def restored(camera_object: bpy.types.Object, *names: str) -> Iterator[None]:
         with without_callbacks():
             for name, value in before.items():
                 setattr(group, name, value)
+
+
+def _as_shown(vector: tuple[float, ...]) -> tuple[float, ...]:
+    """What the property of a vector holds: 0 for what is less than a float32 step of its largest number, and no −0.
+
+    Such a remainder of a rotation or of an axis conversion would be shown as −0 m; `exact` keeps it.
+    """
+    step = 2.0**-23 * max(map(abs, vector))
+    return tuple([number if abs(number) > step else 0.0 for number in vector])
+
+
+@functools.lru_cache(maxsize=256)
+def _shown_values(numbers: tuple[float, ...]) -> tuple[float, ...]:
+    """What the properties hold where the ten numbers of `exact` are stored."""
+    shown = [*_as_shown(numbers[0:3]), *_as_shown(numbers[3:6]), *_as_shown(numbers[6:9]), numbers[9]]
+    with np.errstate(over="ignore"):
+        return tuple(np.array(shown, dtype=np.float32).tolist())
 
 
 @functools.lru_cache(maxsize=256)

@@ -30,7 +30,7 @@ from mathutils import Vector
 
 from ..camera_values import CameraValues
 from ..pinhole import Triple
-from . import datablocks, storage, versions
+from . import datablocks, pose, storage, versions
 
 POINTS = {"eye": "eye", "look_at": "look-at"}  # property → as a sentence says it
 _HOOK = "virtual_pinhole.followed"
@@ -315,5 +315,4 @@ def _ids(driver: bpy.types.FCurve) -> list[bpy.types.Object]:
 
 def _aims(constraints: bpy.types.bpy_prop_collection) -> Iterator[bpy.types.Object]:
     for constraint in constraints:
-        several = getattr(constraint, "targets", ())
-        yield from filter(None, (getattr(each, "target", None) for each in (constraint, *several)))
+        yield from pose.targets_of(constraint)

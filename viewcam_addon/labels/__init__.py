@@ -27,7 +27,7 @@ PASSES = {
 KINDS = tuple(PASSES)
 
 DEPTH_STEPS = 1000.0
-"""Of a 16-bit depth, in a scene unit: millimetres, where the unit is a metre."""
+"""The steps of a 16-bit depth in a scene unit: millimetres, where the unit is a metre."""
 
 FILES = {
     "depth.png": "Depth",
@@ -41,5 +41,5 @@ FILES = {
 
 
 def endings(passes: Collection[str]) -> list[str]:
-    """Of the files that are written of labels with these passes, in order."""
+    """The endings of the files that are written of labels with these passes, in order."""
     return [*["labels.exr"][: len(passes)], *(each for each, name in FILES.items() if name in passes), "labels.json"]

@@ -38,7 +38,7 @@ _MILLIMETRES = 1000.0
 """In a metre."""
 
 _SAME = 1e-6
-"""What figures of one object may differ in from picture to picture: float32's rounding of a matrix, and a little more."""
+"""The tolerance of one object's figures from picture to picture: float32's rounding of a matrix, and a little more."""
 
 
 def write(folder: Path, output: Path) -> dict[str, int]:
@@ -73,7 +73,7 @@ def write(folder: Path, output: Path) -> dict[str, int]:
 
 
 def _picture(path: Path, told: Document, objects: "_Objects", output: Path, number: int) -> tuple[Any, Any, Any]:
-    """What the three files say of a picture; its depth and masks are written."""
+    """The entries of a picture in the three files; its depth and masks are written."""
     depth = files.passes(path, told, ("Depth",))
     if not depth:
         raise InputError(f"{path} has no depth: render it with --labels depth")
@@ -169,7 +169,7 @@ def _camera(told: Document) -> Document:
 
 
 def _copy_rgb(path: Path, told: Document, output: Path, number: int) -> bool:
-    """Whether there is a picture."""
+    """True if there is a picture."""
     picture = files.photograph(path, told)
     if picture is None:
         return False

@@ -105,5 +105,5 @@ def _categories(categories: dict[str, int]) -> list[Document]:
 
 
 def _colour(number: int) -> list[int]:
-    """Of a category: neighbours far apart, by steps around each channel that share no divisor with 256."""
+    """The color of a category: neighbours far apart, by steps around each channel that share no divisor with 256."""
     return [number * step % 256 for step in (67, 149, 211)]

@@ -28,7 +28,7 @@ _MASK = 0xFFFFFFFF
 
 @dataclass(frozen=True, eq=False)
 class Coverage:
-    """Of a picture.
+    """The coverage of a picture's instances.
 
     passes : its Cryptomatte layers. names, areas : of each instance, in the layers, and in pixels. header : their attributes.
     """
@@ -40,7 +40,7 @@ class Coverage:
 
 
 def coverage(surfaces: Surfaces) -> Coverage:
-    """Of all instances."""
+    """The coverage of all instances."""
     names = _names(surfaces.instances)
     marks = np.array([_mark(name) for name in names], np.float32)
     shape = surfaces.instance.shape
@@ -71,7 +71,7 @@ def soft_mask(image: Image, name: str) -> NDArray[np.float32]:
 
 
 def told(found: Coverage, number: int) -> dict[str, Any] | None:
-    """What a label file tells of an instance's coverage; None where it has none."""
+    """The entry of a label file about an instance's coverage; None where it has none."""
     return {"name": found.names[number], "area": float(found.areas[number])} if found.areas[number] else None
 
 

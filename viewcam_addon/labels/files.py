@@ -26,7 +26,7 @@ from .scene_labels import Labels
 _FORMAT, _VERSION = "virtual-pinhole-labels", 1
 
 _UNKNOWN_FLOW = 1e10
-"""What Middlebury's format has where no flow is known; everything above 1e9 counts as that."""
+"""The mark of Middlebury's format where no flow is known; everything above 1e9 counts as that."""
 
 
 def of_picture(path: Path, ending: str) -> Path:
@@ -69,7 +69,7 @@ def write(path: Path, labels: Labels, depth_steps: float = DEPTH_STEPS) -> list[
 
 
 def _content(ending: str, values: NDArray[np.float32], depth_steps: float) -> bytes:
-    """Of one of `FILES`. values : of its pass, rows from the top."""
+    """The bytes of one of `FILES`. values : of its pass, rows from the top."""
     if ending == "depth.png":
         return encoded(depth_levels(values[..., 0], depth_steps))
     if ending == "instances.png":
@@ -78,7 +78,7 @@ def _content(ending: str, values: NDArray[np.float32], depth_steps: float) -> by
 
 
 def read(path: Path) -> dict[str, Any]:
-    """What a label file tells, with the keys that docs/labels.md names.
+    """The content of a label file, with the keys that docs/labels.md names.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def read(path: Path) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def understood(path: Path) -> Iterator[None]:
-    """What a label file lacks that the block wants of it, as the sentence of `read`."""
+    """A context that turns what a label file lacks into the sentence of `read`."""
     try:
         yield
     except InputError:
@@ -112,7 +112,7 @@ def understood(path: Path) -> Iterator[None]:
 
 
 def name(path: Path) -> str:
-    """What a label file's picture is called, and all that belongs to it: shot of shot.labels.json."""
+    """The name of a label file's picture and of all that belongs to it: shot of shot.labels.json."""
     return path.name.removesuffix(".labels.json")
 
 
@@ -139,7 +139,7 @@ def picture(path: Path, told: dict[str, Any]) -> str:
 
 
 def passes(path: Path, told: dict[str, Any], wanted: Sequence[str]) -> dict[str, NDArray[np.float32]]:
-    """Those passes of a label file's EXR that it has: (height, width, channels), rows from the **top**.
+    """The passes of a label file's EXR that it has, of those wanted: (height, width, channels), rows from the **top**.
 
     Raises
     ------

@@ -14,11 +14,13 @@ Window = tuple[int, int, NDArray[np.bool_]]
 """A part of a picture: its first column and row, and which of its pixels are set, rows from the bottom."""
 
 Masks = list[dict[str, Any] | None]
-"""Of each instance: area in pixels, box [x, y, width, height] and uncompressed run lengths; None where it has no pixel."""
+"""The mask of each instance: area in pixels, box [x, y, width, height] and uncompressed run lengths; None where it has no
+pixel."""
 
 
 def of_picture(instance: NDArray[np.int64], count: int) -> Masks:
-    """Those of what each pixel shows. instance : (height, width) numbers below `count`, −1 for none, rows from the bottom."""
+    """The masks of what each pixel shows. instance : (height, width) numbers below `count`, −1 for none, rows from the
+    bottom."""
     shown = instance[::-1].T.ravel()
     starts = np.flatnonzero(np.diff(shown, prepend=-2))
     ends = np.append(starts[1:], shown.size)
@@ -29,7 +31,7 @@ def of_picture(instance: NDArray[np.int64], count: int) -> Masks:
 
 
 def of_windows(windows: Sequence[Window | None], shape: tuple[int, int]) -> Masks:
-    """Those of each instance's part of the picture. shape : height and width of the picture."""
+    """The masks of each instance's part of the picture. shape : height and width of the picture."""
     height = shape[0]
     there = [(owner, *window) for owner, window in enumerate(windows) if window is not None and window[2].size]
     # Column after column from the top, each with a pixel more before its head, not set, so that none runs on in the next.
@@ -62,7 +64,7 @@ def decoded(segmentation: dict[str, Any]) -> NDArray[np.bool_]:
 def _described(
     owners: NDArray[np.intp], starts: NDArray[np.intp], ends: NDArray[np.intp], shape: tuple[int, int], count: int
 ) -> Masks:
-    """Of runs in order: whose they are, their first places and those after their last."""
+    """The description of runs in order: whose they are, their first places and those after their last."""
     found: Masks = [None] * count
     if not len(owners):
         return found

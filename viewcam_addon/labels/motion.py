@@ -20,7 +20,7 @@ _SLACK = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Of each pixel's point from one frame to another; nan where nothing is known. Rows from the bottom.
+    """The motion of each pixel's point from one frame to another; nan where nothing is known. Rows from the bottom.
 
     flow : (height, width, 2), pixels to the right and **down**: where the point appears there, less the pixel's centre here.
     displacement : (height, width, 3), world space. hidden : (height, width), whether the other frame's camera does not see the
@@ -71,7 +71,7 @@ def _geometry(surfaces: Surfaces, instance: Instance) -> Mesh | Spheres:
 
 
 def _is_alike(one: Mesh | Spheres, other: Mesh | Spheres) -> bool:
-    """Whether the primitives of two geometries are the same ones, wherever they stand."""
+    """True if the primitives of two geometries are the same ones, wherever they stand."""
     if one is other:
         return True
     if isinstance(one, Mesh) and isinstance(other, Mesh):

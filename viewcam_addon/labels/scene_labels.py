@@ -17,7 +17,7 @@ from .surfaces import Keepers, Silhouettes, Surfaces
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """What is true of a picture.
+    """The ground truth of a picture.
 
     image : the passes that were asked for, rows from the bottom, with the camera; docs/labels.md says what each holds.
     instances : plain JSON values of each instance of which a pixel is shown or, with amodal masks, would be if it stood alone,

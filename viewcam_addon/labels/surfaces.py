@@ -1,4 +1,4 @@
-"""What each pixel's centre shows: the instance, its primitive and the point, in double precision."""
+"""The surfaces at the pixels' centers: the instance, its primitive and the point, in double precision."""
 
 import hashlib
 import itertools
@@ -24,10 +24,10 @@ _AT_ONCE = 2**16
 """Pixels of silhouettes that a thread traces at a time."""
 
 _EDGES = np.array([(corner, corner | side) for corner in range(8) for side in (1, 2, 4) if not corner & side]).T
-"""Of a box, whose corners differ in x by 4, in y by 2, in z by 1: their two ends."""
+"""The edges of a box, whose corners differ in x by 4, in y by 2, in z by 1: their two ends."""
 
 _MOST_IDS = 2**24 - 1
-"""What float32 counts to, and three bytes of a colour hold."""
+"""The largest number that float32 counts to, and three bytes of a colour hold."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class Instance:
 
 
 def instances(scene: Scene) -> list[Instance]:
-    """Those of a scene, in the order in which the tracer numbers them.
+    """The instances of a scene, in the order in which the tracer numbers them.
 
     An id is a hash of the key, so that it stays the same whatever else comes and goes; where two are equal (1 in 17 million for
     each pair) the later one takes the next that is free.
@@ -71,7 +71,7 @@ def instances(scene: Scene) -> list[Instance]:
 
 
 class Keeper:
-    """Of scenes with the same things, what serves from one camera to the next: hierarchies, instances, boxes.
+    """A store of what serves from one camera of a scene to the next: hierarchies, instances, boxes.
 
     The surfaces that it was last given for are those that can be traced.
     """
@@ -84,7 +84,7 @@ class Keeper:
         self._corners: dict[int, Array] = {}
 
     def box(self, name: str) -> tuple[Array, Array]:
-        """That of a geometry: see `box`."""
+        """The box of a geometry: see `box`."""
         if name not in self._boxes:
             self._boxes[name] = box(self.scene.geometries[name])
         return self._boxes[name]
@@ -116,7 +116,7 @@ class Keepers:
         self._kept: list[Keeper] = []
 
     def of(self, scene: Scene) -> Keeper:
-        """That of the scene with the same things, the last one now."""
+        """The store that serves a scene, which is the last one now."""
         found = next((each for each in self._kept if same_things(scene, each.scene)), None) or Keeper(scene, self._threads)
         self._kept = [*(each for each in self._kept if each is not found), found][-self._most :]
         return found
@@ -168,7 +168,7 @@ class Surfaces:
 
     @cached_property
     def shown_numbers(self) -> list[tuple[int, NDArray[np.intp]]]:
-        """The same, by the numbers of instances."""
+        """The pixels that show each instance, by the instances' numbers."""
         order = np.argsort(self.instance, axis=None, kind="stable")
         numbers = self.instance.ravel()[order]
         starts = np.flatnonzero(np.diff(numbers, prepend=-2))
@@ -193,7 +193,7 @@ class Surfaces:
         return instance.local(self.points.reshape(-1, 3)[pixels])
 
     def seen_first(self, points: Array, owners: NDArray[np.int64], primitives: NDArray[np.int64], slack: float) -> NDArray:
-        """Whether the camera sees points of its scene's surfaces: (n,) bool, False beside the picture and beyond the clip.
+        """True where the camera sees points of its scene's surfaces: (n,) bool, False beside the picture and beyond the clip.
 
         points : (n, 3), world space, each on the primitive of the instance that it is given with. slack : how much nearer than
         a point, as a share of its depth, its own surface may be found.
@@ -218,7 +218,7 @@ class Silhouettes:
         self._surfaces, self._keeper = surfaces, surfaces.keeper
 
     def windows(self) -> list[Window | None]:
-        """Of each instance, in order, the part of the picture that holds it; what shows it among the others belongs to it in
+        """The part of the picture that holds each instance, in order; what shows it among the others belongs to it in
         any case. None where it isn't in the picture.
 
         Rays are traced in the objects' spaces, so that a geometry is made ready once for all its instances; what is flattened
@@ -296,7 +296,7 @@ def box(geometry: Mesh | Spheres) -> tuple[Array, Array]:
 
 
 def _inverses(matrices: Array) -> Array:
-    """Of (n, 4, 4) matrices; of one that flattens, which has none, the nearest thing."""
+    """The inverses of (n, 4, 4) matrices; of one that flattens, which has none, the nearest thing."""
     try:
         return np.linalg.inv(matrices)
     except np.linalg.LinAlgError:

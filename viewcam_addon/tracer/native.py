@@ -211,7 +211,7 @@ def core(name: str | None = None) -> _Core:
 
 @functools.cache
 def _library() -> ctypes.CDLL:
-    """What hatch_build.py compiled and pip, or Blender, installed."""
+    """The core that hatch_build.py compiled and pip, or Blender, installed."""
     name = {"win32": "viewcam.dll", "darwin": "libviewcam.dylib"}.get(sys.platform, "libviewcam.so")
     spec = importlib.util.find_spec("viewcam_core")
     for folder in (spec.submodule_search_locations or ()) if spec else ():
@@ -356,7 +356,7 @@ class CoreScene:
         self.check(self.core.add_objects(self.handle, given))
 
     def serves(self, scene: Scene) -> bool:
-        """Whether its hierarchies are those of another scene: the same things in the same places, near the same origin."""
+        """True if its hierarchies are those of another scene: the same things in the same places, near the same origin."""
         return (
             list(scene.materials) == list(self._scene.materials)  # objects name them by their numbers
             and np.array_equal(self.origin, _origin(scene))
@@ -373,7 +373,8 @@ class CoreScene:
     def silhouette(
         self, camera: Pinhole, clip: tuple[float, float], eye: NDArray, axes: NDArray, window: tuple[int, int, int, int]
     ) -> NDArray[np.bool_]:
-        """Whether anything is seen through the pixels' centres of a part of a picture: (height, width), rows from the bottom.
+        """True where anything is seen through the pixels' centres of a part of a picture: (height, width), rows from the
+        bottom.
 
         eye, axes : (3,) and (3, 3), where the camera's eye and its right, up and forward are in the scene's world, as they may
         be in an object's space. window : the first column, the first row, columns and rows.
@@ -470,15 +471,15 @@ class CoreScene:
         self.check(self.core.render_geometry(self.handle, rows.start, rows.stop, planes, height * width, stop))
 
     def render_hits(self, passes: Passes, hits: tuple[NDArray, NDArray, NDArray], rows: range, stop: Any = None) -> None:
-        """The same, and what is met, each (height, width): the planar depth, float64, inf where nothing is; the object and its
-        primitive, uint32, `NO_HIT` there.
+        """Render passes, and return the hits, each (height, width): the planar depth, float64, inf where nothing is; the
+        object and its primitive, uint32, `NO_HIT` there.
         """
         addresses = [_address(each) for each in hits]
         planes = _planes(passes, hits[0].size)
         self.check(self.core.render_hits(self.handle, rows.start, rows.stop, planes, hits[0].size, *addresses, stop))
 
     def surface_at(self, passes: Passes, columns: NDArray, rows: NDArray) -> None:
-        """The same of n places in the picture; passes (n, channels)."""
+        """Render passes at n places in the picture; passes (n, channels)."""
         columns, rows = array(columns, np.float64, (None,)), array(rows, np.float64, (len(columns),))
         planes = _planes(passes, len(columns))
         self.check(self.core.surface_at(self.handle, len(columns), _address(columns), _address(rows), planes))
@@ -493,7 +494,7 @@ class CoreScene:
         return rays
 
     def closest(self, rays: NDArray, kind: str = "camera", packets: bool = True) -> tuple[NDArray, NDArray, NDArray]:
-        """What n rays meet first: the distances in their directions' lengths, inf where nothing is, objects and primitives.
+        """The first hits of n rays: the distances in their directions' lengths, inf where nothing is, objects and primitives.
 
         kind : of `RAYS`. Objects and primitives are (n,) int64, −1 where nothing is; an object that stands in n places counts
         as n.
@@ -506,7 +507,7 @@ class CoreScene:
         return t, objects, primitives
 
     def occluded(self, rays: NDArray, packets: bool = True) -> NDArray[np.bool_]:
-        """Whether anything stands in the way of n rays that ask for a light."""
+        """True where anything stands in the way of n rays that ask for a light."""
         rays = array(rays, np.float64, (None, 8))
         hidden = np.empty(len(rays), np.uint8)
         self.check(self.core.occluded(self.handle, len(rays), _address(rays), packets, _address(hidden)))
@@ -525,7 +526,8 @@ class CoreScene:
         return found[:, :3], found[:, 3:6], found[:, 6], found[:, 7:10], found[:, 10]
 
     def values(self, rows: NDArray) -> tuple[NDArray, NDArray]:
-        """What the last node makes on a floor, z up: n colours or vectors (n, 3), and the numbers (n,) that they are.
+        """The values that the last node makes on a floor, z up: n colours or vectors (n, 3), and the numbers (n,) that they
+        are.
 
         rows : (n, 6), the unit way that a path came along, u, v, and whether the floor is met from behind.
         """
@@ -541,7 +543,7 @@ class CoreScene:
 
 
 def constant_value(node: Node) -> tuple[tuple[float, float, float], float] | None:
-    """What a node that makes values is everywhere, and that as a number; None where it varies or shows an image."""
+    """The value that a node makes everywhere, as a color and as a number; None where it varies or shows an image."""
     if any(colour.image is not None for colour in node.colours):
         return None
     scene = CoreScene(_NOWHERE, 1)

@@ -56,7 +56,7 @@ class Tracer:
             self._core = CoreScene(scene, self._threads)
 
     def _used_up(self) -> tuple[Scene, CoreScene]:
-        """What this tracer has; it can't trace any more."""
+        """The scene and the core's scene of this tracer, which can't trace any more."""
         former = self._scene, self._core
         vars(self).clear()
         return former
@@ -81,7 +81,7 @@ class Tracer:
         watcher: Watcher | None = None,
         error: float | None = None,
     ) -> Passes:
-        """The same of light, and what is at the pixel centres: Depth and Object Index.
+        """Render light, and the geometry at the pixel centers: Depth and Object Index.
 
         error : as in `render`; then there is the pass Sample Count, too.
         """
@@ -108,7 +108,7 @@ class Tracer:
     def hits(
         self, names: Collection[str] = (), place: tuple[float, float] = (0.5, 0.5)
     ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], Passes]:
-        """What the pixels' centres show, or another place in each of them, each (height, width), rows from the bottom: the
+        """The hits of the pixels' centers, or of another place in each, (height, width), rows from the bottom: the
         planar depth, inf where nothing is; which instance, counting through the objects and the places of each; and which of
         its geometry's primitives, −1 where none is. And of these same points the passes that `names` are, as `render` has them.
         """
@@ -136,7 +136,7 @@ class Tracer:
         return {name: np.isin(instances, np.flatnonzero(owners == name)) for name in there}
 
     def closest(self, origins: ArrayLike, directions: ArrayLike) -> tuple[NDArray, NDArray, NDArray]:
-        """What rays meet first within the clip range, in lengths of their directions; the rest as in `hits`, each (n,).
+        """The first hits of rays within the clip range, in lengths of their directions; the rest as in `hits`, each (n,).
 
         origins, directions : (n, 3) or what broadcasts to it, world space.
         """
@@ -189,13 +189,13 @@ class Tracer:
 
 
 class Keeper:
-    """Of scenes that are traced one after the other, what the next one may share with the one before: see `Tracer`."""
+    """A store of what scenes that are traced one after the other share: see `Tracer`."""
 
     def __init__(self) -> None:
         self._tracer: Tracer | None = None
 
     def tracer(self, scene: Scene, threads: int | None = None) -> Tracer:
-        """That of a scene. The one before can't trace any more."""
+        """The tracer of a scene. The tracer of the scene before it can't trace any more."""
         former, self._tracer = self._tracer, None
         self._tracer = Tracer(scene, threads, former)
         return self._tracer

@@ -31,7 +31,7 @@ class Watcher(Protocol):
         """Some rows are finished. passes : the whole picture's. Called in the thread that called the renderer."""
 
     def stop(self) -> bool:
-        """Whether to give up. Asked often, by any thread."""
+        """True if rendering is to stop. Asked often, by any thread."""
 
 
 def over_threads(

@@ -82,7 +82,7 @@ def test_up_dragged_into_the_eye_stays(posed_camera, steps):
 def test_cancelling_restores_all_to_the_bit_though_the_camera_was_not_at_its_values(posed_camera, scene, steps, name, mode):
     posed_camera.rotation_mode = mode
     posed_camera.virtual_pinhole.pole = "HOLD"
-    cameras.follow(posed_camera, scene)
+    cameras.CameraSync.of(posed_camera).edited(scene)
     posed_camera.location, posed_camera.data.lens = (1.2345, 6.789, 0.1), 33.3
     before, start = everything(posed_camera), gizmos.place(posed_camera, name)
     for step in range(1, 5):

@@ -137,6 +137,7 @@ def test_a_view_through_the_camera_marks_its_look_at_point_and_nothing_else(show
 
 
 def test_what_is_drawn_is_what_the_values_ask_for(shown, posed_camera):
+    posed_camera.virtual_pinhole.keyframe_insert("eye", frame=1)
     limit = posed_camera.constraints.new("LIMIT_LOCATION")  # holds the camera off its values
     limit.use_max_x, limit.max_x = True, 0
     ((pinhole, up, share),) = overlay._figures(shown)

@@ -1,4 +1,5 @@
 import itertools
+import math
 import re
 from types import SimpleNamespace
 
@@ -283,7 +284,8 @@ def test_the_box_does_not_tick_where_the_camera_is_no_pinhole(posed_camera):
     group = posed_camera.virtual_pinhole
     cases = ("PERSP", False, True), ("ORTHO", False, False), ("PANO", False, False), ("ORTHO", True, True)
     for kind, ticked, offered in cases:
-        posed_camera.data.type, group.enabled = kind, ticked
+        posed_camera.data.type, group.enabled = "PERSP", ticked
+        posed_camera.data.type = kind
         assert is_offered() == offered, f"{kind}, ticked: {ticked}"
 
 
@@ -335,10 +337,74 @@ def test_in_the_narrowest_sidebar_no_words_stand_beside_others(posed_camera, eac
         assert (len(rows) > len(set(map(id, rows)))) == is_beside, f"at {width} pixels"
 
 
-def test_what_is_not_enabled_is_greyed_and_can_be_edited(posed_camera):
+def test_a_camera_that_is_not_enabled_shows_its_own_values_greyed_and_one_button(posed_camera):
+    """What is stored is stale: its own are where it stands."""
     posed_camera.virtual_pinhole.enabled = False
-    for name, layout in properties_drawn(panel.VIEWCAM_PT_sidebar).items():
-        assert layout.is_all("active") == (name == "name") and layout.is_all("enabled"), name
+    posed_camera.location, posed_camera.rotation_euler, posed_camera.data.lens = (0, -8, -1e-8), (math.pi / 2, 0, 0), 50
+    bpy.context.view_layer.update()
+    found = drawn(panel.VIEWCAM_PT_sidebar)
+    texts = [look.get("text", name) for kind, name, look, layout, _ in found if kind == "label" and not layout.is_all("active")]
+    assert texts[:4] == ["Camera", "0", "-8 m", "0"], texts
+    assert "50 mm" in texts and "0°" in texts and not any(text.startswith("-0") for text in texts)
+    offered = {name: look for kind, name, look, layout, _ in found if kind == "prop" and layout.is_all("active")}
+    assert list(offered) == ["name", "enabled"] and offered["enabled"] == {"text": "Use", "toggle": True}
+
+
+def test_what_a_constraint_or_a_driver_places_is_read_only_with_a_word_why(posed_camera, empty):
+    def locked():
+        bpy.context.view_layer.update()
+        return [name for name, layout in properties_drawn(panel.VIEWCAM_PT_data).items() if not layout.is_all("enabled")]
+
+    def words():
+        found = drawn(panel.VIEWCAM_PT_data)
+        return [look.get("text", name) for kind, name, look, *_ in found if kind == "label" and look.get("icon") == "LOCKED"]
+
+    constraint = posed_camera.constraints.new("TRACK_TO")
+    assert locked() == [], "a constraint without a target places nothing"
+    constraint.target = empty("Target", (5, 5, 5))
+    assert locked() == ["look_at", "up", "roll"] and words() == ["Constraint"]
+    posed_camera.data.driver_add("lens").driver.expression = "20.0 + 1.0"
+    assert locked() == ["look_at", "up", "focal_length", "lens_unit", "zoom", "roll"] and words() == ["Constraint", "Driver"]
+    posed_camera.constraints.clear()
+    posed_camera.parent = parent = empty("Dolly")
+    assert locked() == ["focal_length", "lens_unit", "zoom"], "a parent that stands still lets its camera be set"
+    parent.keyframe_insert("location", frame=1)
+    assert words() == ["Parent", "Parent", "Driver"]
+
+
+def test_what_is_linked_can_not_be_set_by_buttons(posed_camera, tmp_path):
+    path = str(tmp_path / "library.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(path, link=True) as (_, names):
+        names.objects = ["Camera"]
+    bpy.context.scene.collection.objects.link(bpy.data.objects["Camera"])
+    bpy.context.scene.camera = bpy.data.objects["Camera"]
+    dead = {"viewcam.apply_camera", "viewcam.adopt_camera", "viewcam.bake_camera"}
+    for kind, name, _, layout, _ in drawn(panel.VIEWCAM_PT_data):
+        if kind == "operator" and name in dead:
+            dead.remove(name)
+            assert not layout.is_all("enabled"), name
+    assert not dead
+
+
+def test_of_an_override_it_is_said_why_lens_and_roll_are_grey(posed_camera, tmp_path):
+    path = str(tmp_path / "library.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(path, link=True) as (_, names):
+        names.objects = ["Camera"]
+    bpy.context.scene.collection.objects.link(bpy.data.objects["Camera"])
+    override = bpy.data.objects["Camera"].override_create(remap_local_usages=True)
+    bpy.context.scene.camera = override
+
+    def words():
+        found = drawn(panel.VIEWCAM_PT_data)
+        return [look.get("text", name) for kind, name, look, *_ in found if kind == "label" and look.get("icon") == "LOCKED"]
+
+    assert words() == ["Override: edit in px", "Override: edit Up"]
+    override.virtual_pinhole.lens_unit = "PIXELS"
+    assert words() == ["Override: edit Up"]
 
 
 def test_a_point_that_follows_a_target_can_not_be_edited(posed_camera, empty):
@@ -373,8 +439,8 @@ def test_apply_again_is_not_marked_where_it_mends_nothing(posed_camera, scene):
         assert not is_marked(), f"{name} moves the values"
     posed_camera.constraints.new("LIMIT_LOCATION").use_min_z = True
     posed_camera.constraints[0].min_z = 9
-    assert not is_marked()
-    assert any("moves 'Camera'" in notice.sentence for notice in panel.notices(posed_camera, scene))
+    assert not is_marked(), "the values follow a constraint as well"
+    assert panel.notices(posed_camera, scene) == [] and posed_camera.virtual_pinhole.eye[2] == 9
 
 
 def test_a_notice_is_drawn_in_lines_that_fit_and_with_its_remedy_below(posed_camera):

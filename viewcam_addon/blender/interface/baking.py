@@ -25,7 +25,7 @@ from ...comparison.cameras import conversion_error
 from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
-from .. import causes, datablocks, pose, versions
+from .. import causes, conversion, datablocks, pose, versions
 from .operators import CameraOperator
 
 Array = NDArray[np.float64]
@@ -131,7 +131,7 @@ def _look(flight: _Flight, scene: bpy.types.Scene, is_key: bool) -> None:
         flight.live.append((cameras.read(camera_object, scene), math.dist(stated.eye, stated.look_at)))
         if not is_key:
             return
-        cameras.place(camera_object, stated, scene, depsgraph)
+        conversion.place(camera_object, stated, scene, depsgraph)
         rotation = pose.rotation_channel(camera_object)
         if flight.at:
             parent = pose.parent_matrix(camera_object, depsgraph)
@@ -315,13 +315,13 @@ class VIEWCAM_OT_delete_keyframes(CameraOperator, bpy.types.Operator):
         for block, path in found:
             versions.remove_curves(block, path)
         if camera_object.virtual_pinhole.enabled:
-            cameras.follow(camera_object, scene)
+            cameras.CameraSync.of(camera_object).edited(scene)
 
 
 def draw(layout: bpy.types.UILayout, camera_object: bpy.types.Object) -> None:
     """The button, in the panel."""
     row = layout.row()
-    row.enabled = camera_object.virtual_pinhole.enabled
+    row.enabled = camera_object.library is None
     row.operator("viewcam.bake_camera", icon="ACTION").camera = camera_object.name
 
 

@@ -67,9 +67,9 @@ class VIEWCAM_OT_apply_camera(CameraOperator, bpy.types.Operator):
 
     def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
         _stated(camera_object, scene)
-        cameras.follow(camera_object, scene)
+        cameras.CameraSync.of(camera_object).edited(scene)
         for finding in cameras.check(camera_object, _stated(camera_object, scene), scene):
-            self.report({"WARNING"}, finding)
+            self.report({"WARNING"}, finding.sentence)
 
 
 class VIEWCAM_OT_adopt_camera(CameraOperator, bpy.types.Operator):

@@ -14,25 +14,25 @@ from dataclasses import dataclass
 import bpy
 from bpy.app.translations import pgettext_iface as iface
 
+from ... import roll as rolls
 from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
-from .. import causes, datablocks, findings, hold, targets, versions
+from .. import causes, datablocks, findings, hold, preferences, targets
 from . import baking, clipboard, dragging, panel_rows, presets, readouts, scene_cameras
 from .panel_places import BelowProperties, BelowSidebar, CameraPanel, InProperties, InSidebar, SubPanel
 
 
 @dataclass(frozen=True)
 class Notice:
-    """A sentence of warning. remedy : (operator, its button's text) that mends it and nothing else, if there is one."""
+    """A sentence of warning. remedy : (operator, its button's text) that mends it and nothing else, if there is one.
+
+    is_mended_by_applying : whether setting the camera by its values again brings them together.
+    """
 
     sentence: str
     remedy: tuple[str, str] | None = None
-
-    @property
-    def is_mended_by_applying(self) -> bool:
-        """Whether setting the camera by its values again brings them together."""
-        return findings.APPLY_AGAIN in self.sentence
+    is_mended_by_applying: bool = False
 
 
 class _MainPanel(CameraPanel):
@@ -56,38 +56,92 @@ class _MainPanel(CameraPanel):
             return
         scene_cameras.draw_header(layout, camera_object, context)
         panel_rows.begin(layout, context, decorate=True)
-        _draw_values(layout.column(), camera_object.virtual_pinhole)
         found = notices(camera_object, context.scene)
-        clipboard.draw(layout, camera_object)
-        baking.draw(layout, camera_object)
-        buttons = panel_rows.buttons(layout, context)
-        _draw_setting(buttons, camera_object, any(notice.is_mended_by_applying for notice in found))
+        if camera_object.virtual_pinhole.enabled:
+            _draw_values(layout.column(), camera_object.virtual_pinhole)
+            clipboard.draw(layout, camera_object)
+            baking.draw(layout, camera_object)
+            buttons = panel_rows.buttons(layout, context)
+            _draw_setting(buttons, camera_object, any(notice.is_mended_by_applying for notice in found))
+        else:
+            _draw_standing(layout, camera_object, context)
+            clipboard.draw(layout, camera_object)
         for notice in found:
             _draw_notice(layout.column(align=True), notice, camera_object, context)
 
 
+def _draw_standing(layout: bpy.types.UILayout, camera_object: bpy.types.Object, context: bpy.types.Context) -> None:
+    """The camera as it stands while its values are off, which may be stale, and the button that reads them off it."""
+    column = layout.column(align=True)
+    column.active = False
+    for label, texts in standing(camera_object, context.scene):
+        panel_rows.described(column, context, label, texts, share=0.25)
+    row = layout.row()
+    row.enabled = camera_object.data.type == "PERSP"
+    row.prop(camera_object.virtual_pinhole, "enabled", text="Use", toggle=True)
+
+
+def standing(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> list[tuple[str, tuple[str, ...]]]:
+    """(label, texts) of a camera's values as it stands, whatever is stored; none where it is no pinhole."""
+    try:
+        found = cameras.as_it_stands(camera_object, scene, in_use=False)
+    except InputError:
+        return []
+    roll = math.degrees(rolls.angle_from(preferences.up_axis(), found))
+    return [
+        ("Camera", tuple(datablocks.length(number, scene) for number in readouts.rounded(found.eye))),
+        ("Look At", tuple(datablocks.length(number, scene) for number in readouts.rounded(found.look_at))),
+        ("Up", tuple(f"{number:.4g}" for number in readouts.rounded(found.up))),
+        ("Lens", (f"{camera_object.data.lens:.6g} mm",)),
+        ("Roll", (f"{round(roll, 3) + 0.0:g}°",)),
+    ]
+
+
 def _draw_values(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
     column.active = group.enabled
-    for point in targets.POINTS:
+    followed = causes.followed(group.id_data)
+    for point, quantity in (("eye", findings.EYE), ("look_at", findings.VIEW)):
         rows = column.column()
-        rows.enabled = targets.place(group.id_data, point) is None  # where the point is, its target says
+        # Where the point is, its target says, or what places the camera at every frame.
+        rows.enabled = quantity not in followed and targets.place(group.id_data, point) is None
         panel_rows.field(rows, group, point)
+        _draw_why(column, followed.get(quantity))
         panel_rows.field(column, group, f"{point}_target", text="Object")
         target = targets.target_of(group.id_data, point)
         if target and target.type == "ARMATURE":
             panel_rows.field(column, group, f"{point}_bone", text="Bone", among=(target.data, "bones"))
         elif target and target.type == "MESH":
             panel_rows.field(column, group, f"{point}_group", text="Group", among=(target, "vertex_groups"))
-    panel_rows.field(column, group, "up")
+    turned = column.column()
+    turned.enabled = findings.VIEW not in followed
+    panel_rows.field(turned, group, "up")
     column.separator()
-    _draw_lens(column, group)
-    for name in ("zoom", "keeps"):
-        panel_rows.field(column, group, name)
+    zoomed = column.column()
+    zoomed.enabled = findings.DISTANCE not in followed
+    _draw_lens(zoomed, group)
+    is_override = bool(group.id_data.override_library)  # which keeps values, and not the other looks at them
+    if is_override and group.lens_unit != "PIXELS":
+        _draw_why(column, "Override: edit in px")
+    panel_rows.field(zoomed, group, "zoom")
+    _draw_why(column, followed.get(findings.DISTANCE))
+    panel_rows.field(column, group, "keeps")
     column.separator()
-    panel_rows.field(column, group, "held_roll" if group.pole == "HOLD" else "roll")
+    turned = column.column()
+    turned.enabled = findings.VIEW not in followed
+    panel_rows.field(turned, group, "held_roll" if group.pole == "HOLD" else "roll")
+    if is_override and group.pole != "HOLD":
+        _draw_why(column, "Override: edit Up")
     if group.pole == "HOLD":
         panel_rows.field(column, group, "hold_within")
     panel_rows.field(column, group, "pole")
+
+
+def _draw_why(column: bpy.types.UILayout, word: str | None) -> None:
+    """What a value that can't be edited follows, if it does."""
+    if word:
+        row = column.row()
+        row.alignment = "RIGHT"
+        row.label(text=word, icon="LOCKED")
 
 
 def _draw_lens(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
@@ -114,8 +168,9 @@ def _draw_lens(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> No
 
 def _draw_setting(row: bpy.types.UILayout, camera_object: bpy.types.Object, alert: bool) -> None:
     """The two ways to bring values and camera together. alert : whether they differ, and the first of them mends it."""
+    row.enabled = camera_object.library is None
     apply = row.row(align=True)
-    apply.enabled, apply.alert = camera_object.virtual_pinhole.enabled, alert
+    apply.alert = alert
     apply.operator("viewcam.apply_camera").camera = camera_object.name
     row.operator("viewcam.adopt_camera").camera = camera_object.name
 
@@ -195,16 +250,18 @@ def notices(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> list[Not
             found = []
         else:
             found = _doubts(camera_object, stated)
-            found += (_notice(finding, camera_object) for finding in cameras.check(camera_object, stated, scene))
+            found += map(_notice, cameras.check(camera_object, stated, scene))
     except InputError as error:
         return [Notice(datablocks.sentence(error))]
     return [*found, *map(Notice, datablocks.beyond_pinhole(camera_object, scene))]
 
 
-def _notice(finding: str, camera_object: bpy.types.Object) -> Notice:
-    """A finding, with the button that deletes the keyframes which it is about, if it is."""
-    is_about_keyframes = findings.DELETE_KEYFRAMES in finding and causes.keyed(camera_object, versions.action_curves)
-    return Notice(finding, ("viewcam.delete_keyframes", iface("Delete These Keyframes")) if is_about_keyframes else None)
+def _notice(finding: findings.Finding) -> Notice:
+    """A finding as it is drawn, with the button that mends it, if there is one."""
+    button = finding.cause.mended_by if finding.cause else None
+    deletes = button == findings.Button.DELETE_KEYFRAMES
+    remedy = ("viewcam.delete_keyframes", iface("Delete These Keyframes")) if deletes else None
+    return Notice(finding.sentence, remedy, is_mended_by_applying=button == findings.Button.APPLY_AGAIN)
 
 
 def _doubts(camera_object: bpy.types.Object, stated: Pinhole) -> list[Notice]:

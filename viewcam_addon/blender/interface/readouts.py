@@ -73,6 +73,12 @@ def vector(numbers: Triple) -> str:
     return f"({', '.join(f'{round(number, 5) + 0.0:g}' for number in numbers)})"
 
 
+def rounded(numbers: Triple) -> Triple:
+    """Numbers as they are shown: those that are less than a float32 step of the largest are 0."""
+    step = 2.0**-23 * max(map(abs, numbers))
+    return tuple(number if abs(number) > step else 0.0 for number in numbers)
+
+
 def distance_warning(stated: Pinhole) -> str | None:
     """A sentence on a camera so far from the origin that Blender's and Cycles' float32 is visible where it looks, else None.
 

@@ -34,7 +34,7 @@ from ...pinhole import Pinhole
 from ...tracer.scene import Object
 from ...tracer.scene.shader_nodes import KINDS
 from .. import camera as cameras
-from .. import datablocks, findings, pose
+from .. import conversion, datablocks, findings, pose
 from ..temporary_settings import Overrides, overridden
 from . import baked_inputs, features, linking, materials
 from .depsgraph import visit_still
@@ -317,10 +317,10 @@ def _camera(overrides: Overrides, temporary: bpy.types.Scene, view: _View) -> bp
     data.sensor_fit, (data.sensor_width, data.sensor_height) = view.sensor_fit, view.sensor
     data.clip_start, data.clip_end = view.clip
     shown, claimed = (_relative(pinhole, view.shown.eye) for pinhole in (view.shown, view.claimed))
-    cameras.place(block, shown, temporary, datablocks.depsgraph_of(temporary))
+    conversion.place(block, shown, temporary, datablocks.depsgraph_of(temporary))
     frame = datablocks.frame_of(temporary)
     distance = claimed.distance[0] * frame.resolution_x / frame.size[0]
-    cameras.state(block, claimed.eye, claimed.look_at, claimed.up, distance, frame)
+    cameras.CameraSync.of(block).state(claimed.eye, claimed.look_at, claimed.up, distance, frame)
     return block
 
 

@@ -1,4 +1,5 @@
-"""What the tracer traces: meshes and spheres, the objects that place them in the world, the camera, and what gives light.
+"""The scene that the tracer traces: meshes and spheres, the objects that place them in the world, the camera, and what gives
+light.
 
 A geometry is stored once, in its object's space, and placed by any number of objects. Nothing here knows files (scene_file.py)
 or rays (visibility.py, surface.py); the classes hold arrays and check their shapes. Materials, images, lamps, world, film and
@@ -144,7 +145,7 @@ class Object:
 
 @dataclass(frozen=True)
 class LedgerEntry:
-    """What became of one thing that the exporter met.
+    """The fate of one thing that the exporter met.
 
     object : its name in Blender.
     status : "exported", "approximated" or "skipped".
@@ -157,7 +158,7 @@ class LedgerEntry:
 
     @property
     def is_modelled(self) -> bool:
-        """Whether it was exported whole, as it is."""
+        """True if it was exported whole, as it is."""
         return self.status == "exported"
 
 

@@ -74,5 +74,5 @@ class Bounces:
 
     @property
     def none(self) -> "Bounces":
-        """Those of level direct: light comes straight, if through what is transparent."""
+        """The bounces of level direct: light comes straight, if through what is transparent."""
         return Bounces(0, 0, 0, 0, self.transparent)

@@ -15,7 +15,7 @@ LARGEST_INLINE = 48  # numbers: a plane or a few spheres stay readable in the JS
 
 
 def geometry_document(geometry: Mesh | Spheres, prefix: str, arrays: dict[str, NDArray]) -> dict:
-    """What the JSON holds; large arrays go into `arrays`, under keys that begin with the prefix."""
+    """The JSON of a geometry; large arrays go into `arrays`, under keys that begin with the prefix."""
     document: dict = {"type": "mesh" if isinstance(geometry, Mesh) else "spheres"}
     for field in dataclasses.fields(geometry):
         array = getattr(geometry, field.name)

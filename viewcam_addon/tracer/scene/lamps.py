@@ -95,7 +95,8 @@ def _size(name: str, value: object) -> tuple[float, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Lamp:
-    """What all lamps have. A kind declares where it is, how strong, and then the numbers that the core's lamp of its name has.
+    """The base of all lamps. A kind declares where it is, how strong, and then the numbers that the core's lamp of its name
+    has.
 
     casts_shadow : whether objects can stand in its light. multiple_importance : whether rays run into it, so that the eye,
     mirrors and glass see it, where it has a size; else it only lights what is rough, as much as before. receivers : names of
@@ -119,7 +120,7 @@ class Lamp:
 
     @property
     def _own(self) -> dict[str, Any]:
-        """What its kind declares."""
+        """The fields that its kind declares."""
         return {each.name: getattr(self, each.name) for each in fields(self)[len(fields(Lamp)) :]}
 
     @property
@@ -139,7 +140,7 @@ class Lamp:
 
     @property
     def is_dark(self) -> bool:
-        """Whether it gives no light at all."""
+        """True if it gives no light at all."""
         return not any(self.strength)
 
 
@@ -266,5 +267,5 @@ class World:
 
     @property
     def is_black(self) -> bool:
-        """Whether neither it nor its backdrop shows anything."""
+        """True if neither it nor its backdrop shows anything."""
         return not any(self.radiance) and (self.backdrop is None or self.backdrop.is_black)

@@ -1,4 +1,4 @@
-"""What light is made of, as a scene file has it: materials, images, lamps, world, film and bounces.
+"""The light of a scene file: materials, images, lamps, world, film and bounces.
 
 All of it may be left out, and each value that is what it would be without is left out when a scene is written. Angles are in
 radians: a file must give back the last bit of them, which degrees can't.
@@ -28,7 +28,7 @@ _WHITE = (1.0, 1.0, 1.0)
 
 
 def light_document(scene: Scene, arrays: dict[str, NDArray]) -> dict:
-    """What the JSON holds of a scene's light; large images go into `arrays`."""
+    """The JSON of a scene's light; large images go into `arrays`."""
     document = {
         "images": {
             name: {

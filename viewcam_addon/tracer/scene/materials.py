@@ -1,4 +1,4 @@
-"""What surfaces are made of, as data.
+"""The materials of surfaces, as data.
 
 A material is either a tree of shader nodes (shader_nodes.py) or, for what a hand writes most, a sum of components without any
 roughness, each with a colour: Lambert's diffuse reflection, emission, a perfect mirror, clear glass and clear refraction.
@@ -60,7 +60,7 @@ class Material:
 
     @property
     def closures(self) -> tuple[Closure, ...]:
-        """What the core adds up, of either form of a material."""
+        """The closures that the core adds up, of either form of a material."""
         if self.surface is not None:
             return tuple(closures(self.surface))
         made = {
@@ -74,12 +74,12 @@ class Material:
 
     @property
     def shines(self) -> bool:
-        """Whether it gives light."""
+        """True if it gives light."""
         return any(closure.node.is_shining for closure in self.closures)
 
     @property
     def inputs(self) -> tuple[tuple[str, Colour], ...]:
-        """What all colours and numbers are given or made from, each with what a sentence calls it."""
+        """The inputs of all colours and numbers, each with its name in sentences."""
         found = [("displacement", colour) for colour in self.displacement.colours] if self.displacement else []
         if self.surface is None:
             return (*self.colours.items(), *found)
@@ -92,7 +92,7 @@ class Material:
 
     @property
     def nodes(self) -> Iterator[Node]:
-        """Those of its closures and its displacement, and all that feed them."""
+        """The nodes of its closures and its displacement, and all that feed them."""
         makers = [maker for each in self.closures for maker in (each.node, *(factor for factor, _ in each.factors))]
         makers.append(self.displacement)
         for maker in makers:
@@ -101,12 +101,12 @@ class Material:
 
     @property
     def attributes(self) -> set[str]:
-        """What its nodes ask meshes for, by name."""
+        """The names of the attributes that its nodes ask meshes for."""
         return {name for node in self.nodes for name in node.attributes}
 
 
 def components(shader: Node | None) -> dict[str, Any] | None:
-    """What a tree of shaders is the sum of, as a `Material` takes it; None where no components say the same."""
+    """The components that a tree of shaders is the sum of, as a `Material` takes it; None where no components say the same."""
     if shader is None:
         return {}
     if shader.type not in ("mix", "add"):
@@ -175,4 +175,4 @@ def _constant(value: Colour | Node) -> float | None:
 
 
 PLAIN = Material(diffuse=Colour((0.8, 0.8, 0.8)))
-"""What a surface without a material is made of, in Blender as here."""
+"""The material of a surface that has none, in Blender as here."""

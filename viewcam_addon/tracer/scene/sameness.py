@@ -1,4 +1,4 @@
-"""Whether two scenes hold the same: what was made for one of them can then serve the other.
+"""Equality of two scenes: what was made for one of them can then serve the other.
 
 Nothing in a scene is ever changed in place, so that what is one object is the same without a look inside. Everything else is
 compared to the last bit. Rejected: fingerprints, which read all of both scenes where most of them is one object.
@@ -15,12 +15,12 @@ _FEW = 64  # numbers, below which NumPy takes longer to compare two arrays than 
 
 
 def same_things(one: Scene, other: Scene) -> bool:
-    """Whether the same geometries stand in the same places, made of materials of the same names."""
+    """True if the same geometries stand in the same places, made of materials of the same names."""
     return same(one.objects, other.objects) and same(one.geometries, other.geometries)
 
 
 def same(one: object, other: object) -> bool:
-    """Whether two values, of those that scenes are made of, are the same."""
+    """True if two values, of those that scenes are made of, are the same."""
     if one is other:
         return True
     if type(one) is not type(other):

@@ -24,7 +24,7 @@ DISTRIBUTIONS = ("multiscatter_ggx", "ggx", "beckmann")
 
 @dataclass(frozen=True)
 class Kind:
-    """What a type of node is given.
+    """The inputs of a type of node.
 
     inputs : name → its default; a number, a colour, words to choose from (the first is the default), or None for a shader; of a
     node that makes values also what value_nodes.py says.
@@ -109,7 +109,7 @@ KINDS: dict[str, Kind] = {
 _NEEDED = {"image": "the name of one", "table": "the name of an image of one row", "text": "that of an IES file"}
 
 MOST_NODES = 500
-"""Of a value: a tree that is larger is none that a hand has made, or one node in it feeds others again and again."""
+"""The limit of a value's tree: a larger one is none that a hand has made, or one node in it feeds others again and again."""
 MOST_DEEP = 250
 """Nodes that feed one another in a row: Python does not follow many hundreds."""
 
@@ -173,12 +173,12 @@ class Node:
 
     @property
     def is_value(self) -> bool:
-        """Whether it makes a value, and is no shader."""
+        """True if it makes a value, and is no shader."""
         return self.type in KINDS and KINDS[self.type].is_value
 
     @property
     def varies(self) -> bool:
-        """Whether it is not the same everywhere: nobody asks a node that makes values, whose core knows."""
+        """True if it is not the same everywhere: nobody asks a node that makes values, whose core knows."""
         return True
 
     @property
@@ -204,32 +204,32 @@ class Node:
 
     @property
     def attributes(self) -> Iterator[str]:
-        """What it asks meshes for by name."""
+        """The names of the attributes that it asks meshes for."""
         yield from value_nodes.attributes_of(self.type, self.__getitem__)
         if self.is_stretched and self["tangent"] is None:
             yield "generated"
 
     @property
     def is_stretched(self) -> bool:
-        """Whether it is a shader whose facets are stretched along a tangent."""
+        """True for a shader whose facets are stretched along a tangent."""
         return any(not self[name].is_black for name in ("anisotropy", "anisotropic") if name in KINDS[self.type].inputs)
 
     @property
     def is_tabulated(self) -> bool:
-        """Whether it is a shader that looks up what it scatters in all (core/bsdf/albedo.h)."""
+        """True for a shader that looks up what it scatters in all (core/bsdf/albedo.h)."""
         inputs = KINDS[self.type].inputs
         return self.type in ("principled", "sheen") or ("distribution" in inputs and self["distribution"] == DISTRIBUTIONS[0])
 
     @property
     def is_rough_refraction(self) -> bool:
-        """Whether it is a shader that refracts in more than one direction."""
+        """True for a shader that refracts in more than one direction."""
         if self.type == "principled" and self["transmission_weight"].is_black:
             return False
         return self.type in ("glass", "refraction", "principled") and not self["roughness"].is_black
 
     @property
     def is_shining(self) -> bool:
-        """Whether it gives off any light of its own."""
+        """True if it gives off any light of its own."""
         if self.type == "emission":
             return not (self["color"].is_black or self["strength"].is_black)
         return self.type == "principled" and not (self["emission_color"].is_black or self["emission_strength"].is_black)

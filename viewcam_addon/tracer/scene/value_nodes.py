@@ -32,7 +32,7 @@ INCOMING = "incoming"
 """The default of a vector that is the way that light leaves in, in the world, where nothing else is given."""
 
 OWN = (NORMAL, TANGENT)
-"""What surfaces have of themselves where no node makes another."""
+"""The vectors that surfaces have of themselves where no node makes another."""
 
 GENERATED = "generated"
 """The default of a vector that is the place in the mesh's texture space where nothing else is given."""
@@ -256,7 +256,7 @@ KINDS: dict[str, Mapping[str, Default]] = {
 
 
 def attributes_of(kind: str, value_of: Callable[[str], Any]) -> Iterator[str]:
-    """What a node asks meshes for by name. kind : its type. value_of : input → its value."""
+    """The names of the attributes that a node asks meshes for. kind : its type. value_of : input → its value."""
     if kind == "attribute":
         yield value_of("name")
     if kind == "normal_map" and value_of("space") == "tangent" and value_of("uv"):

@@ -13,7 +13,7 @@ from ... import checks
 from .colours import radiance
 
 LARGEST = 1e18
-"""Of coordinates and sizes: as of scenes, products of a few of them are float64's."""
+"""The largest coordinate and size, as of scenes: products of a few of them are float64's."""
 
 
 def value(default: Any, check: Callable[[str, Any], Any] | None, *read: Any) -> Any:
@@ -41,7 +41,7 @@ def vector(default: tuple[float, ...]) -> Any:
 
 
 def light(default: float = 1.0) -> Any:
-    """Of red, green and blue."""
+    """A field of red, green and blue."""
     return value((default,) * 3, radiance, "vector", 3)
 
 
