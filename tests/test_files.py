@@ -1,5 +1,6 @@
 """A file appears whole or not at all, the folder tells nothing of a failure, and what is no file is not replaced by one."""
 
+import ast
 import contextlib
 import os
 import socket
@@ -171,6 +172,31 @@ def test_what_can_not_be_written_is_known_before_there_is_anything_to_write(tmp_
         monkeypatch.setattr(os, "stat", lambda path, **how: disk if Path(path) == target else real(path, **how))
     with pytest.raises(InputError, match=r"is a folder|can't be written|is a disk"):
         check_writable(target)
+
+
+def test_a_drive_that_is_not_there_is_named(monkeypatch):
+    """Every path of Linux and macOS lies in a folder that is there; one of Windows may name a missing drive or share."""
+    missing = r"Q:\out.exr" if sys.platform == "win32" else "/out.exr"
+    if sys.platform != "win32":
+        monkeypatch.setattr(os.path, "lexists", lambda path: False)
+    with pytest.raises(InputError, match="which is not there: choose another"):
+        check_writable(missing)
+
+
+@pytest.mark.parametrize("name", ["nul\0nul.exr", pytest.param("a" * 40_000, id="40,000 letters")])
+def test_what_can_be_no_name_of_a_file_is_refused_in_one_sentence(tmp_path, name):
+    for write in (check_writable, lambda path: written_whole(path).__enter__()):
+        with pytest.raises(InputError, match=r"is no name that a file can have|can't be written"):
+            write(tmp_path / name)
+
+
+def test_texts_have_the_same_bytes_on_every_system():
+    """What Python writes without newline= ends its lines otherwise on Windows."""
+    package = Path(__file__).resolve().parent.parent / "viewcam_addon"
+    for path in package.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_bytes())):
+            if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "write_text":
+                assert any(keyword.arg == "newline" for keyword in node.keywords), f"{path}:{node.lineno}"
 
 
 def test_to_look_whether_a_file_can_be_written_leaves_nothing(tmp_path):

@@ -181,6 +181,18 @@ def test_names_in_a_blend_are_printed_plain(fresh_blender, tmp_path):
         assert r"\x1b" in done.stdout + done.stderr or words[0] == "check", f"{words}: the name never reached the terminal"
 
 
+@pytest.mark.parametrize("encoding", ["cp1252", "cp437", "ascii"])
+def test_a_name_that_a_code_page_has_no_characters_for_is_printed_as_escapes(encoding, tmp_path):
+    """A redirected output has such a page on Windows, and nothing there says which."""
+    (tmp_path / "日本.json").write_text('{"format": 0}', encoding="utf-8")
+    for words in (["batch", "--help"], ["camera", "日本.json"], ["render", "日本.json", "日本.exr"]):
+        environment = os.environ | {"PYTHONPATH": str(PACKAGE.parent), "PYTHONIOENCODING": f"{encoding}:strict"}
+        command = [sys.executable, "-m", "viewcam_addon", *words]
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, check=False, encoding=encoding)
+        assert "bug" not in done.stderr and "Traceback" not in done.stderr, done.stderr
+        assert done.stdout or r"\u65e5\u672c" in done.stderr, done.stderr
+
+
 def test_what_a_camera_can_not_be_at_a_frame_is_printed_plain(fresh_blender, capfd):
     bpy = fresh_blender
     camera = bpy.data.objects.new(HOSTILE[:60], bpy.data.cameras.new("Camera"))

@@ -24,10 +24,10 @@ def main_and_exit() -> NoReturn:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     number = survived(sys.argv[1:])
     from .cli import main
-    from .terminal import open_closed_streams, share_one_heap
+    from .terminal import open_streams, share_one_heap
 
     signal.signal(signal.SIGINT, answer)
-    open_closed_streams()
+    open_streams()
     share_one_heap()
     status = main(ended_by=number)
     with contextlib.suppress(OSError):  # whoever reads our lines may have gone

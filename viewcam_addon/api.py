@@ -188,7 +188,7 @@ class Check:
 
 
 def check(blend: File, *options: File) -> Check:
-    """Whether Cycles renders the camera of a .blend file, by `viewcam check` in a process of its own.
+    """True if Cycles renders the camera of a .blend file, by `viewcam check` in a process of its own.
 
     options : those of the command, as in `check("shot.blend", "--camera", "Camera", "--level", "direct")`.
 

@@ -49,13 +49,13 @@ HEARTBEAT_TIMEOUT = 60.0
 """Seconds without one after which a process is given up: Blender lets other threads run in all that takes long."""
 
 START_TIMEOUT = 300.0
-"""The same for the first heartbeat of a new process, which a busy machine may be long in starting."""
+"""The timeout of the first heartbeat of a new process, which a busy machine may be long in starting."""
 
 _GRACE = 1.0
 """Seconds for an answer to be finished that nobody waits for any more."""
 
 _KINDS = {kind.__name__: kind for kind in (InputError, FullDiskError, NotModelledError)}
-"""What is raised there is raised here."""
+"""The errors that are raised here where the child raises them."""
 
 
 def viewcam(*arguments: str | Path) -> list[str]:
@@ -153,7 +153,7 @@ class ProcessGroup:
 
 
 def _inherited(handle: int) -> dict[str, object]:
-    """What Popen must be told so that the child has a handle of ours."""
+    """The arguments of Popen by which the child has a handle of ours."""
     if not _ON_WINDOWS:
         return {"pass_fds": (handle,)}
     os.set_handle_inheritable(handle, True)
@@ -196,14 +196,14 @@ class ServerProcess:
             theirs.close()
 
     def is_there(self) -> bool:
-        """Whether the process still listens, as far as can be known without asking it."""
+        """True if the process still listens, as far as can be known without asking it."""
         try:
             return not self._ours.poll()  # it says nothing unasked, so what is there to read is the end
         except OSError:
             return False
 
     def ask(self, request: Mapping[str, Any], ends: float = math.inf) -> Any:
-        """What the process answers. ends : when the answer must be there, by time.monotonic().
+        """The answer of the process. ends : when the answer must be there, by time.monotonic().
 
         Raises
         ------
@@ -272,7 +272,7 @@ class ServerOnDemand:
         self._server: ServerProcess | None = None
 
     def ask(self, request: Mapping[str, Any]) -> Any:
-        """What the process answers; raises as ServerProcess does."""
+        """The answer of the process; raises as ServerProcess does."""
         if self._server is None:
             self._server = ServerProcess(self._name, module(self._module), environment())
         try:

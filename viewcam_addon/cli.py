@@ -73,7 +73,7 @@ class _UsageError(InputError):
         self.command = command
 
     def raised(self, _: argparse.Namespace) -> NoReturn:
-        """What such a command does when it is run."""
+        """Raise what such a command raises when it is run."""
         raise self
 
 
@@ -103,7 +103,7 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_CommandParser)
 
     def command(name: str, text: str) -> Callable[[Callable[[argparse.ArgumentParser], None]], None]:
-        """Of a function that adds the command's own words, and what runs it."""
+        """A decorator of the function that adds a command's options and says what runs it."""
 
         def add(own_words: Callable[[argparse.ArgumentParser], None]) -> None:
             def add_words(added: argparse.ArgumentParser) -> None:
@@ -388,7 +388,9 @@ def _write_result(options: argparse.Namespace, status: int, result: dict[str, An
             from . import checks
 
             with written_whole(options.json) as temporary:
-                temporary.write_text(json.dumps(checks.for_json(result), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+                temporary.write_text(
+                    json.dumps(checks.for_json(result), indent=2, allow_nan=False) + "\n", encoding="utf-8", newline="\n"
+                )
         if path := getattr(options, "junit", None):
             from . import junit
 

@@ -12,7 +12,8 @@ import signal
 import sys
 
 COMMANDS = ("export", "cycles", "check", "demo", "batch", "audit")
-"""Those that open a .blend in their own process. Of a batch, another one may do so, whose crashes render_client.py tells."""
+"""The commands that open a .blend in their own process. Of a batch, another one may do so, whose crashes render_client.py
+tells."""
 
 passed_on: dict[int, int] = {}
 """In a batch that is waited for: the signals by which it hears of those that the waiting process is sent → what these were.

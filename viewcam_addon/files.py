@@ -131,7 +131,11 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     with _in_a_sentence(path):
         file = _replaceable(path)
         if file:
-            folder = next(folder for folder in file.absolute().parents if os.path.lexists(folder))
+            folder = next((folder for folder in file.absolute().parents if os.path.lexists(folder)), None)
+            if folder is None:  # of Windows alone
+                raise InputError(
+                    f"{path} is on the drive or share {file.absolute().anchor}, which is not there: choose another"
+                )
             temporary = _beside(file, folder)
             try:
                 temporary.touch(exist_ok=False)
@@ -142,7 +146,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 
 def is_replaced(path: str | os.PathLike[str]) -> bool:
-    """Whether `written_whole` makes or replaces a regular file there, beside which others may stand.
+    """True if `written_whole` makes or replaces a regular file there, beside which others may stand.
 
     Raises
     ------
@@ -155,7 +159,7 @@ def is_replaced(path: str | os.PathLike[str]) -> bool:
 
 
 def is_printed_to(path: str | os.PathLike[str]) -> bool:
-    """Whether it is where standard output or standard error leads, so that what is written would mix with what is printed."""
+    """True if it is where standard output or standard error leads, so that what is written would mix with what is printed."""
     try:
         there = os.stat(path)
     except OSError:
@@ -169,6 +173,8 @@ def _replaceable(path: Path) -> Path | None:
         there = os.stat(path)
     except FileNotFoundError:
         there = None
+    except ValueError as error:  # a character 0; on Windows, one that is too long, too
+        raise InputError(f"{ascii(str(path))[:100]} is no name that a file can have: give another") from error
     if there is not None:
         kind = stat.S_IFMT(there.st_mode)
         if kind == stat.S_IFDIR:
@@ -185,7 +191,7 @@ def _is_stream(there: os.stat_result) -> bool:
 
 
 def _is_open_as(stream: int, there: os.stat_result) -> bool:
-    """Whether it is what standard output (1) or standard error (2) leads to."""
+    """True if it is what standard output (1) or standard error (2) leads to."""
     try:
         return os.path.samestat(there, os.fstat(stream))
     except OSError:  # it is closed
@@ -193,7 +199,7 @@ def _is_open_as(stream: int, there: os.stat_result) -> bool:
 
 
 def _opened_for_writing(path: Path) -> contextlib.AbstractContextManager[BinaryIO]:
-    """What stands there and is no file to replace, behind what is printed already if it is one of our own streams."""
+    """The opened target that is no file to replace, behind what is printed already if it is one of our own streams."""
     there = os.stat(path)
     for number, stream in ((1, sys.stdout), (2, sys.stderr)):
         if _is_open_as(number, there):

@@ -17,8 +17,12 @@ from typing import TextIO
 _MOST_HEAPS = -8  # M_ARENA_MAX
 
 
-def open_closed_streams() -> None:
-    """Let standard output and standard error lead nowhere, where whoever started this process has closed them."""
+def open_streams() -> None:
+    """Let standard output and standard error take whatever is printed.
+
+    They lead nowhere where whoever started this process has closed them. What their encoding has no character for, as Windows'
+    code pages have none for most, is written as an escape of Python's.
+    """
     for name, number in (("stdout", 1), ("stderr", 2)):
         if getattr(sys, name) is None:
             nowhere = os.open(os.devnull, os.O_WRONLY)
@@ -26,6 +30,8 @@ def open_closed_streams() -> None:
                 os.dup2(nowhere, number)
                 os.close(nowhere)
             setattr(sys, name, os.fdopen(number, "w"))
+        elif isinstance(stream := getattr(sys, name), io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def plain(text: str) -> str:
@@ -50,7 +56,8 @@ def say(*lines: str) -> None:
 
 def copy_of(stream: int) -> TextIO:
     """Where standard output (1) or standard error (2) leads now, to write to inside `silent_libraries` as well."""
-    return open(os.dup(stream), "w", encoding="utf-8", errors="backslashreplace")
+    encoding = getattr(sys.stdout if stream == 1 else sys.stderr, "encoding", None) or "utf-8"
+    return open(os.dup(stream), "w", encoding=encoding, errors="backslashreplace")
 
 
 @contextlib.contextmanager

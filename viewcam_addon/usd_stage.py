@@ -1,4 +1,4 @@
-"""What a USD stage says of its cameras, read by OpenUSD (`pxr`) in a process of its own, with bounds on time, memory and files.
+"""The cameras of a USD stage, read by OpenUSD (`pxr`) in a process of its own, with bounds on time, memory and files.
 
 OpenUSD was not written for hostile files: some crash it, a few references to references make it compose for hours, and a stage
 opens whatever it names. So it never runs in this process, where a crash would be Blender's. In its own it has `_SECONDS` and
@@ -28,7 +28,7 @@ from . import child_process
 from .errors import InputError
 
 _SECONDS = 2
-"""Of computing, and one more for each `_BYTES_A_SECOND` of the file."""
+"""The seconds of computing, and one more for each `_BYTES_A_SECOND` of the file."""
 
 _BYTES_A_SECOND = 4 * 2**20
 _WALL = 10
@@ -49,7 +49,7 @@ _TOO_MUCH = "OpenUSD needed more time or memory for it than its size accounts fo
 
 
 def read(name: str, path: Path | None, text: str, size: str, values: str) -> dict[str, Any]:
-    """What the stage of a file, or of a text if `path` is None, says of its cameras.
+    """The cameras of the stage of a file, or of a text if `path` is None.
 
     name : what sentences call it. size : the attribute of a camera that has the pixels of its picture. values : the key of its
     customData that is wanted.

@@ -3,6 +3,9 @@
 The scenes, the pictures of their points and the mistakes are made here, from formulas of their own."""
 
 import json
+import os
+import struct
+import zlib
 from collections import Counter
 from dataclasses import replace
 
@@ -397,3 +400,35 @@ def test_without_evidence_it_says_what_to_give(tmp_path, capfd):
 def test_an_audit_takes_cameras_as_they_are_read(model):
     found = cameras.read(model[1])
     assert audit(found, tracks_through(found)).kind == "none"
+
+
+def head_of_a_png(width, height):
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    head = chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 16, 0, 0, 0, 0))
+    return b"\x89PNG\r\n\x1a\n" + head + chunk(b"IDAT", zlib.compress(bytes(1000))) + chunk(b"IEND", b"")
+
+
+@pytest.mark.parametrize(
+    ("name", "told"), [("pipe.png", "no file"), ("large.png", "60000 × 60000"), ("cut.npy", "header"), ("huge.npy", "header")]
+)
+def test_no_depth_map_is_waited_for_or_larger_than_a_picture(tmp_path, capsys, name, told):
+    if name == "pipe.png" and not hasattr(os, "mkfifo"):
+        pytest.skip("this system has no pipes in folders")
+    pytest.importorskip("PIL")
+    document = json.loads(cameras.write(a_filmed_scene(), "transforms"))
+    for frame in document["frames"]:
+        frame["depth_file_path"] = name
+    (tmp_path / "transforms.json").write_text(json.dumps(document))
+    if name == "pipe.png":
+        os.mkfifo(tmp_path / name)
+    elif name == "large.png":
+        (tmp_path / name).write_bytes(head_of_a_png(60_000, 60_000))
+    else:
+        np.save(tmp_path / name, np.ones((4, 4)))
+        whole = (tmp_path / name).read_bytes()
+        (tmp_path / name).write_bytes(whole[:70] if name == "cut.npy" else whole.replace(b"(4, 4)", b"(4444444444, 4)"))
+    assert run("audit", tmp_path) == 2
+    said = capsys.readouterr().err
+    assert told in said and "bug" not in said and said.count("\n") == 1

@@ -1,11 +1,14 @@
 """Nothing that is read raises anything but InputError, hangs, or runs: files of every format, damaged in every way."""
 
 import copy
+import io
 import json
 import math
 import re
 import struct
 import time
+import tracemalloc
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -229,6 +232,21 @@ LARGE = {
     "looks": "LookAt 1 2 3 4 5 6 0 0 1\n" * 10_000,
     "sensors": "<sensor type='thinlens'/>" * 5_000 + "<sensor type='perspective'/>" * 5_000,
     "defaults": "".join(f"<default name='a{i}' value='{i}'/>" for i in range(5_000)) + "<sensor type='$a17'/>" * 5_000,
+    "quotes_in_code": "camera.position = [" + "'\\'" * 80_000,
+    "names": "camera.position = a" + ".b" * 120_000,
+    "calls_of_nothing": "camera.position = a" + "().b" * 60_000,
+    "parentheses": "camera.lookAt(" + "(" * 240_000,
+    "casts": "camera.position = " + "(float)" * 35_000,
+    "signs": "camera.position = " + "-" * 240_000,
+    "steps": "a++ " * 60_000 + "camera.position = a",
+    "dots": "camera.position = " + "1.1" * 80_000,
+    "blanks_in_code": "camera.position = [1," + " " * 240_000 + "2",
+    "names_of_names": "".join(f"a{i} = a{i + 1} + a{i + 2};\n" for i in range(9_000)) + "camera.position = a0",
+    "comments_in_code": "camera.position = 1" + " /* //" * 40_000,
+    "keys_in_code": "eye = [" + "a: " * 80_000,
+    "statements_of_pbrt": "LookAt " + "1" * 100_000 + "a" + '"\\' * 60_000,
+    "items_of_python": "{'type': 'perspective', 'to_world': " + "T.a() @ " * 30_000,
+    "lines_of_yaml": "K: [1, 2" + ("\n" + " " * 200 + "- a") * 1_000,
     "digits": '{"frames": [{"transform_matrix": ' + "9" * 249_000 + "}]}",
 }
 
@@ -257,3 +275,112 @@ def test_a_path_in_a_file_opens_nothing_but_a_pictures_head(tmp_path):
         (tmp_path / "transforms.json").write_text(json.dumps(document))
         with pytest.raises(InputError, match="size"):
             cameras.read(Path(tmp_path / "transforms.json"))
+
+
+def npz(**members):
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in members.items():
+            archive.writestr(f"{name}.npy", data)
+    return packed.getvalue()
+
+
+def npy(header, data=b""):
+    text = header.encode().ljust(117) + b"\n"
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text + data
+
+
+def lying():
+    """An archive whose table says that 64 MiB of zeros are 200 bytes."""
+    data = bytearray(npz(K=npy("{'descr': '<f8', 'fortran_order': False, 'shape': (3, 3), }", bytes(2**26))))
+    at = data.index(b"PK\x01\x02") + 24
+    data[at : at + 4] = struct.pack("<I", 200)
+    return bytes(data)
+
+
+SHAPES = {
+    "a cut header": "{'descr': '<f8', 'fortran_order': False, 'shape': (3,",
+    "a huge shape": "{'descr': '<f8', 'fortran_order': False, 'shape': (9999999999, 99999999, 17), }",
+    "a shape beyond C": f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({10**30}, 17), }}",
+    "a shape below nothing": "{'descr': '<f8', 'fortran_order': False, 'shape': (-3, 17), }",
+    "a shape of words": "{'descr': '<f8', 'fortran_order': False, 'shape': ('a', 17), }",
+    "nested signs": "-" * 5000 + "1",
+    "nested brackets": "(" * 5000,
+    "objects": "{'descr': '|O', 'fortran_order': False, 'shape': (3, 17), }",
+    "forty axes": f"{{'descr': '<f8', 'fortran_order': False, 'shape': {(1,) * 40}, }}",
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("file", ["poses_bounds.npy", "k.npz"])
+def test_an_array_whose_header_lies_is_refused_before_it_is_believed(tmp_path, name, file):
+    data = npy(SHAPES[name])
+    (tmp_path / file).write_bytes(data if file.endswith("npy") else npz(K=data, R=data, t=data))
+    with pytest.raises(InputError):
+        cameras.read(tmp_path / file)
+
+
+def test_an_archive_whose_table_lies_unpacks_no_more_than_that(tmp_path):
+    (tmp_path / "k.npz").write_bytes(lying())
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError):
+            cameras.read(tmp_path / "k.npz")
+        assert tracemalloc.get_traced_memory()[1] < 2**25  # half of what is packed there
+    finally:
+        tracemalloc.stop()
+
+
+DEEP = 981
+NESTED = {
+    "openmvg's key": '{"sfm_data_version": "0.3", "views": [], "intrinsics": [{"key": [[1]], '
+    '"value": {"ptr_wrapper": {"data": {}}}}]}',
+    "three.js' child": '{"object": {"type": "Group", "children": "abc"}}',
+    "three.js' children": '{"object": {"type": "Group", "children": ["abc", 5, null]}}',
+    "a matrix": '{"frames": [{"file_path": "a", "transform_matrix": ' + "[" * DEEP + "1" + "]" * DEEP + "}]}",
+    "a matrix of objects": '{"frames": [{"file_path": "a", "transform_matrix": ' + '{"a":' * DEEP + "1" + "}" * DEEP + "}]}",
+    "K": '{"K": ' + "[" * DEEP + "1" + "]" * DEEP + "}",
+    "a pose of BOP": '{"0": {"cam_K": ' + "[" * DEEP + "1" + "]" * DEEP + "}}",
+    "a phone's": '{"poses": ' + "[" * DEEP + "1" + "]" * DEEP + ', "K": 1, "w": 1, "h": 1}',
+    "glTF's": '{"asset": {}, "nodes": [{"camera": 0, "children": ' + "[" * DEEP + "1" + "]" * DEEP + '}], "cameras": [{}]}',
+    "an id of Meshroom": '{"views": [{"viewId": [[]], "poseId": {}}], "intrinsics": [{"intrinsicId": []}], '
+    '"poses": [{"poseId": []}]}',
+    "a sidecar's": '{"camera": ' + "[" * DEEP + "1" + "]" * DEEP + ', "cameraToWorld": 1, "worldToCamera": 1, "K": 1}',
+    "a distortion": '{"K": [1, 0, 1, 0, 1, 1, 0, 0, 1], "image_size": [4, 4], "dist": ' + "[" * DEEP + "0" + "]" * DEEP + "}",
+    "OpenCV's XML": "<opencv_storage><K type_id='opencv-matrix'><rows>1</rows><cols>3</cols><data>1 0 1 0 1 1 0 0 1</data></K>"
+    "</opencv_storage>",
+    "a narrow pbrt": 'LookAt 1 2 3 0 0 0 0 0 1 Camera "perspective" "float fov" [ 5e-324 ]',
+    "a flat view": "view = [0,0,1,0, 0,0,1,0, 0,0,1,-5, 0,0,0,1]",
+}
+
+
+@pytest.mark.parametrize("name", NESTED)
+def test_what_is_of_another_kind_than_expected_is_told_by_its_reader(name):
+    with pytest.raises(InputError) as refused:
+        cameras.read(NESTED[name], options=GIVEN)
+    assert refused.value.__cause__ is None, f"no reader thought of this: {refused.value.__cause__!r}"
+
+
+def test_names_and_sentences_are_lines_of_characters_that_show():
+    name = "a\nb\0c\x1b[2J\ud83d"
+    document = json.loads(cameras.write([camera("plain")], "gltf"))
+    document["nodes"][0]["name"] = name
+    (found,) = cameras.read(json.dumps(document))
+    assert found.name == r"a\nb\x00c\x1b[2J\ud83d"
+    document["cameras"][0]["perspective"]["yfov"] = 4
+    with pytest.raises(InputError) as refused:
+        cameras.read(json.dumps(document))
+    assert str(refused.value).isprintable()
+    with pytest.raises(InputError) as refused:
+        cameras.read('LookAt 1 2 3 0 0 0 0 0 1 Camera "\nspherical" "float fov" [ 50 ]')
+    assert str(refused.value).isprintable()
+
+
+def test_what_no_reader_thought_of_is_a_sentence_with_its_cause(monkeypatch):
+    def stumble(source, options):
+        return {}["nothing of that name"]
+
+    monkeypatch.setattr(cameras.FORMATS["transforms"], "read", stumble)
+    with pytest.raises(InputError, match="damaged where it says its cameras") as refused:
+        cameras.read(cameras.write([camera("plain")], "transforms"))
+    assert isinstance(refused.value.__cause__, KeyError)

@@ -90,6 +90,43 @@ def metashape(known, lens="", label="left.jpg"):
 </chunk></document>"""
 
 
+ENCODINGS = [
+    ("UTF-8", "utf-8", ""),
+    ("UTF-8", "utf-8-sig", ""),
+    ("UTF-16", "utf-16", ""),
+    ("UTF-16", "utf-16-le", ""),
+    ("UTF-16", "utf-16-be", ""),
+    ("ISO-8859-1", "latin-1", ""),
+    ("latin1", "latin-1", ""),
+    ("windows-1252", "cp1252", ""),
+    ("UTF-8", "latin-1", "is not written in it"),
+    ("US-ASCII", "latin-1", "is not written in it"),
+    ("UTF-16", "utf-8", "is not written in it"),
+    ("ISO-8859-1", "utf-16", "is not written in it"),
+    ("UTF-99", "utf-8", "unknown"),
+    ("rot13", "utf-8", "unknown"),
+    ("unicode_escape", "utf-8", "unknown"),
+]
+
+
+@pytest.mark.parametrize(("declared", "written", "problem"), ENCODINGS)
+def test_xml_is_read_in_the_encoding_that_it_declares(tmp_path, declared, written, problem):
+    text = metashape(Known("plain"), label="für.jpg").replace("UTF-8", declared)
+    path = tmp_path / "cameras.xml"
+    path.write_bytes(text.encode(written))
+    if not problem:
+        assert the_same(cameras.read(path), Known("plain")).image == "für.jpg"
+        return
+    with pytest.raises(InputError, match=f"cameras.xml says that its encoding is '{declared}'.*{problem}"):
+        cameras.read(path)
+
+
+@pytest.mark.parametrize("declared", ["UTF-16", "ISO-8859-1", "UTF-99"])
+def test_xml_from_the_clipboard_is_characters_whatever_it_declares(declared):
+    text = metashape(Known("plain"), label="für.jpg").replace("UTF-8", declared)
+    assert the_same(cameras.read(text), Known("plain")).image == "für.jpg"
+
+
 @pytest.mark.parametrize("name", UNMIRRORED)
 def test_metashape_stands_in_its_chunk(name):
     read = the_same(cameras.read(metashape(Known(name))), Known(name))

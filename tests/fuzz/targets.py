@@ -29,6 +29,9 @@ import numpy as np
 
 SECONDS = 20.0
 MEMORY = 4 * 2**30
+SMALL_SECONDS, SMALL_MEMORY = 5.0, 2**30
+"""For a file of cameras or labels; of computing, and beyond what this process has to begin with."""
+
 LONGEST = 1500  # characters of a sentence, which may name files
 
 CAMERA = {"eye": [0, -5, 0], "look_at": [0, 0, 0], "up": [0, 0, 1], "distance": 14, "width": 16, "height": 12}
@@ -323,6 +326,82 @@ def sidecar() -> Feed:
     return feed
 
 
+def cameras_of(name: str) -> Feed:
+    """A file of cameras, read with whatever may be chosen, and written again in some format."""
+    import camera_files
+
+    from viewcam_addon import cameras
+    from viewcam_addon.cameras import Camera, Options
+    from viewcam_addon.errors import InputError
+    from viewcam_addon.intrinsics import ViewPlane
+
+    content = {file: text if isinstance(text, bytes) else text.encode() for file, text in camera_files.files()[name].items()}
+    others = [text for file, text in content.items() if file != "."]
+    plane = ViewPlane((600, 600), (320, 180), 640, 360)
+    choices = [
+        Options(),
+        Options(size=(640, 360)),
+        Options(size=(640, 360), base=camera_files.SHIFTED, size_fits=True, without_distortion=True),
+        Options(view_plane=plane, axes="y_up", scale=0.01, pixel="corner", unmirrored=True, original_world=True),
+    ]
+
+    def feed(chance: random.Random, folder: Path) -> None:
+        changed = chance.choice([file for file in content if file != "."])
+        for file, data in content.items():
+            if file != ".":
+                (folder / file).parent.mkdir(parents=True, exist_ok=True)
+                (folder / file).write_bytes(_mutant(data, chance.choice(others), chance) if file == changed else data)
+        path = folder if "." in content else folder / next(iter(content))
+        options = chance.choice(choices)
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                found = cameras.read(path, options=options)
+        except InputError as error:
+            _judge_caused(error)
+            return
+        for camera in found:
+            for line in (camera.name, *camera.notes):
+                if len(line) > LONGEST or not all(map(str.isprintable, line.split(" "))):
+                    raise Said(f"a name or note is no line of a few characters that show: {line[:200]!r}")
+        try:
+            cameras.write([Camera(f"{i}", each.pinhole) for i, each in enumerate(found[:3])], chance.choice(cameras.writable()))
+        except InputError as error:
+            _judge_caused(error)
+
+    return feed
+
+
+def cameras_of_all() -> Feed:
+    """One mutant of each format after another, but for those that take their time in a process of their own."""
+    names = [name for name in CAMERAS if f"cameras-{name}" not in IN_A_PROCESS]
+    feeds = [cameras_of(name) for name in names]
+
+    def feed(chance: random.Random, folder: Path) -> None:
+        feeds[int(folder.name.rpartition("-")[2]) % len(feeds)](chance, folder)
+
+    return feed
+
+
+def _mutant(data: bytes, other: bytes, chance: random.Random) -> bytes:
+    if data[:2] == b"PK":
+        return mutants.of_zip(data, other, chance)
+    if data[:1] in b"{[":
+        with contextlib.suppress(ValueError):
+            return mutants.of_json(json.loads(data), json.loads(data), chance)
+    if b"\0" in data:
+        return mutants.of_bytes(data, other, chance)
+    return mutants.of_text(data, other, chance)
+
+
+def _judge_caused(error: Exception) -> None:
+    """Raise Said if a sentence is none, or stands for what no reader thought of."""
+    judge(str(error))
+    if error.__cause__ is not None:
+        place = traceback.extract_tb(error.__cause__.__traceback__)[-1]
+        raise Said(f"{type(error.__cause__).__name__} at {Path(place.filename).name}:{place.lineno}: {error.__cause__}")
+
+
 def broken(kind: str) -> Feed:
     """No reader, but what one may do: the third mutant makes it."""
 
@@ -383,6 +462,17 @@ def command(folder: Path) -> None:
 
 
 KINDS = {"scene": scene, "exr": exr, "shots": shots, "sidecar": sidecar, "blend": blend}
+IN_A_PROCESS = ("cameras-usd", "cameras-usdc", "cameras-usdz")
+CAMERAS = (
+    *("transforms", "transforms_applied", "colmap", "colmap_binary", "bop", "gltf", "glb", "usd", "usdc", "usdz", "sidecar"),
+    *("fspy", "metashape", "metashape_bent", "realitycapture", "meshroom", "openmvg", "bundler", "llff", "polycam", "scanner"),
+    *("record3d", "gaussian_splatting", "ros", "ros_window", "opencv", "opencv_json", "opencv_xml", "opencv_npz", "kalibr"),
+    *("tum", "kitti", "euroc", "chan", "three_js", "mitsuba", "mitsuba_dictionary", "pov_ray", "pbrt", "matrices", "look_at"),
+    *("vtk", "textbook", "looks", "looks_gl", "looks_vtk", "text", "text_of_people"),
+)
+"""The kinds of camera_files.py, which makes them only when it is asked."""
+
+KINDS |= {f"cameras-{name}": partial(cameras_of, name) for name in CAMERAS} | {"cameras-all": cameras_of_all}
 KINDS |= {kind: partial(broken, kind) for kind in ("bug", "crash", "hang", "greedy")}
 
 
@@ -393,18 +483,26 @@ def tell(stream: int, number: int, said: str) -> None:
 def main(kind: str, first: str, count: str, place: str) -> None:
     import resource
 
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    is_small = kind.startswith(("cameras-", "labels"))
     told = os.dup(1)  # Blender prints past Python
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     folder = Path(place)
     feed = KINDS[kind]()
+    most = MEMORY
+    if is_small and kind not in IN_A_PROCESS:  # whose own bounds it is that are tried
+        pages = int(Path("/proc/self/statm").read_text().split()[0])
+        most = pages * resource.getpagesize() + SMALL_MEMORY
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
     for number in range(int(first), int(first) + int(count)):
         (folder / "current").write_text(str(number))
         work = folder / f"{kind}-{number}"
         work.mkdir()
+        spent = _spent()
         signal.setitimer(signal.ITIMER_REAL, SECONDS)
         try:
             feed(random.Random(f"{kind} {number}"), work)
+            if is_small and _spent() - spent > SMALL_SECONDS:
+                raise Said(f"took {_spent() - spent:.1f} s")
         except Said as error:
             tell(told, number, str(error))
         except Exception as error:
@@ -416,6 +514,12 @@ def main(kind: str, first: str, count: str, place: str) -> None:
             shutil.rmtree(work, ignore_errors=True)
     (folder / "current").write_text("done")
     os._exit(0)  # bpy may crash as Python takes it apart
+
+
+def _spent() -> float:
+    """Seconds of computing, of this process and of those that it has started and ended."""
+    spent = os.times()
+    return spent.user + spent.system + spent.children_user + spent.children_system
 
 
 if __name__ == "__main__":

@@ -1,10 +1,13 @@
-"""Files of strangers, by the thousand: each is read, or refused in a sentence, within 20 s and 4 GiB.
+"""Files of strangers, by the thousand: each is read, or refused in a sentence, within 20 s and 4 GiB; files of cameras within
+5 s and 1 GiB.
 
-A few of each kind with every run, all of them with `make test-exhaustive`. One that fails is made again by its number:
-`python tests/fuzz/targets.py KIND NUMBER 1 FOLDER keep` leaves its files in FOLDER.
+A few of each kind with every run, all of them with `make test-exhaustive`, and of each format of cameras MUTANTS
+(MUTANTS=850 are 40,000 of all). One that fails is made again by its number: `python tests/fuzz/targets.py KIND NUMBER 1 FOLDER
+keep` leaves its files in FOLDER.
 """
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -58,7 +61,8 @@ def assert_met(kind: str, count: int, folder: Path) -> None:
     assert not found, f"{len(found)} of {count} mutants:\n" + "\n".join(found[:20])
 
 
-SAMPLE = {"scene": 60, "exr": 40, "shots": 200, "sidecar": 40}
+SAMPLE = {"scene": 60, "exr": 40, "shots": 200, "sidecar": 40, "cameras-all": 225}
+MUTANTS = int(os.environ.get("MUTANTS", "500"))
 ALL = {"scene": 4000, "exr": 2500, "shots": 2500, "sidecar": 1000, "blend": 120}
 
 
@@ -74,6 +78,15 @@ def test_every_hostile_file_is_read_or_refused_in_a_sentence(kind, tmp_path):
     if kind == "blend":
         pytest.importorskip("bpy")
     assert_met(kind, ALL[kind], tmp_path)
+
+
+@pytest.mark.exhaustive
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("name", targets.CAMERAS)
+def test_every_hostile_file_of_cameras_is_read_or_refused_in_a_sentence(name, tmp_path):
+    if name.startswith("usd"):
+        pytest.importorskip("pxr")
+    assert_met(f"cameras-{name}", MUTANTS, tmp_path)
 
 
 @pytest.mark.parametrize(

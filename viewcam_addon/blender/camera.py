@@ -267,7 +267,7 @@ class CameraSync:
             self._agree()
 
     def is_untouched(self, by_values: bool) -> bool:
-        """Whether neither the camera nor, unless by_values, its values have changed since they were last seen to agree."""
+        """True if neither the camera nor, unless by_values, its values have changed since they were last seen to agree."""
         camera_object = self.camera_object
         if camera_object.parent or camera_object.constraints or self._state != conversion.state_of(camera_object):
             return False
@@ -503,7 +503,7 @@ def _stood_at(camera_object: bpy.types.Object, values: CameraValues, scene: bpy.
 
 
 def _agrees(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> bool:
-    """Whether the camera stands where its values, in use or not, say."""
+    """True if the camera stands where its values, in use or not, say."""
     with contextlib.suppress(InputError):
         values, level = _level(camera_object, scene)
         wanted = rolls.turned(level, hold.roll(camera_object, values, scene))

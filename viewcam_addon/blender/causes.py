@@ -89,7 +89,7 @@ def fed(camera_object: bpy.types.Object) -> frozenset[str]:
 
 
 def _places(constraint: bpy.types.Constraint, camera_object: bpy.types.Object) -> bool:
-    """Whether a constraint decides at every frame where the camera is: one that carries it, only if it moves itself."""
+    """True if a constraint decides at every frame where the camera is: one that carries it, only if it moves itself."""
     goals = list(pose.targets_of(constraint))
     if constraint.type in _LIMITING or (hasattr(constraint, "target") and not goals):
         return False
@@ -167,7 +167,7 @@ def _animation(camera_object: bpy.types.Object) -> Iterator[Cause]:
 
 
 def _is_moving(block: bpy.types.Object) -> bool:
-    """Whether constraints, keyframes or drivers move an object, the bones of an armature, or what is on a path."""
+    """True if constraints, keyframes or drivers move an object, the bones of an armature, or what is on a path."""
     bones = block.pose.bones if block.pose else ()
     if any(True for each in (block, *bones) for _ in pose.active_constraints(each)):
         return True

@@ -123,7 +123,7 @@ def evaluated(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> bpy.ty
 
 
 def takes_part(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> bool:
-    """Whether Blender evaluates the camera in the scene, so that it stands somewhere there."""
+    """True if Blender evaluates the camera in the scene, so that it stands somewhere there."""
     return evaluated(camera_object, scene).is_evaluated
 
 

@@ -1,4 +1,4 @@
-"""What Blender says about a camera and its picture, in the plain classes of intrinsics.py. Nothing here changes anything."""
+"""A camera and its picture as Blender has them, in the plain classes of intrinsics.py. Nothing here changes anything."""
 
 import functools
 import math
@@ -33,7 +33,7 @@ _VALUES = "virtual_pinhole."
 
 
 def is_animated(camera_object: bpy.types.Object) -> bool:
-    """Whether a keyframe, an NLA strip or a driver changes one of the values of the Virtual Pinhole, or a target does."""
+    """True if a keyframe, an NLA strip or a driver changes one of the values of the Virtual Pinhole, or a target does."""
     curves = [*versions.animation_curves(camera_object), *versions.drivers(camera_object)]
     return any(curve.data_path.startswith(_VALUES) for curve in curves)
 
@@ -46,7 +46,7 @@ def animated_values(camera_object: bpy.types.Object) -> set[str]:
 
 
 def has_driven_values(camera_object: bpy.types.Object) -> bool:
-    """Whether a driver, such as that of a target, has a say in the values."""
+    """True if a driver, such as that of a target, has a say in the values."""
     return any(curve.data_path.startswith(_VALUES) for curve in versions.drivers(camera_object))
 
 

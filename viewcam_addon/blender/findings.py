@@ -1,4 +1,4 @@
-"""What became of a camera after it was set: where it differs from what was asked, and who did it.
+"""The findings about a camera after it was set: where it differs from what was asked, and who did it.
 
 `differences` says what is off by more than float32 storage explains, `explain` says which causes (causes.py) explain it. Both
 are pure and know no Blender. A cause is told of when what it acts on differs, so that a constraint which leaves the camera
@@ -33,7 +33,7 @@ APPLY_OR_ADOPT = "apply the values again, or adopt the camera as it stands"
 
 
 class Button(enum.Enum):
-    """What a button of the panel can do about a cause."""
+    """The remedy of a cause that a button of the panel offers."""
 
     APPLY_AGAIN = enum.auto()
     DELETE_KEYFRAMES = enum.auto()
@@ -56,7 +56,7 @@ class Cause:
 
 @dataclass(frozen=True)
 class Finding:
-    """What is told of a camera. cause : None where the words say all. differing : in words, what of the camera it explains."""
+    """A finding about a camera. cause : None where the words say all. differing : in words, what of the camera it explains."""
 
     words: str = ""
     cause: Cause | None = None
@@ -82,7 +82,7 @@ _SHIFT = Cause("The shift was changed since", frozenset({CENTRE}), APPLY_OR_ADOP
 def differences(
     wanted: Pinhole, found: Pinhole, reach: float, length: Callable[[float], str] = "{:.3g}".format
 ) -> dict[str, str]:
-    """What differs by more than Blender's float32 storage explains: its name → the figures, in words. Pure.
+    """The differences beyond what Blender's float32 storage explains: its name → the figures, in words. Pure.
 
     reach : the largest coordinate that went into the camera's location, world units. length : a length in words, with its unit.
     """

@@ -195,7 +195,7 @@ def _disarmed(put: _Put) -> Iterator[str]:
 
 
 def _unrun() -> Iterator[str]:
-    """What Blender says of texts and drivers that it has not run."""
+    """The sentences of Blender about texts and drivers that it has not run."""
     if bpy.app.autoexec_fail:
         what = bpy.app.autoexec_fail_message
         yield f"Python of the file does not run ({what}), and drivers that need it keep their last values"
@@ -208,7 +208,7 @@ def _has_script_nodes() -> bool:
 
 
 def _point_caches() -> Iterator[bpy.types.PointCache]:
-    """Of the simulations that can also keep theirs in memory."""
+    """The caches of the simulations that can also keep theirs in memory."""
     for each in bpy.data.objects:
         for modifier in each.modifiers:
             if modifier.type in ("CLOTH", "SOFT_BODY"):
@@ -218,7 +218,7 @@ def _point_caches() -> Iterator[bpy.types.PointCache]:
 
 
 def _writes_always(modifier: bpy.types.Modifier) -> bool:
-    """Whether it is simulated where a baked one would only be read, and knows nothing but files for it."""
+    """True if it is simulated where a baked one would only be read, and knows nothing but files for it."""
     if modifier.type == "FLUID" and modifier.fluid_type == "DOMAIN":
         return modifier.domain_settings.cache_type == "REPLAY" or modifier.domain_settings.is_cache_baking_any
     if modifier.type == "DYNAMIC_PAINT" and modifier.canvas_settings:

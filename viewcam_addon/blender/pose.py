@@ -41,7 +41,7 @@ def rotation_channel(camera_object: bpy.types.Object) -> str:
 
 
 def channels_of(block: bpy.types.Object) -> Channels:
-    """What an object's transform holds."""
+    """The channels of an object's transform."""
     mode = block.rotation_mode
     delta = _DELTA_ROTATIONS.get(mode, "delta_rotation_euler")
     return Channels(
@@ -105,7 +105,7 @@ def parent_matrix(camera_object: bpy.types.Object, depsgraph: bpy.types.Depsgrap
 
 
 def is_told_by_its_pose(camera_object: bpy.types.Object) -> bool:
-    """Whether only Blender knows the matrix that carries the camera, so that it is told from how the camera stands.
+    """True if only Blender knows the matrix that carries the camera, so that it is told from how the camera stands.
 
     It is told with the rounding of this pose: best from one close to that which is wanted.
     """
@@ -126,13 +126,13 @@ def targets_of(constraint: bpy.types.Constraint) -> Iterator[bpy.types.Object]:
 
 
 def is_carried_by_constraints(camera_object: bpy.types.Object) -> bool:
-    """Whether it has constraints, and each of them moves it as a parent does."""
+    """True if it has constraints, and each of them moves it as a parent does."""
     constraints = list(active_constraints(camera_object))
     return bool(constraints) and all(map(carries, constraints))
 
 
 def carries(constraint: bpy.types.Constraint) -> bool:
-    """Whether a constraint moves an object as a parent does: it multiplies its matrix by one that does not depend on it."""
+    """True if a constraint moves an object as a parent does: it multiplies its matrix by one that does not depend on it."""
     if constraint.type == "COPY_LOCATION":
         return constraint.use_offset and constraint.owner_space == "WORLD"
     if constraint.influence < 1:

@@ -41,7 +41,7 @@ def without_callbacks() -> Iterator[None]:
 
 
 def is_enabled(camera_object: bpy.types.Object) -> bool:
-    """Whether the values place the camera."""
+    """True if the values place the camera."""
     return camera_object.virtual_pinhole.enabled
 
 
@@ -52,7 +52,7 @@ def enable(camera_object: bpy.types.Object) -> None:
 
 
 def is_focused_on_look_at(camera_object: bpy.types.Object) -> bool:
-    """Whether the focus distance stays on the look-at point."""
+    """True if the focus distance stays on the look-at point."""
     return camera_object.virtual_pinhole.focus_on_look_at
 
 
@@ -145,7 +145,7 @@ def settle(camera_object: bpy.types.Object, values: CameraValues, frame: Frame) 
 
 
 def is_counted_in_earlier(camera_object: bpy.types.Object, values: CameraValues) -> bool:
-    """Whether `counted_in` has to stay: the field of view is kept, and the distance is animated."""
+    """True if `counted_in` has to stay: the field of view is kept, and the distance is animated."""
     if values.keeps != FIELD_OF_VIEW or values.counted_in is None:
         return False
     curves = [*versions.animation_curves(camera_object), *versions.drivers(camera_object)]

@@ -229,7 +229,7 @@ def _missing(camera_object: bpy.types.Object, point: str, target: bpy.types.Obje
 
 
 def can_be_target(camera_object: bpy.types.Object, candidate: bpy.types.Object) -> bool:
-    """Whether an object may be chosen: the camera does not move it."""
+    """True if an object may be chosen: the camera does not move it."""
     return not _chain(candidate, camera_object)
 
 
@@ -238,7 +238,7 @@ def _hooks(camera_object: bpy.types.Object) -> list[bpy.types.FCurve]:
 
 
 def _is_led(block: bpy.types.Object) -> bool:
-    """Whether it is a camera that its values place anew, so that Blender's dependency graph does not know where it will be."""
+    """True if it is a camera that its values place anew, so that Blender's dependency graph does not know where it will be."""
     return block.type == "CAMERA" and storage.is_enabled(block) and datablocks.is_animated(block)
 
 
@@ -278,7 +278,7 @@ def _carriers(target: bpy.types.Object, seen: set[bpy.types.Object]) -> Iterator
 
 
 def _movers(block: bpy.types.Object, is_place: bool = False) -> Iterator[bpy.types.Object]:
-    """What an object's pose depends on directly. is_place : its place alone counts, not where it looks."""
+    """The objects that an object's pose depends on directly. is_place : its place alone counts, not where it looks."""
     if _is_led(block):
         points = ("eye",) if is_place else POINTS
         yield from filter(None, (target_of(block, point) for point in points))
@@ -295,7 +295,8 @@ def _movers(block: bpy.types.Object, is_place: bool = False) -> Iterator[bpy.typ
 
 
 def _shapers(block: bpy.types.Object) -> Iterator[bpy.types.Object]:
-    """What a mesh's shape depends on directly: the objects of its modifiers, and of the drivers of its shape keys."""
+    """The objects that a mesh's shape depends on directly: the objects of its modifiers, and of the drivers of its shape
+    keys."""
     for modifier in block.modifiers:
         found = [getattr(modifier, each.identifier) for each in modifier.bl_rna.properties]
         if modifier.type == "NODES" and modifier.node_group:

@@ -16,7 +16,7 @@ import bpy
 Made = TypeVar("Made")
 
 LARGEST_INDEX = 32767
-"""Of pass_index."""
+"""The largest pass_index."""
 
 
 class Overrides:
@@ -36,7 +36,7 @@ class Overrides:
             setattr(owner, name, value)
 
     def shared(self, make: Callable[["Overrides"], Made]) -> Made:
-        """What `make(overrides)` makes while the overrides last: the same for all who ask, made for the first."""
+        """The result of `make(overrides)` while the overrides last: the same for all who ask, made for the first."""
         if make not in self._made:
             self._made[make] = make(self)
         return self._made[make]

@@ -39,7 +39,7 @@ def light_tree(light: bpy.types.Light) -> bpy.types.NodeTree | None:
 
 
 def panorama(camera: bpy.types.Camera) -> bpy.types.bpy_struct:
-    """What has the settings of a panoramic camera. Until 4.5 they are the add-on's."""
+    """The block that has the settings of a panoramic camera. Until 4.5 they are the add-on's."""
     return camera if hasattr(camera, "panorama_type") else camera.cycles
 
 
@@ -119,7 +119,7 @@ def new_curve(block: bpy.types.ID, data_path: str, index: int) -> bpy.types.FCur
 
 
 def shares_animation(block: bpy.types.ID, other: bpy.types.ID) -> bool:
-    """Whether one curve moves both: they have the same action and, since 4.4, the same slot of it."""
+    """True if one curve moves both: they have the same action and, since 4.4, the same slot of it."""
     data, others = block.animation_data, other.animation_data
     if not data or not others or data.action is None or data.action != others.action:
         return False
@@ -127,7 +127,7 @@ def shares_animation(block: bpy.types.ID, other: bpy.types.ID) -> bool:
 
 
 def is_muted(curve: bpy.types.FCurve) -> bool:
-    """Whether a curve is not played. Since 4.4 Blender plays those of muted groups. Measured: 4.2, 4.5, 5.0 and 5.2."""
+    """True if a curve is not played. Since 4.4 Blender plays those of muted groups. Measured: 4.2, 4.5, 5.0 and 5.2."""
     return curve.mute or (bpy.app.version < (4, 4) and curve.group is not None and curve.group.mute)
 
 
@@ -171,7 +171,7 @@ def compositor(scene: bpy.types.Scene) -> bpy.types.NodeTree | None:
 
 
 def has_strips(editor: bpy.types.SequenceEditor) -> bool:
-    """Whether the sequencer has any strip. They were called sequences."""
+    """True if the sequencer has any strip. They were called sequences."""
     return len(editor.strips if hasattr(editor, "strips") else editor.sequences) > 0
 
 
@@ -201,7 +201,7 @@ def set_preview_file(settings: bpy.types.ImageFormatSettings) -> None:
 
 
 def pass_name(name: str) -> str:
-    """What Blender calls a pass in a render's result. Since 5.0 as we do."""
+    """Blender's name of a pass in a render's result. Since 5.0 as we do."""
     older = {new: old for old, new in OLDER_NAMES.items()} if bpy.app.version < (5, 0) else {}
     return older.get(name, name)
 

@@ -27,6 +27,10 @@ A format is a module in `FORMATS` with
 (own.py's `document`, in a comment or wherever the format lets programs keep what is theirs), and here, for all formats alike, a
 camera takes them if written again they are read as that camera. Where somebody changed the numbers, the numbers count.
 
+**Damage.** Whatever a reader meets in a damaged file that it did not think of is told as a sentence (`_told_of_damage`), since
+nobody who imports a file can mend this project. tests/fuzz sees what caused it, and calls it a fault. Names and sentences are
+one line each of characters that show, whatever stands in the file.
+
 Axes and scale are applied here, for all alike. The first format that recognises something reads it: the more certain ones
 stand first, and what takes any text last.
 """
@@ -34,14 +38,14 @@ stand first, and what takes any text last.
 import contextlib
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 
-from .. import checks
+from .. import checks, terminal
 from ..errors import InputError
 from ..files import written_whole
 from ..pinhole import Pinhole
@@ -157,13 +161,18 @@ def read(given: str | Path, *, format: str | None = None, options: Options | Non
     options = options or Options()
     source = Source(given)
     module = _module(format or recognised(source), "read")
-    if format and not module.recognises(source):
-        raise InputError(f"{source.name} is not {module.TITLE} by its content: leave the format out")
+    with _told_of_damage(source, module.TITLE), np.errstate(all="ignore"):  # anything may stand in a file
+        if format and not module.recognises(source):
+            raise InputError(f"{source.name} is not {module.TITLE} by its content: leave the format out")
+        return _read(source, module, options)
+
+
+def _read(source: Source, module: ModuleType, options: Options) -> list[Camera]:
     try:
         cameras = module.read(source, options)
     except InputError as error:
         if source.path and source.path.name not in str(error):
-            raise InputError(f"{source.name}: {error}") from None
+            raise InputError(f"{source.name}: {error}") from error.__cause__
         raise
     if not cameras:
         raise InputError(f"{source.name} holds no camera: give another file")
@@ -171,8 +180,21 @@ def read(given: str | Path, *, format: str | None = None, options: Options | Non
     cameras = _to_the_bit(cameras, [pinhole for text in notes for pinhole in own.pinholes_in(text)], module, options)
     world = module.in_world(source, options) if hasattr(module, "in_world") else options
     told = _told_of_world(notes, world)
-    found = [_doubted(_unmirrored(moved(camera, world), options)) for camera in cameras]
+    found = [_readable(_doubted(_unmirrored(moved(camera, world), options))) for camera in cameras]
     return [camera.noted(*told) for camera in found] if told else found
+
+
+@contextlib.contextmanager
+def _told_of_damage(source: Source, title: str) -> Iterator[None]:
+    """What no reader thought of in the block as a sentence, with its cause."""
+    try:
+        yield
+    except InputError as error:
+        if (sentence := terminal.plain(str(error))) == str(error):
+            raise
+        raise InputError(sentence) from error.__cause__
+    except (ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError) as error:
+        raise InputError(f"{source.name} is damaged where it says its cameras ({title}): export it again") from error
 
 
 def recognised(source: str | Path | Source) -> str:
@@ -187,8 +209,9 @@ def recognised(source: str | Path | Source) -> str:
     if source.path is None and not source.text.strip():
         raise InputError("there is no text: copy a camera first")
     for name in readable():
-        if FORMATS[name].recognises(source):
-            return name
+        with _told_of_damage(source, FORMATS[name].TITLE):
+            if FORMATS[name].recognises(source):
+                return name
     if source.json_problem:
         raise InputError(f"{source.name} looks like JSON and is none ({source.json_problem}): correct it")
     if source.path is None:
@@ -261,15 +284,14 @@ def _to_the_bit(cameras: list[Camera], stated: list[Pinhole], module: ModuleType
 
 
 def _read_again(pinholes: list[Pinhole], writer: ModuleType, reader: ModuleType, options: Options) -> list[Camera]:
-    """What is read of these pinholes where they are written; nothing if they can't be."""
+    """The cameras that are read of these pinholes once they are written; nothing if they can't be."""
     if not hasattr(writer, "write"):
         return []
     try:
-        with np.errstate(all="ignore"):  # anything may stand in a file
-            cameras = [Camera(f"{number}", pinhole) for number, pinhole in enumerate(pinholes)]
-            if hasattr(writer, "read_again"):
-                return [*writer.read_again(cameras, options)]
-            again = reader.read(Source(writer.write(cameras, options)), options)
+        cameras = [Camera(f"{number}", pinhole) for number, pinhole in enumerate(pinholes)]
+        if hasattr(writer, "read_again"):
+            return [*writer.read_again(cameras, options)]
+        again = reader.read(Source(writer.write(cameras, options)), options)
     except InputError:
         return []
     return again if len(again) == len(pinholes) else []
@@ -290,6 +312,15 @@ def _doubted(camera: Camera) -> Camera:
         return camera
     size = f"{pinhole.width} × {pinhole.height}"
     return camera.noted(f"The principal point of {camera.name} lies outside of a picture of {size} pixels: is that its size?")
+
+
+def _readable(camera: Camera) -> Camera:
+    """The camera, whose name and notes show as they are; a picture's path that does not leads nowhere."""
+    texts = (camera.name, camera.image or "", *camera.notes)
+    if all(map(str.isprintable, texts)):
+        return camera
+    image = camera.image if camera.image == terminal.plain(camera.image or "") else None
+    return replace(camera, name=terminal.plain(camera.name), image=image, notes=tuple(map(terminal.plain, camera.notes)))
 
 
 def _unmirrored(camera: Camera, options: Options) -> Camera:

@@ -1,4 +1,4 @@
-"""What is wrong with the cameras of a dataset, told by what their pictures show.
+"""An audit of a dataset's cameras: what is wrong with them, told by what their pictures show.
 
 Each mistake that people make has an inverse. All inverses are tried on the cameras, and the evidence says which of them, if
 any, makes the cameras true:
@@ -130,7 +130,8 @@ class Depths:
             self.samples.append((columns[chosen] + 0.5, rows[chosen] + 0.5, depth[rows[chosen], columns[chosen]]))
 
     def errors(self, views: Views) -> Array:
-        """Of each sample in each pair of pictures: by which part the two depths differ; ½ where the other picture lacks it."""
+        """The error of each sample in each pair of pictures: by which part the two depths differ; ½ where the other picture
+        lacks it."""
         found = []
         for i, j in self.pairs:
             columns, rows, depth = self.samples[i]
@@ -162,7 +163,7 @@ def _between(depth: Array, places: Array) -> Array:
 
 
 def tracks_through(true: Sequence[Camera]) -> Tracks:
-    """What true cameras, as a .blend's, show of points before them: evidence for cameras that should be the same."""
+    """The tracks that true cameras, as a .blend's, have of points before them: evidence for cameras that should be the same."""
     random = np.random.default_rng(0)
     views = views_of(true)
     spread = np.linalg.norm(views.eye - views.eye.mean(axis=0), axis=1).max()
@@ -404,7 +405,7 @@ MISTAKES = _mistakes()
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the evidence says.
+    """The verdict of the evidence.
 
     kind : a Mistake's, "none" if the cameras are right, "unknown" if they are wrong in no known way, "unsure" if the evidence
     is too little. sentence : for people. others : kinds that explain it as well; of right cameras, those that the evidence is
@@ -422,7 +423,7 @@ class Verdict:
 
 
 def audit(cameras: Sequence[Camera], evidence: "Tracks | Depths") -> Verdict:
-    """What is wrong with cameras, of which the evidence counts the same pictures in the same order."""
+    """The verdict about cameras, of which the evidence counts the same pictures in the same order."""
     return _audited(views_of(cameras), evidence)
 
 
@@ -480,7 +481,7 @@ def _usual(errors: Array, evidence: "Tracks | Depths") -> float:
 
 
 def _differ(errors: Array, others: Array, evidence: "Tracks | Depths") -> bool:
-    """Whether there was something to undo: swapped, a principal point in the middle of a square is as it was."""
+    """True if there was something to undo: swapped, a principal point in the middle of a square is as it was."""
     with np.errstate(invalid="ignore"):
         return bool((np.abs(errors - others) > evidence.floor).any())
 

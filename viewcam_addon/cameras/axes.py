@@ -121,7 +121,7 @@ def pinhole(matrix: ArrayLike, plane: ViewPlane, what: str, scaled: bool = False
 
 
 def pinholes(matrices: np.ndarray, planes: Sequence[ViewPlane], whats: Sequence[str]) -> list[tuple[Pinhole, tuple[str, ...]]]:
-    """What `pinhole` gives of each of many matrices: for files of thousands of poses, in a tenth of the time.
+    """The results of `pinhole` for many matrices: for files of thousands of poses, in a tenth of the time.
 
     matrices : (n, 3, 4), finite. planes, whats : of each.
     """

@@ -42,13 +42,13 @@ class Camera:
     left_out: tuple[tuple[str, str], ...] = field(default=(), repr=False)
 
     def noted(self, *notes: str) -> "Camera":
-        """The same camera with more notes, each of them once."""
+        """This camera with more notes, each of them once."""
         return replace(self, notes=tuple(dict.fromkeys((*self.notes, *notes))))
 
 
 @dataclass(frozen=True)
 class Options:
-    """What is chosen where a format leaves a choice. Reading what was written with the same options gives the same cameras.
+    """The choices where a format leaves one. Reading what was written with the same options gives the same cameras.
 
     axes : one of AXES. scale : > 0; world units here of one of the file's. size : (width, height) in pixels, where a file
     says none. pixel_aspect : width of a pixel over its height, where a file says none. view_plane : the intrinsics where a

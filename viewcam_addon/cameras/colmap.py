@@ -66,7 +66,7 @@ _FOLDERS = ((), ("0",), ("sparse", "0"), ("sparse",), ("colmap", "sparse", "0"))
 
 
 class _Intrinsics(NamedTuple):
-    """What cameras.txt says of one."""
+    """The entry of cameras.txt about one camera."""
 
     model: str
     width: int
@@ -354,7 +354,7 @@ def comments(cameras: Iterable[Camera]) -> str:
 
 
 def intrinsics_of(pinhole: Pinhole) -> _Intrinsics:
-    """What cameras.txt says of a camera."""
+    """The entry of cameras.txt about a camera."""
     (f_x, _, c_x), (_, f_y, c_y), _ = intrinsics(pinhole)
     model, focal = ("SIMPLE_PINHOLE", (f_x,)) if f_x == f_y else ("PINHOLE", (f_x, f_y))
     return _Intrinsics(model, pinhole.width, pinhole.height, (*focal, c_x, c_y))
@@ -366,7 +366,7 @@ def _camera(pinhole: Pinhole) -> str:
 
 
 def pose_of(pinhole: Pinhole) -> tuple[float, ...]:
-    """What images.txt says of it: the quaternion, w first, and the translation."""
+    """The pose that images.txt has of it: the quaternion, w first, and the translation."""
     *rows, _ = world_to_camera(pinhole)
     return (*quaternion(rows), *(row[3] for row in rows))
 

@@ -1,4 +1,4 @@
-"""What a lens bends: never dropped silently, refused with the displacement that it makes at the picture's corner.
+"""Lens distortion: never dropped silently, refused with the displacement that it makes at the picture's corner.
 
 All lenses that programs model around a pinhole are here, so that the figure is the lens's own. What leaves the pinhole
 altogether (fisheyes, panoramas) is refused by name, in camera.py.

@@ -5,14 +5,17 @@ of 16 bits, which Pillow decodes where it is installed; `depth_unit_scale_factor
 """
 
 import importlib.util
+import io
 import struct
+import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from .. import checks
+from .. import checks, npy
 from ..errors import InputError
+from ..files import read_bytes
 from . import colmap
 from .audit import Depths, Tracks
 from .camera import Camera
@@ -20,6 +23,7 @@ from .source import Record, Source
 
 _DEPTH_KEYS = ("depth_file_path", "depth_path")
 _NO_POINT = 2**64 - 1
+_MOST_PIXELS = 2**25  # of a depth map: those of 8K
 
 
 def tracks(path: Path, cameras: Sequence[Camera]) -> Tracks | None:
@@ -89,7 +93,7 @@ def _binary_points(path: Path) -> Iterator[tuple[int, tuple[float, float, float]
             (length,) = struct.unpack_from("<Q", data, at + 43)
             at += 51 + 8 * length
             yield point, checks.vector("a point", (x, y, z), 3)
-    except struct.error:
+    except (struct.error, OverflowError):
         raise InputError(f"{path} ends too early: copy it again") from None
 
 
@@ -106,7 +110,7 @@ def _binary_tracks(path: Path) -> Iterator[tuple[str, list[tuple[float, float, i
             found = [struct.unpack_from("<2dQ", data, end + 9 + 24 * i) for i in range(many)]
             at = end + 9 + 24 * many
             yield name, [each for each in found if each[2] != _NO_POINT]
-    except (struct.error, ValueError):
+    except (struct.error, ValueError, OverflowError):
         raise InputError(f"{path} ends too early: copy it again") from None
 
 
@@ -133,18 +137,37 @@ def depths(path: Path, cameras: Sequence[Camera]) -> Depths | None:
 
 def _depth(path: Path, scale: float, said: bool) -> np.ndarray:
     try:
+        data = read_bytes(path)
         if path.suffix == ".npy":
-            depth = np.load(path, allow_pickle=False)
-            scale = scale if said else 1.0
-        elif importlib.util.find_spec("PIL") is None:
-            raise InputError(f"{path} needs Pillow to be read: pip install pillow, or give depth as .npy")
+            depth, scale = npy.read(data), scale if said else 1.0
         else:
-            from PIL import Image
-
-            depth = np.asarray(Image.open(path))
-        depth = np.squeeze(np.asarray(depth, dtype=np.float64)) * scale
-    except (OSError, ValueError, EOFError) as error:
+            depth = _pixels(data, path)
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(f"{path} can't be read as a depth map ({error}): give .npy or PNG of 16 bits") from None
+    if depth.size > _MOST_PIXELS:
+        raise InputError(f"{path} has {depth.size} numbers: give depth in the pictures' size")
+    depth = np.squeeze(np.asarray(depth, dtype=np.float64)) * scale
     if depth.ndim != 2:
         raise InputError(f"{path} has the shape {depth.shape}: a depth map has rows and columns only")
     return depth
+
+
+def _pixels(data: bytes, path: Path) -> np.ndarray:
+    """The numbers of a picture that Pillow decodes, once its head says that they are not too many."""
+    if importlib.util.find_spec("PIL") is None:
+        raise InputError(f"{path} needs Pillow to be read: pip install pillow, or give depth as .npy")
+    from PIL import Image
+
+    try:
+        with warnings.catch_warnings():  # of a picture that may be a bomb
+            warnings.simplefilter("ignore")
+            with Image.open(io.BytesIO(data)) as picture:
+                if picture.width * picture.height > _MOST_PIXELS:
+                    raise InputError(f"{path} has {picture.width} × {picture.height} pixels: give depth in the pictures' size")
+                return np.asarray(picture)
+    except InputError:
+        raise
+    except Exception as error:  # of each decoder its own
+        raise ValueError(error) from error

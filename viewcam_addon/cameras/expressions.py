@@ -11,23 +11,19 @@ import math
 import re
 from collections.abc import Callable
 
-from . import texts
+from . import texts, tokens
 
 _DEEPEST = 30
 _MOST_STEPS = 100_000  # of all values of a text
 
-_BLANK = re.compile(r"\s*+")
-_NUMBER = re.compile(r"(?:0[xX][\da-fA-F]++|(?:\d++(?:\.\d*+)?+|\.\d++)(?:[eE][-+]?+\d++)?+)(?:[fFlLuU]\b)?+(?![A-Za-z_\d.])")
-_STRING = re.compile(r"[rbfu]?+(?:\"((?:[^\"\\\n]|\\.){0,1000}+)\"|'((?:[^'\\\n]|\\.){0,1000}+)')")
-_NAME = re.compile(r"(?:(?:new|const|auto|return)\s++)*+([A-Za-z_$][\w$]*+(?:\s*+(?:\.|->|::)\s*+[A-Za-z_$][\w$]*+)*+)")
-_TEMPLATE = re.compile(r"<[\w\s,:*]*+>(?=\s*+\()")
-_UNIT = re.compile(r"\s*+(?:(°|deg(?:rees?)?\b)|(rad(?:ians?)?\b))")
-_KEYWORD = re.compile(r"\s*+(?:([A-Za-z_]\w*+)|\"([^\"\n]{0,1000}+)\"|'([^'\n]{0,1000}+)')\s*+(=(?!=)|:(?!:))")
+_TEMPLATE = re.compile(r"<[\w\s,:*]{0,200}>(?=\s*\()")
+_UNIT = re.compile(r"\s*(?:(°|deg(?:rees?)?\b)|(rad(?:ians?)?\b))")
 _VECTOR = re.compile(
     r"(?:make_?|d3dx|xm|scalar)?[a-z]?(?:vec(?:tor)?|point|float|double|cartesian|array|asarray|tuple|list|coord|position|xyz)_?[234]?[dfi]?_?t?"
 )
-_CAST = re.compile(r"\(\s*+(?:unsigned\s++)?(?:float|double|int|GLfloat|GLdouble|FLOAT|real)\s*+\)\s*+(?=[\w(.])")
-_SKIPPED = re.compile(r"\"(?:[^\"\\\n]|\\.){0,1000}+\"|'(?:[^'\\\n]|\\.){0,1000}+'|[()\[\]{},;]")
+_BEFORE_NAMES = {"new", "const", "auto", "return"}
+_CAST_TO = {"float", "double", "int", "GLfloat", "GLdouble", "FLOAT", "real"}
+JOINTS = {".", "->", "::"}
 _CLOSING = {"(": ")", "[": "]", "{": "}", "<": ">"}
 _PLAIN = {"sqrt": math.sqrt, "tan": math.tan, "sin": math.sin, "cos": math.cos, "abs": abs, "min": min, "max": max}
 _INVERSE = {"atan": math.atan, "atan2": math.atan2, "asin": math.asin, "acos": math.acos}
@@ -90,126 +86,163 @@ class Expressions:
         except _Failed:
             return [Unknown(opened)], {}, opened + 1
 
-    def _next(self, at: int) -> int:
+    def _token(self, at: int) -> tokens.Token:
         self._steps += 1
         if self._steps > _MOST_STEPS:
             raise _Failed
-        return _BLANK.match(self.text, at).end()
+        return tokens.token(self.text, at)
 
     def _sum(self, at: int, depth: int) -> tuple[object, int]:
         left, at = self._product(at, depth)
-        while (sign := self.text[(after := self._next(at)) : after + 1]) in ("+", "-") and sign:
-            right, at = self._product(after + 1, depth)
-            left = _added(left, right, 1 if sign == "+" else -1)
+        while (sign := self._token(at)).text in ("+", "-"):
+            right, at = self._product(sign.end, depth)
+            left = _added(left, right, 1 if sign.text == "+" else -1)
         return left, at
 
     def _product(self, at: int, depth: int) -> tuple[object, int]:
         left, at = self._signed(at, depth)
-        while (sign := self.text[(after := self._next(at)) : after + 1]) in ("*", "/") and sign:
-            right, at = self._signed(after + 1, depth)
-            left = _multiplied(left, right, sign)
+        while (sign := self._token(at)).text in ("*", "/"):
+            right, at = self._signed(sign.end, depth)
+            left = _multiplied(left, right, sign.text)
         return left, at
 
     def _signed(self, at: int, depth: int) -> tuple[object, int]:
         if depth > _DEEPEST:
             raise _Failed
-        at = self._next(at)
-        if cast := _CAST.match(self.text, at):
-            at = cast.end()
-        sign = self.text[at : at + 1]
-        if sign and sign in "-+&":
-            value, end = self._signed(at + 1, depth + 1)
-            return (_multiplied(-1.0, value, "*") if sign == "-" else value), end
-        return self._single(at, depth)
+        first = self._after_cast(self._token(at))
+        if first.text in ("-", "+", "&"):
+            value, end = self._signed(first.end, depth + 1)
+            return (_multiplied(-1.0, value, "*") if first.text == "-" else value), end
+        return self._single(first, depth)
 
-    def _single(self, at: int, depth: int) -> tuple[object, int]:
-        if found := _NUMBER.match(self.text, at):
-            digits = found[0].rstrip("fFlLuU") if found[0][:2].lower() != "0x" else str(int(found[0], 16))
-            number, at = float(digits), found.end()
-            if unit := _UNIT.match(self.text, at):
+    def _after_cast(self, first: tokens.Token) -> tokens.Token:
+        """What stands behind (float), if that is there and something stands behind it."""
+        if first.text != "(":
+            return first
+        kind = self._token(first.end)
+        kind = self._token(kind.end) if kind.text == "unsigned" else kind
+        if kind.text in _CAST_TO and (closed := self._token(kind.end)).text == ")":
+            after = self._token(closed.end)
+            if after.kind in ("name", "number") or after.text == "(":
+                return after
+        return first
+
+    def _single(self, first: tokens.Token, depth: int) -> tuple[object, int]:
+        if first.kind == "number":
+            number = tokens.number(first.text)
+            if number is None:
+                raise _Failed
+            if unit := _UNIT.match(self.text, first.end):
                 return (Degrees(number) if unit[1] else Radians(number)), unit.end()
-            return (number if math.isfinite(number) else Unknown(found.start())), at
-        if found := _STRING.match(self.text, at):
-            return found[1] if found[1] is not None else found[2], found.end()
-        opening = self.text[at : at + 1]
-        if opening and (opening in "([{" or (opening == "<" and self._angled)):
-            values, named, end = self._list(at, depth)
-            if opening == "(" and len(values) == 1 and not named and not _has_comma(self.text, at, end):
+            return (number if math.isfinite(number) else Unknown(first.start)), first.end
+        if first.text in ("'", '"') and (quoted := tokens.string(self.text, first.start)):
+            return quoted
+        if first.text in ("(", "[", "{") or (first.text == "<" and self._angled):
+            values, named, end = self._list(first.start, depth)
+            if first.text == "(" and len(values) == 1 and not named and not _has_comma(self.text, first.start, end):
                 return values[0], end
             return (named if named else tuple(values)), end
-        if found := _NAME.match(self.text, at):
-            return self._named(found, depth)
+        if first.kind == "name":
+            return self._named(first, depth)
         raise _Failed
 
-    def _named(self, found: re.Match, depth: int) -> tuple[object, int]:
-        path, at = re.sub(r"\s", "", found[1]), found.end()
-        if template := _TEMPLATE.match(self.text, at):
-            at = template.end()
-        after = self._next(at)
-        opening = self.text[after : after + 1]
-        last = re.split(r"\.|->|::", path)[-1]
-        if opening == "(" or (opening == "{" and _VECTOR.fullmatch(last.lower())):
-            values, named, end = self._list(after, depth)
-            value = _called(last, values, named, found.start())
-            if self.text[self._next(end) : self._next(end) + 1] in (".", "["):
-                value = Unknown(found.start())
-                while (dotted := re.compile(r"\s*+\.\s*+\w++").match(self.text, end)) or self.text[end : end + 1] in ("(", "["):
-                    end = dotted.end() if dotted else self._list(end, depth)[2]
+    def _named(self, first: tokens.Token, depth: int) -> tuple[object, int]:
+        after = self._token(first.end)
+        has_prefix = first.text in ("r", "b", "f", "u") and after.text in ("'", '"') and after.start == first.end  # Python's
+        if has_prefix and (quoted := tokens.string(self.text, after.start)):
+            return quoted
+        while first.text in _BEFORE_NAMES and after.kind == "name":
+            first, after = after, self._token(after.end)
+        path, last = [first.text], first
+        while after.text in JOINTS and (part := self._token(after.end)).kind == "name":
+            path += [after.text, part.text]
+            last, after = part, self._token(part.end)
+        if after.text == "<" and after.start == last.end and (template := _TEMPLATE.match(self.text, after.start)):
+            after = self._token(template.end())
+        if after.text == "(" or (after.text == "{" and _VECTOR.fullmatch(last.text.lower())):
+            values, named, end = self._list(after.start, depth)
+            value = _called(last.text, values, named, first.start)
+            if self._token(end).text in (".", "["):
+                return Unknown(first.start), self._past_calls(end, depth)
             return value, end
-        key = texts.plain(last)
+        key = texts.plain(last.text)
         if key in _PI or key.removeprefix("math") in _PI:
-            return Radians(_PI[key if key in _PI else key.removeprefix("math")] * math.pi), at
-        value = self._names(path)
-        return (Unknown(found.start()) if value is None else value), at
+            return Radians(_PI[key if key in _PI else key.removeprefix("math")] * math.pi), last.end
+        value = self._names("".join(path))
+        return (Unknown(first.start) if value is None else value), last.end
+
+    def _past_calls(self, at: int, depth: int) -> int:
+        """Where .normalize().x[0] and its like end, behind what is called or indexed."""
+        while True:
+            following = self._token(at)
+            if following.text == "." and (part := self._token(following.end)).kind == "name":
+                at = part.end
+            elif following.text in ("(", "[") and following.start == at:
+                at = self._list(at, depth)[2]
+            else:
+                return at
 
     def _skipped(self, at: int, closing: str) -> int:
         """Where what is not understood ends: at the comma after it, or the bracket around it."""
         depth = 0
-        for found in _SKIPPED.finditer(self.text, at):
+        for sign, place in tokens.outside_strings(self.text, at):
             self._steps += 1
             if self._steps > _MOST_STEPS:
                 raise _Failed
-            if found[0] in "([{":
+            if sign in "([{":
                 depth += 1
-            elif found[0] in ")]}":
+            elif sign in ")]}":
                 if not depth:
-                    if found[0] != closing:
+                    if sign != closing:
                         raise _Failed
-                    return found.start()
+                    return place
                 depth -= 1
-            elif found[0] in ",;" and not depth:
-                return found.start()
+            elif not depth:
+                return place
         raise _Failed
+
+    def _keyword(self, first: tokens.Token) -> tuple[str, int] | None:
+        """The name before = or :, plain or in quotes, and where its value begins; None if there is none."""
+        name, end = first.text, first.end
+        if name in ("'", '"'):
+            if not (quoted := tokens.string(self.text, first.start)):
+                return None
+            name, end = quoted
+        elif first.kind != "name":
+            return None
+        sign = self._token(end)
+        return (name, sign.end) if sign.text in ("=", ":") else None
 
     def _list(self, opened: int, depth: int) -> tuple[list, dict[str, object], int]:
         if depth > _DEEPEST:
             raise _Failed
         closing = _CLOSING[self.text[opened]]
         values, named = [], {}
-        at = self._next(opened + 1)
+        next_ = self._token(opened + 1)
         separated = True
-        while self.text[at : at + 1] != closing:
-            if at >= len(self.text):
+        while next_.text != closing:
+            if not next_.kind:
                 raise _Failed
-            keyword = _KEYWORD.match(self.text, at)
+            keyword = self._keyword(next_)
+            at = next_.start
             try:
-                value, end = self._sum(keyword.end() if keyword else at, depth + 1)
+                value, end = self._sum(keyword[1] if keyword else at, depth + 1)
             except _Failed:
                 value, end = Unknown(at), self._skipped(at, closing)
                 if not separated and values:  # 2 ? 3 : 4 is one value
                     values.pop()
             if keyword:
-                named[keyword[1] or keyword[2] or keyword[3] or ""] = value
+                named[keyword[0]] = value
             else:
                 values.append(value)
-            at = self._next(end)
-            separated = self.text[at : at + 1] in (",", ";") and at < len(self.text)
+            next_ = self._token(end)
+            separated = next_.text in (",", ";")
             if separated:
-                at = self._next(at + 1)
-            elif at == end and self.text[at : at + 1] != closing:
-                at = self._skipped(at, closing)
+                next_ = self._token(next_.end)
+            elif next_.start == end and next_.kind and next_.text != closing:
+                next_ = self._token(self._skipped(end, closing))
                 values = [*values[:-1], Unknown(end)]
-        return values, named, at + 1
+        return values, named, next_.end
 
 
 def numbers(value: object, count: int) -> tuple[float, ...] | None:

@@ -6,10 +6,9 @@ The principal point is the middle. Pictures are named by their order, sorted, in
 Source: LLFF's README.md and llff/poses/pose_utils.py.
 """
 
-import io
-
 import numpy as np
 
+from .. import npy
 from ..errors import InputError
 from . import axes, naming
 from .camera import Camera, Options
@@ -49,10 +48,10 @@ def _array(source: Source) -> np.ndarray | None:
     if source is None or source.data[:6] != b"\x93NUMPY":
         return None
     try:
-        array = np.lib.format.read_array(io.BytesIO(source.data), allow_pickle=False)
-    except (ValueError, EOFError, OSError, SyntaxError, MemoryError):
+        array = npy.read(source.data)
+    except ValueError:
         return None
-    if array.dtype.kind not in "iuf" or array.ndim != 2 or array.shape[1] not in (15, 17) or not len(array):
+    if array.ndim != 2 or array.shape[1] not in (15, 17) or not len(array):
         return None
     return array.astype(np.float64)
 

@@ -7,9 +7,9 @@
     point3 lookfrom(7,-6,4); point3 lookat(0,0,1); vec3 vup(0,0,1); auto vfov = 40;                 Ray Tracing in One Weekend
     pinhole->set_eye(7,-6,4); pinhole->set_lookat(0,0,1); pinhole->set_view_distance(960); vp.set_hres(640);    textbooks
 
-The statements that say a camera are looked for, wherever they stand; names are followed to plain values (expressions.py), and
-nothing is run. What is set twice to different values, moved by other means (rotate, dolly, quaternions) or computed from what
-the text does not say is refused.
+The statements that say a camera are looked for among the text's words (tokens.py), wherever they stand; names are followed to
+plain values (expressions.py), and nothing is run. What is set twice to different values, moved by other means (rotate, dolly,
+quaternions) or computed from what the text does not say is refused.
 
 **Angles.** Whose unit a program's documentation says is taken so: degrees of the height in gluPerspective, three.js and
 VTK; radians in glm, gl-matrix, Direct3D and Cesium (there of the longer side). Others: texts.angle_of, as of vfov.
@@ -25,28 +25,23 @@ Ray Tracing from the Ground Up, chapters 8 to 10. Rejected: running the code.
 import functools
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from ..errors import InputError
-from . import axes, own, texts
+from . import axes, own, texts, tokens
 from .camera import Camera, Options, not_a_pinhole
-from .expressions import Degrees, Expressions, Radians, Unknown, numbers
+from .expressions import JOINTS, Degrees, Expressions, Radians, Unknown, numbers
 from .source import Source
 
 TITLE = "code that places a camera (gluLookAt, three.js, VTK, lookfrom …)"
 SUFFIX = ".txt"
 
-_COMMENT = r"//[^\n]*+|/\*.*?(?:\*/|\Z)|#(?!\s*+define)[^\n]*+"
-_DEFINE = re.compile(r"#\s*+define\s++(\w++)\s++")
-_PATH = r"[A-Za-z_$][\w$]*+(?:(?:\s*+\(\s*+\))?+\s*+(?:\.|->|::)\s*+[A-Za-z_$][\w$]*+)*+"
-_STATEMENT = re.compile(rf"(?<![\w$.])(?<!->)(?<!::)({_PATH})\s*+(=(?!=)|\(|:(?!:)|\{{)")
+_COMMENT = r"//[^\n]*|/\*.*?(?:\*/|\Z)|#(?!\s*define)[^\n]*"
 _WINDOW = re.compile(r"renderer|ren\w{0,3}win|renderwindow")
-_LIGHT = re.compile(r"\bvtkLight\s*+>\s*+(\w++)|\b(\w++)\s*+=\s*+(?:vtk\w*+\s*+\.\s*+)?+vtkLight\s*+\(")
-_PARTS = re.compile(r"[\w$]++")
-_MADE = re.compile(r"(?<![\w$])([\w$]++)\s*+[=:]\s*+new\s++(?:THREE\s*+\.\s*+)?+PerspectiveCamera\b")
+_MOST_CHARACTERS = 2**23
 _MOST_STATEMENTS = 2_000
-_IS_CODE = re.compile(r"\w\s*+\(\s*+[-\w.]|;\s*+$|\w\.\w++\s*+[=(]", re.MULTILINE)
+_IS_CODE = re.compile(r"\w\s*\(\s*[-\w.]|;\s*$|\w\.\w+\s*[=(]", re.MULTILINE)
 _CAMERA = re.compile(r"cam|view|eye|lens|observer", re.IGNORECASE)
 _NAMED_CAMERA = re.compile(r"cam", re.IGNORECASE)
 
@@ -111,26 +106,20 @@ _MOVES = {
 }  # fmt: skip
 _TURNED = {"rotation", "quaternion", "matrix", "matrixworld", "rotate"}
 # Where they are made they turn the camera to their target, whatever it looked at before.
-_CONTROLS = re.compile(r"\bnew\s++(?:[A-Za-z]++\s*+\.\s*+)?+((?:Orbit|Trackball|Map|Arcball)Controls)\b")
-_OTHER_CONTROLS = re.compile(r"\bnew\s++(?:[A-Za-z]++\s*+\.\s*+)?+((?:FirstPerson|DeviceOrientation)Controls)\b")
+_CONTROLS = {"OrbitControls", "TrackballControls", "MapControls", "ArcballControls"}
+_OTHER_CONTROLS = {"FirstPersonControls", "DeviceOrientationControls"}
 _PLACES = {"position", "up", "direction"}
 # What turns or moves a view that a look-at made: glm::rotate(view, …), mat4.rotateY(view, view, …).
-_VIEW_MOVED = re.compile(
-    r"\b(?:rotate|translate|scale)\w{0,3}\s*+\(\s*+(?:\w+\s*+(?:\.|->)\s*+)?+(?:view|camera)\w*+\s*+,", re.IGNORECASE
-)
+_VIEW_MOVED = re.compile(r"(?:rotate|translate|scale)\w{0,3}", re.IGNORECASE)
 _GL_MOVES = {"gltranslatef", "gltranslated", "glrotatef", "glrotated", "glscalef", "glscaled", "glmultmatrixf", "glmultmatrixd"}
-_CHANGED = re.compile(rf"(?<![\w$.])({_PATH})\s*+[-+*/]=")
-_STEPPED = re.compile(r"(?<![\w$])([A-Za-z_$][\w$]*+)\s*+(?:[-+*/]=|\+\+|--)|(?:\+\+|--)\s*+([A-Za-z_$][\w$]*+)")
-_COORDINATE = re.compile(rf"(?<![\w$.])({_PATH})\s*+\[\s*+[0-2]\s*+\]\s*+[-+*/]?+=(?!=)")
+_CHANGES_BY = {*"+-*/"}
 _COORDINATES = {*"xyzXYZ"}
 _CHANGES = {"glloadidentity", "glpushmatrix", "resetcamera", "add", *_GL_MOVES}
 _VECTORS = {"eye", "target", "up", "direction"}
 _OF_VTK = re.compile(
-    r"SetViewUp|SetFocalPoint|CameraFocalPoint|\bcamera_position\s*+=|\bcpos\s*+=|\bfocal_point\s*+=", re.IGNORECASE
+    r"SetViewUp|SetFocalPoint|CameraFocalPoint|\bcamera_position\s*=|\bcpos\s*=|\bfocal_point\s*=", re.IGNORECASE
 )
-_OTHER_LENSES = re.compile(
-    r"\b(ThinLens|FishEye|Fisheye|Spherical|Stereo(?:Camera)?|Orthographic)\s*+\*|new\s++(ThinLens|FishEye|Spherical|StereoCamera|Orthographic)\b"
-)
+_LENSES = {"ThinLens", "FishEye", "Fisheye", "Spherical", "Stereo", "StereoCamera", "Orthographic"}
 
 
 @dataclass
@@ -144,12 +133,15 @@ class _Said:
     frustum: tuple[float, ...] | None = None
     orthographic: int | None = None
     three: bool = False
+    controls: str | None = None  # of three.js, which turn the camera to their target
 
 
 def recognises(source: Source) -> bool:
     if source.is_binary or source.is_folder or source.document or source.xml is not None:
         return False
     text = source.text
+    if len(text) > _MOST_CHARACTERS:
+        return False
     if own.recognises(source):
         try:
             own.pairs(text.replace("−", "-"))
@@ -172,11 +164,14 @@ class _Code:
 
     def __init__(self, text: str) -> None:
         self.text = texts.without(_COMMENT, text).replace("−", "-")
-        self._has_viewports = bool(re.search(r"\bSetViewport\s*+\(", self.text))
-        self._lights = {found[1] or found[2] for found in _LIGHT.finditer(self.text)} if "vtkLight" in text else set()
-        self._changed = {found[1] or found[2] for found in _STEPPED.finditer(self.text)}
+        self._has_viewports = bool(re.search(r"\bSetViewport\s*\(", self.text))
+        self._words, self._places = tokens.words(self.text)
+        self._words += [""] * 8  # so that what stands before and behind a word can be asked for
+        self._places += [len(self.text)] * 8
+        self._lights = self._names_of_lights()
+        self._cameras = self._names_of_cameras()
+        self._stepped = self._names_stepped()
         self._following: set[str] = set()
-        self._cameras = {found[1] for found in _MADE.finditer(self.text)}
         self._values: dict[str, object] = {}
         self._lookups = 0
         self._roles: dict[tuple[str, ...], str | None] = {}
@@ -184,25 +179,112 @@ class _Code:
         # name stands.
         self.statements: list[tuple[list[str], str, int, int]] = []
         self.assigned: dict[str, list[int]] = {}
-        known: dict[tuple[str, str], tuple[list[str], bool]] = {}
-        for found in _STATEMENT.finditer(self.text):
-            path, sign = key = found.groups()
-            if key not in known:
-                parts = _PARTS.findall(path)
-                known[key] = (parts, self._may_say(parts, sign))
-            parts, may_say = known[key]
-            if may_say:
-                self.statements.append((parts, sign, found.end(), found.start()))
+        self._changed: list[tuple[list[str], int]] = []  # by +=, and where
+        self._coordinates: list[tuple[list[str], int]] = []  # eye[0] = …
+        self._find_statements()
+        self.reader = Expressions(self.text, self._name)
+
+    def _find_statements(self) -> None:
+        words, places = self._words, self._places
+        known: dict[tuple[str, ...], bool] = {}
+        at = 0
+        while at < len(words):
+            first = at
+            of_what_is_called = words[first - 1] in JOINTS and places[first - 1] + len(words[first - 1]) == places[first]
+            if not _is_name(words[first]) or of_what_is_called:
+                at += 1
+                continue
+            parts, at = self._path(first)
+            if self._is_set(at) and words[at] != "=":
+                self._changed.append((parts, places[first]))
+            elif words[at] == "[" and words[at + 1] in ("0", "1", "2") and words[at + 2] == "]" and self._is_set(at + 3):
+                self._coordinates.append((parts, places[first]))
+            sign, place = words[at], places[at]
+            if parts[0] == "define" and words[first - 1] == "#" and place > places[first] + len(parts[0]):
+                parts, after = self._path(at)
+                if len(parts) == 1 and places[after] > place + len(parts[0]):
+                    self.assigned.setdefault(parts[0], []).append(places[after])
+            if sign not in ("=", "(", ":", "{"):
+                continue
+            at += 1
+            if (key := (sign, *parts)) not in known:
+                known[key] = self._may_say(parts, sign)
+            if known[key]:
+                self.statements.append((parts, sign, place + 1, places[first]))
                 if len(self.statements) > _MOST_STATEMENTS:  # refused in `said`
                     break
             if sign == "=" or (sign != ":" and len(parts) == 1):
-                self.assigned.setdefault(parts[-1], []).append(found.end() - (sign != "="))
-        for found in _DEFINE.finditer(self.text):
-            self.assigned.setdefault(found[1], []).append(found.end())
-        self.reader = Expressions(self.text, self._name)
+                self.assigned.setdefault(parts[-1], []).append(place + (sign == "="))
+
+    def _is_set(self, at: int) -> bool:
+        """Whether what stands before a word gets a value by it: =, += …"""
+        return self._words[at] == "=" or (self._words[at] in _CHANGES_BY and self._words[at + 1] == "=")
+
+    def _path(self, first: int) -> tuple[list[str], int]:
+        """The parts of a name such as a.b()->c, of which the first is a word, and the word behind it."""
+        words = self._words
+        parts, at = [words[first]], first + 1
+        while True:
+            joint = at + 2 if words[at] == "(" and words[at + 1] == ")" else at
+            if words[joint] not in JOINTS or not _is_name(words[joint + 1]):
+                return parts, at
+            parts.append(words[joint + 1])
+            at = joint + 2
+
+    def _names_of_lights(self) -> set[str]:
+        words, names = self._words, set()
+        for at in self._all("vtkLight"):
+            if words[at + 1] == ">":  # vtkNew<vtkLight> a
+                names.add(words[at + 2])
+            elif words[at + 1] == "(" and words[(before := self._before(at))] == "=":
+                names.add(words[before - 1])
+        return names
+
+    def _names_of_cameras(self) -> set[str]:
+        words, names = self._words, set()
+        for at in self._all("PerspectiveCamera"):
+            if words[(before := self._before(at))] == "new" and words[before - 1] in ("=", ":"):
+                names.add(words[before - 2])
+        return names
+
+    def _all(self, *kinds: str) -> Iterator[int]:
+        """Each place of one of some words."""
+        if any(kind in self.text for kind in kinds):
+            yield from (at for at, word in enumerate(self._words) if word in kinds)
+
+    def _before(self, at: int) -> int:
+        """The word before a name and all of its namespaces."""
+        at -= 1
+        while self._words[at] in JOINTS and _is_name(self._words[at - 1]):
+            at -= 2
+        return at
+
+    def _made_new(self, kinds: set[str]) -> int | None:
+        """The first word that is made new and of one of these kinds."""
+        return next((at for at in self._all(*kinds) if self._words[self._before(at)] == "new"), None)
+
+    def _names_stepped(self) -> set[str]:
+        """The names that are changed from what they were: a += 1, a++, --a."""
+        words, places, names = self._words, self._places, set()
+        for at, word in enumerate(words):
+            if word in _CHANGES_BY and places[at + 1] == places[at] + 1:
+                following = words[at + 1]
+                if following == "=" or (following == word and word in "+-"):
+                    names.add(words[at - 1] if _is_name(words[at - 1]) or following == "=" else words[at + 2])
+        return names
+
+    def _view_moved(self) -> int | None:
+        """Where the first of _VIEW_MOVED stands that moves a view."""
+        words = self._words
+        for at, word in enumerate(words):
+            if _VIEW_MOVED.fullmatch(word) and words[at + 1] == "(" and _is_name(words[at + 2]):
+                parts, after = self._path(at + 2)
+                if words[after] == "," and parts[-1].lower().startswith(("view", "camera")):
+                    return self._places[at]
+        return None
 
     def _may_say(self, parts: list[str], sign: str) -> bool:
-        """Whether a statement has a role, is one coordinate of what has one, or is a call that changes what others say."""
+        """True if a statement has a role, is one coordinate of what has one, or is a call that changes what others say."""
         if self._role(parts, sign):
             return True
         if len(parts) > 1 and parts[-1] in _COORDINATES and self._role(parts[:-1], sign) in _VECTORS:
@@ -277,7 +359,7 @@ class _Code:
             return self._values[last]
         self._lookups += 1
         if (
-            last in self._changed
+            last in self._stepped
             or last not in self.assigned
             or last in self._following
             or len(self.assigned[last]) > 20
@@ -309,24 +391,26 @@ class _Code:
         if len(self.statements) > _MOST_STATEMENTS:
             raise InputError(f"the text says more than {_MOST_STATEMENTS} things of cameras: copy one camera")
         said = _Said(three=bool(re.search(r"\bTHREE\b|PerspectiveCamera", self.text)))
-        if other := _OTHER_LENSES.search(self.text):
-            not_a_pinhole("the text's camera", f"a {other[1] or other[2]}")
-        for changed in _CHANGED.finditer(self.text):
-            parts = _PARTS.findall(changed[1])
+        for at in self._all(*_LENSES):
+            if self._words[at + 1] == "*" or self._words[at - 1] == "new":
+                not_a_pinhole("the text's camera", f"a {self._words[at]}")
+        for parts, place in self._changed:
             if self._is_camera(parts[:1]) and self._role(parts, "=") not in (None, "width", "height", "size"):
-                texts.fail(self.text, changed.start(), "this moves the camera from where it was, write where it is then")
-        for changed in _COORDINATE.finditer(self.text):
-            if self._role(_PARTS.findall(changed[1]), "=") in _VECTORS:
-                texts.fail(self.text, changed.start(), "this is one coordinate, write the whole vector where it is set")
+                texts.fail(self.text, place, "this moves the camera from where it was, write where it is then")
+        for parts, place in self._coordinates:
+            if self._role(parts, "=") in _VECTORS:
+                texts.fail(self.text, place, "this is one coordinate, write the whole vector where it is set")
         for parts, sign, _, start in self.statements:
             if len(parts) < 2 or sign != "=" or parts[-1] not in _COORDINATES or self._role(parts, sign):
                 continue
             if self._role(parts[:-1], sign) in _VECTORS:
                 texts.fail(self.text, start, "this is one coordinate, write the whole vector where it is set")
-        if said.three and (turned := _OTHER_CONTROLS.search(self.text)):
-            texts.fail(self.text, turned.start(), "these turn the camera by themselves, write where it looks then")
-        if moved := _VIEW_MOVED.search(self.text):
-            texts.fail(self.text, moved.start(), "this moves the view by other means, write eye, look-at and up")
+        if said.three and (turning := self._made_new(_OTHER_CONTROLS)) is not None:
+            texts.fail(self.text, self._places[turning], "these turn the camera by themselves, write where it looks then")
+        if said.three and (turning := self._made_new(_CONTROLS)) is not None:
+            said.controls = self._words[turning]
+        if (moved := self._view_moved()) is not None:
+            texts.fail(self.text, moved, "this moves the view by other means, write eye, look-at and up")
         parts_of: dict[str, dict[str, float]] = {}
         placed: dict[str, str] = {}  # position or up: whose
         moved_before = None  # the matrix of OpenGL that gluLookAt multiplies
@@ -385,10 +469,10 @@ class _Code:
         return said
 
     def _adds_camera(self, parts: list[str], sign: str, at: int) -> bool:
-        """Whether the statement makes a camera part of something else than the scene."""
+        """True if the statement makes a camera part of something else than the scene."""
         if sign != "(" or len(parts) < 2 or parts[-1] != "add" or "scene" in parts[-2].lower():
             return False
-        added = re.match(r"\s*+([\w$.]++)\s*+[,)]", self.text[at : at + 200])
+        added = re.match(r"\s*([\w$.]+)\s*[,)]", self.text[at : at + 200])
         return bool(added) and self._is_camera(added[1].split("."))
 
     def _set(self, said: _Said, role: str, value: object, at: int) -> None:
@@ -490,12 +574,16 @@ class _Code:
                 self._set(said, "aspect_of_lens", aspect, start)
 
 
+def _is_name(word: str) -> bool:
+    return word[:1].isalpha() or word[:1] in ("_", "$")
+
+
 def _is_unknown(value: object) -> bool:
     return isinstance(value, Unknown) or (isinstance(value, tuple) and any(map(_is_unknown, value)))
 
 
 def _looks_declared(text: str, opened: int) -> bool:
-    """Whether the brackets are the head of a function's definition."""
+    """True if the brackets are the head of a function's definition."""
     head = text[opened : opened + 2_000]
     try:
         end = texts.closing(head, 0, "()")
@@ -552,9 +640,9 @@ def _pose(said: _Said, text: str, options: Options) -> tuple:
     eye, target, up, direction = (found[role] for role in ("eye", "target", "up", "direction"))
     if said.three and eye is None:
         eye = (0.0, 0.0, 0.0)
-    if said.three and (turning := _CONTROLS.search(text)):
+    if said.controls:
         known = _known(values, "target_of_controls", text, "write the target in plain numbers") or (0.0, 0.0, 0.0)
-        target, notes = numbers(known, 3), (f"{turning[1]} turn the camera to their target, {known}",)
+        target, notes = numbers(known, 3), (f"{said.controls} turn the camera to their target, {known}",)
     if target is None and (aims := {point for _, point in said.aimed}):
         if len(aims) > 1:
             texts.fail(text, said.aimed[1][0], "it looks at several points, copy one camera")

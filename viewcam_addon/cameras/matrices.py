@@ -41,16 +41,16 @@ _ROLES = {
 _NAMES = re.compile(
     r"\b(model[_ ]?view(?:[_ ]?proj(?:ection)?)?|view[_ ]?proj(?:ection)?|world_?to_?view|matrixWorldInverse"
     r"|view|proj(?:ection)?|mvp|persp(?:ective)?)"
-    r"([_ ]?mat(?:rix)?)?+\b(?:\s*+\[\s*+\d{1,2}+\s*+\])*+\]?+['\"]?+\s*+(?:\([^()\n]{0,40}\))?+\s*+(?:=|:)?+\s*+"
-    r"(?=[^\w\s;.]|[-+.\d\n]|new\b|np\.|glm|mat|array|float|Matrix|XM|\[)",
+    r"([_ ]?mat(?:rix)?)?\b(?:\s*\[\s*\d{1,2}\s*\])*\]?['\"]?\s*(?:\([^()\n]{0,40}\)\s*)?(?:(?::?=|:)\s*)?"
+    r"(?=[^\w\s;.=:]|[-+.\d]|new\b|np\.|glm|mat|array|float|Matrix|XM|\[)",
     re.IGNORECASE,
 )
-_BEFORE = re.compile(r"(?:\s++|new\b|[A-Za-z_][\w.:]*+\s*+(?=\(|\{)|=|[\[({<]){0,20}+")
-_ROW = re.compile(r"[\s,()\[\]{}]*+(?:glm::)?+(?:d?vec4|float4|array|np\.array)\s*+(?=[\[({])")
+_BEFORE = re.compile(r"(?:\s+|new\b|[A-Za-z_][\w.:]*\s*(?=\(|\{)|=|[\[({<]){0,20}")
+_ROW = re.compile(r"[\s,()\[\]{}]*(?:glm::)?(?:d?vec4|float4|array|np\.array)\s*(?=[\[({])")
 _SIZE = re.compile(
-    r"\b(?:size|viewport|resolution)\b['\"]?+\s*+[=:]\s*+[\[({]?+\s*+(\d{1,9}+)\s*+[x×,\s]\s*+(\d{1,9}+)", re.IGNORECASE
+    r"\b(?:size|viewport|resolution)\b['\"]?\s*[=:]\s*(?:[\[({]\s*)?(\d{1,9})(?:\s*[x×,]\s*|\s+)(\d{1,9})", re.IGNORECASE
 )
-_NUMBER = re.compile(r"[\s,;|()\[\]{}<>]*+([-+]?+(?:\d++(?:\.\d*+)?+|\.\d++)(?:[eE][-+]?+\d++)?+)[fFd]?+(?![\w.])")
+_NUMBER = re.compile(r"[\s,;|()\[\]{}<>]*([-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?)[fFd]?(?![\w.])")
 _MOST = 100
 _ROUNDED = 1e-4  # what digits leave of a zero, relative to the largest number
 
@@ -86,7 +86,7 @@ def _sixteen(text: str, at: int) -> list[float] | None:
             continue
         numbers.append(float(found[1]))
         at = found.end()
-    return None if _NUMBER.match(text, at) and re.match(r"[ \t,]*+[-+.\d]", text[at : at + 40]) else numbers
+    return None if _NUMBER.match(text, at) and re.match(r"[ \t,]*[-+.\d]", text[at : at + 40]) else numbers
 
 
 def read(source: Source, options: Options) -> list[Camera]:
@@ -140,6 +140,8 @@ def _projected(to_pixels: np.ndarray, size: tuple[int, int]) -> tuple[Pinhole, t
 def _posed(view: np.ndarray, options: Options) -> Camera:
     """A view matrix alone: OpenGL's, whose camera looks along −z."""
     plane = options.plane_or_refuse("the view matrix")
+    if abs(np.linalg.det(view)) < 1e-30:
+        raise InputError("the view matrix is flat: copy the camera's view and projection")
     pinhole, notes = axes.pinhole(np.linalg.inv(view), plane, "the view matrix")
     return Camera("Camera", pinhole, False, ("A view matrix alone is taken as OpenGL's, whose camera looks along −z", *notes))
 

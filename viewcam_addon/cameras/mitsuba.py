@@ -21,7 +21,7 @@ import numpy as np
 
 from .. import checks
 from ..errors import InputError
-from . import axes, own, texts
+from . import axes, own, texts, tokens
 from .camera import Camera, LeftOut, Options, not_a_pinhole
 from .expressions import Expressions, Unknown, numbers
 from .source import Source
@@ -33,13 +33,13 @@ SUFFIX = ".xml"
 _SIZE = (768, 576)
 _MOST = 4_000
 _DIAGONAL_OF_FILM = math.hypot(36, 24)  # mm
-_XML = re.compile(r"<\s*+(?:sensor|scene|lookat|transform)\b", re.IGNORECASE)
-_PYTHON = re.compile(r"(?:to_world|type)['\"]\s*+:|\blook_at\s*+\(|\bload_dict\s*+\(")
+_XML = re.compile(r"<\s*(?:sensor|scene|lookat|transform)\b", re.IGNORECASE)
+_PYTHON = re.compile(r"(?:to_world|type)['\"]\s*:|\blook_at\s*\(|\bload_dict\s*\(")
 _SENSOR = re.compile(
-    r"['\"]type['\"]\s*+:\s*+['\"](perspective|thinlens|orthographic|radiancemeter|distant|irradiancemeter|batch)['\"]"
+    r"['\"]type['\"]\s*:\s*['\"](perspective|thinlens|orthographic|radiancemeter|distant|irradiancemeter|batch)['\"]"
 )
-_DEFAULT = re.compile(r"\$([^\s,$]{1,100}+)")
-_LOOK = re.compile(r"\blook_at\s*+\(")
+_DEFAULT = re.compile(r"\$([^\s,$]{1,100})")
+_LOOK = re.compile(r"\blook_at\s*\(")
 _FOV_AXES = ("x", "y", "diagonal", "smaller", "larger")
 _HARMLESS = {
     *("nearclip", "farclip", "shutteropen", "shutterclose", "focusdistance", "type", "id", "film", "sampler", "toworld"),
@@ -49,7 +49,7 @@ _SCALED = 1e-3  # of squared lengths, as Mitsuba's has_scale
 
 
 class _Sensor:
-    """What a sensor says, keys without capitals and underscores: `values` texts or numbers, `film` likewise, `to_world`."""
+    """The values of a sensor, keys without capitals and underscores: `values` texts or numbers, `film` likewise, `to_world`."""
 
     def __init__(self, kind: str, name: str, values: Mapping, film: Mapping | None, pose: "np.ndarray | _Look | None") -> None:
         self.kind, self.name, self.values, self.film, self.pose = kind, name, values, film, pose
@@ -75,7 +75,7 @@ def recognises(source: Source) -> bool:
 
 
 def _is_python(text: str) -> bool:
-    return bool(_SENSOR.search(text) or re.search(r"\blook_at\s*+\(\s*+(?:origin|target|up)\b|['\"]to_world['\"]", text))
+    return bool(_SENSOR.search(text) or re.search(r"\blook_at\s*\(\s*(?:origin|target|up)\b|['\"]to_world['\"]", text))
 
 
 def source_xml(source: Source) -> ElementTree.Element | None:
@@ -85,7 +85,7 @@ def source_xml(source: Source) -> ElementTree.Element | None:
         return None
     if source.xml is not None:
         return source.xml
-    return Source(f"<fragment>{re.sub(r'^<[?]xml[^>]*+[?]>', '', text)}</fragment>").xml
+    return Source(f"<fragment>{text.partition('?>')[2] if text.startswith('<?xml') else text}</fragment>").xml
 
 
 def read(source: Source, options: Options) -> list[Camera]:
@@ -223,7 +223,7 @@ def _in_xml(root: ElementTree.Element) -> Iterator[_Sensor]:
 
 
 def _elements(root: ElementTree.Element, tag: str) -> list[ElementTree.Element]:
-    """Those with the tag; in a sensor, as in a batch, only the outer one."""
+    """The elements with the tag; in a sensor, as in a batch, only the outer one."""
     if root.tag.lower() == tag:
         return [root]
     return [element for child in root for element in _elements(child, tag)]
@@ -327,7 +327,7 @@ def _step(step: ElementTree.Element, name: str, text) -> "np.ndarray | _Look":
 
 
 def _in_python(text: str) -> Iterator[_Sensor]:
-    text = texts.without(r"#[^\n]*+", text)
+    text = texts.without(r"#[^\n]*", text)
     starts = [found for found in _SENSOR.finditer(text)]
     if not starts:
         looks = list(_LOOK.finditer(text))
@@ -338,13 +338,13 @@ def _in_python(text: str) -> Iterator[_Sensor]:
         return
     for found in starts:
         opened = _enclosing(text, found.start())
-        named = re.search(r"['\"](\w{1,60}+)['\"]\s*+:\s*+\Z|(\w{1,60}+)\s*+=\s*+\Z", text[max(0, opened - 90) : opened])
+        named = re.search(r"['\"](\w{1,60})['\"]\s*:\s*\Z|(\w{1,60})\s*=\s*\Z", text[max(0, opened - 90) : opened])
         name = next((part for part in named.groups() if part), "sensor") if named else "sensor"
         yield _dictionary(text, opened, found[1], name)
 
 
-_FRAGMENT = re.compile(r"['\"](fov|fov_axis|focal_length)['\"]\s*+:\s*+['\"]?+([^\s,'\"}]++)")
-_ITEM = re.compile(r"\s*+['\"](\w++)['\"]\s*+:\s*+")
+_FRAGMENT = re.compile(r"['\"](fov|fov_axis|focal_length)['\"]\s*:\s*['\"]?([^\s,'\"}]+)")
+_ITEM = re.compile(r"\s*['\"](\w+)['\"]\s*:\s*")
 
 
 def _enclosing(text: str, at: int) -> int:
@@ -390,24 +390,30 @@ def _dictionary(text: str, opened: int, kind: str, name: str) -> _Sensor:
 def _end_of_value(text: str, at: int, end: int) -> int:
     """Where the comma after a value stands, or its dictionary ends."""
     depth = 0
-    for found in re.compile(r"\"(?:[^\"\\\n]|\\.){0,1000}+\"|'(?:[^'\\\n]|\\.){0,1000}+'|[()\[\]{},]").finditer(text, at, end):
-        if found[0] in "([{":
+    for sign, place in tokens.outside_strings(text, at, end):
+        if sign in "([{":
             depth += 1
-        elif found[0] in ")]}":
+        elif sign in ")]}":
             depth -= 1
-        elif found[0] == "," and not depth:
-            return found.start()
+        elif sign == "," and not depth:
+            return place
     return end
 
 
-_TRANSFORM = re.compile(r"\s*+(?:[A-Za-z_]\w*+\s*+\.\s*+)*+([A-Za-z_]\w*+)\s*+(?=[(.])")
-_EMPTY_CALL = re.compile(r"\s*+\(\s*+\)")
-
-
 def _start_of(text: str, at: int) -> int:
-    """Where the product of transforms begins in which a look_at stands."""
-    before = re.search(r"(?:[\w.]++(?:\((?:[^()\n]|\([^()\n]*+\))*+\))?+[\s.@]*+)*+\Z", text[max(0, at - 400) : at])
-    return max(0, at - 400) + before.start() if before else at
+    """Where the product of transforms begins in which a look_at stands: names, dots, @ and calls before it."""
+    depth, start = 0, at
+    for place in range(at - 1, max(-1, at - 400), -1):
+        sign = text[place]
+        if sign == "(" and not depth:
+            break
+        depth += (sign == ")") - (sign == "(")
+        if depth:
+            continue
+        if not (sign.isalnum() or sign.isspace() or sign in "_.@()"):
+            break
+        start = start if sign.isspace() or sign == "@" else place
+    return start
 
 
 def _product(text: str, at: int) -> "np.ndarray | _Look":
@@ -415,29 +421,23 @@ def _product(text: str, at: int) -> "np.ndarray | _Look":
     made: list = []
     reader = Expressions(text)
     while True:
-        found = _TRANSFORM.match(text, at)
-        if not found:
+        name = tokens.token(text, at)
+        opened = tokens.token(text, name.end)
+        if name.kind != "name" or opened.text not in (".", "("):
             texts.fail(text, at, "give to_world as look_at, translate, rotate, scale and matrices of numbers")
-        name, at = found[1], found.end()
-        if text[at] == "." and text[at:].lstrip(".").startswith("look_at"):
-            at += 1
+        at = opened.end
+        if opened.text == ".":
             continue
-        if empty := _EMPTY_CALL.match(text, at):
-            at = empty.end()
-            while text[at : at + 1] in (" ", "\n", "\t"):
-                at += 1
-            if text[at : at + 1] == ".":
-                at += 1
-                continue
-            made.append(np.eye(4))
+        if (closed := tokens.token(text, at)).text == ")":
+            at = closed.end
+            made += [np.eye(4)] if tokens.token(text, at).text != "." else []
         else:
-            values, named, end = reader.arguments(at)
-            made.append(_call(name, values, named, text, found.start()))
-            at = end
-        after = re.compile(r"\s*+([.@]?+)").match(text, at)
-        if not after[1]:
+            values, named, at = reader.arguments(opened.start)
+            made.append(_call(name.text, values, named, text, name.start))
+        after = tokens.token(text, at)
+        if after.text not in (".", "@"):
             break
-        at = after.end()
+        at = after.end
     if len(made) == 1:
         return made[0]
     if len(made) == 2 and isinstance(made[0], _Look) and _is_mirror(made[1]):

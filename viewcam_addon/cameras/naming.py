@@ -24,7 +24,7 @@ def stem(path: str) -> str:
 
 
 def has_suffix(path: str) -> bool:
-    """Whether the path ends as a picture's does."""
+    """True if the path ends as a picture's does."""
     return PurePosixPath(path).suffix.lower() in _PICTURES
 
 
@@ -97,7 +97,7 @@ def refuse_taken(names: Sequence[str]) -> None:
 
 
 def a_file_each(cameras: Sequence[Camera], suffix: str, text: Callable[[Camera], str]) -> str | dict[str, str]:
-    """What `write` gives in a format whose files have one camera: its text, or of several the files, called as the cameras.
+    """The result of `write` in a format whose files have one camera: its text, or of several the files, called as the cameras.
 
     Raises
     ------
@@ -124,6 +124,6 @@ def several(files: Sequence[str]) -> str:
 
 
 def _is_unseen(character: str) -> bool:
-    """Whether it is no character of a line of text: a control or format character, half of one, or a line's end."""
+    """True if it is no character of a line of text: a control or format character, half of one, or a line's end."""
     category = unicodedata.category(character)
     return category[0] == "C" or category in ("Zl", "Zp")

@@ -15,16 +15,18 @@ lines; K that means the corner where it is exactly half the size: the middle of 
 Source: OpenCV's modules/core/src/persistence_yml.cpp and calib3d's projectPoints.
 """
 
+import contextlib
 import io
 import math
 import re
 import zipfile
+import zlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from .. import checks
+from .. import checks, npy
 from ..errors import InputError
 from ..pinhole import ViewPlane
 from . import axes, distortion, naming, own
@@ -36,7 +38,7 @@ SUFFIX = ".yml"
 
 _K = ("k", "cameramatrix", "intrinsicmatrix", "intrinsics", "intrinsic", "mtx", "cammatrix", "camk", "kmatrix")
 _R = ("r", "rot", "rotation", "rmat", "rotationmatrix", "rw2c")
-_SAYS_K = re.compile(r"(?:k|matrix|intrinsics?|mtx)[\s_$\"'-]*+:", re.IGNORECASE)  # each of these
+_SAYS_K = re.compile(r"(?:k|matrix|intrinsics?|mtx)[\s_$\"'-]*:", re.IGNORECASE)  # each of these
 _RVEC = ("rvec", "rodrigues", "rotationvector", "rvecs")
 _T = ("t", "tvec", "translation", "translationvector", "trans", "tw2c")
 _EXTRINSIC = (
@@ -58,7 +60,8 @@ _WIDTH = ("imagewidth", "width", "w", "resx")
 _HEIGHT = ("imageheight", "height", "h", "resy")
 _SIZE = ("imagesize", "size", "resolution", "imgsize", "imagesizewh")
 NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tx", "ty")
-"""Of the distortion's coefficients, in OpenCV's order."""
+"""The names of the distortion's coefficients, in OpenCV's order."""
+_MOST_BYTES, _MOST_ARRAYS = 2**16, 1000  # of an NPZ
 _WIDEST = 50  # widths of the picture to a focal length, which are 177.7°
 _WAY = "R and t were taken as from world to camera, x right, y down, z into the view"
 
@@ -91,7 +94,8 @@ def write(cameras: Sequence[Camera], options: Options) -> str | dict[str, str]:
 
 
 def half_pixel(options: Options, habit: str = "center") -> float:
-    """What to add to a format's principal point to count it from the picture's corner. habit : of the format, one of PIXELS."""
+    """The amount to add to a format's principal point to count it from the picture's corner. habit : of the format, one of
+    PIXELS."""
     return 0.5 if (options.pixel or habit) == "center" else 0.0
 
 
@@ -197,15 +201,14 @@ def _document(source: Source) -> Mapping[str, Any]:
 
 def _npz(source: Source) -> dict[str, Any]:
     """Arrays of numbers without pickle, and no more of them than a camera has."""
-    found = {}
+    found: dict[str, Any] = {}
     try:
         with zipfile.ZipFile(io.BytesIO(source.data)) as archive:
-            for entry in archive.infolist():
-                if entry.filename.endswith(".npy") and entry.file_size < 2**16 and len(found) < 1000:
-                    array = np.lib.format.read_array(io.BytesIO(archive.read(entry)), allow_pickle=False)
-                    if array.dtype.kind in "iuf":
-                        found[entry.filename.removesuffix(".npy")] = array.tolist()
-    except (ValueError, zipfile.BadZipFile, OSError, EOFError, NotImplementedError, RuntimeError, SyntaxError):
+            for name, member in npy.members(archive).items():
+                if member.file_size < _MOST_BYTES and len(found) < _MOST_ARRAYS:
+                    with contextlib.suppress(ValueError), archive.open(member) as file:
+                        found[name] = npy.read(file.read(member.file_size)).tolist()  # and no more, whatever is packed there
+    except (ValueError, OSError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error):
         return {}
     return found
 

@@ -18,7 +18,7 @@ from .source import Record, Source
 
 TITLE = "OpenMVG sfm_data.json"
 
-_NONE = 2**32 - 1
+_NONE = str(2**32 - 1)
 _LENSES = {"disto_k1": ("k1",), "disto_k3": ("k1", "k2", "k3"), "disto_t2": ("k1", "k2", "k3", "p1", "p2")}
 _PINHOLES = ("pinhole", "pinhole_radial_k1", "pinhole_radial_k3", "pinhole_brown_t2")
 
@@ -29,7 +29,7 @@ def recognises(source: Source) -> bool:
 
 def read(source: Source, options: Options) -> list[Camera]:
     document = Record(source.document, source.name)
-    poses = {each.values.get("key"): each.record("value") for each in document.records("extrinsics", "extrinsic")}
+    poses = {str(each.values.get("key")): each.record("value") for each in document.records("extrinsics", "extrinsic")}
     kinds: dict[int, str] = {}
     intrinsics = {}
     for each in document.records("intrinsics", "intrinsic"):
@@ -37,17 +37,17 @@ def read(source: Source, options: Options) -> list[Camera]:
         number = value.values.get("polymorphic_id")
         number = number & 0x3FFFFFFF if isinstance(number, int) else -1
         kinds.setdefault(number, str(value.values.get("polymorphic_name") or "pinhole"))
-        intrinsics[each.values.get("key")] = (kinds[number], value.record("ptr_wrapper").record("data"))
+        intrinsics[str(each.values.get("key"))] = (kinds[number], value.record("ptr_wrapper").record("data"))
     root = document.values.get("root_path")
     found, lost = [], 0
     for each in document.records("views", "view"):
         view = each.record("value").record("ptr_wrapper").record("data")
-        pose, intrinsic = view.values.get("id_pose"), view.values.get("id_intrinsic")
-        if pose not in poses or intrinsic not in intrinsics or intrinsic == _NONE:
+        pose_id, intrinsic_id = str(view.values.get("id_pose")), str(view.values.get("id_intrinsic"))
+        if pose_id not in poses or intrinsic_id not in intrinsics or intrinsic_id == _NONE:
             lost += 1
             continue
         path = "/".join(part for part in (str(view.get("local_path") or ""), str(view.get("filename") or "")) if part)
-        found.append((path or f"view {view.get('id_view')}", poses[pose], *intrinsics[intrinsic]))
+        found.append((path or f"view {view.get('id_view')}", poses[pose_id], *intrinsics[intrinsic_id]))
     if not found:
         raise InputError(f"none of the {lost} views of {source.name} has a pose: let OpenMVG reconstruct it first")
     told: tuple[str, ...] = (f"{lost} views without a pose were left out",) if lost else ()

@@ -33,7 +33,7 @@ VECTORS = ("eye", "look_at", "up")
 KEY = "virtual_pinhole"
 """Under which another format's file has a `document` beside its own numbers; or it stands so in a comment."""
 
-_DOCUMENTS = re.compile(rf"{KEY}[^\w{{]{{0,4}}+(?:\d{{1,18}}+ )?+(\{{[^{{}}]*+\}})")
+_DOCUMENTS = re.compile(rf"{KEY}[^\w{{]{{0,4}}(?:\d{{1,18}} )?(\{{[^{{}}]*\}})")
 # What a text says, checked: eye, look_at, up; distance (one or two), width, height, principal_point, mirrored; fov, fov_x,
 # fov_y with their axis, degrees or radians as `_Angle` says.
 Values = dict[str, object]
@@ -60,19 +60,19 @@ _AXIS_SPELLINGS = {
 _COUNTS = {**dict.fromkeys(VECTORS, 3), "principal_point": 2, "size": 2}
 _LENS = {"distance", "fov", "fov_x", "fov_y"}
 
-_GAP = re.compile(r"[\s,;|()\[\]{}<>'\"]*+")
-_SAYS = re.compile(r"\s*+['\"]?+\s*+[=:]?+\s*+(?:<?Vector\b)?+")
-_SAYS_VALUE = re.compile(r"\s*+['\"]?+\s*+(?:[=:]|[-−+.\d(\[{<]|<?Vector\b|\Z)")
-_WORD = re.compile(r"[A-Za-z_][\w-]*+")
+_GAP = re.compile(r"[\s,;|()\[\]{}<>'\"]*")
+_SAYS = re.compile(r"\s*(?:['\"]\s*)?(?:[=:]\s*)?(?:<?Vector\b)?")
+_SAYS_VALUE = re.compile(r"\s*(?:['\"]\s*)?(?:[=:]|[-−+.\d(\[{<]|<?Vector\b|\Z)")
+_WORD = re.compile(r"[A-Za-z_][\w-]*")
 _TWO_WORDS = re.compile(
-    r"(look\s++at|look\s++from|fov\s++axis|field\s++of\s++view|up\s++vector|view\s++up|focal\s++point|principal\s++point)\b",
+    r"(look\s+at|look\s+from|fov\s+axis|field\s+of\s+view|up\s+vector|view\s+up|focal\s+point|principal\s+point)\b",
     re.IGNORECASE,
 )
-_SIZE = re.compile(r"[\s(\['\"]*+(\d{1,9}+)\s*+[x×X*,\s]\s*+(\d{1,9}+)")
-_TRUTH = re.compile(r"\s*+(true|false|yes|no|0|1)\b", re.IGNORECASE)
-_PIXELS = re.compile(r"(?:\s*+(?:px|pixels?)\b)?+")
-_UNIT = re.compile(r"(?:\s*+(?:(°|deg(?:rees?)?\b)|(rad(?:ians?)?\b)))?+")
-_JSON = re.compile(r"\A\s*+(?:\{|\"\w++\"\s*+:)")
+_SIZE = re.compile(r"[\s(\['\"]*(\d{1,9})(?:\s*[x×X*,]\s*|\s+)(\d{1,9})")
+_TRUTH = re.compile(r"\s*(true|false|yes|no|0|1)\b", re.IGNORECASE)
+_PIXELS = re.compile(r"(?:\s*(?:px|pixels?)\b)?")
+_UNIT = re.compile(r"(?:\s*(?:(°|deg(?:rees?)?\b)|(rad(?:ians?)?\b)))?")
+_JSON = re.compile(r"\A\s*(?:\{|\"\w+\"\s*:)")
 _SAID = "write eye=…, look_at=…, up=… and d=…, or copy a camera"
 
 

@@ -32,19 +32,19 @@ from .source import Source
 TITLE = "pbrt scene"
 SUFFIX = ".pbrt"
 
-_COMMENT = r"#[^\n]*+"
+_COMMENT = r"#[^\n]*"
 _WORDS = re.compile(
-    r"\"((?:[^\"\\]|\\.){0,1000}+)\"|([A-Za-z]\w*+)|([-+]?+(?:\d++(?:\.\d*+)?+|\.\d++)(?:[eE][-+]?+\d++)?+(?![\w.]))|([][])|(\S)"
+    r"\"([^\"\\]*(?:\\.[^\"\\]*)*)\"|([A-Za-z]\w*)|([-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?(?![\w.]))|([][])"
+    r"|(\"[^\"\\]*(?:\\.[^\"\\]*)*|[-+.\d][\w.]*|\S)"
 )
 _KINDS = ("perspective", "orthographic", "environment", "spherical", "realistic")
-_STATEMENT = re.compile(
-    rf'\bLookAt\s++[-+.\d\[]|\bCamera\s*+"(?:{"|".join(_KINDS)})"|^[ \t]*+Camera[ \t]*+"\w++"', re.MULTILINE
-)
-_LUX = re.compile(r'\bFilm\s*+"(?:fleximage|multiimage)"|^[ \t]*+SearchPath[ \t]*+"', re.MULTILINE)
+_STATEMENT = re.compile(rf'\bLookAt\s+[-+.\d\[]|\bCamera\s*"(?:{"|".join(_KINDS)})"|^[ \t]*Camera[ \t]*"\w+"', re.MULTILINE)
+_LUX = re.compile(r'\bFilm\s*"(?:fleximage|multiimage)"|^[ \t]*SearchPath[ \t]*"', re.MULTILINE)
 _MOVES = {"LookAt": 9, "Translate": 3, "Scale": 3, "Rotate": 4, "Transform": 16, "ConcatTransform": 16, "Identity": 0}
 _NOT_READ = {"Include", "Import"}
 _SIZE = (1280, 720)
 _MOST_MOVES = 1_000
+_NARROWEST = 1e-9  # degrees
 _TIMES = {"All": (0, 1), "StartTime": (0,), "EndTime": (1,)}
 _HARMLESS = {"shutteropen", "shutterclose", "focaldistance", "lensradius", "medium", "hither", "yon"}
 
@@ -57,7 +57,7 @@ def recognises(source: Source) -> bool:
 
 
 def _has_statement(text: str) -> bool:
-    """Whether a LookAt is followed by a number, or a Camera by the name of one."""
+    """True if a LookAt is followed by a number, or a Camera by the name of one."""
     return ("LookAt" in text or "Camera" in text) and bool(_STATEMENT.search(texts.without(_COMMENT, text[: 2**20])))
 
 
@@ -84,7 +84,7 @@ class _Transform(NamedTuple):
 
 
 class _Scene:
-    """What stands before WorldBegin."""
+    """The statements before WorldBegin."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -243,7 +243,7 @@ def _angle(parameters: _Parameters, text: str) -> float:
     degrees = _number(parameters, "fov", 90.0, text)
     half = _number(parameters, "halffov", -1.0, text)
     degrees = 2 * half if half > 0 else degrees
-    if not 0 < degrees < 180:
+    if not _NARROWEST < degrees < 180:
         at = parameters["halffov" if half > 0 else "fov"][1]
         texts.fail(text, at, f"the field of view is {degrees:g}°, give an angle between 0 and 180")
     return math.radians(degrees)

@@ -31,12 +31,12 @@ from .source import Source
 TITLE = "POV-Ray camera"
 SUFFIX = ".pov"
 
-_CAMERA = re.compile(r"\bcamera\s*+\{")
-_COMMENT = r"//[^\n]*+|/\*.*?(?:\*/|\Z)"
-_DECLARE = re.compile(r"#\s*+(?:declare|local)\s++(\w++)\s*+=\s*+")
-_CONDITION = re.compile(r"#\s*+(if|ifdef|ifndef|while|for|switch|macro|end)\b")
-_VERSION = re.compile(r"#\s*+version\s++(\d++(?:\.\d++)?+)")
-_WORD = re.compile(r"\s*+([A-Za-z_]\w*+)")
+_CAMERA = re.compile(r"\bcamera\s*\{")
+_COMMENT = r"//[^\n]*|/\*.*?(?:\*/|\Z)"
+_DECLARE = re.compile(r"#\s*(?:declare|local)\s+(\w+)\s*=\s*")
+_CONDITION = re.compile(r"#\s*(if|ifdef|ifndef|while|for|switch|macro|end)\b")
+_VERSION = re.compile(r"#\s*version\s+(\d+(?:\.\d+)?)")
+_WORD = re.compile(r"\s*([A-Za-z_]\w*)")
 _VECTORS = ("location", "right", "up", "direction", "sky", "look_at")
 _SIZE = (800, 600)
 _PARALLEL = 1e-10  # POV-Ray's EPSILON
@@ -47,7 +47,7 @@ _KINDS = (
 )
 _BLUR = ("blur_samples", "focal_point", "confidence", "variance", "bokeh", "aperture")
 _WORDS = "|".join((*_VECTORS, *_MOVES, *_KINDS, *_BLUR, "perspective", "angle"))
-_SAYS_CAMERA = re.compile(rf"\bcamera\s*+\{{\s*+(?:(?:{_WORDS})\b|(\w++)\s*+((?:{_WORDS})\b)?+)")
+_SAYS_CAMERA = re.compile(rf"\bcamera\s*\{{\s*(?:(?:{_WORDS})\b|(\w+)\s*((?:{_WORDS})\b)?)")
 _PIXELS = re.compile(r"\+([WwHh])(\d{1,6})\b")
 _UNITS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
@@ -285,7 +285,7 @@ class _Block:
 
     @property
     def _is_given(self) -> bool:
-        """Whether somebody said which picture this camera is for."""
+        """True if somebody said which picture this camera is for."""
         return self.size is None and self.options.size is not None and not self.options.size_fits
 
     def _film(self, aspect: float) -> texts.Film:

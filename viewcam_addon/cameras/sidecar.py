@@ -1,4 +1,4 @@
-"""What the sidecar of a picture says of its camera: the exact values, and what others would have to derive from them.
+"""The sidecar of a picture, about its camera: the exact values, and what others would have to derive from them.
 
 A batch writes one beside each picture (docs/datasets.md). Unlike a dataset's file it can say that a camera is mirrored: the
 matrices then have a determinant of −1. Read back it is the same pinhole to the bit; of what the shot asked for (`stated`) and

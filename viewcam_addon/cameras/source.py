@@ -1,10 +1,11 @@
-"""What cameras are read from: a text, a file or a folder, and safe ways into JSON, XML and YAML.
+"""Sources that cameras are read from: a text, a file or a folder, and safe ways into JSON, XML and YAML.
 
 Each is parsed once, whoever asks. JSON may have comments, as instant-ngp's has; keys that appear twice are refused, since
 nobody knows which counts. XML is read without a document type, entities or anything outside, and no deeper than 100 elements:
 what attacks XML parsers needs one of these.
 """
 
+import codecs
 import json
 import re
 import struct
@@ -25,12 +26,22 @@ from . import yaml
 
 _MOST_BYTES = 2**30
 _DEEPEST = 100
-_COMMENT = re.compile(r'"(?:[^"\\]|\\.)*+"|//[^\n]*+|/\*.*?\*/', re.DOTALL)
-_TRAILING_COMMA = re.compile(r'"(?:[^"\\]|\\.)*+"|,(?=\s*+[\]}])')
+_STRING = r'"[^"\\]*(?:\\.[^"\\]*)*"?'
+_COMMENT = re.compile(rf"{_STRING}|//[^\n]*|/\*.*?(?P<end>\*/|\Z)", re.DOTALL)
+_TRAILING_COMMA = re.compile(rf"{_STRING}|,(?=\s*[\]}}])", re.DOTALL)
+_XML_DECLARATION = re.compile(rb"\s*<\?xml\s[^>]{0,200}\bencoding\s*=\s*[\"']([^\"'>]{0,40})[\"']")
+_ENCODINGS = {  # as Python calls them
+    *("utf-8", "utf-16", "utf-16-le", "utf-16-be", "ascii", "koi8-r", "koi8-u"),
+    *(f"iso8859-{part}" for part in range(1, 17)),
+    *(f"cp{page}" for page in range(1250, 1259)),
+    *("shift_jis", "cp932", "euc_jp", "euc_kr", "cp949", "gb2312", "gbk", "gb18030", "big5"),
+}
+_UTF_16 = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"<\0?\0": "utf-16-le", b"\0<\0?": "utf-16-be"}
+"""What a text in UTF-16 begins with: a byte order mark, or XML's declaration without one."""
 
 
 class Source:
-    """What was given: `path` of a file or folder, or None for a text; `data`, its bytes; `text`, its characters.
+    """A source that was given: `path` of a file or folder, or None for a text; `data`, its bytes; `text`, its characters.
 
     `parsed` is for formats whose content takes its time: what one has made of it, by its title.
 
@@ -74,16 +85,47 @@ class Source:
 
     @cached_property
     def is_binary(self) -> bool:
-        return b"\0" in self.data[:4096] and not self.data.startswith((b"\xff\xfe", b"\xfe\xff"))
+        return b"\0" in self.data[:4096] and not self._utf_16
+
+    @property
+    def _utf_16(self) -> str | None:
+        """The kind of UTF-16 that this is; None if it is none."""
+        return next((name for mark, name in _UTF_16.items() if self.data.startswith(mark)), None)
 
     @cached_property
     def text(self) -> str:
         """The characters, with plain line ends; empty if these are no characters."""
         if self.is_binary:
             return ""
-        data = self.data
-        encoding = "utf-16" if data.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig"
-        return data.decode(encoding, errors="replace").replace("\r\n", "\n").replace("\r", "\n")
+        encoding = self._encoding[0]
+        return self.data.decode(encoding, errors="replace").replace("\r\n", "\n").replace("\r", "\n")
+
+    @cached_property
+    def _encoding(self) -> tuple[str, str]:
+        """How the characters are written, and what is wrong with what an XML file says of that."""
+        data, utf_16 = self.data, self._utf_16
+        usual = utf_16 or "utf-8-sig"
+        head = data[:1024].decode(utf_16, errors="ignore").encode("ascii", errors="ignore") if utf_16 else data[:1024]
+        declared = _XML_DECLARATION.match(head.removeprefix(b"\xef\xbb\xbf"))
+        if isinstance(self._given, str) or not declared:
+            return usual, ""
+        name = declared[1].decode("ascii", errors="replace")
+        advice = "save it in UTF-8 and let it say so"
+        try:
+            encoding = codecs.lookup(name).name
+        except (LookupError, ValueError):
+            encoding = ""
+        if encoding not in _ENCODINGS:
+            return usual, f"{self.name} says that its encoding is {checks.shown(name)}, which is unknown: {advice}"
+        contradicts = f"{self.name} says that its encoding is {checks.shown(name)} and is not written in it: {advice}"
+        if bool(utf_16) != encoding.startswith("utf-16"):
+            return usual, contradicts
+        encoding = usual if encoding in ("utf-8", "utf-16", "utf-16-le", "utf-16-be") else encoding
+        try:
+            data.decode(encoding)
+        except UnicodeDecodeError:
+            return usual, contradicts
+        return encoding, ""
 
     @cached_property
     def _json(self) -> tuple[Any, str]:
@@ -129,10 +171,12 @@ class Source:
         Raises
         ------
         InputError
-            if it has a document type or entities of its own, or is nested too deeply.
+            if it has a document type or entities of its own, is nested too deeply, or is not written as it says.
         """
         if not self.text.lstrip().startswith("<"):
             return None
+        if self._encoding[1]:
+            raise InputError(self._encoding[1])
         return _parsed_xml(self.text.strip())
 
     @cached_property
@@ -305,7 +349,7 @@ def _size_in(head: bytes) -> tuple[int, int] | None:
 
 
 def _without_comments(text: str) -> str:
-    text = _COMMENT.sub(lambda found: found[0] if found[0][0] == '"' else " ", text)
+    text = _COMMENT.sub(lambda found: found[0] if found[0][0] == '"' or found["end"] == "" else " ", text)
     return _TRAILING_COMMA.sub(lambda found: found[0] if found[0][0] == '"' else " ", text)
 
 
@@ -326,7 +370,7 @@ def _not_finite(name: str) -> float:
 
 
 def _parsed_xml(text: str) -> ElementTree.Element | None:
-    builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate(namespace_separator="}")
+    builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate("utf-8", namespace_separator="}")
     depth = 0
 
     def start(tag: str, attributes: dict[str, str]) -> None:
@@ -348,7 +392,7 @@ def _parsed_xml(text: str) -> ElementTree.Element | None:
     parser.EntityDeclHandler = parser.UnparsedEntityDeclHandler = parser.ExternalEntityRefHandler = refuse
     parser.buffer_text = True
     try:
-        parser.Parse(re.sub(r"\A<\?xml[^>]*+\?>", "", text).encode("utf-8", errors="replace"), True)
+        parser.Parse(text.encode("utf-8", errors="replace"), True)  # whatever its declaration says
         return builder.close()
     except (expat.ExpatError, AssertionError):
         return None

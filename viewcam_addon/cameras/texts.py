@@ -1,6 +1,8 @@
-"""What all formats of a camera's text share: the place of an error, comments, numbers in any punctuation, the picture.
+"""Functions that all formats of a camera's text share: the place of an error, comments, numbers in any punctuation, the
+picture.
 
-Every pattern runs once over the text (possessive, or starting from a word), so that no text takes long.
+Every expression goes over the text once: where one of its parts ends, what comes next is of other characters, so that nothing
+is tried twice and no text takes long.
 """
 
 import math
@@ -24,9 +26,9 @@ MIRRORED = (
     "take it unmirrored if the scene was mirrored instead"
 )
 
-_UNSAID = re.compile(r"[\s_$-]++")
-_GAP = re.compile(r"[\s,;|()\[\]{}<>'\"]*+")
-_NUMBER = re.compile(r"[-+]?+(?:\d++(?:\.\d*+)?+|\.\d++)(?:[eE][-+]?+\d++)?+")
+_UNSAID = re.compile(r"[\s_$-]+")
+_GAP = re.compile(r"[\s,;|()\[\]{}<>'\"]*")
+_NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?")
 _ASKEW, _NOTED = 2e-3, 1e-5  # cosine between the picture's sides: refused from, told from
 
 
@@ -46,7 +48,7 @@ def fail(text: str, at: int, advice: str) -> NoReturn:
 
 def without(comments: str, text: str) -> str:
     """The text with blanks in place of what a pattern matches, so that places stay where they are; strings stay."""
-    pattern = re.compile(rf"(?:\"(?:[^\"\\\n]|\\.){{0,1000}}+\"?+)++|{comments}", flags=re.DOTALL)
+    pattern = re.compile(rf"\"[^\"\\\n]*(?:\\.[^\"\\\n]*)*\"?|{comments}", flags=re.DOTALL)
     return pattern.sub(_blanked, text)
 
 

@@ -94,7 +94,7 @@ def _is_named_chan(source: Source) -> bool:
 
 
 def _is_of_chan(row: list[float]) -> bool:
-    """Whether it is a frame, a position, three angles and the field of view in degrees, where a pose has a quaternion."""
+    """True if it is a frame, a position, three angles and the field of view in degrees, where a pose has a quaternion."""
     return len(row) == 8 and row[0].is_integer() and math.hypot(*row[4:]) > 1.1 and 1.1 < row[7] < 180
 
 

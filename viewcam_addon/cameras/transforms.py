@@ -75,7 +75,7 @@ def text(content: dict[str, Any]) -> str:
 
 
 def document(cameras: Iterable[Camera], aabb_scale: int | None = None) -> dict[str, Any]:
-    """What the file holds, frames in the order of the cameras.
+    """The content of the file, frames in the order of the cameras.
 
     aabb_scale : for instant-ngp alone: how many times the unit cube it looks for the scene in. Not said if None.
 

@@ -37,7 +37,7 @@ def write(cameras: Sequence[Camera], options: Options) -> str:
 
 
 def _continued(quaternion: axes.Quaternion, before: axes.Quaternion) -> axes.Quaternion:
-    """Of the two quaternions of a rotation the one that is nearer to the row before: else what goes from row to row spins."""
+    """The one of a rotation's two quaternions that is nearer to the row before: else what goes from row to row spins."""
     opposed = sum(a * b for a, b in zip(quaternion, before, strict=True)) < 0
     return tuple(0.0 - part for part in quaternion) if opposed else quaternion
 

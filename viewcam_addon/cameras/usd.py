@@ -87,7 +87,7 @@ def notes_in(source: Source) -> list[str]:
 
 
 def _stage(source: Source) -> dict[str, Any]:
-    """What `usd_stage.read` says of it, asked once."""
+    """The result of `usd_stage.read`, asked once."""
     if TITLE not in source.parsed:
         source.parsed[TITLE] = usd_stage.read(source.name, source.path, source.text, _SIZE, own.KEY)
     return source.parsed[TITLE]
@@ -143,7 +143,7 @@ def _identifier(name: str, taken: set[str]) -> str:
 
 
 def read_again(cameras: Sequence[Camera], options: Options) -> list[Camera]:
-    """What `read` makes of these cameras once they are written, without OpenUSD."""
+    """The cameras that `read` makes of these once they are written, without OpenUSD."""
     found = []
     for camera in cameras:
         lens, pinhole = _lens(camera.pinhole), camera.pinhole

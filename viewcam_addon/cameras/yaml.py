@@ -8,9 +8,9 @@ line and tags, and which Blender's Python has not.
 import re
 from typing import Any
 
-_LINE = re.compile(r"(\s*+)(?:- )?([\"']?)([^:\"'#\[\]{}]++)\2\s*+:(?:\s++(.*))?$")
+_NO_KEY = re.compile(r"[\"'#\[\]{}]")
 _BRACKET = re.compile(r"[\[\]{}]")
-_ITEM = re.compile(r"(\s*+)-\s++(.*)$")
+_ITEM = re.compile(r"(\s*)-\s+(.*)$")
 _FLOW = re.compile(r"""[\[\]{},]|:(?=[\s\[\]{},"']|$)|"[^"]*"|'[^']*'|[^\s\[\]{},:"'](?:[^\[\]{},:]|:(?![\s\[\]{},"']|$))*""")
 _DEEPEST = 8
 
@@ -24,10 +24,9 @@ def read(text: str) -> dict[str, Any]:
         if (item := _ITEM.match(line)) and block is not None and len(item[1]) >= block[0]:
             block[1].append(_value(item[2].strip()))
             continue
-        found = _LINE.match(line)
-        if not found:
+        if not (found := _key(line)):
             continue
-        indent, key, value = len(found[1]), found[3].strip(), _without_tag((found[4] or "").strip())
+        indent, key, value = found
         while indent <= stack[-1][0]:
             stack.pop()
         holder, block = stack[-1][1], None
@@ -41,6 +40,17 @@ def read(text: str) -> dict[str, Any]:
     return _settled_blocks(root)
 
 
+def _key(line: str) -> tuple[int, str, str] | None:
+    """The blanks before a key, the key, and the value behind it; None if the line has no key."""
+    written = line.lstrip()
+    key, colon, value = written.removeprefix("- ").partition(":")
+    if key[:1] in ("'", '"') and key.rstrip()[1:].endswith(key[0]):
+        key = key.rstrip()[1:-1]
+    if not colon or not key or _NO_KEY.search(key) or not (value[:1].isspace() or not value):
+        return None
+    return len(line) - len(written), key.strip(), _without_tag(value.strip())
+
+
 def _settled_blocks(values: dict[str, Any]) -> dict[str, Any]:
     """The blocks as what they turned out to be: objects, or lists."""
     return {
@@ -50,7 +60,7 @@ def _settled_blocks(values: dict[str, Any]) -> dict[str, Any]:
 
 
 class _Block(dict):
-    """What stands below a key: keys of its own, or the items of a list."""
+    """The block below a key: keys of its own, or the items of a list."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""What each sub-command of `viewcam` does. Each returns the exit status and what --json writes."""
+"""The sub-commands of `viewcam`. Each returns the exit status and what --json writes."""
 
 import importlib
 import importlib.util

@@ -55,7 +55,7 @@ def add_reading_options(added: argparse._ActionsContainer, size: bool = True) ->
 
 
 def options_of(options: argparse.Namespace) -> Options:
-    """What the options on reading say, which `viewcam batch` has, too."""
+    """The choices of the options on reading, which `viewcam batch` has, too."""
     plane = None
     if options.distance is not None:
         if options.size is None:

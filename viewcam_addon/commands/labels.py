@@ -24,7 +24,7 @@ def run(options: argparse.Namespace) -> Result:
     else:
         document = coco.panoptic(options.folder) if options.to == "panoptic" else coco.instances(options.folder, options.amodal)
         with written_whole(options.output) as temporary:
-            temporary.write_text(json.dumps(document) + "\n", encoding="utf-8")
+            temporary.write_text(json.dumps(document) + "\n", encoding="utf-8", newline="\n")
         counts = {name: len(document[name]) for name in ("images", "annotations", "categories")}
     say(f"{options.output}: " + ", ".join(f"{count:,} {name}" for name, count in counts.items()))
     return 0, {"output": str(options.output), **counts}

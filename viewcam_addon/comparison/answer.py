@@ -23,7 +23,7 @@ _MOST_NAMED = 3
 
 @dataclass(frozen=True)
 class NotModelled:
-    """What of a picture is not modelled.
+    """The part of a picture that is not modelled.
 
     names : of the objects, those that the ledger has as approximated or skipped and that are in the picture, or may be.
     share : of the pixels, 0 to 1: those that show them or differ by them; None where that was not measured. shown : those that
@@ -40,7 +40,7 @@ class NotModelled:
 
 @dataclass(frozen=True)
 class Answer:
-    """What two pictures came to.
+    """The answer of comparing two pictures.
 
     answer : one of ANSWERS. headline : a few words. text : the figures that stand for it, or what differs.
     not_modelled : of the picture, whatever the answer.
@@ -53,7 +53,7 @@ class Answer:
 
     @property
     def passed(self) -> bool:
-        """Whether nothing differs of what is modelled."""
+        """True if nothing differs of what is modelled."""
         return self.answer != DIFFERENT
 
     @property
@@ -92,7 +92,7 @@ def answered(same: bool, headline: str, text: str, not_modelled: NotModelled) ->
 def in_the_picture(
     names: Sequence[str], shown: Mapping[str, NDArray[np.bool_]], changed: NDArray[np.bool_] | None, is_lit: bool
 ) -> NotModelled:
-    """What of a picture is not modelled.
+    """The part of a picture that is not modelled.
 
     names : of the objects that are not. shown : name → (height, width), the pixels that show it, of those that are surfaces
     in the scene. changed : (height, width), those where the picture with everything is another than the one with stand-ins;

@@ -49,7 +49,7 @@ class ConversionError:
 
 @dataclass(frozen=True)
 class Systematic:
-    """What is the same for all pixels of the test picture, by least squares.
+    """The systematic part of the errors, the same for all pixels of the test picture, by least squares.
 
     shift_x, shift_y : pixels, to the right and upwards: the mean displacement at the picture's principal point.
     zoom_x, zoom_y : relative magnification, 0 for none. roll : radians, counter-clockwise.

@@ -1,4 +1,5 @@
-"""What differs as a picture, and both sides beside it, for a viewer of images such as Blender's: PNGs, and words for the scale.
+"""The difference as a picture, and both sides beside it, for a viewer of images such as Blender's: PNGs, and words for the
+scale.
 
 Geometry is drawn as the error of each position, light as Combined's difference, both in the scales of the report; what sees
 another surface is marked. Rejected: the bare errors as an EXR, a ten-thousandth of a pixel being black on every screen.

@@ -1,4 +1,4 @@
-"""Whether the size of the coordinates costs pixels, which another origin would give back.
+"""Pixels that the size of the coordinates costs, which another origin would give back.
 
 The tolerance is 2⁻²⁴ · d · (M + t)/z · t/z for a rounding, and M holds the largest coordinate C of the eye and of what is seen.
 With the origin at the eye that would be C′ = |P − e|: the difference is what the distance from the origin costs. What a long
@@ -40,7 +40,7 @@ class FarFromOrigin:
 
 
 def far_from_origin(pinhole: Pinhole, expected: Seen, compared: NDArray, position: PassErrors) -> FarFromOrigin | None:
-    """What there is to be said about the distance from the origin; None unless another origin would mend a visible error.
+    """The cost of the distance from the origin; None unless another origin would mend a visible error.
 
     expected : the reference's passes, (pixels, channels). compared : (n,), the pixels of `position`.
     """

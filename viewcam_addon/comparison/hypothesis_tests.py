@@ -85,7 +85,7 @@ class HypothesisTest:
 
     @property
     def is_open(self) -> bool:
-        """Whether nobody knows an answer: of pixels whose noise is not known, that share it, or that do not differ."""
+        """True if nobody knows an answer: of pixels whose noise is not known, that share it, or that do not differ."""
         return not self.errors.any()
 
     @property
@@ -99,7 +99,7 @@ class HypothesisTest:
 
     @property
     def is_everywhere(self) -> bool:
-        """Whether half of the tiles differ, so that the place of the worst tells nothing."""
+        """True if half of the tiles differ, so that the place of the worst tells nothing."""
         return bool(self.failing.mean() > 0.5)
 
     def to_json(self) -> dict:
@@ -197,7 +197,7 @@ def _errors(differences: Array, variances: Array) -> Array:
 
 
 def _beyond(values: Array, allowance: Array) -> Array:
-    """What of the values is beyond ± the allowance."""
+    """The part of the values that is beyond ± the allowance."""
     return np.sign(values) * np.maximum(np.abs(values) - allowance, 0.0)
 
 

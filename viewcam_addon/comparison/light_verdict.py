@@ -1,4 +1,4 @@
-"""What a comparison of light has found, as figures, as one sentence, and as aligned lines for the shell."""
+"""The verdict of a comparison of light, as figures, as one sentence, and as aligned lines for the shell."""
 
 import math
 from dataclasses import asdict, dataclass, field
@@ -37,7 +37,7 @@ _MOST_DIGITS = 12
 
 @dataclass(frozen=True)
 class LightRow:
-    """What was found in one quantity.
+    """The result for one quantity.
 
     reference, test : means over the picture and its channels. ratio : test over reference, nan where that is 0.
     ratio_error : its standard error. visible : the relative bias of the whole picture that is found half of the time.
@@ -77,7 +77,7 @@ class LightRow:
 
 @dataclass(frozen=True, eq=False)
 class RadianceComparison:
-    """What differs between a reference and the mean of some test pictures, in light.
+    """The comparison of a reference with the mean of some test pictures, in light.
 
     samples : of the reference, and of all test pictures together; None where the files do not tell. seeds : test pictures.
     is_noisy : whether chance had a part in it. rows : one for each quantity, Combined first. equal : further quantities, the
@@ -99,7 +99,7 @@ class RadianceComparison:
 
     @property
     def answer(self) -> Answer:
-        """Whether the light is the same, in one sentence, which says where and by how much where it is not."""
+        """True if the light is the same, in one sentence, which says where and by how much where it is not."""
         combined = self.rows[0]
         worst = [row for row in self.rows if not row.ok]
         if worst:
@@ -118,7 +118,7 @@ class RadianceComparison:
 
     @property
     def passed(self) -> bool:
-        """Whether nothing of what is modelled differs by more than chance and rounding."""
+        """True if nothing of what is modelled differs by more than chance and rounding."""
         return self.answer.passed
 
     @property
@@ -187,7 +187,7 @@ def differs_text(test: HypothesisTest) -> str:
 
 
 def worst_test(row: LightRow) -> HypothesisTest | None:
-    """Of those that fail, the one that tells where: the smallest tiles, or the whole picture where half of them differ."""
+    """The failed test that tells where: the smallest tiles, or the whole picture where half of them differ."""
     failing = [test for test in row.hypothesis_tests if not test.ok]
     if not failing:
         return None

@@ -105,12 +105,13 @@ class SurfaceAgreement:
     renderer: Renderer = CYCLES
 
     def at(self, chosen: NDArray) -> "SurfaceAgreement":
-        """That of some of the pixels, by their indices."""
+        """The agreement at some of the pixels, by their indices."""
         slopes = {name: slope[chosen] for name, slope in self.slopes.items()}
         return replace(self, across=self.across[chosen], slopes=slopes)
 
     def errors(self, expected: Seen, seen: Seen) -> dict[str, Errors]:
-        """Of each pass that both sides have; tolerances are taken at `expected`. Meaningless where either side missed."""
+        """The errors of each pass that both sides have; tolerances are taken at `expected`. Meaningless where either side
+        missed."""
         there = [(name, each.errors) for name, each in PASSES.items() if name in expected and name in seen]
         return {name: errors(self, expected, seen) for name, errors in there if errors}
 
@@ -266,5 +267,5 @@ def _within(error: Array, one_rounding: Array, floor: Array | float) -> NDArray[
 
 
 def at(seen: Seen, chosen: NDArray) -> Seen:
-    """The same passes at some of the pixels, by their indices."""
+    """The passes at some of the pixels, by their indices."""
     return {name: values[chosen] for name, values in seen.items()}

@@ -1,4 +1,4 @@
-"""Whether a difference is more than chance: tails of distributions, and how a picture is cut into tiles.
+"""Chance: tails of distributions, and how a picture is cut into tiles.
 
 A comparison makes millions of tests (each pixel, each tile, each channel), and may raise one false alarm in a hundred
 comparisons over all of them. What a single test may claim is therefore tiny, some 10⁻⁹, and there the shape of the noise
@@ -44,7 +44,7 @@ def sign_tail(errors: float) -> float:
 
 @lru_cache(maxsize=256)
 def sign_critical(level: float) -> float:
-    """What `sign_tail` brings to `level`."""
+    """The number that `sign_tail` brings to `level`."""
     return _bisected(lambda errors: sign_tail(errors) > level, 0.0, 38.0)
 
 
@@ -64,7 +64,8 @@ def student_tail(t: Array, freedom: Array) -> Array:
 
 
 def student_critical(freedom: Array, level: float) -> Array:
-    """What |t| exceeds with the probability `level`, for each number of degrees of freedom (1 or more, not whole perhaps)."""
+    """The bound that |t| exceeds with the probability `level`, for each number of degrees of freedom (1 or more, not whole
+    perhaps)."""
     inverse, critical = _student_table(level)
     return np.exp(np.interp(1.0 / np.clip(freedom, 1.0, _MOST_FREEDOM), inverse, critical))
 

@@ -59,7 +59,7 @@ class Edges:
 
 @dataclass(frozen=True, eq=False)
 class Allowance:
-    """What rounding may do to one quantity, each (height, width), the largest of its channels.
+    """The allowance for rounding in one quantity, each (height, width), the largest of its channels.
 
     moved : by the shift of the picture, for one rounding. value : by one rounding of its own figures. floor : by storage.
     shift : pixels, that of the picture for one rounding.
@@ -72,17 +72,17 @@ class Allowance:
 
     @property
     def one(self) -> Array:
-        """What one rounding of everything causes."""
+        """The change that one rounding of everything causes."""
         return self.moved + self.value
 
     @property
     def most(self) -> Array:
-        """What no pixel may go beyond."""
+        """The bound that no pixel may go beyond."""
         return tolerances.ROUNDINGS[-1] * self.one + self.floor
 
 
 class Rounding:
-    """What rounding causes in the light of a picture.
+    """The rounding of the light of a picture.
 
     test : one of the test pictures, which tells its Blender. samples : of each picture, the most.
     belongs : (height, width) the object of each pixel, 0 for none or where nobody knows.
@@ -111,8 +111,8 @@ class Rounding:
         return Allowance(self._shift * slope, error, self._floor(sides.name, value), self._shift)
 
     def _floor(self, name: str, value: Array) -> Array:
-        """What albedos from tables may add, and the storage of smooth normals: the light from straight above times the cosine's
-        change."""
+        """The amount that albedos from tables may add, and the storage of smooth normals: the light from straight above times
+        the cosine's change."""
         tables = np.zeros(value.shape) if name in _NOT_SCATTERED else self._tables * value
         if not self._storage or name not in _SHADED:
             return tables

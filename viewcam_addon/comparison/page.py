@@ -1,4 +1,4 @@
-"""What both HTML reports are given: one file that holds everything, to be looked at rather than read.
+"""The common part of both HTML reports: one file that holds everything, to be looked at rather than read.
 
 The page is report.html, which report_geometry.html and report_light.html extend with what tells their results; pictures.py
 makes the pixels and charts.py the drawings. Rejected: pictures as files beside the page (a report gets mailed).
@@ -82,7 +82,7 @@ def write(folder: str | os.PathLike[str], template: str, values: Mapping[str, An
         raise InputError(f"{path.parent} is a file: give a folder for the report")
     text = html_page.filled(f"comparison/{template}", **values)
     with written_whole(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8", newline="\n")
     return path
 
 
@@ -95,7 +95,7 @@ def common(
     pinhole: Pinhole,
     origin: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> dict[str, Any]:
-    """What report.html is given by both reports; the views, the crops and their own parts are added to it.
+    """The values that both reports give report.html; the views, the crops and their own parts are added to it.
 
     comparison : whose `answer` is told. ledger : the scene's entries, with `object`, `status` and `reason`.
     command : what repeats the comparison. pinhole : the camera that is told. origin : the point of the world that its
@@ -123,7 +123,8 @@ def common(
 
 
 def _subject(test: Image) -> str:
-    """What was rendered, by file, camera and frame as Blender stamps them in its pictures, else the picture's own name."""
+    """The subject of the picture, by file, camera and frame as Blender stamps them in its pictures, else the picture's own
+    name."""
     stamp = test.attributes
     if "File" not in stamp:
         return Path(test.source).name

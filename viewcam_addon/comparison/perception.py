@@ -1,4 +1,4 @@
-"""What an eye sees of the difference: figures that are told, and judge nothing.
+"""The difference to an eye: figures that are told, and judge nothing.
 
 relMSE is what papers on rendering compare noise by: the mean of (test − reference)² / (reference² + ε), here with an ε of a
 hundredth of the mean square, so that it does not depend on the exposure. FLIP (Andersson et al., FLIP: A Difference Evaluator

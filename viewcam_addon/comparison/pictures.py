@@ -66,7 +66,7 @@ def shaded(image: Image) -> Picture:
 
 
 def brightness(colour: NDArray) -> float:
-    """What is shown just below white: the 98th percentile of the largest of each pixel's channels."""
+    """The value that is shown just below white: the 98th percentile of the largest of each pixel's channels."""
     return max(float(np.percentile(np.nan_to_num(colour.astype(np.float64)).max(axis=-1), 98)), 1e-12)
 
 

@@ -23,11 +23,11 @@ from .sides import Sides, all_sides, quiet, samples_of
 from .tolerances import Array, in_float32
 
 VARIANCE_BATCHES = 16
-"""Of so many means, or of one for each sample, the reference's Variance is estimated at least (tracer/core/film/film.h)."""
+"""The number of means, or of one for each sample, the reference's Variance is estimated at least (tracer/core/film/film.h)."""
 
 
 def carries_light(image: Image) -> bool:
-    """Whether a reference is to be compared by its light: Combined alone comes with every picture of Cycles."""
+    """True if a reference is to be compared by its light: Combined alone comes with every picture of Cycles."""
     return "Combined" in image.passes and any(name in image.passes for name in LIGHT_PASSES if name != "Combined")
 
 
@@ -59,7 +59,7 @@ def compare(reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_sam
 
 @dataclass(frozen=True, eq=False)
 class QuantityComparison:
-    """What the verdict stands on.
+    """The arrays that the verdict stands on.
 
     combined : both sides of it. samples : of the reference, and of each test picture. rows, equal, maps : as in
     RadianceComparison, but no map of what an eye sees.
@@ -140,7 +140,7 @@ def _relative(error: float, light: float) -> float:
 
 
 def _factor(sides: Sides, passes: Callable[[Sides], bool]) -> float | None:
-    """What the test is times the reference, if that explains all of the difference."""
+    """The factor from the reference to the test, if that explains all of the difference."""
     _, reference, test = _means(sides)
     if min(reference, test) <= 0.0 or sides.broken.any():
         return None

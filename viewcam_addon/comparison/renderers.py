@@ -1,4 +1,4 @@
-"""What pictures of renderers other than the tracer hold: each as the passes that are compared, and what it rounds by design.
+"""Pictures of renderers other than the tracer: each as the passes that are compared, and what it rounds by design.
 
 Cycles writes every pass. EEVEE has a half float for each number of a picture and a depth buffer behind it, and no index; but it
 draws any material in place of the scene's, and this one writes what is asked for in halves that add up to a float
@@ -33,7 +33,7 @@ MARK = "viewcam"
 
 @dataclass(frozen=True)
 class Renderer:
-    """What a renderer does by design, beside its roundings.
+    """The deviations of a renderer by design, beside its roundings.
 
     centre : pixels that its rays are beside the pixels' centres. edges : pixels that its edges are beside the scene's. normal :
     radians that its storage turns a normal by. near : of the depth buffer that its depths come from, world units; or None.
@@ -78,12 +78,12 @@ def read(path: str | os.PathLike[str]) -> tuple[Image, Renderer]:
 
 
 def note(engine: str, near: float) -> str:
-    """What a picture of EEVEE or Workbench says of itself. near : where the camera's clipping starts, world units."""
+    """The note in a picture of EEVEE or Workbench. near : where the camera's clipping starts, world units."""
     return f"{MARK} {engine} {near!r}"
 
 
 def _channels_of(engine: str) -> dict[str, list[str]]:
-    """What image.read_channels has to read of such a picture."""
+    """The channels that image.read_channels has to read of such a picture."""
     if engine == "WORKBENCH":
         return {"Combined": [f"Combined.{letter}" for letter in "RGBA"], "Depth": ["Depth.Z"]}
     parts = {part: [f"{part}.{letter}" for letter in "RGB"] for name in PARTS for part in part_names(name)}
@@ -91,7 +91,7 @@ def _channels_of(engine: str) -> dict[str, list[str]]:
 
 
 def part_names(name: str) -> list[str]:
-    """Of the passes that add up to one."""
+    """The names of the passes that add up to one."""
     return [f"Pinhole {name} {number}" for number in range(1, len(PARTS[name]) + 2)]
 
 

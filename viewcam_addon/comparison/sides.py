@@ -1,4 +1,5 @@
-"""What light is compared in: for each quantity the reference, the mean of the test pictures, and the variance of both.
+"""The quantities that light is compared in: for each quantity the reference, the mean of the test pictures, and the variance
+of both.
 
 Several test pictures are one picture rendered with several seeds: their mean is the test, and their spread tells its noise. The
 reference brings the variance of its Combined pass along. Of the other passes only the spread is known, and that the reference
@@ -52,7 +53,7 @@ class Sides:
 
     @property
     def are_equal(self) -> bool:
-        """Whether nothing differs, to the last bit, so that there is nothing to ask."""
+        """True if nothing differs, to the last bit, so that there is nothing to ask."""
         return bool((self.reference == self.test).all() and not self.broken.any())
 
 
@@ -105,7 +106,7 @@ def quiet(values: Array, variance: Array) -> NDArray[np.bool_]:
 
 
 def _variance(reference: Image) -> Array:
-    """Of the reference's Combined: as its pass tells; 0 for one sample without that pass; else unknown."""
+    """The variance of the reference's Combined: as its pass tells; 0 for one sample without that pass; else unknown."""
     if "Variance" in reference.passes:
         variance = reference["Variance"].astype(np.float64)
         return np.where(np.isnan(variance), np.inf, np.maximum(variance, 0.0))

@@ -36,7 +36,7 @@ class PassErrors:
 
     @property
     def ok(self) -> bool:
-        """Whether something was compared and stays within tolerance everywhere."""
+        """True if something was compared and stays within tolerance everywhere."""
         return self.count > 0 and all(share <= 1.0 for share in self.shares)
 
     @property

@@ -1,4 +1,4 @@
-"""What two exact pictures may differ by: tolerances in closed form, for every pixel of every pass.
+"""Tolerances of two exact pictures, in closed form, for every pixel of every pass.
 
 Cycles computes in float32, with a relative rounding of 2⁻²⁴. Three things are rounded on the way to a hit at the distance t
 along the ray and the planar depth z: the world coordinates, of the size of the largest, that of the object's origin included

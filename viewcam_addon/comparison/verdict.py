@@ -1,4 +1,4 @@
-"""What a comparison of geometry has found, as figures, as one sentence, and as aligned lines for the shell."""
+"""The verdict of a comparison of geometry, as figures, as one sentence, and as aligned lines for the shell."""
 
 from dataclasses import dataclass, field
 
@@ -24,7 +24,7 @@ NOTHING_TO_COMPARE = (
 
 @dataclass(frozen=True, eq=False)
 class GeometryComparison:
-    """What differs between a reference and a test picture.
+    """The comparison of a reference with a test picture.
 
     pinhole : the camera of the reference. stated : the camera that was asked for, or None.
     hits : pixels that hit something in (reference, test).
@@ -70,12 +70,12 @@ class GeometryComparison:
 
     @property
     def shows_nothing(self) -> bool:
-        """Whether no pixel of either picture shows an object, so that there is nothing to compare."""
+        """True if no pixel of either picture shows an object, so that there is nothing to compare."""
         return self.hits == (0, 0)
 
     @property
     def answer(self) -> Answer:
-        """Whether the two are the same picture, in one sentence, which names the gravest fault where there is one."""
+        """True if the two are the same picture, in one sentence, which names the gravest fault where there is one."""
         if self.shows_nothing:
             return answered(False, "Nothing to compare", NOTHING_TO_COMPARE, self.not_modelled)
         systematic_ok = self.systematic is None or self.systematic.ok  # where nothing is compared no row is
@@ -87,7 +87,7 @@ class GeometryComparison:
 
     @property
     def passed(self) -> bool:
-        """Whether nothing differs of what is modelled. False, too, where there was nothing to compare."""
+        """True if nothing differs of what is modelled. False, too, where there was nothing to compare."""
         return self.answer.passed
 
     @property
@@ -178,7 +178,7 @@ def _agreement(comparison: GeometryComparison) -> str:
 
 
 def _faults(comparison: GeometryComparison) -> list[str]:
-    """What is wrong, the gravest first."""
+    """The faults, the gravest first."""
     faults = []
     position, rest = comparison.rows[0], comparison.rows[1:]
     if position.name != "Position":
@@ -211,7 +211,7 @@ def _faults(comparison: GeometryComparison) -> list[str]:
 
 
 def _cause(comparison: GeometryComparison) -> str:
-    """What the systematic part looks like: the largest of shift, zoom and roll, in pixels at the picture's border."""
+    """The likely cause of the systematic part: the largest of shift, zoom and roll, in pixels at the picture's border."""
     s = comparison.systematic
     radius = max(comparison.pinhole.width, comparison.pinhole.height) / 2
     if s.zoom_x < -1:

@@ -58,7 +58,7 @@ class Comparer(TracingServer):
         not_modelled: Sequence[str] = (),
         everything: Path | None = None,
     ) -> dict[str, Any]:
-        """Whether a picture shows what a camera sees.
+        """True if a picture shows what a camera sees.
 
         scene : a scene file; the same path is the same scene, and is not read again. image : Cycles' passes of geometry.
         camera : the camera that is said to have taken the picture, whatever the scene's is; clip : what it sees, as in Scene.

@@ -124,7 +124,7 @@ class Folder:
 
 
 def _is_sidecar(record: Any, name: str) -> bool:
-    """Whether it says all that the summary and the contact sheet tell of a shot; else it is somebody else's, or damaged."""
+    """True if it says all that the summary and the contact sheet tell of a shot; else it is somebody else's, or damaged."""
 
     def has(owner: Any, **kinds: type | tuple[type, ...]) -> bool:
         return isinstance(owner, dict) and all(isinstance(owner.get(key), kind) for key, kind in kinds.items())
@@ -140,7 +140,7 @@ def _is_sidecar(record: Any, name: str) -> bool:
 
 
 def _are_labels(told: Any, name: str) -> bool:
-    """Whether a sidecar's labels are files of its shot, which no other folder has."""
+    """True if a sidecar's labels are files of its shot, which no other folder has."""
     return (
         isinstance(told, dict)
         and isinstance(told.get("depth_steps"), int | float)
@@ -152,7 +152,7 @@ def _are_labels(told: Any, name: str) -> bool:
 
 
 def _is_file_name(text: str) -> bool:
-    """Whether it is one of a file in the folder, which text of a damaged sidecar need not be."""
+    """True if it is one of a file in the folder, which text of a damaged sidecar need not be."""
     return not set(text) & {"/", "\\", "\0"} and text.encode("utf-8", "replace").decode("utf-8") == text
 
 

@@ -54,7 +54,7 @@ def read(path: str | os.PathLike[str], cameras: Collection[str] | None = None) -
 
 
 def is_list(path: str | os.PathLike[str]) -> bool:
-    """Whether a file is a list of shots by its suffix and its first row, and not cameras of another program."""
+    """True if a file is a list of shots by its suffix and its first row, and not cameras of another program."""
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in _READERS or path.is_dir():

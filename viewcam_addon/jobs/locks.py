@@ -58,7 +58,7 @@ class Claims:
 
     @contextlib.contextmanager
     def alone(self) -> Iterator[bool]:
-        """Whether certainly no other batch is at work in the folder, and none can begin inside the block; then this one is."""
+        """True if certainly no other batch is at work in the folder, and none can begin inside the block; then this one is."""
         alone = self._lock(_ALIVE)
         try:
             yield alone is True
@@ -83,7 +83,7 @@ class Claims:
         self._unlock(_byte(shot))
 
     def _lock(self, byte: int, shared: bool = False, wait: bool = False) -> bool | None:
-        """Whether it is had; None where the file system has no locks."""
+        """True if it is had; None where the file system has no locks."""
         if _ON_WINDOWS:
             return True
         kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX

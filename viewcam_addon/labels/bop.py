@@ -66,7 +66,7 @@ def write(folder: Path, output: Path) -> dict[str, int]:
             for name, each in zip(scene, values, strict=True):
                 scene[name][str(number)] = each
         for name, values in {**scene, "objects": objects.told()}.items():
-            (temporary / f"{name}.json").write_text(_lines(values), encoding="utf-8")
+            (temporary / f"{name}.json").write_text(_lines(values), encoding="utf-8", newline="\n")
         shown = sum(_copy_rgb(path, told, temporary, number) for number, (path, told) in enumerate(pictures))
     count = sum(len(poses) for poses in scene["scene_gt"].values())
     return {"images": len(pictures), "instances": count, "objects": len(objects.told()), "rgb": shown}

@@ -64,7 +64,7 @@ def write(path: Path, labels: Labels, depth_steps: float = DEPTH_STEPS) -> list[
             temporary.write_bytes(content)
     with written_whole(told_in) as temporary:
         told = _told(path, labels, [each.name for each in others], depth_steps)
-        temporary.write_text(json.dumps(told, allow_nan=False) + "\n", encoding="utf-8")
+        temporary.write_text(json.dumps(told, allow_nan=False) + "\n", encoding="utf-8", newline="\n")
     return [*others, told_in]
 
 

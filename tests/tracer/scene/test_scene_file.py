@@ -271,6 +271,11 @@ def test_no_path_leaves_the_folder(with_arrays, tmp_path, tmp_path_factory, name
         scene_file.read(with_arrays(name, tent=np.zeros((5, 3))))
 
 
+def test_a_name_of_arrays_that_is_too_long_for_the_system_is_refused_in_one_sentence(with_arrays):
+    with pytest.raises(InputError, match=r"leaves|is no \.npz"):
+        scene_file.read(with_arrays("a" * 40_000))
+
+
 def test_arrays_that_are_absent_damaged_or_no_archive_are_refused(with_arrays, tmp_path):
     with pytest.raises(InputError, match="not there"):
         scene_file.read(with_arrays("scene.npz"))

@@ -75,7 +75,7 @@ class BackgroundBatch:
             self.folder.mkdir(parents=True)
             copy, listed = self._temporary / f"{stem}.blend", self._temporary / "shots.json"
             comparing.save_copy(copy)
-            listed.write_text(json.dumps(shots), encoding="utf-8")
+            listed.write_text(json.dumps(shots), encoding="utf-8", newline="\n")
             command = comparing.command(copy, scene, "batch", [str(listed), "--out", str(self.folder), *words])
             scripts = bpy.utils.system_resource("SCRIPTS")
             variables = child_process.environment(scripts, **{key: str(self._temporary) for key in ("TMPDIR", "TMP", "TEMP")})

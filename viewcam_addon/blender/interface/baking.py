@@ -237,7 +237,7 @@ def _check_own_action(block: bpy.types.ID) -> None:
 
 
 def _is_mixed(data: bpy.types.AnimData | None) -> bool:
-    """Whether NLA tracks have a say beside the action."""
+    """True if NLA tracks have a say beside the action."""
     if not data or not data.use_nla or not data.nla_tracks:
         return False
     replaces = data.action_blend_type == "REPLACE" and data.action_influence == 1

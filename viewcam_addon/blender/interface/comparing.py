@@ -74,7 +74,7 @@ class Outcome:
         return found if all(found.values()) else {}
 
     def is_of(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> bool:
-        """Whether the camera is still the one that was compared."""
+        """True if the camera is still the one that was compared."""
         return camera_object.name == self.camera and camera_seen(camera_object, scene) == self.seen
 
     def discard(self) -> None:

@@ -39,7 +39,7 @@ _handlers = []
 
 
 def is_shown(camera_object: bpy.types.Object, context: bpy.types.Context) -> bool:
-    """Whether a 3D viewport shows this object as an enabled camera, and does not look through it."""
+    """True if a 3D viewport shows this object as an enabled camera, and does not look through it."""
     if camera_object.type != "CAMERA" or not camera_object.virtual_pinhole.enabled:
         return False
     if not _is_viewport(context) or camera_object == looked_through(context):
@@ -56,7 +56,7 @@ def looked_through(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 def _is_viewport(context: bpy.types.Context) -> bool:
-    """Whether it is a window's: File › Render › Viewport draws one from anywhere."""
+    """True if it is a window's: File › Render › Viewport draws one from anywhere."""
     return context.space_data is not None and context.space_data.type == "VIEW_3D" and context.region_data is not None
 
 

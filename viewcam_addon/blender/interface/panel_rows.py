@@ -9,7 +9,7 @@ _BESIDE_TEXT = 60  # pixels, of what stands left and right of a sentence
 
 
 def is_narrow(context: bpy.types.Context) -> bool:
-    """Whether the panel that is drawn has no room for a name beside a field."""
+    """True if the panel that is drawn has no room for a name beside a field."""
     return _width(context) < _NARROW
 
 

@@ -107,7 +107,9 @@ class VIEWCAM_OT_add_preset(AddPresetBase, bpy.types.Operator):
     def add(self, _context: bpy.types.Context, path: str) -> None:
         """What Blender calls to write the preset."""
         with written_whole(path) as temporary:
-            temporary.write_text(f"import bpy\n\nbpy.ops.viewcam.paste_camera(text={self._text!r})\n", encoding="utf-8")
+            temporary.write_text(
+                f"import bpy\n\nbpy.ops.viewcam.paste_camera(text={self._text!r})\n", encoding="utf-8", newline="\n"
+            )
 
 
 CLASSES = (VIEWCAM_PT_presets, VIEWCAM_OT_execute_preset, VIEWCAM_OT_add_preset)

@@ -280,7 +280,7 @@ def _draw_figures(layout: bpy.types.UILayout, outcome: Outcome, context: bpy.typ
 
 
 def _is_playing(context: bpy.types.Context) -> bool:
-    """Whether some window plays: Escape is then for that."""
+    """True if some window plays: Escape is then for that."""
     return any(window.screen.is_animation_playing for window in context.window_manager.windows)
 
 

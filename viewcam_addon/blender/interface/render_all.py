@@ -80,7 +80,7 @@ class Rendering(BackgroundBatch):
         return self.folder / _SHEET
 
     def poll(self) -> tuple[bool, str] | None:
-        """Whether all went well, and a sentence; None while it runs."""
+        """True if all went well, and a sentence; None while it runs."""
         global _sheet
         ended = self.ended()
         if ended is None:

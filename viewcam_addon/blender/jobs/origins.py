@@ -9,6 +9,7 @@ A simulation that is not baked writes its cache while it is rendered: that is no
 it depends on the frames before. Rejected: hashes of what Blender has loaded, which sees no pixel of an image until it is drawn.
 """
 
+import contextlib
 import glob
 import hashlib
 import importlib.metadata
@@ -89,7 +90,9 @@ def _version() -> str:
     try:
         return tomllib.loads(_MANIFEST.read_text(encoding="utf-8"))["version"]
     except OSError:  # installed as a Python package
-        return importlib.metadata.version("virtual-pinhole")
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+            return importlib.metadata.version("virtual-pinhole")
+        return "unknown"  # a folder of modules that nothing has installed
 
 
 def _hash(path: Path) -> str:

@@ -27,7 +27,7 @@ def drop(scene: bpy.types.Scene) -> None:
 
 
 def is_simulated() -> bool:
-    """Whether anything in the file may depend on the frames before."""
+    """True if anything in the file may depend on the frames before."""
     objects, groups = bpy.data.objects, bpy.data.node_groups
     return (
         any(scene.rigidbody_world for scene in bpy.data.scenes)
@@ -38,7 +38,7 @@ def is_simulated() -> bool:
 
 
 def is_driven_by_camera() -> bool:
-    """Whether a driver in the file reads a property of whichever camera the scene has."""
+    """True if a driver in the file reads a property of whichever camera the scene has."""
     return any(
         (variable.type == "CONTEXT_PROP" or target.id_type == "SCENE") and "camera" in target.data_path
         for driver in _drivers()
@@ -48,7 +48,7 @@ def is_driven_by_camera() -> bool:
 
 
 def changes_between_renders() -> bool:
-    """Whether anything in the file may be another in the next render of the same frame, though nobody but the camera moved."""
+    """True if anything in the file may be another in the next render of the same frame, though nobody but the camera moved."""
     asks = any(node.bl_idname == "GeometryNodeInputActiveCamera" for tree in bpy.data.node_groups for node in tree.nodes)
     return asks or is_simulated() or is_driven_by_camera()
 

@@ -54,7 +54,7 @@ def write(scene: bpy.types.Scene, image: Path, preview: Path) -> None:
 
 
 def _is_passing(attribute: str) -> bool:
-    """Whether an attribute of the EXR tells of the rendering and not of the picture."""
+    """True if an attribute of the EXR tells of the rendering and not of the picture."""
     return attribute in _PASSING or (attribute.startswith("cycles.") and attribute.endswith("_time"))
 
 

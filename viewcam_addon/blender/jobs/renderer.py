@@ -202,7 +202,7 @@ class BlenderRenderer:
 
 
 def _is_scenes(shot: Shot) -> bool:
-    """Whether the scene's own camera takes the shot."""
+    """True if the scene's own camera takes the shot."""
     return shot.camera is None and shot.eye is None
 
 

@@ -86,7 +86,7 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
             self.update_stats("", f"{words} | Remaining {remaining // 60}:{remaining % 60:02}")
 
     def _exported(self, depsgraph: bpy.types.Depsgraph) -> Scene:
-        """What is seen through the camera and the render border."""
+        """The scene that is seen through the camera and the render border."""
         if depsgraph.scene.render.use_multiview:
             raise InputError("stereoscopy is on, and each eye has another camera: turn it off among the output properties")
         settings, camera_object = depsgraph.scene_eval.virtual_pinhole_reference, self.camera_override.original
@@ -106,7 +106,7 @@ class VIEWCAM_RenderEngine(bpy.types.RenderEngine):
         return scene
 
     def _read_scene(self, depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, lit: bool) -> Scene:
-        """What is seen through the camera."""
+        """The scene that is seen through the camera."""
         former, self._read = self._read, None
         if former and former[0] == lit and self.keeps_scene and only_cameras_changed(depsgraph):
             scene = export.seen_from(former[1], depsgraph, camera_object)

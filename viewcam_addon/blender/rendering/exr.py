@@ -1,4 +1,5 @@
-"""Whether an EXR that Blender wrote is whole (on a full disk Blender reports it as saved all the same), and its attributes.
+"""A check that an EXR that Blender wrote is whole (on a full disk Blender reports it as saved all the same), and its
+attributes.
 
 An EXR file holds a table with the offset of each chunk of pixels, written when all of them are; a chunk that is missing has the
 offset 0. To read it takes a few lines, and OpenEXR itself must not be loaded into Blender's process. Layout: the format's own
@@ -23,7 +24,7 @@ _ROWS = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256)
 
 
 def is_whole(path: str | os.PathLike[str]) -> bool:
-    """Whether all pixels of a scan-line EXR, of one part or several, are in the file."""
+    """True if all pixels of a scan-line EXR, of one part or several, are in the file."""
     try:
         with open(path, "rb") as file:
             (magic,) = struct.unpack("<I", file.read(4))

@@ -1,4 +1,4 @@
-"""Whether Blender can draw with a GPU here, as EEVEE and the Workbench do.
+"""A check that Blender can draw with a GPU here, as EEVEE and the Workbench do.
 
 Where there is neither display nor driver, Blender ends with a crash as soon as it is asked to (measured: 4.2, 5.0 and 5.2), so
 a Blender of its own is asked: it draws a picture of 4 × 4 pixels of nothing. Rejected: `gpu.platform`, which says nothing in
@@ -24,7 +24,7 @@ _LONGEST = 120  # seconds
 
 @functools.cache
 def are_there() -> bool:
-    """Whether a Blender like this one draws; asked once, which takes seconds."""
+    """True if a Blender like this one draws; asked once, which takes seconds."""
     try:
         return another_blender.run(_DRAW, _LONGEST).returncode == 0
     except (OSError, subprocess.TimeoutExpired):

@@ -24,7 +24,7 @@ _PATIENCE = 0.05
 
 
 class _Watcher:
-    """What the tracer tells and asks, from its threads."""
+    """The receiver of what the tracer tells and asks, from its threads."""
 
     def __init__(self) -> None:
         self.bands: queue.SimpleQueue[tuple[Passes, range] | None] = queue.SimpleQueue()
@@ -38,7 +38,7 @@ class _Watcher:
 
 
 def keeper() -> "Keeper":
-    """What `bands` needs to keep what pictures share."""
+    """The store in which `bands` keeps what pictures share."""
     from ...tracer.render import Keeper  # loads the tracer, which Blender's start need not wait for
 
     return Keeper()

@@ -47,7 +47,8 @@ class _Job:
 
 
 def baked_in(depsgraph: bpy.types.Depsgraph) -> dict[str, dict[tuple[str, str], shaders.Baked | str]]:
-    """What was baked for the materials of a depsgraph, by their full names, or a clause that says why it was not."""
+    """The images that were baked for the materials of a depsgraph, by their full names, or a clause that says why it was
+    not."""
     found: dict[str, dict[tuple[str, str], shaders.Baked | str]] = {}
     jobs = []
     for material, places in _shown(depsgraph).items():
@@ -140,7 +141,7 @@ def _has_any(material: bpy.types.Material) -> bool:
 
 
 def _runs_scripts() -> bool:
-    """Whether something in the file is driven by Python, which does not run in the other Blender."""
+    """True if something in the file is driven by Python, which does not run in the other Blender."""
     trees = [versions.node_tree(material) for material in bpy.data.materials]
     data = bpy.data
     blocks = [*data.objects, *data.meshes, *data.shape_keys, *data.armatures, *data.node_groups, *filter(None, trees)]
@@ -149,12 +150,12 @@ def _runs_scripts() -> bool:
 
 
 def _may_change(block: bpy.types.Object) -> bool:
-    """Whether an object can be given a modifier for a while."""
+    """True if an object can be given a modifier for a while."""
     return block.type == "MESH" and not block.library and block.mode == "OBJECT"
 
 
 def _is_of_the_place(of: Input, has_uvs: bool) -> bool:
-    """Whether what feeds an input is the same wherever a surface is looked at from, and something in it is baked."""
+    """True if what feeds an input is the same wherever a surface is looked at from, and something in it is baked."""
     feeding = nodes.feeding(of)
     return any(each.node.type in _BAKED for each in feeding) and all(_is_alike(each, has_uvs) for each in feeding)
 

@@ -1,4 +1,4 @@
-"""What Cycles' own baker makes of inputs of shaders, in a Blender that was started for it by baked_inputs.py."""
+"""Inputs of shaders baked by Cycles' own baker, in a Blender that was started for it by baked_inputs.py."""
 
 import contextlib
 import json
@@ -21,7 +21,7 @@ SMALLEST_CELL = 8
 _SMALLEST = 128
 _MARGIN = 2  # texels round each face, of the two that the smallest cell of a finer image has
 _SAMPLES = 64
-"""Of an input that is noisy, each with the samples that its nodes take."""
+"""The samples of an input that is noisy, each with the samples that its nodes take."""
 
 
 def main(library: str, name: str, jobs: str, faces: str, out: str, layer: str, frame: str, subframe: str) -> None:

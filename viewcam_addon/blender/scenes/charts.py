@@ -14,7 +14,8 @@ from ..temporary_settings import Overrides
 
 NAME = "Virtual Pinhole Chart"
 RADIUS = 0.375
-"""Of a polygon, in cells: between two there is a quarter of a cell, whose texels are baked as the nearest of the polygon."""
+"""The radius of a polygon, in cells: between two there is a quarter of a cell, whose texels are baked as the nearest of the
+polygon."""
 
 
 def columns(faces: int) -> int:

@@ -1,4 +1,5 @@
-"""What Cycles makes of a mesh where a shader asks for it, by formulas of vertices and edges, and its hash of whole numbers.
+"""Attributes that Cycles makes of a mesh where a shader asks for them, by formulas of vertices and edges, and its hash of
+whole numbers.
 
 As in attr_create_pointiness and attr_create_random_per_island of intern/cycles/blender/mesh.cpp, and in util/hash.h.
 """
@@ -7,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 GENERATED, POINTINESS, RANDOM_PER_ISLAND = "generated", "pointiness", "random_per_island"
-"""What Cycles calls them; an Attribute node that names one asks for it, too."""
+"""Cycles' names of them; an Attribute node that names one asks for it, too."""
 VERTEX_COLOR = "vertex_color"
-"""What it calls the colour attribute that is active for rendering."""
+"""Cycles' name of the color attribute that is active for rendering."""
 
 _EPSILON = float(np.finfo(np.float32).eps)
 _ROTATIONS = (14, 11, 25, 16, 4, 14, 24)

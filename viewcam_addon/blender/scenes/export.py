@@ -64,7 +64,7 @@ class Surface:
 
     @property
     def used_slots(self) -> list[bpy.types.Material | None]:
-        """Those of `slots` that some face, or the points, have."""
+        """The materials of `slots` that some face, or the points, have."""
         if not isinstance(self.data, bpy.types.Mesh):
             return [self.slots[0]]
         return [self.slots[index] for index in sorted(export_geometry.used_slots(self.data, len(self.slots)))]
@@ -72,7 +72,7 @@ class Surface:
 
 @dataclass(frozen=True)
 class Lighting:
-    """What of a Scene gives light, and makes a picture of it."""
+    """The part of a Scene that gives light, and makes a picture of it."""
 
     lamps: tuple[Lamp, ...]
     world: World
@@ -138,7 +138,7 @@ def level_needed(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, camera
 def light_in(
     depsgraph: bpy.types.Depsgraph, ledger: Ledger, images: dict[str, Picture] | None = None, render: bool = True
 ) -> Lighting:
-    """What gives light in a depsgraph, and how it becomes a picture.
+    """The light of a depsgraph, and how it becomes a picture.
 
     images : receives the world's and the lamps'. render : as in world_of.
     """
@@ -219,7 +219,7 @@ def _hashed(columns: NDArray[np.uint64]) -> NDArray[np.uint64]:
 
 
 def _shown_by_light(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading, surfaces: set[str]) -> dict[str, object]:
-    """What of a Scene makes its light, and what shows it. surfaces : the names of its objects."""
+    """The part of a Scene that makes its light, and what shows it. surfaces : the names of its objects."""
     images = shading.pictures()
     light = light_in(depsgraph, ledger, images)
     return vars(light) | {"lamps": linking.among(light.lamps, surfaces), "materials": shading.materials, "images": images}
@@ -231,7 +231,7 @@ def seen_from(scene: Scene, depsgraph: bpy.types.Depsgraph, camera_object: bpy.t
 
 
 def _view_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object) -> dict[str, object]:
-    """What of a Scene is its camera's."""
+    """The part of a Scene that is its camera's."""
     camera = camera_object.evaluated_get(depsgraph)
     return {
         "camera": cameras.read(camera, depsgraph.scene),
@@ -286,7 +286,7 @@ def placements(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading 
 
 
 def _draws(depsgraph: bpy.types.Depsgraph) -> tuple[NDArray[np.bool_], NDArray[np.uint32]]:
-    """Whether what the depsgraph shows is an instance, and what Cycles draws for it then."""
+    """True if what the depsgraph shows is an instance, and what Cycles draws for it then."""
     instances = depsgraph.object_instances
     return export_geometry.read(instances, "is_instance", bool), export_geometry.read(instances, "random_id", np.int32).view(
         "u4"
@@ -302,7 +302,7 @@ def random_number(name: str) -> int:
 
 
 def _drawn(placed: list[Placement], ledger: Ledger) -> Iterator[Placement]:
-    """Those that no scale of 0 flattens, of which Cycles draws only meshes that no other object uses."""
+    """The placements that no scale of 0 flattens, of which Cycles draws only meshes that no other object uses."""
     users: Counter[tuple[int, int]] = Counter()
     for source, matrices, _ in placed:
         users[source.key] += len(matrices)
@@ -330,7 +330,7 @@ def _source(
     shading: Shading | None,
     links: linking.Links | None,
 ) -> Surface | None:
-    """What one object shows, or None if nothing of it is seen."""
+    """The source of what one object shows, or None if nothing of it is seen."""
     if not features.is_surface(placed, ledger, shading):
         return None
     shown, real, _ = placed

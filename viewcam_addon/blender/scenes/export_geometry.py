@@ -103,7 +103,7 @@ def _corner_normals(mesh: bpy.types.Mesh, vertices: Array, triangles: Array, cor
 
 
 def _only_faces_are_sharp(mesh: bpy.types.Mesh) -> bool:
-    """Whether flat faces stand beside smooth ones, without sharp edges and without custom normals."""
+    """True if flat faces stand beside smooth ones, without sharp edges and without custom normals."""
     if mesh.normals_domain != "CORNER" or mesh.has_custom_normals:
         return False
     edges = _attribute(mesh, "sharp_edge", "value", np.bool_, domain="EDGE")

@@ -1,4 +1,5 @@
-"""What of a scene the tracer does not model, found and named: each with the remedy that takes it out of Cycles' render too.
+"""Parts of a scene that the tracer does not model, found and named: each with the remedy that takes it out of Cycles' render
+too.
 
 Hair and volumes need no remedy: the view layer is told to leave them out (cycles.py).
 """
@@ -31,7 +32,7 @@ def note_render(
     ledger: Ledger,
     light: bool = False,
 ) -> None:
-    """What the camera and the render settings do beyond a pinhole. To be asked before the settings are overridden."""
+    """Note what the camera and the render settings do beyond a pinhole. To be asked before the settings are overridden."""
     for sentence in datablocks.beyond_pinhole(camera_object, scene):
         ledger.note(camera_object.name, "approximated", f"{sentence} (off on both sides)")
     ledger.set_for_cycles(camera_object.data.dof, "use_dof", False)
@@ -65,7 +66,7 @@ class Placed(NamedTuple):
 
 
 def placed_by(instance: bpy.types.DepsgraphObjectInstance) -> Placed:
-    """What a depsgraph's instance is."""
+    """The object that a depsgraph's instance places, and how."""
     shown = instance.object
     real, parent = (instance.instance_object, instance.parent) if instance.is_instance else (shown, shown)
     return Placed(shown, real, parent)
@@ -81,7 +82,7 @@ def hidden_from(placed: Placed, layer: bpy.types.ViewLayer) -> frozenset[str]:
 
 
 def is_surface(placed: Placed, ledger: Ledger, shading: Shading | None) -> bool:
-    """Whether this is a mesh or a point cloud; what is drawn but is neither is noted."""
+    """True if this is a mesh or a point cloud; what is drawn but is neither is noted."""
     shown, real, _ = placed
     name = placed.name
     if shown.type in _NO_SURFACE:
@@ -105,7 +106,7 @@ def note_object(
     ledger: Ledger,
     shading: Shading | None,
 ) -> None:
-    """What a visible surface is beyond its geometry. slots : its materials."""
+    """Note what a visible surface is beyond its geometry. slots : its materials."""
     shown, real, parent = placed
     name = placed.name
     if parent.holdout_get(view_layer=depsgraph.view_layer_eval):
@@ -158,7 +159,7 @@ def note_object(
 
 
 def _note_light(placed: Placed, slots: list[bpy.types.Material | None], ledger: Ledger, shading: Shading) -> None:
-    """What matters as soon as there is light."""
+    """Note what matters as soon as there is light."""
     shown, real, parent = placed
     if isinstance(shown.data, bpy.types.PointCloud):
         for asked in sorted(shading.attributes(tuple(slots))):

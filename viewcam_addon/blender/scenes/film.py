@@ -1,4 +1,4 @@
-"""What of the render settings makes a picture of light: film and bounces."""
+"""Render settings that make a picture of light: film and bounces."""
 
 import bpy
 
@@ -16,7 +16,7 @@ BOUNCES = {
 CAUSTICS = ("caustics_reflective", "caustics_refractive")
 
 CYCLES_SETTINGS = ("pixel_filter_type", "filter_width", "film_exposure", *BOUNCES.values(), *CAUSTICS)
-"""Those of `scene.cycles` that are read here."""
+"""The settings of `scene.cycles` that are read here."""
 
 
 def film_of(scene: bpy.types.Scene) -> Film:

@@ -12,11 +12,11 @@ from . import nodes
 _LINEAR = ("Non-Color", "Linear Rec.709", "Raw", "Linear")
 
 MISSING = (1.0, 0.0, 1.0, 1.0)
-"""What Cycles shows in place of an image that is not there, linear (kernel/types.h, IMAGE_TEXTURE_MISSING)."""
+"""The color that Cycles shows in place of an image that is not there, linear (kernel/types.h, IMAGE_TEXTURE_MISSING)."""
 
 
 def shows_nothing(node: bpy.types.Node) -> bool:
-    """Whether a texture node is MISSING: has no image, or one whose file is not there, unless it is clipped, where it fades."""
+    """True if a texture node is MISSING: has no image, or one whose file is not there, unless it is clipped, where it fades."""
     if node.type not in ("TEX_IMAGE", "TEX_ENVIRONMENT"):
         return False
     image = node.image and node.image.original
@@ -27,7 +27,7 @@ def shows_nothing(node: bpy.types.Node) -> bool:
 
 
 def missing(tree: bpy.types.NodeTree | None) -> list[str]:
-    """What of a tree shows no image, one clause each; whether it leads to the output is not asked."""
+    """The nodes of a tree that show no image, one clause each; whether it leads to the output is not asked."""
     found = {}
     for node in nodes.all_of(tree) if tree else ():
         if shows_nothing(node):
@@ -58,7 +58,7 @@ def alpha_obstacle(image: bpy.types.Image) -> str | None:
 
 
 def is_multiplied(image: bpy.types.Image) -> bool:
-    """Whether Cycles multiplies an image's colours by its alpha, in bytes."""
+    """True if Cycles multiplies an image's colours by its alpha, in bytes."""
     plain = image.is_float or image.colorspace_settings.is_data
     return image.channels == 4 and image.alpha_mode == "STRAIGHT" and not plain
 

@@ -19,7 +19,7 @@ Array = NDArray[np.generic]
 
 UV_MAP, COLOURS = "UVMap", "Color"
 RENAMED = {name: name.replace("_", " ").title() for name in (cycles_attributes.POINTINESS, cycles_attributes.RANDOM_PER_ISLAND)}
-"""What is called otherwise, or Cycles would make it anew, of edges that triangles have and faces had not."""
+"""The attributes that are called otherwise, or Cycles would make it anew, of edges that triangles have and faces had not."""
 # Numbers a corner → the type of an attribute, and the field that has its values.
 _ATTRIBUTES = {1: ("FLOAT", "value"), 2: ("FLOAT2", "vector"), 3: ("FLOAT_VECTOR", "vector"), 4: ("FLOAT_COLOR", "color")}
 # Of a unit vector's float32 components, three roundings by which Blender's arithmetic may be off.

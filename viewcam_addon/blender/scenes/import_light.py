@@ -20,7 +20,7 @@ _COLUMN = 260.0  # between nodes, in the node editor's units
 
 
 def has_light(scene: Scene) -> bool:
-    """Whether a scene says anything beyond geometry."""
+    """True if a scene says anything beyond geometry."""
     return bool(scene.materials or scene.lamps) or (scene.world, scene.film, scene.bounces) != (World(), Film(), Bounces())
 
 

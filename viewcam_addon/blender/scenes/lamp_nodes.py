@@ -1,4 +1,4 @@
-"""What the nodes of a light make of its light, at each place of it and in each direction.
+"""The light that the nodes of a light make, at each place of it and in each direction.
 
 A lamp of the tracer has no space of its own: what Blender's nodes say in a light's is computed from places and directions of
 the world, as Cycles has them (shader_setup_from_sample, and the files of intern/cycles/kernel/light).
@@ -36,7 +36,7 @@ class LampReader(shaders.Tree):
         self._light, self._matrix, self._uv = light, matrix, uv
 
     def emission(self, of: Input) -> RGB | Node:
-        """What the shaders give off: the same everywhere, or a node that makes it; if `reading` has no reasons then."""
+        """The emission of the shaders: the same everywhere, or a node that makes it; if `reading` has no reasons then."""
         total: RGB | Node = _BLACK
         for closure in closures(self.surface(of)):
             if closure.node.type != "emission":
@@ -109,7 +109,7 @@ def emission(
 
 
 def _constant(value: Colour | Node) -> tuple[RGB, float] | None:
-    """What a value is everywhere, and that as a number; None where it varies."""
+    """The color that a value is everywhere, and its number; None where it varies."""
     if isinstance(value, Node):
         from ...tracer import native  # here: ctypes keeps its structures, and enabling the add-on needs none
 
@@ -128,7 +128,7 @@ def _number(value: Colour | Node) -> float | Node:
 
 
 def _share(factor: float | Node, rest: bool) -> float | Node:
-    """Of a mixture, from 0 to 1; or what it leaves to the other side."""
+    """The share of a mixture, from 0 to 1; or what it leaves to the other side."""
     if not isinstance(factor, Node):
         share = min(max(factor, 0.0), 1.0)
         return 1.0 - share if rest else share

@@ -41,7 +41,7 @@ class _Kind:
     size = "shadow_soft_size"
 
     def values(self, light: bpy.types.Light, matrix: np.ndarray, strength: RGB) -> dict[str, Any]:
-        """Of the lamp: where it is, how strong it is, and its numbers."""
+        """The values of the lamp: where it is, how strong it is, and its numbers."""
         place = {"power": strength, "matrix": matrix}
         return place | {ours: getattr(light, theirs) for ours, theirs in self.settings.items()}
 
@@ -54,7 +54,7 @@ class _Kind:
         return self.lamp(name, **self.values(light, matrix, strength), **common)
 
     def area(self, light: bpy.types.Light, matrix: np.ndarray) -> float:
-        """What a strength by area is times."""
+        """The area that a strength by area is multiplied by."""
         radius = light.shadow_soft_size
         return 4 * math.pi * radius**2 if radius > 0 else 4.0
 
@@ -69,7 +69,7 @@ class _Kind:
         return tuple(self.settings.values())
 
     def uv(self, light: bpy.types.Light, inverse: np.ndarray) -> Node | None:
-        """What nodes find as its UV; None where that is not modelled. inverse : (4, 4), the world's space to the light's."""
+        """The node that makes its UV; None where that is not modelled. inverse : (4, 4), the world's space to the light's."""
         raise NotImplementedError
 
 
@@ -272,7 +272,7 @@ def _make_plain(overrides: Overrides, light: bpy.types.Light) -> None:
 
 
 def _note(name: str, light: bpy.types.Light, bounces: Bounces, ledger: Ledger) -> None:
-    """What else Cycles does to a light, which both sides leave out."""
+    """Note what else Cycles does to a light, which both sides leave out."""
     settings = light.original.cycles
     if (
         not light.use_shadow and settings.use_multiple_importance_sampling and getattr(light, KINDS[light.type].size) > 0

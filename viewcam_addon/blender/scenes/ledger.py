@@ -1,4 +1,4 @@
-"""What became of each thing that the exporter met, and what Cycles must leave out so that both sides show the same.
+"""The ledger: what became of each thing that the exporter met, and what Cycles must leave out so that both sides show the same.
 
 One entry an object, however often it is placed; its worst finding decides the status. A remedy is a change that, made for
 Cycles' render, takes out of it what the tracer does not model, so that the rest can be compared. Some only make Cycles exact

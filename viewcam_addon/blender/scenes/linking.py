@@ -74,7 +74,7 @@ class Links:
 
 
 def is_linked(block: bpy.types.Object) -> bool:
-    """Whether what gives light has receivers or blockers."""
+    """True if what gives light has receivers or blockers."""
     return any(getattr(block.light_linking, each) for each in _COLLECTIONS)
 
 

@@ -183,7 +183,7 @@ def _want_as_before(node: bpy.types.Node, name: str, value: object, before: floa
 def _colour(
     adder: nodes.Adder, socket: bpy.types.NodeSocket, colour: Colour | Node | tuple[float, ...], reading: shaders.Reading
 ) -> None:
-    """What an input is given: a value, or the product that a colour is."""
+    """The color of an input: a value, or the product that a colour is."""
     if isinstance(colour, Node):
         adder.link(_value(adder, colour, reading), socket)
         return
@@ -251,12 +251,12 @@ def plain(overrides: Overrides) -> bpy.types.Material:
 
 
 def _sees_through(node: bpy.types.Node) -> bool:
-    """Whether the node has an opacity that is not plainly 1."""
+    """True if the node has an opacity that is not plainly 1."""
     alpha = node.inputs.get("Alpha") if node.type == "BSDF_PRINCIPLED" else None
     return alpha is not None and (alpha.is_linked or alpha.default_value != 1.0)
 
 
 def _is_turned(node: bpy.types.Node) -> bool:
-    """Whether a shader takes its normal from another node."""
+    """True if a shader takes its normal from another node."""
     is_shader = any(output.type == "SHADER" for output in node.outputs)
     return is_shader and any("Normal" in socket.name and socket.is_linked for socket in node.inputs)

@@ -53,7 +53,7 @@ def source(of: Input) -> Output | Input:
 
 
 def _counts(link: bpy.types.NodeLink) -> bool:
-    """Whether Cycles has a link, too."""
+    """True if Cycles has a link, too."""
     return link.is_valid and not link.is_muted and link.from_node.type not in _UNKNOWN_TO_CYCLES
 
 
@@ -107,7 +107,7 @@ def all_of(tree: bpy.types.NodeTree, seen: set[bpy.types.NodeTree] | None = None
 
 
 def circular_links(tree: bpy.types.NodeTree) -> list[bpy.types.NodeLink]:
-    """Those that Blender marks as invalid since they go in a circle, of sockets that are in use."""
+    """The links that Blender marks as invalid since they go in a circle, of sockets that are in use."""
     trees = {node.id_data for node in all_of(tree)}
     links = [link for each in trees for link in each.links if not link.is_valid and not link.is_muted]
     return [

@@ -167,7 +167,7 @@ def as_in_file(objects: Iterable[Object], names: Mapping[str, str]) -> tuple[Obj
 def _seen(
     depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, ledger: Ledger, overrides: Overrides, lit: bool
 ) -> tuple[_View, list[_Placed], dict[bpy.types.ID, _Copy]]:
-    """What of the file is rendered; geometries are copied, and the copies gone when the overrides end."""
+    """The objects of the file that are rendered; geometries are copied, and the copies gone when the overrides end."""
     if lit:
         light_in(depsgraph, ledger, render=False)  # for what the ledger tells of the file's own lamps
     view = _view(depsgraph, camera_object)
@@ -325,7 +325,7 @@ def _camera(overrides: Overrides, temporary: bpy.types.Scene, view: _View) -> bp
 
 
 def _relative(pinhole: Pinhole, origin: tuple[float, ...]) -> Pinhole:
-    """The same pinhole where `origin` is (0, 0, 0)."""
+    """The pinhole where `origin` is (0, 0, 0)."""
     eye, look_at = (tuple(a - b for a, b in zip(point, origin, strict=True)) for point in (pinhole.eye, pinhole.look_at))
     return replace(pinhole, eye=eye, look_at=look_at)
 

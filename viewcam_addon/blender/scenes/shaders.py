@@ -117,7 +117,7 @@ _WORDS = {"multiscatter_ggx": "MULTI_GGX"}
 
 
 def word_of(ours: str) -> str:
-    """What Blender calls one of the words of our shader nodes."""
+    """Blender's name of one of the words of our shader nodes."""
     return _WORDS.get(ours, ours.upper())
 
 
@@ -131,7 +131,8 @@ class Unknown(NamedTuple):
 
 
 class Baked(NamedTuple):
-    """What stands in for such an input. difference, most : from an image of half its width (charts.difference), and of all."""
+    """The image that stands in for such an input. difference, most : from an image of half its width (charts.difference), and
+    of all."""
 
     picture: Picture
     difference: float
@@ -148,7 +149,7 @@ _MOST_DEEP = 100
 
 @dataclass
 class Reading:
-    """What a Blender material is to the tracer.
+    """A Blender material as the tracer has it.
 
     images : key in `Colour.image` → the image. texts : of IES files, where nodes are made that show them. renamed : what
     attributes of these names are called there. reasons : why it is approximated, one clause each, about the material.
@@ -168,26 +169,26 @@ class Reading:
 
     @functools.cached_property
     def asks_for_random(self) -> bool:
-        """Whether it is another on each instance."""
+        """True if it is another on each instance."""
         return any(node.type == "object_info" and node["output"] == "random" for node in self.material.nodes)
 
     @property
     def is_bumped(self) -> bool:
-        """Whether it, or a shader of it, has a normal of its own."""
+        """True if it, or a shader of it, has a normal of its own."""
         return self.material.displacement is not None or any(
             KINDS[each.node.type].inputs[name] is NORMAL for each in self.material.closures for name, _ in each.node.inputs
         )
 
     @property
     def mixes_refractions(self) -> bool:
-        """Whether another closure lets light through beside one that refracts it roughly."""
+        """True if another closure lets light through beside one that refracts it roughly."""
         shaders = [each.node for each in self.material.closures]
         refractions = sum(shader.is_rough_refraction for shader in shaders)
         return refractions > 1 or (refractions == 1 and any(shader.type == "translucent" for shader in shaders))
 
 
 def read(material: bpy.types.Material, baked: BakedInputs = MappingProxyType({})) -> Reading:
-    """What Cycles would show of an evaluated material, but for what moves the surface and its volume.
+    """The reading of what Cycles would show of an evaluated material, but for what moves the surface and its volume.
 
     baked : what stands in for inputs that are not modelled.
     """
@@ -209,7 +210,7 @@ def read(material: bpy.types.Material, baked: BakedInputs = MappingProxyType({})
 
 
 def _displaced(reading: Reading, material: bpy.types.Material, output: bpy.types.Node, shines: bool) -> Reading:
-    """The same with what its displacement does to the normals, where that is all that it does."""
+    """A reading with what its displacement does to the normals, where that is all that it does."""
     if is_only_bumped(material):
         reader = Tree(PLAIN.diffuse, shines)
         reader.reading = reading
@@ -218,7 +219,7 @@ def _displaced(reading: Reading, material: bpy.types.Material, output: bpy.types
 
 
 def is_only_bumped(material: bpy.types.Material) -> bool:
-    """Whether a displacement moves nothing, but turns the normals."""
+    """True if a displacement moves nothing, but turns the normals."""
     return material.displacement_method == "BUMP"
 
 
@@ -281,7 +282,7 @@ class Tree:
         return Node(ours, tuple((given | self._words(source, ours)).items()))
 
     def _shown(self, of: Input) -> Colour | Node:
-        """What a surface shines with whose shader is a colour or a number."""
+        """The emission of a surface whose shader is a colour or a number."""
         made = self._value_input(of, None)
         return made if isinstance(made, Colour | Node) else Colour(made) if made and possible(made) else self.viewport
 
@@ -303,7 +304,7 @@ class Tree:
         return self.viewport
 
     def _product(self, output: Output) -> Colour:
-        """What a Vector Math node makes of two colours."""
+        """The product that a Vector Math node makes of two colors."""
         first, second = self._colour(output, 0), self._colour(output, 1)
         if (first.image and second.image) or (first.vertex and second.vertex):
             self._reason(output, "multiplies two colours that vary alike")
@@ -332,7 +333,7 @@ class Tree:
         return Colour(_WHITE, node.image.original.name_full, node.interpolation == "Closest")
 
     def _shows(self, output: Output) -> bool:
-        """Whether an Image Texture's image is one that we can have, which is noted then."""
+        """True if an Image Texture's image is one that we can have, which is noted then."""
         node = output.node
         image = node.image and node.image.original
         why = images.obstacle(image)
@@ -345,13 +346,13 @@ class Tree:
         return True
 
     def _is_uv(self, vector: Output) -> bool:
-        """Whether an output is the UV map of a mesh that is active for rendering."""
+        """True if an output is the UV map of a mesh that is active for rendering."""
         if vector.node.type == "UVMAP" and not vector.node.from_instancer:
             return not vector.node.uv_map
         return vector.node.type == "TEX_COORD" and vector.socket.name == "UV" and not vector.node.from_instancer
 
     def _want(self, output: Output, name: str, wanted: float) -> bool:
-        """Whether an input has this value, or is none in this version; a reason is noted where it has another."""
+        """True if an input has this value, or is none in this version; a reason is noted where it has another."""
         if output.input(name) is None:
             return True
         value = constant_number(output, name)
@@ -365,7 +366,7 @@ class Tree:
             self.reading.reasons.append(reason)
 
     def height(self, of: Input) -> Node | None:
-        """What a displacement is along the normal, or None where it is the same everywhere or not modelled."""
+        """The height of a displacement along the normal, or None where it is the same everywhere or not modelled."""
         source = nodes.source(of)
         if not isinstance(source, Output):
             return None
@@ -377,7 +378,7 @@ class Tree:
         return None if offset is None else _along_normal(offset)
 
     def _displacement(self, output: Output) -> Node | None:
-        """What a Displacement node raises along the normal."""
+        """The height that a Displacement node raises along the normal."""
         height, midlevel, scale = (self._value_input(output.input(name), 0.0) for name in ("Height", "Midlevel", "Scale"))
         if height is None or midlevel is None or scale is None:
             return None
@@ -396,7 +397,7 @@ class Tree:
         return _node("math", operation="multiply", a=height, b=_along_normal(way))
 
     def _displacement_vector(self, output: Output) -> Node | None:
-        """What a Vector Displacement node moves."""
+        """The height by which a Vector Displacement node moves."""
         if output.node.space == "TANGENT":
             self._reason(output, "displaces along tangents")
             return None
@@ -431,7 +432,7 @@ class Tree:
         return found
 
     def _input(self, output: Output, name: str | int, otherwise: float | None) -> Colour | Node:
-        """What an input is given. otherwise : what a number is where that is not modelled, or None of a colour."""
+        """The value of an input. otherwise : the number where that is not modelled, or None of a colour."""
         value = None if otherwise is None else constant_number(output, name)
         if value is None:
             source = nodes.source(output.input(name))
@@ -577,7 +578,7 @@ class Tree:
         return made
 
     def _value_input(self, of: Input, known: object) -> Colour | Node | tuple[float, ...] | None:
-        """What an input of a node that makes values is given. known : its default, a number where it is one."""
+        """The value of an input of a node that makes values. known : its default, a number where it is one."""
         constant = constant_number_of(of) if isinstance(known, float) else _constant(of)
         if constant is not None:
             three = _rgb(constant)
@@ -601,13 +602,13 @@ class Tree:
         return None
 
     def _of_itself(self, output: Output, known: object) -> Node | None:
-        """What a node that makes values looks itself up by where nothing is given, but for what we do alike."""
+        """The node that a node that makes values looks itself up by where nothing is given, but for what we do alike."""
         if known is INCOMING:
             return _node("vector_transform", vector=_node("geometry", output="incoming"), kind="normal")
         return None
 
     def _falloff(self, output: Output) -> Colour | Node | None:
-        """What a Light Falloff node makes of light that falls off with the square of its way."""
+        """The strength that a Light Falloff node makes of light that falls off with the square of its way."""
         strength, smooth = (self._value_input(output.input(name), 0.0) for name in ("Strength", "Smooth"))
         if strength is None or smooth is None:
             return None
@@ -630,7 +631,7 @@ class Tree:
         return ends | {"table": Colour(_WHITE, key), "extrapolate": mapping.extend == "EXTRAPOLATED"}
 
     def _along(self, output: Output) -> Node | None:
-        """What a Normal node says: its direction, and how far another one goes along it."""
+        """The value of a Normal node: its direction, and how far another one goes along it."""
         direction = _node("vector_math", operation="normalize", a=tuple(output.node.outputs["Normal"].default_value))
         if output.socket.name == "Normal":
             return direction
@@ -665,7 +666,7 @@ class Tree:
 
 
 def _counts(output: Output, ours: str, theirs: str | int) -> bool:
-    """Whether what an input of a shader is given has a say."""
+    """True if what an input of a shader is given has a say."""
     needed = _ONLY_WITH.get(ours, {}).get(theirs, ())
     return not needed or not all(_is_zero(output, name) for name in needed)
 
@@ -677,7 +678,7 @@ def _is_zero(output: Output, name: str) -> bool:
 
 
 def _is_vertex_colour(output: Output) -> bool:
-    """Whether an output is the mesh's colour that is active for rendering, as `Colour.vertex` is; others are attributes."""
+    """True if an output is the mesh's colour that is active for rendering, as `Colour.vertex` is; others are attributes."""
     return output.node.type == "VERTEX_COLOR" and output.socket.name == "Color" and not output.node.layer_name
 
 
@@ -705,7 +706,7 @@ def dot(vector: Node, by: object) -> Node:
 
 
 def _from_camera(output: str) -> Node:
-    """What a Camera Data node says."""
+    """The node of what a Camera Data node says."""
     place = _node("texture_coordinate", output="camera")
     if output == "View Z Depth":
         return _node("separate", color=place, output="z")
@@ -713,7 +714,7 @@ def _from_camera(output: str) -> Node:
 
 
 def maps_plainly(node: bpy.types.Node) -> bool:
-    """Whether a texture node has no mapping of its own."""
+    """True if a texture node has no mapping of its own."""
     mapping, colours = node.texture_mapping, node.color_mapping
     return (
         tuple(mapping.translation) == tuple(mapping.rotation) == (0.0, 0.0, 0.0)
@@ -736,7 +737,7 @@ def constant_number(output: Output, name: str | int) -> float | None:
 
 
 def constant_number_of(of: Input) -> float | None:
-    """The same of an input."""
+    """The constant of an input as a number, or None where it varies."""
     value = _constant(of)
     if value is None or isinstance(value, int | float):
         return value
@@ -744,13 +745,13 @@ def constant_number_of(of: Input) -> float | None:
 
 
 def constant_colour(output: Output, name: str | int) -> RGB | None:
-    """The same for a colour."""
+    """The constant color that a node's input is given, or None where it varies."""
     of = output.input(name)
     return of and constant_colour_of(of)
 
 
 def constant_colour_of(of: Input) -> RGB | None:
-    """The same of an input."""
+    """The constant of an input as a color, or None where it varies."""
     value = _constant(of)
     return None if value is None else _rgb(value)
 

@@ -11,7 +11,7 @@ from .. import versions
 from . import images, shaders
 
 _DEFAULT = "Cycles' default surface"
-"""What is without material since 5.0 (intern/cycles/scene/shader.cpp, add_default)."""
+"""The name of what has no material since 5.0 (intern/cycles/scene/shader.cpp, add_default)."""
 
 
 def add_pictures(reading: shaders.Reading, alphas: set[str], to: dict[str, Picture]) -> None:
@@ -30,7 +30,7 @@ class Shading:
         self._readings: dict[str, shaders.Reading] = {}
 
     def reading(self, material: bpy.types.Material) -> shaders.Reading:
-        """What an evaluated material is to the tracer."""
+        """The reading of an evaluated material."""
         name = material.original.name_full
         if name not in self._readings:
             self._readings[name] = shaders.read(material, self._baked.get(name, {}))
@@ -59,19 +59,19 @@ class Shading:
         return tuple(material.original.name_full if material else default for material in slots)
 
     def attributes(self, slots: tuple[bpy.types.Material | None, ...]) -> set[str]:
-        """What a mesh of these materials is asked for by name, as `Mesh.attributes` has it."""
+        """The attributes that a mesh of these materials is asked for by name, as `Mesh.attributes` has it."""
         materials = [self.reading(material).material for material in filter(None, slots)]
         return {name for material in materials for name in material.attributes}
 
     def asks_for_random(self, slots: tuple[bpy.types.Material | None, ...]) -> bool:
-        """Whether one of these materials differs from instance to instance."""
+        """True if one of these materials differs from instance to instance."""
         return any(self.reading(material).asks_for_random for material in filter(None, slots))
 
     def shines(self, slots: Iterable[bpy.types.Material | None]) -> bool:
-        """Whether one of these materials gives light."""
+        """True if one of these materials gives light."""
         return any(self.reading(material).material.shines for material in filter(None, slots))
 
     def asks_for_colours(self, slots: tuple[bpy.types.Material | None, ...]) -> bool:
-        """Whether a mesh of these materials is coloured by its colour attribute that is active for rendering."""
+        """True if a mesh of these materials is coloured by its colour attribute that is active for rendering."""
         materials = [self.reading(material).material for material in filter(None, slots)]
         return any(colour.vertex for material in materials for _, colour in material.inputs)

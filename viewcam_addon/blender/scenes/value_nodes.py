@@ -291,7 +291,7 @@ VALUES: tuple[tuple[str, Value], ...] = (
     ),
     _value("rgb_to_bw", "RGBTOBW", "RGBToBW", {"Val": None}),
 )
-"""What we call each, and what it is; of what is one thing to us the first is made."""
+"""Our name of each value, and the value; of what is one thing to us the first is made."""
 
 # Blender's words, where they are others than ours in capitals.
 _WORDS = {
@@ -301,12 +301,12 @@ _WORDS = {
 
 
 def word_of(ours: str, word: str) -> str:
-    """What Blender calls one of the words of a node."""
+    """Blender's name of one of the words of a node."""
     return _WORDS.get((ours, word), word.upper())
 
 
 def value_of(output: Output) -> tuple[str, Value] | None:
-    """What makes the value of an output, or None where that is not modelled."""
+    """Our name and value of an output's node, or None where that is not modelled."""
     for ours, value in VALUES:
         is_it = value.kind == output.node.type and output.socket.identifier in value.outputs
         if is_it and all(getattr(output.node, name) == wanted for name, wanted in value.fixed.items()):
@@ -355,7 +355,7 @@ def curve_table(mapping: bpy.types.CurveMapping) -> tuple[np.ndarray, float, flo
 
 
 def ies_text(node: bpy.types.Node) -> str:
-    """What an IES Texture shows; empty where it is missing."""
+    """The text of an IES Texture; empty where it is missing."""
     if node.mode == "INTERNAL":
         return node.ies.as_string() if node.ies else ""
     try:

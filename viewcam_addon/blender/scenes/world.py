@@ -199,7 +199,7 @@ def _read(world: bpy.types.World, camera: bool) -> tuple[RGB, _Wrapped | None, l
 
 
 def _factored(source: Output) -> tuple[Output | Input, RGB]:
-    """What a Vector Math node multiplies by a constant, and that."""
+    """The factor that a Vector Math node multiplies by a constant, and that constant."""
     if source.node.type == "VECT_MATH" and source.node.operation == "MULTIPLY":
         factor = shaders.constant_colour(source, 1)
         if factor is not None:
@@ -244,7 +244,7 @@ def _rotation(vector: Output | Input) -> tuple[float, float, float] | None:
 
 
 def _mean(source: Output, world: bpy.types.World) -> tuple[RGB, str]:
-    """What stands in for a colour that varies, and what varies."""
+    """The mean that stands in for a color that varies, and what varies."""
     reason = f"has a node {source.node.name!r} that varies"
     if source.node.type == "TEX_ENVIRONMENT" and images.obstacle(source.node.image) is None:
         return images.mean(source.node.image), reason

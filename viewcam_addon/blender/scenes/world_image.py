@@ -23,7 +23,7 @@ from .ledger import Ledger
 from .nodes import Input, Output
 
 WIDTH = 2048
-"""Of an image that nothing in the world asks to be wider. A sky of 4096 gives surfaces the same light to 2e-5."""
+"""The width of an image that nothing in the world asks to be wider. A sky of 4096 gives surfaces the same light to 2e-5."""
 MOST_WIDTH = 4096
 _TIMEOUT = 600.0
 _ALL_RAYS = frozenset(RAYS[:-1])
@@ -53,13 +53,13 @@ def obstacle(world: bpy.types.World) -> str | None:
 
 
 def width(world: bpy.types.World) -> int:
-    """Of the image that stands in, pixels."""
+    """The width of the image that stands in, pixels."""
     wrapped = [each.node.image for each in _feeding(world) if each.node.type == "TEX_ENVIRONMENT" and each.node.image]
     return min(max([WIDTH, *(image.size[0] for image in wrapped)]), MOST_WIDTH)
 
 
 def tells_rays_apart(world: bpy.types.World) -> bool:
-    """Whether other rays than the camera's see different worlds."""
+    """True if other rays than the camera's see different worlds."""
     return any(each.node.type == "LIGHT_PATH" and each.socket.name != "Is Camera Ray" for each in _feeding(world))
 
 
@@ -69,7 +69,7 @@ def _feeding(world: bpy.types.World) -> set[Output]:
 
 
 def rendered(world: bpy.types.World, scene: bpy.types.Scene) -> Rendered | None:
-    """What another Blender renders of a world without an obstacle at a scene's frame; None if it can't."""
+    """The image that another Blender renders of a world without an obstacle at a scene's frame; None if it can't."""
     with tempfile.TemporaryDirectory(prefix="viewcam-") as folder:
         library, out = Path(folder, "world.blend"), Path(folder, "world.npz")
         bpy.data.libraries.write(str(library), {world.original}, path_remap="ABSOLUTE", fake_user=True)

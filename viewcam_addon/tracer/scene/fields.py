@@ -12,12 +12,12 @@ import zipfile
 import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import IO, NoReturn
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import checks, memory
+from ... import checks, memory, npy
 from ...errors import InputError
 
 _LARGEST_WHOLE = 2**31 - 1
@@ -26,7 +26,6 @@ _LARGEST_WHOLE = 2**31 - 1
 _MOST_UNPACKED = 1032
 # An array is read and then converted to the type that the tracer takes, while it is still there.
 _COPIES = 2
-_HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 
 
 class Field:
@@ -148,7 +147,7 @@ class Arrays:
 
     def __init__(self, file: str = "", archive: zipfile.ZipFile | None = None) -> None:
         self._file, self._archive = file, archive
-        self._members = {} if archive is None else _arrays_of(archive)
+        self._members = {} if archive is None else npy.members(archive)
         self._taken: dict[str, NDArray] = {}
 
     def take(self, key: Field) -> NDArray:
@@ -170,7 +169,7 @@ class Arrays:
         member = self._members[name]
         try:
             with self._archive.open(member) as file:
-                dtype, size = _header(file)
+                dtype, size = npy.header(file)
                 if dtype.hasobject:
                     raise InputError(
                         f"{self._file}: the array {checks.shown(name)} holds pickled objects, which are not read: store numbers"
@@ -197,27 +196,6 @@ class Arrays:
             raise InputError(damaged) from error
 
 
-def _arrays_of(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
-    """The members that are arrays, by their names, packed as NumPy packs them."""
-    return {
-        member.filename.removesuffix(".npy"): member
-        for member in archive.infolist()
-        if member.filename.endswith(".npy") and member.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-    }
-
-
-def _header(file: IO[bytes]) -> tuple[np.dtype, int]:
-    """The type of an array and its size in bytes, as its header has them; ValueError if it is none."""
-    try:
-        version = np.lib.format.read_magic(file)
-        shape, _, dtype = _HEADERS[version](file)
-    except Exception as error:  # of the tokenizer and the parser of Python, of no common class
-        raise ValueError("no header") from error
-    if any(type(length) is not int or length < 0 for length in shape):
-        raise ValueError("no shape")
-    return dtype, math.prod(shape) * dtype.itemsize
-
-
 @contextlib.contextmanager
 def arrays_beside(scene_path: Path, field: Field | None) -> Iterator[Arrays]:
     """Open the .npz that the field names, for the time of the block."""
@@ -242,7 +220,11 @@ def _beside(scene_path: Path, field: Field) -> Path:
     """The path of a file in the scene file's own folder."""
     folder = scene_path.resolve().parent
     path = folder / field.text()
-    if "\0" in field.value or path.resolve().parent != folder or path.name != field.value:
+    try:
+        inside = "\0" not in field.value and path.resolve().parent == folder and path.name == field.value
+    except (OSError, ValueError):  # too long for the system to tell
+        inside = False
+    if not inside:
         field.fail(f"is {checks.shown(field.value)}, which leaves the scene file's folder: give the name of a file in it")
     return path
 

@@ -47,7 +47,7 @@ def write(scene: Scene, path: str | os.PathLike[str]) -> None:
     text = json.dumps(document, indent=1, allow_nan=False)
     text = _LIST_OF_NUMBERS.sub(lambda match: "[" + " ".join(match[1].split()) + "]", text)
     with written_whole(path) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8")
+        temporary.write_text(text + "\n", encoding="utf-8", newline="\n")
         if arrays:
             with written_whole(arrays_path) as temporary_arrays:
                 np.savez(temporary_arrays, **arrays)
