@@ -148,8 +148,10 @@ def compare(
         raise InputError(f"{of.source} does not tell its camera: give its scene with --scene, or trace it with viewcam render")
     # The picture may be of another size than the scene says, or of the stated camera.
     shown = scene and replace(scene, camera=camera)
+    stated = scene.stated_camera if scene and camera == scene.camera else None
     if radiance.carries_light(of):
         lit = radiance.compare(of, pictures, camera, test_samples)
+        lit = replace(lit, stated=stated)
         if shown is None or not (names := shown.not_modelled):
             return lit
         surfaces = tracing.Tracer(shown, threads).pixels_of(names)
@@ -161,7 +163,6 @@ def compare(
         found = geometry.compare(of, pictures[0], camera, renderer=by, partial=partial)
     else:
         tracer = tracing.Tracer(shown, threads)
-        stated = shown.stated_camera if scene and camera == scene.camera else None
         found = geometry.compare(of, pictures[0], camera, tracer.surface_at, stated, shown.origin, by, partial)
         names = shown.not_modelled
         found = replace(found, not_modelled=not_modelled(names, tracer.pixels_of(names), of, pictures, whole))

@@ -31,7 +31,7 @@ _SURE, _TIED = 14.0, 10.0
 _FEWEST = 40  # observations
 _LEFT_OUT = 2.0  # pixels: less may be anything's
 _FITTED = "focal_factor"
-_FACTORS, _STEPS, _ROUNDS = (1 / 16, 16.0), 41, 6  # between these, in so many steps, each round within two steps of the last
+_FACTORS, _STEPS, _FINEST = (1 / 8, 8.0), 25, 1e-5  # of depth maps: what is tried first, and how fine it is told
 _COUNTED = 2000  # at most: a systematic error repeats in each, so more of them add no certainty
 _FARTHEST = 1e6  # times the usual error: what is behind the camera counts as that
 _Y_TO_Z = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
@@ -488,15 +488,30 @@ def _differ(errors: Array, others: Array, evidence: "Tracks | Depths") -> bool:
 
 def _of_focal_factor(views: Views, evidence: "Tracks | Depths") -> Mistake:
     """The mistake of a focal length that is wrong by the factor that the evidence asks for."""
-    low, high = np.log(_FACTORS)
-    for _ in range(_ROUNDS):
-        logs = np.linspace(low, high, _STEPS)
-        usual = [_usual(evidence.errors(_scaled(views, factor)), evidence) for factor in np.exp(logs)]
-        best, step = int(np.argmin(usual)), logs[1] - logs[0]
-        low, high = logs[best] - step, logs[best] + step
-    factor = float(np.exp(logs[best]))
+    factor = _factor_of_tracks(views, evidence) if isinstance(evidence, Tracks) else _factor_of_depths(views, evidence)
     off = f"{factor:.4g} times too short" if factor > 1 else f"{1 / factor:.4g} times too long"
     return Mistake(_FITTED, f"the focal length is {off}", lambda v: _scaled(v, factor))
+
+
+def _factor_of_tracks(views: Views, evidence: Tracks) -> float:
+    """How many times as far from the principal point as the cameras say pictures show a point, in the median."""
+    places, depth = views.project(evidence.which, evidence.points)
+    center = views.center[(evidence.which + views.shifted) % len(views.eye)]
+    with np.errstate(all="ignore"):
+        expected = places - center
+        factors = ((evidence.places - center) * expected).sum(axis=-1) / (expected * expected).sum(axis=-1)
+    usable = factors[(depth > 0) & np.isfinite(factors) & (factors > 0)]
+    return float(np.median(usable)) if len(usable) else 1.0
+
+
+def _factor_of_depths(views: Views, evidence: Depths) -> float:
+    """The factor with the least usual error: of some, then of those around the best, until it is told finely enough."""
+    logs = np.linspace(*np.log(_FACTORS), _STEPS)
+    while (step := logs[1] - logs[0]) > _FINEST:
+        usual = [_usual(evidence.errors(_scaled(views, factor)), evidence) for factor in np.exp(logs)]
+        best = logs[int(np.argmin(usual))]
+        logs = np.linspace(best - step, best + step, _STEPS // 3)
+    return float(np.exp(best))
 
 
 def _left_out(views: Views, evidence: Tracks) -> list[Mistake]:

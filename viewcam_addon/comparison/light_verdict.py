@@ -83,7 +83,7 @@ class RadianceComparison:
     is_noisy : whether chance had a part in it. rows : one for each quantity, Combined first. equal : further quantities, the
     same to the last bit. appearance : relMSE and FLIP. test : the mean of the test pictures' Combined, (height, width, 3).
     maps : name to (height, width) float32, rows from the bottom: what differs in Combined and in quantities that fail.
-    not_modelled : what of the picture neither side models as it is.
+    not_modelled : what of the picture neither side models as it is. stated : the camera that was asked for, or None.
     """
 
     pinhole: Pinhole
@@ -96,6 +96,9 @@ class RadianceComparison:
     test: Array
     maps: dict[str, NDArray[np.float32]]
     not_modelled: NotModelled = field(default_factory=NotModelled)
+    stated: Pinhole | None = None
+    renderer = "Cycles"
+    """Who made the test: light is compared with Cycles' alone."""
 
     @property
     def answer(self) -> Answer:

@@ -37,7 +37,8 @@ class GeometryComparison:
     roundings : (n,) float64, the error of each compared position over what one rounding of float32 causes there.
     far_from_origin : what the distance from the origin costs, None where that is nothing to speak of.
     origin : the point of the world from which the coordinates of both pictures are counted.
-    lacking : passes that only the reference has. not_modelled : what of the picture neither side models as it is.
+    lacking : passes that only the reference has. renderer : who made the test, by name. not_modelled : what of the picture
+    neither side models as it is.
     """
 
     pinhole: Pinhole
@@ -52,6 +53,7 @@ class GeometryComparison:
     far_from_origin: FarFromOrigin | None = None
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     lacking: tuple[str, ...] = ()
+    renderer: str = "Cycles"
     not_modelled: NotModelled = field(default_factory=NotModelled)
 
     @property
