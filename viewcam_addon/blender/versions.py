@@ -60,6 +60,11 @@ def without_first_sample(samples: int) -> dict[str, object]:
     return {"use_sample_subset": True, "sample_offset": 1, "sample_subset_length": samples, "samples": samples + 1}
 
 
+def stored_properties(owner: bpy.types.bpy_struct) -> Any:
+    """What the add-on's properties of an owner hold, by name. What is set here calls nothing, and no evaluation follows it."""
+    return owner if bpy.app.version < (5, 0) else owner.bl_system_properties_get(do_create=True)
+
+
 def drivers(block: bpy.types.ID) -> list[bpy.types.FCurve]:
     """The drivers on a datablock's own properties."""
     return list(block.animation_data.drivers) if block.animation_data else []
