@@ -19,8 +19,8 @@ LIGHTS_HAVE_SPACES = bpy.app.version >= (4, 5)
 _LINEAR = 1  # an enum's number, as foreach_set takes it
 # What Cycles draws without a material: a diffuse surface, and since 5.0 a Principled one, which bends grazing smooth normals.
 DEFAULT_SURFACE_BENDS_NORMALS = bpy.app.version >= (5, 0)
-# How Cycles reads a mesh in which flat faces stand beside smooth ones (export_geometry.py). Measured: 4.2, 4.5, 5.0 and 5.2.
-CYCLES_KEEPS_FLAT_FACES = bpy.app.version < (5, 1)
+# Whether Cycles has one normal a vertex, and splits those at sharp edges (export_geometry.py). Measured: 4.2, 4.5, 5.0 and 5.2.
+CYCLES_HAS_VERTEX_NORMALS = bpy.app.version < (5, 1)
 # Whether meshes can keep custom normals as they are given; before, as two angles of 16 bits. Measured: 4.2, 4.5, 5.0 and 5.2.
 MESHES_KEEP_NORMALS = bpy.app.version >= (4, 5)
 

@@ -288,10 +288,11 @@ def test_an_empty_slot_that_no_face_uses_is_not_told(monkey, both_sides, node_gr
 
 @pytest.mark.parametrize("kind", ["shared data", "copied data", "one mesh"])
 def test_triangles_that_lie_exactly_where_others_do_are_told_where_there_is_light(monkey, scene, add_lamp, kind):
-    from viewcam_addon.blender.rendering import job
+    from viewcam_addon.blender.jobs import renderer as jobs
+    from viewcam_addon.jobs.job import Job
 
     def told(level="direct"):
-        return [entry.reason for entry in job.export(job.Request(level=level)).ledger if "lie exactly" in entry.reason]
+        return [entry.reason for entry in jobs.export(Job(level=level)).ledger if "lie exactly" in entry.reason]
 
     add_lamp("SUN")
     assert not told()
@@ -311,7 +312,8 @@ def test_triangles_that_lie_exactly_where_others_do_are_told_where_there_is_ligh
 
 def test_triangles_of_a_lattice_are_no_doubles_of_one_another(scene, add_lamp, add):
     """Sums of their coordinates, weighted by the roots of 2 and 3, are the same for 1,442 of these."""
-    from viewcam_addon.blender.rendering import job
+    from viewcam_addon.blender.jobs import renderer as jobs
+    from viewcam_addon.jobs.job import Job
 
     random = np.random.default_rng(7)
     corners = random.integers(0, 20, (40_000, 1, 3)) + random.integers(-1, 2, (40_000, 3, 3))
@@ -325,6 +327,6 @@ def test_triangles_of_a_lattice_are_no_doubles_of_one_another(scene, add_lamp, a
     add_lamp("SUN")
 
     def told():
-        return [entry.reason for entry in job.export(job.Request(level="direct")).ledger if "lie exactly" in entry.reason]
+        return [entry.reason for entry in jobs.export(Job(level="direct")).ledger if "lie exactly" in entry.reason]
 
     assert len(mesh.polygons) > 30_000 and not told()

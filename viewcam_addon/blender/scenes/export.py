@@ -11,8 +11,8 @@ What has no counterpart is noted in the ledger, with the remedy that takes it ou
 """
 
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import bpy
@@ -38,16 +38,18 @@ Matrix = NDArray[np.float64]
 class Surface:
     """A visible surface that stands in the world once or many times; two that are equal are one.
 
-    data : evaluated. key : the same for all that share a geometry in Cycles. slots : the materials, evaluated, at least 1.
-    hidden_from : the kinds of rays that don't see it. color : with its alpha; of instances that of what places them. receivers,
-    blockers : of its light, as of Object, where it shines.
+    is_mesh : or a point cloud. key : the same for all that share a geometry in Cycles. slots : the materials, evaluated, one or
+    more; used : the indices of those that some face, or the points, have. hidden_from : the kinds of rays that don't see it.
+    color : with its alpha; of instances that of what places them. receivers, blockers : of its light, as of Object, where it
+    shines.
     """
 
     name: str
-    data: bpy.types.Mesh | bpy.types.PointCloud = field(compare=False)
+    is_mesh: bool
     key: tuple[int, int]
     object_index: int
     slots: tuple[bpy.types.Material | None, ...]
+    used: tuple[int, ...]
     hidden_from: frozenset[str]
     color: tuple[float, float, float, float]
     receivers: frozenset[str] | None = None
@@ -65,9 +67,7 @@ class Surface:
     @property
     def used_slots(self) -> list[bpy.types.Material | None]:
         """The materials of `slots` that some face, or the points, have."""
-        if not isinstance(self.data, bpy.types.Mesh):
-            return [self.slots[0]]
-        return [self.slots[index] for index in sorted(export_geometry.used_slots(self.data, len(self.slots)))]
+        return [self.slots[index] for index in self.used]
 
 
 @dataclass(frozen=True)
@@ -160,11 +160,13 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
     names: dict[tuple[int, int], str] = {}
     geometries: dict[str, Mesh | Spheres] = {}
     objects = []
-    for source, matrices, random in placements(depsgraph, ledger, shading):
+
+    def read(source: Surface, shown: bpy.types.Object) -> None:
         if source.key not in names:
-            geometry = _geometry(source, ledger, shading)
-            names[source.key] = _free_name(source.data.name, geometries)
-            geometries[names[source.key]] = geometry
+            names[source.key] = _free_name(shown.data.name, geometries)
+            geometries[names[source.key]] = _geometry(source, shown, ledger, shading)
+
+    for source, matrices, random in placements(depsgraph, ledger, shading, read):
         materials = shading.names(source.slots) if shading else ()
         placed = (source.object_index, source.materials, materials, source.hidden_from, source.color, random)
         links = source.receivers, source.blockers
@@ -175,7 +177,7 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
     surfaces = {placed.name for placed in objects}
     return Scene(
         **_view_in(depsgraph, camera_object),
-        geometries=geometries,
+        geometries={name: geometries[name] for name in dict.fromkeys(placed.geometry for placed in objects)},
         objects=linking.among(objects, surfaces),
         **(_shown_by_light(depsgraph, ledger, shading, surfaces) if shading else {}),
         ledger=ledger.entries(),
@@ -251,10 +253,16 @@ class Placement(NamedTuple):
     random: NDArray[np.float32] | None
 
 
-def placements(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading | None = None) -> list[Placement]:
+def placements(
+    depsgraph: bpy.types.Depsgraph,
+    ledger: Ledger,
+    shading: Shading | None = None,
+    read: Callable[[Surface, bpy.types.Object], None] | None = None,
+) -> list[Placement]:
     """Each surface that the camera may see.
 
-    shading : reads the materials, where there shall be light; then other rays than the camera's may see a surface.
+    shading : reads the materials, where there shall be light; then other rays than the camera's may see a surface. read : is
+    called with each surface as it is met first, and the object or instance that shows it, which is gone afterwards.
     """
     matrices = export_geometry.read(depsgraph.object_instances, "matrix_world", np.float32, 16)
     found: dict[Surface, list[int]] = {}
@@ -270,6 +278,8 @@ def placements(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading 
         identity = placed.real.as_pointer(), placed.parent.as_pointer(), data.as_pointer()
         if identity not in known:
             source = _source(placed, depsgraph, ledger, shading, links)
+            if read and source and source not in found:
+                read(source, shown)
             known[identity] = found.setdefault(source, []) if source else []
         known[identity].append(number)
     for source, numbers in found.items():
@@ -309,7 +319,7 @@ def _drawn(placed: list[Placement], ledger: Ledger) -> Iterator[Placement]:
     for source, matrices, random in placed:
         with np.errstate(invalid="ignore"):  # what is not finite is not flat
             drawn = np.linalg.det(matrices[:, :3, :3]) != 0
-        if not drawn.all() and (users[source.key] > 1 or not isinstance(source.data, bpy.types.Mesh)):
+        if not drawn.all() and (users[source.key] > 1 or not source.is_mesh):
             ledger.note(source.name, "exported", "flattened by its scale, and Cycles does not draw it")
             matrices, random = matrices[drawn], random if random is None else random[drawn]
         if len(matrices):
@@ -340,18 +350,19 @@ def _source(
         ledger.note(placed.name, "exported", "not visible to the camera")
         if not shading or len(hidden_from) == len(RAYS):
             return None
-    data = shown.data
-    if isinstance(data, bpy.types.Mesh):
-        if data.is_editmode:  # the file is in edit mode: what is edited must be made a mesh first
-            data = real.to_mesh()
-        if not data.polygons:
-            return None
-        if not layer.use_solid:
-            ledger.note(placed.name, "exported", "the view layer leaves out surfaces")
-            return None
+    is_mesh = isinstance(shown.data, bpy.types.Mesh)
+    if is_mesh and not layer.use_solid:
+        ledger.note(placed.name, "exported", "the view layer leaves out surfaces")
+        return None
     override = layer.material_override
     slots = [override or slot.material for slot in shown.material_slots] or [override]
-    features.note_object(placed, slots, depsgraph, ledger, shading)
+    used = {0}
+    if is_mesh:
+        with export_geometry.mesh_shown(shown) as mesh:
+            used = export_geometry.used_slots(mesh, len(slots))
+        if not used:  # it has no faces
+            return None
+    features.note_object(placed, slots, used, depsgraph, ledger, shading)
     receivers, blockers = None, None
     if links and linking.is_linked(placed.real.original) and shading.shines(slots):
         receivers, blockers = links.of(placed, ledger, True)
@@ -359,10 +370,11 @@ def _source(
     own = any(slot.link == "OBJECT" for slot in shown.material_slots)
     return Surface(
         name=placed.name,
-        data=data,
-        key=(data.as_pointer(), real.as_pointer() if own else 0),
+        is_mesh=is_mesh,
+        key=(shown.data.as_pointer(), real.as_pointer() if own else 0),
         object_index=shown.pass_index,
         slots=tuple(slots),
+        used=tuple(sorted(used)),
         hidden_from=hidden_from if shading else frozenset(),
         color=tuple(placed.parent.color) if shading else Object.color,
         receivers=receivers,
@@ -370,13 +382,15 @@ def _source(
     )
 
 
-def _geometry(source: Surface, ledger: Ledger, shading: Shading | None) -> Mesh | Spheres:
-    if not isinstance(source.data, bpy.types.Mesh):
-        return export_geometry.spheres_of(source.data)
+def _geometry(source: Surface, shown: bpy.types.Object, ledger: Ledger, shading: Shading | None) -> Mesh | Spheres:
+    if not source.is_mesh:
+        return export_geometry.spheres_of(shown.data)
     has_colours = shading is not None and shading.asks_for_colours(source.slots)
     attributes = shading.attributes(source.slots) if shading else ()
-    mesh = export_geometry.mesh_of(source.data, len(source.materials), has_colours, attributes)
-    if nowhere := len(source.data.loop_triangles) - len(mesh.triangles):
+    with export_geometry.mesh_shown(shown, split=True) as data:
+        mesh = export_geometry.mesh_of(data, len(source.materials), has_colours, attributes)
+        nowhere = len(data.loop_triangles) - len(mesh.triangles)
+    if nowhere:
         ledger.note(
             source.name, "exported", f"{nowhere} triangles have vertices that are not finite, and Cycles draws none of them"
         )
