@@ -19,7 +19,7 @@ from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import causes, datablocks, findings, hold, preferences, targets
-from . import baking, clipboard, dragging, panel_rows, presets, readouts, scene_cameras
+from . import baking, clipboard, converting, dragging, panel_rows, presets, readouts, scene_cameras
 from .panel_places import BelowProperties, BelowSidebar, CameraPanel, InProperties, InSidebar, SubPanel
 
 
@@ -61,6 +61,7 @@ class _MainPanel(CameraPanel):
             _draw_values(layout.column(), camera_object.virtual_pinhole)
             clipboard.draw(layout, camera_object)
             baking.draw(layout, camera_object)
+            converting.draw(layout, camera_object)
             buttons = panel_rows.buttons(layout, context)
             _draw_setting(buttons, camera_object, any(notice.is_mended_by_applying for notice in found))
         else:
