@@ -56,7 +56,7 @@ def compared(far_scene):
         replace(far_scene.picture(), source="reference.exr"),
         replace(far_scene.rendered(seed=1), source="a<b>.exr"),
     )
-    return compare(reference, test, far_scene.pinhole, far_scene.surface_at, far_scene.pinhole), reference, test
+    return compare(reference, test, far_scene.pinhole, far_scene.surfaces_at, far_scene.pinhole), reference, test
 
 
 def written(tmp_path, comparison, reference, test, **more):
@@ -90,7 +90,7 @@ def test_the_two_sides_are_called_by_their_names_and_the_camera_is_told_as_typed
 
 def test_a_failed_comparison_says_so_at_the_top(paper_scene, tmp_path):
     reference, test = paper_scene.picture(), paper_scene.picture(1.0, 0.5)
-    text, page = written(tmp_path, compare(reference, test, paper_scene.pinhole, paper_scene.surface_at), reference, test)
+    text, page = written(tmp_path, compare(reference, test, paper_scene.pinhole, paper_scene.surfaces_at), reference, test)
     assert "Not the same picture." in page.text and "shifted by (+0.5" in page.text
     assert '<html lang="en" class="different">' in text
 

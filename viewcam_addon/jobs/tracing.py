@@ -306,8 +306,10 @@ def _told(
     from .. import image
     from ..comparison import difference, light_report, report
     from ..comparison.light_verdict import RadianceComparison
+    from ..tracer.scene import with_pairs
 
     lines, result = comparison.lines(), comparison.to_json()
+    ledger = with_pairs(ledger, comparison.pairs)
     about = (written.report or "", ledger, written.command)
     if isinstance(comparison, RadianceComparison):
         figures = _light_figures(result)
