@@ -121,7 +121,8 @@ def check_one(
     if "reason" in found:
         say(f"level {found['level']} is enough. {found['reason']}")
     seconds, (width, height) = found["seconds"], found["result"]["size"]
-    say(f"exported and rendered with {(job.engine or 'CYCLES').capitalize()} in {seconds['rendered']:.1f} s")
+    engine = (job.engine or "Cycles").capitalize()
+    say(f"exported and rendered with {engine} in {seconds['rendered']:.1f} s")
     say(f"traced {width} × {height} pixels in {seconds['traced']:.2f} s")
     say(*ledger_lines(found["result"]["ledger"]), *found["lines"])
     return exit_status(found["answer"], job.strict), found["result"]
