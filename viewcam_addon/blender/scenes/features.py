@@ -130,6 +130,10 @@ def note_object(
         if any(modifier.type == "NODES" and modifier.show_render for modifier in real.modifiers):
             ledger.note(name, "approximated", "has no material, and Cycles may bend its normals where they graze")
     for material in filter(None, slots):
+        if materials.is_volume_alone(material):
+            ledger.note(name, "skipped", f"material {material.name!r} is a volume without a surface, which is not modelled")
+            ledger.call_for_cycles(material.original, materials.make_transparent)
+            continue
         if not shading:  # the Normal pass; mirrors and glass bend normals on both sides (scattering.specular_normal)
             ledger.call_for_cycles(material.original, materials.keep_normals, stands_in=False)
         reasons = materials.departures(material, lit=shading is not None)
