@@ -39,7 +39,7 @@ def note_render(
     ledger.set_for_cycles(camera_object.data.dof, "use_dof", False)
     for layer in scene.view_layers:
         if layer.use and layer != view_layer:
-            ledger.note(f"view layer {layer.name}", "skipped", f"only view layer {view_layer.name!r} is compared")
+            ledger.note(f"view layer {layer.name}", "exported", f"another picture than that of {view_layer.name!r}")
     for library in bpy.data.libraries:
         if not Path(bpy.path.abspath(library.filepath)).is_file():
             ledger.note(library.name, "skipped", f"the library {library.filepath} is missing, and all that is linked from it")
