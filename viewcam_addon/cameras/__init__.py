@@ -51,6 +51,7 @@ from ..files import written_whole
 from ..pinhole import Pinhole
 from . import (
     arkit,
+    arrays,
     bop,
     bundler,
     colmap,
@@ -82,7 +83,7 @@ from . import (
     vtk,
 )
 from .axes import moved, moved_back
-from .camera import ANGLES, AXES, PIXELS, Camera, Options, choose
+from .camera import ANGLES, AXES, PIXELS, POSES, Camera, Options, choose
 from .source import Source
 
 __all__ = [
@@ -90,6 +91,7 @@ __all__ = [
     "AXES",
     "FORMATS",
     "PIXELS",
+    "POSES",
     "Camera",
     "Options",
     "choose",
@@ -131,6 +133,7 @@ FORMATS: dict[str, ModuleType] = {
     "pbrt": pbrt,
     "matrices": matrices,
     "look_at": look_at,
+    "arrays": arrays,
     "text": own,
 }
 """Name → module, in the order in which they are asked."""
