@@ -40,7 +40,7 @@ CODES = {
     f"extrinsics = torch.tensor({W2C.tolist()}).cuda()",
     "names": f"f = {F}\ncx, cy = {C_X}, {C_Y}\n"
     f"K = np.array([[f, 0, cx], [0, {known.f_y!r}, cy], [0, 0, 1]])\nw2c = {W2C.tolist()}",
-    "transposed": f"K = np.array({K.T.tolist()}).T\nR = np.array({R.T.tolist()}).transpose()\nt = np.array({[[float(x)] for x in T]})",
+    "transposed": f"K = np.array({K.T.tolist()}).T\nR = np.array({R.T.tolist()}).transpose()\nt = {T[:, None].tolist()}",
     "repr_of_numpy_2": f"K = {K.tolist()}\nR = {R.tolist()}\nt = [{', '.join(f'np.float64({float(x)!r})' for x in T)}]",
     "reshaped": f"K = np.array([{row(K)}]).reshape(3, 3)\nR = np.array([{row(R)}]).reshape((3, 3))\nt = [{row(T)}]",
     "matlab": f"K = [{rows(K)}];  % intrinsics\nR = [{rows(R.T)}]'; t = [{row(T, '; ')}];",
