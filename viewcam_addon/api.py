@@ -5,6 +5,7 @@ functions. Nothing here needs Blender. Where Blender is a module of this process
 no picture may be read from a file in it or written (image.py says why): those in memory may be compared.
 """
 
+import functools
 import os
 from collections.abc import Collection, Sequence
 from dataclasses import replace
@@ -136,7 +137,10 @@ def compare(
         either picture shows an object.
     """
     from .comparison import geometry, radiance, renderers
+    from .comparison.coincident import SAMPLES as SAMPLES_OF_COINCIDENT
+    from .comparison.coincident import CoincidentLight
     from .comparison.everything import not_modelled
+    from .comparison.tolerances import ROUNDINGS
 
     several = tests if isinstance(tests, Sequence) and not isinstance(tests, str) else [tests]
     if files := [each for each in (reference, *several) if not isinstance(each, Image)]:
@@ -150,11 +154,23 @@ def compare(
         raise InputError(f"{of.source} does not tell its camera: give its scene with --scene, or trace it with viewcam render")
     # The picture may be of another size than the scene says, or of the stated camera.
     shown = scene and replace(scene, camera=camera)
+    stated = scene.stated_camera if scene and camera == scene.camera else None
     if radiance.carries_light(of):
-        lit = radiance.compare(of, pictures, camera, test_samples)
-        if shown is None or not (names := shown.not_modelled):
+        if shown is None:
+            return radiance.compare(of, pictures, camera, test_samples)
+        makes_tracer = functools.cache(lambda: (keeper or tracing.Keeper()).tracer(shown, threads))
+
+        def coincident() -> CoincidentLight:
+            level = of.attributes.get("level", "path")
+            light, pairs = makes_tracer().coincident_light(level, SAMPLES_OF_COINCIDENT, 0, ROUNDINGS[-1])
+            return CoincidentLight(Image(light), pairs)
+
+        lit = replace(radiance.compare(of, pictures, camera, test_samples, coincident), stated=stated)
+        names = tuple(dict.fromkeys((*shown.not_modelled, *lit.taken_out.names)))
+        if not names:
             return lit
-        surfaces = (keeper or tracing.Keeper()).tracer(shown, threads).pixels_of(names)
+        surfaces = makes_tracer().pixels_of(shown.not_modelled)
+        surfaces |= {name: surfaces.get(name, False) | lit.taken_out.pixels for name in lit.taken_out.names}
         return replace(lit, not_modelled=not_modelled(names, surfaces, of, pictures, whole, camera))
     if len(pictures) != 1:
         raise InputError(f"{of.source} has no noise that several pictures could tell: compare it with one")
@@ -163,8 +179,7 @@ def compare(
         found = geometry.compare(of, pictures[0], camera, renderer=by, partial=partial)
     else:
         tracer = (keeper or tracing.Keeper()).tracer(shown, threads)
-        stated = shown.stated_camera if scene and camera == scene.camera else None
-        found = geometry.compare(of, pictures[0], camera, tracer.surface_at, stated, shown.origin, by, partial)
+        found = geometry.compare(of, pictures[0], camera, tracer.surfaces_at, stated, shown.origin, by, partial)
         names = shown.not_modelled
         found = replace(found, not_modelled=not_modelled(names, tracer.pixels_of(names), of, pictures, whole))
     if found.shows_nothing and not may_be_empty:

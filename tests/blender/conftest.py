@@ -185,7 +185,7 @@ def both_sides(fresh_blender, scene, tmp_path, read_passes):
         exported = jobs.both_sides(Job(threads=2, **request), [tmp_path / "cycles.exr"])
         tracer = render.Tracer(exported, 2)
         traced, (cycles,) = render.render(exported, threads=2), read_passes([tmp_path / "cycles.exr"])
-        comparison = geometry.compare(Image(traced), Image(cycles), exported.camera, tracer.surface_at, exported.stated_camera)
+        comparison = geometry.compare(Image(traced), Image(cycles), exported.camera, tracer.surfaces_at, exported.stated_camera)
         return BothSides(exported, traced, cycles, comparison)
 
     return make

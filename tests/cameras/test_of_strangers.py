@@ -40,6 +40,8 @@ def read(text):
 def test_controls_turn_the_camera_to_their_target_whatever_it_looked_at_before(name, before):
     made = f"{before} const controls = new THREE.{name}(camera, canvas);"
     assert read(THREE + made).pinhole.look_at == (0, 0, 0)
+    with pytest.raises(InputError, match="write the target in plain numbers"):
+        read(THREE + made + "controls.target.set(1, height, 0);")
     aimed = read(THREE + made + "controls.target.set(1, 2, 0);")
     assert aimed.pinhole.look_at == (1, 2, 0) and any(name in note for note in aimed.notes)
 

@@ -64,7 +64,7 @@ def compared(still, tmp_path):
         fault(still)
         jobs.cycles(Job(threads=2), tmp_path / "cycles.exr")
         test = Image(change(read_outside(tmp_path / "cycles.exr")))
-        return compare(reference, test, exported.camera, tracer.surface_at, exported.stated_camera)
+        return compare(reference, test, exported.camera, tracer.surfaces_at, exported.stated_camera)
 
     return make
 

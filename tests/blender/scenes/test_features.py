@@ -5,7 +5,10 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.scenes import materials
+from viewcam_addon.jobs.job import Job
+from viewcam_addon.tracer import render
 
 
 @pytest.fixture
@@ -95,7 +98,6 @@ DEPARTURES = {
     make_turned: "turns the normals",
     make_displaced: "is displaced",
     make_misty: "has a volume",
-    make_volume_only: "has no surface",
     make_without_output: "has no output",
     make_bumpy_in_a_group: "turns the normals",
 }
@@ -109,6 +111,53 @@ def test_a_plain_material_stands_in(monkey, material, both_sides, depart):
     (entry,) = sides.exported.ledger
     assert entry.status == "approximated" and DEPARTURES[depart] in entry.reason and "'Skin'" in entry.reason
     assert not any(node.type == "BSDF_DIFFUSE" for node in material.node_tree.nodes)
+
+
+def test_a_box_of_fog_is_left_out_on_both_sides(monkey, material, both_sides):
+    """An opaque box stood in for it, and around a scene both sides were black and called the same."""
+    bpy.ops.mesh.primitive_cube_add(size=30)
+    fog = bpy.data.materials.new("Fog")
+    if not fog.node_tree:
+        fog.use_nodes = True
+    make_volume_only(fog)
+    box = bpy.context.object
+    box.data.materials.append(fog)
+    sides = both_sides()
+    sides.check()
+    told = {entry.object: (entry.status, entry.reason) for entry in sides.exported.ledger}
+    assert told[box.name] == ("skipped", "material 'Fog' is a volume without a surface, which is not modelled")
+    assert [placed.name for placed in sides.exported.objects] == [monkey.name]
+    assert fog.node_tree.nodes.get("Transparent BSDF") is None
+
+
+def test_faces_of_fog_beside_others_are_left_out_on_both_sides(monkey, material, both_sides):
+    fog = bpy.data.materials.new("Fog")
+    if not fog.node_tree:
+        fog.use_nodes = True
+    make_volume_only(fog)
+    monkey.data.materials.append(fog)
+    everything = both_sides().comparison.hits[1]
+    monkey.data.polygons.foreach_set("material_index", [face.index % 3 == 0 for face in monkey.data.polygons])
+    sides = both_sides()
+    sides.check()
+    assert sides.comparison.hits[1] < everything
+    assert [entry.status for entry in sides.exported.ledger] == ["approximated"]
+
+
+def test_a_lamp_shines_through_a_box_of_fog_on_both_sides(monkey, material, add_lamp, read_passes, tmp_path):
+    bpy.context.scene.render.resolution_x = bpy.context.scene.render.resolution_y = 32
+    add_lamp("SUN", energy=2.0)
+    bpy.ops.mesh.primitive_cube_add(size=3)
+    fog = bpy.data.materials.new("Fog")
+    if not fog.node_tree:
+        fog.use_nodes = True
+    make_volume_only(fog)
+    bpy.context.object.data.materials.append(fog)
+    exported = jobs.both_sides(Job(threads=2, level="direct", samples=16), [tmp_path / "lit.exr"])
+    (theirs,) = read_passes([tmp_path / "lit.exr"])
+    ours = render.render(exported, "direct", 16, threads=2)
+    means = [passes["Combined"][..., :3].mean() for passes in (ours, theirs)]
+    assert means[0] > 0.05 and means[0] == pytest.approx(means[1], rel=0.05), means  # 16 samples of 1,024 pixels
 
 
 @pytest.mark.parametrize("depart", [make_invisible, make_bumpy, make_displaced], ids=lambda depart: depart.__name__)
@@ -287,12 +336,14 @@ def test_an_empty_slot_that_no_face_uses_is_not_told(monkey, both_sides, node_gr
 
 
 @pytest.mark.parametrize("kind", ["shared data", "copied data", "one mesh"])
-def test_triangles_that_lie_exactly_where_others_do_are_told_where_there_is_light(monkey, scene, add_lamp, kind):
+def test_triangles_that_lie_exactly_where_others_do_are_told(monkey, scene, add_lamp, kind):
     from viewcam_addon.blender.jobs import renderer as jobs
     from viewcam_addon.jobs.job import Job
 
     def told(level="direct"):
-        return [entry.reason for entry in jobs.export(Job(level=level)).ledger if "lie exactly" in entry.reason]
+        ledger = jobs.export(Job(level=level)).ledger
+        assert all(entry.status == "exported" for entry in ledger), "where it matters is the comparison's to find"
+        return [entry.reason for entry in ledger if "lie exactly" in entry.reason]
 
     add_lamp("SUN")
     assert not told()
@@ -303,11 +354,47 @@ def test_triangles_that_lie_exactly_where_others_do_are_told_where_there_is_ligh
     if kind == "one mesh":
         with bpy.context.temp_override(active_object=monkey, selected_editable_objects=[monkey, double]):
             bpy.ops.object.join()
-    (reason,) = told()
-    assert not told("geometry") and ("others of it" if kind == "one mesh" else "those of") in reason
+    for level in ("direct", "geometry"):
+        (reason,) = told(level)
+        assert ("others of it" if kind == "one mesh" else "those of") in reason
     if kind != "one mesh":
         double.location.x += 1e-5
         assert not told()
+
+
+def test_instances_in_one_place_and_doubles_within_them_are_told(monkey, scene, add):
+    from viewcam_addon.blender.jobs import renderer as jobs
+    from viewcam_addon.jobs.job import Job
+
+    def told():
+        reasons = [entry.reason for entry in jobs.export(Job(level="geometry")).ledger]
+        return [clause.partition(":")[0] for reason in reasons for clause in reason.split("; ") if "lie exactly" in clause]
+
+    def instance(number, location):
+        place = add(None, f"Place {number}", location=location)
+        place.instance_type, place.instance_collection = "COLLECTION", collection
+
+    collection = bpy.data.collections.new("Instanced")
+    scene.collection.objects.unlink(monkey)
+    collection.objects.link(monkey)
+    instance(1, (1, 0, 0))
+    instance(2, (-1, 0, 0))
+    assert not told()
+    instance(3, (1, 0, 0))
+    assert told() == ["1 instances lie exactly where others of it do"]
+    bpy.data.objects["Place 3"].location.x = 0
+    with bpy.context.temp_override():
+        mesh = monkey.data
+        vertices = np.empty(3 * len(mesh.vertices))
+        mesh.vertices.foreach_get("co", vertices)
+        faces = [list(face.vertices) for face in mesh.polygons]
+        count = len(mesh.vertices)
+        doubled = bpy.data.meshes.new("Doubled")
+        twins = [[index + count for index in face] for face in faces[:5]]
+        doubled.from_pydata(np.tile(vertices.reshape(-1, 3), (2, 1)).tolist(), [], faces + twins)
+        monkey.data = doubled
+    (reason,) = told()
+    assert reason.endswith("triangles lie exactly where others of it do") and 5 <= int(reason.split()[0]) <= 10
 
 
 def test_triangles_of_a_lattice_are_no_doubles_of_one_another(scene, add_lamp, add):

@@ -26,7 +26,7 @@ from ...tracer.scene.levels import level_of
 from ...tracer.scene.materials import PLAIN, Picture
 from .. import camera as cameras
 from .. import versions
-from . import baked_inputs, cycles_attributes, export_geometry, features, film, lamps, linking, world
+from . import baked_inputs, cycles_attributes, export_geometry, features, film, lamps, linking, materials, world
 from .depsgraph import visit_still
 from .ledger import Ledger
 from .shading import Shading
@@ -39,7 +39,7 @@ class Surface:
     """A visible surface that stands in the world once or many times; two that are equal are one.
 
     is_mesh : or a point cloud. key : the same for all that share a geometry in Cycles. slots : the materials, evaluated, one or
-    more; used : the indices of those that some face, or the points, have. hidden_from : the kinds of rays that don't see it.
+    more; used : the indices of those that are seen. hidden_from : the kinds of rays that don't see it.
     color : with its alpha; of instances that of what places them. receivers, blockers : of its light, as of Object, where it
     shines.
     """
@@ -172,8 +172,7 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
         links = source.receivers, source.blockers
         matrix = matrices if len(matrices) > 1 else matrices[0]
         objects.append(Object(source.name, names[source.key], matrix, *placed, *links))
-    if shading:
-        _note_doubles(objects, geometries, ledger)
+    _note_doubles(objects, geometries, ledger)
     surfaces = {placed.name for placed in objects}
     return Scene(
         **_view_in(depsgraph, camera_object),
@@ -185,25 +184,64 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
 
 
 def _note_doubles(objects: list[Object], geometries: dict[str, Mesh | Spheres], ledger: Ledger) -> None:
-    """Triangles that lie where others do: which of the two a ray of Cycles leaves or meets is its rounding's choice."""
-    keys, owners = [np.empty(0, np.uint64)], [np.empty(0, np.int64)]
+    """What lies exactly where something else does: which of the two a ray of Cycles meets or leaves is its rounding's choice.
+
+    Triangles of what stands in the scene once are sought in the world; those of instances, and points, among their own;
+    and instances of one geometry by their matrices. What overlaps otherwise is found where pictures differ.
+    """
+    tokens = {name: token for token, name in enumerate(geometries)}
+    keys, owners, places, placed_by = [], [], [], []
+    instanced = {
+        placed.geometry for placed in objects if len(placed.matrices) > 1 or isinstance(geometries[placed.geometry], Spheres)
+    }
+    within = {name: len(_pairs(_keys(geometries[name]))) for name in instanced}
     for number, placed in enumerate(objects):
-        made = geometries[placed.geometry]
-        if isinstance(made, Mesh) and len(placed.matrices) == 1:
-            places = (made.vertices @ placed.matrices[0, :3, :3].T + placed.matrices[0, :3, 3]).astype(np.float32)
-            bits = (places + np.float32(0)).view(np.uint32)  # 0 for −0
-            corners = np.sort(_hashed(bits.T.astype(np.uint64))[made.triangles], axis=1)
-            corners = corners[(corners[:, :-1] != corners[:, 1:]).all(axis=1)]
-            keys.append(_hashed(corners.T))
-            owners.append(np.full(len(corners), number))
-    key = np.concatenate(keys)
-    order = np.argsort(key, kind="stable")
-    owner, key = np.concatenate(owners)[order], key[order]
-    pairs = np.flatnonzero(key[1:] == key[:-1])
-    for (first, second), count in Counter(zip(owner[pairs].tolist(), owner[pairs + 1].tolist(), strict=True)).items():
-        whose = "others of it" if first == second else f"those of {objects[first].name!r}"
-        reason = f"{count} triangles lie exactly where {whose} do: in Cycles one shadows the other"
-        ledger.note(objects[second].name, "approximated", reason)
+        geometry, several = geometries[placed.geometry], len(placed.matrices) > 1
+        token = np.full((1, len(placed.matrices)), tokens[placed.geometry], np.uint64)
+        places.append(_hashed(np.concatenate([token, _bits(placed.matrices.reshape(-1, 16)).T])))
+        placed_by.append(np.full(len(placed.matrices), number))
+        if isinstance(geometry, Mesh) and not several:
+            keys.append(_keys(geometry, placed.matrices[0]))
+            owners.append(np.full(len(keys[-1]), number))
+        elif within[placed.geometry]:
+            what = "triangles" if isinstance(geometry, Mesh) else "points"
+            _note_double(ledger, placed.name, f"{within[placed.geometry]} {what}", "others of it")
+    for found, owner, what in (keys, owners, "triangles"), (places, placed_by, "instances"):
+        number = np.concatenate([np.empty(0, np.int64), *owner])
+        pairs = _pairs(np.concatenate([np.empty(0, np.uint64), *found]))
+        for (first, second), count in Counter(map(tuple, number[pairs].tolist())).items():
+            if what == "instances" and all(len(objects[i].matrices) == 1 for i in (first, second)):
+                continue  # its triangles tell
+            whose = "others of it" if first == second else f"those of {objects[first].name!r}"
+            _note_double(ledger, objects[second].name, f"{count} {what}", whose)
+
+
+def _note_double(ledger: Ledger, name: str, what: str, whose: str) -> None:
+    # All of it comes along: where it matters to a picture is the comparison's to find.
+    ledger.note(
+        name, "exported", f"{what} lie exactly where {whose} do: either may be seen, and in Cycles one shadows the other"
+    )
+
+
+def _keys(geometry: Mesh | Spheres, matrix: Matrix | None = None) -> NDArray[np.uint64]:
+    """(n,): of each triangle that is one, or of each point, the same for those in one place."""
+    if isinstance(geometry, Spheres):
+        return _hashed(_bits(np.column_stack([geometry.centers, geometry.radii])).T)
+    places = geometry.vertices if matrix is None else geometry.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+    corners = np.sort(_hashed(_bits(places).T)[geometry.triangles], axis=1)
+    return _hashed(corners[(corners[:, :-1] != corners[:, 1:]).all(axis=1)].T)
+
+
+def _bits(values: NDArray[np.float64]) -> NDArray[np.uint64]:
+    """Those of the numbers as float32 has them, 0 for −0."""
+    return (values.astype(np.float32) + np.float32(0)).view(np.uint32).astype(np.uint64)
+
+
+def _pairs(keys: NDArray[np.uint64]) -> NDArray[np.int64]:
+    """(m, 2): the indices of two each that are equal and follow one another."""
+    order = np.argsort(keys, kind="stable")
+    equal = np.flatnonzero(keys[order[1:]] == keys[order[:-1]])
+    return np.stack([order[equal], order[equal + 1]], axis=1)
 
 
 def _hashed(columns: NDArray[np.uint64]) -> NDArray[np.uint64]:
@@ -363,6 +401,9 @@ def _source(
         if not used:  # it has no faces
             return None
     features.note_object(placed, slots, used, depsgraph, ledger, shading)
+    used = {index for index in used if not materials.is_volume_alone(slots[index])}
+    if not used:
+        return None
     receivers, blockers = None, None
     if links and linking.is_linked(placed.real.original) and shading.shines(slots):
         receivers, blockers = links.of(placed, ledger, True)
@@ -394,7 +435,7 @@ def _geometry(source: Surface, shown: bpy.types.Object, ledger: Ledger, shading:
         ledger.note(
             source.name, "exported", f"{nowhere} triangles have vertices that are not finite, and Cycles draws none of them"
         )
-    return mesh
+    return export_geometry.of_slots(mesh, source.used)
 
 
 def _free_name(name: str, taken: dict[str, Mesh | Spheres]) -> str:
