@@ -25,8 +25,8 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.jobs.makers import orbit
-from viewcam_addon.jobs.shot import Shot
 from viewcam_addon.pinhole import Pinhole
 
 Seconds = np.ndarray
@@ -83,7 +83,7 @@ class Blender:
         return np.array([time.perf_counter() - started, cpu])
 
 
-def by_loop(blender: Blender, shots: list[Shot], blend: Path, folder: Path, denoise: bool) -> Seconds:
+def by_loop(blender: Blender, shots: list[Job], blend: Path, folder: Path, denoise: bool) -> Seconds:
     seconds = np.zeros(2)
     for shot in shots:
         image = str(folder / f"{shot.name}_####")
@@ -92,7 +92,7 @@ def by_loop(blender: Blender, shots: list[Shot], blend: Path, folder: Path, deno
     return seconds
 
 
-def by_batch(blender: Blender, shots: list[Shot], blend: Path, folder: Path) -> Seconds:
+def by_batch(blender: Blender, shots: list[Job], blend: Path, folder: Path) -> Seconds:
     folder.mkdir(parents=True)
     rows = [{key: value for key, value in vars(shot).items() if value is not None} for shot in shots]
     (folder / "shots.json").write_text(json.dumps(rows), encoding="utf-8")
@@ -107,7 +107,7 @@ def without_denoising(blender: Blender, folder: Path) -> Path:
     return path
 
 
-def same_pixels(shots: list[Shot], loop: Path, batch: Path) -> int:
+def same_pixels(shots: list[Job], loop: Path, batch: Path) -> int:
     """How many shots are the same to the bit in every channel."""
 
     def channels(path: Path) -> dict[str, np.ndarray]:

@@ -38,8 +38,8 @@ from benchmarks import race
 from benchmarks.batch import STILL, STUDIO
 from viewcam_addon import image
 from viewcam_addon.files import written_whole
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.jobs.makers import orbit
-from viewcam_addon.jobs.shot import Shot
 from viewcam_addon.labels import DEPTH_STEPS, files, masks
 from viewcam_addon.png import encoded
 
@@ -103,7 +103,7 @@ def judged(seconds: Mapping[str, Spent], differing: Mapping[str, float]) -> bool
     return seconds["ours"].wall <= theirs and max(differing.values()) <= ON_EDGES
 
 
-def measured(shots: Sequence[Shot], folder: Path) -> dict[str, Spent]:
+def measured(shots: Sequence[Job], folder: Path) -> dict[str, Spent]:
     """What ours, Cycles' passes, and what is made of them have taken; all files are in the folder."""
     blend, middle = folder / "indexed.blend", len(shots) // 2
     with race.Contestant(prepare_passes, blend, list(shots), folder / "passes") as blender:
@@ -116,7 +116,7 @@ def measured(shots: Sequence[Shot], folder: Path) -> dict[str, Spent]:
     return {"ours": Spent(*np.sum(ours, axis=0)), "passes": Spent(*np.sum(theirs, axis=0)), "made of them": made}
 
 
-def labelled(blend: Path, shots: Sequence[Shot], folder: Path) -> Spent:
+def labelled(blend: Path, shots: Sequence[Job], folder: Path) -> Spent:
     """What `viewcam batch` takes, which makes a folder named as the first shot; SystemExit if it fails."""
     rows = [{key: value for key, value in vars(shot).items() if value is not None} for shot in shots]
     listed = blend.with_name("shots.json")
@@ -131,7 +131,7 @@ def labelled(blend: Path, shots: Sequence[Shot], folder: Path) -> Spent:
     return spent(run)
 
 
-def prepare_passes(blend: Path, shots: Sequence[Shot], folder: Path) -> dict[str, Callable[[int, int], Spent]]:
+def prepare_passes(blend: Path, shots: Sequence[Job], folder: Path) -> dict[str, Callable[[int, int], Spent]]:
     """In Blender's process: the still with an index for each object and material, for both; and what renders the passes of
     shots, from which to which, counted from 1.
     """
@@ -202,7 +202,7 @@ def table(seconds: Mapping[str, Spent], count: int) -> Iterator[str]:
         yield f"| {name} | {each.wall:.1f} | {each.cpu:.1f} | {count / each.wall:.2f} | {ours.wall / each.wall:.0%} |"
 
 
-def compared(shots: Sequence[Shot], folder: Path) -> dict[str, float]:
+def compared(shots: Sequence[Job], folder: Path) -> dict[str, float]:
     """Of each pass the share of all pixels that differ."""
     shares = [
         differences(_ours(folder / "ours", shot), image.read(folder / "passes" / f"{number:04d}.exr", tuple(TOLERANCES)).passes)
@@ -211,7 +211,7 @@ def compared(shots: Sequence[Shot], folder: Path) -> dict[str, float]:
     return {name: float(np.mean([each[name] for each in shares])) for name in TOLERANCES}
 
 
-def _ours(folder: Path, shot: Shot) -> dict[str, NDArray]:
+def _ours(folder: Path, shot: Job) -> dict[str, NDArray]:
     """Our passes, with the index of each instance's object."""
     (path,) = folder.glob(f"*/{shot.name}.labels.json")
     indices = {each["id"]: each["object_index"] for each in files.read(path)["instances"]}

@@ -52,20 +52,18 @@ ROOMS = {
     "comparison": "errors files html_page pinhole image png",
     "tracer": "errors checks memory files npy pinhole image",
     "labels": "errors files png pinhole image cameras tracer",
-    "api": "errors child_process image comparison tracer labels",
-    "pytest_plugin": "errors junit api",
+    "api": "errors image comparison tracer labels",
+    "pytest_plugin": "errors junit jobs",
     "jobs": (
-        "errors checks files terminal events html_page child_process pinhole moves image cameras comparison tracer labels"
+        "errors checks files terminal events argument_types html_page child_process pinhole moves image cameras comparison "
+        "tracer labels api"
     ),
     "blender": (
-        "errors checks files terminal html_page child_process png pinhole roll rotation moves diagram photo_match image "
+        "errors checks files terminal events html_page child_process png pinhole roll rotation moves diagram photo_match image "
         "intrinsics camera_values cameras comparison tracer labels jobs"
     ),
-    "commands": (
-        "errors files terminal argument_types events crashes child_process pinhole image cameras comparison tracer labels "
-        "api jobs"
-    ),
-    "cli": "errors checks files junit events argument_types tracer commands",
+    "commands": ("errors files terminal argument_types events crashes pinhole image cameras comparison tracer labels api jobs"),
+    "cli": "errors checks files junit events argument_types tracer jobs commands",
 }
 BLENDER_ROOMS = {
     "versions": "",
@@ -90,10 +88,10 @@ BLENDER_ROOMS = {
     "own_picture": "",
     "animation": "datablocks storage targets camera resolution",
     "scenes": "versions temporary_settings another_blender picture findings datablocks pose conversion camera",
-    "rendering": "versions temporary_settings another_blender opening datablocks resolution scenes",
+    "rendering": "versions temporary_settings another_blender datablocks scenes",
     "interface": (
         "versions temporary_settings picture findings render_settings preferences datablocks storage targets hold causes "
-        "pose conversion camera own_picture scenes rendering"
+        "pose conversion camera own_picture scenes rendering jobs"
     ),
     "jobs": "versions temporary_settings opening datablocks camera resolution scenes rendering",
 }
@@ -207,7 +205,7 @@ def test_the_table_has_no_circle_and_no_arrow_that_nothing_uses():
         ("if TYPE_CHECKING:\n    from .blender import camera", "roll.py"),
         ("from .render import Tracer", "tracer/native.py"),
         ("from ..native import CoreScene", "tracer/scene/lamps.py"),
-        ("from .rendering import job", "blender/camera.py"),
+        ("from .rendering import cycles", "blender/camera.py"),
     ],
 )
 def test_an_import_that_is_not_in_the_table_is_seen(source, path):

@@ -12,8 +12,10 @@ from xml.etree import ElementTree
 import numpy as np  # noqa: F401 - before pytester, which forgets what is imported while it runs
 import pytest
 
-from viewcam_addon import api, junit, pytest_plugin
+from viewcam_addon import junit, pytest_plugin
 from viewcam_addon.cli import main
+from viewcam_addon.errors import InputError
+from viewcam_addon.jobs import check as checks
 
 pytest_plugins = ["pytester"]
 
@@ -36,22 +38,24 @@ def run(pytester, monkeypatch):
 
 @pytest.fixture
 def asked(monkeypatch):
-    """The words of each command, none of which is run; blue.blend fails, and none.blend is not there."""
-    words = []
+    """What is asked of jobs.check, none of which is done; blue.blend fails, and none.blend is not there."""
+    calls = []
 
-    def told(*given):
-        words.append([str(word) for word in given])
-        if "none.blend" in str(given[1]):
-            raise api.InputError("none.blend is not there: give another")
-        passed = "blue" not in str(given[1])
-        return api.Check(
-            passed,
-            "fine" if passed else VERDICT,
-            {"answer": "same" if passed else "different", "passed": passed, "passes": [{"name": "Depth", "max": 0.5}]},
-        )
+    def answer(name):
+        def call(*paths, **options):
+            calls.append((name, [str(path) for path in paths], options))
+            if "none.blend" in str(paths[0]):
+                raise InputError("none.blend is not there: give another")
+            passed = "blue" not in str(paths[0])
+            answer = "same" if passed else "different"
+            figures = {"answer": answer, "passed": passed, "passes": [{"name": "Depth", "max": 0.5}]}
+            return checks.Check(passed, "fine" if passed else VERDICT, figures)
 
-    monkeypatch.setattr(api, "run", told)
-    return words
+        return call
+
+    for name in ("check", "compare"):
+        monkeypatch.setattr(checks, name, answer(name))
+    return calls
 
 
 def test_a_failure_is_the_verdict_and_where_the_report_is_and_no_traceback(run, asked, pytester):
@@ -62,7 +66,7 @@ def test_a_failure_is_the_verdict_and_where_the_report_is_and_no_traceback(run, 
     assert (
         VERDICT in told and f"report: {report / 'index.html'}" in told and "Traceback" not in told and "def test_it" not in told
     )
-    assert asked == [["check", str(pytester.path / "blue.blend"), "--report", str(report)]]
+    assert asked == [("check", [str(pytester.path / "blue.blend")], {"report": report})]
 
 
 def test_options_are_those_of_the_command_and_marks_give_them_for_all(run, asked, pytester):
@@ -72,13 +76,15 @@ def test_options_are_those_of_the_command_and_marks_give_them_for_all(run, asked
         @pytest.mark.viewcam(level="direct")
         def test_it(viewcam_check, same_picture):
             viewcam_check("a.blend", samples=8, clay=True, camera=None, strict=False, scene="a.json")
-            same_picture("a.exr", "b.exr", "c.exr", test_samples=3, level=None, samples=None)
+            same_picture("a.exr", "b.exr", "c.exr", threads=3, level=None, samples=None)
     """
     run(text).assert_outcomes(passed=1)
-    here = str(pytester.path)
-    first, second = asked
-    assert first == ["check", f"{here}/a.blend", "--level", "direct", "--samples", "8", "--clay", "--scene", f"{here}/a.json"]
-    assert second == ["compare", f"{here}/a.exr", f"{here}/b.exr", f"{here}/c.exr", "--test-samples", "3"]
+    here = pytester.path
+    options = {"level": "direct", "samples": 8, "clay": True, "scene": here / "a.json"}
+    assert asked == [
+        ("check", [str(here / "a.blend")], options),
+        ("compare", [str(here / name) for name in ("a.exr", "b.exr", "c.exr")], {"threads": 3}),
+    ]
 
 
 def test_tests_that_judge_pictures_can_be_left_out(run, asked):

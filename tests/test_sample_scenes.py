@@ -11,7 +11,8 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.jobs import renderer as jobs
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer.scene import Spheres
 
 pytestmark = pytest.mark.slow
@@ -126,7 +127,7 @@ def test_flight_moves_eye_and_look_at_and_the_camera_follows(opened):
 
 
 def test_spheres_are_exact_spheres_and_one_is_an_ellipsoid(fresh_blender):
-    exported = job.export(job.Request(blend=FOLDER / "spheres.blend", strict=True))
+    exported = jobs.export(Job(blend=FOLDER / "spheres.blend", strict=True))
     spheres = {name: shape for name, shape in exported.geometries.items() if isinstance(shape, Spheres)}
     assert sum(len(shape.radii) for shape in spheres.values()) >= 6000
     matrices = [matrix for thing in exported.objects if thing.geometry in spheres for matrix in thing.matrices]

@@ -16,7 +16,7 @@ import os, signal, sys, time
 from viewcam_addon import errors
 from viewcam_addon import child_process
 
-def answers(request):
+def answers(request, tell):
     print("words that are nobody's business")
     if "die" in request:
         os.kill(os.getpid(), signal.SIGKILL)
@@ -24,6 +24,8 @@ def answers(request):
         raise getattr(errors, request["raise"])("the lamp is broken: mend it")
     if "bug" in request:
         return request["nothing of that name"]
+    for number in range(request.get("tells", 0)):
+        tell("progress", share=number)
     if "sleep" in request:
         time.sleep(request["sleep"])
     return {"heard": request, "process": os.getpid()}

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from . import cameras as cameras
-    from .api import Check as Check
-    from .api import check as check
     from .api import compare as compare
     from .api import label as label
     from .api import read_scene as read_scene
     from .api import render as render
     from .errors import InputError as InputError
     from .image import Image as Image
+    from .jobs.check import Check as Check
+    from .jobs.check import check as check
     from .labels.scene_labels import Labels as Labels
     from .pinhole import Pinhole as Pinhole
     from .tracer.scene import Scene as Scene
@@ -25,7 +25,7 @@ _HOMES = {
     "Pinhole": "pinhole",
     "Scene": "tracer.scene",
     "Image": "image",
-    "Check": "api",
+    "Check": "jobs.check",
     "InputError": "errors",
     "cameras": "cameras",
     "read_scene": "api",
@@ -33,7 +33,7 @@ _HOMES = {
     "label": "api",
     "Labels": "labels.scene_labels",
     "compare": "api",
-    "check": "api",
+    "check": "jobs.check",
 }
 __all__ = [
     "Check",

@@ -1,17 +1,16 @@
 """What `import viewcam_addon as vp` gives: a camera, a picture traced of a scene, and what two pictures differ by.
 
 Everything here takes what is in memory or the path of a file, and gives what is in memory; the command line is made of the same
-functions. Nothing needs Blender but `check`, which runs it in a process of its own. Where Blender is a module of this process,
+functions. Nothing here needs Blender. Where Blender is a module of this process,
 no picture may be read from a file in it or written (image.py says why): those in memory may be compared.
 """
 
-import json
+import functools
 import os
-import tempfile
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from . import image as images
 from .errors import InputError
@@ -49,6 +48,7 @@ def render(
     threads: int | None = None,
     error: float | None = None,
     watcher: tracing.Watcher | None = None,
+    keeper: tracing.Keeper | None = None,
 ) -> Image:
     """Trace a scene with the reference tracer.
 
@@ -56,7 +56,7 @@ def render(
     level : "geometry", "direct", "path", or "auto" for the least one that leaves nothing out.
     samples : of each pixel, at the levels of light. seed : another for other noise. threads : all cores where None.
     error : the standard error of each pixel, scene-linear, instead of a number of samples.
-    watcher : is told of rows that are done, and may stop it.
+    watcher : is told of rows that are done, and may stop it. keeper : of what scenes share that are traced one after another.
 
     Returns the passes by name, (height, width, channels) float32, rows from the bottom, with the camera.
 
@@ -67,7 +67,7 @@ def render(
     """
     scene = scene if isinstance(scene, Scene) else read_scene(scene)
     level = least_level(scene)[0] if level == "auto" else level
-    passes = tracing.render(scene, level, MOST_SAMPLES if error else samples, seed, threads, watcher, error)
+    passes = tracing.render(scene, level, MOST_SAMPLES if error else samples, seed, threads, watcher, error, keeper)
     attributes = {"software": "Virtual Pinhole", "level": level}
     if level != "geometry":
         if error:
@@ -115,6 +115,8 @@ def compare(
     renderer: "Renderer | None" = None,
     partial: bool = False,
     everything: Image | File | None = None,
+    keeper: tracing.Keeper | None = None,
+    may_be_empty: bool = False,
 ) -> "GeometryComparison | RadianceComparison":
     """What a picture differs from the tracer's by, how much, and whether it is explained.
 
@@ -123,7 +125,8 @@ def compare(
     test_samples : of each test picture, where that is not what its file tells. renderer : who made it, one of
     comparison.renderers; Cycles by default. partial : of geometry, whether it may lack passes: Depth, Distance or Position is
     enough. everything : Cycles' picture with all that the scene's ledger says is not modelled, of the first test's seed; it
-    tells on how much of the picture that is.
+    tells on how much of the picture that is. keeper : as of `render`. may_be_empty : whether pictures that show no object are
+    different, and no error.
 
     Returns geometry's comparison or that of light: `.answer`, `.passed`, `.sentence`, `.lines()`, `.to_json()`.
 
@@ -134,7 +137,10 @@ def compare(
         either picture shows an object.
     """
     from .comparison import geometry, radiance, renderers
+    from .comparison.coincident import SAMPLES as SAMPLES_OF_COINCIDENT
+    from .comparison.coincident import CoincidentLight
     from .comparison.everything import not_modelled
+    from .comparison.tolerances import ROUNDINGS
 
     several = tests if isinstance(tests, Sequence) and not isinstance(tests, str) else [tests]
     if files := [each for each in (reference, *several) if not isinstance(each, Image)]:
@@ -149,10 +155,21 @@ def compare(
     # The picture may be of another size than the scene says, or of the stated camera.
     shown = scene and replace(scene, camera=camera)
     if radiance.carries_light(of):
-        lit = radiance.compare(of, pictures, camera, test_samples)
-        if shown is None or not (names := shown.not_modelled):
+        if shown is None:
+            return radiance.compare(of, pictures, camera, test_samples)
+        makes_tracer = functools.cache(lambda: (keeper or tracing.Keeper()).tracer(shown, threads))
+
+        def coincident() -> CoincidentLight:
+            level = of.attributes.get("level", "path")
+            light, pairs = makes_tracer().coincident_light(level, SAMPLES_OF_COINCIDENT, 0, ROUNDINGS[-1])
+            return CoincidentLight(Image(light), pairs)
+
+        lit = radiance.compare(of, pictures, camera, test_samples, coincident)
+        names = tuple(dict.fromkeys((*shown.not_modelled, *lit.taken_out.names)))
+        if not names:
             return lit
-        surfaces = tracing.Tracer(shown, threads).pixels_of(names)
+        surfaces = makes_tracer().pixels_of(shown.not_modelled)
+        surfaces |= {name: surfaces.get(name, False) | lit.taken_out.pixels for name in lit.taken_out.names}
         return replace(lit, not_modelled=not_modelled(names, surfaces, of, pictures, whole, camera))
     if len(pictures) != 1:
         raise InputError(f"{of.source} has no noise that several pictures could tell: compare it with one")
@@ -160,64 +177,11 @@ def compare(
     if shown is None:
         found = geometry.compare(of, pictures[0], camera, renderer=by, partial=partial)
     else:
-        tracer = tracing.Tracer(shown, threads)
+        tracer = (keeper or tracing.Keeper()).tracer(shown, threads)
         stated = shown.stated_camera if scene and camera == scene.camera else None
-        found = geometry.compare(of, pictures[0], camera, tracer.surface_at, stated, shown.origin, by, partial)
+        found = geometry.compare(of, pictures[0], camera, tracer.surfaces_at, stated, shown.origin, by, partial)
         names = shown.not_modelled
         found = replace(found, not_modelled=not_modelled(names, tracer.pixels_of(names), of, pictures, whole))
-    if found.shows_nothing:
+    if found.shows_nothing and not may_be_empty:
         raise InputError(found.sentence)
     return found
-
-
-@dataclass(frozen=True)
-class Check:
-    """What `check` has found, or a comparison of files.
-
-    passed : whether Cycles renders the camera, or the pictures are the same. sentence : by how much. figures : all that --json
-    writes. answer : one of "same", "same_but" (the same, but for objects that are not modelled) and "different".
-    """
-
-    passed: bool
-    sentence: str
-    figures: dict[str, Any]
-
-    @property
-    def answer(self) -> str:
-        return str(self.figures["answer"])
-
-
-def check(blend: File, *options: File) -> Check:
-    """True if Cycles renders the camera of a .blend file, by `viewcam check` in a process of its own.
-
-    options : those of the command, as in `check("shot.blend", "--camera", "Camera", "--level", "direct")`.
-
-    Raises
-    ------
-    InputError
-        as the command does: no Blender, no such file or camera, no such option.
-    """
-    return run("check", blend, *options)
-
-
-def run(command: str, *words: File) -> Check:
-    """What `viewcam check` or `viewcam compare` finds, in a process of its own; raises as `check` does."""
-    from . import child_process
-
-    with tempfile.TemporaryDirectory(prefix="viewcam-") as folder:
-        result, errors = Path(folder) / "result.json", _Errors()
-        given = [str(word) for word in (*words, "--json", result)]
-        status = child_process.run_viewcam(command, *given, tell_on=errors, apart_from=child_process.blender_scripts())
-        if not result.exists() or "answer" not in (figures := json.loads(result.read_text(encoding="utf-8"))):
-            raise InputError(errors.last or f"viewcam {command} ended with status {status} and without a word")
-    return Check(status == 0, figures["sentence"], figures)
-
-
-class _Errors:
-    """The last sentence of what goes wrong."""
-
-    last = ""
-
-    def tell(self, event: str, **fields: Any) -> None:
-        if event == "error":
-            self.last = fields["text"]

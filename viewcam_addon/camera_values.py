@@ -40,6 +40,7 @@ class CameraValues:
     view_when_set : (eye, look_at, up) from which the next edit sets out, None where that is not known.
     precision : the relative rounding of the values, 2⁻⁵³ where all are known in float64, else float32's 2⁻²⁴.
     follows : those of "eye" and "look_at" that are set to follow an object.
+    asked : (name, number) of other looks at the values, such as a lens in millimeters or the roll, that count over them.
     """
 
     eye: Triple
@@ -57,6 +58,7 @@ class CameraValues:
     view_when_set: tuple[Triple, Triple, Triple] | None = None
     precision: float = 2.0**-24
     follows: tuple[str, ...] = ()
+    asked: tuple[tuple[str, float], ...] = ()
 
     def view(self) -> Pinhole:
         """Where the values look, in a picture of one pixel and whatever a held roll is.
@@ -128,6 +130,18 @@ class CameraValues:
     def seeing(self, distance: float, frame: Frame, sensor_fit: str) -> "CameraValues":
         """This view by another lens; the zoom stays. distance : the effective one in the picture of `frame` at 100 %."""
         return replace(self, distance=distance / self.growth(frame, sensor_fit) / self.zoom)
+
+    def rolled(self, angle: float, up_axis: Triple, held: float) -> "CameraValues":
+        """The same view with the roll that `roll_from` says: another up, or where it is held another held roll.
+
+        Raises
+        ------
+        InputError
+            as `view` does.
+        """
+        if self.pole == HOLD:
+            return replace(self, held_roll=self.held_roll + angle - self.roll_from(up_axis, held))
+        return replace(self, up=rolls.rolled(rolls.turned(self.view(), held), up_axis, angle).up)
 
     def moved_to(
         self, found: Pinhole, moved: Collection[str], bound: Collection[tuple[str, int]], up_axis: Triple, rounding: float

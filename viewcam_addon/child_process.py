@@ -8,8 +8,8 @@ way what `--log-json` tells (events.py).
 **It is kept open and asked one thing after another** (ServerProcess): a dict in, a dict out. Both ends of the connection exist
 before the process does, which inherits its own. So nothing has to be found, nobody else can call, and each side sees the end of
 the connection as soon as the other is gone, however it went: a process whose asker was killed ends by itself. Requests and
-answers are JSON; while an answer is being found, an empty message each second is a heartbeat, which a process that is stopped
-or stuck does not give.
+answers are JSON; while an answer is being found, events are told (events.py), and an empty message each second is a heartbeat,
+which a process that is stopped or stuck does not give.
 
 Rejected: ending a child alone (`viewcam check` has children itself, which would trace on for minutes after it; and a signal
 that the child could answer by ending them Blender does not let Python hear while it renders); standard input and output for
@@ -176,7 +176,7 @@ class ServerProcess:
     """The process, as the one who asks has it: it ends with `close`, or with whoever started it.
 
     name : what sentences call it. command : its handle is added as the last word, for `answer`. log : a file for what it
-    prints, nowhere by default.
+    prints, nowhere by default. events : whoever is told what it tells on the way, nobody by default.
 
     Raises
     ------
@@ -184,8 +184,15 @@ class ServerProcess:
         if the process can't be started.
     """
 
-    def __init__(self, name: str, command: Sequence[str], variables: Mapping[str, str], log: Path = Path(os.devnull)) -> None:
-        self._name, self._timeout = name, START_TIMEOUT
+    def __init__(
+        self,
+        name: str,
+        command: Sequence[str],
+        variables: Mapping[str, str],
+        log: Path = Path(os.devnull),
+        events: Events | None = None,
+    ) -> None:
+        self._name, self._timeout, self._events = name, START_TIMEOUT, events
         self._ours, theirs = connection.Pipe()
         try:
             self._process = ProcessGroup([*command, str(theirs.fileno())], log, variables, theirs.fileno())
@@ -218,9 +225,9 @@ class ServerProcess:
         """
         try:
             self._ours.send_bytes(json.dumps(request).encode())
-            while not (message := self._next(ends)):
-                continue
-            answer = json.loads(message)
+            while "event" in (answer := self._next(ends)):
+                if self._events:
+                    self._events.tell(**answer)
         except (EOFError, OSError) as error:
             raise ProcessEnded(
                 f"{self._name} has ended {self._how()}", "see whether there is memory enough, then try again"
@@ -243,11 +250,12 @@ class ServerProcess:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _next(self, ends: float) -> bytes:
-        """The next message."""
-        if self._ours.poll(max(0.0, min(self._timeout, ends - time.monotonic()))):
+    def _next(self, ends: float) -> dict[str, Any]:
+        """The next message that is no heartbeat."""
+        while self._ours.poll(max(0.0, min(self._timeout, ends - time.monotonic()))):
             self._timeout = HEARTBEAT_TIMEOUT
-            return self._ours.recv_bytes()
+            if message := self._ours.recv_bytes():
+                return json.loads(message)
         self._process.end()
         if time.monotonic() >= ends:
             raise AnswerTimeout(f"{self._name} was ended before it had answered")
@@ -264,17 +272,17 @@ class ServerProcess:
 class ServerOnDemand:
     """A server process that is started with the first question, and again if it was lost.
 
-    name : what sentences call it. module : of this package, which serves when it is run.
+    name : what sentences call it. module : of this package, which serves when it is run. events : as of ServerProcess.
     """
 
-    def __init__(self, name: str, module: str) -> None:
-        self._name, self._module = name, module
+    def __init__(self, name: str, module: str, events: Events | None = None) -> None:
+        self._name, self._module, self._events = name, module, events
         self._server: ServerProcess | None = None
 
     def ask(self, request: Mapping[str, Any]) -> Any:
         """The answer of the process; raises as ServerProcess does."""
         if self._server is None:
-            self._server = ServerProcess(self._name, module(self._module), environment())
+            self._server = ServerProcess(self._name, module(self._module), environment(), events=self._events)
         try:
             return self._server.ask(request)
         except ProcessEnded:
@@ -294,11 +302,15 @@ class ServerOnDemand:
         self.close()
 
 
-def serve(handle: str, answers: Callable[[dict[str, Any]], Any], idle: float | None = None) -> None:
+Tell = Callable[..., None]
+"""Tells an event to whoever asks: its name, and fields that JSON can hold."""
+
+
+def serve(handle: str, answers: Callable[[dict[str, Any], Tell], Any], idle: float | None = None) -> None:
     """Answer what is asked, until nobody is left to ask.
 
-    handle : the last word of this process's command. answers : gives the answer to a request, which JSON can hold.
-    idle : return as well when nothing was asked for so many seconds.
+    handle : the last word of this process's command. answers : gives the answer to a request, which JSON can hold, and may tell
+    events meanwhile. idle : return as well when nothing was asked for so many seconds.
 
     A thread of its own listens, so that this process ends within a second of its asker also in the midst of an answer.
     """
@@ -308,9 +320,9 @@ def serve(handle: str, answers: Callable[[dict[str, Any]], Any], idle: float | N
     threading.Thread(target=_listen, args=(asked, requests, left), daemon=True).start()
     try:
         while (request := requests.get(timeout=idle)) is not None:
-            with _heartbeat(asked):
-                reply = json.dumps(_reply(request, answers)).encode()
-            asked.send_bytes(reply)
+            with _sending(asked) as send:
+                reply = _reply(request, answers, lambda event, send=send, **fields: send({"event": event, **fields}))
+            asked.send_bytes(json.dumps(reply).encode())
     except (queue.Empty, OSError):  # nobody asks any more, nobody hears it any more
         return
     finally:
@@ -336,27 +348,30 @@ def _listen(asked: "connection.Connection", requests: queue.SimpleQueue, left: t
 
 
 @contextlib.contextmanager
-def _heartbeat(asked: "connection.Connection") -> Iterator[None]:
-    """Give heartbeats meanwhile."""
-    done = threading.Event()
+def _sending(asked: "connection.Connection") -> Iterator[Callable[[dict[str, Any]], None]]:
+    """Give heartbeats meanwhile, and what sends a message between them."""
+    done, one_at_a_time = threading.Event(), threading.Lock()
+
+    def send(message: bytes) -> None:
+        with contextlib.suppress(OSError), one_at_a_time:  # the thread that listens hears it, too
+            asked.send_bytes(message)
 
     def beat() -> None:
-        with contextlib.suppress(OSError):  # the thread that listens hears it, too
-            while not done.wait(_HEARTBEAT):
-                asked.send_bytes(b"")
+        while not done.wait(_HEARTBEAT):
+            send(b"")
 
     thread = threading.Thread(target=beat, daemon=True)
     thread.start()
     try:
-        yield
+        yield lambda message: send(json.dumps(message, default=str).encode())
     finally:
         done.set()
         thread.join()
 
 
-def _reply(request: dict[str, Any], answers: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:
+def _reply(request: dict[str, Any], answers: Callable[[dict[str, Any], Tell], Any], tell: Tell) -> dict[str, Any]:
     try:
-        return {"answer": answers(request)}
+        return {"answer": answers(request, tell)}
     except InputError as error:
         kind = type(error).__name__
         return {"error": str(error), "kind": kind if kind in _KINDS else InputError.__name__}

@@ -169,8 +169,6 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         added.add_argument("--difference", metavar="FILE.png", type=types.png, help="draw there what differs, pixel by pixel")
         added.add_argument("--junit", metavar="FILE.xml", type=Path, help="write the result as a test's, for CI systems")
         added.set_defaults(writes=("report", "difference"))
-        added.add_argument("--sides", type=Path, help=argparse.SUPPRESS)  # a folder for both sides as pictures
-        added.add_argument("--repeat", help=argparse.SUPPRESS)  # what the report shall name as its command
 
     @command("export", "Write the scene of a .blend as the tracer reads it.")
     def add_export(added: argparse.ArgumentParser) -> None:
@@ -222,9 +220,6 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
             "--scene", metavar="SCENE.json", type=Path, help="the reference's scene: explains silhouettes, brings the ledger"
         )
         strict(added, "if anything in the picture is not modelled")
-        added.add_argument("--everything", type=Path, help=argparse.SUPPRESS)  # Cycles' picture without stand-ins
-        # Cycles' file counts one that is left out.
-        added.add_argument("--test-samples", type=types.positive, help=argparse.SUPPRESS)
         words = "what TEST.exr holds, made elsewhere: position=P.X,P.Y,P.Z depth=Z; also distance, normal, uv, object-index"
         added.add_argument("--channels", metavar="PASS=CHANNELS", type=types.channels, nargs="+", help=words)
         report(added)
@@ -234,16 +229,25 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         added.set_defaults(run=verification.check)
         blend(added)
         scene_choices(added)
-        engines = ["CYCLES", "EEVEE", "WORKBENCH"]
+        from .commands import carry_out
+        from .jobs.job import DEVICES, TESTED
+
         words = "who renders; all but Cycles at level geometry (default: %(default)s)"
-        added.add_argument("--engine", choices=engines, default="CYCLES", help=words)
-        devices = ["CPU", "CUDA", "OPTIX", "HIP", "ONEAPI", "METAL"]
+        added.add_argument("--engine", choices=TESTED, default="CYCLES", help=words)
         words = "what Cycles renders on, all of that kind (default: %(default)s)"
-        added.add_argument("--device", choices=devices, default="CPU", help=words)
+        added.add_argument("--device", choices=DEVICES, default="CPU", help=words)
         error(added, "the tracer takes")
         against = "the scene that Cycles must show, as viewcam export wrote it (default: what the file holds now)"
         added.add_argument("--scene", metavar="SCENE.json", type=Path, help=against)
         report(added)
+        many = added.add_argument_group("many checks, a shot each; --report has their page and results")
+        many.add_argument("--frames", metavar="A..B", help="the camera at each frame (from -5 on: --frames=-5..3)")
+        many.add_argument("--cameras", metavar="GLOB", help="each camera so called: with * ? [abc]")
+        many.add_argument("--shard", metavar="I/N", help="of all these, every N-th from the I-th on")
+        kept = many.add_mutually_exclusive_group()
+        kept.add_argument("--resume", action="store_true", help="keep the results that are there from the same settings")
+        kept.add_argument("--overwrite", action="store_true", help="check all of them anew")
+        carry_out.add_machines(added)
 
     @command("batch", "Render many shots of one file: opened once, each written whole, and continued after whatever ended it.")
     def add_batch(added: argparse.ArgumentParser) -> None:
@@ -295,9 +299,9 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         added.set_defaults(
             blend=verification.DEMO_SCENE, camera=None, frame=None, size=None, strict=False, recenter=False, clay=False
         )
-        added.set_defaults(
-            difference=None, sides=None, repeat=None, scene=None, trust=False, engine="CYCLES", device="CPU", writes=("report",)
-        )
+        added.set_defaults(difference=None, scene=None, trust=False, engine="CYCLES", device="CPU", writes=("report",))
+        added.set_defaults(frames=None, cameras=None, shard=None, resume=False, overwrite=False)
+        added.set_defaults(time_limit=None, workers=None, scheduler=None)
         light(added)
         error(added, "the tracer takes")
         added.add_argument(
@@ -331,10 +335,10 @@ def _parser(blend_is_open: bool) -> argparse.ArgumentParser:
         )
 
     def add_serve(hidden: argparse.ArgumentParser) -> None:
-        from .commands import batch
+        from .commands import serve
 
-        hidden.add_argument("handle")
-        hidden.set_defaults(run=batch.serve, json=None, log_json=False, writes=())
+        hidden.add_argument("what")
+        hidden.set_defaults(run=serve.run, json=None, log_json=True, writes=(), blend=None)
 
     subparsers.add_parser("serve").add_words = add_serve  # for our own processes: without a help, the list leaves it out
     return parser

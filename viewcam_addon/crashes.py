@@ -33,7 +33,8 @@ def survived(words: list[str]) -> int | None:
     """
     if not words or words[0] not in COMMANDS or not hasattr(os, "fork"):
         return None
-    parent, is_batch = os.getpid(), words[0] == "batch"
+    parent = os.getpid()
+    is_batch = words[0] == "batch" or any(word.startswith(("--frames", "--cameras")) for word in words)
     passing = {signal.SIGINT: signal.SIGUSR1, signal.SIGTERM: signal.SIGUSR2}
     child = os.fork()
     if child == 0:

@@ -1,4 +1,4 @@
-"""JUnit XML, which every CI system reads: what a command has found, as the one test of a suite.
+"""JUnit XML, which every CI system reads: what a command has found, as a test of a suite, or a test for each shot.
 
 The format has no schema that all agree upon; this is what pytest writes (xunit2), and nothing that another reader refuses. The
 figures are properties of the test: those of `--json`, their keys joined by dots, as in `passes.Position.percentiles.max.value`.
@@ -41,32 +41,61 @@ def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def write(path: Path, words: str, status: int, result: Mapping[str, Any], seconds: float) -> None:
-    """Write one test of one suite.
+    """Write one suite: one test, or one for each of the result's `shots`.
 
-    path : the file. words : those of the command, the test's name. status : its exit status: 0 passed, 1 failed, 3 failed where
-    there is an `answer`, another one an error. result : what --json writes, with `sentence` or `error`. seconds : it took.
+    path : the file. words : those of the command, the test's name, or the suite's of several. status : its exit status: 0
+    passed, 1 failed, 3 failed where there is an `answer`, another one an error. result : what --json writes, with `sentence` or
+    `error`. seconds : it took.
 
     Raises
     ------
     InputError
         if it can't be written.
     """
-    kind = {0: None, 1: "failure", 3: "failure" if "answer" in result else "error"}.get(status, "error")
-    counts = {"errors": kind == "error", "failures": kind == "failure", "skipped": False, "tests": True}
-    took = f"{seconds:.3f}"
+    if shots := result.get("shots"):
+        cases = [
+            _case(
+                shot["name"], *_outcome_of(shot, result.get("strict", False)), shot, shot.get("timing", {}).get("seconds", 0.0)
+            )
+            for shot in shots
+        ]
+    else:
+        kind = {0: None, 1: "failure", 3: "failure" if "answer" in result else "error"}.get(status, "error")
+        cases = [_case(words, kind, result.get("error") or result.get("sentence") or f"exit status {status}", result, seconds)]
+    kinds = [child.tag for case in cases for child in case]
+    counts = {"errors": kinds.count("error"), "failures": kinds.count("failure"), "skipped": kinds.count("skipped")}
+    counted = {name: str(count) for name, count in {**counts, "tests": len(cases)}.items()}
     suites = ElementTree.Element("testsuites", name="viewcam")
-    counted = {name: str(int(count)) for name, count in counts.items()}
-    suite = ElementTree.SubElement(suites, "testsuite", name="viewcam", **counted, time=took)
-    case = ElementTree.SubElement(suite, "testcase", classname="viewcam", name=_text(words), time=took)
-    if figures := properties(result):
-        of_case = ElementTree.SubElement(case, "properties")
-        for name, value in figures:
-            ElementTree.SubElement(of_case, "property", name=_text(name), value=_text(value))
-    if kind:
-        sentence = _text(result.get("error") or result.get("sentence") or f"exit status {status}")
-        ElementTree.SubElement(case, kind, message=sentence).text = sentence
+    suite = ElementTree.SubElement(suites, "testsuite", name="viewcam", **counted, time=f"{seconds:.3f}")
+    suite.extend(cases)
     with written_whole(path) as temporary:
         ElementTree.ElementTree(suites).write(temporary, encoding="utf-8", xml_declaration=True)
+
+
+def _case(name: str, kind: str | None, sentence: str, figures: Mapping[str, Any], seconds: float) -> ElementTree.Element:
+    """One test. kind : "failure", "error" or "skipped", None where it passed. sentence : why."""
+    case = ElementTree.Element("testcase", classname="viewcam", name=_text(name), time=f"{seconds:.3f}")
+    if named := properties({key: value for key, value in figures.items() if key != "timing"}):
+        of_case = ElementTree.SubElement(case, "properties")
+        for key, value in named:
+            ElementTree.SubElement(of_case, "property", name=_text(key), value=_text(value))
+    if kind:
+        ElementTree.SubElement(case, kind, message=_text(sentence)).text = _text(sentence)
+    return case
+
+
+def _seconds(shot: Mapping[str, Any]) -> float:
+    return float(shot.get("timing", {}).get("seconds", 0.0))
+
+
+def _outcome_of(shot: Mapping[str, Any], strict: bool) -> tuple[str | None, str]:
+    """What became of a shot of a summary, and why. strict : whether what is not modelled fails it."""
+    if shot["state"] == "failed":
+        return "error", shot["error"]
+    if shot["state"] == "left":
+        return "skipped", "left to check"
+    passed = shot.get("passed", True) and not (strict and shot.get("answer") == "same_but")
+    return (None if passed else "failure"), shot.get("verdict", "")
 
 
 def _text(text: str) -> str:

@@ -1,8 +1,8 @@
 """pytest-viewcam: pictures and cameras as tests. pytest finds it by its entry point (pyproject.toml); docs/ci.md shows it.
 
 It is imported in every run of pytest in an environment that has this project, so nothing is imported here before it is used.
-Everything is judged by the commands of viewcam, in processes of their own: what one test's Blender does can't touch the next
-test, and a test may use bpy itself.
+Everything is judged in processes of their own: what one test's Blender does can't touch the next test, and a test may use bpy
+itself.
 """
 
 import re
@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from .api import Check
+    from .jobs.check import Check
 
-Option = str | float | Path | bool | None
+Option = str | float | Path | bool | tuple[int, int] | None
 
 _FIXTURES = {"viewcam_check", "same_picture"}
 _FILES = ("scene", "report", "difference")
@@ -79,12 +79,12 @@ class _Runner:
         self._request, self._runs = request, 0
 
     def __call__(self, command: str, paths: list[str | Path], given: dict[str, Option]) -> "Check":
-        from . import api
         from .errors import InputError
+        from .jobs import check as checks
 
         node, folder, self._runs = self._request.node, self._request.path.parent, self._runs + 1
         options = {name: value for mark in reversed(list(node.iter_markers("viewcam"))) for name, value in mark.kwargs.items()}
-        options |= given
+        options = {name: value for name, value in (options | given).items() if value is not None and value is not False}
         for name in _FILES:
             if isinstance(options.get(name), str | Path):
                 options[name] = folder / options[name]
@@ -92,8 +92,11 @@ class _Runner:
         if reports is not None:
             options.setdefault("report", self._report(reports))
         try:
-            check = api.run(command, *(folder / path for path in paths), *_words(options))
+            judged = getattr(checks, command)
+            check = judged(*(folder / path for path in paths), **options)
         except InputError as error:
+            pytest.fail(str(error), pytrace=False)
+        except TypeError as error:  # an option that there is not
             pytest.fail(str(error), pytrace=False)
         self._record(options.get("report"), check)
         if not check.passed:
@@ -115,12 +118,3 @@ class _Runner:
         if report:
             found.append(("report", str(Path(str(report), "index.html"))))
         self._request.node.user_properties += [(f"{prefix}.{name}", value) for name, value in found]
-
-
-def _words(options: dict[str, Option]) -> list[str]:
-    """As the command line has them: a flag stands alone, and what is None or False is left out."""
-    words = []
-    for name, value in options.items():
-        if value is not None and value is not False:
-            words += [f"--{name.replace('_', '-')}", *([] if value is True else [str(value)])]
-    return words

@@ -184,7 +184,7 @@ class Block:
 
     def _of_geometry(self, test: Passes) -> float:
         image = rivals.without_the_tracers_own(Image(test))
-        return rivals.of_geometry(self._bench.surfaces, image, self._bench.tracer.surface_at)
+        return rivals.of_geometry(self._bench.surfaces, image, self._bench.tracer.surfaces_at)
 
     def _surfaces(self, tracer: Tracer, random: np.random.Generator) -> Passes:
         width, height = faults.SIZE

@@ -28,9 +28,9 @@ Array = NDArray[np.float64]
 OURS = "ours"
 
 
-def of_geometry(reference: Image, test: Image, surface_at: Callable) -> float:
+def of_geometry(reference: Image, test: Image, surfaces_at: Callable) -> float:
     """Ours, of geometry: the largest share of what is allowed."""
-    found = geometry.compare(reference, test, reference.camera, surface_at)
+    found = geometry.compare(reference, test, reference.camera, surfaces_at)
     shares = [share for row in found.rows for share in row.shares]
     if found.systematic:
         shares.append(found.systematic.mean / found.systematic.tolerance)

@@ -24,8 +24,9 @@ from numpy.typing import NDArray
 
 from viewcam_addon import image
 from viewcam_addon.blender.camera import apply
-from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.comparison.geometry import compare
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import Tracer, render
 from viewcam_addon.tracer.scene import Mesh, Object, Scene
@@ -167,7 +168,7 @@ def _cycles(places: Array) -> list[Curve]:
             _set_stage(place)
             for method, recenter in methods.items():
                 path = Path(name, f"{number}-{recenter}.exr")
-                exported[method, place] = path, job.export_and_render(job.Request(recenter=recenter), [path])
+                exported[method, place] = path, jobs.both_sides(Job(recenter=recenter), [path])
         with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:  # where there is no Blender
             pictures = list(pool.map(image.read, [path for path, _ in exported.values()]))
     errors: dict[str, list[float]] = {method: [] for method in methods}

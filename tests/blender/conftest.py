@@ -179,12 +179,13 @@ def both_sides(fresh_blender, scene, tmp_path, read_passes):
     scene.render.resolution_x, scene.render.resolution_y = 160, 120
 
     def make(**request):
-        from viewcam_addon.blender.rendering import job
+        from viewcam_addon.blender.jobs import renderer as jobs
+        from viewcam_addon.jobs.job import Job
 
-        exported = job.export_and_render(job.Request(threads=2, **request), [tmp_path / "cycles.exr"])
+        exported = jobs.both_sides(Job(threads=2, **request), [tmp_path / "cycles.exr"])
         tracer = render.Tracer(exported, 2)
         traced, (cycles,) = render.render(exported, threads=2), read_passes([tmp_path / "cycles.exr"])
-        comparison = geometry.compare(Image(traced), Image(cycles), exported.camera, tracer.surface_at, exported.stated_camera)
+        comparison = geometry.compare(Image(traced), Image(cycles), exported.camera, tracer.surfaces_at, exported.stated_camera)
         return BothSides(exported, traced, cycles, comparison)
 
     return make

@@ -263,7 +263,7 @@ def test_a_check_at_another_size_sees_the_held_camera_and_leaves_it_as_it_was(he
     group.held_roll = 1.0
     group.when_set = group.when_set.replace("[", "[ ")  # as nobody but this test would write it
     expected, before = cameras.stated(held_camera, scene).basis(), (group.held_roll, group.when_set, axes(held_camera).tolist())
-    found = both_sides(size=(120, 90))
+    found = both_sides(width=120, height=90)
     np.testing.assert_array_equal(found.exported.stated_camera.basis(), expected)
     found.check()
     assert (group.held_roll, group.when_set, axes(held_camera).tolist()) == before

@@ -11,9 +11,10 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.comparison import radiance
 from viewcam_addon.image import Image
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer.render import render
 
 pytestmark = pytest.mark.slow
@@ -49,7 +50,7 @@ def stage(fresh_blender, scene, camera_object, make_material, add_lamp, read_pas
             added = light(rng)
             bpy.context.view_layer.update()
             some = [tmp_path / f"{number}-{picture}.exr" for picture in range(pictures)]
-            exported = job.export_and_render(job.Request(level="direct", samples=samples, seed=number), some)
+            exported = jobs.both_sides(Job(level="direct", samples=samples, seed=number), some)
             ours.append((exported, render(exported, "direct", samples, seed=number, threads=1)))
             paths += some
             bpy.data.objects.remove(added)

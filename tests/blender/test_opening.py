@@ -16,10 +16,10 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon import child_process
 from viewcam_addon.blender import dataset_cameras, opening, versions
+from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.jobs.renderer import BlenderRenderer
-from viewcam_addon.blender.rendering import job
 from viewcam_addon.errors import InputError, NotModelledError
-from viewcam_addon.jobs.shot import Shot
+from viewcam_addon.jobs.job import Job
 
 pytestmark = pytest.mark.slow
 
@@ -29,7 +29,7 @@ def shots(**more):
         with BlenderRenderer(blend, trust=trust) as renderer:
             warnings = []
             for frame in (1, 2, 3):
-                shot = Shot(f"shot_{frame}", (0, -8, 0), (0, 0, 0), (0, 0, 1), 16.0, frame=frame, **more)
+                shot = Job(f"shot_{frame}", (0, -8, 0), (0, 0, 0), (0, 0, 1), 16.0, frame=frame, **more)
                 warnings = renderer.render(shot, out / "shot.exr", out / "shot.png")["warnings"]
             return warnings
 
@@ -43,10 +43,10 @@ def told(ledger):
 COMMANDS = {
     "batch": shots(),
     "batch of VIEWCAM": shots(engine="VIEWCAM", level="geometry"),
-    "export": lambda blend, out, trust: told(job.export(job.Request(blend, frame=2, trust=trust)).ledger),
-    "cycles": lambda blend, out, trust: told(job.render(job.Request(blend, frame=2, trust=trust), out / "a.exr")),
+    "export": lambda blend, out, trust: told(jobs.export(Job(blend=blend, frame=2, trust=trust)).ledger),
+    "cycles": lambda blend, out, trust: told(jobs.cycles(Job(blend=blend, frame=2, trust=trust), out / "a.exr")),
     "check": lambda blend, out, trust: told(
-        job.export_and_render(job.Request(blend, frame=2, trust=trust, level="direct", samples=1), [out / "b.exr"]).ledger
+        jobs.both_sides(Job(blend=blend, frame=2, trust=trust, level="direct", samples=1), [out / "b.exr"]).ledger
     ),
     "audit": lambda blend, out, trust: list(dataset_cameras.of_pictures(["2"], blend, trust)[0].notes),
 }
@@ -308,7 +308,7 @@ def test_what_is_off_is_told(fresh_blender, tmp_path):
         assert "Freestyle draws no lines in view layer 'ViewLayer'" in first and "--trust" in first, name
         assert command(blend, tmp_path / "out", True) == [], name
     with pytest.raises(NotModelledError, match="Freestyle"):
-        job.export(job.Request(blend, strict=True))
+        jobs.export(Job(blend=blend, strict=True))
 
 
 def test_a_file_that_blender_reads_but_for_something_is_open_and_that_is_told(fresh_blender, scene, camera_object, tmp_path):
@@ -320,7 +320,7 @@ def test_a_file_that_blender_reads_but_for_something_is_open_and_that_is_told(fr
     blend = tmp_path / "strip.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(blend), compress=False)
     blend.write_bytes(blend.read_bytes().replace((113).to_bytes(4, "little"), (200).to_bytes(4, "little")))
-    (entry,) = job.export(job.Request(blend)).ledger
+    (entry,) = jobs.export(Job(blend=blend)).ledger
     assert entry.status == "approximated" and "channel larger than 128" in entry.reason and "--trust" not in entry.reason
 
 

@@ -277,11 +277,6 @@ def test_roll_of_a_camera_that_is_not_enabled_turns_up_and_leaves_it(camera_obje
     assert group.roll == pytest.approx(0.5) and pose(camera_object) == before and not group.enabled
 
 
-def test_roll_can_not_be_keyed_since_up_can(posed_camera):
-    with pytest.raises(TypeError, match="not animatable"):
-        posed_camera.virtual_pinhole.keyframe_insert("roll")
-
-
 def test_percentage_shows_the_same_picture(posed_camera, scene):
     at_full_size = cameras.stated(posed_camera, scene)
     scene.render.resolution_percentage = 50

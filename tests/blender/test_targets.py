@@ -283,9 +283,10 @@ def test_what_cycles_is_compared_with_follows_the_target(watching_camera, scene,
 
 
 def test_a_comparison_in_another_size_keeps_the_target(watching_camera, scene, target):
-    from viewcam_addon.blender.rendering import job
+    from viewcam_addon.blender.jobs import renderer as jobs
+    from viewcam_addon.jobs.job import Job
 
-    job.export(job.Request(size=(64, 48)))
+    jobs.export(Job(width=64, height=48))
     assert watching_camera.virtual_pinhole.look_at_target == target
     target.location.x = 3
     update()

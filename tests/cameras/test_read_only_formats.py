@@ -530,7 +530,8 @@ def test_a_camera_of_usd_stands_at_every_time_that_has_a_sample(tmp_path):
     }}"""
     (tmp_path / "a.usda").write_text(text)
     found = cameras.read(tmp_path / "a.usda", options=Options(size=(640, 480)))
-    assert [camera.pinhole.eye for camera in found] == [(1, 0, 0), (2, 0, 0), (3, 0, 0)]
+    meters = 0.01  # a unit of a stage that says none
+    assert [camera.pinhole.eye for camera in found] == [pytest.approx((meters * x, 0, 0), rel=1e-15) for x in (1, 2, 3)]
 
 
 @pytest.mark.parametrize("pointer", ["/nodes/1/translation", "/cameras/0/perspective/yfov"])

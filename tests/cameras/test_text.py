@@ -300,3 +300,65 @@ def test_a_quarter_of_a_million_characters_takes_no_time(name):
         assert len(str(error)) < 1200
     # 0.25 s at most were measured on an idle machine; what is quadratic takes minutes at a million, and a sixteenth here.
     assert time.process_time() - started < 2
+
+
+# ---- simulators and differentiable renderers
+
+
+def test_pybullets_two_matrices_are_eye_target_up_and_the_height_in_degrees():
+    text = (
+        "view = p.computeViewMatrix(cameraEyePosition=[7, -6, 4], cameraTargetPosition=[0, 0, 1], cameraUpVector=[0, 0, 1])\n"
+        "lens = p.computeProjectionMatrixFOV(fov=40, aspect=640 / 480, nearVal=0.1, farVal=100)\n"
+        "p.getCameraImage(640, 480, viewMatrix=view, projectionMatrix=lens)\n"
+    )
+    camera = read(text)
+    assert pose(camera.pinhole) == POSE and camera.size_stated
+    assert (camera.pinhole.width, camera.pinhole.height) == (640, 480)
+    assert camera.pinhole.distance[1] == pytest.approx(240 / math.tan(math.radians(20)))
+    by_place = "v = computeViewMatrix([7, -6, 4], [0, 0, 1], [0, 0, 1]); computeProjectionMatrixFOV(40, 1.5, 0.1, 9); "
+    assert read(by_place + "getCameraImage(width=600, height=400)").pinhole.distance[1] == pytest.approx(
+        200 / math.tan(math.radians(20))
+    )
+    frustum = "computeViewMatrix([7, -6, 4], [0, 0, 1], [0, 0, 1]); computeProjectionMatrix(-1, 1, -1, 1, 2, 9); "
+    assert read(frustum + "getCameraImage(300, 300)").pinhole.distance == (300, 300)
+
+
+@pytest.mark.parametrize(
+    ("axis", "eye"), [(2, (3.34923133, -2.06898911, 4.7101006)), (1, (-1.34923146, 3.71010046, -1.06898908))]
+)
+def test_pybullets_yaw_and_pitch_are_as_pybullet_has_them(axis, eye):
+    """eye : of PyBullet 3.2.7, whose numbers are float32."""
+    pinhole = said(f"p.computeViewMatrixFromYawPitchRoll([1, 2, 3], 5, 30, -20, 0, {axis})")
+    assert pinhole.eye == pytest.approx(eye, abs=1e-6) and pinhole.look_at == (1, 2, 3)
+    with pytest.raises(InputError, match="no roll"):
+        said(f"p.computeViewMatrixFromYawPitchRoll([1, 2, 3], 5, 30, -20, 15, {axis})")
+
+
+def test_pytorch3ds_view_is_on_a_sphere_and_its_angle_is_of_the_shorter_side():
+    text = (
+        "R, T = look_at_view_transform(2, 30, 90); c = FoVPerspectiveCameras(R=R, fov=90); RasterizationSettings(image_size={})"
+    )
+    pinhole = read(text.format(512)).pinhole
+    assert pinhole.eye == pytest.approx((math.sqrt(3), 1, 0)) and pinhole.look_at == (0, 0, 0) and pinhole.up == (0, 1, 0)
+    assert (pinhole.width, pinhole.height) == (512, 512) and pinhole.distance == pytest.approx((256, 256))
+    upright = read(text.format((640, 480))).pinhole  # height first
+    assert (upright.width, upright.height) == (480, 640) and upright.distance == pytest.approx((240, 240))
+    aimed = (
+        "R, T = look_at_view_transform(eye=((7, -6, 4),), at=((0, 0, 1),), up=((0, 0, 1),)); FoVPerspectiveCameras(R=R, T=T)"
+    )
+    assert pose(read(aimed).pinhole) == POSE
+    assert read(aimed).pinhole.distance[1] == pytest.approx(540 / math.tan(math.radians(30)))
+
+
+@pytest.mark.parametrize(
+    ("lens", "problem"),
+    [
+        ("PerspectiveCameras(focal_length=2.0)", "write FoVPerspectiveCameras"),
+        ("FoVOrthographicCameras(R=R)", "orthographic"),
+        ("FoVPerspectiveCameras(fov=1.0, degrees=False)", "give fov in degrees"),
+        ("FoVPerspectiveCameras(fov=angle)", "field of view"),
+    ],
+)
+def test_pytorch3ds_other_lenses_are_refused(lens, problem):
+    with pytest.raises(InputError, match=problem):
+        read(f"R, T = look_at_view_transform(2, 30, 90); cameras = {lens}")

@@ -30,7 +30,7 @@ KINDS = [
     *(("camera", text) for text in ("Camera", CAMERA)),
     *(("width", text) for text in ("", "3", "70000", "320.5", "320x180")),
     *(("frame", text) for text in ("1.5", "1048575", "first")),
-    *(("engine", text) for text in ("cycles", "WORKBENCH")),
+    *(("engine", text) for text in ("cycles", "BLENDER")),
     *(("samples", text) for text in ("0", "many", "16777217")),
     ("level", "full"),
 ]

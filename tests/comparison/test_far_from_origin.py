@@ -18,7 +18,7 @@ def compared(paper_scene):
         eye, look_at = (tuple(np.add(point, offset)) for point in (paper_scene.pinhole.eye, paper_scene.pinhole.look_at))
         pinhole = replace(paper_scene.pinhole, eye=eye, look_at=look_at, **change)
         scene = replace(paper_scene, pinhole=pinhole, offset=offset)
-        return compare(scene.picture(), scene.rendered(roundings), pinhole, scene.surface_at)
+        return compare(scene.picture(), scene.rendered(roundings), pinhole, scene.surfaces_at)
 
     return make
 
@@ -48,7 +48,7 @@ def test_an_error_that_no_other_origin_mends_is_not_blamed_on_this_one(compared,
     assert telephoto.rows[0].values[0] > 0.1 and telephoto.far_from_origin is None
     reference = paper_scene.picture()
     slender = replace(reference, passes=reference.passes | {"Magnitude": reference["Magnitude"] * np.float32(1e6)})
-    comparison = compare(slender, paper_scene.rendered(0.2e6), paper_scene.pinhole, paper_scene.surface_at)
+    comparison = compare(slender, paper_scene.rendered(0.2e6), paper_scene.pinhole, paper_scene.surfaces_at)
     assert comparison.far_from_origin is None
 
 

@@ -15,7 +15,7 @@ from viewcam_addon.errors import InputError
 
 @pytest.mark.parametrize("seed", range(3))
 def test_errors_within_the_tolerance_pass(seed, paper_scene):
-    comparison = compare(paper_scene.picture(), paper_scene.rendered(seed=seed), paper_scene.pinhole, paper_scene.surface_at)
+    comparison = compare(paper_scene.picture(), paper_scene.rendered(seed=seed), paper_scene.pinhole, paper_scene.surfaces_at)
     assert comparison.passed, "\n".join(comparison.lines())
 
 
@@ -33,14 +33,14 @@ def test_errors_within_the_tolerance_pass_from_anywhere(azimuth, height, distanc
     target = np.array([0.2, 0.1, 0.6]) + offset
     pinhole = replace(paper_scene.pinhole, eye=tuple(eye), look_at=tuple(target), distance=distance, width=120, height=90)
     scene = replace(paper_scene, pinhole=replace(pinhole, principal_point=None), offset=offset)
-    comparison = compare(scene.picture(), scene.rendered(seed=seed), scene.pinhole, scene.surface_at)
+    comparison = compare(scene.picture(), scene.rendered(seed=seed), scene.pinhole, scene.surfaces_at)
     assert comparison.passed, "\n".join(comparison.lines())
 
 
 def test_crossed_silhouettes_are_found_and_all_of_them_explained(far_scene):
     found = 0
     for seed in range(4):
-        comparison = compare(far_scene.picture(), far_scene.rendered(seed=seed), far_scene.pinhole, far_scene.surface_at)
+        comparison = compare(far_scene.picture(), far_scene.rendered(seed=seed), far_scene.pinhole, far_scene.surfaces_at)
         assert comparison.passed, "\n".join(comparison.lines())
         found += len(comparison.mismatches.kinds)
         largest = np.nanmax(comparison.mismatches.shifts, initial=0.0)
@@ -58,7 +58,7 @@ def test_without_a_scene_a_crossed_silhouette_stays_unexplained_and_the_verdict_
 def test_the_comparison_works_without_the_tracers_own_passes(paper_scene):
     reference = paper_scene.picture()
     bare = replace(reference, passes={name: reference[name] for name in ("Depth", "Position", "Normal", "Object Index")})
-    comparison = compare(bare, paper_scene.rendered(), paper_scene.pinhole, paper_scene.surface_at)
+    comparison = compare(bare, paper_scene.rendered(), paper_scene.pinhole, paper_scene.surfaces_at)
     assert [row.name for row in comparison.rows] == ["Position", "Position depth", "Depth", "Normal"]
     assert comparison.passed, "\n".join(comparison.lines())
 
@@ -75,7 +75,7 @@ def test_maps_hold_the_errors_where_they_were_made(paper_scene):
 
 def test_the_result_is_plain_json_and_says_what_the_lines_say(paper_scene):
     comparison = compare(
-        paper_scene.picture(), paper_scene.rendered(), paper_scene.pinhole, paper_scene.surface_at, paper_scene.pinhole
+        paper_scene.picture(), paper_scene.rendered(), paper_scene.pinhole, paper_scene.surfaces_at, paper_scene.pinhole
     )
     told = json.loads(json.dumps(comparison.to_json(), allow_nan=False))
     assert told["passed"] and told["passes"][0]["name"] == "Position"
@@ -109,7 +109,7 @@ BIAS = 3.505e-6
 
 def test_the_bias_of_cycles_filter_table_passes_however_small_the_picture(paper_scene):
     scene = paper_scene.seen_by(replace(paper_scene.pinhole, **SMALL))
-    comparison = compare(scene.picture(), scene.picture(0.5 + BIAS, 0.5 + BIAS), scene.pinhole, scene.surface_at)
+    comparison = compare(scene.picture(), scene.picture(0.5 + BIAS, 0.5 + BIAS), scene.pinhole, scene.surfaces_at)
     assert comparison.passed, "\n".join(comparison.lines())
     assert np.median(comparison.roundings) > tolerances.ROUNDINGS[0], "roundings alone would allow it: the test tests nothing"
 
@@ -117,4 +117,4 @@ def test_the_bias_of_cycles_filter_table_passes_however_small_the_picture(paper_
 def test_four_times_that_bias_is_caught(paper_scene):
     scene = paper_scene.seen_by(replace(paper_scene.pinhole, **SMALL))
     off = 0.5 + 4 * BIAS
-    assert not compare(scene.picture(), scene.picture(off, off), scene.pinhole, scene.surface_at).passed
+    assert not compare(scene.picture(), scene.picture(off, off), scene.pinhole, scene.surfaces_at).passed

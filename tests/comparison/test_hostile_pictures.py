@@ -103,17 +103,17 @@ def test_a_reference_that_its_scene_does_not_show_is_refused_before_its_rays_are
     """Rays for each of its pixels, as far as its figures say that they may be off, take minutes."""
     asked = 0
 
-    def surface_at(*where):
+    def surfaces_at(*where):
         nonlocal asked
         asked += len(where[0])
-        return paper_scene.surface_at(*where)
+        return paper_scene.surfaces_at(*where)
 
     other = replace(paper_scene, spheres=((0.0, 0.0, 4.0, 3.0),))
     with pytest.raises(InputError, match="is not what the tracer sees in the scene: trace it again"):
-        compare(other.picture(), paper_scene.rendered(), paper_scene.pinhole, surface_at)
+        compare(other.picture(), paper_scene.rendered(), paper_scene.pinhole, surfaces_at)
     assert asked < 3000
 
 
 def test_a_test_picture_that_shows_something_else_is_no_fault_of_the_reference(paper_scene):
     test = harmed(paper_scene.rendered(), "Depth", 5.0, slice(None), slice(None))
-    assert not compare(paper_scene.picture(), test, paper_scene.pinhole, paper_scene.surface_at).passed
+    assert not compare(paper_scene.picture(), test, paper_scene.pinhole, paper_scene.surfaces_at).passed

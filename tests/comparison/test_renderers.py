@@ -23,7 +23,7 @@ def only(picture, *names):
 
 
 def judged(scene, test, **options):
-    return compare(scene.picture(), test, scene.pinhole, scene.surface_at, partial=True, **options)
+    return compare(scene.picture(), test, scene.pinhole, scene.surfaces_at, partial=True, **options)
 
 
 ENOUGH = [("Depth",), ("Distance",), ("Position",), ("Position", "Depth", "Object Index"), ("Distance", "Normal")]

@@ -56,7 +56,7 @@ def compared(far_scene):
         replace(far_scene.picture(), source="reference.exr"),
         replace(far_scene.rendered(seed=1), source="a<b>.exr"),
     )
-    return compare(reference, test, far_scene.pinhole, far_scene.surface_at, far_scene.pinhole), reference, test
+    return compare(reference, test, far_scene.pinhole, far_scene.surfaces_at, far_scene.pinhole), reference, test
 
 
 def written(tmp_path, comparison, reference, test, **more):
@@ -77,7 +77,7 @@ def test_the_report_says_what_the_comparison_says(compared, tmp_path):
 
 def test_a_failed_comparison_says_so_at_the_top(paper_scene, tmp_path):
     reference, test = paper_scene.picture(), paper_scene.picture(1.0, 0.5)
-    text, page = written(tmp_path, compare(reference, test, paper_scene.pinhole, paper_scene.surface_at), reference, test)
+    text, page = written(tmp_path, compare(reference, test, paper_scene.pinhole, paper_scene.surfaces_at), reference, test)
     assert "Not the same picture." in page.text and "shifted by (+0.5" in page.text
     assert '<html lang="en" class="different">' in text
 

@@ -117,20 +117,20 @@ def honest(paper_scene):
 
 
 def test_the_picture_without_a_fault_passes(paper_scene, reference, honest):
-    comparison = compare(reference, honest, paper_scene.pinhole, paper_scene.surface_at)
+    comparison = compare(reference, honest, paper_scene.pinhole, paper_scene.surfaces_at)
     assert comparison.passed, "\n".join(comparison.lines())
 
 
 @pytest.mark.parametrize("fault", CAMERA_FAULTS)
 def test_a_fault_of_the_camera_or_the_scene_is_found(fault, paper_scene, reference):
-    comparison = compare(reference, CAMERA_FAULTS[fault](paper_scene), paper_scene.pinhole, paper_scene.surface_at)
+    comparison = compare(reference, CAMERA_FAULTS[fault](paper_scene), paper_scene.pinhole, paper_scene.surfaces_at)
     assert not comparison.passed, f"{fault} went unnoticed:\n" + "\n".join(comparison.lines())
     assert comparison.sentence.startswith("Not the same picture: ")
 
 
 @pytest.mark.parametrize("fault", FILE_FAULTS)
 def test_a_fault_of_the_file_is_found(fault, paper_scene, reference, honest):
-    comparison = compare(reference, FILE_FAULTS[fault](honest), paper_scene.pinhole, paper_scene.surface_at)
+    comparison = compare(reference, FILE_FAULTS[fault](honest), paper_scene.pinhole, paper_scene.surfaces_at)
     assert not comparison.passed, f"{fault} went unnoticed:\n" + "\n".join(comparison.lines())
     assert comparison.sentence.startswith("Not the same picture: ")
 
@@ -147,13 +147,13 @@ def test_a_fault_of_the_file_is_found(fault, paper_scene, reference, honest):
     ],
 )
 def test_the_verdict_names_the_fault_of_the_camera(fault, words, paper_scene, reference):
-    sentence = compare(reference, CAMERA_FAULTS[fault](paper_scene), paper_scene.pinhole, paper_scene.surface_at).sentence
+    sentence = compare(reference, CAMERA_FAULTS[fault](paper_scene), paper_scene.pinhole, paper_scene.surfaces_at).sentence
     assert words in sentence, sentence
 
 
 def test_two_empty_pictures_prove_nothing(paper_scene):
     away = paper_scene.seen_by(replace(paper_scene.pinhole, look_at=(5.0, -7.0, 9.0), up=(0.0, 1.0, 0.0)))
-    comparison = compare(away.picture(), away.picture(), away.pinhole, away.surface_at)
+    comparison = compare(away.picture(), away.picture(), away.pinhole, away.surfaces_at)
     assert not comparison.passed
     assert comparison.sentence.startswith("Nothing to compare")
     assert comparison.to_json()["passed"] is False

@@ -13,9 +13,10 @@ bpy = pytest.importorskip("bpy")
 
 import viewcam_addon
 from viewcam_addon.blender import camera as cameras
-from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.comparison.geometry import compare
 from viewcam_addon.image import Image
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import Tracer
 
@@ -57,13 +58,13 @@ def compared(still, tmp_path):
     """A function that exports the scene, does something to it, has Cycles render it, and compares."""
 
     def make(fault=lambda scene: None, change=lambda passes: passes):
-        exported = job.export(job.Request())
+        exported = jobs.export(Job())
         tracer = Tracer(exported, 2)
         reference = Image(tracer.render(), exported.camera)
         fault(still)
-        job.render(job.Request(threads=2), tmp_path / "cycles.exr")
+        jobs.cycles(Job(threads=2), tmp_path / "cycles.exr")
         test = Image(change(read_outside(tmp_path / "cycles.exr")))
-        return compare(reference, test, exported.camera, tracer.surface_at, exported.stated_camera)
+        return compare(reference, test, exported.camera, tracer.surfaces_at, exported.stated_camera)
 
     return make
 

@@ -287,15 +287,15 @@ def sidecar() -> Feed:
     from viewcam_addon.errors import InputError, told
     from viewcam_addon.jobs import dataset, one, run
     from viewcam_addon.jobs.folder import Folder, Outputs
+    from viewcam_addon.jobs.job import Job
     from viewcam_addon.jobs.settings import settings_hash
-    from viewcam_addon.jobs.shot import Shot
     from viewcam_addon.pinhole import Pinhole
 
     class Painter(painting.Painter):
         def render(self, *given: object) -> dict:
             return {**super().render(*given), **record(Pinhole(**CAMERA))}
 
-    wanted = [Shot("one", camera="Camera"), Shot("two", camera="Camera")]
+    wanted = [Job("one", camera="Camera"), Job("two", camera="Camera")]
     settings = {shot.name: settings_hash(shot, {}) for shot in wanted}
     made: dict[str, bytes] = {}
 

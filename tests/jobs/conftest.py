@@ -24,19 +24,19 @@ def note(*words):
         print(*words, os.getpid(), file=diary)
 
 class Renderer:
-    def __init__(self, blend, seed, threads, trust):
-        note("open", blend, threads)
+    def __init__(self, blend, trust, events):
+        note("open", blend)
         note("one-thread", os.environ.get("OMP_NUM_THREADS"))
         if not blend.exists():
             raise InputError(f"{{blend}} is not there: give another")
-        self.blend, self.seed = blend, seed
+        self.blend = blend
     def __enter__(self):
         return self
     def __exit__(self, *_):
         pass
     cameras, scene_camera = ("Left", "Right"), "Left"
     def made_from(self):
-        return {{"blend": self.blend.read_text(), "blender": "stand-in", "seed": self.seed}}
+        return {{"blend": self.blend.read_text(), "blender": "stand-in"}}
     def problems(self, shots, check):
         return [f"{{shot.name}} is impossible" for shot in shots if shot.name.startswith("impossible")]
     def render(self, shot, image, preview):
@@ -44,7 +44,7 @@ class Renderer:
         said |= {{"rendered": {{"width": shot.width, "height": shot.height}}}}
         if image is None:
             return said
-        note("render", shot.name)
+        note("render", shot.name, shot.threads)
         image.write_bytes(b"half of it")
         kind = shot.name.split("_")[0]
         first = sum(line.split()[1:2] == [shot.name] for line in open(os.path.join(FOLDER, "diary.txt"))) == 1
@@ -61,10 +61,10 @@ class Renderer:
             raise OSError(errno.ENOSPC, "No space left on device")
         if kind == "bug":
             raise KeyError("a bug")
-        image.write_bytes(hashlib.sha256(repr((self.seed, shot)).encode()).digest())
+        image.write_bytes(hashlib.sha256(repr((shot.seed, shot.name, shot.eye)).encode()).digest())
         preview.write_bytes(b"preview")
         return said
-    def check(self, shot):
+    def check(self, shot, has_picture, written, keep):
         first = not any(line.split()[:2] == ["check", shot.name] for line in open(os.path.join(FOLDER, "diary.txt")))
         note("check", shot.name)
         if shot.name.startswith("checkcrash") and first:

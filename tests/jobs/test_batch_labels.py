@@ -4,13 +4,13 @@ import json
 
 import pytest
 
-from viewcam_addon.commands.batch import _refuse_names_of_labels
+from viewcam_addon.commands.carry_out import _refuse_names_of_labels
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs.folder import Folder, Outputs
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.jobs.one import render_one
-from viewcam_addon.jobs.shot import Shot
 
-SHOT = Shot("left", camera="Camera")
+SHOT = Job("left", camera="Camera")
 DEPTH, MASKS = Outputs(labels=("depth",)), Outputs(labels=("masks",))
 LABELS_ONLY = Outputs(picture=False, labels=("depth",))
 
@@ -110,5 +110,5 @@ def test_what_a_killed_batch_left_of_labels_is_removed(tmp_path, painting):
 
 def test_shots_whose_labels_would_be_another_shots_picture_are_refused():
     with pytest.raises(InputError, match=r"'a' and 'A.depth'"):
-        _refuse_names_of_labels([Shot("a", camera="x"), Shot("A.depth", camera="x"), Shot("b", camera="x")])
-    _refuse_names_of_labels([Shot("a", camera="x"), Shot("ab.depth", camera="x")])
+        _refuse_names_of_labels([Job("a", camera="x"), Job("A.depth", camera="x"), Job("b", camera="x")])
+    _refuse_names_of_labels([Job("a", camera="x"), Job("ab.depth", camera="x")])

@@ -9,7 +9,7 @@ from viewcam_addon.cameras import sidecar as record
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs import dataset
 from viewcam_addon.jobs.folder import Folder, write_json
-from viewcam_addon.jobs.shot import Shot
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.pinhole import Pinhole
 
 STATED = Pinhole((3, -6, 2.5), (0, 0, 1), (0, 0, 1), 400.0, 320, 180)
@@ -19,7 +19,7 @@ FILES = ("sparse/0/cameras.txt", "sparse/0/images.txt", "sparse/0/points3D.txt",
 
 
 def shots(*names):
-    return [Shot(name, eye=STATED.eye, look_at=STATED.look_at, up=STATED.up, d=400.0) for name in names]
+    return [Job(name, eye=STATED.eye, look_at=STATED.look_at, up=STATED.up, d=400.0) for name in names]
 
 
 @pytest.fixture

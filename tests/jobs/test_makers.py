@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs import makers
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.jobs.problems import ShotsError
 from viewcam_addon.jobs.shards import shard
-from viewcam_addon.jobs.shot import Shot
 from viewcam_addon.pinhole import Pinhole
 
 coordinates = st.floats(-1e3, 1e3, allow_subnormal=False)
@@ -25,7 +25,7 @@ def test_an_orbit_begins_at_the_camera_and_goes_evenly_around_up(eye, look_at, u
     pinhole = Pinhole(eye, look_at, up, distance, 320, 180)
     assume(pinhole.sine_to_up > 1e-2)
     made = makers.orbit(pinhole, count)
-    assert made[0] == Shot("orbit_000", eye, look_at, up, distance, width=320, height=180)
+    assert made[0] == Job("orbit_000", eye, look_at, up, distance, width=320, height=180)
     assert [shot.name for shot in made] == [f"orbit_{i:03d}" for i in range(count)]
     axis = np.array(up) / math.hypot(*up)
     away = np.array([shot.eye for shot in made]) - look_at
@@ -78,7 +78,7 @@ def test_frames_that_are_no_range_are_refused(text):
 
 def test_cameras_are_chosen_by_a_pattern_sorted_and_case_counts():
     names = ["Cam.002", "Top", "Cam.001", "cam.003", "Camera"]
-    assert makers.from_cameras("Cam.*", names) == [Shot("Cam.001", camera="Cam.001"), Shot("Cam.002", camera="Cam.002")]
+    assert makers.from_cameras("Cam.*", names) == [Job("Cam.001", camera="Cam.001"), Job("Cam.002", camera="Cam.002")]
     assert [shot.name for shot in makers.from_cameras("[Cc]am.00?", names)] == ["Cam.001", "Cam.002", "cam.003"]
     assert len(makers.from_cameras("*", names)) == 5
 
@@ -129,7 +129,7 @@ def test_an_orbit_keeps_the_principal_point_and_the_mirroring():
 def test_of_a_million_shots_those_of_a_shard_are_made_and_no_others(made, monkeypatch):
     """One shot of a million took three minutes."""
     made_ones = []
-    monkeypatch.setattr(makers, "Shot", lambda name, *values, **named: made_ones.append(name) or Shot(name, *values, **named))
+    monkeypatch.setattr(makers, "Job", lambda name, *values, **named: made_ones.append(name) or Job(name, *values, **named))
     (last,) = shard(made(), "999999/1000000")
     assert last.name in ("orbit_999998", "frame_0999999") and len(made_ones) <= 3
     several = shard(made(), "2/100000")

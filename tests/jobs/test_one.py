@@ -8,10 +8,10 @@ import pytest
 
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs.folder import Folder, Outputs
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.jobs.one import render_one
-from viewcam_addon.jobs.shot import Shot
 
-SHOT = Shot("left.v2", (-3, -6, 2.5), (0, 0, 1), (0, 0, 1), 400, frame=12)
+SHOT = Job("left.v2", (-3, -6, 2.5), (0, 0, 1), (0, 0, 1), 400, frame=12)
 
 
 @pytest.fixture
@@ -61,7 +61,7 @@ def test_a_shot_that_fails_leaves_what_was_there(folder, painting, error, there_
 
 def test_a_check_that_fails_to_be_made_leaves_nothing(folder, painting):
     class Blind(painting.Painter):
-        def check(self, shot):
+        def check(self, shot, *_):
             raise InputError("the scene can't be traced: simplify it")
 
     with pytest.raises(InputError, match="can't be traced"):

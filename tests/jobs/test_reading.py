@@ -1,6 +1,5 @@
 """Lists of shots as files: each format says the same, to the last bit, and the page on them is right."""
 
-import dataclasses
 import json
 import re
 from pathlib import Path
@@ -11,8 +10,8 @@ from hypothesis import strategies as st
 
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs import lists
+from viewcam_addon.jobs.job import ENGINES, FIELDS, LEVELS, Job
 from viewcam_addon.jobs.problems import ShotsError
-from viewcam_addon.jobs.shot import ENGINES, LEVELS, Shot
 
 PAGE = Path(__file__).parents[2].joinpath("docs", "batch.md").read_text(encoding="utf-8")
 LARGEST_FLOAT32 = (2.0 - 2.0**-23) * 2.0**127
@@ -34,7 +33,7 @@ def lists_of_shots(draw):
         four = (eye, look_at, draw(triples.filter(any)), draw(st.floats(2.0**-126, LARGEST_FLOAT32)))
         camera = draw(maybe(st.sampled_from(["Camera", "Camera.001", "a, b", 'the "best"'])))
         size = draw(maybe(st.tuples(st.integers(4, 65536), st.integers(4, 65536)))) or (None, None)
-        shot = Shot(
+        shot = Job(
             f"{draw(st.sampled_from(['left', 'Überblick, eins', '左']))} {i}",
             *([None] * 4 if camera else four),
             camera,
@@ -51,7 +50,8 @@ def lists_of_shots(draw):
 def as_cells(shot, in_parts):
     """A shot's values as texts, by column."""
     cells = {}
-    for key, value in vars(shot).items():
+    for key in FIELDS:
+        value = getattr(shot, key)
         if value is None:
             texts = ["", "", ""]
         else:
@@ -64,7 +64,7 @@ def as_cells(shot, in_parts):
 
 
 def as_objects(listed):
-    return [{key: value for key, value in vars(shot).items() if value is not None} for shot in listed]
+    return [shot.listed() for shot in listed]
 
 
 def read(folder, name, text, cameras=None):
@@ -97,7 +97,7 @@ def test_a_csv_of_any_dialect_gives_every_bit_back(folder, listed, in_parts, sep
 @settings(max_examples=50)
 @given(lists_of_shots(), st.booleans())
 def test_json_and_json_lines_give_every_bit_back(folder, listed, with_nulls):
-    objects = [vars(shot) for shot in listed] if with_nulls else as_objects(listed)
+    objects = [{key: getattr(shot, key) for key in FIELDS} for shot in listed] if with_nulls else as_objects(listed)
     assert read(folder, "list.json", json.dumps(objects)) == listed
     assert read(folder, "list.json", json.dumps({"shots": objects}, indent=1)) == listed
     assert read(folder, "list.JSONL", "\n".join(map(json.dumps, objects))) == listed
@@ -114,7 +114,7 @@ def test_defaults_are_what_a_shot_does_not_say(folder, listed, others):
     expected = []
     for row in as_objects(listed):
         other_kind = four if "camera" in row else {"camera"}
-        expected.append(Shot(**{key: value for key, value in defaults.items() if key not in other_kind} | row))
+        expected.append(Job(**{key: value for key, value in defaults.items() if key not in other_kind} | row))
     document = json.dumps({"defaults": defaults, "shots": as_objects(listed)})
     assert read(folder, "list.json", document) == expected
 
@@ -124,7 +124,7 @@ def test_a_default_and_a_shot_may_write_a_value_in_different_ways(folder):
         '{"defaults": {"up_x": 0, "up_y": 0, "up_z": 1, "distance": 5, "eye": [1, 2, 3]}, "shots": [{"name": "a", "d": 7, '
     )
     document += '"up": [0, 1, 0], "look_at_x": 1, "look_at_y": 0, "look_at_z": 0}]}'
-    assert read(folder, "list.json", document) == [Shot("a", (1, 2, 3), (1, 0, 0), (0, 1, 0), 7)]
+    assert read(folder, "list.json", document) == [Job("a", (1, 2, 3), (1, 0, 0), (0, 1, 0), 7)]
 
 
 @given(st.binary(max_size=300), st.sampled_from(["list.csv", "list.json", "list.jsonl"]))
@@ -142,7 +142,7 @@ def test_whatever_a_file_holds_it_is_shots_or_a_sentence(folder, data, name):
 
 def test_each_list_of_the_page_is_the_same_two_shots(folder):
     four = {"look_at": (0, 0, 1), "up": (0, 0, 1), "d": 400, "width": 320, "height": 180}
-    two = [Shot("left", eye=(-3, -6, 2.5), frame=12, **four), Shot("right", eye=(3, -6, 2.5), **four)]
+    two = [Job("left", eye=(-3, -6, 2.5), frame=12, **four), Job("right", eye=(3, -6, 2.5), **four)]
     examples = re.findall(r"```(csv|jsonl?)\n(.*?)```", PAGE.split("## What is wrong")[0], re.DOTALL)
     assert [suffix for suffix, _ in examples] == ["csv"] * 3 + ["json"] * 2 + ["jsonl"]
     for suffix, text in examples:
@@ -161,7 +161,7 @@ def test_the_page_shows_the_problems_as_they_are_told(tmp_path, monkeypatch):
 def test_the_page_has_every_key_and_every_choice():
     table = PAGE.split("| key | value |")[1].split("\n\n")[0]
     keys = {key for cell in re.findall(r"(?m)^\| (`.*?) \|", table) for key in re.findall(r"`(\w+)`", cell)}
-    assert keys == {field.name for field in dataclasses.fields(Shot)}
+    assert keys == {*FIELDS}
     assert {*ENGINES, *LEVELS} <= {*re.findall(r"`(\w+)`", table)}
 
 

@@ -12,19 +12,19 @@ from viewcam_addon import child_process
 from viewcam_addon.errors import FullDiskError, InputError
 from viewcam_addon.jobs import one, render_client
 from viewcam_addon.jobs.folder import Folder, Outputs
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.jobs.render_client import ServedRenderer
-from viewcam_addon.jobs.shot import Shot
 
 pytestmark = pytest.mark.slow
 
 
 def shot(name, eye=(0.1, -6.0, 1e-300)):
-    return Shot(name, eye, (0, 0, 1), (0, 0, 1), 400.0, None, 64, 36)
+    return Job(name, eye, (0, 0, 1), (0, 0, 1), 400.0, None, 64, 36)
 
 
 @pytest.fixture
 def renderer(stand_in, blend):
-    with ServedRenderer(blend, seed=3, threads=2) as renderer:
+    with ServedRenderer(blend) as renderer:
         yield renderer
 
 
@@ -38,9 +38,9 @@ def test_what_a_renderer_says_is_said_here(renderer, stand_in, blend, tmp_path):
     assert renderer.check(shot("a")) == {"passed": True, "verdict": "as it should be"}
     assert (tmp_path / "a.exr").stat().st_size == 32 and (tmp_path / "a.png").read_bytes() == b"preview"
     assert renderer.cameras == ("Left", "Right") and renderer.scene_camera == "Left"
-    assert renderer.made_from() == {"blend": "a scene", "blender": "stand-in", "seed": 3}
+    assert renderer.made_from() == {"blend": "a scene", "blender": "stand-in"}
     assert renderer.problems([shot("a"), shot("impossible")]) == ("impossible is impossible",)
-    assert [words[1:3] for words in stand_in.diary("open")] == [[str(blend), "2"]], "one load for all of it"
+    assert [words[1:-1] for words in stand_in.diary("open")] == [[str(blend)]], "one load for all of it"
 
 
 def test_no_blender_is_started_before_it_is_needed(renderer, stand_in):

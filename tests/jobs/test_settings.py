@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.jobs.settings import settings_hash
-from viewcam_addon.jobs.shot import Shot
 
-SHOT = Shot("a", (3.0, -6.0, 2.5), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), 400.0, None, 320, 180, 1, "CYCLES", 16, "direct")
+SHOT = Job("a", (3.0, -6.0, 2.5), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), 400.0, None, 320, 180, 1, "CYCLES", 16, "direct")
 MADE_FROM = {"blend": "0f" * 32, "versions": {"blender": "5.2.2", "viewcam": "0.1.0"}, "seed": 0, "clay": False, "error": None}
 
 plain = st.recursive(
@@ -38,7 +38,7 @@ def test_the_hash_is_the_same_on_every_machine_and_in_every_version():
 
 
 def test_the_hash_is_the_same_in_another_process_with_other_hashes_of_texts():
-    imports = "from viewcam_addon.jobs.settings import settings_hash; from viewcam_addon.jobs.shot import Shot"
+    imports = "from viewcam_addon.jobs.settings import settings_hash; from viewcam_addon.jobs.job import Job"
     program = f"{imports}\nprint(settings_hash({SHOT!r}, {MADE_FROM!r}))"
     command = [sys.executable, "-X", "utf8", "-c", program]
     root = Path(__file__).parents[2]
@@ -66,6 +66,14 @@ def test_hashes_are_equal_if_and_only_if_the_settings_are(one, other):
         {"engine": "EEVEE"},
         {"samples": 17},
         {"level": "path"},
+        {"trust": True},
+        {"seed": 1},
+        {"error": 0.01},
+        {"device": "CUDA"},
+        {"clay": True},
+        {"recenter": True},
+        {"strict": True},
+        {"scene": "approved.json"},
     ],
     ids=lambda change: next(iter(change)),
 )
@@ -73,8 +81,15 @@ def test_whatever_decides_the_picture_changes_the_hash(change):
     assert settings_hash(dataclasses.replace(SHOT, **change), MADE_FROM) != settings_hash(SHOT, MADE_FROM)
 
 
-def test_the_name_does_not_decide_the_picture():
-    assert settings_hash(dataclasses.replace(SHOT, name="b"), MADE_FROM) == settings_hash(SHOT, MADE_FROM)
+@pytest.mark.parametrize("change", [{"name": "b"}, {"blend": "elsewhere/shot.blend"}, {"threads": 2}], ids=str)
+def test_what_does_not_decide_the_picture_changes_nothing(change):
+    assert settings_hash(dataclasses.replace(SHOT, **change), MADE_FROM) == settings_hash(SHOT, MADE_FROM)
+
+
+def test_every_field_of_a_job_decides_or_does_not():
+    told = {"eye", "look_at", "up", "d", "camera", "width", "height", "frame", "engine", "samples", "level", "trust", "seed"}
+    told |= {"error", "device", "clay", "recenter", "strict", "scene", "name", "blend", "threads"}
+    assert told | {"principal_point", "pixel_aspect", "mirrored"} == {field.name for field in dataclasses.fields(SHOT)}
 
 
 @pytest.mark.parametrize("value", [b"bytes", {1: 2}, {1, 2}, Path("a"), pytest.param(object(), id="object")], ids=repr)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs import sheet
-from viewcam_addon.jobs.shot import Shot
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.jobs.summary import Result, Summary
 
 
@@ -80,7 +80,7 @@ def test_the_same_batch_gives_the_same_page(tmp_path, painting):
 
 def _can_be_a_shot(name):
     try:
-        return bool(Shot(name, camera="C"))
+        return bool(Job(name, camera="C"))
     except InputError:
         return False
 

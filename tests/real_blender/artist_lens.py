@@ -18,26 +18,27 @@ def tick_the_box():
 
 
 def choose_the_unit():
-    """Beside the lens, by the wheel over it: each unit has its field, which takes what is typed. A unit changes no lens."""
+    """Beside the lens, by the wheel over it: each unit has its field, which takes keyframes. A unit changes no lens."""
     lens = camera().data.lens
     place = yield from find("virtual_pinhole.focal_length")
     for unit in UNITS:
         assert values().lens_unit == unit and camera().data.lens == lens
-        field = {"MILLIMETERS": "focal_length", "PIXELS": "distance"}.get(unit, "field_of_view")
+        sides = {"HORIZONTAL": "horizontal_fov", "VERTICAL": "vertical_fov", "DIAGONAL": "diagonal_fov"}
+        field = {"MILLIMETERS": "focal_length", "PIXELS": "distance", **sides}[unit]
         assert (yield from look(*place, SIDEBAR)) == f"virtual_pinhole.{field}"
         yield from picture(f"lens_{unit.lower()}", SIDEBAR)
+        press("I", *place)
+        yield
+        yield
+        keyed = [curve.data_path for curve in room("versions").action_curves(camera())]
+        assert keyed == [f"virtual_pinhole.{field}"], f"I over the field has keyed {keyed}"
+        yield from picture(f"lens_{unit.lower()}_keyed", SIDEBAR)
+        camera().animation_data_clear()
         if unit != UNITS[-1]:
             x = yield from _unit_in_row(place[1])
             window().event_simulate(type="WHEELDOWNMOUSE", value="PRESS", x=int(x), y=int(place[1]), ctrl=True)
             yield
             yield
-    yield from look(*place, SIDEBAR)
-    press("I", *place)
-    yield
-    yield
-    keyed = [curve.data_path for curve in room("versions").action_curves(camera())]
-    assert keyed == ["virtual_pinhole.distance"], f"I over the field has keyed {keyed}"
-    camera().animation_data_clear()
     values().lens_unit = "HORIZONTAL"
     yield
     yield from click(*place)

@@ -13,6 +13,7 @@ def _rooms() -> list[ModuleType]:
         baking,
         camera_files,
         clipboard,
+        converting,
         file_menu,
         gizmos,
         labels,
@@ -30,7 +31,7 @@ def _rooms() -> list[ModuleType]:
     )
     from .rendering import engine
 
-    buttons = [operators, moving, clipboard, baking, presets]
+    buttons = [operators, moving, clipboard, baking, converting, presets]
     shown = [panel, scene_cameras, photo_matching, proof, render_all, labels, overlay, gizmos]
     followers = [animation, resolution, own_picture]
     return [

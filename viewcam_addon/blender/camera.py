@@ -42,6 +42,7 @@ __all__ = [
     "ALL",
     "CameraSync",
     "adopt",
+    "answer",
     "apply",
     "as_it_stands",
     "check",
@@ -264,6 +265,7 @@ class CameraSync:
             targets.connect(camera_object)  # one that was removed from the file leaves its driver
             targets.mirror(camera_object, evaluated)
             self._store_changed(storage.load(camera_object), values)
+            storage.forget_asked(camera_object, datablocks.LOOKS.values())
             self._agree()
 
     def is_untouched(self, by_values: bool) -> bool:
@@ -485,6 +487,8 @@ def _level(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> tuple[Cam
     frame = datablocks.frame_of(scene)
     plane = datablocks.view_plane(datablocks.camera_data_of(evaluated), frame)
     values = storage.load(camera_object)
+    if values.asked:
+        values = _answered(camera_object, values, scene)
     if values.follows:
         values = targets.followed(camera_object, values)
     return values, values.pinhole(plane, frame, camera_object.data.sensor_fit, rotation.mirrors(evaluated.matrix_world))
@@ -581,45 +585,53 @@ def lens(camera_object: bpy.types.Object, unit: str) -> float:
     """
     if camera_object.type != "CAMERA":
         return 0.0
-    frame, fit = datablocks.frame_of(datablocks.scene_of(camera_object)), camera_object.data.sensor_fit
+    scene = datablocks.scene_of(camera_object)
+    frame, fit = datablocks.frame_of(scene), camera_object.data.sensor_fit
     with contextlib.suppress(InputError, ZeroDivisionError):
-        distance = storage.load(camera_object).distance_at_full_size(frame, fit)
+        values = _answered(camera_object, storage.load(camera_object), scene)
+        distance = values.distance_at_full_size(frame, fit)
         return intrinsics.lens_in(unit, distance, frame, datablocks.own_sensor(camera_object.data), fit)
     return 0.0
-
-
-def set_lens(camera_object: bpy.types.Object, unit: str, value: float) -> None:
-    """Say the distance that is this lens, and move nothing. The zoom stays, and what is no lens changes nothing."""
-    if camera_object.type != "CAMERA":
-        return
-    frame, fit = datablocks.frame_of(datablocks.scene_of(camera_object)), camera_object.data.sensor_fit
-    with contextlib.suppress(InputError, ZeroDivisionError):
-        distance = intrinsics.distance_by_lens(unit, value, frame, datablocks.own_sensor(camera_object.data), fit)
-        said = storage.load(camera_object).seeing(distance, frame, fit)
-        intrinsics.check_storable(camera_object.name, distance=(said.distance,))
-        storage.store(camera_object, said, "distance")
 
 
 def roll(camera_object: bpy.types.Object) -> float:
     """The property `roll`, radians: 0 where the values make no camera, and below what can be seen."""
     with contextlib.suppress(InputError):
+        asked = storage.asked_of(camera_object)
+        if "roll" in asked:
+            return asked["roll"]
         values = targets.values(camera_object)
         found = values.roll_from(preferences.up_axis(), _held_roll(camera_object, values))
         return found if abs(found) > _UNSEEN else 0.0
     return 0.0
 
 
-def turn(camera_object: bpy.types.Object, angle: float) -> None:
-    """Say values with that `roll`, radians, and move nothing. Those that make no camera stay as they are."""
-    with contextlib.suppress(InputError):
-        values = targets.values(camera_object)
-        held = _held_roll(camera_object, values)
-        if values.pole == HOLD:
-            more = angle - values.roll_from(preferences.up_axis(), held)
-            storage.store(camera_object, replace(values, held_roll=values.held_roll + more), "held_roll")
-        else:
-            up = rolls.rolled(rolls.turned(values.view(), held), preferences.up_axis(), angle).up
-            storage.store(camera_object, replace(storage.load(camera_object), up=up), "up")
+def answer(camera_object: bpy.types.Object) -> None:
+    """State the distance and the up that other looks at them ask for, and move nothing. What is no lens changes nothing."""
+    if storage.asked_of(camera_object) and camera_object.type == "CAMERA":
+        values = storage.load(camera_object)
+        answered = _answered(camera_object, values, datablocks.scene_of(camera_object))
+        names = [name for name in ("distance", "up", "held_roll") if getattr(answered, name) != getattr(values, name)]
+        storage.store(camera_object, answered, *names)
+    storage.forget_asked(camera_object, datablocks.LOOKS.values())
+
+
+def _answered(camera_object: bpy.types.Object, values: CameraValues, scene: bpy.types.Scene) -> CameraValues:
+    """Values as other looks at them ask for. Those that make no camera, or are asked for no lens, stay as they are."""
+    frame, fit = datablocks.frame_of(scene), camera_object.data.sensor_fit
+    for look, number in values.asked:
+        with contextlib.suppress(InputError, ZeroDivisionError):
+            if look == "roll":
+                followed = targets.followed(camera_object, values)
+                turned = followed.rolled(number, preferences.up_axis(), hold.roll(camera_object, followed, scene))
+                values = replace(values, up=turned.up, held_roll=turned.held_roll)
+            else:
+                sensor = datablocks.own_sensor(camera_object.data)
+                distance = intrinsics.distance_by_lens(datablocks.LENSES[look], number, frame, sensor, fit)
+                seeing = values.seeing(distance, frame, fit)
+                intrinsics.check_storable(camera_object.name, distance=(seeing.distance,))
+                values = seeing
+    return replace(values, asked=())
 
 
 def _held_roll(camera_object: bpy.types.Object, values: CameraValues) -> float:

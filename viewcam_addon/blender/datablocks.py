@@ -30,6 +30,14 @@ def _no_perspective(camera_object: bpy.types.Object) -> InputError:
 
 
 _VALUES = "virtual_pinhole."
+# Properties that are another look at a value, which is what is kept → that value. They can be animated like any other.
+LENSES = {
+    "focal_length": "MILLIMETERS",
+    "horizontal_fov": "HORIZONTAL",
+    "vertical_fov": "VERTICAL",
+    "diagonal_fov": "DIAGONAL",
+}
+LOOKS = dict.fromkeys(LENSES, "distance") | {"roll": "up"}
 
 
 def is_animated(camera_object: bpy.types.Object) -> bool:
@@ -39,10 +47,13 @@ def is_animated(camera_object: bpy.types.Object) -> bool:
 
 
 def animated_values(camera_object: bpy.types.Object) -> set[str]:
-    """The names of the values that keyframes, NLA strips or drivers change; a point that follows a target is one of them."""
+    """The names of the values that keyframes, NLA strips or drivers change, or a look at them.
+
+    A point that follows a target is one of them.
+    """
     curves = [*versions.animation_curves(camera_object), *versions.drivers(camera_object)]
     found = {(curve.data_path.removeprefix(_VALUES), curve.array_index) for curve in curves if _counts(curve)}
-    return {("eye", "look_at")[index] if name == "followed" else name for name, index in found}
+    return {("eye", "look_at")[index] if name == "followed" else LOOKS.get(name, name) for name, index in found}
 
 
 def has_driven_values(camera_object: bpy.types.Object) -> bool:

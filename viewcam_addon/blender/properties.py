@@ -5,8 +5,8 @@ storage.py), and what they do to the camera stands in camera.py.
 
 `roll` is not stored: it is the angle about the view by which the picture is turned from what the preferred up axis says, read
 off the axes, well defined straight down as well, where the canonical ones count. Setting it turns up, or where the roll is held
-through the pole (hold.py), what is held. Rejected: to store it, a second truth beside up, and to animate it: up can be keyed,
-and of a keyed roll and a keyed up one would have to win.
+through the pole (hold.py), what is held. Rejected: to store it, a second truth beside up. A lens in millimeters or degrees is
+another look at the distance likewise. All of these can be animated: of a keyed look and a keyed value the look wins.
 
 Undo, redo and opening a file bring values and camera back together and call nothing. Callbacks raise nothing: values that make
 no camera (eye = look-at) leave it where it was, and the panel says so.
@@ -16,6 +16,7 @@ import contextlib
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import bpy
 
@@ -57,6 +58,7 @@ def _edit_of(*names: str) -> Callable[["VirtualPinhole", bpy.types.Context], Non
     def on_edited(group: "VirtualPinhole", _context: bpy.types.Context) -> None:
         if storage.is_storing:
             return
+        storage.forget_asked(group.id_data, edited)
         if not group.enabled:
             storage.state(group.id_data, edited & storage.EXACT)
             return
@@ -75,6 +77,7 @@ def _on_distance(group: "VirtualPinhole", _context: bpy.types.Context) -> None:
     if storage.is_storing:
         return
     camera_object = group.id_data
+    storage.forget_asked(camera_object, {"distance"})
     with contextlib.suppress(InputError):  # the panel finds the same error and shows it
         scene = datablocks.scene_of(camera_object)
         picture = without_border(datablocks.frame_of(scene))
@@ -133,32 +136,57 @@ def _roll(group: "VirtualPinhole") -> float:
     return cameras.roll(group.id_data)
 
 
-def _turn(group: "VirtualPinhole", angle: float) -> None:
-    cameras.turn(group.id_data, angle)
-    _edit_of("up", "held_roll")(group, bpy.context)
+def _looks_like(look: str) -> Callable[["VirtualPinhole"], float]:
+    """How a lens reads that is one of datablocks.LENSES."""
+    unit = datablocks.LENSES[look]
+    return lambda group: cameras.lens(group.id_data, unit)
 
 
-def _focal_length(group: "VirtualPinhole") -> float:
-    return cameras.lens(group.id_data, "MILLIMETERS")
+def _asks_for(look: str) -> Callable[["VirtualPinhole", float], None]:
+    """The setter of another look at a value, which Blender calls for a curve or a driver as well, on evaluated objects too."""
+    return lambda group, number: storage.ask(group.id_data, look, number)
 
 
-def _set_focal_length(group: "VirtualPinhole", value: float) -> None:
-    cameras.set_lens(group.id_data, "MILLIMETERS", value)
-    _on_lens(group, bpy.context)
+def _on_asked(*names: str) -> Callable[["VirtualPinhole", bpy.types.Context], None]:
+    """The callback of such a look, which Blender calls for an edit alone: the values that it names follow it."""
+    on_edited = _edit_of(*names)
+
+    def on_asked(group: "VirtualPinhole", context: bpy.types.Context) -> None:
+        if not storage.is_storing:
+            cameras.answer(group.id_data)
+            on_edited(group, context)
+
+    return on_asked
 
 
-def _side(group: "VirtualPinhole") -> str:
-    """Whose angle `field_of_view` is."""
-    return group.lens_unit if group.lens_unit in ("VERTICAL", "DIAGONAL") else "HORIZONTAL"
+_on_lens_asked = _on_asked("distance")
 
 
 def _field_of_view(group: "VirtualPinhole") -> float:
-    return cameras.lens(group.id_data, _side(group))
+    """The angle of the side that `lens_unit` names, else the horizontal one."""
+    unit = group.lens_unit if group.lens_unit in ("VERTICAL", "DIAGONAL") else "HORIZONTAL"
+    return cameras.lens(group.id_data, unit)
 
 
 def _set_field_of_view(group: "VirtualPinhole", value: float) -> None:
-    cameras.set_lens(group.id_data, _side(group), value)
-    _on_lens(group, bpy.context)
+    name = {"VERTICAL": "vertical_fov", "DIAGONAL": "diagonal_fov"}.get(group.lens_unit, "horizontal_fov")
+    storage.ask(group.id_data, name, value)
+
+
+def _angle(look: str, side: str) -> Any:
+    """The property that is the lens as the field of view of a side."""
+    return bpy.props.FloatProperty(
+        name="Lens",
+        description=f"The {side} field of view, zoom included. It is kept as the view-plane distance d",
+        subtype="ANGLE",
+        soft_min=math.radians(0.4),
+        soft_max=math.radians(173),
+        step=10,
+        precision=3,
+        get=_looks_like(look),
+        set=_asks_for(look),
+        update=_on_lens_asked,
+    )
 
 
 class VirtualPinhole(bpy.types.PropertyGroup):
@@ -273,23 +301,26 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         options=set(),
         override={"LIBRARY_OVERRIDABLE"},
     )
-    # Two looks at one distance: a property has one kind of unit. Neither is stored, nor overridable.
+    # Other looks at the distance: a property has one kind of unit. None is stored, nor overridable; all can be animated.
     focal_length: bpy.props.FloatProperty(
         name="Lens",
-        description="The focal length, zoom included. It is kept as the view-plane distance d: choose px to key it",
+        description="The focal length, zoom included. It is kept as the view-plane distance d",
         subtype="DISTANCE_CAMERA",
         unit="CAMERA",
         soft_min=1.0,
         soft_max=5000.0,
         step=100,
         precision=4,
-        get=_focal_length,
-        set=_set_focal_length,
-        options=set(),
+        get=_looks_like("focal_length"),
+        set=_asks_for("focal_length"),
+        update=_on_lens_asked,
     )
+    horizontal_fov: _angle("horizontal_fov", "horizontal")
+    vertical_fov: _angle("vertical_fov", "vertical")
+    diagonal_fov: _angle("diagonal_fov", "diagonal")
     field_of_view: bpy.props.FloatProperty(
         name="Lens",
-        description="The field of view, zoom included. It is kept as the view-plane distance d: choose px to key it",
+        description="The field of view of the side that the unit names, zoom included; of a script, for a curve needs one side",
         subtype="ANGLE",
         soft_min=math.radians(0.4),
         soft_max=math.radians(173),
@@ -297,6 +328,7 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         precision=3,
         get=_field_of_view,
         set=_set_field_of_view,
+        update=_on_lens_asked,
         options=set(),
     )
     # No minimum either.
@@ -335,8 +367,8 @@ class VirtualPinhole(bpy.types.PropertyGroup):
         step=100,
         precision=5,
         get=_roll,
-        set=_turn,
-        options=set(),
+        set=_asks_for("roll"),
+        update=_on_asked("up", "held_roll"),
     )
     pole: bpy.props.EnumProperty(
         name="At the Pole",

@@ -10,7 +10,7 @@ gone. `picture` and `counted_in` keep resolution, percentage and pixel aspect. R
 import contextlib
 import functools
 import json
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 
 import bpy
@@ -24,6 +24,7 @@ from . import datablocks, versions
 
 EXACT = frozenset({"eye", "look_at", "up", "distance"})  # of these `exact` has the digits
 _VECTORS = ("eye", "look_at", "up")
+_ASKED = "asked"  # where Blender keeps what `ask` has noted
 # What is noted of a camera once it has been set.
 _NOTED = ("distance", "counted_in", "set_for", "view_when_set", "held_roll")
 is_storing = False  # else the artist or a script sets a property, and the camera moves
@@ -68,6 +69,7 @@ def load(camera_object: bpy.types.Object) -> CameraValues:
         columns = zip(*exact, _shown_values(exact[0]), shown, strict=True)
         numbers = tuple([full if value in (short, zeroed) else value for full, short, zeroed, value in columns])
     follows = tuple(name for name in ("eye", "look_at") if getattr(group, f"{name}_target"))
+    asked = asked_of(camera_object)
     when_set = _parsed(group.when_set, 9) if group.pole == HOLD else None  # nobody else asks
     return CameraValues(
         eye=numbers[0:3],
@@ -85,7 +87,35 @@ def load(camera_object: bpy.types.Object) -> CameraValues:
         view_when_set=(when_set[0][0:3], when_set[0][3:6], when_set[0][6:9]) if when_set else None,
         precision=2.0**-53 if exact and numbers == exact[0] and not follows else 2.0**-24,
         follows=follows,
+        asked=tuple(asked.items()),
     )
+
+
+def ask(camera_object: bpy.types.Object, look: str, number: float) -> None:
+    """Note what another look at a value shall be (datablocks.LOOKS), which an artist or a curve has set.
+
+    Blender sets curves and drivers as it evaluates them, in any order, when nothing may be computed: the value follows later.
+    """
+    stored = versions.stored_properties(camera_object.virtual_pinhole)
+    if _ASKED not in stored:
+        stored[_ASKED] = {}
+    stored[_ASKED][look] = number
+
+
+def asked_of(camera_object: bpy.types.Object) -> dict[str, float]:
+    """The looks at values that have been asked for and not been answered yet. The evaluated object may be given as well."""
+    stored = versions.stored_properties(camera_object.virtual_pinhole)
+    return stored[_ASKED].to_dict() if _ASKED in stored else {}
+
+
+def forget_asked(camera_object: bpy.types.Object, names: Collection[str]) -> None:
+    """Take it that the looks at these values have been answered, or that the values themselves were set since."""
+    stored = versions.stored_properties(camera_object.virtual_pinhole)
+    if _ASKED in stored:
+        left = {look: number for look, number in stored[_ASKED].items() if datablocks.LOOKS[look] not in names}
+        del stored[_ASKED]
+        if left:
+            stored[_ASKED] = left
 
 
 def store(camera_object: bpy.types.Object, values: CameraValues, *names: str) -> None:
@@ -104,6 +134,7 @@ def store(camera_object: bpy.types.Object, values: CameraValues, *names: str) ->
                 setattr(group, "picture" if name == "set_for" else name, shape)
             else:
                 setattr(group, name, value)
+        forget_asked(camera_object, names)
         if not EXACT.isdisjoint(names):
             group.exact = json.dumps([*values.eye, *values.look_at, *values.up, values.distance])
     finally:

@@ -170,7 +170,8 @@ def bound(camera_object: bpy.types.Object) -> set[tuple[str, int]]:
     for curve in versions.drivers(camera_object):
         owner, _, name = curve.data_path.partition(".")
         if owner == "virtual_pinhole" and curve.data_path != _HOOK and not versions.is_muted(curve):
-            found.add((name, curve.array_index))
+            look = datablocks.LOOKS.get(name)
+            found |= {(look, i) for i in range(3)} if look else {(name, curve.array_index)}
     return found
 
 

@@ -19,8 +19,8 @@ LIGHTS_HAVE_SPACES = bpy.app.version >= (4, 5)
 _LINEAR = 1  # an enum's number, as foreach_set takes it
 # What Cycles draws without a material: a diffuse surface, and since 5.0 a Principled one, which bends grazing smooth normals.
 DEFAULT_SURFACE_BENDS_NORMALS = bpy.app.version >= (5, 0)
-# How Cycles reads a mesh in which flat faces stand beside smooth ones (export_geometry.py). Measured: 4.2, 4.5, 5.0 and 5.2.
-CYCLES_KEEPS_FLAT_FACES = bpy.app.version < (5, 1)
+# Whether Cycles has one normal a vertex, and splits those at sharp edges (export_geometry.py). Measured: 4.2, 4.5, 5.0 and 5.2.
+CYCLES_HAS_VERTEX_NORMALS = bpy.app.version < (5, 1)
 # Whether meshes can keep custom normals as they are given; before, as two angles of 16 bits. Measured: 4.2, 4.5, 5.0 and 5.2.
 MESHES_KEEP_NORMALS = bpy.app.version >= (4, 5)
 
@@ -58,6 +58,11 @@ def without_first_sample(samples: int) -> dict[str, object]:
     if bpy.app.version < (4, 4):
         return {"sample_offset": 1, "samples": samples}
     return {"use_sample_subset": True, "sample_offset": 1, "sample_subset_length": samples, "samples": samples + 1}
+
+
+def stored_properties(owner: bpy.types.bpy_struct) -> Any:
+    """What the add-on's properties of an owner hold, by name. What is set here calls nothing, and no evaluation follows it."""
+    return owner if bpy.app.version < (5, 0) else owner.bl_system_properties_get(do_create=True)
 
 
 def drivers(block: bpy.types.ID) -> list[bpy.types.FCurve]:

@@ -53,6 +53,7 @@ from ..files import written_whole
 from ..pinhole import Pinhole
 from . import (
     arkit,
+    arrays,
     bop,
     bundler,
     colmap,
@@ -85,7 +86,7 @@ from . import (
     vtk,
 )
 from .axes import moved, moved_back
-from .camera import ANGLES, AXES, PIXELS, Camera, LeftOut, Options, choose
+from .camera import ANGLES, AXES, PIXELS, POSES, Camera, LeftOut, Options, choose
 from .source import Source
 
 __all__ = [
@@ -93,6 +94,7 @@ __all__ = [
     "AXES",
     "FORMATS",
     "PIXELS",
+    "POSES",
     "Camera",
     "Options",
     "choose",
@@ -134,6 +136,7 @@ FORMATS: dict[str, ModuleType] = {
     "pbrt": pbrt,
     "matrices": matrices,
     "look_at": look_at,
+    "arrays": arrays,
     "text": own,
 }
 """Name → module, in the order in which they are asked."""

@@ -17,6 +17,12 @@ PIXELS = {
     "corner": "(0, 0) is the picture's corner and the first pixel's centre is (0.5, 0.5)",
     "center": "(0, 0) is the centre of the first pixel",
 }
+POSES = {
+    "w2c_opencv": "World to camera, x right, y down, z into the view: OpenCV, COLMAP",
+    "c2w_opencv": "Camera to world, x right, y down, z into the view: OpenCV, COLMAP",
+    "w2c_opengl": "World to camera, x right, y up, z back: OpenGL, Blender",
+    "c2w_opengl": "Camera to world, x right, y up, z back: OpenGL, Blender, NeRF",
+}
 ANGLES = {"degrees": "Degrees", "radians": "Radians"}
 _NAMED = 8
 
@@ -53,7 +59,8 @@ class Options:
     axes : one of AXES. scale : > 0; world units here of one of the file's. size : (width, height) in pixels, where a file
     says none. pixel_aspect : width of a pixel over its height, where a file says none. view_plane : the intrinsics where a
     file says none. base : the camera whose values stand where a text says only some. angle_unit : one of ANGLES, where a text
-    says none. pixel : one of PIXELS, in place of what the format has by habit. without_distortion : take a camera without its
+    says none. pixel : one of PIXELS, in place of what the format has by habit. pose : one of POSES, where a name does not say
+    which way a matrix goes. without_distortion : take a camera without its
     distortion. unmirrored : take a camera that mirrors its picture without that. original_world : undo the turn and scale
     that a file says were applied to its world. size_fits : whether the size is that of whatever scene is open, whose shape
     gives way to that of a text's camera, and not the picture's own.
@@ -72,6 +79,7 @@ class Options:
     base: Pinhole | None = None
     angle_unit: str | None = None
     pixel: str | None = None
+    pose: str | None = None
     without_distortion: bool = False
     unmirrored: bool = False
     original_world: bool = False
@@ -79,7 +87,7 @@ class Options:
 
     def __post_init__(self) -> None:
         _choice("axes", self.axes, AXES)
-        for name, among in (("angle_unit", ANGLES), ("pixel", PIXELS)):
+        for name, among in (("angle_unit", ANGLES), ("pixel", PIXELS), ("pose", POSES)):
             if getattr(self, name) is not None:
                 _choice(name, getattr(self, name), among)
         for name in ("scale", "pixel_aspect"):

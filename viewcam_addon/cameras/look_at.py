@@ -3,6 +3,8 @@
     gluPerspective(40, 16./9, .1, 100); gluLookAt(7,-6,4, 0,0,1, 0,0,1);                   OpenGL, glm, gl-matrix, Direct3D
     camera = new THREE.PerspectiveCamera(40, 16/9); camera.position.set(7,-6,4); camera.lookAt(0,0,1)       three.js
     camera.SetPosition(7,-6,4); camera.SetFocalPoint(0,0,1); camera.SetViewUp(0,0,1); camera.SetViewAngle(40)      VTK, ParaView
+    p.computeViewMatrix([7,-6,4], [0,0,1], [0,0,1]); p.computeProjectionMatrixFOV(40, 16/9, .1, 100)            PyBullet
+    look_at_view_transform(dist=9, elev=20, azim=130); FoVPerspectiveCameras(fov=40)                             PyTorch3D
     plotter.camera_position = [(7,-6,4), (0,0,1), (0,0,1)]                                                          PyVista
     point3 lookfrom(7,-6,4); point3 lookat(0,0,1); vec3 vup(0,0,1); auto vfov = 40;                 Ray Tracing in One Weekend
     pinhole->set_eye(7,-6,4); pinhole->set_lookat(0,0,1); pinhole->set_view_distance(960); vp.set_hres(640);    textbooks
@@ -19,7 +21,8 @@ sense and is refused unless it is 0.
 
 Sources: the OpenGL reference pages of gluLookAt and gluPerspective; glm's ext/matrix_clip_space.inl; three.js'
 PerspectiveCamera and Object3D.lookAt; VTK's vtkCamera.h and vtkCamera.cxx (WindowCenter, defaults); Shirley's books; Suffern's
-Ray Tracing from the Ground Up, chapters 8 to 10. Rejected: running the code.
+Ray Tracing from the Ground Up, chapters 8 to 10; PyBullet's quickstart guide; PyTorch3D's renderer/cameras.py (degrees of the
+picture's shorter side, a point of view on a sphere about `at` whose pole is y). Rejected: running the code.
 """
 
 import functools
@@ -27,6 +30,8 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+
+import numpy as np
 
 from ..errors import InputError
 from . import axes, own, texts, tokens
@@ -47,9 +52,10 @@ _CAMERA = re.compile(r"cam|view|eye|lens|observer", re.IGNORECASE)
 _NAMED_CAMERA = re.compile(r"cam", re.IGNORECASE)
 
 _EYE = "eye eyepos eyeposition eyepoint eyelocation lookfrom lookfrompoint campos camerapos camposition "
-_EYE += "cameraposition cameralocation camerafrom cameraorigin cameraeye cameracenter"
-_TARGET = "lookat lookatpoint lookatpos lookto focalpoint camerafocalpoint cameratarget camtarget cameralookat cameraat"
-_UP = "up vup upvector viewup cameraviewup cameraup camup camerauup defaultup"
+_EYE += "cameraposition cameralocation camerafrom cameraorigin cameraeye cameracenter cameraeyeposition"
+_TARGET = "lookat lookatpoint lookatpos lookto focalpoint camerafocalpoint cameratarget camtarget cameralookat cameraat "
+_TARGET += "cameratargetposition"
+_UP = "up vup upvector viewup cameraviewup cameraup camup camerauup defaultup cameraupvector"
 _SPECIFIC = {
     **dict.fromkeys(_EYE.split(), "eye"),
     **dict.fromkeys(_TARGET.split(), "target"),
@@ -84,26 +90,29 @@ _GENERIC = {
 _LOOK_AT = {
     "lookat", "glulookat", "lookatrh", "lookatlh", "setlookat", "makelookat", "createlookat", "createlookatlh",
     "matrixlookatlh", "matrix4lookat", "xmmatrixlookatrh", "xmmatrixlookatlh", "d3dxmatrixlookatlh", "d3dxmatrixlookatrh",
-    "targetto",
+    "targetto", "computeviewmatrix",
 }  # fmt: skip
 _PERSPECTIVE = {
     "gluperspective", "perspective", "perspectivecamera", "perspectiverh", "perspectivelh", "makeperspective",
-    "perspectiveprojection", "createperspectiveprojectionmatrix",
+    "perspectiveprojection", "createperspectiveprojectionmatrix", "computeprojectionmatrixfov",
 }  # fmt: skip
 _PERSPECTIVE |= {
     f"{name}{hand}"
     for name in ("xmmatrixperspectivefov", "d3dxmatrixperspectivefov", "createperspectivefieldofview", "perspectivefov")
     for hand in ("lh", "rh", "")
 }
-_FRUSTUM = {"glfrustum", "frustum", "makefrustum"}
+_FRUSTUM = {"glfrustum", "frustum", "makefrustum", "computeprojectionmatrix"}
+_PYBULLET = {"computeviewmatrixfromyawpitchroll", "getcameraimage"}
+_PYTORCH3D = {"lookatviewtransform", "fovperspectivecameras", "openglperspectivecameras", "perspectivecameras"}
 _ORTHOGRAPHIC = {
     "glortho", "ortho", "orthographiccamera", "gluortho2d", "xmmatrixorthographiclh", "enableparallelprojection",
-    "parallelprojectionon",
+    "parallelprojectionon", "fovorthographiccameras", "orthographiccameras",
 }  # fmt: skip
+_PYTORCH3D_LOOK = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0))  # eye, at and up where they are not given
 _MOVES = {
     "rotatex", "rotatey", "rotatez", "rotateonaxis", "translatex", "translatey", "translatez", "azimuth", "elevation",
     "dolly", "roll", "yaw", "pitch", "setroll", "orthogonalizeviewup", "applymatrix4", "setviewoffset", "setfocallength",
-    "filmoffset", "quaternion", "rotation", "flyto", "setview",
+    "filmoffset", "quaternion", "rotation", "flyto", "setview"
 }  # fmt: skip
 _TURNED = {"rotation", "quaternion", "matrix", "matrixworld", "rotate"}
 # Where they are made they turn the camera to their target, whatever it looked at before.
@@ -134,6 +143,7 @@ class _Said:
     frustum: tuple[float, ...] | None = None
     orthographic: int | None = None
     three: bool = False
+    is_height_first: bool = False  # in sizes, as in PyTorch3D's
     controls: str | None = None  # of three.js, which turn the camera to their target
 
 
@@ -297,6 +307,8 @@ class _Code:
             role = self._role(parts, sign)
             if role in ("eye", "target", "look_at", "camera_position", "direction", "position_x", "position_y", "position_z"):
                 return True
+            if role in ("lookatviewtransform", "computeviewmatrixfromyawpitchroll"):
+                return True
         return False
 
     def _role(self, parts: list[str], sign: str) -> str | None:
@@ -321,6 +333,8 @@ class _Code:
             before = texts.plain(parts[-2]) if len(parts) > 1 else ""
         elif key in ("x", "y", "z") and before in ("position", "up") and sign == "=" and self._is_camera(parts[:-2]):
             return f"{before}_{key}"
+        if sign == "(" and (key in _PYTORCH3D or key in _PYBULLET):
+            return key
         if sign == "(" and key in _LOOK_AT and not (key == "setlookat" and before):
             return "look_at"
         if sign == "(" and key in _PERSPECTIVE:
@@ -391,7 +405,7 @@ class _Code:
     def said(self) -> _Said:
         if len(self.statements) > _MOST_STATEMENTS:
             raise InputError(f"the text says more than {_MOST_STATEMENTS} things of cameras: copy one camera")
-        said = _Said(three=bool(re.search(r"\bTHREE\b|PerspectiveCamera", self.text)))
+        said = _Said(three=bool(re.search(r"\b(?:THREE|PerspectiveCamera)\b", self.text)))
         for at in self._all(*_LENSES):
             if self._words[at + 1] == "*" or self._words[at - 1] == "new":
                 not_a_pinhole("the text's camera", f"a {self._words[at]}")
@@ -441,6 +455,15 @@ class _Code:
                 self._look_at(said, parts, at - 1, start)
             elif role == "perspective":
                 self._perspective(said, parts, at - 1, start)
+            elif role in _PYTORCH3D:
+                self._of_pytorch3d(said, role, at - 1, start)
+            elif role == "computeviewmatrixfromyawpitchroll":
+                self._of_pybullet(said, at - 1, start)
+            elif role == "getcameraimage":
+                values, named, _ = self.reader.arguments(at - 1)
+                self._set(
+                    said, "size", tuple((*values[:2], *(named[key] for key in ("width", "height") if key in named))), start
+                )
             elif role == "frustum":
                 values, _, _ = self.reader.arguments(at - 1)
                 said.frustum = numbers(tuple(values[:6]), 6) if len(values) >= 6 else None
@@ -493,6 +516,7 @@ class _Code:
         else:
             value = self.reader.value(at)[0]
         if role in _VECTORS:
+            value = _only(value)
             found = numbers(value, 3)
             if found is None and sign in "({" and _looks_declared(self.text, at - 1):
                 return
@@ -510,7 +534,8 @@ class _Code:
         if texts.plain(parts[-1]).endswith("lh"):
             said.mirrored = True
         if named:
-            spelt = {own._spelt(key): value for key, value in named.items()}
+            roles = {key: _SPECIFIC.get(texts.plain(key)) for key in named}
+            spelt = {own._spelt(roles[key] or key): value for key, value in named.items()}
             values = [spelt.get(name) for name in own.VECTORS]
         flat = tuple(values)
         if (nine := numbers(flat[-9:], 9)) and len(flat) in (9, 10):
@@ -535,6 +560,56 @@ class _Code:
             texts.fail(self.text, start, "give eye, target and up as plain numbers")
         for role, vector in zip(("eye", "target", "up"), vectors, strict=True):
             self._set(said, role, vector, start)
+
+    def _of_pybullet(self, said: _Said, opened: int, start: int) -> None:
+        """A point of view on a sphere about the target: degrees, whose roll, which also moves the eye, must be 0."""
+        values, named, _ = self.reader.arguments(opened)
+        given = (
+            dict(zip(("cameraTargetPosition", "distance", "yaw", "pitch", "roll", "upAxisIndex"), values, strict=False)) | named
+        )
+        target = numbers(given.get("cameraTargetPosition"), 3)
+        rest = numbers(tuple(given.get(name, 0.0) for name in ("distance", "yaw", "pitch", "roll", "upAxisIndex")), 5)
+        if target is None or rest is None or rest[3] or rest[4] not in (1.0, 2.0):
+            texts.fail(self.text, start, "give plain numbers and no roll, or write computeViewMatrix with eye, target and up")
+        distance, yaw, pitch, _, axis = rest
+        around, sideways = texts.turn(yaw, np.eye(3)[int(axis)]), texts.turn(pitch if axis == 2 else -pitch, np.eye(3)[0])
+        offset = around @ sideways @ (-distance * np.eye(3)[1 if axis == 2 else 2])
+        said.moved.append(start)
+        self._set(said, "eye", tuple((np.array(target) + offset).tolist()), start)
+        self._set(said, "target", target, start)
+        self._set(said, "up", tuple((around @ sideways @ np.eye(3)[int(axis)]).tolist()), start)
+
+    def _of_pytorch3d(self, said: _Said, role: str, opened: int, start: int) -> None:
+        values, named, _ = self.reader.arguments(opened)
+        if role == "perspectivecameras":
+            texts.fail(self.text, start, "write FoVPerspectiveCameras with the fov that this focal length makes")
+        if role != "lookatviewtransform":
+            if "degrees" in named or named.get("aspect_ratio", 1.0) != 1.0:
+                texts.fail(self.text, start, "give fov in degrees and leave degrees and aspect_ratio out")
+            angle = named.get("fov", values[2] if len(values) > 2 else 60.0)
+            self._set(said, "fov_of_shorter", Degrees(angle) if isinstance(angle, float) else Unknown(start), start)
+            return
+        names = ("dist", "elev", "azim", "degrees", "eye", "at", "up")
+        given = dict(zip(names, values, strict=False)) | named
+        eye, at, up = (
+            numbers(_only(given.get(name, usual)), 3) for name, usual in zip(names[4:], _PYTORCH3D_LOOK, strict=True)
+        )
+        if "eye" not in given:
+            spherical = numbers(
+                tuple(_only(given.get(name, usual)) for name, usual in zip(names, (1.0, 0.0, 0.0), strict=False)), 3
+            )
+            if spherical is None or "degrees" in given or at is None:
+                texts.fail(self.text, start, "give dist, elev and azim as plain numbers in degrees, or eye, at and up")
+            distance, elevation, azimuth = spherical[0], math.radians(spherical[1]), math.radians(spherical[2])
+            around = distance * math.cos(elevation)
+            offset = (around * math.sin(azimuth), distance * math.sin(elevation), around * math.cos(azimuth))
+            eye = tuple(a + b for a, b in zip(at, offset, strict=True))
+        if None in (eye, at, up):
+            texts.fail(self.text, start, "give eye, at and up as plain numbers")
+        said.moved.append(start)
+        for name, vector in zip(("eye", "target", "up"), (eye, at, up), strict=True):
+            self._set(said, name, vector, start)
+        said.is_height_first = True
 
     def _camera_position(self, said: _Said, at: int, start: int) -> None:
         value = self.reader.value(at)[0]
@@ -562,7 +637,7 @@ class _Code:
             return
         angle = named.get("fov", named.get("fovy", values[0] if values else None))
         if isinstance(angle, float) and not isinstance(angle, Radians | Degrees):
-            if name in ("gluperspective", "perspectivecamera", "perspectiveprojection"):
+            if name in ("gluperspective", "perspectivecamera", "perspectiveprojection", "computeprojectionmatrixfov"):
                 angle = Degrees(angle)
             elif angle < math.pi and ("glm" in family or "mat4" in family or name.startswith(("xm", "d3dx", "create"))):
                 angle = Radians(angle)
@@ -573,6 +648,11 @@ class _Code:
             aspect = named.get("aspect", values[1] if len(values) > 1 else None)
             if isinstance(aspect, float):
                 self._set(said, "aspect_of_lens", aspect, start)
+
+
+def _only(value: object) -> object:
+    """What stands alone in brackets, as in PyTorch3D's batches of one; else the value itself."""
+    return value[0] if isinstance(value, tuple) and len(value) == 1 else value
 
 
 def _is_name(word: str) -> bool:
@@ -643,7 +723,9 @@ def _pose(said: _Said, text: str, options: Options) -> tuple:
         eye = (0.0, 0.0, 0.0)
     if said.controls:
         known = _known(values, "target_of_controls", text, "write the target in plain numbers") or (0.0, 0.0, 0.0)
-        target, notes = numbers(known, 3), (f"{said.controls} turn the camera to their target, {known}",)
+        if (target := numbers(known, 3)) is None:
+            texts.fail(text, values["target_of_controls"][1], "write the target in plain numbers")
+        notes = (f"{said.controls} turn the camera to their target, {target}",)
     if target is None and (aims := {point for _, point in said.aimed}):
         if len(aims) > 1:
             texts.fail(text, said.aimed[1][0], "it looks at several points, copy one camera")
@@ -686,6 +768,10 @@ def _plane(said: _Said, text: str, options: Options) -> tuple:
     if aspect is not None and not 1e-4 < aspect < 1e4:
         raise InputError(f"the picture's aspect is {aspect:g}: give its width over its height")
     size = _size(values, aspect)
+    if said.is_height_first and isinstance(values.get("size", (None,))[0], float):
+        size = _size(values | {"size": ((values["size"][0],) * 2, values["size"][1])}, aspect)
+    elif said.is_height_first and size:
+        size = (size[1], size[0])
     if said.frustum:
         left, right, bottom, top, near, _ = said.frustum
         if not (left != right and bottom != top and near > 0):
@@ -707,7 +793,7 @@ def _plane(said: _Said, text: str, options: Options) -> tuple:
         if s <= 0 or zoom <= 0:
             raise InputError(f"pixel size and zoom are {s:g} and {zoom:g}: give positive ones")
         return film.centred(d * zoom / s), film.is_stated, film.notes
-    said_angles = [role for role in ("fov_y", "fov_x", "view_angle", "fov") if role in values]
+    said_angles = [role for role in ("fov_of_shorter", "fov_y", "fov_x", "view_angle", "fov") if role in values]
     if _plain_number(values, "zoom", 1.0, text) != 1 and not (said.three and said_angles):
         texts.fail(text, values["zoom"][1], "what this zooms differs between programs, write the field of view that it makes")
     if not said_angles:
@@ -729,7 +815,7 @@ def _plane(said: _Said, text: str, options: Options) -> tuple:
     value = _known(values, role, text, "write the field of view as a number")
     if not isinstance(value, float):
         texts.fail(text, values[role][1], "write the field of view as a number")
-    axis = {"fov_y": "y", "fov_x": "x", "view_angle": "y"}.get(role)
+    axis = {"fov_of_shorter": "smaller", "fov_y": "y", "fov_x": "x", "view_angle": "y"}.get(role)
     if role == "view_angle":
         value = value if isinstance(value, Radians) else Degrees(value)
         axis = "x" if _plain_number(values, "use_horizontal", 0.0, text) else "y"

@@ -30,7 +30,7 @@ from .. import checks, npy
 from ..errors import InputError
 from ..pinhole import ViewPlane
 from . import axes, distortion, naming, own
-from .camera import Camera, LeftOut, NoPinholeError, Options, not_a_pinhole
+from .camera import POSES, Camera, LeftOut, NoPinholeError, Options, not_a_pinhole
 from .source import Record, Source, flat, number, pixels
 
 TITLE = "OpenCV K, R, t (FileStorage YAML, JSON or XML; NPZ)"
@@ -44,7 +44,7 @@ _RVEC = ("rvec", "rodrigues", "rotationvector", "rvecs")
 _T = ("t", "tvec", "translation", "translationvector", "trans", "tw2c")
 _EXTRINSIC = (
     "extrinsic", "extrinsics", "rt", "worldtocamera", "worldtocam", "world2camera", "world2cam", "w2c", "tcw",
-    "extrinsicmatrix",
+    "extrinsicmatrix", "tcamworld", "tcameraworld",
 )  # fmt: skip
 _DISTORTION = (
     "distortioncoefficients", "distcoeffs", "dist", "distortion", "distcoef", "distcoeff", "d", "distortioncoeffs", "dist0",
@@ -56,7 +56,11 @@ _OTHER_LENS = re.compile(
 # Of what may be a pose in words that nobody knows; Kalibr's T_cam_imu is none.
 _MAY_BE_POSE = re.compile(r"pose|extrin|rotation|rot$|transf|transl|2cam|2world|toworld|tocam|w2|c2|rvec|tvec|position|quat")
 _NO_POSE = ("tcamimu", "timushift", "rectificationmatrix", "projectionmatrix", "p")
-_OTHER_POSE = ("pose", "c2w", "cam2world", "cameratoworld", "camtoworld", "twc", "camerapose", "quaternion", "q", "qvec")
+_BLENDERS = ("matrixworld",)
+_OTHER_POSE = (
+    *("pose", "c2w", "cam2world", "camera2world", "cameratoworld", "camtoworld", "twc", "camerapose", "transform"),
+    *("transformmatrix", "tworldcam", "tworldcamera", *_BLENDERS, "quaternion", "q", "qvec"),
+)
 _WIDTH = ("imagewidth", "width", "w", "resx")
 _HEIGHT = ("imageheight", "height", "h", "resy")
 _SIZE = ("imagesize", "size", "resolution", "imgsize", "imagesizewh")
@@ -64,6 +68,7 @@ NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4",
 """The names of the distortion's coefficients, in OpenCV's order."""
 _MOST_BYTES, _MOST_ARRAYS = 2**16, 1000  # of an NPZ
 _WIDEST = 50  # widths of the picture to a focal length, which are 177.7°
+_UNSAID = f"whose axes it means and which way it goes is not said: give --pose, one of {', '.join(POSES)}"
 _WAY = "R and t were taken as from world to camera, x right, y down, z into the view"
 
 
@@ -78,7 +83,7 @@ def read(source: Source, options: Options) -> list[Camera]:
             before = _four_rows(values["tcncnm1"], f"T_cn_cnm1 of camera {checks.shown(name)}") @ before
             values |= {"r": before[:3, :3].tolist(), "t": before[:3, 3].tolist()}
         with left_out.unless_pinhole(name):
-            cameras.append(_camera(name, values, options))
+            cameras.append(camera(name, values, options))
     return left_out.told(cameras)
 
 
@@ -151,16 +156,38 @@ def of_rotation_vector(vector: Sequence[float], what: str) -> np.ndarray:
     return axes.rotation_of((math.cos(angle / 2), *(sine * part for part in vector)), what)
 
 
-def _plain(key: str) -> str:
+def plain(key: str) -> str:
+    """A name in small letters and digits alone."""
     return re.sub(r"[^a-z0-9]", "", key.lower()[:60])
 
 
 def _by_name(values: Mapping[str, Any]) -> dict[str, Any]:
-    return {_plain(key): value for key, value in values.items() if isinstance(key, str) and value is not None}
+    return {plain(key): value for key, value in values.items() if isinstance(key, str) and value is not None}
 
 
 def _first(values: Mapping[str, Any], names: Sequence[str]) -> Any:
     return next((values[name] for name in names if name in values), None)
+
+
+def says_intrinsics(values: Mapping[str, Any]) -> bool:
+    """Whether one of the values is K, whether its numbers are known or not."""
+    k = _first(values, _K)
+    return k is not None and (not isinstance(k, list | dict) or _is_camera(values))
+
+
+def is_of_pose(name: str) -> bool:
+    """Whether a plain name is that of a pose, or of a part of one."""
+    return name in (*_R, *_RVEC, *_T, *_EXTRINSIC, *_OTHER_POSE)
+
+
+def is_size(name: str) -> bool:
+    """Whether a plain name is that of the picture's size, or of one side."""
+    return name in (*_WIDTH, *_HEIGHT, *_SIZE)
+
+
+def is_known(name: str) -> bool:
+    """Whether a plain name is that of anything that a camera has."""
+    return is_of_pose(name) or is_size(name) or name in (*_K, *_DISTORTION)
 
 
 def _is_camera(values: Mapping[str, Any]) -> bool:
@@ -289,7 +316,7 @@ def of_window(plane: ViewPlane, values: Mapping[str, Any], what: str) -> tuple[V
     values : `roi` of ROS' camera_info, a window of the sensor in its own pixels (0 × 0: all of it), and `binning_x` and
     `binning_y`, how many of these are one of the picture (0: one), with underscores or without.
     """
-    given = Record({_plain(key): value for key, value in values.items()}, what)
+    given = Record({plain(key): value for key, value in values.items()}, what)
     x, y = (given.number(f"binning{side}", 1.0, 0, 1e4) or 1.0 for side in "xy")
     roi = given.record("roi") if "roi" in given else Record({}, f"roi of {what}")
     left, top, width, height = (roi.number(key, 0.0, 0, 1e9) for key in ("x_offset", "y_offset", "width", "height"))
@@ -326,17 +353,28 @@ def settled(numbers: dict[str, float], plane: ViewPlane, what: str, options: Opt
     return distortion.settle(numbers, distortion.opencv(numbers), plane, what, options)
 
 
-def _camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
+def camera(name: str, values: Mapping[str, Any], options: Options) -> Camera:
+    """The camera of values by their plain names; without K it sees as the options say.
+
+    Raises
+    ------
+    InputError
+        if they are no camera, or leave open what it is.
+    """
     what = f"camera {checks.shown(name)}"
     refuse_other_lens(values, what)
     if {"t", "hw"} <= values.keys():
         return _of_infinigen(name, values, what, options)
+    if (k := _first(values, _K)) is None:
+        matrix, more = _pose(values, what, options)
+        pinhole, more_of_pose = axes.pinhole(matrix, options.plane_or_refuse(what), what)
+        return Camera(name, pinhole, False, (*more, *more_of_pose))
     size, stated = _size(values, what, options)
-    plane = plane_of_k(_numbers("K", _first(values, _K)), size, half_pixel(options), what)
+    plane = plane_of_k(_numbers("K", k), size, half_pixel(options), what)
     plane, windowed = of_window(plane, values, what)
     notes = told_of_half_pixel(options, "OpenCV") + windowed + settled(_coefficients(values, what), plane, what, options)
-    turn, translation, more = _pose(values, what)
-    pinhole, more_of_pose = axes.pinhole(axes.from_world_to_camera(turn, translation, what), plane, what)
+    matrix, more = _pose(values, what, options)
+    pinhole, more_of_pose = axes.pinhole(matrix, plane, what)
     return Camera(name, pinhole, stated, (*notes, *more, *more_of_pose))
 
 
@@ -352,7 +390,7 @@ def _of_infinigen(name: str, values: Mapping[str, Any], what: str, options: Opti
 def refuse_other_lens(values: Mapping[str, Any], what: str) -> None:
     """Raise InputError if a model that the values name is none of a pinhole, whatever its coefficients are."""
     for key, value in values.items():
-        is_model = _plain(key) in ("cameramodel", "distortionmodel", "model", "distortiontype") and isinstance(value, str)
+        is_model = plain(key) in ("cameramodel", "distortionmodel", "model", "distortiontype") and isinstance(value, str)
         if is_model and _OTHER_LENS.search(value.lower()):
             not_a_pinhole(what, f"of the model {checks.shown(value)}")
 
@@ -398,26 +436,26 @@ def _size(values: Mapping[str, Any], what: str, options: Options) -> tuple[tuple
     return options.size_or_refuse(what), False
 
 
-def _pose(values: Mapping[str, Any], what: str) -> tuple[np.ndarray, tuple[float, ...], tuple[str, ...]]:
-    extrinsic, turn, vector, translation = (_first(values, names) for names in (_EXTRINSIC, _R, _RVEC, _T))
-    if other := next((name for name in _OTHER_POSE if name in values), None):
-        raise InputError(f"{what} has {other}, and whose axes it means is not said: write R and t, from world to camera")
+def _pose(values: Mapping[str, Any], what: str, options: Options) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Camera to world, 4 × 4 with columns u, v, w and the eye; and notes."""
+    whole = next((name for name in (*_EXTRINSIC, *_OTHER_POSE, *_T) if _is_whole(name, values)), None)
+    turn, vector, translation = (_first(values, names) for names in (_R, _RVEC, _T))
     if turn is not None and translation is None and "p" in values:  # of ROS: how a stereo pair is rectified
         turn = None
-    if extrinsic is not None and turn is None and vector is None:
-        numbers = _numbers(f"the extrinsic matrix of {what}", extrinsic)
-        if len(numbers) not in (12, 16) or (len(numbers) == 16 and numbers[12:] != (0, 0, 0, 1)):
-            raise InputError(f"the extrinsic matrix of {what} is not 3 × 4 or 4 × 4 with the last row 0 0 0 1: correct it")
-        rows = np.array(numbers).reshape(-1, 4)[:3]
-        return rows[:, :3], tuple(rows[:, 3].tolist()), (_WAY,)
+    if whole is not None and (whole not in _EXTRINSIC or (turn is None and vector is None)):
+        way = options.pose or ("w2c_opencv" if whole in _EXTRINSIC else "c2w_opengl" if whole in _BLENDERS else None)
+        if way is None:
+            raise InputError(f"{what} has {whole}, and {_UNSAID}")
+        matrix, notes = _four_columns(_numbers(f"{whole} of {what}", values[whole]), f"{whole} of {what}")
+        return _to_world(matrix, way, what), (_told_of(way), *notes)
     if turn is None and vector is None and translation is None:
         for name, value in values.items():
             if name not in _NO_POSE and isinstance(value, list | dict) and _MAY_BE_POSE.search(name):
-                raise InputError(f"{what} has {name}, and whose axes it means is not said: write R and t, from world to camera")
-        return np.eye(3), (0.0, 0.0, 0.0), (f"{what} has no pose: it stands at the origin and looks along z, y down",)
+                raise InputError(f"{what} has {name}, and {_UNSAID}")
+        return axes.of_opencv(np.eye(4)), (f"{what} has no pose: it stands at the origin and looks along z, y down",)
     if (turn is None and vector is None) or translation is None:
         raise InputError(f"{what} has only a part of its pose: give R or rvec, and t")
-    translation = _numbers(f"t of {what}", translation)
+    translation = checks.vector(f"t of {what}", _numbers(f"t of {what}", translation), 3)
     numbers = _numbers(f"R of {what}", turn if turn is not None else vector)
     if len(numbers) == 9:
         matrix = np.array(numbers).reshape(3, 3)
@@ -429,4 +467,39 @@ def _pose(values: Mapping[str, Any], what: str) -> tuple[np.ndarray, tuple[float
         both = _numbers(f"rvec of {what}", vector)
         if len(both) == 3 and np.abs(of_rotation_vector(both, what) - matrix).max() > 1e-3:
             raise InputError(f"R and rvec of {what} are different rotations: take one out")
-    return matrix, translation, (_WAY,)
+    way = options.pose or "w2c_opencv"
+    return _to_world(np.column_stack([matrix, translation]), way, what), (_told_of(way),)
+
+
+def _is_whole(name: str, values: Mapping[str, Any]) -> bool:
+    """Whether a name has a whole pose, if it may have, and not a translation alone."""
+    if name not in _T:
+        return name in values
+    value = values.get(name)
+    return isinstance(value, list | dict) and len(_numbers(name, value)) in (12, 16)
+
+
+def _told_of(way: str) -> str:
+    return _WAY if way == "w2c_opencv" else f"The pose was taken as: {POSES[way]}"
+
+
+def _four_columns(numbers: Sequence[float], name: str) -> tuple[np.ndarray, tuple[str, ...]]:
+    """(3, 4) of twelve numbers or of sixteen, whose rows or columns come first as the 0 0 0 1 tells; and notes."""
+    if len(numbers) == 12:
+        return np.array(numbers).reshape(3, 4), ()
+    matrix = np.array(numbers).reshape(4, 4) if len(numbers) == 16 else np.zeros((4, 4))
+    by_rows, by_columns = (last.tolist() == [0, 0, 0, 1] for last in (matrix[3], matrix[:, 3]))
+    if by_rows:
+        return matrix[:3], ()
+    if not by_columns:
+        raise InputError(f"{name} is not 3 × 4 or 4 × 4 with the last row 0 0 0 1: correct it")
+    return matrix.T[:3], (f"{name} has 0 0 0 1 as its last column: its columns were taken as rows",)
+
+
+def _to_world(matrix: np.ndarray, way: str, what: str) -> np.ndarray:
+    """Camera to world with columns u, v, w and the eye, of (3, 4) that is one of POSES."""
+    if way.startswith("c2w"):
+        whole = np.vstack([matrix, [0.0, 0.0, 0.0, 1.0]])
+        return axes.of_opencv(whole) if way == "c2w_opencv" else whole
+    rows = matrix if way == "w2c_opencv" else matrix * [[1.0], [-1.0], [-1.0]] + 0.0
+    return axes.from_world_to_camera(rows[:, :3], tuple(rows[:, 3].tolist()), what)

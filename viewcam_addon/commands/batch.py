@@ -1,35 +1,23 @@
-"""`viewcam batch`: what is asked for becomes shots, all of them are looked at, and then they are run, here or on a cluster.
-
-Whatever is wrong with any shot is told before the first is rendered. Libraries are silent all the while: of a batch, its
-events are heard.
-"""
+"""`viewcam batch`: what is asked for becomes jobs, and these are carried out (carry_out.py)."""
 
 import argparse
-import contextlib
 import dataclasses
 import functools
-import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from .. import argument_types as types
-from .. import cameras, crashes
+from .. import cameras
 from ..errors import InputError
-from ..jobs import cluster, dataset, lists, makers, one, render_client, render_server
-from ..jobs import run as running
-from ..jobs.folder import Folder, Outputs
-from ..jobs.interruption import Interruption
-from ..jobs.names import one_file
-from ..jobs.problems import ShotsError
-from ..jobs.settings import settings_hash
-from ..jobs.shards import shard
-from ..jobs.shot import ENGINES, LEVELS, Shot
-from ..jobs.summary import Summary
+from ..jobs import lists, makers
+from ..jobs.folder import Outputs
+from ..jobs.job import ENGINES, LEVELS, Job
+from ..jobs.plan import Plan
 from ..labels import KINDS
-from ..terminal import say, silent_libraries
-from . import Result, blender_room
+from . import Result
 from .camera import add_reading_options, options_of
+from .carry_out import add_machines, carry_out
 
 _EXAMPLES = """\
 examples:
@@ -54,20 +42,6 @@ exit status:
   0 all shots are there, and every check passed   1 a check failed
   2 bad input, nothing is rendered   4 shots failed or are left   130, 143 ended by SIGINT, SIGTERM
 """
-
-_MOST_NAMED = 5
-_OPEN_TO_ALL = "whoever reaches {} can run any program on its workers: docs/farm.md says how TLS lets in only your own"
-
-
-@dataclasses.dataclass(frozen=True)
-class _Job:
-    """shots : those of this run. all_shots : those of a dataset, or of this run. made_from : all but the shot that decides a
-    picture; settings : the hash of what each of all_shots is made from, by its name."""
-
-    all_shots: Sequence[Shot]
-    shots: Sequence[Shot]
-    made_from: Mapping[str, Any]
-    settings: Mapping[str, str]
 
 
 def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
@@ -120,54 +94,28 @@ def add_options(added: argparse.ArgumentParser, blend_is_open: bool) -> None:
         "--transforms", choices=["png", "exr"], nargs="?", const="png", help="transforms.json and COLMAP text of the png or exr"
     )
 
-    machines = added.add_argument_group("more than one process")
-    limit = "seconds that a shot may take; then its Blender is ended, and the shot has failed"
-    machines.add_argument("--time-limit", type=types.above_zero, metavar="SECONDS", help=limit)
-    machines.add_argument("--workers", type=types.positive, metavar="N", help="render in N processes of this machine")
-    where = "render on a Dask cluster, as tcp://host:8786 (without an address: on one of this machine)"
-    machines.add_argument("--scheduler", metavar="ADDRESS", nargs="?", const="", type=_address, help=where)
-
-
-def _address(text: str) -> str:
-    if "://" not in text:
-        raise argparse.ArgumentTypeError(f"{text!r} is no address of a Dask scheduler: write tcp://host:8786")
-    return text
+    add_machines(added)
 
 
 def run(options: argparse.Namespace) -> Result:
     _refuse_contradictions(options)
-    outputs = _outputs(options)
-    on_signal = functools.partial(options.events.tell, "stopping")
-    with silent_libraries(), Interruption(on_signal, crashes.passed_on) as interruption, contextlib.ExitStack() as stack:
-        renderer = stack.enter_context(_renderer(options))
-        job = _job(options, renderer, outputs)
-        if _on_cluster(options):
-            blend, program = renderer.blend, renderer.program
-            stack.close()  # the workers open the file themselves
-            if (options.scheduler or "").startswith("tcp://"):
-                options.events.tell("note", command=options.command, text=_OPEN_TO_ALL.format(options.scheduler))
-            machines = stack.enter_context(cluster.opened(options.scheduler or None, options.workers, program))
-        folder = Folder(options.out, options.shard.strip().replace("/", "-of-") if options.shard else "")
-        if _on_cluster(options):
-            about = (job.made_from, options.seed, options.threads, outputs, options.trust, options.time_limit)
-            work = machines.work(blend, folder, job.settings, *about)
-        else:
-            work = one.in_turn(folder, renderer, job.settings, outputs)
-        unknown = tuple(job.made_from.get("unknown", ()))
-        anew = options.overwrite or bool(options.resume_known and unknown)
-        how = {"resume": options.resume or options.resume_known, "overwrite": anew, "outputs": outputs}
-        summary = running.run(job.shots, folder, job.settings, work, options.events, interruption=interruption, **how)
-        words = dataset.write(folder, job.all_shots, job.settings, options.transforms) if options.transforms else ""
-    _tell(options, summary, folder, unknown)
-    if words:
-        say(words)
+    plan = Plan(
+        out=options.out,
+        outputs=_outputs(options),
+        blend=options.blend,
+        trust=options.trust,
+        resume=options.resume,
+        resume_known=options.resume_known,
+        overwrite=options.overwrite,
+        shard=options.shard,
+        transforms=options.transforms,
+        time_limit=options.time_limit,
+        workers=options.workers,
+        scheduler=options.scheduler,
+    )
+    complete = functools.partial(_completed, options=options)
+    summary = carry_out(plan, functools.partial(_shots, options), options.events, complete, str(options.shots or ""))
     return summary.exit_status, summary.to_json()
-
-
-def serve(options: argparse.Namespace) -> Result:
-    """`viewcam serve`: a Blender that renders the shots of a batch for the process that started it. No command for people."""
-    render_server.serve(options.handle, blender_room("jobs.renderer").BlenderRenderer)
-    return 0, {}
 
 
 def _refuse_contradictions(options: argparse.Namespace) -> None:
@@ -197,55 +145,7 @@ def _outputs(options: argparse.Namespace) -> Outputs:
     return Outputs(not options.labels_only, options.check, kinds, options.depth_steps)
 
 
-def _refuse_names_of_labels(shots: Sequence[Shot]) -> None:
-    """Labels of a shot a are called a.labels.exr and the like, and so would be the picture of a shot a.labels."""
-    names = {one_file(shot.name): shot.name for shot in shots}
-    for name in names:
-        stem, _, rest = name.partition(".")
-        while rest:
-            if stem in names:
-                other, shot = names[stem], names[name]
-                raise InputError(f"the shots {other!r} and {shot!r} may have labels of one name: call one of them otherwise")
-            more, _, rest = rest.partition(".")
-            stem = f"{stem}.{more}"
-
-
-def _on_cluster(options: argparse.Namespace) -> bool:
-    return options.scheduler is not None or options.workers is not None
-
-
-def _renderer(options: argparse.Namespace) -> contextlib.AbstractContextManager:
-    """Blender with the file open, in this process; but in one of its own where VIEWCAM_BLENDER names one, workers will, or time
-    is limited.
-
-    The bpy module puts folders on sys.path in which a worker's children, who get that path, would find half a bpy.
-    """
-    apart = os.environ.get(render_client.BLENDER) or _on_cluster(options) or options.time_limit
-    if options.blend is not None and apart:
-        return render_client.ServedRenderer(options.blend, options.seed, options.threads, options.trust, options.time_limit)
-    if options.time_limit and not _on_cluster(options):
-        raise InputError("--time-limit ends the Blender of a shot, and here that is this one: give --workers 1 as well")
-    return blender_room("jobs.renderer").BlenderRenderer(options.blend, options.seed, options.threads, options.trust)
-
-
-def _job(options: argparse.Namespace, renderer: Any, outputs: Outputs) -> _Job:
-    """All that is to be rendered, once nothing is wrong with it."""
-    listed = _shots(options, renderer)
-    shots = [_completed(shot, options) for shot in (shard(listed, options.shard) if options.shard else listed)]
-    all_shots = [_completed(shot, options) for shot in listed] if options.shard and options.transforms else shots
-    if problems := renderer.problems(all_shots, outputs):
-        raise ShotsError(str(options.shots or options.blend or renderer.blend), tuple(problems))
-    if _on_cluster(options) and renderer.blend is None:
-        raise InputError("this file is nowhere that workers could open it: save it first")
-    if outputs.labels:
-        _refuse_names_of_labels(all_shots)
-    if options.transforms:
-        dataset.refuse(all_shots, options.transforms)
-    made_from = renderer.made_from()
-    return _Job(all_shots, shots, made_from, {shot.name: settings_hash(shot, made_from) for shot in all_shots})
-
-
-def _shots(options: argparse.Namespace, renderer: Any) -> Sequence[Shot]:
+def _shots(options: argparse.Namespace, renderer: Any) -> Sequence[Job]:
     if options.shots is not None:
         if lists.is_list(options.shots):
             return lists.read(options.shots, renderer.cameras)
@@ -264,27 +164,10 @@ def _shots(options: argparse.Namespace, renderer: Any) -> Sequence[Shot]:
     return makers.frames(options.frames, options.camera)
 
 
-def _completed(shot: Shot, options: argparse.Namespace) -> Shot:
-    """The shot, with what the command line says where it says nothing itself."""
+def _completed(job: Job, options: argparse.Namespace) -> Job:
+    """The job, with what the command line says where it says nothing itself."""
     width, height = options.size or (None, None)
-    said = {field: getattr(options, field) for field in ("frame", "engine", "samples", "level")}
-    said |= {"width": width, "height": height}
-    return dataclasses.replace(shot, **{field: value for field, value in said.items() if getattr(shot, field) is None})
-
-
-def _tell(options: argparse.Namespace, summary: Summary, folder: Folder, unknown: Sequence[str]) -> None:
-    """In one line what the batch came to. unknown : what may have changed the pictures that were kept."""
-    counts = summary.counts
-    shots = "1 shot" if counts["shots"] == 1 else f"{counts['shots']} shots"
-    if counts["failed"] or counts["left"]:
-        what = f"of {shots}, {counts['failed']} failed and {counts['left']} are left"
-        options.events.tell("error", command=options.command, text=f"{what}: the same command with --resume renders them")
-        return
-    kept = f", {summary.kept} of them kept" if summary.kept else ""
-    say(f"{shots}{kept}, in {summary.seconds:.1f} s: {folder.contact_sheet}")
-    if summary.kept and unknown:
-        more = f" (and {len(unknown) - 1} more)" if len(unknown) > 1 else ""
-        say(f"whether those that were kept are still right is not sure: --resume-known renders them. {unknown[0]}{more}")
-    if unlike := [shot["name"] for shot in summary.shots if shot.get("passed") is False]:
-        named = ", ".join(unlike[:_MOST_NAMED]) + (", …" if len(unlike) > _MOST_NAMED else "")
-        say(f"{len(unlike)} are not what the reference tracer sees: {named}; {folder.summary} says how")
+    stated = {field: getattr(options, field) for field in ("frame", "engine", "samples", "level", "seed", "threads")}
+    stated |= {"width": width, "height": height}
+    missing = {field: value for field, value in stated.items() if getattr(job, field) is None}
+    return dataclasses.replace(job, trust=options.trust, **missing)

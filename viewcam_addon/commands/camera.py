@@ -49,6 +49,7 @@ def add_reading_options(added: argparse._ActionsContainer, size: bool = True) ->
     )
     added.add_argument("--angles", choices=[*cameras.ANGLES], help="the unit of angles that have none")
     added.add_argument("--pixel", choices=[*cameras.PIXELS], help="where (0, 0) is, in place of the format's habit")
+    added.add_argument("--pose", choices=[*cameras.POSES], help="which way a matrix goes whose name does not say it")
     added.add_argument("--without-distortion", action="store_true", help="take cameras without their lens distortion")
     added.add_argument("--unmirrored", action="store_true", help="take cameras that mirror their picture without that")
     added.add_argument("--original-world", action="store_true", help="undo a transforms.json's applied_transform")
@@ -71,6 +72,7 @@ def options_of(options: argparse.Namespace) -> Options:
         view_plane=plane,
         angle_unit=options.angles,
         pixel=options.pixel,
+        pose=options.pose,
         without_distortion=options.without_distortion,
         unmirrored=options.unmirrored,
         original_world=options.original_world,

@@ -1,28 +1,21 @@
 """The commands that prove a camera: export, render, cycles, compare, and check and demo, which are all of these in one go.
 
 What Blender does (export, Cycles) and what OpenEXR does (the tracer's pictures, the comparison) never share a process, because
-Blender brings a copy of OpenEXR of its own: `check` does the first in its own process and the second in child processes, in the
-shell and inside Blender alike. Rejected: one process in the shell and several inside Blender, since that would be two programs
-to test.
+Blender brings a copy of OpenEXR of its own: `check` does the first where Blender is and the second in the tracer's process
+(jobs/tracing.py), in the shell and inside Blender alike. A check of many cameras or frames is a batch without pictures.
 """
 
 import argparse
 import dataclasses
-import json
 import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import InputError
-from ..events import Events
 from ..terminal import say, silent_libraries
-from ..tracer.scene.film import seeds
 from . import Result, blender_room
-
-if TYPE_CHECKING:
-    from ..tracer.tiles import Passes  # brings what the other commands need not wait for
 
 DEMO_SCENE = Path(__file__).parents[2] / "sample_scenes" / "studio.blend"
 
@@ -31,15 +24,16 @@ def export(options: argparse.Namespace) -> Result:
     from ..tracer.scene import scene_file
 
     with silent_libraries():
-        scene = blender_room("rendering.job").export(_request(options, options.strict))
+        scene = blender_room("jobs.renderer").export(_job(options))
     scene_file.write(scene, options.scene)
-    say(*_ledger_lines(scene.ledger))
+    say(*ledger_lines(_ledger_json(scene.ledger)))
     result = {"scene": str(options.scene), "ledger": _ledger_json(scene.ledger)}
     return 0, result | (_told_level(scene) if options.level != "geometry" else {})
 
 
 def render(options: argparse.Namespace) -> Result:
     from .. import api, image
+    from ..tracer.tiles import Progress
 
     scene = api.read_scene(options.scene)
     if options.stated:
@@ -59,7 +53,7 @@ def render(options: argparse.Namespace) -> Result:
     labels = api.label(scene, options.labels, **others, threads=options.threads) if options.labels else None
     told = _told_level(scene) if options.level == "auto" else {}
     level = told.get("level", options.level)
-    progress = _Progress(options.events, scene.camera.height)
+    progress = Progress(options.events.tell, scene.camera.height)
     started = time.perf_counter()
     traced = api.render(scene, level, options.samples, options.seed, options.threads, options.error, progress)
     seconds = time.perf_counter() - started
@@ -75,95 +69,118 @@ def render(options: argparse.Namespace) -> Result:
 
 def cycles(options: argparse.Namespace) -> Result:
     with silent_libraries():
-        ledger = blender_room("rendering.job").render(_request(options, options.strict), options.image)
-    say(*_ledger_lines(ledger))
+        ledger = blender_room("jobs.renderer").cycles(_job(options), options.image)
+    say(*ledger_lines(_ledger_json(ledger)))
     return 0, {"image": str(options.image), "ledger": _ledger_json(ledger)}
 
 
 def compare(options: argparse.Namespace) -> Result:
-    from .. import api, image
-    from ..comparison import difference, light_report, radiance, renderers, report
+    from ..comparison.answer import exit_status
+    from ..jobs.tracing import Written, compare_files
 
-    image.check_same_frames([options.reference, *options.tests])
-    reference = image.read(options.reference)
-    is_light = radiance.carries_light(reference)
-    if options.channels:
-        if is_light:
-            raise InputError(f"--channels are of geometry, and {options.reference} shows light: trace it at level geometry")
-        tests, renderer = [image.read_channels(path, _stated(options.channels)) for path in options.tests], renderers.CYCLES
-    else:
-        tests, (renderer, *_) = zip(*map(renderers.read, options.tests), strict=True)
-    partial = bool(options.channels) or renderer is not renderers.CYCLES
-    scene = api.read_scene(options.scene) if options.scene else None
-    of = reference, tests, scene, options.threads, options.test_samples, renderer, partial
-    comparison = api.compare(*of, everything=options.everything)
-    if partial:
-        tests = [renderers.completed(test, comparison.pinhole) for test in tests]
-    ledger = scene.ledger if scene else ()
-    words = f"viewcam {options.repeat or options.words}"
-    write_report, tests = (light_report.write_report, tests) if is_light else (report.write_report, tests[0])
-    say(*_ledger_lines(ledger), *comparison.lines())
-    if options.report:
-        say(f"report: {write_report(comparison, reference, tests, options.report, ledger, words)}")
-    result = {**comparison.to_json(), "ledger": _ledger_json(ledger)}
-    if options.difference:
-        result["difference"] = difference.write(comparison, options.difference)
-    if options.sides:
-        difference.write_sides(comparison, reference, tests if is_light else [tests], options.sides)
-    return comparison.answer.exit_status(options.strict), result
-
-
-def _stated(channels: Sequence[tuple[str, list[str]]]) -> dict[str, list[str]]:
-    """What --channels says, checked to tell where things are."""
-    if not {"Depth", "Distance", "Position"} & {name for name, _ in channels}:
-        raise InputError("--channels tells nothing of where things are: name depth, distance or position")
-    return dict(channels)
+    report, difference = (path and str(path) for path in (options.report, options.difference))
+    written = Written(report, difference, command=f"viewcam {options.words}")
+    channels = dict(options.channels) if options.channels else None
+    found = compare_files(options.reference, options.tests, options.scene, options.threads, channels, written)
+    say(*ledger_lines(found["result"]["ledger"]), *found["lines"])
+    return exit_status(found["answer"], options.strict), found["result"]
 
 
 def check(options: argparse.Namespace) -> Result:
-    from ..child_process import run_viewcam
+    job = _job(options)
+    job.refuse_unchecked()
+    if options.frames is not None or options.cameras is not None:
+        return _check_many(options, job)
+    for name in ("resume", "overwrite", "shard", "workers", "scheduler", "time_limit"):
+        if getattr(options, name) not in (None, False):
+            words = name.replace("_", "-")
+            raise InputError(f"--{words} is for many checks: say which with --frames or --cameras, or leave it out")
+    report, difference = (path and str(path) for path in (options.report, options.difference))
+    return check_one(job, options, report=report, difference=difference, command=f"viewcam {options.words}")
 
-    if options.engine != "CYCLES" and (options.level != "geometry" or options.error):
-        raise InputError(f"--engine {options.engine} is checked at level geometry alone: leave --level and --error out")
-    if options.engine != "CYCLES" and options.device != "CPU":
-        raise InputError(f"--device is for Cycles, and {options.engine} renders on what the graphics driver has: leave it out")
+
+def check_one(
+    job: Any,
+    options: argparse.Namespace,
+    report: str | None = None,
+    difference: str | None = None,
+    sides: str | None = None,
+    command: str = "",
+) -> Result:
+    """Check one job. report, difference, sides, command : as of tracing.Written; the report's folder keeps all pictures."""
+    from ..comparison.answer import exit_status
+    from ..jobs.plan import Plan
+    from ..jobs.tracing import Written
+    from . import carry_out
+
+    reference = str(Path(report, "reference.exr")) if report else None
+    written = Written(report, difference, sides, reference, command)
+    plan = Plan(Path(), blend=Path(job.blend) if job.blend else None, trust=job.trust)
+    with silent_libraries(), carry_out.opened(plan, options.events) as renderer:
+        found = renderer.check(job, has_picture=False, written=written, keep=Path(report) if report else None)
+    if "reason" in found:
+        say(f"level {found['level']} is enough. {found['reason']}")
+    seconds, (width, height) = found["seconds"], found["result"]["size"]
+    engine = (job.engine or "Cycles").capitalize()
+    say(f"exported and rendered with {engine} in {seconds['rendered']:.1f} s")
+    say(f"traced {width} × {height} pixels in {seconds['traced']:.2f} s")
+    say(*ledger_lines(found["result"]["ledger"]), *found["lines"])
+    return exit_status(found["answer"], job.strict), found["result"]
+
+
+def _check_many(options: argparse.Namespace, job: Any) -> Result:
+    """Checks of a range of frames or of several cameras, a shot each."""
+    from ..jobs import makers
+    from ..jobs.folder import Outputs
+    from ..jobs.plan import Plan
+    from .carry_out import carry_out
+
+    _refuse_of_many(options)
+    outputs = Outputs(picture=False, check=True, report=options.report is not None)
+
+    def jobs_of(renderer: Any) -> Sequence[Any]:
+        if options.cameras is not None:
+            return makers.from_cameras(options.cameras, renderer.cameras)
+        return makers.frames(options.frames, options.camera)
+
+    def complete(shot: Any) -> Any:
+        stated = {"camera": shot.camera, "name": shot.name} | ({} if shot.frame is None else {"frame": shot.frame})
+        return dataclasses.replace(job, **stated)
+
     with tempfile.TemporaryDirectory(prefix="viewcam-") as temporary:
-        folder = options.report or Path(temporary)
-        scene, reference = folder / "scene.json", folder / "reference.exr"
-        count = seeds(options.level, options.samples)
-        name = options.engine.lower()
-        tests = [folder / f"{name}-{i + 1}.exr" for i in range(count)] if count > 1 else [folder / f"{name}.exr"]
-        numbered = {} if options.scene is None else {"numbered": _numbered(options.scene)}
-        everything = folder / "everything.exr"
-        everything.unlink(missing_ok=True)
-        level = _export_and_render(options, scene, tests, everything, engine=options.engine, device=options.device, **numbered)
-        size = []
-        if options.scene:
-            scene, size = options.scene, ["--size", "x".join(map(str, options.size))] if options.size else []
-        threads = ["--threads", str(options.threads)] if options.threads else []
-        spent = ["--error", str(options.error)] if options.error else ["--samples", str(options.samples)]
-        light = ["--level", level, *spent, "--seed", str(options.seed)]
-        tell_on = options.events if options.log_json else None
-        options.events.tell("step", name="tracing")
-        status = run_viewcam("render", scene, reference, *light, *size, *threads, tell_on=tell_on)
-        if status:
-            return status, {"error": "the reference could not be traced"}
-        outputs = [
-            word
-            for flag in ("report", "difference", "sides")
-            if (to := getattr(options, flag))
-            for word in (f"--{flag}", str(to))
-        ]
-        outputs += ["--strict"] if options.strict else []
-        outputs += ["--everything", str(everything)] if everything.exists() else []
-        outputs += ["--test-samples", str(max(options.samples // count, 1)), "--repeat", options.repeat or options.words]
-        if level == "geometry":
-            tests = tests[:1]
-        options.events.tell("step", name="comparing")
-        result = Path(temporary) / "result.json"
-        outputs += ["--json", str(result)]
-        status = run_viewcam("compare", reference, *tests, "--scene", scene, *threads, *outputs, tell_on=tell_on)
-        return status, json.loads(result.read_bytes()) if result.exists() else {"error": "the pictures could not be compared"}
+        plan = Plan(
+            out=options.report or Path(temporary),
+            outputs=outputs,
+            blend=options.blend,
+            trust=options.trust,
+            resume=options.resume,
+            overwrite=options.overwrite,
+            shard=options.shard,
+            time_limit=options.time_limit,
+            workers=options.workers,
+            scheduler=options.scheduler,
+            command="check",
+        )
+        summary = carry_out(plan, jobs_of, options.events, complete)
+    status = summary.exit_status or (3 if options.strict and summary.counts["not_all_modelled"] else 0)
+    return status, {**summary.to_json(), "exit_status": status, "strict": options.strict}
+
+
+def _refuse_of_many(options: argparse.Namespace) -> None:
+    if options.frames is not None and options.cameras is not None:
+        raise InputError("--frames and --cameras say each which pictures: give one of them")
+    if options.cameras is not None and options.camera is not None:
+        raise InputError("--camera is of one picture or of --frames, and --cameras says the cameras itself: leave it out")
+    if options.frames is not None and options.frame is not None:
+        raise InputError("--frame and --frames say both which frame: leave one of them out")
+    if options.difference:
+        raise InputError("--difference is a picture of one check: with --report each of many has its page")
+    if options.scene:
+        raise InputError("--scene is what one picture must show: leave it out of many checks")
+    if (options.resume or options.overwrite) and not options.report:
+        raise InputError("--resume and --overwrite are of results that are kept: name their folder with --report")
+    if options.scheduler and options.workers is not None:
+        raise InputError("a scheduler with an address has its workers already: leave --workers out")
 
 
 def demo(options: argparse.Namespace) -> Result:
@@ -171,39 +188,6 @@ def demo(options: argparse.Namespace) -> Result:
         raise InputError(f"{options.blend} is not here: run the demo in a clone of the project, where its sample scenes are")
     say(f"{options.blend.name}: a camera given by four values, rendered by Cycles and by the reference tracer")
     return check(options)
-
-
-def _numbered(scene_path: Path) -> tuple[str, ...]:
-    """What of a .blend must be numbered for its picture to be this scene's: what has numbers there."""
-    from ..tracer.scene import scene_file
-
-    objects = scene_file.read(scene_path).objects
-    has_numbers = {
-        "objects": any(placed.object_index for placed in objects),
-        "materials": any(any(placed.material_indices) for placed in objects),
-    }
-    return tuple(kind for kind, has in has_numbers.items() if has)
-
-
-def _export_and_render(
-    options: argparse.Namespace, scene_path: Path, image_paths: Sequence[Path], everything: Path, **more: Any
-) -> str:
-    """What of a check needs Blender: both sides from one evaluated state, under one numbering of the indices.
-
-    everything : as in job.export_and_render. more : of the request. Returns the level, the least one where that is asked for.
-    """
-    from ..tracer.scene import scene_file
-
-    started = time.perf_counter()
-
-    def rendering(number: int) -> None:
-        options.events.tell("step", name="rendering", number=number, of=max(number, len(image_paths)))
-
-    with silent_libraries():
-        scene = blender_room("rendering.job").export_and_render(_request(options, **more), image_paths, rendering, everything)
-    scene_file.write(scene, scene_path)
-    say(f"exported and rendered with {options.engine.capitalize()} in {time.perf_counter() - started:.1f} s")
-    return _told_level(scene)["level"] if options.level == "auto" else options.level
 
 
 def _told_level(scene: Any) -> dict[str, str]:
@@ -215,51 +199,26 @@ def _told_level(scene: Any) -> dict[str, str]:
     return {"level": level, "reason": reason}
 
 
-def _request(options: argparse.Namespace, strict: bool = False, **more: Any) -> Any:
-    """strict : whether anything of the file that is not modelled ends it; where pictures are compared, theirs alone counts."""
-    return blender_room("rendering.job").Request(
-        blend=options.blend,
-        camera=options.camera,
-        frame=options.frame,
-        size=options.size,
-        strict=strict,
-        recenter=options.recenter,
-        threads=options.threads,
-        level=options.level,
-        samples=options.samples,
-        seed=options.seed,
-        clay=options.clay,
-        trust=options.trust,
-        **more,
-    )
+def _job(options: argparse.Namespace) -> Any:
+    """The job that the words ask for."""
+    from ..jobs.job import Job
+
+    width, height = options.size or (None, None)
+    stated = {
+        name: getattr(options, name, None) for name in ("camera", "frame", "samples", "seed", "threads", "level", "error")
+    }
+    flags = {name: getattr(options, name) for name in ("trust", "clay", "recenter", "strict")}
+    engine, device = getattr(options, "engine", "CYCLES"), getattr(options, "device", "CPU")
+    approved = getattr(options, "scene", None) if options.command in ("check", "demo") else None
+    return Job(width=width, height=height, blend=options.blend, engine=engine, device=device, scene=approved, **stated, **flags)
 
 
-def _ledger_lines(ledger: Sequence[Any]) -> list[str]:
-    exported = sum(entry.is_modelled for entry in ledger)
-    rest = [f"  {entry.status}: {entry.object}: {entry.reason}" for entry in ledger if not entry.is_modelled]
+def ledger_lines(ledger: Sequence[dict[str, str]]) -> list[str]:
+    """What of a scene is modelled, for a terminal. ledger : as --json has it."""
+    exported = sum(entry["status"] == "exported" for entry in ledger)
+    rest = [f"  {entry['status']}: {entry['object']}: {entry['reason']}" for entry in ledger if entry["status"] != "exported"]
     return [f"{exported} of {len(ledger)} objects exported whole", *rest] if ledger else []
 
 
 def _ledger_json(ledger: Sequence[Any]) -> list[dict[str, str]]:
-    return [{"object": entry.object, "status": entry.status, "reason": entry.reason} for entry in ledger]
-
-
-class _Progress:
-    """A tracer's watcher that tells `progress`, with the share of the rows that are done, at each whole percent.
-
-    rows : how many the picture has.
-    """
-
-    def __init__(self, events: Events, rows: int) -> None:
-        self._events, self._done, self._percent = events, bytearray(rows), 0
-        events.tell("progress", share=0.0)
-
-    def tile(self, passes: "Passes", rows: range) -> None:
-        self._done[rows.start : rows.stop] = b"\1" * len(rows)
-        percent = 100 * sum(self._done) // len(self._done)
-        if percent > self._percent:
-            self._percent = percent
-            self._events.tell("progress", share=percent / 100)
-
-    def stop(self) -> bool:
-        return False
+    return [dataclasses.asdict(entry) for entry in ledger]

@@ -65,8 +65,8 @@ class Answer:
         return f"{self.headline}: {self.text}"
 
     def exit_status(self, strict: bool) -> int:
-        """0, 1 where something differs, and 3 where that can't be said of all of the picture and `strict` asks for it."""
-        return 1 if not self.passed else 3 if strict and self.answer == SAME_BUT else 0
+        """The status of a command that came to this."""
+        return exit_status(self.answer, strict)
 
     def to_json(self) -> dict[str, Any]:
         return {
@@ -75,6 +75,14 @@ class Answer:
             "sentence": self.sentence,
             "not_modelled": self.not_modelled.to_json(),
         }
+
+
+def exit_status(answer: str, strict: bool) -> int:
+    """0, 1 where something differs, and 3 where that can't be said of all of the picture and `strict` asks for it.
+
+    answer : one of ANSWERS.
+    """
+    return 1 if answer == DIFFERENT else 3 if strict and answer == SAME_BUT else 0
 
 
 def answered(same: bool, headline: str, text: str, not_modelled: NotModelled) -> Answer:

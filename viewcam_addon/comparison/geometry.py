@@ -19,16 +19,18 @@ from .cameras import conversion_error, systematic_error
 from .far_from_origin import far_from_origin
 from .mismatches import (
     KINDS,
+    NOWHERE,
     PASSES,
     Errors,
     Mismatches,
     SurfaceAgreement,
-    SurfaceAt,
+    SurfacesAt,
     at,
     explain,
     kinds_of,
     largest_around,
     reach_of,
+    settle,
 )
 from .renderers import CYCLES, Renderer, completed
 from .statistics import PassErrors, measure
@@ -48,7 +50,7 @@ def compare(
     reference: Image,
     test: Image,
     pinhole: Pinhole,
-    surface_at: SurfaceAt | None = None,
+    surfaces_at: SurfacesAt | None = None,
     stated: Pinhole | None = None,
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
     renderer: Renderer = CYCLES,
@@ -56,9 +58,9 @@ def compare(
 ) -> GeometryComparison:
     """Compare two pictures of one camera.
 
-    pinhole : the camera that traced the reference. surface_at : re-traces sub-pixel positions of the reference's scene;
-    without it no mismatch can be explained. stated : the camera as the four values state it; with it the conversion's error
-    is measured too. origin : that of both pictures, in the world. renderer : the test's.
+    pinhole : the camera that traced the reference. surfaces_at : re-traces sub-pixel positions of the reference's
+    scene; without it no mismatch can be explained. stated : the camera as the four values state it; with it the
+    conversion's error is measured too. origin : that of both pictures, in the world. renderer : the test's.
     partial : whether the test may lack passes, all but one of Depth, Distance and Position; they are not judged then.
 
     Whatever float32 can hold may stand in the pictures: what can't be computed with is not within tolerance.
@@ -66,7 +68,7 @@ def compare(
     Raises
     ------
     InputError
-        if the sizes differ, a pass is missing, or the reference is not what `surface_at` sees.
+        if the sizes differ, a pass is missing, or the reference is not what `surfaces_at` sees.
     """
     measured = set(test.passes) | ({"Depth"} if "Distance" in test.passes else set())
     expected, seen = _passes(reference, test, pinhole, partial)
@@ -78,16 +80,18 @@ def compare(
     across = np.hypot(off_x, off_y) if "Position" in measured else np.zeros(len(off_x))
     agreement = SurfaceAgreement(pinhole, across, _slopes(expected, hit, size), renderer)
 
-    kinds = kinds_of(expected, seen, agreement)
+    kinds, in_one_place = kinds_of(expected, seen, agreement), NOWHERE
+    if surfaces_at is not None:
+        _check_reference(reference.source, expected, np.flatnonzero(kinds >= 0), agreement, surfaces_at)
+        lonely = tolerances.lonely(np.where(hit, expected["Object Index"][:, 0], -1).reshape(size)).ravel()
+        kinds, expected, agreement, in_one_place = settle(kinds, expected, seen, agreement, lonely, surfaces_at)
     # At an edge the ray may meet either surface, so a re-traced one is judged by the steepest slope around.
     steepest = {name: largest_around(slope.reshape(size)).ravel() for name, slope in agreement.slopes.items()}
     # Where an edge has moved, a pixel shows the surface's plane beyond it: as far as edges move, and its slope's worth.
     beyond = replace(renderer, centre=renderer.centre + renderer.edges)
     around = replace(agreement, slopes=steepest, renderer=beyond)
-    if surface_at is not None:
-        _check_reference(reference.source, expected, np.flatnonzero(kinds >= 0), agreement, surface_at)
     reach = reach_of(shift.reshape(size)).ravel() + renderer.edges
-    mismatches = _mismatches(kinds, seen, reach, around, surface_at)
+    mismatches = _mismatches(kinds, seen, reach, around, surfaces_at)
 
     compared = hit & np.isin(kinds, (-1, KINDS.index("material index"), KINDS.index("surface")))
     # What is explained, or few enough to be let pass, is no error of the passes; what is not, shows in their figures.
@@ -119,7 +123,7 @@ def compare(
     far = far_from_origin(pinhole, expected, chosen, rows[0]) if "Position" in measured else None
     lacking = tuple(name for name in PASSES if name in expected and name not in measured)
     return GeometryComparison(
-        pinhole, stated, hits, rows, mismatches, systematic, conversion, maps, roundings, far, origin, lacking
+        pinhole, stated, hits, rows, mismatches, systematic, conversion, maps, roundings, far, origin, lacking, in_one_place
     )
 
 
@@ -153,16 +157,16 @@ def _slopes(expected: Seen, hit: NDArray, size: tuple[int, int]) -> dict[str, Ar
 
 
 def _mismatches(
-    kinds: NDArray, seen: Seen, reach: Array, agreement: SurfaceAgreement, surface_at: SurfaceAt | None
+    kinds: NDArray, seen: Seen, reach: Array, agreement: SurfaceAgreement, surfaces_at: SurfacesAt | None
 ) -> Mismatches:
     found = np.flatnonzero(kinds >= 0)
     columns, rows = found % agreement.pinhole.width, found // agreement.pinhole.width
     shifts, retraced = np.full(len(found), np.nan), 0
-    if surface_at is not None:
+    if surfaces_at is not None:
         numbers = kinds[found] != KINDS.index("not a number")
         traced = found[numbers]
         shifts[numbers], retraced = explain(
-            columns[numbers], rows[numbers], at(seen, traced), reach[traced], agreement.at(traced), surface_at
+            columns[numbers], rows[numbers], at(seen, traced), reach[traced], agreement.at(traced), surfaces_at
         )
     return Mismatches(columns, rows, kinds[found], shifts, reach[found], retraced)
 
@@ -188,7 +192,7 @@ def _check_figures(source: str, expected: Seen, pinhole: Pinhole) -> None:
         )
 
 
-def _check_reference(source: str, expected: Seen, found: NDArray, agreement: SurfaceAgreement, surface_at: SurfaceAt) -> None:
+def _check_reference(source: str, expected: Seen, found: NDArray, agreement: SurfaceAgreement, surfaces_at: SurfacesAt) -> None:
     """Refuse a reference that its own scene does not show, where it differs from the test.
 
     Else rays would be sent for each of its pixels, as far as its figures say that they may be off. One of an older version of
@@ -198,7 +202,8 @@ def _check_reference(source: str, expected: Seen, found: NDArray, agreement: Sur
     """
     found = found[:: max(len(found) // _ASKED_OF_THE_REFERENCE, 1)]
     rows, columns = np.divmod(found, agreement.pinhole.width)
-    traced, shown = surface_at(columns, rows, 0.5, 0.5), at(expected, found)
+    rays, _, traced = surfaces_at(columns, rows, 0.5, 0.5)
+    traced, shown = at(traced, np.searchsorted(rays, np.arange(len(found)))), at(expected, found)
     same = agreement.at(found).same_place(traced, shown) | ~(
         tolerances.is_hit(traced) | tolerances.is_hit(shown) | np.isnan(shown["Depth"][:, 0])
     )

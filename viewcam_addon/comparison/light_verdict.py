@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 
 from ..pinhole import Pinhole
 from .answer import Answer, NotModelled, answered
+from .coincident import TakenOut
 from .hypothesis_tests import CONTOURS, PIXELS, WHOLE, HypothesisTest, Place
 from .noise_free import Edges
 from .perception import Appearance
 from .statistics import PassErrors, percentile_name, plain
 from .tolerances import PERCENTILES, Array
-from .verdict import mark, percent
+from .verdict import mark, pairs_text, percent
 
 FALSE_ALARMS = 0.01
 """The probability, at most, that two sides of the same light are called different; shared out evenly over the quantities."""
@@ -83,7 +84,7 @@ class RadianceComparison:
     is_noisy : whether chance had a part in it. rows : one for each quantity, Combined first. equal : further quantities, the
     same to the last bit. appearance : relMSE and FLIP. test : the mean of the test pictures' Combined, (height, width, 3).
     maps : name to (height, width) float32, rows from the bottom: what differs in Combined and in quantities that fail.
-    not_modelled : what of the picture neither side models as it is.
+    not_modelled : what of the picture neither side models as it is. taken_out : pixels that the rest says nothing of.
     """
 
     pinhole: Pinhole
@@ -96,6 +97,12 @@ class RadianceComparison:
     test: Array
     maps: dict[str, NDArray[np.float32]]
     not_modelled: NotModelled = field(default_factory=NotModelled)
+    taken_out: TakenOut = field(default_factory=TakenOut)
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """The names of two objects each that were found in one place."""
+        return tuple(self.taken_out.pairs)
 
     @property
     def answer(self) -> Answer:
@@ -104,16 +111,18 @@ class RadianceComparison:
         worst = [row for row in self.rows if not row.ok]
         if worst:
             others = f"; {_listed([row.name for row in worst[1:]])} too" if len(worst) > 1 else ""
-            return answered(False, "Different here", f"{_difference(worst[0])}{_hint(worst[0])}{others}.", self.not_modelled)
+            return answered(
+                False, "Different here", f"{_difference(worst[0])}{_hint(worst[0])}{others}{_without(self)}.", self.not_modelled
+            )
         if not self.is_noisy:
             row = combined.noise_free
             text = (
                 f"over {row.count:,} pixels without noise the light differs by {row.values[0]:.1e} of its "
                 f"value in the median and by at most {row.values[-1]:.1e}, {percent(row.worst[1])} of what float32 allows"
-                f"{_edges(combined)}."
+                f"{_edges(combined)}{_without(self)}."
             )
             return answered(True, "The same picture", text, self.not_modelled)
-        text = f"no pixel and no tile differs by more than chance; {_mean_text(combined)}."
+        text = f"no pixel and no tile differs by more than chance; {_mean_text(combined)}{_without(self)}."
         return answered(True, f"The same within noise at {samples_text(self)}", text, self.not_modelled)
 
     @property
@@ -130,6 +139,10 @@ class RadianceComparison:
         table = _noisy_lines(self) if self.is_noisy else _noise_free_lines(self)
         if self.equal:
             table.append(f"{'To the last bit':<17}{', '.join(self.equal)}")
+        if self.taken_out.pairs:
+            table.append(
+                f"{'In one place':<17}{self.taken_out.count:,} pixels are taken out: {pairs_text(self.taken_out.pairs)}"
+            )
         seen = self.appearance
         expected = "" if seen.expected_relmse is None else f", of which noise explains {seen.expected_relmse:.2e}"
         flip = "" if seen.flip is None else f"; FLIP {seen.flip:.4f}"
@@ -148,7 +161,16 @@ class RadianceComparison:
             "quantities": [row.to_json() for row in self.rows],
             "equal": list(self.equal),
             "appearance": asdict(self.appearance),
+            "in_one_place": self.taken_out.to_json(),
         }
+
+
+def _without(comparison: RadianceComparison) -> str:
+    taken_out = comparison.taken_out
+    if not taken_out.pairs:
+        return ""
+    which = f"the {taken_out.count:,} pixels that show surfaces in one place, or are lit by them, are taken out"
+    return f"; {which} ({pairs_text(taken_out.pairs)})"
 
 
 def samples_text(comparison: RadianceComparison) -> str:

@@ -8,9 +8,14 @@ One thing no exact ray sees: the back of a silhouette. Where a renderer's ray sl
 meets the face behind, at the same place but with another normal and UV. So on a silhouette (the ring sees something else,
 too, or grazes the surface) the same object at the same depth is enough.
 
+Where several surfaces lie in one place, which of them a ray meets is rounding's choice, and any is a right answer: its own
+object, material, normal and UV, all of the same one. In one place are those as far behind the nearest one as a ray may be off,
+here and there, times the slope of the depth: the lesser one of the two, since where they cross at an angle the rings find it.
+
 Rejected: accepting a pixel when a neighbour shows the test's object. Next to an edge that is so for any error below a pixel.
 """
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -22,8 +27,10 @@ from . import tolerances
 from .renderers import CYCLES, Renderer
 from .tolerances import Array, Seen
 
-# surface_at(columns, rows, px, py) -> dict of pass name to (n, channels) float32: what rays through sub-pixel positions see.
-SurfaceAt = Callable[[NDArray, NDArray, Array, Array], Seen]
+# surfaces_at(columns, rows, px, py) -> what rays through n sub-pixel positions may see: (m,) which of them each surface is of,
+# ascending, its nearest surface first; (m,) the objects' names; and dict of pass name to (m, channels) float32, perhaps with
+# "UV Slope" and "Normal Slope". A ray that meets nothing has one entry, too. As Tracer.surfaces_at.
+SurfacesAt = Callable[[NDArray, NDArray, Array, Array], tuple[NDArray, NDArray, Seen]]
 
 # Of n pixels: the error, what one rounding causes, and what storage and the filter's bias cause, which may be one number.
 Errors = tuple[Array, Array, Array | float]
@@ -40,6 +47,8 @@ _DIRECTIONS = 16
 # pixels from its silhouette.
 _RIM = 0.03
 _BATCH = 1_000
+# Pixels whose centres are traced again at a time.
+_CENTRES = 50_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +118,11 @@ class SurfaceAgreement:
         slopes = {name: slope[chosen] for name, slope in self.slopes.items()}
         return replace(self, across=self.across[chosen], slopes=slopes)
 
+    def slope(self, expected: Seen, name: str) -> Array:
+        """That of a pass: the surface's own, where it is known."""
+        own = expected.get(f"{name} Slope")
+        return self.slopes[name] if own is None else own[..., 0]
+
     def errors(self, expected: Seen, seen: Seen) -> dict[str, Errors]:
         """The errors of each pass that both sides have; tolerances are taken at `expected`. Meaningless where either side
         missed."""
@@ -143,13 +157,13 @@ def _depth_errors(agreement: SurfaceAgreement, expected: Seen, seen: Seen) -> Er
 
 
 def _normal_errors(agreement: SurfaceAgreement, expected: Seen, seen: Seen) -> Errors:
-    slope, renderer = agreement.slopes["Normal"], agreement.renderer
+    slope, renderer = agreement.slope(expected, "Normal"), agreement.renderer
     one_rounding = tolerances.normal_error(agreement.pinhole, expected, slope)
     return tolerances.angle_between(expected["Normal"], seen["Normal"]), one_rounding, renderer.normal + renderer.centre * slope
 
 
 def _uv_errors(agreement: SurfaceAgreement, expected: Seen, seen: Seen) -> Errors:
-    slope = agreement.slopes["UV"]
+    slope = agreement.slope(expected, "UV")
     apart = np.abs(expected["UV"][..., :2].astype(np.float64) - seen["UV"][..., :2]).max(axis=-1)
     floor = tolerances.uv_storage(expected) + agreement.renderer.centre * slope
     return apart, tolerances.uv_error(agreement.pinhole, expected, slope), floor
@@ -215,8 +229,83 @@ def contrast(values: Array) -> Array:
     return np.stack([largest_around(channel) + largest_around(-channel) for channel in channels], axis=-1)
 
 
+@dataclass(frozen=True, eq=False)
+class InOnePlace:
+    """The pixels where several surfaces lie in one place, and the test picture shows another of them than the reference.
+
+    columns, rows : (n,) int, rows from the bottom. objects : (n, 2), the names of those that the reference and the test show,
+    which may be the same.
+    """
+
+    columns: NDArray[np.intp]
+    rows: NDArray[np.intp]
+    objects: NDArray[np.object_]
+
+    def pairs(self) -> dict[tuple[str, str], int]:
+        """Names in order of the alphabet → how many pixels, the most first."""
+        return dict(Counter(tuple(sorted(pair)) for pair in self.objects.tolist()).most_common())
+
+    def to_json(self) -> dict:
+        pairs = [{"objects": list(pair), "pixels": count} for pair, count in self.pairs().items()]
+        return {"pixels": len(self.columns), "pairs": pairs}
+
+
+NOWHERE = InOnePlace(np.empty(0, np.intp), np.empty(0, np.intp), np.empty((0, 2), object))
+
+
+def settle(
+    kinds: NDArray, expected: Seen, seen: Seen, agreement: SurfaceAgreement, lonely: NDArray[np.bool_], surfaces_at: SurfacesAt
+) -> tuple[NDArray, Seen, SurfaceAgreement, InOnePlace]:
+    """What the scene tells of pixels that differ, at their centres: how steep the surface itself is, and what else is in its
+    place.
+
+    kinds : of all pixels, as `kinds_of` has them. lonely : those whose slopes the picture does not tell.
+
+    Returns the kinds and the reference's passes, in which pixels that show another surface in the same place show that; the
+    agreement with their slopes; and which pixels these are.
+    """
+    width, differs = agreement.pinhole.width, (kinds >= 0) & (kinds != KINDS.index("not a number"))
+    asked = np.flatnonzero((lonely | differs) & tolerances.is_hit(expected))
+    kinds, expected = kinds.copy(), {name: values.copy() for name, values in expected.items()}
+    agreement = replace(agreement, slopes={name: slope.copy() for name, slope in agreement.slopes.items()})
+    pixels, objects = [NOWHERE.columns], [NOWHERE.objects]
+    for start in range(0, len(asked), _CENTRES):
+        batch = asked[start : start + _CENTRES]
+        rays, names, traced = surfaces_at(batch % width, batch // width, *np.full((2, len(batch)), 0.5))
+        nearest, pixel = np.searchsorted(rays, np.arange(len(batch))), batch[rays]
+        here = agreement.at(pixel)
+        agrees = here.same_surface(traced, at(seen, pixel)) & in_one_place(agreement, rays, traced) & differs[pixel]
+        right = np.flatnonzero(agrees)
+        right = right[np.unique(rays[right], return_index=True)[1]]  # the nearest one that agrees
+        kinds[pixel[right]] = -1
+        other = right[right != nearest[rays[right]]]
+        for name, values in expected.items():
+            values[pixel[other]] = traced[name][other, : values.shape[1]]
+        for name, slope in agreement.slopes.items():
+            own = here.slope(traced, name)
+            slope[batch] = np.maximum(slope[batch], own[nearest])
+            slope[pixel[other]] = own[other]
+        pixels.append(pixel[other])
+        objects.append(np.stack([names[nearest[rays[other]]], names[other]], axis=1))
+    shown = np.concatenate(pixels)
+    return kinds, expected, agreement, InOnePlace(shown % width, shown // width, np.concatenate(objects))
+
+
+def in_one_place(agreement: SurfaceAgreement, rays: NDArray, traced: Seen) -> NDArray[np.bool_]:
+    """(m,) bool: which of the surfaces of some rays are where the nearest one of their ray is, within tolerance.
+
+    agreement : its camera and renderer count. rays, traced : as of SurfacesAt.
+    """
+    nearest = np.searchsorted(rays, rays)
+    depth, renderer = traced["Depth"][:, 0].astype(np.float64), agreement.renderer
+    shift = tolerances.ROUNDINGS[-1] * tolerances.ray_shift(agreement.pinhole, traced) + renderer.centre
+    slope, storage = tolerances.depth_slope(agreement.pinhole, traced), renderer.depth_storage(depth) + np.zeros(len(depth))
+    allowed = (shift + shift[nearest]) * np.minimum(slope, slope[nearest]) + storage + storage[nearest]
+    return ~(depth - depth[nearest] > allowed * depth[nearest])
+
+
 def explain(
-    columns: NDArray, rows: NDArray, seen: Seen, reach: Array, agreement: SurfaceAgreement, surface_at: SurfaceAt
+    columns: NDArray, rows: NDArray, seen: Seen, reach: Array, agreement: SurfaceAgreement, surfaces_at: SurfacesAt
 ) -> tuple[Array, int]:
     """The smallest shift of the ray that explains what the test picture shows.
 
@@ -231,7 +320,9 @@ def explain(
         pending = batch
         for ring in _RINGS:
             radius = reach[pending] * (ring / _RINGS[-1])
-            found = _explained_by(columns[pending], rows[pending], at(seen, pending), radius, agreement.at(pending), surface_at)
+            found = _explained_by(
+                columns[pending], rows[pending], at(seen, pending), radius, agreement.at(pending), surfaces_at
+            )
             shifts[pending[found]] = radius[found]
             pending = pending[~found]
             if not len(pending):
@@ -242,21 +333,21 @@ def explain(
 
 
 def _explained_by(
-    columns: NDArray, rows: NDArray, seen: Seen, radius: Array, agreement: SurfaceAgreement, surface_at: SurfaceAt
+    columns: NDArray, rows: NDArray, seen: Seen, radius: Array, agreement: SurfaceAgreement, surfaces_at: SurfacesAt
 ) -> NDArray[np.bool_]:
     """(n,) bool: whether some ray on the ring of this radius sees the same."""
     angles = (np.arange(_DIRECTIONS) + 0.5) * (2.0 * np.pi / _DIRECTIONS)
     each = np.repeat(np.arange(len(columns)), _DIRECTIONS)
     px = 0.5 + np.outer(radius, np.cos(angles)).ravel()
     py = 0.5 + np.outer(radius, np.sin(angles)).ravel()
-    traced, shown, here = surface_at(columns[each], rows[each], px, py), at(seen, each), agreement.at(each)
-    same_surface, same_place, grazed = (
-        figure.reshape(-1, _DIRECTIONS)
-        for figure in (
-            here.same_surface(traced, shown),
-            here.same_place(traced, shown),
-            tolerances.facing(agreement.pinhole, traced) < _RIM,
-        )
+    rays, _, traced = surfaces_at(columns[each], rows[each], px, py)
+    shown, here = at(seen, each[rays]), agreement.at(each[rays])
+    counts = in_one_place(agreement, rays, traced)
+    nearest = np.searchsorted(rays, np.arange(len(each)))
+    grazed = (tolerances.facing(agreement.pinhole, traced) < _RIM)[nearest].reshape(-1, _DIRECTIONS)
+    same_surface, same_place = (
+        np.logical_or.reduceat(same & counts, nearest).reshape(-1, _DIRECTIONS)
+        for same in (here.same_surface(traced, shown), here.same_place(traced, shown))
     )
     on_silhouette = grazed.any(axis=1) | ~same_place.all(axis=1)
     return same_surface.any(axis=1) | (same_place.any(axis=1) & on_silhouette)

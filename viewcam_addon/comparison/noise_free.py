@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..image import Image
 from ..pinhole import Pinhole
 from . import tolerances
+from .coincident import CoincidentLight
 from .mismatches import contrast, largest_around
 from .noise import poisson_allowance
 from .sides import Sides
@@ -86,9 +87,13 @@ class Rounding:
 
     test : one of the test pictures, which tells its Blender. samples : of each picture, the most.
     belongs : (height, width) the object of each pixel, 0 for none or where nobody knows.
+    coincident : of the light, how much comes by surfaces in one place, or None.
     """
 
-    def __init__(self, pinhole: Pinhole, reference: Image, test: Image, samples: int) -> None:
+    def __init__(
+        self, pinhole: Pinhole, reference: Image, test: Image, samples: int, coincident: CoincidentLight | None = None
+    ) -> None:
+        self._coincident = coincident
         self._shift = _ray_shift(pinhole, reference)
         self._samples = samples
         self.belongs = np.zeros(self._shift.shape)
@@ -108,7 +113,10 @@ class Rounding:
         slope = np.max([tolerances.slopes(channel, self.belongs) for channel in channels], axis=0)
         value = np.abs(sides.reference).max(axis=-1)
         error = tolerances.radiance_error(value, self._brightest, self._samples)
-        return Allowance(self._shift * slope, error, self._floor(sides.name, value), self._shift)
+        floor = self._floor(sides.name, value)
+        if self._coincident is not None:
+            floor = floor + self._coincident.of(sides)
+        return Allowance(self._shift * slope, error, floor, self._shift)
 
     def _floor(self, name: str, value: Array) -> Array:
         """The amount that albedos from tables may add, and the storage of smooth normals: the light from straight above times

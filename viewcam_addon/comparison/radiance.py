@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..image import LIGHT_PASSES, Image
 from ..pinhole import Pinhole
 from . import hypothesis_tests, noise_free, perception
+from .coincident import CoincidentLight, MakeCoincidentLight, TakenOut
 from .light_verdict import FALSE_ALARMS, LightRow, RadianceComparison
 from .sides import Sides, all_sides, quiet, samples_of
 from .tolerances import Array, in_float32
@@ -32,11 +33,18 @@ def carries_light(image: Image) -> bool:
 
 
 @np.errstate(all="ignore")
-def compare(reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_samples: int | None = None) -> RadianceComparison:
+def compare(
+    reference: Image,
+    tests: Sequence[Image],
+    pinhole: Pinhole,
+    test_samples: int | None = None,
+    make_coincident: MakeCoincidentLight | None = None,
+) -> RadianceComparison:
     """Compare one reference with one test picture or with several of different seeds.
 
     pinhole : the camera of the reference, which must have the passes Combined and Depth. test_samples : of each test picture,
-    where that is not what its file tells (Cycles counts a first sample that it leaves out).
+    where that is not what its file tells (Cycles counts a first sample that it leaves out). make_coincident : traces the light
+    that comes by surfaces in one place, which is taken out; asked where the pictures differ.
 
     Whatever float32 can hold may stand in the pictures: what is no number is told as broken.
 
@@ -46,14 +54,27 @@ def compare(reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_sam
         if the sizes differ, a pass is missing, or there is no test picture.
     """
     compared = compare_quantities(reference, tests, pinhole, test_samples)
+    combined, taken_out = compared.combined, TakenOut()
+    if make_coincident is not None and not all(row.ok for row in compared.rows) and (coincident := make_coincident()).pairs:
+        compared = compare_quantities(reference, tests, pinhole, test_samples, coincident)
+        taken_out = TakenOut(coincident.share_out(combined), coincident.pairs)
     maps = dict(compared.maps)
-    appearance, flip = perception.appearance(compared.combined)
+    appearance, flip = perception.appearance(combined)
     if flip is not None:
         maps["FLIP"] = flip
     samples, seeds = compared.samples, len(tests)
     together = (samples[0], samples[1] and samples[1] * seeds)
     return RadianceComparison(
-        pinhole, together, seeds, compared.is_noisy, compared.rows, compared.equal, appearance, compared.combined.test, maps
+        pinhole,
+        together,
+        seeds,
+        compared.is_noisy,
+        compared.rows,
+        compared.equal,
+        appearance,
+        combined.test,
+        maps,
+        taken_out=taken_out,
     )
 
 
@@ -75,10 +96,17 @@ class QuantityComparison:
 
 @np.errstate(all="ignore")
 def compare_quantities(
-    reference: Image, tests: Sequence[Image], pinhole: Pinhole, test_samples: int | None = None
+    reference: Image,
+    tests: Sequence[Image],
+    pinhole: Pinhole,
+    test_samples: int | None = None,
+    coincident: CoincidentLight | None = None,
 ) -> QuantityComparison:
-    """`compare` without what decides nothing."""
+    """`compare` without what decides nothing. coincident : the light by surfaces in one place, which is taken out."""
     found = list(all_sides(reference, tests))
+    if coincident is not None:
+        out = coincident.share_out(found[0])
+        found = [coincident.without(sides, out) for sides in found]
     combined, equal = found[0], tuple(sides.name for sides in found[1:] if sides.are_equal)
     unequal = [sides for sides in found if sides.name not in equal]
     samples, seeds = (samples_of(reference), test_samples or samples_of(tests[0])), len(tests)
@@ -86,7 +114,7 @@ def compare_quantities(
     # Where things shine as brightly as what is behind them, only the other passes have any.
     is_noisy |= seeds > 1 and any(not quiet(sides.test, sides.spread).all() for sides in (combined, *unequal))
     freedom = (max(min(samples[0] or 2, VARIANCE_BATCHES) - 1, 1), max(seeds - 1, 1))
-    rounding = noise_free.Rounding(pinhole, reference, tests[0], max(filter(None, samples), default=1))
+    rounding = noise_free.Rounding(pinhole, reference, tests[0], max(filter(None, samples), default=1), coincident)
 
     rows: list[LightRow] = []
     maps: dict[str, NDArray] = {}

@@ -114,11 +114,11 @@ def _variance(reference: Image) -> Array:
 
 
 def _sides(name: str, reference: Image, tests: Sequence[Image], variance: Array) -> Sides:
-    expected = _values(reference, name)
+    expected = values_of(reference, name)
     mean, squares = np.zeros_like(expected), np.zeros_like(expected)
     with np.errstate(invalid="ignore"):
         for count, image in enumerate(tests, 1):  # Welford's running mean and sum of squares
-            step = _values(image, name) - mean
+            step = values_of(image, name) - mean
             mean = mean + step / count
             squares += step**2 * (count - 1) / count
     seeds = len(tests)
@@ -134,7 +134,8 @@ def _has(image: Image, name: str) -> bool:
     return all(pass_name in image.passes for pass_name in needed)
 
 
-def _values(image: Image, name: str) -> Array:
+def values_of(image: Image, name: str) -> Array:
+    """(height, width, channels): a quantity of one picture."""
     if name == "Alpha":
         return image["Combined"][..., 3:].astype(np.float64)
     values = image[name][..., :3].astype(np.float64)

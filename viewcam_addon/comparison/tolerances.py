@@ -185,6 +185,22 @@ def slopes(values: NDArray, belongs: NDArray) -> Array:
     return slope
 
 
+def lonely(belongs: NDArray) -> NDArray[np.bool_]:
+    """(height, width): pixels without a neighbour of the same object to the left or right, or above or below.
+
+    Of these `slopes` knows too little.
+    """
+    alone = np.zeros(belongs.shape, bool)
+    for axis in (0, 1):
+        beside = np.zeros(belongs.shape, bool)
+        here, there = ((*(slice(None),) * axis, side) for side in (slice(None, -1), slice(1, None)))
+        same = belongs[there] == belongs[here]
+        beside[here] |= same
+        beside[there] |= same
+        alone |= ~beside
+    return alone & (belongs >= 0)
+
+
 def angle_between(a: NDArray, b: NDArray) -> Array:
     """(n,) radians between unit vectors (n, 3), by their chord: exact for small angles, not fooled by a vector of length 0."""
     chord = np.linalg.norm(a.astype(np.float64) - b, axis=-1)

@@ -1,5 +1,6 @@
 """The verdict of a comparison of geometry, as figures, as one sentence, and as aligned lines for the shell."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,12 +10,13 @@ from ..pinhole import Pinhole
 from .answer import Answer, NotModelled, answered
 from .cameras import ConversionError, Systematic
 from .far_from_origin import FarFromOrigin
-from .mismatches import PIXELS_PER_UNEXPLAINED, Mismatches
+from .mismatches import NOWHERE, PIXELS_PER_UNEXPLAINED, InOnePlace, Mismatches
 from .statistics import PassErrors, percentile_name
 from .tolerances import PERCENTILES, Array
 
 # A sentence with more faults is not read; the table has them all.
 _MOST_FAULTS = 2
+_MOST_PAIRS = 3
 
 NOTHING_TO_COMPARE = (
     "no pixel of either picture shows an object: point the camera at one, and see that frame, view layer and clipping leave "
@@ -37,7 +39,8 @@ class GeometryComparison:
     roundings : (n,) float64, the error of each compared position over what one rounding of float32 causes there.
     far_from_origin : what the distance from the origin costs, None where that is nothing to speak of.
     origin : the point of the world from which the coordinates of both pictures are counted.
-    lacking : passes that only the reference has. not_modelled : what of the picture neither side models as it is.
+    lacking : passes that only the reference has. in_one_place : pixels that show another of several surfaces in one place,
+    which is as right as the reference's. not_modelled : what of the picture neither side models as it is.
     """
 
     pinhole: Pinhole
@@ -52,7 +55,13 @@ class GeometryComparison:
     far_from_origin: FarFromOrigin | None = None
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     lacking: tuple[str, ...] = ()
+    in_one_place: InOnePlace = NOWHERE
     not_modelled: NotModelled = field(default_factory=NotModelled)
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """The names of two objects each that were found in one place."""
+        return tuple(self.in_one_place.pairs())
 
     @property
     def pixels(self) -> int:
@@ -127,6 +136,8 @@ class GeometryComparison:
             )
         if self.lacking:
             table.append(f"{'Not compared':<16}{'':>11}  {', '.join(self.lacking)}: the test picture has none")
+        if len(self.in_one_place.columns):
+            table.append(f"{'In one place':<16}{len(self.in_one_place.columns):>11,}  {in_one_place_text(self.in_one_place)}")
         if self.far_from_origin:
             table.append(self.far_from_origin.sentence)
         return [*table, self.sentence]
@@ -148,12 +159,25 @@ class GeometryComparison:
             "far_from_origin": self.far_from_origin and self.far_from_origin.to_json(),
             "origin": list(self.origin),
             "not_compared": list(self.lacking),
+            "in_one_place": self.in_one_place.to_json(),
         }
 
 
 def allowed_unexplained(pinhole: Pinhole) -> int:
     """How many mismatches may stay unexplained in a picture of this size."""
     return pinhole.width * pinhole.height // PIXELS_PER_UNEXPLAINED
+
+
+def in_one_place_text(in_one_place: InOnePlace) -> str:
+    """Who: pixels show another of several surfaces in one place: 'Floor' and 'Carpet', and 2 more pairs."""
+    return f"pixels show another of several surfaces in one place: {pairs_text(in_one_place.pairs())}"
+
+
+def pairs_text(pairs: Iterable[tuple[str, str]]) -> str:
+    """'Floor' and 'Carpet', two of 'Leaves', and 2 more pairs."""
+    named = [f"two of {first!r}" if first == second else f"{first!r} and {second!r}" for first, second in pairs]
+    more = f", and {len(named) - _MOST_PAIRS:,} more pairs" if len(named) > _MOST_PAIRS else ""
+    return ", ".join(named[:_MOST_PAIRS]) + more
 
 
 def _row_line(row: PassErrors) -> str:
@@ -169,6 +193,8 @@ def _agreement(comparison: GeometryComparison) -> str:
     first = comparison.rows[0]
     count = len(comparison.mismatches.kinds)
     edges = f"; {count:,} on edges, {_explained(comparison)}" if count else ""
+    if shown := len(comparison.in_one_place.columns):
+        edges += f"; {shown:,} {in_one_place_text(comparison.in_one_place)}"
     median, nearly_all = (first.values[PERCENTILES.index(p)] for p in (50.0, 99.9))
     unit = first.unit if first.name == "Position" else "of the depth"
     return (

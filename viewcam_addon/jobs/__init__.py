@@ -1,22 +1,24 @@
 """Work on one .blend: what is to be rendered and checked, and all that carries it out, with nothing lost on the way.
 
 What is to be done
-    shot                  one picture, checked
-    lists                 CSV, JSON and JSON Lines (docs/batch.md) → shots, by documents, table, rows, problems
-    makers                shots by rule: an orbit, frames, cameras
-    names                 what a shot may be called: its name is that of its files
+    job                   one picture, to be rendered, labelled or checked, and how: the one record of work, to JSON and back
+    lists                 CSV, JSON and JSON Lines (docs/batch.md) → jobs, by documents, table, rows, problems
+    makers                jobs by rule: an orbit, frames, cameras
+    names                 what a shot, a job of several, may be called: its name is that of its files
+    plan                  how several are carried out: where, by which processes, what is kept
     settings, shards      what a picture was made from; which of many machines makes it
 
-Doing it, many shots of one file, each as a picture, a preview and a sidecar
+Doing it, many shots of one file, each with a sidecar
     folder                what stands where, and whether a shot is there already
-    one                   one shot, rendered and written; what a renderer is
+    one                   one shot, rendered, labelled, checked and written; what a renderer is
     run                   all of them: claimed, rendered, counted, through failures, full disks, signals and other batches
     locks, interruption   shared work; the first signal and the second
     summary, sheet        what it came to, as JSON and as a page of thumbnails
     dataset               what it came to, as those read it who learn a scene from its pictures
+    check                 a check, or a comparison of files, as a call of Python
 
 On child processes (../child_process.py)
-    comparer, labeller              is what was rendered what the sidecar says; ground truth beside it
+    tracing                         renders the reference, compares, writes reports and labels
     render_server, render_client    a renderer in a process of its own
     cluster, worker                 shots on several workers, each of which keeps such a process
 

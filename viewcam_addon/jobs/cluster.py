@@ -30,8 +30,8 @@ from typing import Any
 from ..errors import FullDiskError, InputError, bug
 from . import render_client
 from .folder import Folder, Outputs
+from .job import Job
 from .one import Outcome, Work
-from .shot import Shot
 
 _WORKER = "viewcam_addon.jobs.worker"  # as the workers know it
 
@@ -97,7 +97,7 @@ class Cluster:
     """Workers that a scheduler knows. threads : for each, unless the command line says."""
 
     def __init__(self, client: Any, threads: int | None) -> None:
-        self._client, self._threads = client, threads
+        self._client, self.threads = client, threads
         self._seen, self._asked = (), -math.inf
 
     def work(
@@ -106,8 +106,6 @@ class Cluster:
         folder: Folder,
         settings: Mapping[str, str],
         made_from: Mapping[str, Any],
-        seed: int | None = None,
-        threads: int | None = None,
         outputs: Outputs | None = None,
         trust: bool = False,
         time_limit: float | None = None,
@@ -121,14 +119,12 @@ class Cluster:
         """
         scene = {
             "blend": str(blend.absolute()),
-            "seed": seed,
-            "threads": threads or self._threads,
             "trust": trust,
             "time_limit": time_limit,
             "made_from": dict(made_from),
         }
 
-        def work(shots: Iterator[Shot | None]) -> Iterator[tuple[Shot, Outcome]]:
+        def work(shots: Iterator[Job | None]) -> Iterator[tuple[Job, Outcome]]:
             yield from _Flight(self, scene, folder, settings, outputs or Outputs()).outcomes(shots)
 
         return work
@@ -171,14 +167,14 @@ class _Flight:
     def __init__(self, cluster: Cluster, scene: dict, folder: Folder, settings: Mapping[str, str], outputs: Outputs) -> None:
         self._cluster, self._scene, self._folder = cluster, scene, folder
         self._settings, self._outputs = settings, outputs
-        self._pending: dict[str, tuple[Any, Shot]] = {}
+        self._pending: dict[str, tuple[Any, Job]] = {}
         self._finished: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._suspects: list[Shot] = []
+        self._suspects: list[Job] = []
         self._unfit: dict[str, str] = {}
         self._without_workers_since: float | None = None
         self._fruitful = False
 
-    def outcomes(self, shots: Iterator[Shot | None]) -> Iterator[tuple[Shot, Outcome]]:
+    def outcomes(self, shots: Iterator[Job | None]) -> Iterator[tuple[Job, Outcome]]:
         try:
             for shot in shots:
                 if shot is None:
@@ -198,7 +194,7 @@ class _Flight:
             for future, _ in self._pending.values():
                 future.cancel()
 
-    def _lost(self, error: InputError) -> Iterator[tuple[Shot, Outcome]]:
+    def _lost(self, error: InputError) -> Iterator[tuple[Job, Outcome]]:
         """The outcomes of the shots in flight when no worker can say more: what stands in the folder is done.
 
         Raises the error if no shot ever was.
@@ -210,12 +206,12 @@ class _Flight:
         for shot, record in zip(shots, records, strict=True):
             yield shot, record or error
 
-    def _rest(self) -> Iterator[tuple[Shot, Outcome]]:
+    def _rest(self) -> Iterator[tuple[Job, Outcome]]:
         while self._pending:
             yield from self._next()
 
-    def _submit(self, shot: Shot) -> None:
-        fields = dataclasses.asdict(shot)
+    def _submit(self, shot: Job) -> None:
+        fields = {**shot.to_json(), "threads": shot.threads or self._cluster.threads}
         arguments = (
             self._scene,
             str(self._folder.path.absolute()),
@@ -235,7 +231,7 @@ class _Flight:
             raise _LostError("; ".join(dict.fromkeys(self._unfit[address] for address in addresses)))
         return fit
 
-    def _next(self) -> Iterator[tuple[Shot, Outcome]]:
+    def _next(self) -> Iterator[tuple[Job, Outcome]]:
         """The next outcome, if there is one within a moment."""
         try:
             future = self._finished.get(timeout=_MOMENT)
@@ -257,7 +253,7 @@ class _Flight:
         elif time.monotonic() > self._without_workers_since + _WORKERS_WITHIN:
             raise _LostError("all workers are gone: start some, and continue with --resume")
 
-    def _outcome(self, future: Any, shot: Shot) -> Outcome | None:
+    def _outcome(self, future: Any, shot: Job) -> Outcome | None:
         """What became of the shot; None if it flies on."""
         with _scheduler_asked():
             try:
@@ -285,7 +281,7 @@ class _Flight:
         self._submit(shot)
         return None
 
-    def _refused(self, error: Exception, future: Any, shot: Shot) -> Outcome | None:
+    def _refused(self, error: Exception, future: Any, shot: Job) -> Outcome | None:
         """What an error means that is Dask's."""
         if isinstance(error, ImportError):
             raise _LostError(f"a worker can't load viewcam ({error}): pip install virtual-pinhole there") from error
@@ -297,7 +293,7 @@ class _Flight:
             return None
         return InputError("every worker that took this shot ended in it: see whether their machines have memory enough")
 
-    def _seen(self, shot: Shot) -> dict[str, Any] | None:
+    def _seen(self, shot: Job) -> dict[str, Any] | None:
         """The sidecar, which a folder of another machine may show a little later."""
         ends = time.monotonic() + _ANSWER_WITHIN
         while True:
@@ -306,7 +302,7 @@ class _Flight:
                 return record
             time.sleep(_MOMENT)
 
-    def _record(self, shot: Shot) -> dict[str, Any] | None:
+    def _record(self, shot: Job) -> dict[str, Any] | None:
         return self._folder.finished(shot.name, self._settings[shot.name], self._outputs)
 
 

@@ -12,18 +12,18 @@ from ..cameras.naming import several
 from ..errors import InputError
 from ..pinhole import Pinhole
 from .folder import Folder
-from .shot import Shot
+from .job import Job
 
 MODEL = ("sparse", "0")
 """Where COLMAP and those who read its models look for one."""
 
 
-def refuse(shots: Sequence[Shot], suffix: str) -> None:
+def refuse(shots: Sequence[Job], suffix: str) -> None:
     """Raise InputError for shots that no dataset could name, before any of them is rendered. suffix : as of `write`."""
     colmap.check_names([f"{shot.name}.{suffix}" for shot in shots])
 
 
-def write(folder: Folder, shots: Sequence[Shot], settings: Mapping[str, str], suffix: str) -> str:
+def write(folder: Folder, shots: Sequence[Job], settings: Mapping[str, str], suffix: str) -> str:
     """Write transforms.json and sparse/0 into the folder, each file whole or not at all, if all shots are there.
 
     shots : all of the list, whose order the dataset has. settings : the hash of what each is made from, by its name.

@@ -24,14 +24,16 @@ _TEMPORARY = re.compile(r"\.(.+)-[0-9a-f]{8}\.(?:exr|png|json|html|txt|labels)")
 class Outputs:
     """What a batch makes of each shot, beside its sidecar.
 
-    picture : EXR and preview. check : whether its geometry is compared with the tracer. labels : kinds of labels.KINDS.
-    depth_steps : of the labels' 16-bit depth, in a scene unit.
+    picture : EXR and preview. check : whether it is compared with the tracer: of a picture its geometry, else the job's engine
+    at its level. labels : kinds of labels.KINDS. depth_steps : of the labels' 16-bit depth, in a scene unit. report : whether a
+    check without a picture writes its page and a thumbnail.
     """
 
     picture: bool = True
     check: bool = False
     labels: tuple[str, ...] = ()
     depth_steps: float = 1000.0
+    report: bool = False
 
 
 class Folder:
@@ -80,6 +82,7 @@ class Folder:
         is_all = (
             ("image" in record or not outputs.picture)
             and ("check" in record or not outputs.check)
+            and ("report" in record or not outputs.report)
             and set(outputs.labels) <= set(labels.get("kinds", ()))
             and (not outputs.labels or labels["depth_steps"] == outputs.depth_steps)
         )
@@ -96,13 +99,13 @@ class Folder:
     def _sizes(self, name: str, record: Mapping[str, Any]) -> dict[str, int]:
         """Of the files that a sidecar tells of, by what `bytes` calls them."""
         paths = {"image": self.image(name), "preview": self.preview(name)} if "image" in record else {}
-        paths |= {file: self.path / file for file in record.get("labels", {}).get("files", ())}
+        paths |= {file: self.path / file for file in _files_beside(record)}
         return {key: path.stat().st_size for key, path in paths.items()}
 
     def remove_former(self, name: str, record: Mapping[str, Any], of_labels_only: bool) -> None:
         """Remove what a former sidecar tells of, and the sidecar first. of_labels_only : all but the picture."""
         self.sidecar(name).unlink(missing_ok=True)
-        files = list(record.get("labels", {}).get("files", ()))
+        files = _files_beside(record)
         for path in (
             *(self.path / file for file in reversed(files)),  # the JSON first, which says that the others are there
             *(() if of_labels_only or "image" not in record else (self.image(name), self.preview(name))),
@@ -123,6 +126,11 @@ class Folder:
                 path.unlink(missing_ok=True)
 
 
+def _files_beside(record: Mapping[str, Any]) -> list[str]:
+    """The files of a shot that are neither its picture nor its sidecar."""
+    return [*record.get("report", ()), *record.get("labels", {}).get("files", ())]
+
+
 def _is_sidecar(record: Any, name: str) -> bool:
     """True if it says all that the summary and the contact sheet tell of a shot; else it is somebody else's, or damaged."""
 
@@ -136,6 +144,7 @@ def _is_sidecar(record: Any, name: str) -> bool:
         and all(isinstance(warning, str) for warning in record["warnings"])
         and ("check" not in record or has(record["check"], passed=bool, verdict=str))
         and ("labels" not in record or _are_labels(record["labels"], name))
+        and ("report" not in record or _are_files(record["report"], name))
     )
 
 
@@ -144,10 +153,16 @@ def _are_labels(told: Any, name: str) -> bool:
     return (
         isinstance(told, dict)
         and isinstance(told.get("depth_steps"), int | float)
-        and all(
-            isinstance(told.get(key), list) and all(isinstance(each, str) for each in told[key]) for key in ("kinds", "files")
-        )
-        and all(file.startswith(f"{name}.") and _is_file_name(file) for file in told["files"])
+        and isinstance(told.get("kinds"), list)
+        and all(isinstance(each, str) for each in told["kinds"])
+        and _are_files(told.get("files"), name)
+    )
+
+
+def _are_files(told: Any, name: str) -> bool:
+    """Whether a list of a sidecar is of files of its shot, which no other folder has."""
+    return isinstance(told, list) and all(
+        isinstance(file, str) and file.startswith(f"{name}.") and _is_file_name(file) for file in told
     )
 
 

@@ -12,9 +12,9 @@ from pathlib import Path
 from ..errors import InputError
 from ..files import read_bytes
 from . import documents, table
+from .job import Job
 from .problems import Problems
 from .rows import shots_of
-from .shot import Shot
 
 _READERS = {
     ".csv": table.read,
@@ -26,7 +26,7 @@ _READERS = {
 _OTHER_ENCODINGS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE, codecs.BOM_UTF32_BE)  # that of UTF-32 LE begins as UTF-16 LE's
 
 
-def read(path: str | os.PathLike[str], cameras: Collection[str] | None = None) -> list[Shot]:
+def read(path: str | os.PathLike[str], cameras: Collection[str] | None = None) -> list[Job]:
     """The shots of a file, in its order; its suffix tells the format.
 
     cameras : the names of the .blend's cameras, where they are known, so that a shot of another is a problem.
@@ -44,7 +44,7 @@ def read(path: str | os.PathLike[str], cameras: Collection[str] | None = None) -
         raise InputError(f"{path} is no list of shots by its suffix: give a file called {', '.join(_READERS)}")
     text = _text(path)
     problems = Problems(str(path))
-    shots: list[Shot] = []
+    shots: list[Job] = []
     with problems.caught():
         shots = shots_of(reader(text, problems), problems, cameras)
     problems.raise_any()

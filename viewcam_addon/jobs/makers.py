@@ -10,20 +10,20 @@ from .. import checks, moves
 from ..errors import InputError
 from ..pinhole import Pinhole
 from . import names
+from .job import Job
 from .problems import Problems
-from .shot import Shot
 
 _MOST = 1_000_000
 _RANGE = re.compile(r"([-+]?\d{1,9})\.\.([-+]?\d{1,9})", re.ASCII)
 
 
-class _Made(Sequence[Shot]):
+class _Made(Sequence[Job]):
     """Shots that are made when they are asked for: of a million views, one of many machines renders a few.
 
     make : a number → its shot. numbers : those of the shots, in their order.
     """
 
-    def __init__(self, make: Callable[[int], Shot], numbers: range) -> None:
+    def __init__(self, make: Callable[[int], Job], numbers: range) -> None:
         self._make, self._numbers = make, numbers
 
     def __len__(self) -> int:
@@ -34,7 +34,7 @@ class _Made(Sequence[Shot]):
         return _Made(self._make, numbers) if isinstance(index, slice) else self._make(numbers)
 
 
-def orbit(pinhole: Pinhole, count: int) -> Sequence[Shot]:
+def orbit(pinhole: Pinhole, count: int) -> Sequence[Job]:
     """`count` views of the pinhole's look-at point, evenly around up from the pinhole itself on, towards u.
 
     The shots have the pinhole's size, principal point and mirroring and, as d, its distance in pixel widths; pixel aspect stays
@@ -54,15 +54,15 @@ def orbit(pinhole: Pinhole, count: int) -> Sequence[Shot]:
         "mirrored": pinhole.mirrored or None,
     }
 
-    def view(i: int) -> Shot:
+    def view(i: int) -> Job:
         moved = moves.orbited(pinhole, math.tau * i / count, 0.0)
         name = f"orbit_{i:0{_digits(count - 1)}d}"
-        return Shot(name, moved.eye, moved.look_at, moved.up, moved.distance[0], **beside)
+        return Job(name, moved.eye, moved.look_at, moved.up, moved.distance[0], **beside)
 
     return _Made(view, range(count))
 
 
-def frames(text: str, camera: str | None = None) -> Sequence[Shot]:
+def frames(text: str, camera: str | None = None) -> Sequence[Job]:
     """A shot of the camera at each frame of a range "A..B", both included.
 
     camera : its name; the scene's own at each frame where None, which markers may bind.
@@ -81,15 +81,15 @@ def frames(text: str, camera: str | None = None) -> Sequence[Shot]:
     _count(last - first + 1)
     digits = _digits(max(abs(first), abs(last)))
 
-    def still(frame: int) -> Shot:
-        return Shot(f"frame_{'-' * (frame < 0)}{abs(frame):0{digits}d}", camera=camera, frame=frame)
+    def still(frame: int) -> Job:
+        return Job(f"frame_{'-' * (frame < 0)}{abs(frame):0{digits}d}", camera=camera, frame=frame)
 
     for end in (first, last):  # Blender's limits: what lies between them is within, too
         still(end)
     return _Made(still, range(first, last + 1))
 
 
-def from_cameras(pattern: str, cameras: Iterable[str], spaces: bool = True) -> list[Shot]:
+def from_cameras(pattern: str, cameras: Iterable[str], spaces: bool = True) -> list[Job]:
     """A shot, of the camera's own name, of each camera whose name fits a pattern of *, ? and [abc]; sorted.
 
     Case counts on every system. spaces : whether the shots' names may have some; else each is an underscore there.
@@ -120,10 +120,10 @@ def from_cameras(pattern: str, cameras: Iterable[str], spaces: bool = True) -> l
             )
         shots[camera] = name
     problems.raise_any()
-    return [Shot(name, camera=camera) for camera, name in shots.items()]
+    return [Job(name, camera=camera) for camera, name in shots.items()]
 
 
-def from_pinholes(pinholes: Iterable[tuple[str, Pinhole]]) -> list[Shot]:
+def from_pinholes(pinholes: Iterable[tuple[str, Pinhole]]) -> list[Job]:
     """A shot of each named pinhole, with its size, principal point, pixel aspect and mirroring.
 
     Names that can't be a file's are made so: what may not stand in them is an underscore.
@@ -146,7 +146,7 @@ def from_pinholes(pinholes: Iterable[tuple[str, Pinhole]]) -> list[Shot]:
         middle = (width / 2, height / 2)
         with problems.caught():
             shots.append(
-                Shot(
+                Job(
                     name,
                     pinhole.eye,
                     pinhole.look_at,

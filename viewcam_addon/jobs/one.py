@@ -1,7 +1,6 @@
 """One shot: rendered, labelled or checked, and written with its sidecar. And the shots of a batch one after another."""
 
 import contextlib
-import dataclasses
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
@@ -11,12 +10,13 @@ from typing import Any, Protocol
 from ..files import written_together, written_whole
 from ..labels import KINDS
 from .folder import Folder, Outputs, write_json
-from .shot import Shot
+from .job import Job
+from .tracing import PAGE, SIDES, Written
 
 Outcome = dict[str, Any] | Exception
 """The sidecar of a shot, or why there is none."""
 
-Work = Callable[[Iterator[Shot | None]], Iterator[tuple[Shot, Outcome]]]
+Work = Callable[[Iterator[Job | None]], Iterator[tuple[Job, Outcome]]]
 """Renders shots: takes them one by one as it can use them, and yields each with its outcome, in any order.
 
 None in place of a shot says that another batch works on all that are left: look after what is under way, wait for a moment,
@@ -24,6 +24,8 @@ and ask again.
 """
 
 _MOMENT = 0.2  # seconds
+_KEPT = ("passed", "answer", "verdict", "figures", "not_modelled", "ledger", "level")
+"""What a sidecar keeps of a check."""
 
 
 class Renderer(Protocol):
@@ -33,7 +35,7 @@ class Renderer(Protocol):
     may then still be asked for.
     """
 
-    def render(self, shot: Shot, image: Path | None, preview: Path | None) -> dict[str, Any]:
+    def render(self, shot: Job, image: Path | None, preview: Path | None) -> dict[str, Any]:
         """Write the picture (EXR) and its preview (PNG) to these two paths; None for both makes ready for the rest alone.
 
         Both paths are temporary, in the batch's folder: the caller renames them, and removes them after an error.
@@ -43,22 +45,29 @@ class Renderer(Protocol):
         """
         ...
 
-    def label(self, shot: Shot, picture: Path, kinds: Sequence[str], depth_steps: float) -> list[str]:
+    def label(self, shot: Job, picture: Path, kinds: Sequence[str], depth_steps: float) -> list[str]:
         """Write the labels of the shot that was just rendered beside where its picture would be; the names of their files.
 
         kinds : of labels.KINDS. depth_steps : of their 16-bit depth, in a scene unit. The same shot gives the same bytes.
         """
         ...
 
-    def check(self, shot: Shot) -> dict[str, Any]:
-        """Compare the shot that was just rendered with the tracer: `passed` (bool), `verdict` (a sentence), and figures."""
+    def check(
+        self, job: Job, has_picture: bool = True, written: Written | None = None, keep: Path | None = None
+    ) -> dict[str, Any]:
+        """Compare a job with the tracer: `passed` (bool), `verdict` (a sentence), and figures.
+
+        has_picture : whether it was just rendered, and camera and geometry of its picture are checked; else the job's engine
+        is, at the job's level, and `result` has all figures. written : files of the comparison. keep : a folder for scene and
+        pictures.
+        """
         ...
 
 
 def in_turn(folder: Folder, renderer: Renderer, settings: Mapping[str, str], outputs: Outputs) -> Work:
     """The work of one process: a shot after another. settings : their hashes by the shot's name."""
 
-    def work(shots: Iterator[Shot | None]) -> Iterator[tuple[Shot, Outcome]]:
+    def work(shots: Iterator[Job | None]) -> Iterator[tuple[Job, Outcome]]:
         for shot in shots:
             if shot is None:
                 time.sleep(_MOMENT)
@@ -72,7 +81,7 @@ def in_turn(folder: Folder, renderer: Renderer, settings: Mapping[str, str], out
     return work
 
 
-def render_one(shot: Shot, folder: Folder, renderer: Renderer, settings: str, outputs: Outputs) -> dict[str, Any]:
+def render_one(shot: Job, folder: Folder, renderer: Renderer, settings: str, outputs: Outputs) -> dict[str, Any]:
     """Render a shot into the folder; its sidecar, as it was written. `timing` is all in it that differs from run to run.
 
     settings : the hash of what it is made from. outputs : what of it is wanted. A picture and labels that stand there
@@ -106,11 +115,15 @@ def render_one(shot: Shot, folder: Folder, renderer: Renderer, settings: str, ou
             names = renderer.label(shot, beside / image.name, kinds, steps)
             sizes |= {name: (beside / name).stat().st_size for name in names}
             labels = {"labels": {"kinds": kinds, "depth_steps": steps, "files": names}}
-        verdict = {"check": renderer.check(shot)} if outputs.check else {key: kept[key] for key in ("check",) if key in kept}
+        verdict: dict[str, Any] = {key: kept[key] for key in ("check", "report") if key in kept}
+        if outputs.check:
+            beside = files.enter_context(written_together(folder.path, shot.name))
+            verdict = _checked(shot, renderer, outputs.picture or bool(kinds), beside if outputs.report else None)
+            sizes |= {name: (beside / name).stat().st_size for name in verdict.get("report", ())}
         sidecar.unlink(missing_ok=True)
         folder.remove_former(shot.name, former, of_labels_only="image" in sizes)
     record = {
-        "shot": {key: value for key, value in dataclasses.asdict(shot).items() if value is not None},
+        "shot": shot.listed(),
         "settings": settings,
         **({"image": image.name, "preview": preview.name} if "image" in sizes else {}),
         "bytes": sizes,
@@ -124,3 +137,16 @@ def render_one(shot: Shot, folder: Folder, renderer: Renderer, settings: str, ou
     }
     write_json(sidecar, record)
     return record
+
+
+def _checked(job: Job, renderer: Renderer, has_picture: bool, folder: Path | None) -> dict[str, Any]:
+    """What a sidecar keeps of a check. folder : receives its page and a thumbnail, NAME.html and NAME.test.png."""
+    if folder is None:
+        found = renderer.check(job, has_picture)
+        return {"check": {key: found[key] for key in _KEPT if key in found}}
+    found = renderer.check(job, has_picture, Written(report=str(folder), sides=str(folder), command=job.check_words()))
+    names = [f"{job.name}.html", f"{job.name}.{SIDES['test']}"]
+    for name, made in zip(names, (PAGE, SIDES["test"]), strict=True):
+        (folder / made).rename(folder / name)
+    (folder / SIDES["reference"]).unlink()
+    return {"check": {key: found[key] for key in _KEPT if key in found}, "report": names}

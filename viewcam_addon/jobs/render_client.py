@@ -17,9 +17,11 @@ from typing import Any
 from .. import child_process
 from ..child_process import AnswerTimeout, ProcessEnded, ServerProcess
 from ..errors import InputError
+from ..events import Events
 from ..pinhole import Pinhole
 from .folder import Outputs
-from .shot import Shot
+from .job import Job
+from .tracing import Written
 
 BLENDER = "VIEWCAM_BLENDER"
 """The variable that names the Blender."""
@@ -31,8 +33,9 @@ ATTEMPTS = 3
 class ServedRenderer:
     """A scene held open by a Blender in another process, which is started when it is first needed. See BlenderRenderer.
 
-    blend : the file. seed, threads, trust : as the command line has them. program : that of this process, which is no Blender.
-    time_limit : seconds that a shot may take, rendered, labelled and checked, once the file is open.
+    blend : the file. trust : as of Job. program : that of this process, which is no Blender.
+    time_limit : seconds that a shot may take, rendered, labelled and checked, once the file is open. events : whoever is
+    told how far a check is.
 
     Every method raises InputError, also if that Blender can't be started or ends again and again, and OSError where it could
     not write.
@@ -41,32 +44,35 @@ class ServedRenderer:
     def __init__(
         self,
         blend: Path,
-        seed: int | None = None,
-        threads: int | None = None,
         trust: bool = False,
         time_limit: float | None = None,
+        events: Events | None = None,
     ) -> None:
         self.blend, self.program = blend, None
-        self._opening = {"open": {"blend": str(blend), "seed": seed, "threads": threads, "trust": trust}}
+        self._opening = {"open": {"blend": str(blend), "trust": trust}}
         self._server: ServerProcess | None = None
-        self._limit, self._ends = time_limit, math.inf
+        self._limit, self._ends, self._events = time_limit, math.inf, events
         self._rendering: dict[str, Any] = {}
 
     def open(self) -> None:
         """Start the Blender and open the file, unless that is done."""
         self._ask()
 
-    def render(self, shot: Shot, image: Path | None, preview: Path | None) -> dict[str, Any]:
+    def render(self, shot: Job, image: Path | None, preview: Path | None) -> dict[str, Any]:
         paths = {"image": image and str(image), "preview": preview and str(preview)}
-        self._rendering = {"render": {"shot": dataclasses.asdict(shot), **paths}}
+        self._rendering = {"render": {"shot": shot.to_json(), **paths}}
         return self._ask(self._rendering)
 
-    def label(self, shot: Shot, picture: Path, kinds: Sequence[str], depth_steps: float) -> list[str]:
+    def label(self, shot: Job, picture: Path, kinds: Sequence[str], depth_steps: float) -> list[str]:
         said = {"picture": str(picture), "kinds": list(kinds), "depth_steps": depth_steps}
-        return self._ask(self._rendering, {"label": {"shot": dataclasses.asdict(shot), **said}})
+        return self._ask(self._rendering, {"label": {"shot": shot.to_json(), **said}})
 
-    def check(self, shot: Shot) -> dict[str, Any]:
-        return self._ask(self._rendering, {"check": {"shot": dataclasses.asdict(shot)}})
+    def check(
+        self, job: Job, has_picture: bool = True, written: Written | None = None, keep: Path | None = None
+    ) -> dict[str, Any]:
+        files = {"written": dataclasses.asdict(written or Written()), "keep": keep and str(keep)}
+        request = {"check": {"job": job.to_json(), "has_picture": has_picture, **files}}
+        return self._ask(self._rendering, request) if has_picture else self._ask(request)
 
     @property
     def cameras(self) -> tuple[str, ...]:
@@ -82,8 +88,8 @@ class ServedRenderer:
     def made_from(self) -> dict[str, Any]:
         return self._ask({"made_from": {}})
 
-    def problems(self, shots: Iterable[Shot], outputs: Outputs | None = None) -> tuple[str, ...]:
-        said = [dataclasses.asdict(shot) for shot in shots]
+    def problems(self, shots: Iterable[Job], outputs: Outputs | None = None) -> tuple[str, ...]:
+        said = [shot.to_json() for shot in shots]
         return tuple(self._ask({"problems": {"shots": said, "outputs": dataclasses.asdict(outputs or Outputs())}}))
 
     def close(self) -> None:
@@ -130,7 +136,7 @@ class ServedRenderer:
 
     def _start(self) -> None:
         name, command, variables = _blender()
-        self._server = ServerProcess(name, command, variables)
+        self._server = ServerProcess(name, command, variables, events=self._events)
         try:
             self._server.ask(self._opening)
         except ProcessEnded as gone:

@@ -13,7 +13,8 @@ from typing import Any
 
 from .. import child_process
 from .folder import Outputs
-from .shot import Shot
+from .job import Job
+from .tracing import Written
 
 IDLE = 120.0
 """Seconds after which a Blender that is asked for nothing ends: a farm's worker outlives the batches that it worked for."""
@@ -23,33 +24,41 @@ def serve(handle: str, opened: Callable[..., Any]) -> None:
     """Answer the ServedRenderer that started this process, until it has gone.
 
     handle : the last word of this process's command. opened : BlenderRenderer, or what takes its place; called with the file,
-    `seed`, `threads` and `trust`.
+    `trust` and whoever is told events.
     """
     with contextlib.ExitStack() as stack:
         child_process.serve(handle, _Served(stack, opened).answer, IDLE)
+
+
+class _Asker:
+    """Whoever asks at the moment, to be told events."""
+
+    tell: child_process.Tell
 
 
 class _Served:
     def __init__(self, stack: contextlib.ExitStack, opened: Callable[..., Any]) -> None:
         self._stack, self._opened = stack, opened
         self._renderer: Any = None
+        self._events = _Asker()
 
-    def answer(self, request: dict[str, Any]) -> Any:
+    def answer(self, request: dict[str, Any], tell: child_process.Tell) -> Any:
         """request : {what is asked for: its arguments}."""
         ((name, arguments),) = request.items()
+        self._events.tell = tell
         return _ANSWERS[name](self, **arguments)
 
-    def open(self, blend: str, seed: int | None, threads: int | None, trust: bool) -> None:
-        self._renderer = self._stack.enter_context(self._opened(Path(blend), seed=seed, threads=threads, trust=trust))
+    def open(self, blend: str, trust: bool) -> None:
+        self._renderer = self._stack.enter_context(self._opened(Path(blend), trust, self._events))
 
     def render(self, shot: dict[str, Any], image: str | None, preview: str | None) -> dict[str, Any]:
-        return self._renderer.render(Shot(**shot), image and Path(image), preview and Path(preview))
+        return self._renderer.render(Job.from_json(shot), image and Path(image), preview and Path(preview))
 
     def label(self, shot: dict[str, Any], picture: str, kinds: list[str], depth_steps: float) -> list[str]:
-        return self._renderer.label(Shot(**shot), Path(picture), kinds, depth_steps)
+        return self._renderer.label(Job.from_json(shot), Path(picture), kinds, depth_steps)
 
-    def check(self, shot: dict[str, Any]) -> dict[str, Any]:
-        return self._renderer.check(Shot(**shot))
+    def check(self, job: dict[str, Any], has_picture: bool, written: dict[str, Any], keep: str | None) -> dict[str, Any]:
+        return self._renderer.check(Job.from_json(job), has_picture, Written(**written), keep and Path(keep))
 
     def cameras(self) -> list[str]:
         return list(self._renderer.cameras)
@@ -64,7 +73,7 @@ class _Served:
         return self._renderer.made_from()
 
     def problems(self, shots: list[dict[str, Any]], outputs: dict[str, Any]) -> list[str]:
-        return list(self._renderer.problems([Shot(**shot) for shot in shots], Outputs(**outputs)))
+        return list(self._renderer.problems([Job.from_json(shot) for shot in shots], Outputs(**outputs)))
 
 
 _ANSWERS: dict[str, Callable[..., Any]] = {name: method for name, method in vars(_Served).items() if name[0] != "_"}

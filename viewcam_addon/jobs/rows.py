@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 from .. import checks
 from . import names
+from .job import BESIDE_THEM, FIELDS, Job, conflicts
 from .problems import MOST_SHOWN, Problems
-from .shot import BESIDE_THEM, FIELDS, Shot, conflicts
 
 VECTORS = ("eye", "look_at", "up")
 LISTS = (*VECTORS, "principal_point")
@@ -98,7 +98,7 @@ def with_defaults(row: Mapping[str, Cell], defaults: Mapping[str, Cell]) -> dict
     return {column: cell for column, cell in defaults.items() if _FIELD_OF[column] not in said} | dict(row)
 
 
-def shots_of(rows: Iterable[Row], problems: Problems, cameras: Collection[str] | None) -> list[Shot]:
+def shots_of(rows: Iterable[Row], problems: Problems, cameras: Collection[str] | None) -> list[Job]:
     """The shots; what is wrong with a row is added to the problems, and its shot is left out.
 
     cameras : the names of the file's cameras, where they are known.
@@ -108,7 +108,7 @@ def shots_of(rows: Iterable[Row], problems: Problems, cameras: Collection[str] |
     taken: dict[str, tuple[str, str]] = {}  # one_file(name) → (name, place)
     for row in rows:
         values = _values(row, problems)
-        refused = conflicts(values, names_camera=True)
+        refused = conflicts(values, in_list=True)
         for fields, sentence in refused:
             if left := [name for name in fields if name not in row.excused]:
                 problems.add(f"{row.place_of(left)}: {sentence}")
@@ -118,7 +118,7 @@ def shots_of(rows: Iterable[Row], problems: Problems, cameras: Collection[str] |
             close = ", ".join(difflib.get_close_matches(camera, cameras)) if guesses >= 0 else ""
             problems.add(f"{row.cells['camera'].place}: the file has no camera {checks.shown(camera)}, but {close or first}")
         if None not in values.values() and not refused:
-            shots.append(Shot(**values))
+            shots.append(Job(**values))
     return shots
 
 

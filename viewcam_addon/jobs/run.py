@@ -14,14 +14,14 @@ from ..events import Events
 from . import sheet, summary
 from .folder import Folder, Outputs, write_json
 from .interruption import Interruption
+from .job import Job
 from .locks import Claims
 from .one import Work
-from .shot import Shot
 from .summary import Summary
 
 
 def run(
-    shots: Sequence[Shot],
+    shots: Sequence[Job],
     folder: Folder,
     settings: Mapping[str, str],
     work: Work,
@@ -62,7 +62,7 @@ def run(
 class _Batch:
     def __init__(
         self,
-        shots: Sequence[Shot],
+        shots: Sequence[Job],
         folder: Folder,
         settings: Mapping[str, str],
         events: Events,
@@ -73,7 +73,7 @@ class _Batch:
         self._interruption = interruption
         self._settings = {shot.name: settings[shot.name] for shot in shots}
         self._started = time.monotonic()
-        self._todo: deque[Shot] = deque()
+        self._todo: deque[Job] = deque()
         self._errors: dict[str, str] = {}
         self._full = False
         self._rendered = self._kept = self._elsewhere = 0
@@ -99,7 +99,7 @@ class _Batch:
             if alone:
                 self._folder.remove_leftovers(self._settings)
 
-    def claimed(self, claims: Claims) -> Iterator[Shot | None]:
+    def claimed(self, claims: Claims) -> Iterator[Job | None]:
         """The shots to render, each claimed when it is asked for; None while all that are left are another batch's."""
         missed = 0
         while self._todo and not self._full and self._signal is None:
@@ -120,7 +120,7 @@ class _Batch:
                 self._events.tell("shot_started", shot=shot.name)
                 yield shot
 
-    def note(self, shot: Shot, outcome: dict | Exception) -> None:
+    def note(self, shot: Job, outcome: dict | Exception) -> None:
         """Count a shot that was rendered or failed."""
         if isinstance(outcome, Exception):
             error = told(outcome)
@@ -164,5 +164,5 @@ class _Batch:
     def _signal(self) -> int | None:
         return self._interruption.number if self._interruption else None
 
-    def _is_there(self, shot: Shot) -> bool:
+    def _is_there(self, shot: Job) -> bool:
         return self._folder.finished(shot.name, self._settings[shot.name], self._outputs) is not None

@@ -4,29 +4,29 @@ Rejected: Python's hash (another in each process), pickle (another in each versi
 two may be one.
 """
 
-import dataclasses
 import hashlib
 import json
 from collections.abc import Mapping
 
-from .shot import Shot
+from .job import Job
 
+_DECIDE_NOTHING = ("name", "blend", "threads")
 _FORMAT = 1  # counts up when the same settings are to have another hash
 
 
-def settings_hash(shot: Shot, made_from: Mapping[str, object]) -> str:
-    """SHA-256, in hexadecimal, over all that decides the shot's picture.
+def settings_hash(job: Job, made_from: Mapping[str, object]) -> str:
+    """SHA-256, in hexadecimal, over all that decides the job's picture and its check.
 
     made_from : whatever else does: versions, the hash of the .blend's content and of what it links, seed, options. Of texts,
-    numbers, truth values, None, and lists and dicts of these; 1 and 1.0 are not the same. The shot's name is left out: it
-    decides nothing of the picture.
+    numbers, truth values, None, and lists and dicts of these; 1 and 1.0 are not the same. Name, path and threads are
+    left out: they decide nothing of the picture.
 
     Raises
     ------
     TypeError
         if there is anything else among them, which could not be told apart for certain.
     """
-    settings = {key: value for key, value in dataclasses.asdict(shot).items() if key != "name" and value is not None}
+    settings = {key: value for key, value in job.to_json().items() if key not in _DECIDE_NOTHING}
     document = {"format": _FORMAT, "shot": settings, "made_from": made_from}
     text = json.dumps(_canonical(document), sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode("ascii")).hexdigest()

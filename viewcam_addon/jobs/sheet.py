@@ -1,9 +1,9 @@
 """The contact sheet: every shot of a batch in one HTML page, in the folder beside the pictures.
 
 Thumbnails are the previews themselves, loaded when they come into view, and are shown larger by a click; EXR and sidecar are
-linked. The page holds no times, so that the same batch gives the same page; when it was made, the browser knows and says.
-Rejected: thumbnails inside the page, as reports have their pictures (ten thousand shots make a page that no browser opens), and
-smaller copies (a third file a shot).
+linked, and of a check without a picture its report. The page holds no times, so that the same batch gives the same page; when
+it was made, the browser knows and says. Rejected: thumbnails inside the page, as reports have their pictures (ten thousand
+shots make a page that no browser opens), and smaller copies (a third file a shot).
 
 A sidecar may be anybody's: all that it says is text here and nothing else, and no link leads out of the folder.
 """
@@ -68,8 +68,10 @@ def verdict(result: Result) -> str:
         return "not checked"
     if result.answer == DIFFERENT:
         return "differs"
-    largest = _part(_part(check, "figures"), "position").get("max")
+    figures = _part(check, "figures")
+    largest = _part(figures, "position").get("max")
     words = f"identical to {plain(largest)} px" if isinstance(largest, float) else "identical"
+    words = "the same within noise" if figures.get("noisy") else words
     names = _part(check, "not_modelled").get("names")
     return f"{words}, {but_for(names)}" if result.answer == SAME_BUT and isinstance(names, list) else words
 

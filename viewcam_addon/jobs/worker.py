@@ -12,9 +12,9 @@ from typing import Any
 
 from ..errors import FullDiskError, InputError, told
 from .folder import Folder, Outputs
+from .job import Job
 from .one import render_one
 from .render_client import ServedRenderer
-from .shot import Shot
 
 
 class _Blender:
@@ -29,7 +29,7 @@ class _Blender:
         if self._renderer is None or scene != self._scene:
             self.close()
             _forget_dasks_variables()
-            renderer = ServedRenderer(Path(scene["blend"]), *(scene[key] for key in ("seed", "threads", "trust", "time_limit")))
+            renderer = ServedRenderer(Path(scene["blend"]), scene["trust"], scene["time_limit"])
             try:
                 renderer.open()
                 _refuse_other(renderer.made_from(), scene["made_from"])
@@ -52,7 +52,7 @@ _one_at_a_time = threading.Lock()  # a worker may have several threads
 def render(scene: dict[str, Any], folder: str, shot: dict[str, Any], settings: str, outputs: dict[str, Any]) -> dict[str, str]:
     """Render a shot into the folder.
 
-    scene : `blend`, `seed`, `threads`, `trust`, `time_limit` and `made_from`, what the batch says the file is made from.
+    scene : `blend`, `trust`, `time_limit` and `made_from`, what the batch says the file is made from.
     outputs : the fields of Outputs.
 
     Returns nothing if the shot is there, {"failed": sentence} or {"full": sentence} if it is not, and {"unfit": sentence} if
@@ -66,7 +66,7 @@ def render(scene: dict[str, Any], folder: str, shot: dict[str, Any], settings: s
         except Exception as error:
             return {"unfit": told(error)}
         try:
-            render_one(Shot(**shot), Folder(Path(folder)), renderer, settings, Outputs(**outputs))
+            render_one(Job.from_json(shot), Folder(Path(folder)), renderer, settings, Outputs(**outputs))
         except FullDiskError as error:
             return {"full": str(error)}
         except Exception as error:  # told as the shot's, and the next one is tried

@@ -134,7 +134,13 @@ class _Film(Structure):
 
 
 class _LightSettings(Structure):
-    _fields_ = [("bounces", c_int32 * 5), ("seed", c_uint32), ("samples", c_uint32), ("error", c_double)]
+    _fields_ = [
+        ("bounces", c_int32 * 5),
+        ("seed", c_uint32),
+        ("samples", c_uint32),
+        ("error", c_double),
+        ("coincident", c_double),
+    ]
 
 
 class _LightPasses(Structure):
@@ -162,6 +168,10 @@ class _Core(Structure):
         ("render_hits", _function(c_int, c_void_p, c_uint32, c_uint32, c_void_p, c_size_t, *[c_void_p] * 4)),
         ("silhouette", _function(c_int, c_void_p, POINTER(_Camera), c_void_p)),
         ("surface_at", _function(c_int, c_void_p, c_size_t, c_void_p, c_void_p, c_void_p)),
+        (
+            "surfaces_at",
+            _function(c_int, c_void_p, c_size_t, c_void_p, c_void_p, c_double, *[c_void_p] * 2, c_size_t, *[c_void_p] * 2),
+        ),
         ("closest", _function(c_int, c_void_p, c_size_t, c_void_p, c_uint32, c_int, c_void_p, c_void_p, c_void_p)),
         ("occluded", _function(c_int, c_void_p, c_size_t, c_void_p, c_int, c_void_p)),
         ("clear_light", _function(c_int, c_void_p)),
@@ -173,6 +183,7 @@ class _Core(Structure):
         ("set_film", _function(c_int, c_void_p, POINTER(_Film))),
         ("light_create", _function(c_int, c_void_p, POINTER(_LightSettings), POINTER(c_void_p))),
         ("light_free", _function(None, c_void_p)),
+        ("light_pairs", _function(c_size_t, c_void_p, c_size_t, c_void_p, c_void_p)),
         ("trace_light", _function(c_int, c_void_p, c_uint32, c_uint32, POINTER(_LightPasses), c_void_p)),
         (
             "probe_sobol",
@@ -484,6 +495,33 @@ class CoreScene:
         planes = _planes(passes, len(columns))
         self.check(self.core.surface_at(self.handle, len(columns), _address(columns), _address(rows), planes))
 
+    def surface_counts(self, columns: NDArray, rows: NDArray, within: float) -> NDArray[np.int64]:
+        """(n,): how many surfaces `surfaces_at` finds at each place."""
+        columns, rows = array(columns, np.float64, (None,)), array(rows, np.float64, (len(columns),))
+        counts = np.empty(len(columns), np.uint32)
+        places = len(columns), _address(columns), _address(rows), within, _address(counts)
+        self.check(self.core.surfaces_at(self.handle, *places, None, 0, None, None))
+        return counts.astype(np.int64)
+
+    def surfaces_at(
+        self, passes: Passes, columns: NDArray, rows: NDArray, within: float, counts: NDArray
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """All surfaces at n places in the picture that lie up to `within` times the nearest one's depth beyond it.
+
+        passes : (m, channels) each, of the first place's surfaces, the nearest first, then the next one's. counts : (n,), how
+        many each has, of `surface_counts`.
+
+        Returns (m,) objects, −1 where nothing is, and (2, m) how much UV and normal change there with each pixel.
+        """
+        columns, rows = array(columns, np.float64, (None,)), array(rows, np.float64, (len(columns),))
+        counts = array(counts, np.uint32, (len(columns),))
+        total = int(counts.sum(dtype=np.int64))
+        objects, slopes = np.empty(total, np.uint32), np.empty((2, total))
+        places = len(columns), _address(columns), _address(rows), within, _address(counts)
+        planes = _planes(passes, total)
+        self.check(self.core.surfaces_at(self.handle, *places, planes, total, _address(slopes), _address(objects)))
+        return objects.view(np.int32).astype(np.int64), slopes
+
     def rays(
         self, origins: NDArray, directions: NDArray, nearest: float | NDArray = 0.0, farthest: float | NDArray = math.inf
     ) -> NDArray:
@@ -555,13 +593,26 @@ def constant_value(node: Node) -> tuple[tuple[float, float, float], float] | Non
 
 
 class CoreLight:
-    """Light in a scene of the core, which must not change before it is traced. The rest as in render.render."""
+    """Light in a scene of the core, which must not change before it is traced.
 
-    def __init__(self, scene: CoreScene, given: Scene, level: str, samples: int, seed: int, error: float | None) -> None:
+    coincident : 0 for all light, or how many of float32's roundings apart surfaces are in one place, for the light alone that
+    comes by these. The rest as in render.render.
+    """
+
+    def __init__(
+        self,
+        scene: CoreScene,
+        given: Scene,
+        level: str,
+        samples: int,
+        seed: int,
+        error: float | None,
+        coincident: float = 0.0,
+    ) -> None:
         self._scene, self._handle = scene, c_void_p()
         scene.illuminate(given)
         bounces = given.bounces if level == "path" else given.bounces.none
-        settings = _LightSettings(seed=seed & 0xFFFFFFFF, samples=samples, error=error or 0.0)
+        settings = _LightSettings(seed=seed & 0xFFFFFFFF, samples=samples, error=error or 0.0, coincident=coincident)
         settings.bounces[:] = astuple(bounces)
         scene.check(scene.core.light_create(scene.handle, settings, ctypes.byref(self._handle)))
 
@@ -573,6 +624,13 @@ class CoreLight:
         """Write a tile, by its lowest row and first column, into `LIGHT`'s passes, (height, width, channels), C-contiguous."""
         addresses = _LightPasses(*(_address(passes.get(name)) for name in LIGHT))
         self._scene.check(self._scene.core.trace_light(self._handle, row, column, addresses, stop))
+
+    def pairs(self) -> list[tuple[int, int, int]]:
+        """Two objects, which may be one, that paths have met in one place, and how often; the most frequent first, of 1,000."""
+        objects, counts = np.empty((1000, 2), np.uint32), np.empty(1000, np.uint64)
+        found = min(self._scene.core.light_pairs(self._handle, len(counts), _address(objects), _address(counts)), len(counts))
+        order = np.argsort(-counts[:found].astype(np.float64), kind="stable")
+        return [(int(first), int(second), int(counts[i])) for i in order for first, second in (objects[i],)]
 
 
 class StopFlag:

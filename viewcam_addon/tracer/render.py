@@ -5,6 +5,7 @@ core (native.py) computes every pixel alone and sums its samples in order, so th
 number of threads.
 """
 
+import functools
 import math
 import os
 from collections.abc import Callable, Collection, Iterable, Iterator
@@ -29,6 +30,10 @@ BAND = 16
 MOST_SAMPLES = 2**24
 CENTRES = ("Depth", "Object Index")
 """The passes that tell what is at the pixels' centres, at the levels of light."""
+SLOPES = ("UV Slope", "Normal Slope")
+"""What `Tracer.surfaces_at` has beside the passes of level `geometry`."""
+WITHIN = 1e-3
+"""Of a depth: as far as float32's roundings carry a surface in any picture that is worth comparing."""
 PASSES = {name: len(CHANNELS[name]) for name in GEOMETRY_PASSES}
 """The passes of level `geometry` and their numbers of channels."""
 
@@ -105,6 +110,27 @@ class Tracer:
                 watcher.tile(passes, range(row, min(row + native.TILE, height)))
         return passes
 
+    def coincident_light(
+        self, level: str, samples: int, seed: int, roundings: float
+    ) -> tuple[Passes, dict[tuple[str, str], int]]:
+        """The light that depends on surfaces in one place, as much as any choice among them may bring: passes as of
+        `render_light`. And the names of two objects each that were found in one place, in order of the alphabet, with how
+        often; the same one twice where they are faces of one.
+
+        roundings : of float32, how far apart surfaces are in one place.
+        """
+        passes = self._blank(lambda shape: _dark(shape, LIGHT_PASSES))
+        light = CoreLight(self._core, self._scene, level, samples, seed, None, roundings)
+        width, height = self._camera.width, self._camera.height
+        tiles = ((row, column) for row in range(0, height, native.TILE) for column in range(0, width, native.TILE))
+        for _ in self._in_threads(lambda tile, stop: light.trace(passes, *tile, stop), tiles, None):
+            pass
+        pairs: dict[tuple[str, str], int] = {}
+        for first, second, count in light.pairs():
+            pair = tuple(sorted((self._names[first], self._names[second])))
+            pairs[pair] = pairs.get(pair, 0) + count
+        return passes, pairs
+
     def hits(
         self, names: Collection[str] = (), place: tuple[float, float] = (0.5, 0.5)
     ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], Passes]:
@@ -155,6 +181,31 @@ class Tracer:
         passes = unwritten(column.shape)
         self._core.surface_at(passes, column, row)
         return passes
+
+    def surfaces_at(
+        self, columns: ArrayLike, rows: ArrayLike, px: ArrayLike = 0.5, py: ArrayLike = 0.5, within: float = WITHIN
+    ) -> tuple[NDArray[np.int64], NDArray[np.object_], Passes]:
+        """All surfaces that lie about where the nearest one does, at sample points of pixels.
+
+        columns, rows, px, py : as of `surface_at`. within : how far beyond the nearest one, in its depth.
+
+        Returns (m,) which of the n sample points each surface is of, ascending, its nearest first; (m,) the objects' names, ""
+        where nothing is, which is one, too; and pass name → (m, channels) float32, with "UV Slope" and "Normal Slope" among
+        them: how much each changes there with each pixel.
+        """
+        column, row = np.broadcast_arrays(np.add(columns, px, dtype=np.float64), np.add(rows, py, dtype=np.float64))
+        counts = self._core.surface_counts(column, row, within)
+        passes = unwritten((int(counts.sum()),))
+        objects, slopes = self._core.surfaces_at(passes, column, row, within, counts)
+        for name, slope in zip(SLOPES, slopes, strict=True):
+            passes[name] = slope.astype(np.float32)[:, None]
+        return np.repeat(np.arange(len(counts)), counts), self._names[objects], passes
+
+    @functools.cached_property
+    def _names(self) -> NDArray[np.object_]:
+        """Of each placed object, and "" last."""
+        names = [placed.name for placed in self._scene.objects for _ in placed.matrices]
+        return np.array([*names, ""], dtype=object)
 
     def _bands(self) -> Iterator[range]:
         height = self._camera.height

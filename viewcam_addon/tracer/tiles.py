@@ -34,6 +34,27 @@ class Watcher(Protocol):
         """True if rendering is to stop. Asked often, by any thread."""
 
 
+class Progress:
+    """A watcher that tells `progress`, with the share of the rows that are done, at each whole percent.
+
+    tell : is told the event's name and fields. rows : how many the picture has.
+    """
+
+    def __init__(self, tell: Callable[..., None], rows: int) -> None:
+        self._tell, self._done, self._percent = tell, bytearray(rows), 0
+        tell("progress", share=0.0)
+
+    def tile(self, passes: Passes, rows: range) -> None:
+        self._done[rows.start : rows.stop] = b"\1" * len(rows)
+        percent = 100 * sum(self._done) // len(self._done)
+        if percent > self._percent:
+            self._percent = percent
+            self._tell("progress", share=percent / 100)
+
+    def stop(self) -> bool:
+        return False
+
+
 def over_threads(
     work: Callable[[Tile], None], tiles: Iterable[Tile], threads: int, ask: Callable[[], None], give_up: Callable[[], None]
 ) -> Iterator[Tile]:

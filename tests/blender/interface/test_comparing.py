@@ -70,7 +70,7 @@ def stand_in(monkeypatch, seen):
         def let(self, steps):
             (self.folder / "go").write_text(str(steps))
 
-    def command(copy, _scene, _name, _words):
+    def command(copy, _scene, _written):
         return [sys.executable, "-c", STAND_IN, str(copy.parent)]
 
     monkeypatch.setattr(comparing, "command", command)
@@ -315,7 +315,7 @@ def test_a_child_that_dies_is_told_with_its_last_words(monkeypatch, seen):
 @pytest.mark.parametrize(
     ("said", "status", "sentence"),
     [
-        ("traced\nviewcam render: out.exr can't be written\nleft\n", 2, "Out.exr can't be written"),
+        ('traced\n{"event": "error", "text": "out.exr can\'t be written"}\nleft\n', 2, "Out.exr can't be written"),
         ("", 3, "The process that compares ended with status 3"),
         ("first\n\n last \n", -9, "The process that compares was ended by signal 9 after saying: last"),
     ],

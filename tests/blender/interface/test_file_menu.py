@@ -10,8 +10,9 @@ bpy = pytest.importorskip("bpy")
 
 import viewcam_addon
 from viewcam_addon.blender.interface import file_menu
-from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.scenes import import_geometry, import_scene
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer.scene import LedgerEntry, scene_file
 
 
@@ -29,7 +30,7 @@ def some_scene(monkey, camera, add_lamp, scene):
 
 def test_the_menu_writes_what_the_command_writes(some_scene, tmp_path, capfd):
     assert export(tmp_path / "scene.json") == {"FINISHED"}
-    scene_file.write(job.export(job.Request(level="path")), tmp_path / "command.json")
+    scene_file.write(jobs.export(Job(level="path")), tmp_path / "command.json")
     written = (tmp_path / "scene.json").read_text().replace("scene.npz", "command.npz")
     assert written == (tmp_path / "command.json").read_text()
     assert len(scene_file.read(tmp_path / "scene.json").lamps) == 1

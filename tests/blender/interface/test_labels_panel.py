@@ -12,12 +12,12 @@ from viewcam_addon.blender.interface import comparing, labels
 from viewcam_addon.labels import KINDS
 from viewcam_addon.labels import files as label_files
 
-# In place of `viewcam batch`: it keeps the words it was started with, and writes the last of a label's files.
+# In place of the batch: it keeps what it was to do, and writes the last of a label's files.
 STAND_IN = """
 import json, pathlib, sys
-listed, folder = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[3])
-(shot,) = json.loads(listed.read_text())
-(folder / (shot["name"] + ".labels.json")).write_text(json.dumps([shot, sys.argv[4:]]))
+written = json.loads(pathlib.Path(sys.argv[1]).read_text())
+(shot,), folder = written["jobs"], pathlib.Path(written["plan"]["out"])
+(folder / (shot["name"] + ".labels.json")).write_text(json.dumps([shot, written["plan"]["outputs"]]))
 """
 
 
@@ -40,9 +40,8 @@ def camera(add_camera, scene):
 
 @pytest.fixture
 def stand_in(monkeypatch):
-    def command(_copy, _scene, name, words):
-        assert name == "batch"
-        return [sys.executable, "-c", STAND_IN, *words]
+    def command(_copy, _scene, written):
+        return [sys.executable, "-c", STAND_IN, str(written)]
 
     monkeypatch.setattr(comparing, "command", command)
 
@@ -58,9 +57,11 @@ def test_a_click_starts_a_batch_of_this_frame_with_labels_alone(settings, camera
     folder, sentence = labels.background.latest
     assert folder.parent == Path(settings.folder) and sentence == f"Written to {folder}"
     assert folder.name.startswith("untitled Hero_ close 0003 labels 2")
-    shot, words = json.loads((folder / "Hero_ close.labels.json").read_text())
+    shot, outputs = json.loads((folder / "Hero_ close.labels.json").read_text())
+    assert Path(shot.pop("blend")).name == "untitled.blend"
     assert shot == {"name": "Hero_ close", "camera": "Hero: close", "width": 64, "height": 48, "frame": 3}
-    assert words == ["--labels", "depth,flow", "--labels-only", "--depth-steps", "250"]
+    wanted = {"picture": False, "check": False, "labels": ["depth", "flow"], "depth_steps": 250.0, "report": False}
+    assert outputs == wanted
 
 
 def test_a_child_that_dies_leaves_no_folder_and_its_last_words_are_said(settings, camera, monkeypatch, tmp_path):
@@ -73,8 +74,9 @@ def test_a_child_that_dies_leaves_no_folder_and_its_last_words_are_said(settings
 
 def test_a_shot_that_fails_is_said_in_its_own_words(settings, camera, monkeypatch):
     summary = '{"shots": [{"name": "Hero", "error": "the disk is full"}]}'
-    fails = "import pathlib, sys; pathlib.Path(sys.argv[3], 'summary.json').write_text(sys.argv[-1]); sys.exit(4)"
-    monkeypatch.setattr(comparing, "command", lambda *given: [sys.executable, "-c", fails, *given[3], summary])
+    fails = "import json, pathlib, sys; out = json.loads(pathlib.Path(sys.argv[1]).read_text())['plan']['out'];"
+    fails += "pathlib.Path(out, 'summary.json').write_text(sys.argv[2]); sys.exit(4)"
+    monkeypatch.setattr(comparing, "command", lambda *given: [sys.executable, "-c", fails, str(given[2]), summary])
     with pytest.raises(RuntimeError, match="The disk is full"):
         bpy.ops.viewcam.write_labels()
 

@@ -215,12 +215,21 @@ def test_the_sub_panel_has_every_move_for_the_camera_that_is_shown(posed_camera)
 def test_every_value_has_its_row_and_the_roll_is_the_one_that_counts(posed_camera):
     always = ["name", "eye", "eye_target", "look_at", "look_at_target", "up", "focal_length", "lens_unit", "zoom", "keeps"]
     assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "roll", "pole"]
-    for unit, name in (("DIAGONAL", "field_of_view"), ("PIXELS", "distance")):
+    for unit, name in (("DIAGONAL", "diagonal_fov"), ("PIXELS", "distance")):
         posed_camera.virtual_pinhole.lens_unit = unit
         always[always.index("lens_unit") - 1] = name
         assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "roll", "pole"]
     posed_camera.virtual_pinhole.pole = "HOLD"
     assert list(properties_drawn(panel.VIEWCAM_PT_data)) == [*always, "held_roll", "hold_within", "pole"]
+
+
+SHOWN = {
+    "MILLIMETERS": "focal_length",
+    "HORIZONTAL": "horizontal_fov",
+    "VERTICAL": "vertical_fov",
+    "DIAGONAL": "diagonal_fov",
+    "PIXELS": "distance",
+}
 
 
 def test_nothing_but_a_dot_takes_room_from_the_lens(posed_camera):
@@ -229,7 +238,7 @@ def test_nothing_but_a_dot_takes_room_from_the_lens(posed_camera):
         posed_camera.virtual_pinhole.lens_unit = unit
         found = drawn(panel.VIEWCAM_PT_sidebar, 292)
         beside = [(kind, name) for kind, name, _, layout, _ in found if layout.is_row and kind in ("label", "decorator")]
-        assert ("label", "") not in beside and (("decorator", "distance") in beside) == (unit == "PIXELS")
+        assert ("label", "") not in beside and [name for kind, name in beside if kind == "decorator"] == [SHOWN[unit]]
 
 
 BLENDERS = {

@@ -11,13 +11,14 @@ bpy = pytest.importorskip("bpy")
 from viewcam_addon.blender import own_picture
 from viewcam_addon.blender.interface import comparing, render_all
 from viewcam_addon.errors import InputError
-from viewcam_addon.jobs.shot import Shot
+from viewcam_addon.jobs import plan
+from viewcam_addon.jobs.job import Job
 
 # In place of `viewcam batch`: it makes a picture, tells so, and waits until it may make the other and the contact sheet.
 STAND_IN = """
 import json, pathlib, sys, time
-listed, folder, status = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), int(sys.argv[3])
-names = [row["name"] for row in json.loads(listed.read_text())]
+written, status = json.loads(pathlib.Path(sys.argv[1]).read_text()), int(sys.argv[2])
+folder, names = pathlib.Path(written["plan"]["out"]), [job["name"] for job in written["jobs"]]
 (folder / (names[0] + ".exr")).write_text("x")
 while not (folder.parent / "go").exists():
     time.sleep(0.01)
@@ -53,9 +54,8 @@ def stand_in(monkeypatch):
     """A function that says with which status the child shall end."""
 
     def told(status):
-        def command(_copy, _scene, name, words):
-            assert name == "batch"
-            return [sys.executable, "-c", STAND_IN, words[0], words[2], str(status)]
+        def command(_copy, _scene, written):
+            return [sys.executable, "-c", STAND_IN, str(written), str(status)]
 
         monkeypatch.setattr(comparing, "command", command)
 
@@ -66,19 +66,17 @@ def stand_in(monkeypatch):
 def test_every_camera_is_a_shot_in_its_own_picture(two):
     rows = render_all.shots(two, animation=False)
     assert rows == [
-        {"name": "Hero_ close", "camera": "Hero: close", "width": 20, "height": 30, "frame": 1},
-        {"name": "Wide", "camera": "Wide", "width": 50, "height": 30, "frame": 1},
+        Job("Hero_ close", camera="Hero: close", width=20, height=30, frame=1),
+        Job("Wide", camera="Wide", width=50, height=30, frame=1),
     ]
     two.camera = two.objects["Hero: close"]
     own_picture.switch(two)
     assert render_all.shots(two, animation=False) == rows, "whichever is active"
-    for row in rows:
-        Shot(**row)
 
 
 def test_an_animation_has_each_camera_s_own_frames(two):
     rows = render_all.shots(two, animation=True)
-    assert [(row["name"], row["frame"]) for row in rows] == [
+    assert [(job.name, job.frame) for job in rows] == [
         ("Hero_ close_0007", 7),
         ("Wide_0001", 1),
         ("Wide_0002", 2),
@@ -89,7 +87,7 @@ def test_an_animation_has_each_camera_s_own_frames(two):
 def test_names_that_are_one_file_are_kept_apart_and_hidden_cameras_left_out(add_camera, scene):
     for name in ("a:b", "A?b", "hidden"):
         add_camera(name).hide_render = name == "hidden"
-    assert [row["name"] for row in render_all.shots(scene, False)] == ["A_b", "a_b_"]
+    assert [job.name for job in render_all.shots(scene, False)] == ["A_b", "a_b_"]
     for each in scene.objects:
         each.hide_render = True
     with pytest.raises(InputError, match="has no camera that is rendered"):
@@ -145,9 +143,9 @@ def test_by_script_it_waits_and_says_where_the_sheet_is(two, stand_in, tmp_path)
 def test_a_proof_of_each_picture_is_asked_for_by_one_box(two, stand_in, tmp_path, monkeypatch, check):
     (tmp_path / "go").touch()
     asked, stood_in = [], comparing.command
-    monkeypatch.setattr(comparing, "command", lambda *given: asked.append(given[3]) or stood_in(*given))
+    monkeypatch.setattr(comparing, "command", lambda *given: asked.append(plan.read(given[2])[1]) or stood_in(*given))
     assert bpy.ops.viewcam.render_all_cameras(directory=str(tmp_path), check=check) == {"FINISHED"}
-    assert [("--check" in words) for words in asked] == [check]
+    assert [how.outputs.check for how in asked] == [check]
 
 
 def test_without_a_folder_it_is_refused_and_a_child_that_dies_leaves_no_folder(two, monkeypatch, tmp_path):

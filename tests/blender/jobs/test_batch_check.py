@@ -13,15 +13,16 @@ from viewcam_addon import cli
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import datablocks, versions
 from viewcam_addon.blender.jobs import checking, scene_files
+from viewcam_addon.blender.jobs import renderer as renderers
 from viewcam_addon.blender.jobs.renderer import BlenderRenderer
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs import makers
-from viewcam_addon.jobs.comparer import Comparer
-from viewcam_addon.jobs.shot import Shot
+from viewcam_addon.jobs.job import Job
+from viewcam_addon.jobs.tracing import Tracing
 
 pytestmark = pytest.mark.slow
 
-LEFT = Shot("left", eye=(-3.0, -6.0, 2.5), look_at=(0.0, 0.0, 0.5), up=(0.0, 0.0, 1.0), d=90.0)
+LEFT = Job("left", eye=(-3.0, -6.0, 2.5), look_at=(0.0, 0.0, 0.5), up=(0.0, 0.0, 1.0), d=90.0)
 RIGHT = replace(LEFT, name="right", eye=(3.0, -5.0, 2.0), d=110.0)
 SIZE = (96, 54)
 
@@ -32,18 +33,18 @@ def add(kind, **options):
 
 
 @pytest.fixture(scope="module")
-def comparer():
+def tracing():
     """One for all tests, since to start it takes as long as a test."""
-    with Comparer() as comparer:
-        yield comparer
+    with Tracing() as tracing:
+        yield tracing
 
 
 @pytest.fixture(autouse=True)
-def one_comparer(comparer, monkeypatch):
-    class Kept(Comparer):
-        verdict = staticmethod(comparer.verdict)  # its own process is never started
+def one_process(tracing, monkeypatch):
+    class Kept(Tracing):
+        ask = staticmethod(tracing.ask)  # its own process is never started
 
-    monkeypatch.setattr(checking, "Comparer", Kept)
+    monkeypatch.setattr(renderers, "Tracing", Kept)
 
 
 @pytest.fixture
@@ -148,7 +149,7 @@ FAULTS = {
 
 
 def test_shots_of_four_values_and_of_a_camera_pass_and_their_figures_say_so(stage, batch):
-    found = verdicts(batch(LEFT, RIGHT, Shot("as it stands", camera="Camera")))
+    found = verdicts(batch(LEFT, RIGHT, Job("as it stands", camera="Camera")))
     assert all(each["passed"] for each in found.values()), found
     assert all(each["verdict"].startswith("The same picture") for each in found.values())
     bent = ["Suzanne: material 'Bumpy' turns the normals, and a plain one stands in"]
@@ -209,7 +210,7 @@ def test_pictures_are_the_same_bytes_with_and_without_their_checks(stage, batch,
     output = output or tree.nodes.new("ShaderNodeOutputWorld")
     tree.links.new(fog.outputs[0], output.inputs["Volume"])
     stage.camera.data.dof.use_dof, stage.camera.data.dof.focus_distance = True, 3.0
-    shots = [replace(shot, engine=engine) for shot in (LEFT, RIGHT)] + [Shot("camera", camera="Camera", engine=engine)]
+    shots = [replace(shot, engine=engine) for shot in (LEFT, RIGHT)] + [Job("camera", camera="Camera", engine=engine)]
     with_checks, without = batch(*shots), batch(*shots, check=False)
     for name, (said, image, preview) in without.items():
         checked, its_image, its_preview = with_checks[name]
@@ -223,7 +224,7 @@ def test_pictures_are_the_same_bytes_with_and_without_their_checks(stage, batch,
 def test_verdicts_are_to_the_last_digit_those_of_a_batch_that_is_resumed(stage, batch, engine):
     """Whatever is kept from shot to shot, so that the sidecars are the same bytes."""
     small = replace(LEFT, name="small", width=64, height=64, samples=3)
-    shots = [replace(shot, engine=engine) for shot in (LEFT, small, RIGHT, Shot("camera", camera="Camera"))]
+    shots = [replace(shot, engine=engine) for shot in (LEFT, small, RIGHT, Job("camera", camera="Camera"))]
     whole = verdicts(batch(*shots))
     assert whole == verdicts(batch(shots[0])) | verdicts(batch(*shots[:0:-1]))
 
@@ -301,7 +302,7 @@ def test_a_render_border_is_checked_as_the_picture_has_it(stage, batch, crop):
 
 def test_a_mirrored_camera_of_the_file_passes_as_what_it_is(stage, batch):
     stage.camera.scale = (-1, 1, 1)
-    said, _, _ = batch(Shot("mirrored", camera="Camera"))["mirrored"]
+    said, _, _ = batch(Job("mirrored", camera="Camera"))["mirrored"]
     assert said["camera"]["mirrored"] and said["check"]["passed"], said["check"]
 
 
@@ -319,13 +320,14 @@ def test_what_both_sides_leave_out_is_told_in_a_few_words(stage, batch):
     assert len(told) == 6 and "hair and curves" in told[0] and told[-1] == "and 4 more, which viewcam check tells", told
 
 
-def test_the_camera_of_a_shot_by_eevee_is_checked_with_cycles(stage):
+def test_the_camera_of_a_shot_by_eevee_is_checked_with_cycles(stage, tracing):
     """Without a picture by EEVEE, which needs a GPU: what is checked is the camera."""
     stage.render.engine = versions.EEVEE
     camera = cameras.read(stage.camera, stage)
-    with checking.Checker() as checker:
-        assert checker.check(stage, stage.camera, camera)["passed"]
-        assert not checker.check(stage, stage.camera, replace(camera, distance=1.001 * camera.distance[0]))["passed"]
+    job, wrong = Job("camera", camera="Camera"), replace(camera, distance=1.001 * camera.distance[0])
+    with checking.Checker(tracing) as checker:
+        assert checker.check_picture(job, stage, stage.camera, camera)["passed"]
+        assert not checker.check_picture(job, stage, stage.camera, wrong)["passed"]
     assert stage.render.engine == versions.EEVEE
 
 

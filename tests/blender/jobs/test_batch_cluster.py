@@ -7,6 +7,7 @@ import re
 import signal
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -17,8 +18,8 @@ pytest.importorskip("distributed")
 from viewcam_addon.blender.jobs.renderer import BlenderRenderer
 from viewcam_addon.jobs import cluster, one, run
 from viewcam_addon.jobs.folder import Folder, Outputs
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.jobs.settings import settings_hash
-from viewcam_addon.jobs.shot import Shot
 
 pytestmark = [
     pytest.mark.exhaustive,
@@ -32,7 +33,7 @@ WAITS = 120
 
 def shot(name, turn, engine="CYCLES", samples=4):
     eye = (6 * math.cos(turn), 6 * math.sin(turn), 2.5)
-    return Shot(name, eye, (0, 0, 0.5), (0, 0, 1), 90.0, None, 96, 54, 1, engine, samples, "direct")
+    return Job(name, eye, (0, 0, 0.5), (0, 0, 1), 90.0, None, 96, 54, 1, engine, samples, "direct")
 
 
 # The slow one takes some seconds, so that whoever renders it can be killed meanwhile.
@@ -168,6 +169,6 @@ def test_whoever_is_killed_the_files_are_those_of_one_process_and_each_worker_lo
 
 
 def test_the_files_of_another_seed_would_be_others(blend, alone, tmp_path):
-    with BlenderRenderer(blend, seed=7) as renderer:
-        record = one.render_one(SHOTS[1], Folder(tmp_path), renderer, "hash", Outputs())
+    with BlenderRenderer(blend) as renderer:
+        record = one.render_one(replace(SHOTS[1], seed=7), Folder(tmp_path), renderer, "hash", Outputs())
     assert json.dumps(record) and (tmp_path / "shot_0.exr").read_bytes() != alone[2]["shot_0.exr"]

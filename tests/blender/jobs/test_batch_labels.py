@@ -9,36 +9,37 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon import image
-from viewcam_addon.blender.jobs import labelling, scene_files
+from viewcam_addon.blender.jobs import renderer as renderers
+from viewcam_addon.blender.jobs import scene_files
 from viewcam_addon.blender.jobs.renderer import BlenderRenderer
 from viewcam_addon.jobs.folder import Folder, Outputs
-from viewcam_addon.jobs.labeller import Labeller
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.jobs.one import render_one
-from viewcam_addon.jobs.shot import Shot
+from viewcam_addon.jobs.tracing import Tracing
 from viewcam_addon.pinhole import Pinhole
 
 ALLOWED = 1e-3
 """Pixels: what flow may differ by where depths are float32."""
 
 SLOPE = 0.25
-STATED = Shot("stated", eye=(-3.0, -6.0, 2.5), look_at=(0.0, 0.0, 0.5), up=(0.0, 0.0, 1.0), d=90.0, frame=2)
-FRAMES = [Shot(f"frame_{number}", camera="Camera", frame=number) for number in (1, 2, 3)]
+STATED = Job("stated", eye=(-3.0, -6.0, 2.5), look_at=(0.0, 0.0, 0.5), up=(0.0, 0.0, 1.0), d=90.0, frame=2)
+FRAMES = [Job(f"frame_{number}", camera="Camera", frame=number) for number in (1, 2, 3)]
 ALL = Outputs(picture=False, labels=("depth", "masks", "amodal", "flow"))
 
 
 @pytest.fixture(scope="module")
-def labeller():
+def tracing():
     """One for all tests, since to start it takes as long as a test."""
-    with Labeller() as labeller:
-        yield labeller
+    with Tracing() as tracing:
+        yield tracing
 
 
 @pytest.fixture(autouse=True)
-def one_labeller(labeller, monkeypatch):
-    class Kept(Labeller):
-        write = staticmethod(labeller.write)  # its own process is never started
+def one_process(tracing, monkeypatch):
+    class Kept(Tracing):
+        ask = staticmethod(tracing.ask)  # its own process is never started
 
-    monkeypatch.setattr(labelling, "Labeller", Kept)
+    monkeypatch.setattr(renderers, "Tracing", Kept)
 
 
 @pytest.fixture
@@ -165,7 +166,7 @@ def test_labels_alone_are_those_beside_a_picture_and_nothing_is_rendered(stage, 
 def test_a_scene_that_stands_is_read_once_for_labels(stage, tmp_path, monkeypatch):
     exported, export = [], scene_files.export_scene
     monkeypatch.setattr(scene_files, "export_scene", lambda *given: exported.append(1) or export(*given))
-    shots = [Shot(f"shot_{x}", eye=(x, -6, 2), look_at=(0, 0, 0.5), up=(0, 0, 1), d=90) for x in range(4)]
+    shots = [Job(f"shot_{x}", eye=(x, -6, 2), look_at=(0, 0, 0.5), up=(0, 0, 1), d=90) for x in range(4)]
     shoot(tmp_path, shots, Outputs(picture=False, labels=("depth",)))
     assert len(exported) == 1
     depths = [image.read(tmp_path / f"{shot.name}.labels.exr")["Depth"] for shot in shots]

@@ -11,9 +11,9 @@ from viewcam_addon.blender import versions
 from viewcam_addon.blender.jobs import persistent_data
 from viewcam_addon.blender.jobs.renderer import BlenderRenderer
 from viewcam_addon.blender.scenes import export
-from viewcam_addon.jobs.shot import Shot
+from viewcam_addon.jobs.job import Job
 
-LEFT = Shot("left", eye=(-6.0, -7.0, 4.0), look_at=(0.0, 0.0, 1.0), up=(0.0, 0.0, 1.0), d=40.0)
+LEFT = Job("left", eye=(-6.0, -7.0, 4.0), look_at=(0.0, 0.0, 1.0), up=(0.0, 0.0, 1.0), d=40.0)
 RIGHT = replace(LEFT, name="right", eye=(6.0, -7.0, 4.0))
 TRACED = replace(LEFT, engine="VIEWCAM", level="direct", samples=1)
 
@@ -22,8 +22,8 @@ UNLIKE = (
     LEFT,
     RIGHT,
     replace(RIGHT, frame=7),
-    Shot("own", camera="Second", frame=7),
-    Shot("first", camera="First", frame=7),
+    Job("own", camera="Second", frame=7),
+    Job("first", camera="First", frame=7),
     replace(LEFT, width=48, height=36, samples=8),
     replace(LEFT, samples=2),
     TRACED,
@@ -135,7 +135,7 @@ def grow_hair(scene):
 
 def test_a_driver_that_reads_the_scenes_camera_reads_that_of_the_shot(stage, pictures):
     drive_by_the_camera(stage)
-    shots = (Shot("first", camera="First"), Shot("second", camera="Second"), LEFT)
+    shots = (Job("first", camera="First"), Job("second", camera="Second"), LEFT)
     assert persistent_data.is_driven_by_camera()
     assert differing(pictures, shots) == []
 
@@ -148,7 +148,7 @@ def test_hair_at_another_frame_is_as_if_no_frame_was_before(stage, pictures):
 @pytest.mark.parametrize(
     ("prepare", "shots"),
     [
-        (drive_by_the_camera, (Shot("first", camera="First"), Shot("second", camera="Second"))),
+        (drive_by_the_camera, (Job("first", camera="First"), Job("second", camera="Second"))),
         (grow_hair, (LEFT, replace(LEFT, frame=7))),
     ],
 )

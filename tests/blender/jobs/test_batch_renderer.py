@@ -17,12 +17,12 @@ from viewcam_addon.blender.jobs.renderer import BlenderRenderer
 from viewcam_addon.blender.rendering import exr, graphics
 from viewcam_addon.blender.scenes import depsgraph
 from viewcam_addon.errors import InputError
-from viewcam_addon.jobs import comparer, makers
+from viewcam_addon.jobs import makers, tracing
 from viewcam_addon.jobs.folder import Outputs
-from viewcam_addon.jobs.shot import Shot
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.pinhole import Pinhole
 
-LEFT = Shot("left", eye=(-6.0, -7.0, 4.0), look_at=(0.0, 0.0, 1.0), up=(0.0, 0.0, 1.0), d=40.0)
+LEFT = Job("left", eye=(-6.0, -7.0, 4.0), look_at=(0.0, 0.0, 1.0), up=(0.0, 0.0, 1.0), d=40.0)
 RIGHT = replace(LEFT, name="right", eye=(6.0, -7.0, 4.0))
 
 
@@ -87,7 +87,7 @@ def _value(owner, prop):
 UNLIKE = (
     LEFT,
     replace(LEFT, width=48, height=48, samples=1, frame=9),
-    Shot("second", camera="Second", frame=2),
+    Job("second", camera="Second", frame=2),
     replace(RIGHT, engine="VIEWCAM", level="direct", samples=1),
 )
 
@@ -96,11 +96,11 @@ def test_the_scene_is_exactly_as_before(stage, shoot):
     stage.objects["First"].virtual_pinhole.enabled = True
     bpy.context.view_layer.update()
     before = state()
-    with BlenderRenderer(seed=7, threads=1) as renderer:
+    with BlenderRenderer() as renderer:
         renderer.problems(UNLIKE)
         renderer.pinhole("Second", (100, 50))
         for shot in UNLIKE:
-            shoot(renderer, shot)
+            shoot(renderer, replace(shot, seed=7, threads=1))
         assert state() != before
     assert_same(state(), before)
 
@@ -108,7 +108,7 @@ def test_the_scene_is_exactly_as_before(stage, shoot):
 def test_the_scene_is_as_before_after_an_error(stage, tmp_path):
     before = state()
     with BlenderRenderer() as renderer, pytest.raises(InputError, match="no camera 'Third'"):
-        renderer.render(Shot("third", camera="Third", frame=7), tmp_path / "a.exr", tmp_path / "a.png")
+        renderer.render(Job("third", camera="Third", frame=7), tmp_path / "a.exr", tmp_path / "a.png")
     assert_same(state(), before)
 
 
@@ -154,9 +154,10 @@ def test_the_four_values_are_the_camera_to_float32(stage, shoot):
 
 
 def test_what_a_shot_says_is_rendered_and_said(stage, shoot):
-    with BlenderRenderer(seed=7) as renderer:
-        plain, said = shoot(renderer, LEFT)[0], shoot(renderer, replace(LEFT, width=48, height=40, samples=1, frame=9))[0]
-        traced = shoot(renderer, replace(RIGHT, engine="VIEWCAM", level="auto", samples=3))[0]
+    left = replace(LEFT, seed=7)
+    with BlenderRenderer() as renderer:
+        plain, said = shoot(renderer, left)[0], shoot(renderer, replace(left, width=48, height=40, samples=1, frame=9))[0]
+        traced = shoot(renderer, replace(RIGHT, seed=7, engine="VIEWCAM", level="auto", samples=3))[0]
     settings = {
         "engine": "CYCLES",
         "level": None,
@@ -173,7 +174,7 @@ def test_what_a_shot_says_is_rendered_and_said(stage, shoot):
 
 def test_a_camera_of_the_file_is_rendered_as_it_stands(stage, shoot):
     with BlenderRenderer() as renderer:
-        said = shoot(renderer, Shot("first", camera="First", frame=8))[0]
+        said = shoot(renderer, Job("first", camera="First", frame=8))[0]
         assert stage.camera.name == "First", "the marker's camera"
         assert stage.camera.data.dof.use_dof
     assert "stated" not in said
@@ -260,8 +261,9 @@ def test_strips_do_not_stand_in_place_of_a_shot(stage, shoot):
 
 def test_cameras_are_told_by_name_without_the_batchs_own(stage):
     with BlenderRenderer() as renderer:
+        renderer.problems([LEFT])
+        assert len(bpy.data.cameras) == 3, "a camera for the four values"
         assert renderer.cameras == ("First", "Second") and renderer.scene_camera == "First"
-        assert len(bpy.data.cameras) == 3
 
 
 def chosen_by_blender(scene, frame):
@@ -275,7 +277,7 @@ def test_shots_of_frames_are_taken_by_the_camera_that_blender_chooses_at_each(st
     before = state()
     eyes = {name: tuple(stage.objects[name].location) for name in ("First", "Second")}
     with BlenderRenderer() as renderer:
-        shots = [LEFT, *makers.frames("1..4"), Shot("named", camera="First", frame=9), *makers.frames("7..9")]
+        shots = [LEFT, *makers.frames("1..4"), Job("named", camera="First", frame=9), *makers.frames("7..9")]
         assert renderer.problems(shots) == ()
         taken = {shot: shoot(renderer, shot)[0] for shot in shots}
     assert_same(state(), before)
@@ -322,7 +324,7 @@ def test_an_orbit_begins_with_the_picture_that_the_camera_takes_of_a_cropped_bor
             (first,) = makers.orbit(renderer.pinhole("First", size), 1)
             width, height = size or (None, None)
             asked = shoot(renderer, first)[0]
-            own = shoot(renderer, Shot("own", camera="First", width=width, height=height))[0]
+            own = shoot(renderer, Job("own", camera="First", width=width, height=height))[0]
         assert [asked["rendered"][name] for name in ("width", "height")] == [
             own["rendered"][name] for name in ("width", "height")
         ]
@@ -341,7 +343,7 @@ def test_an_orbit_keeps_what_its_camera_has_beside_the_four_values(stage, shoot,
     with BlenderRenderer() as renderer:
         views = makers.orbit(renderer.pinhole("First", (64, 36)), 3)
         taken = [Pinhole(**shoot(renderer, shot)[0]["camera"]) for shot in views]
-        own = Pinhole(**shoot(renderer, Shot("own", camera="First", width=64, height=36))[0]["camera"])
+        own = Pinhole(**shoot(renderer, Job("own", camera="First", width=64, height=36))[0]["camera"])
     assert own.mirrored == (name == "scale") and (own.principal_point == (32, 18)) == (name == "scale")
     for pinhole in taken:
         # What float32 stores of either: 2⁻²⁴ of a hundred pixels, a few times over.
@@ -353,11 +355,11 @@ def test_an_orbit_keeps_what_its_camera_has_beside_the_four_values(stage, shoot,
 @pytest.mark.parametrize(
     ("shot", "words"),
     [
-        (Shot("x", camera="Third"), "'x': scene 'Scene' has no camera 'Third': choose from First, Second"),
-        (Shot("x", camera="viewcam batch"), "has no camera 'viewcam batch'"),
-        (Shot("x", camera="Suzanne"), "has no camera 'Suzanne'"),
-        (Shot("x", camera="Flat"), "camera 'Flat' is orthographic, no pinhole"),
-        (Shot("x", camera="Hidden"), "camera 'Hidden' takes no part in scene 'Scene'"),
+        (Job("x", camera="Third"), "'x': scene 'Scene' has no camera 'Third': choose from First, Second"),
+        (Job("x", camera="viewcam batch"), "has no camera 'viewcam batch'"),
+        (Job("x", camera="Suzanne"), "has no camera 'Suzanne'"),
+        (Job("x", camera="Flat"), "camera 'Flat' is orthographic, no pinhole"),
+        (Job("x", camera="Hidden"), "camera 'Hidden' takes no part in scene 'Scene'"),
         (replace(LEFT, d=1.2e-38), "the distance of 1.2e-38 pixels needs a sensor of"),
         (replace(LEFT, engine="EEVEE"), "EEVEE draws with a GPU, and Blender can't open one here"),
     ],
@@ -385,7 +387,7 @@ def test_a_scene_without_a_view_layer_to_render_is_said_before(stage):
 
 
 def test_a_check_that_could_not_be_had_is_said_before(stage, monkeypatch):
-    monkeypatch.setattr(comparer, "lacking", lambda: "a check needs OpenEXR")
+    monkeypatch.setattr(tracing, "lacking", lambda: "a check needs OpenEXR")
     with BlenderRenderer() as renderer:
         assert renderer.problems([LEFT], Outputs(check=True)) == ("a check needs OpenEXR",)
         assert renderer.problems([LEFT]) == ()

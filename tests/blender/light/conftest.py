@@ -53,9 +53,10 @@ def pictures(stage, read_passes, tmp_path):
     """pictures(arrange, samples=…, count=…, …) → Sides of ten scenes: `arrange(rng)` changes what the stage has set up.
 
     samples : of each of Cycles' pictures; count : how many of them, the tracer having the samples of all. The rest is as in
-    job.Request.
+    Job.
     """
-    from viewcam_addon.blender.rendering import job
+    from viewcam_addon.blender.jobs import renderer as jobs
+    from viewcam_addon.jobs.job import Job
 
     def make(arrange=lambda rng: None, samples=1, count=1, level="direct", scenes=SCENES, **request):
         exported, paths = [], []
@@ -64,8 +65,8 @@ def pictures(stage, read_passes, tmp_path):
             stage(rng)
             arrange(rng)
             paths.append([tmp_path / f"{number}-{picture}.exr" for picture in range(count)])
-            wanted = job.Request(threads=2, level=level, samples=samples * count, **request)
-            exported.append(job.export_and_render(wanted, paths[-1]))
+            wanted = Job(threads=2, level=level, samples=samples * count, **request)
+            exported.append(jobs.both_sides(wanted, paths[-1]))
         passes = iter(read_passes([path for each in paths for path in each]))
         return [
             Sides(each, render.render(each, level, samples * count, threads=2), [next(passes) for _ in range(count)])

@@ -16,9 +16,10 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon import api
-from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.comparison import radiance
 from viewcam_addon.image import Image
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer import native, render
 
 COLOUR = (0.8, 0.5, 0.2, 1.0)
@@ -95,7 +96,7 @@ def patches(scene, strewn, painted, add_lamp, set_world, read_passes, tmp_path):
         shaders = list(shaders)
         strewn([painted(*shader) for shader in shaders])
         path = tmp_path / "patches.exr"
-        exported = job.export_and_render(job.Request(threads=2, level="direct", samples=1), [path])
+        exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [path])
         assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
         (theirs,) = read_passes([path])
         ours = render.render(exported, "direct", 1, threads=2)
@@ -337,7 +338,7 @@ def test_rough_refraction_beside_a_translucent_is_up_to_5_percent_off_and_told(
         tree.links.new(mixed.outputs[0], tree.nodes["Output"].inputs["Surface"])
     strewn(materials, backwards=lambda i: backwards)
     paths = [tmp_path / f"{picture}.exr" for picture in range(2)]
-    exported = job.export_and_render(job.Request(threads=2, level="direct", samples=128), paths)
+    exported = jobs.both_sides(Job(threads=2, level="direct", samples=128), paths)
     told = {entry.object: entry.reason for entry in exported.ledger if "refracts roughly" in entry.reason}
     assert set(told) == {"P0", "P1", "P2"}, exported.ledger
     theirs = np.mean([each["Combined"][..., :3] for each in read_passes(paths)], axis=0, dtype=np.float64)

@@ -195,7 +195,8 @@ def test_nodes_of_a_lamp_that_are_a_little_wrong_are_found(shone, monkeypatch, w
 @pytest.mark.parametrize("shape", ["RECTANGLE", "ELLIPSE"])
 def test_a_panel_with_a_picture_shows_it(fresh_blender, scene, camera, add_lamp, set_world, shape, read_passes, tmp_path):
     """As the camera sees it, at every place; the way there begins at the clip's start; the panel is turned, and stretched."""
-    from viewcam_addon.blender.rendering import job
+    from viewcam_addon.blender.jobs import renderer as jobs
+    from viewcam_addon.jobs.job import Job
     from viewcam_addon.tracer import render
 
     scene.render.resolution_x, scene.render.resolution_y = 48, 36
@@ -206,7 +207,7 @@ def test_a_panel_with_a_picture_shows_it(fresh_blender, scene, camera, add_lamp,
     falloff(lamp, "Linear")
     camera.location, camera.rotation_euler, camera.data.lens = (0, 0, 0), (0, 0, 0), 40
     path = tmp_path / "panel.exr"
-    exported = job.export_and_render(job.Request(threads=2, level="direct", samples=1), [path])
+    exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), [path])
     assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
     (theirs,) = read_passes([path])
     ours = render.render(exported, "direct", 1, threads=2)

@@ -7,11 +7,12 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.scenes import linking
 from viewcam_addon.blender.scenes.import_scene import import_scene
 from viewcam_addon.comparison import radiance
 from viewcam_addon.image import Image
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer import render
 
 ALL = {"Monkey", "Floor", "Panel"}
@@ -150,11 +151,11 @@ def test_only_surfaces_that_shine_are_linked(stage, panel, link):
     stage(np.random.default_rng(0))
     link(panel(3, 3, 5.0), receiver_collection={"Monkey": "INCLUDE"}, blocker_collection={"Floor": "EXCLUDE"})
     link(bpy.data.objects["Floor"], receiver_collection={"Monkey": "EXCLUDE"})
-    exported = job.export(job.Request(level="direct"))
+    exported = jobs.export(Job(level="direct"))
     assert links_of(exported) == ({"Monkey"}, {"Monkey", "Panel"}) and not told(exported)
     assert unlinked(exported).objects[1:] != exported.objects[1:]
     assert [one.receivers for one in exported.objects if one.name != "Panel"] == [None, None]
-    geometry = job.export(job.Request(level="geometry"))
+    geometry = jobs.export(Job(level="geometry"))
     assert links_of(geometry) == (None, None) and not told(geometry)
 
 
@@ -179,16 +180,16 @@ def test_an_instance_shines_for_what_its_object_shines(pictures, panel, painted,
 def test_links_of_surfaces_come_back_from_a_scene_file(stage, panel, names):
     stage(np.random.default_rng(0))
     panel(3, 3, 5.0)
-    exported = job.export(job.Request(level="direct"))
+    exported = jobs.export(Job(level="direct"))
     given = tuple(replace(one, receivers=names, blockers=names) if one.name == "Panel" else one for one in exported.objects)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     import_scene(replace(exported, objects=given), "Imported", bpy.context.scene)
     wanted = None if names is None else frozenset(names)
-    assert links_of(job.export(job.Request(level="direct"))) == (wanted, wanted)
+    assert links_of(jobs.export(Job(level="direct"))) == (wanted, wanted)
 
 
 def test_a_recentred_scene_has_no_links_and_they_are_told(stage, panel, link):
     stage(np.random.default_rng(0))
     link(panel(3, 3, 5.0), receiver_collection={"Monkey": "INCLUDE"})
-    exported = job.export(job.Request(level="direct", recenter=True))
+    exported = jobs.export(Job(level="direct", recenter=True))
     assert links_of(exported) == (None, None) and told(exported)["Panel"] == "light linking is off on both sides"

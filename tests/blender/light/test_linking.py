@@ -7,8 +7,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.scenes.import_scene import import_scene
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer.render import render
 
 ALL = {"Monkey", "Floor"}
@@ -22,7 +23,7 @@ def lamp(stage, add_lamp):
 
 
 def linked(request="direct"):
-    exported = job.export(job.Request(level=request))
+    exported = jobs.export(Job(level=request))
     told = {entry.object: entry.reason for entry in exported.ledger if entry.status != "exported"}
     return exported.lamps[0].receivers, exported.lamps[0].blockers, told
 
@@ -94,7 +95,7 @@ def test_a_light_that_is_linked_to_instances_is_named(lamp, link, scene):
 
 @pytest.mark.parametrize("names", [{"Monkey"}, set(), None])
 def test_links_come_back_from_a_scene_file(lamp, link, names):
-    exported = job.export(job.Request(level="direct"))
+    exported = jobs.export(Job(level="direct"))
     given = replace(exported, lamps=(replace(exported.lamps[0], receivers=names, blockers=names),))
     bpy.ops.wm.read_factory_settings(use_empty=True)
     import_scene(given, "Imported", bpy.context.scene)

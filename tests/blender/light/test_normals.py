@@ -8,7 +8,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.jobs import renderer as jobs
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer import render
 
 COLOUR = (0.8, 0.5, 0.2, 1.0)
@@ -130,7 +131,7 @@ def shown(scene, camera, add_lamp, set_world, read_passes, tmp_path):
     def show(size, level="direct"):
         scene.render.resolution_x = scene.render.resolution_y = size
         path = tmp_path / "normals.exr"
-        exported = job.export_and_render(job.Request(threads=2, level=level, samples=1), [path])
+        exported = jobs.both_sides(Job(threads=2, level=level, samples=1), [path])
         assert all(entry.status == "exported" for entry in exported.ledger), exported.ledger
         (theirs,) = read_passes([path])
         ours = render.render(exported, level, 1, threads=2)

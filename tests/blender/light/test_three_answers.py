@@ -6,7 +6,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon import api
+import viewcam_addon as vp
 
 pytestmark = pytest.mark.slow
 
@@ -30,9 +30,9 @@ def stage(fresh_blender, tmp_path):
     bpy.ops.object.camera_add(location=(0, -7, 2.5), rotation=(math.radians(78), 0, 0))
     scene.camera = bpy.context.object
 
-    def check(level, *options):
+    def check(level, **options):
         bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "stage.blend"))
-        return api.check(tmp_path / "stage.blend", "--size", SIZE, "--level", level, "--samples", "32", *options)
+        return vp.check(tmp_path / "stage.blend", size=SIZE, level=level, samples=32, **options)
 
     return check
 
@@ -119,11 +119,11 @@ def test_surface_scattering_below_the_skin_is_no_matter_of_geometry(stage):
 
 def test_strict_fails_what_is_amber_and_lets_pass_what_is_green(stage):
     hair()
-    assert not stage("geometry", "--strict").passed
+    assert not stage("geometry", strict=True).passed
     bpy.data.objects["Ball"].location = BEHIND
-    assert stage("geometry", "--strict").passed
+    assert stage("geometry", strict=True).passed
 
 
 def test_all_that_is_modelled_is_green_and_rendered_once(stage, tmp_path):
-    assert stage("path", "--report", str(tmp_path / "report")).answer == "same"
+    assert stage("path", report=tmp_path / "report").answer == "same"
     assert not (tmp_path / "report" / "everything.exr").exists()

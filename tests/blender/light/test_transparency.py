@@ -11,7 +11,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.jobs import renderer as jobs
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer import render
 
 FLOAT32 = 1e-6  # of the light: colours are multiplied in float32, as often as there are panes, and cosines rounded
@@ -52,7 +53,7 @@ def both(read_passes, tmp_path):
 
     def make(level="path", samples=1, count=1):
         paths = [tmp_path / f"{number}.exr" for number in range(count)]
-        exported = job.export_and_render(job.Request(threads=2, level=level, samples=samples * count), paths)
+        exported = jobs.both_sides(Job(threads=2, level=level, samples=samples * count), paths)
         assert not [entry for entry in exported.ledger if entry.status != "exported"], exported.ledger
         return exported, render.render(exported, level, samples * count, threads=2), read_passes(paths)
 

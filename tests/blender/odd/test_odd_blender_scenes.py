@@ -7,7 +7,8 @@ bpy = pytest.importorskip("bpy")
 from viewcam_addon.blender import camera as cameras
 from viewcam_addon.blender import datablocks
 from viewcam_addon.blender.interface import panel
-from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.jobs import renderer as jobs
+from viewcam_addon.jobs.job import Job
 
 
 @pytest.fixture
@@ -232,7 +233,7 @@ def test_a_marker_chooses_the_camera_of_its_frame(both_sides, posed_camera, add_
     sides.check()
     assert sides.exported.camera.eye == (0, 0, 8)
     for request, eye in (({"frame": 4}, (7, -6, 5)), ({"frame": 1}, (0, 0, 8)), ({"camera": "Camera"}, (7, -6, 5))):
-        assert job.export(job.Request(**request)).camera.eye == eye
+        assert jobs.export(Job(**request)).camera.eye == eye
         assert (scene.camera, scene.frame_current) == (posed_camera, 3)
     assert [marker.camera for marker in scene.timeline_markers] == [other, posed_camera]
     scene.frame_set(4)

@@ -8,10 +8,12 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import temporary_settings
-from viewcam_addon.blender.rendering import cycles, job
+from viewcam_addon.blender.jobs import renderer as jobs
+from viewcam_addon.blender.rendering import cycles
 from viewcam_addon.blender.scenes import depsgraph
 from viewcam_addon.blender.temporary_settings import numbered_indices, overridden
 from viewcam_addon.errors import InputError
+from viewcam_addon.jobs.job import Job
 
 # What describes the settings, what follows from them, and brushes (reading some of them crashes 4.2).
 NO_SETTINGS = {"rna_type", "is_evaluated", "depsgraph", "tool_settings"}
@@ -149,7 +151,7 @@ def test_every_override_for_light_is_restored(crowded, tmp_path, request_):
     crowded.render.image_settings.file_format = "PNG"
     before = state(crowded)
     paths = [tmp_path / "first.exr", tmp_path / "second.exr"]
-    exported = job.export_and_render(job.Request(level="path", samples=4, threads=2, **request_), paths)
+    exported = jobs.both_sides(Job(level="path", samples=4, threads=2, **request_), paths)
     assert not (changed := list(differences(before, state(crowded)))), "\n".join(changed)
     assert all(path.stat().st_size > 1000 for path in paths) and paths[0].read_bytes() != paths[1].read_bytes()
     told = {entry.object: entry.reason for entry in exported.ledger}
@@ -177,7 +179,7 @@ def test_pictures_of_light_share_samples_and_count_seeds(scene, camera_object, t
     scene.cycles.max_bounces, scene.cycles.diffuse_bounces, scene.cycles.film_exposure = 9, 3, 2.0
     scene.cycles.pixel_filter_type = "BOX"
     paths = [tmp_path / f"{number}.exr" for number in range(3)]
-    job.export_and_render(job.Request(level="path", samples=48, seed=7), paths)
+    jobs.both_sides(Job(level="path", samples=48, seed=7), paths)
     first = 0 if hasattr(scene.cycles, "sample_subset_length") else 1  # before 4.4 the first sample is not counted
     assert [each["samples"] for each in settings_of_renders] == [17 - first] * 3
     assert [each["seed"] for each in settings_of_renders] == [7, 8, 9]
@@ -187,7 +189,7 @@ def test_pictures_of_light_share_samples_and_count_seeds(scene, camera_object, t
 
 
 def test_direct_light_has_no_bounces_and_one_sample_is_the_centre(scene, camera_object, tmp_path, settings_of_renders):
-    job.export_and_render(job.Request(level="direct", samples=1), [tmp_path / "picture.exr"])
+    jobs.both_sides(Job(level="direct", samples=1), [tmp_path / "picture.exr"])
     (seen,) = settings_of_renders
     assert (seen["samples"], seen["max_bounces"], seen["diffuse_bounces"]) == (1, 0, 0)
     assert seen["pixel_filter_type"] == "BLACKMAN_HARRIS" and seen["passes"] == {"use_pass_emit", "use_pass_z"}
@@ -196,10 +198,10 @@ def test_direct_light_has_no_bounces_and_one_sample_is_the_centre(scene, camera_
 def test_the_level_is_the_least_where_it_is_left_to_the_scene(scene, camera_object, tmp_path, settings_of_renders):
     bpy.ops.mesh.primitive_cube_add()
     scene.world = None
-    exported = job.export_and_render(job.Request(level="auto"), [tmp_path / "dark.exr"])
+    exported = jobs.both_sides(Job(level="auto"), [tmp_path / "dark.exr"])
     assert settings_of_renders[-1]["passes"] >= {"use_pass_position"} and not exported.lamps
     scene.collection.objects.link(bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN")))
-    exported = job.export_and_render(job.Request(level="auto"), [tmp_path / "lit.exr"])
+    exported = jobs.both_sides(Job(level="auto"), [tmp_path / "lit.exr"])
     assert settings_of_renders[-1]["max_bounces"] == exported.bounces.total and exported.lamps
 
 

@@ -12,8 +12,10 @@ bpy = pytest.importorskip("bpy")
 
 from viewcam_addon import image
 from viewcam_addon.blender import versions
-from viewcam_addon.blender.rendering import job, tracing
+from viewcam_addon.blender.jobs import renderer as jobs
+from viewcam_addon.blender.rendering import tracing
 from viewcam_addon.image import SETTINGS
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer import render as renders
 from viewcam_addon.tracer.render import render
 
@@ -76,7 +78,7 @@ def written(name, found, layer="ViewLayer"):
 
 def traced(level="path", samples=SAMPLES, seed=SEED):
     """The same picture the other way: exported, and traced outside of any engine."""
-    return render(job.export(job.Request(level=level)), level, samples, seed, threads=1)
+    return render(jobs.export(Job(level=level)), level, samples, seed, threads=1)
 
 
 def ask_for_all_passes(view_layer):

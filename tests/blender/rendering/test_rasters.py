@@ -7,8 +7,10 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender.rendering import graphics, job
+from viewcam_addon.blender.jobs import renderer as jobs
+from viewcam_addon.blender.rendering import graphics
 from viewcam_addon.errors import InputError
+from viewcam_addon.jobs.job import Job
 
 
 @pytest.fixture
@@ -51,7 +53,7 @@ def verdict(folder, engine, scene):
     before = settings(scene)
     scene.view_layers[0].aovs.add().name = "Artist's"
     before[-3] = ["Artist's"]
-    exported = job.export_and_render(job.Request(engine=engine, threads=2), [folder / "test.exr"])
+    exported = jobs.both_sides(Job(engine=engine, threads=2), [folder / "test.exr"])
     assert settings(scene) == before
     scene_file.write(exported, folder / "scene.json")
     program = """
@@ -73,7 +75,7 @@ def test_what_an_engine_draws_is_what_the_tracer_sees_or_it_is_refused(engine, b
     is_old = engine == "EEVEE" and bpy.app.version < (5, 0)
     if is_old or not graphics.are_there():
         with pytest.raises(InputError, match="5.0 or newer" if is_old else "graphics driver"):
-            job.export_and_render(job.Request(engine=engine), [tmp_path / "test.exr"])
+            jobs.both_sides(Job(engine=engine), [tmp_path / "test.exr"])
         return
     status, sentence = verdict(tmp_path, engine, scene)
     assert status == 0 and sentence.startswith("The same picture"), sentence
@@ -82,5 +84,5 @@ def test_what_an_engine_draws_is_what_the_tracer_sees_or_it_is_refused(engine, b
 def test_without_a_driver_there_is_one_sentence_and_no_file(ball, scene, tmp_path, monkeypatch):
     monkeypatch.setattr(graphics, "are_there", lambda: False)
     with pytest.raises(InputError, match="WORKBENCH needs a graphics driver, and there is none: install one"):
-        job.export_and_render(job.Request(engine="WORKBENCH"), [tmp_path / "test.exr"])
+        jobs.both_sides(Job(engine="WORKBENCH"), [tmp_path / "test.exr"])
     assert not list(tmp_path.iterdir())

@@ -6,9 +6,11 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import another_blender
-from viewcam_addon.blender.rendering import cycles, job
+from viewcam_addon.blender.jobs import renderer as jobs
+from viewcam_addon.blender.rendering import cycles
 from viewcam_addon.blender.scenes import baker, charts, export_geometry
 from viewcam_addon.blender.temporary_settings import overridden
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer import native, render
 from viewcam_addon.tracer.scene.film import Bounces
 
@@ -58,7 +60,7 @@ def told(exported, name="Cube"):
 
 
 def export():
-    return job.export(job.Request(level="direct"))
+    return jobs.export(Job(level="direct"))
 
 
 @pytest.fixture
@@ -67,7 +69,7 @@ def sides(scene, camera, read_passes, tmp_path):
 
     def make():
         paths = [tmp_path / "baked.exr", tmp_path / "true.exr"]
-        exported = job.export_and_render(job.Request(threads=2, level="direct", samples=1), paths[:1])
+        exported = jobs.both_sides(Job(threads=2, level="direct", samples=1), paths[:1])
         light = cycles.LightSettings(exported.film, Bounces(0, 0, 0, 0), 1)
         cycles.render(scene, bpy.context.view_layer, camera, paths[1], light=light)
         ours, *theirs = render.render(exported, "direct", 1, threads=2), *read_passes(paths)

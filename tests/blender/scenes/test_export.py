@@ -165,6 +165,39 @@ def test_a_scatter_of_geometry_nodes(add, both_sides, mesh_from, node_group):
     assert len(sides.exported.geometries) == len(sides.exported.objects) == 3
 
 
+@pytest.mark.parametrize("recenter", [False, True])
+@pytest.mark.parametrize("shown", ["itself", "a collection", "nodes' instances", "nodes' geometry"])
+def test_a_mesh_in_edit_mode_is_also_shown_by_others(add, both_sides, mesh_from, node_group, shown, recenter):
+    """The mesh that was made of it was freed by the next one, and geometry nodes showed nothing."""
+    group, mesh = bpy.data.collections.new("Group"), mesh_from("monkey")
+    mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
+    for edge in mesh.edges:
+        edge.use_edge_sharp = edge.index % 4 == 0
+    for name in ("Red", "Green"):
+        mesh.materials.append(bpy.data.materials.new(name))
+    mesh.polygons.foreach_set("material_index", [face.index % 2 for face in mesh.polygons])
+    edited = add(mesh, "Edited", collection=group)
+    bpy.context.scene.collection.children.link(group)
+    if shown == "a collection":
+        for i in (-1, 1):
+            add(None, f"Instancer {i}", location=(2 * i, 0, 0), instance_type="COLLECTION", instance_collection=group)
+    elif shown != "itself":
+        tree, source, target = node_group()
+        info, scatter = tree.nodes.new("GeometryNodeObjectInfo"), tree.nodes.new("GeometryNodeInstanceOnPoints")
+        info.inputs["Object"].default_value, info.inputs["As Instance"].default_value = edited, "instances" in shown
+        tree.links.new(source.outputs[0], scatter.inputs["Points"])
+        tree.links.new(info.outputs["Geometry"], scatter.inputs["Instance"])
+        tree.links.new(scatter.outputs[0], target.inputs[0])
+        add(mesh_from("plane", size=4), "Ground").modifiers.new("Scatter", "NODES").node_group = tree
+    bpy.context.view_layer.objects.active = edited
+    bpy.ops.object.mode_set(mode="EDIT")
+    sides = both_sides(recenter=recenter)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    sides.check()
+    assert sum(len(placed.matrices) for placed in sides.exported.objects) == {"itself": 1, "a collection": 3}.get(shown, 5)
+    assert set(np.unique(sides.cycles["Material Index"])) == {0, 1, 2}
+
+
 def test_a_lawn_of_ten_thousand_tufts_is_one_object_of_as_many_matrices(add, both_sides, mesh_from, node_group):
     tuft = add(mesh_from("ico_sphere", radius=0.03), "Tuft", location=(0, 0, -9))
     lawn = add(mesh_from("grid", size=5, x_subdivisions=99, y_subdivisions=99), "Lawn")

@@ -7,6 +7,7 @@ bpy = pytest.importorskip("bpy")
 
 from mathutils import Vector
 
+from viewcam_addon.blender import versions
 from viewcam_addon.tracer.scene import Spheres
 
 
@@ -73,6 +74,69 @@ def test_custom_normals_beside_flat_faces(monkey, both_sides):
     normals += np.random.default_rng(1).normal(scale=0.3, size=normals.shape)
     mesh.normals_split_custom_set((normals / np.linalg.norm(normals, axis=1, keepdims=True)).tolist())
     mesh.polygons.foreach_set("use_smooth", [index % 4 > 0 for index in range(len(mesh.polygons))])
+    both_sides().check()
+
+
+def folded(mesh_from, seed, kinds):
+    """A crumpled grid with what stops Blender's corner normals in random places.
+
+    kinds : of "sharp edges", "flat faces", "flipped faces", "fins" (edges of three faces), "tips" (faces that share a vertex).
+    """
+    draw = np.random.default_rng(seed)
+    mesh = mesh_from("grid", x_subdivisions=7, y_subdivisions=7, size=5)
+    places = [
+        (*vertex.co.xy, z) for vertex, z in zip(mesh.vertices, draw.normal(scale=0.3, size=len(mesh.vertices)), strict=True)
+    ]
+    faces = [tuple(face.vertices) for face in mesh.polygons]
+    if "flipped faces" in kinds:
+        faces = [face[::-1] if draw.random() < 0.2 else face for face in faces]
+    for face in list(faces) if {"fins", "tips"} & {*kinds} else ():
+        if draw.random() < 0.15:
+            (first, second), above = face[:2], [(places[at][0], places[at][1], places[at][2] + 0.8) for at in face[:2]]
+            new = len(places), len(places) + 1
+            places += above
+            faces.append((first, second, new[1], new[0]) if "fins" in kinds else (first, *new))
+    made = bpy.data.meshes.new("Folded")
+    made.from_pydata(places, [], faces)
+    made.polygons.foreach_set("use_smooth", ["flat faces" not in kinds or draw.random() > 0.1 for _ in faces])
+    for edge in made.edges if "sharp edges" in kinds else ():
+        edge.use_edge_sharp = draw.random() < 0.15
+    made.update()
+    return made
+
+
+FOLDS = [
+    ("sharp edges",),
+    ("flipped faces", "sharp edges"),
+    ("fins", "sharp edges"),
+    ("tips", "sharp edges"),
+    ("flipped faces", "flat faces"),
+    ("flipped faces", "fins", "flat faces", "sharp edges"),
+]
+
+
+@pytest.mark.parametrize("kinds", FOLDS, ids=" and ".join)
+def test_corner_normals_stop_where_those_of_cycles_do(add, both_sides, mesh_from, kinds):
+    """Blender's stop at each edge of faces that are wound against each other or not two; until 5.0 those of Cycles do not."""
+    add(folded(mesh_from, 1, kinds))
+    both_sides().check()
+
+
+def test_custom_normals_stop_where_those_of_cycles_do(add, both_sides, mesh_from):
+    mesh = folded(mesh_from, 2, ("flipped faces", "sharp edges"))
+    normals = [(vertex := mesh.vertices[loop.vertex_index]).normal + vertex.co / 4 for loop in mesh.loops]
+    mesh.normals_split_custom_set([normal.normalized() for normal in normals])
+    add(mesh)
+    both_sides().check()
+
+
+@pytest.mark.skipif(not versions.MESHES_KEEP_NORMALS, reason="meshes keep no custom normals as they are given")
+def test_custom_normals_that_differ_about_a_vertex_are_those_of_cycles(add, both_sides, mesh_from):
+    mesh = folded(mesh_from, 3, ())
+    kept = mesh.attributes.new("custom_normal", "FLOAT_VECTOR", "CORNER")
+    normals = np.random.default_rng(3).normal((0, 0, 1), 0.3, (len(mesh.loops), 3))
+    kept.data.foreach_set("vector", (normals / np.linalg.norm(normals, axis=1, keepdims=True)).ravel())
+    add(mesh)
     both_sides().check()
 
 

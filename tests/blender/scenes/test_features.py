@@ -287,11 +287,14 @@ def test_an_empty_slot_that_no_face_uses_is_not_told(monkey, both_sides, node_gr
 
 
 @pytest.mark.parametrize("kind", ["shared data", "copied data", "one mesh"])
-def test_triangles_that_lie_exactly_where_others_do_are_told_where_there_is_light(monkey, scene, add_lamp, kind):
-    from viewcam_addon.blender.rendering import job
+def test_triangles_that_lie_exactly_where_others_do_are_told(monkey, scene, add_lamp, kind):
+    from viewcam_addon.blender.jobs import renderer as jobs
+    from viewcam_addon.jobs.job import Job
 
     def told(level="direct"):
-        return [entry.reason for entry in job.export(job.Request(level=level)).ledger if "lie exactly" in entry.reason]
+        ledger = jobs.export(Job(level=level)).ledger
+        assert all(entry.status == "exported" for entry in ledger), "where it matters is the comparison's to find"
+        return [entry.reason for entry in ledger if "lie exactly" in entry.reason]
 
     add_lamp("SUN")
     assert not told()
@@ -302,16 +305,53 @@ def test_triangles_that_lie_exactly_where_others_do_are_told_where_there_is_ligh
     if kind == "one mesh":
         with bpy.context.temp_override(active_object=monkey, selected_editable_objects=[monkey, double]):
             bpy.ops.object.join()
-    (reason,) = told()
-    assert not told("geometry") and ("others of it" if kind == "one mesh" else "those of") in reason
+    for level in ("direct", "geometry"):
+        (reason,) = told(level)
+        assert ("others of it" if kind == "one mesh" else "those of") in reason
     if kind != "one mesh":
         double.location.x += 1e-5
         assert not told()
 
 
+def test_instances_in_one_place_and_doubles_within_them_are_told(monkey, scene, add):
+    from viewcam_addon.blender.jobs import renderer as jobs
+    from viewcam_addon.jobs.job import Job
+
+    def told():
+        reasons = [entry.reason for entry in jobs.export(Job(level="geometry")).ledger]
+        return [clause.partition(":")[0] for reason in reasons for clause in reason.split("; ") if "lie exactly" in clause]
+
+    def instance(number, location):
+        place = add(None, f"Place {number}", location=location)
+        place.instance_type, place.instance_collection = "COLLECTION", collection
+
+    collection = bpy.data.collections.new("Instanced")
+    scene.collection.objects.unlink(monkey)
+    collection.objects.link(monkey)
+    instance(1, (1, 0, 0))
+    instance(2, (-1, 0, 0))
+    assert not told()
+    instance(3, (1, 0, 0))
+    assert told() == ["1 instances lie exactly where others of it do"]
+    bpy.data.objects["Place 3"].location.x = 0
+    with bpy.context.temp_override():
+        mesh = monkey.data
+        vertices = np.empty(3 * len(mesh.vertices))
+        mesh.vertices.foreach_get("co", vertices)
+        faces = [list(face.vertices) for face in mesh.polygons]
+        count = len(mesh.vertices)
+        doubled = bpy.data.meshes.new("Doubled")
+        twins = [[index + count for index in face] for face in faces[:5]]
+        doubled.from_pydata(np.tile(vertices.reshape(-1, 3), (2, 1)).tolist(), [], faces + twins)
+        monkey.data = doubled
+    (reason,) = told()
+    assert reason.endswith("triangles lie exactly where others of it do") and 5 <= int(reason.split()[0]) <= 10
+
+
 def test_triangles_of_a_lattice_are_no_doubles_of_one_another(scene, add_lamp, add):
     """Sums of their coordinates, weighted by the roots of 2 and 3, are the same for 1,442 of these."""
-    from viewcam_addon.blender.rendering import job
+    from viewcam_addon.blender.jobs import renderer as jobs
+    from viewcam_addon.jobs.job import Job
 
     random = np.random.default_rng(7)
     corners = random.integers(0, 20, (40_000, 1, 3)) + random.integers(-1, 2, (40_000, 3, 3))
@@ -325,6 +365,6 @@ def test_triangles_of_a_lattice_are_no_doubles_of_one_another(scene, add_lamp, a
     add_lamp("SUN")
 
     def told():
-        return [entry.reason for entry in job.export(job.Request(level="direct")).ledger if "lie exactly" in entry.reason]
+        return [entry.reason for entry in jobs.export(Job(level="direct")).ledger if "lie exactly" in entry.reason]
 
     assert len(mesh.polygons) > 30_000 and not told()

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import findings, versions
-from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.scenes import import_scene
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer import render
 from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres, scene_file
@@ -50,7 +51,7 @@ def lacking(ledger):
 def there_and_back(made):
     """What the exporter makes of an imported scene."""
     import_whole(made)
-    return job.export(job.Request(level="path"))
+    return jobs.export(Job(level="path"))
 
 
 def things(scene, light=True):
@@ -149,13 +150,13 @@ def check_same(made, found):
 )
 def test_a_sample_scene_comes_back_as_the_same_picture(name, fresh_blender, tmp_path):
     scene_file.write(
-        job.export(job.Request(SAMPLES / f"{name}.blend", level="path")),
+        jobs.export(Job(blend=SAMPLES / f"{name}.blend", level="path")),
         tmp_path / "a.json",
     )
     made = scene_file.read(tmp_path / "a.json")
     imported = import_whole(made, name)
     assert versions.MESHES_KEEP_NORMALS is False or lacking(imported.ledger) == []
-    found = job.export(job.Request(level="path"))
+    found = jobs.export(Job(level="path"))
     assert things(made) == things(found)
     check_same_surfaces(made, found)
     check_same_lamps(made, found)
@@ -169,7 +170,7 @@ def test_a_sample_scene_comes_back_as_the_same_picture(name, fresh_blender, tmp_
 
 def test_the_light_of_a_sample_scene_comes_back(fresh_blender):
     """The same paths are followed; on each the factors of a surface and of a lamp are off by PRODUCT at every bounce."""
-    made = job.export(job.Request(SAMPLES / "cornell.blend", level="path", size=(32, 32)))
+    made = jobs.export(Job(blend=SAMPLES / "cornell.blend", level="path", width=32, height=32))
     found = dataclasses.replace(there_and_back(made), camera=made.camera)
     wanted, got = (render.render(each, level="path", samples=4, seed=1, threads=2)["Combined"] for each in (made, found))
     assert wanted[..., :3].max() > 0.5
@@ -438,5 +439,5 @@ def test_an_image_survives_saving_and_loading(fresh_blender, tmp_path):
     import_whole(made)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "file.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "file.blend"))
-    (picture,) = job.export(job.Request(level="path")).images.values()
+    (picture,) = jobs.export(Job(level="path")).images.values()
     assert np.array_equal(picture.pixels, pixels) and not picture.srgb

@@ -7,7 +7,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.jobs import renderer as jobs
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer.native import constant_value
 from viewcam_addon.tracer.scene.lamps import Area, Point, Spot, Sun
 from viewcam_addon.tracer.scene.shader_nodes import node
@@ -23,7 +24,7 @@ def export():
     """export() → (the lamps of the open file, what the ledger says that is not plain)."""
 
     def make():
-        exported = job.export(job.Request(level="direct"))
+        exported = jobs.export(Job(level="direct"))
         told = {entry.object: entry.reason for entry in exported.ledger if entry.status != "exported"}
         return exported.lamps, told
 

@@ -5,10 +5,11 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.scenes.ledger import Ledger
 from viewcam_addon.blender.scenes.world import world_of
 from viewcam_addon.blender.temporary_settings import overridden
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer.scene.film import Bounces, Film
 from viewcam_addon.tracer.scene.lamps import World
 
@@ -18,7 +19,7 @@ def export(camera_object):
     """export() → (the scene of the open file, what the ledger says that is not plain)."""
 
     def make():
-        exported = job.export(job.Request(level="direct"))
+        exported = jobs.export(Job(level="direct"))
         return exported, {entry.object: entry.reason for entry in exported.ledger if entry.status != "exported"}
 
     return make

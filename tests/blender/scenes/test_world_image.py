@@ -8,8 +8,9 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender import another_blender
-from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.scenes import world_image
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.tracer import render
 
 pytestmark = pytest.mark.slow
@@ -24,7 +25,7 @@ def export(camera_object, monkeypatch):
     monkeypatch.setattr(world_image, "WIDTH", 64)
 
     def make():
-        exported = job.export(job.Request(level="direct"))
+        exported = jobs.export(Job(level="direct"))
         return exported, "; ".join(entry.reason for entry in exported.ledger if entry.object == "World")
 
     return make
@@ -150,7 +151,7 @@ def test_neither_export_nor_render_changes_what_is_open(tree, export, scene, tmp
     before = state()
     scene.render.resolution_x, scene.render.resolution_y = 8, 8
     export()
-    job.export_and_render(job.Request(level="direct", samples=1), [tmp_path / "sky.exr"])
+    jobs.both_sides(Job(level="direct", samples=1), [tmp_path / "sky.exr"])
     assert state() == before
 
 
@@ -192,7 +193,7 @@ def test_cycles_shows_the_same_image_and_nearly_the_sky_itself(tree, camera_obje
     tree.colour(sky.outputs[0])
     scene.render.resolution_x, scene.render.resolution_y = 64, 48
     camera_object.rotation_euler, camera_object.data.lens = (math.radians(115), 0, 0.3), 25
-    exported = job.export_and_render(job.Request(level="direct", samples=1), [tmp_path / "image.exr"])
+    exported = jobs.both_sides(Job(level="direct", samples=1), [tmp_path / "image.exr"])
     from viewcam_addon.blender.rendering import cycles
     from viewcam_addon.tracer.scene.film import Bounces
 

@@ -1,29 +1,29 @@
-"""A `viewcam batch` beside Blender: of a copy of the file as it stands, into a new folder, while the artist works on.
+"""A batch beside Blender: of a copy of the file as it stands, into a new folder, while the artist works on.
 
 Nothing here needs a window. Whoever starts one asks it now and then how far it is, or ends it.
 """
 
-import json
 import shutil
 import tempfile
 from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 import bpy
 
-from ... import child_process
 from ...errors import InputError
+from ...jobs.folder import Outputs
+from ...jobs.job import Job
 from ...jobs.names import made_fit
+from ...jobs.plan import Plan
 from .. import own_picture
 from . import comparing
 
 _SAID = "said.txt"
 
 
-def shot(camera_object: bpy.types.Object, scene: bpy.types.Scene, name: str, frame: int) -> dict[str, Any]:
-    """A row of a list of shots: a camera in its own picture, at a frame.
+def shot(camera_object: bpy.types.Object, scene: bpy.types.Scene, name: str, frame: int) -> Job:
+    """A camera in its own picture, at a frame.
 
     Raises
     ------
@@ -34,20 +34,15 @@ def shot(camera_object: bpy.types.Object, scene: bpy.types.Scene, name: str, fra
     share = picture["resolution_percentage"] / 100
     if picture["pixel_aspect_x"] * render.pixel_aspect_y != picture["pixel_aspect_y"] * render.pixel_aspect_x:
         raise InputError(f"camera {camera_object.name!r} has pixels of another shape than the scene: render it alone")
-    return {
-        "name": name,
-        "camera": camera_object.name,
-        "width": max(4, int(picture["resolution_x"] * share)),
-        "height": max(4, int(picture["resolution_y"] * share)),
-        "frame": frame,
-    }
+    width, height = (max(4, int(picture[f"resolution_{axis}"] * share)) for axis in "xy")
+    return Job(name, camera=camera_object.name, width=width, height=height, frame=frame)
 
 
 class BackgroundBatch:
     """One on its way, from the moment it is made.
 
     into : where a folder is made for it, named by file, `what` and time. shots : the list. files : what each shot that is done
-    has one of there. words : more for the command.
+    has one of there. outputs : what is made of each shot.
 
     Raises
     ------
@@ -60,9 +55,9 @@ class BackgroundBatch:
         scene: bpy.types.Scene,
         into: Path,
         what: str,
-        shots: Sequence[dict[str, Any]],
+        shots: Sequence[Job],
         files: str,
-        words: Sequence[str] = (),
+        outputs: Outputs,
     ) -> None:
         self.count, self._files = len(shots), files
         stem = Path(bpy.data.filepath).stem or "untitled"
@@ -73,13 +68,9 @@ class BackgroundBatch:
             raise InputError(f"no folder for the copy can be made ({error.strerror}): free some space") from error
         try:
             self.folder.mkdir(parents=True)
-            copy, listed = self._temporary / f"{stem}.blend", self._temporary / "shots.json"
+            copy = self._temporary / f"{stem}.blend"
             comparing.save_copy(copy)
-            listed.write_text(json.dumps(shots), encoding="utf-8", newline="\n")
-            command = comparing.command(copy, scene, "batch", [str(listed), "--out", str(self.folder), *words])
-            scripts = bpy.utils.system_resource("SCRIPTS")
-            variables = child_process.environment(scripts, **{key: str(self._temporary) for key in ("TMPDIR", "TMP", "TEMP")})
-            self._process = child_process.ProcessGroup(command, self._temporary / _SAID, variables)
+            self._process = comparing.start(copy, scene, shots, self._temporary / _SAID, Plan(self.folder, outputs))
         except OSError as error:
             self._clear()
             raise InputError(f"{self.folder} can't be written ({error.strerror}): choose another folder") from error

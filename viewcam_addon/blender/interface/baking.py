@@ -192,7 +192,7 @@ def _check(camera_object: bpy.types.Object) -> None:
             "animate them, or leave it as it is"
         )
     for block in (camera_object, camera):
-        _check_editable(block)
+        check_editable(block)
     sharers = [other.name for other in bpy.data.objects if other.data == camera and other != camera_object]
     if sharers:
         raise InputError(
@@ -201,10 +201,11 @@ def _check(camera_object: bpy.types.Object) -> None:
         )
     for block in (camera_object, camera):
         _check_animation(block)
-        _check_own_action(block)
+        check_own_action(block)
 
 
-def _check_editable(block: bpy.types.ID) -> None:
+def check_editable(block: bpy.types.ID) -> None:
+    """Raise InputError if a datablock, or its action, is linked."""
     action = block.animation_data.action if block.animation_data else None
     for each in filter(None, (block, action)):
         if each.library:
@@ -226,7 +227,8 @@ def _check_animation(block: bpy.types.ID) -> None:
         )
 
 
-def _check_own_action(block: bpy.types.ID) -> None:
+def check_own_action(block: bpy.types.ID) -> None:
+    """Raise InputError if the action of a datablock moves others too."""
     kind = bpy.data.objects if isinstance(block, bpy.types.Object) else bpy.data.cameras
     sharers = [other.name for other in kind if other != block and versions.shares_animation(block, other)]
     if sharers:
@@ -303,6 +305,10 @@ class VIEWCAM_OT_delete_keyframes(CameraOperator, bpy.types.Operator):
         "that the four values alone say where the camera is. Keyframes of the values stay"
     )
 
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask, since keyframes are deleted."""
+        return context.window_manager.invoke_confirm(self, event)
+
     def work(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
         found = causes.keyed(camera_object, versions.action_curves)
         if not found:
@@ -310,8 +316,8 @@ class VIEWCAM_OT_delete_keyframes(CameraOperator, bpy.types.Operator):
                 f"no action of camera {camera_object.name!r} has keyframes of its own channels: look into its NLA tracks"
             )
         for block, _ in found:
-            _check_editable(block)
-            _check_own_action(block)
+            check_editable(block)
+            check_own_action(block)
         for block, path in found:
             versions.remove_curves(block, path)
         if camera_object.virtual_pinhole.enabled:

@@ -13,6 +13,13 @@ from ...cameras import Options
 
 _UNSTATED = "UNSTATED"
 _AXES = {"as_is": "As They Are", "y_up": "Y Up to Z Up"}
+_POSES = {
+    "w2c_opencv": "World to Camera, OpenCV's Axes",
+    "c2w_opencv": "Camera to World, OpenCV's Axes",
+    "w2c_opengl": "World to Camera, OpenGL's Axes",
+    "c2w_opengl": "Camera to World, OpenGL's Axes",
+}
+_MAY_BE_STATED = ("angle_unit", "pixel", "pose")
 
 
 def axes(**look: Any) -> Any:
@@ -81,10 +88,20 @@ class ReadingOptions(WorldOptions):
         options={"SKIP_SAVE"},
     )
 
+    pose: bpy.props.EnumProperty(
+        name="Matrix Goes",
+        description="Which way a matrix goes, and by whose axes, where its name does not say it",
+        items=[
+            (_UNSTATED, "As Its Name Says", "Refuse a matrix that may go either way"),
+            *((key, _POSES[key], text) for key, text in formats.POSES.items()),
+        ],
+        options={"SKIP_SAVE"},
+    )
+
     def chosen(self, **more: Any) -> Options:
-        stated = {name: None if getattr(self, name) == _UNSTATED else getattr(self, name) for name in ("angle_unit", "pixel")}
+        stated = {name: None if getattr(self, name) == _UNSTATED else getattr(self, name) for name in _MAY_BE_STATED}
         return super().chosen(unmirrored=self.unmirrored, without_distortion=self.without_distortion, **stated, **more)
 
 
-READING = ("axes", "scale", "unmirrored", "without_distortion", "angle_unit", "pixel")
+READING = ("axes", "scale", "unmirrored", "without_distortion", *_MAY_BE_STATED)
 """The names of all of them, in the order in which they are shown."""

@@ -1,4 +1,4 @@
-"""One comparison with Cycles beside Blender: a copy of the file as it stands, `viewcam check` on it in a process of its own.
+"""One comparison with Cycles beside Blender: a copy of the file as it stands, and a job on it, in a process of its own.
 
 Nothing here needs a window. Whoever starts a comparison asks it now and then how far it is, or ends it. The copy, the child's
 own temporary files and what it makes stand in one folder in Blender's own temporary one, which ends with Blender.
@@ -8,10 +8,9 @@ process (it would stop the artist, and change the scene for as long), and `bpy.d
 windows, and so another scene may be the current one).
 """
 
+import dataclasses
 import importlib.util
 import json
-import re
-import shlex
 import shutil
 import tempfile
 import time
@@ -28,7 +27,10 @@ from ...comparison.answer import DIFFERENT, SAME_BUT, but_for
 from ...comparison.statistics import plain
 from ...errors import InputError
 from ...files import written_whole
+from ...jobs import plan as orders
+from ...jobs.job import Job
 from ...jobs.names import made_fit
+from ...jobs.plan import Plan
 from ...pinhole import Pinhole
 from ...tracer.scene.film import LEVELS, SAMPLES, seeds
 from .. import camera as cameras
@@ -115,16 +117,14 @@ class RunningComparison:
         self._keep_in = keep_in and keep_in / report_name(camera_object.name, scene.frame_current)
         self._pictures = seeds(level, samples)
         self._started = time.monotonic()
-        words = ["--camera", camera_object.name, "--level", level]
-        words += ["--samples", str(samples)] if level != LEVELS[0] else []
-        words += ["--clay"] if clay else []
+        job = Job(camera=camera_object.name, level=level, clay=clay, samples=samples if level != LEVELS[0] else None)
         try:
             self.folder = Path(tempfile.mkdtemp(prefix="viewcam-", dir=bpy.app.tempdir or None))
         except OSError as error:
             raise InputError(f"no folder for the comparison can be made ({error.strerror}): free some space") from error
         try:
             save_copy(self.folder / _file_name())
-            self._process = self._child(scene, words)
+            self._process = self._child(scene, job)
         except OSError as error:
             _remove(self.folder)
             raise InputError(f"the comparison can't be started ({error.strerror}): free some space") from error
@@ -132,18 +132,13 @@ class RunningComparison:
             _remove(self.folder)
             raise
 
-    def _child(self, scene: bpy.types.Scene, words: Sequence[str]) -> child_process.ProcessGroup:
-        """`viewcam check` with these words, on its way; the report names them and the artist's file."""
-        report = self.folder / _REPORT
-        repeat = shlex.join(["check", _file_name(), *words])
-        written = ["--json", str(self.folder / _RESULT), "--report", str(report), "--sides", str(report)]
-        written += ["--difference", str(report / _PICTURES["difference"])]
-        words = [*words, *written, "--repeat", repeat, "--log-json"]
-        start = command(self.folder / _file_name(), scene, "check", words)
-        # Blender's own scripts hold what the inside of a `bpy` looks like, which hides the module from a new process.
-        scripts = bpy.utils.system_resource("SCRIPTS")
-        variables = child_process.environment(scripts, **{name: str(self.folder) for name in ("TMPDIR", "TMP", "TEMP")})
-        return child_process.ProcessGroup(start, self.folder / _SAID, variables)
+    def _child(self, scene: bpy.types.Scene, job: Job) -> child_process.ProcessGroup:
+        """The check of the job, on its way; the report names what repeats it with the artist's file."""
+        copy, report = self.folder / _file_name(), str(self.folder / _REPORT)
+        difference = str(self.folder / _REPORT / _PICTURES["difference"])
+        command = f"viewcam {dataclasses.replace(job, blend=copy).check_words()}"
+        files = {"report": report, "difference": difference, "sides": report, "command": command}
+        return start(copy, scene, [job], self.folder / _SAID, files=files)
 
     def progress(self) -> tuple[float, str]:
         """How far it is, from 0 to 1 in steps of unequal length, and what it is doing."""
@@ -296,15 +291,15 @@ def figures(result: dict[str, Any]) -> list[tuple[str, str]]:
     return [*rows, ("Modelled", f"{whole} of {len(ledger)} objects")]
 
 
-def failure(said: str, status: int) -> str:
-    """One sentence for a child that came to nothing: its own, or its last words."""
-    lines = [line.strip() for line in said.splitlines() if line.strip() and not line.startswith('{"event"')]
-    own = [match[1] for line in lines if (match := re.match(r"viewcam(?: \w+)?: (.*)", line))]
-    if own:
-        return own[-1][:1].upper() + own[-1][1:]
+def failure(printed: str, status: int) -> str:
+    """One sentence for a child that came to nothing: the error that it has told, or its last words."""
+    lines = printed.splitlines()
+    errors = [event["text"] for event in child_process.events_in(lines) if event["event"] == "error"]
+    if errors:
+        return errors[-1][:1].upper() + errors[-1][1:]
     how = f"was ended by signal {-status}" if status < 0 else f"ended with status {status}"
-    last = f" after saying: {lines[-1]}" if lines else ""
-    return f"The process that compares {how}{last}"
+    words = [line.strip() for line in lines if line.strip() and not line.startswith('{"event"')]
+    return f"The process that compares {how}" + (f" after saying: {words[-1]}" if words else "")
 
 
 def _check_possible(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> None:
@@ -317,25 +312,44 @@ def _check_possible(camera_object: bpy.types.Object, scene: bpy.types.Scene) -> 
         raise InputError("OpenEXR is missing: install the extension from its zip, which brings it along")
 
 
-def command(copy: Path, scene: bpy.types.Scene, name: str, words: Sequence[str]) -> list[str]:
-    """`viewcam NAME` on the copy, in this same Blender."""
-    if not bpy.app.binary_path:  # a module of Python
-        return child_process.viewcam(name, copy, *words)
+def start(
+    copy: Path,
+    scene: bpy.types.Scene,
+    jobs: Sequence[Job],
+    log: Path,
+    plan: Plan | None = None,
+    files: Mapping[str, str] | None = None,
+) -> child_process.ProcessGroup:
+    """Start a process that carries out jobs on a copy, in this same Blender.
+
+    log : what it prints, its events among it; the folder of this file has all else that it needs for a while. plan, files : as
+    of plan.write.
+
+    Raises
+    ------
+    OSError
+        if it can't be started; InputError if what it is to do can't be written.
+    """
+    if not bpy.app.binary_path:  # a module of Python, which opens the copy itself
+        jobs = [dataclasses.replace(job, blend=copy) for job in jobs]
+        plan = plan and dataclasses.replace(plan, blend=copy)
+    written = log.with_name("jobs.json")
+    orders.write(written, jobs, plan, files)
+    # Blender's own scripts hold what the inside of a `bpy` looks like, which hides the module from a new process.
+    scripts = bpy.utils.system_resource("SCRIPTS")
+    variables = child_process.environment(scripts, **{name: str(log.parent) for name in ("TMPDIR", "TMP", "TEMP")})
+    return child_process.ProcessGroup(command(copy, scene, written), log, variables)
+
+
+def command(copy: Path, scene: bpy.types.Scene, written: Path) -> list[str]:
+    """The command of that process. written : what it is to do."""
+    if not bpy.app.binary_path:
+        return child_process.viewcam("serve", written)
     # The file's own scene is that of its first window. The add-on may be enabled for this session only.
     other = ["--scene", scene.name] if any(window.scene != scene for window in bpy.context.window_manager.windows[:1]) else []
     enabled = ["--addons", preferences.PACKAGE] if preferences.PACKAGE in bpy.context.preferences.addons else []
-    return [
-        bpy.app.binary_path,
-        "--background",
-        "--disable-autoexec",
-        *enabled,
-        str(copy),
-        *other,
-        "--command",
-        "viewcam",
-        name,
-        *words,
-    ]
+    options = ["--background", "--disable-autoexec", *enabled, str(copy), *other]
+    return [bpy.app.binary_path, *options, "--command", "viewcam", "serve", str(written)]
 
 
 def _is_compressed() -> bool:

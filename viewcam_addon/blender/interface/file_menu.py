@@ -47,14 +47,15 @@ class VIEWCAM_OT_export_scene(ExportHelper, bpy.types.Operator):
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
+        from ...jobs.job import Job
         from ...tracer.scene import scene_file  # here, since Blender starts without
-        from ..rendering import job
+        from ..jobs import renderer
 
         path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), _SUFFIX))
         try:
             if path.name == _SUFFIX:
                 raise InputError("the scene has no file name: give one")
-            scene = job.export(job.Request(level="path" if self.light else "geometry", recenter=self.recenter))
+            scene = renderer.export(Job(level="path" if self.light else "geometry", recenter=self.recenter))
             scene_file.write(scene, path)
         except InputError as error:
             self.report({"ERROR"}, text(datablocks.sentence(error)))

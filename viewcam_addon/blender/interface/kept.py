@@ -2,22 +2,22 @@
 
 import bpy
 
-from .. import storage, versions
+from .. import datablocks, storage, versions
 
 # What moving a camera changes besides its values.
 _CHANNELS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
 _LENS = ("lens", "shift_x", "shift_y", "sensor_width", "sensor_height", "virtual_pinhole_sensor", "dof.focus_distance")
 
-# Of the values these are told from the others.
-_TOLD = ("roll", "focal_length", "field_of_view")
+# These are other looks at the values, and none of their own.
+_LOOKS = (*datablocks.LOOKS, "field_of_view")
 
 
 def state(camera_object: bpy.types.Object) -> dict[str, object]:
-    """All that a drag or a match changes, by its path from the camera."""
+    """All that a drag or a match changes, by its path from the camera, other looks at the values included."""
     stored = camera_object.virtual_pinhole.bl_rna.properties
     values = [each.identifier for each in stored if not each.is_readonly and each.type != "POINTER"]
     paths = [*_CHANNELS, *(f"data.{name}" for name in _LENS)]
-    paths += [f"virtual_pinhole.{name}" for name in values if name not in _TOLD]
+    paths += [f"virtual_pinhole.{name}" for name in values]
     found = {path: camera_object.path_resolve(path) for path in paths}
     return {
         path: tuple(value) if hasattr(value, "__len__") and not isinstance(value, str) else value
@@ -30,8 +30,8 @@ def restore(camera_object: bpy.types.Object, before: dict[str, object]) -> None:
     present = state(camera_object)
     with storage.without_callbacks():
         for path, value in before.items():
-            if present[path] != value:
-                owner, _, name = path.rpartition(".")
+            owner, _, name = path.rpartition(".")
+            if present[path] != value and not (owner == "virtual_pinhole" and name in _LOOKS):
                 setattr(camera_object.path_resolve(owner) if owner else camera_object, name, value)
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import bpy
 
 from ...errors import InputError
+from ...jobs.folder import Outputs
 from ...jobs.names import made_fit
 from ...labels import DEPTH_STEPS, KINDS, PASSES, endings
 from .. import datablocks
@@ -92,8 +93,8 @@ class Writing(BackgroundBatch):
             raise InputError("no label is chosen: choose some")
         frame = scene.frame_current
         row = shot(camera_object, scene, made_fit(camera_object.name), frame)
-        words = ["--labels", ",".join(kinds), "--labels-only", "--depth-steps", f"{settings.depth_steps:.7g}"]
-        super().__init__(scene, settings.into(), f"{camera_object.name} {frame:04d} labels", [row], "*.labels.json", words)
+        outputs = Outputs(picture=False, labels=tuple(kinds), depth_steps=float(f"{settings.depth_steps:.7g}"))
+        super().__init__(scene, settings.into(), f"{camera_object.name} {frame:04d} labels", [row], "*.labels.json", outputs)
 
     def poll(self) -> tuple[Path | None, str] | None:
         """Where they are, and a sentence; None while it runs."""

@@ -19,7 +19,7 @@ from ...errors import InputError
 from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import causes, datablocks, findings, hold, preferences, targets
-from . import baking, clipboard, dragging, panel_rows, presets, readouts, scene_cameras
+from . import baking, clipboard, converting, dragging, panel_rows, presets, readouts, scene_cameras
 from .panel_places import BelowProperties, BelowSidebar, CameraPanel, InProperties, InSidebar, SubPanel
 
 
@@ -61,6 +61,7 @@ class _MainPanel(CameraPanel):
             _draw_values(layout.column(), camera_object.virtual_pinhole)
             clipboard.draw(layout, camera_object)
             baking.draw(layout, camera_object)
+            converting.draw(layout, camera_object)
             buttons = panel_rows.buttons(layout, context)
             _draw_setting(buttons, camera_object, any(notice.is_mended_by_applying for notice in found))
         else:
@@ -145,11 +146,8 @@ def _draw_why(column: bpy.types.UILayout, word: str | None) -> None:
 
 
 def _draw_lens(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> None:
-    """One field and its unit, no wider than its words, or below it where both would be cut.
-
-    The dot keys d, and Blender wants d's own field beside it. Other fields have its room: "112.5 mm" would be cut to "112.5 m".
-    """
-    field = {"MILLIMETERS": "focal_length", "PIXELS": "distance"}.get(group.lens_unit, "field_of_view")
+    """One field and its unit, no wider than its words, or below it where both would be cut."""
+    field = {unit: look for look, unit in datablocks.LENSES.items()}.get(group.lens_unit, "distance")
     if not column.use_property_split:
         column.label(text="Lens")
         panel_rows.field(column, group, field, text="")
@@ -162,8 +160,7 @@ def _draw_lens(column: bpy.types.UILayout, group: bpy.types.PropertyGroup) -> No
     unit.use_property_split = False
     unit.ui_units_x = 2.4 if group.lens_unit in ("MILLIMETERS", "PIXELS") else 9.0
     unit.prop(group, "lens_unit", text="")
-    if group.lens_unit == "PIXELS":
-        row.prop_decorator(group, "distance")
+    row.prop_decorator(group, field)
 
 
 def _draw_setting(row: bpy.types.UILayout, camera_object: bpy.types.Object, alert: bool) -> None:

@@ -1,4 +1,4 @@
-"""Render › Render All Cameras: every camera of the scene in its own picture, by `viewcam batch` in a process beside this one.
+"""Render › Render All Cameras: every camera of the scene in its own picture, as a batch in a process beside this one.
 
 A copy of the file as it stands is rendered, as comparing.py does it, so that the artist works on; the pictures and the contact
 sheet go into a new folder, named by file and time. What is there when it is cancelled stays: each picture is written whole.
@@ -7,11 +7,12 @@ that waits, and a scene whose camera and resolution change under the artist's ha
 """
 
 from pathlib import Path
-from typing import Any
 
 import bpy
 
 from ...errors import InputError
+from ...jobs.folder import Outputs
+from ...jobs.job import Job
 from ...jobs.names import made_fit, one_file
 from .. import own_picture
 from . import scene_cameras
@@ -40,7 +41,7 @@ background = Background(0.5, _looked)
 """What it comes to: whether all went well, and a sentence."""
 
 
-def shots(scene: bpy.types.Scene, animation: bool) -> list[dict[str, Any]]:
+def shots(scene: bpy.types.Scene, animation: bool) -> list[Job]:
     """The list of shots: each camera that is rendered, in its own picture; of an animation each frame of its range.
 
     Raises
@@ -68,8 +69,7 @@ class Rendering(BackgroundBatch):
     """The pictures on their way. Raises InputError as its base and `shots` do."""
 
     def __init__(self, scene: bpy.types.Scene, into: Path, animation: bool = False, check: bool = False) -> None:
-        words = ["--check"] if check else []
-        super().__init__(scene, into, "all cameras", shots(scene, animation), "*.exr", words)
+        super().__init__(scene, into, "all cameras", shots(scene, animation), "*.exr", Outputs(check=check))
 
     def progress(self) -> tuple[float, str]:
         """How far it is, from 0 to 1, and what it is doing."""

@@ -1,12 +1,13 @@
-"""A batch where Blender is: one .blend, opened once, and many shots of it.
+"""Jobs where Blender is: one .blend, opened once, and many jobs of it.
 
-renderer.py    opens, overrides settings, renders shot after shot, and restores everything
-shot_settings.py     what of the file's settings a batch changes for its time, and why each
-persistent_data.py     what Blender keeps from shot to shot, and where it must not
+renderer.py    opens, overrides settings, renders, checks, labels and exports job after job, and restores everything
+job_settings.py     what of the file's settings a job changes for its time, and why each
+stage.py       a scene as one job's two sides want it: clay, level, recentred, numbered, with its ledger
+persistent_data.py     what Blender keeps from job to job, and where it must not
 pictures.py    a render as files: EXR and preview, the same bytes each time
 origins.py     what the pictures are made from: hashes of the .blend and all it links
-checking.py    whether Cycles and the tracer see the same through a shot's camera
+checking.py    both sides of a check, and the question to the tracer's process
 labelling.py   ground truth of a shot, by the tracer
-scene_files.py the scene for those two, kept from shot to shot
-obstacles.py   why a shot can't be rendered, known before anything is
+scene_files.py the scene for these two, kept from job to job
+obstacles.py   why a job can't be had, known before anything is
 """

@@ -1,84 +1,170 @@
-"""The check of a shot: is the camera that its sidecar tells the one through which Blender renders?
+"""The check of a job: does the engine render what the tracer sees?
 
-Cycles renders the passes of geometry through the very camera object that took the picture, whatever engine did; the tracer
-traces the same scene with the camera of the sidecar; and jobs/comparer.py, a process beside this one, compares the two.
-So a check is about camera and geometry: not about light, nor about another engine's own rasteriser. Of a shot with the four
-values, their conversion to Blender's camera is checked as well.
+Both sides are made from one state of the file, under one numbering of the indices, and the process beside this one compares
+them (jobs/tracing.py). **Of a picture that was rendered**, the check is of its camera and geometry: Cycles renders the passes
+through the very camera object that took the picture, whatever engine did, and the tracer traces the same scene with the camera
+of the sidecar; of four values, their conversion to Blender's camera is checked as well. **Of a job without a picture**, it is
+of the job's engine at the job's level.
 
-Whatever the check changes (engine,
-samples, passes, indices where nothing has any) it restores, so that the pictures are the same bytes with and without it. What
-Cycles has built serves checks and pictures alike. Rejected: a second Blender for checks alone, with all of the scene in memory
-once more; and to ask Blender what has changed, as our engine does, since giving back is a change, too.
+Whatever the check changes (engine, samples, passes, indices where nothing has any) it restores, so that the pictures are the
+same bytes with and without it. What Cycles has built serves checks and pictures alike. Rejected: a second Blender for checks
+alone, with all of the scene in memory once more; and to ask Blender what has changed, as our engine does, since giving back is
+a change, too.
 """
 
 import contextlib
+import dataclasses
 import functools
+import time
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 import bpy
 
-from ...jobs.comparer import Comparer
+from ...events import Events
+from ...jobs.job import Job
+from ...jobs.tracing import Tracing, Written
 from ...pinhole import Pinhole
-from ...tracer.scene import LedgerEntry
+from ...tracer.scene import LedgerEntry, Scene, scene_file
+from ...tracer.scene.film import LEVELS, SAMPLES, seeds
+from ...tracer.scene.levels import least_level
 from .. import datablocks
-from ..rendering import cycles, job
-from ..temporary_settings import numbered_indices, overridden
+from ..rendering import cycles, exr
+from ..scenes.export import Lighting
+from ..temporary_settings import numbered_indices
+from . import pictures
 from .scene_files import SceneFiles
+from .stage import Stage, staged
 
 _MOST_TOLD = 5
 
 
 class Checker:
-    """Checks shots of one file after another; a context manager. threads : of Cycles and the tracer, all by default.
+    """Checks jobs of one file after another; a context manager.
 
-    The file must stay as it is between two checks but for cameras and what shots say.
+    tracing : the process that traces and compares. events : whoever is told how far it is.
+
+    The file must stay as it is between two checks but for cameras and what jobs say.
     """
 
-    def __init__(self, threads: int | None = None) -> None:
-        self._threads = threads
-        self._comparer = Comparer(threads)
+    def __init__(self, tracing: Tracing, events: Events | None = None) -> None:
+        self._tracing, self._events = tracing, events
         self._ends = contextlib.ExitStack()
-        self._ends.enter_context(self._comparer)
         self._files = self._ends.enter_context(SceneFiles())
 
-    def check(
+    def check_picture(
         self,
+        job: Job,
         scene: bpy.types.Scene,
         camera_object: bpy.types.Object,
         pinhole: Pinhole,
         stated: Pinhole | None = None,
-        is_scenes: bool = False,
     ) -> dict[str, Any]:
         """Compare what Cycles renders through a camera, as the scene stands, with what `pinhole` sees.
 
-        pinhole : the camera of the picture, as its sidecar has it. stated : the four values it was made from. is_scenes :
-        whether Cycles takes the camera that Blender chooses at this frame, as markers bind it, and not `camera_object`.
+        pinhole : the camera of the picture, as its sidecar has it. stated : the four values it was made from. Of the scene's
+        own camera Blender chooses once more which that is: a picture of another one is a difference.
 
-        Returns what Comparer.verdict does, and in `ledger` what both sides leave out or replace, a sentence for each of the
-        first few.
+        Returns `passed`, `answer`, `verdict`, `not_modelled` and `figures` as Tracing.compare has them, and in `ledger` what
+        both sides leave out or replace, a sentence for each of the first few.
 
         Raises
         ------
         InputError
-            if the scene can't be exported or rendered by Cycles, or if the comparer can't compare.
+            if the scene can't be exported or rendered by Cycles, or if the two can't be compared.
         """
-        layer, image = job.rendered_layer(scene), self._files.folder / "cycles.exr"
-        with numbered_indices(), overridden() as overrides:
-            if not scene.render.use_crop_to_border:  # the picture is of the whole frame then
-                overrides.set(scene.render, "use_border", False)
-            export = self._files.exported(scene, layer, camera_object)
-            of = None if is_scenes else camera_object
-            ledger, render = export.ledger, functools.partial(cycles.render, scene, layer, of)
-            render(image, ledger.remedies.values(), self._threads, keep=True)
-            names, everything = export.scene.not_modelled, None
-            if names:
-                everything = self._files.folder / "everything.exr"
-                render(everything, ledger.remedies_of_everything, self._threads, keep=True, everything=True)
+        of = dataclasses.replace(
+            job, engine="CYCLES", level=LEVELS[0], recenter=False, clay=False, device="CPU", error=None, width=None, height=None
+        )
+        image = self._files.folder / "cycles.exr"
+        with numbered_indices(), staged(of, scene, camera_object, whole=True) as stage:
+            export = self._files.exported(stage)
+            camera = None if job.is_of_scenes_camera else camera_object
+            ledger, render = export.ledger, functools.partial(cycles.render, scene, stage.view_layer, camera)
+            render(image, ledger.remedies.values(), job.threads, keep=True)
+            everything = self._files.folder / "everything.exr" if export.scene.not_modelled else None
+            if everything:
+                render(everything, ledger.remedies_of_everything, job.threads, keep=True, everything=True)
         data = camera_object.evaluated_get(datablocks.depsgraph_of(scene)).data
         clip = data.clip_start, data.clip_end
-        path = self._files.file_of(export.scene)
-        said = self._comparer.verdict(path, image, pinhole, clip, stated, names, everything)
-        return said | {"ledger": _told(export.scene.ledger)}
+        entries, path = export.scene.ledger, self._files.file_of(export.scene)
+        found = self._tracing.compare(
+            path, [image], of, pinhole, clip, stated, entries, everything=everything, may_be_empty=True
+        )
+        return _brief(found, entries)
+
+    def check(
+        self,
+        job: Job,
+        scene: bpy.types.Scene,
+        camera_object: bpy.types.Object,
+        notes: Iterable[str] = (),
+        written: Written | None = None,
+        keep: Path | None = None,
+    ) -> dict[str, Any]:
+        """Compare what the job's engine renders, as the scene stands, with what the tracer makes of the scene at a level.
+
+        notes : sentences of the file as a whole, for the ledger. written : files beside the result. keep : a folder for scene
+        and pictures: scene.json, cycles.exr or another engine's, of several with numbers.
+
+        Returns as `check_picture` does, and `result`, all that --json has, `lines` for a terminal, `level`,
+        with `reason` where it was chosen, and the `seconds` of both sides.
+
+        Raises
+        ------
+        InputError
+            as `check_picture` does.
+        """
+        job.refuse_unchecked()
+        count = seeds(job.level or LEVELS[0], job.samples or SAMPLES)
+        engine = (job.engine if job.engine in ("EEVEE", "WORKBENCH") else "CYCLES").lower()
+        folder = keep or self._files.folder
+        folder.mkdir(parents=True, exist_ok=True)
+        tests = [folder / (f"{engine}-{i + 1}.exr" if count > 1 else f"{engine}.exr") for i in range(count)]
+        started = time.perf_counter()
+        with numbered_indices(_numbered(job.scene)), staged(job, scene, camera_object, notes) as stage:
+            everything = folder / "everything.exr"
+            everything.unlink(missing_ok=True)
+            exported = self.both_sides(stage, job, tests, everything)
+        if not keep:  # the page has to be the same bytes each time
+            for path in filter(Path.exists, (*tests, everything)):
+                exr.strip(path, pictures.is_passing)
+        level, rendered = stage.level, time.perf_counter() - started
+        path = Path(job.scene) if job.scene else self._files.file_of(exported)
+        if keep:
+            scene_file.write(exported, keep / "scene.json")
+        if level == LEVELS[0]:
+            tests = tests[:1]
+        whole = everything if everything.exists() else None
+        approved = scene_file.read(path) if job.scene else None
+        of, ledger = dataclasses.replace(job, level=level), (approved or exported).ledger
+        if approved:
+            found = self._tracing.compare(path, tests, of, ledger=ledger, written=written, everything=whole)
+        else:
+            camera, clip, stated = exported.camera, exported.clip, exported.stated_camera
+            found = self._tracing.compare(path, tests, of, camera, clip, stated, ledger, written, whole)
+        told = {"result": found["result"], "lines": found["lines"], "level": level}
+        told["seconds"] = {"rendered": rendered, "traced": found["seconds"]}
+        if job.level == "auto":
+            told["reason"] = least_level(exported)[1]
+        return _brief(found, ledger) | told
+
+    def both_sides(self, stage: Stage, job: Job, paths: Sequence[Path], everything: Path | None = None) -> Scene:
+        """The scene for the tracer, and the engine's pictures at these paths, from one state of the file.
+
+        everything : as of Stage.render, written where there is any such thing. A recentred scene has none of it.
+        """
+
+        def rendering(number: int) -> None:
+            if self._events:
+                self._events.tell("step", name="rendering", number=number, of=max(number, len(paths)))
+
+        exported = stage.export()
+        lighting = Lighting(exported.lamps, exported.world, exported.film, exported.bounces)
+        has_more = exported.not_modelled and job.engine not in ("EEVEE", "WORKBENCH") and not job.recenter
+        stage.render(job, paths, lighting, rendering, keep=True, everything=everything if has_more else None)
+        return exported
 
     def __enter__(self) -> "Checker":
         return self
@@ -87,7 +173,21 @@ class Checker:
         self._ends.close()
 
 
-def _told(ledger: tuple[LedgerEntry, ...]) -> list[str]:
+def _numbered(scene_path: str | None) -> tuple[str, ...]:
+    """What of a .blend must be numbered for its picture to be an approved scene's: what has numbers there, else all."""
+    if scene_path is None:
+        return "objects", "materials"
+    objects = scene_file.read(Path(scene_path)).objects
+    has_numbers = {
+        "objects": any(placed.object_index for placed in objects),
+        "materials": any(any(placed.material_indices) for placed in objects),
+    }
+    return tuple(kind for kind, has in has_numbers.items() if has)
+
+
+def _brief(found: dict[str, Any], ledger: Sequence[LedgerEntry]) -> dict[str, Any]:
+    """What a sidecar keeps of a comparison."""
     lacking = [f"{entry.object}: {entry.reason}" for entry in ledger if not entry.is_modelled]
     more = [f"and {len(lacking) - _MOST_TOLD} more, which viewcam check tells"] if len(lacking) > _MOST_TOLD else []
-    return lacking[:_MOST_TOLD] + more
+    told = {key: found[key] for key in ("passed", "answer", "not_modelled", "figures")}
+    return {**told, "verdict": found["sentence"], "ledger": lacking[:_MOST_TOLD] + more}

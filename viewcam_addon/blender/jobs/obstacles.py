@@ -1,28 +1,32 @@
 """Why a shot can't be rendered, known before anything is: of a batch of a thousand, the last one counts as well."""
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import bpy
 
 from ... import checks, html_page, intrinsics
 from ...errors import InputError
-from ...jobs import comparer
+from ...jobs import tracing
 from ...jobs.folder import Outputs
-from ...jobs.shot import Shot
+from ...jobs.job import Job
 from ...pinhole import Pinhole
 from .. import camera as cameras
 from .. import datablocks, versions
 from ..rendering import graphics
-from .shot_settings import ShotSettings, engine_name
+from .job_settings import JobSettings, engine_name
 
 _DRAWN = (versions.EEVEE, "BLENDER_WORKBENCH")
 
 
 def obstacles(
-    shots: Sequence[Shot], outputs: Outputs, scene: bpy.types.Scene, own: bpy.types.Object, settings: ShotSettings
+    shots: Sequence[Job],
+    outputs: Outputs,
+    scene: bpy.types.Scene,
+    own: Callable[[], bpy.types.Object],
+    settings: JobSettings,
 ) -> Iterator[str]:
-    """One sentence for each obstacle. outputs : what is wanted of each shot. own : the camera for the four values."""
+    """One sentence for each obstacle. outputs : what is wanted of each shot. own : gives the camera for the four values."""
     if not any(layer.use for layer in scene.view_layers):
         yield f"scene {scene.name!r} renders nothing: all of its view layers are off, let one render"
     engines = sorted({settings.engine_of(shot) for shot in shots}) if outputs.picture else []
@@ -32,10 +36,10 @@ def obstacles(
         if engine in _DRAWN and not graphics.are_there():
             needs = f"{engine_name(engine)} draws with a GPU, and Blender can't open one here"
             yield f"{needs}: choose CYCLES or VIEWCAM, or start a display"
-    for lacking in (html_page.lacking(), comparer.lacking() if outputs.check or outputs.labels else None):
+    for lacking in (html_page.lacking(), tracing.lacking() if outputs.check or outputs.labels else None):
         if lacking:
             yield lacking
-    among = cameras_of(scene, own)
+    among = cameras_of(scene, own() if any(shot.eye is not None for shot in shots) else None)
     read: set[str] = set()
     for shot in shots:
         try:
@@ -45,19 +49,19 @@ def obstacles(
                     cameras.read(camera_object, scene)
                     read.add(camera_object.name)
             else:
-                _check_storable(stated(shot, settings.frame_of(shot)), settings.frame_of(shot), own.data)
+                _check_storable(stated(shot, settings.frame_of(shot)), settings.frame_of(shot), own().data)
         except InputError as error:
             yield f"the shot {checks.shown(shot.name)}: {error}"
 
 
-def cameras_of(scene: bpy.types.Scene, own: bpy.types.Object) -> dict[str, bpy.types.Object]:
+def cameras_of(scene: bpy.types.Scene, own: bpy.types.Object | None) -> dict[str, bpy.types.Object]:
     """The scene's cameras but for the batch's own, by name, sorted."""
     found = {each.name: each for each in scene.objects if each.type == "CAMERA" and each != own}
     return dict(sorted(found.items()))
 
 
 def camera_of(
-    shot: Shot, scene: bpy.types.Scene, among: Mapping[str, bpy.types.Object], settings: ShotSettings
+    shot: Job, scene: bpy.types.Scene, among: Mapping[str, bpy.types.Object], settings: JobSettings
 ) -> bpy.types.Object:
     """The camera of the file that takes a shot without the four values. among : cameras_of(scene).
 
@@ -76,7 +80,7 @@ def camera_of(
     return camera_object
 
 
-def stated(shot: Shot, frame: intrinsics.Frame) -> Pinhole:
+def stated(shot: Job, frame: intrinsics.Frame) -> Pinhole:
     """The pinhole that a shot's values ask for in the picture of `frame`."""
     distance = (shot.d, shot.d * (frame.pixel_aspect_x / frame.pixel_aspect_y))
     whole = Pinhole(shot.eye, shot.look_at, shot.up, distance, *frame.size, shot.principal_point, bool(shot.mirrored))

@@ -18,7 +18,7 @@ from ..rendering import exr
 from ..rendering.cycles import override_whole
 from ..temporary_settings import Overrides
 
-_PASSING = ("Date", "File", "Hostname", "Memory", "RenderTime")
+_PASSING = ("Date", "Hostname", "Memory", "RenderTime")
 _PROBE = bytes(2**20)
 
 
@@ -44,7 +44,7 @@ def write(scene: bpy.types.Scene, image: Path, preview: Path) -> None:
     if not exr.is_whole(image):
         _probe(image)
         raise OSError(errno.EIO, "Blender did not finish the file")
-    exr.strip(image, _is_passing)
+    exr.strip(image, lambda attribute: attribute == "File" or is_passing(attribute))
     versions.set_preview_file(settings)
     _save(scene, preview)
     if not png.is_whole(preview):
@@ -53,7 +53,7 @@ def write(scene: bpy.types.Scene, image: Path, preview: Path) -> None:
     png.strip(preview)
 
 
-def _is_passing(attribute: str) -> bool:
+def is_passing(attribute: str) -> bool:
     """True if an attribute of the EXR tells of the rendering and not of the picture."""
     return attribute in _PASSING or (attribute.startswith("cycles.") and attribute.endswith("_time"))
 

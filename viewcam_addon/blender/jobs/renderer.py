@@ -1,12 +1,13 @@
-"""A batch's renderer where Blender is: opens a .blend once, renders shot after shot of it, and gives all back as it was.
+"""Jobs where Blender is: a .blend is opened once, job after job of it is rendered, checked and exported, and all is given back.
 
     with BlenderRenderer(blend) as renderer:
-        for shot in shots:
-            renderer.render(shot, image, preview)
+        for job in jobs:
+            renderer.render(job, image, preview)
+            renderer.check(job)
 
-A shot is what `blender -b FILE -f N` would render (all view layers, the compositor, samples, world and passes as they are),
-from the shot's camera: `shot_settings.py` has what else is another. The four values go to a camera of the batch's own, which
-has the clip range of the scene's camera; one of the file is rendered as it stands. The file is never saved.
+A picture is what `blender -b FILE -f N` would render (all view layers, the compositor, samples, world and passes as they are),
+from the job's camera: `job_settings.py` has what else is another. The four values go to a camera of our own, which has the clip
+range of the scene's camera; one of the file is rendered as it stands. The file is never saved.
 
 Rejected: `-f` in a process each (a start, a file and an acceleration structure built for each shot), and the artist's own
 camera for the four values (what carries it would carry them).
@@ -21,28 +22,33 @@ from typing import Any
 import bpy
 
 from ...cameras.sidecar import record
+from ...events import Events
 from ...jobs.folder import Outputs
-from ...jobs.shot import Shot
+from ...jobs.job import Job
+from ...jobs.tracing import Tracing, Written
 from ...pinhole import Pinhole
+from ...tracer.scene import LedgerEntry, Scene
 from .. import camera as cameras
 from .. import datablocks
 from ..opening import opened
 from ..rendering.engine import VIEWCAM_RenderEngine
 from ..scenes.depsgraph import render_still
-from ..temporary_settings import Overrides
+from ..scenes.export import survey
+from ..temporary_settings import Overrides, numbered_indices
 from . import obstacles, origins, persistent_data, pictures
 from .checking import Checker
+from .job_settings import JobSettings
 from .labelling import ShotLabels
-from .shot_settings import ShotSettings
+from .stage import staged
 
 _NAME = "viewcam batch"
 
 
 class BlenderRenderer:
-    """Renders shots of one .blend (jobs.one.Renderer); a context manager.
+    """Renders and checks jobs of one .blend (jobs.one.Renderer); a context manager.
 
-    blend : the file, or None for the one that is open. seed : of Cycles' and our noise, threads : of all engines; as the file
-    says where None. trust : whether what is in the file may run and write (opening.py); its File Output nodes never write.
+    blend : the file, or None for the one that is open. trust : whether what is in the file may run and write (opening.py); its
+    File Output nodes never write. events : whoever is told how far a check is.
 
     Raises
     ------
@@ -50,25 +56,20 @@ class BlenderRenderer:
         on entering, if the file can't be opened.
     """
 
-    def __init__(
-        self,
-        blend: str | os.PathLike[str] | None = None,
-        seed: int | None = None,
-        threads: int | None = None,
-        trust: bool = False,
-    ) -> None:
-        self._blend, self._seed, self._threads, self._trust = blend, seed, threads, trust
+    def __init__(self, blend: str | os.PathLike[str] | None = None, trust: bool = False, events: Events | None = None) -> None:
+        self._blend, self._trust, self._events = blend, trust, events
         self._loan = contextlib.ExitStack()
+        self._own: bpy.types.Object | None = None
         self._has_drawn = False
 
     def __enter__(self) -> "BlenderRenderer":
         with contextlib.ExitStack() as stack:
-            overrides, off = stack.enter_context(opened(self._blend, self._trust))
+            self._overrides, off = stack.enter_context(opened(self._blend, self._trust))
             self.scene = bpy.context.scene
-            self._settings = ShotSettings(overrides, self.scene, self._threads, self._seed, off)
-            self._own = _own_camera(overrides, self.scene, self.scene.objects.get(self.scene_camera or ""))
-            self._checker = stack.enter_context(Checker(self._threads))
-            self._labels = stack.enter_context(ShotLabels(self._threads))
+            self._settings = JobSettings(self._overrides, self.scene, off)
+            tracing = stack.enter_context(Tracing(self._events))
+            self._checker = stack.enter_context(Checker(tracing, self._events))
+            self._labels = stack.enter_context(ShotLabels(tracing))
             self._loan = stack.pop_all()
         return self
 
@@ -107,7 +108,7 @@ class BlenderRenderer:
             if there is none of that name, or if it is no pinhole.
         """
         width, height = size or (None, None)
-        shot = Shot("pinhole", camera=name, width=width, height=height, frame=frame)
+        shot = Job("pinhole", camera=name, width=width, height=height, frame=frame)
         camera_object = obstacles.camera_of(shot, self.scene, obstacles.cameras_of(self.scene, self._own), self._settings)
         self._settings.set(shot)
         found = cameras.as_it_stands(camera_object, self.scene, in_use=camera_object.virtual_pinhole.enabled)
@@ -116,21 +117,20 @@ class BlenderRenderer:
         return found.cropped(-column, -row, *picture.size)
 
     def made_from(self) -> dict[str, Any]:
-        """What the pictures are made from, beside the shots: hashes of the .blend and of all that it links; versions; the seed;
-        whether it is trusted.
+        """What the pictures are made from, beside the jobs: hashes of the .blend and of all that it links; versions.
 
         Raises
         ------
         InputError
             if the open file was never saved.
         """
-        return origins.made_from() | {"seed": self._seed} | ({"trust": True} if self._trust else {})
+        return origins.made_from()
 
-    def problems(self, shots: Sequence[Shot], outputs: Outputs | None = None) -> tuple[str, ...]:
+    def problems(self, shots: Sequence[Job], outputs: Outputs | None = None) -> tuple[str, ...]:
         """One sentence for each reason why a shot can't be had, as far as it is known before anything is rendered."""
-        return tuple(obstacles.obstacles(shots, outputs or Outputs(), self.scene, self._own, self._settings))
+        return tuple(obstacles.obstacles(shots, outputs or Outputs(), self.scene, self._camera_of_values, self._settings))
 
-    def render(self, shot: Shot, image: Path | None, preview: Path | None) -> dict[str, Any]:
+    def render(self, shot: Job, image: Path | None, preview: Path | None) -> dict[str, Any]:
         """Write the shot's picture and preview to these two paths, or nothing where they are None; what the sidecar says of it.
 
         Raises
@@ -140,8 +140,7 @@ class BlenderRenderer:
         OSError
             if the disk is full.
         """
-        self._settings.set(shot)
-        warnings = self._aim(shot)
+        warnings = self._set(shot)
         if image and preview:
             if self._settings.engine == "EEVEE" and not self._has_drawn:  # see persistent_data.py
                 render_still(self.scene)
@@ -160,7 +159,7 @@ class BlenderRenderer:
             "versions": origins.versions(),
         }
 
-    def label(self, shot: Shot, picture: Path, kinds: Sequence[str], depth_steps: float) -> list[str]:
+    def label(self, shot: Job, picture: Path, kinds: Sequence[str], depth_steps: float) -> list[str]:
         """Write the labels of the shot that was just rendered beside a picture; the names of their files (labelling.py).
 
         Raises
@@ -168,42 +167,95 @@ class BlenderRenderer:
         InputError
             if the scene can't be exported, or the labels not be written.
         """
-        is_still = shot.eye is not None
-        names = self._labels.write(self.scene, self.scene.camera, self._taken, picture, kinds, depth_steps, is_still)
+        names = self._labels.write(self.scene, self.scene.camera, self._taken, picture, kinds, depth_steps, shot)
         if "flow" in kinds:  # other frames were looked at
             persistent_data.drop(self.scene)
         return names
 
-    def check(self, shot: Shot) -> dict[str, Any]:
-        """Compare the shot that was just rendered with the tracer (checking.py).
+    def check(
+        self, job: Job, has_picture: bool = True, written: Written | None = None, keep: Path | None = None
+    ) -> dict[str, Any]:
+        """Compare a job with the tracer (checking.py).
 
-        Of the scene's own camera Blender chooses once more which that is: a picture of another one is a difference.
+        has_picture : whether it was just rendered, and camera and geometry of its picture are checked; else the job's engine
+        is, at the job's level. written, keep : of the latter, as in Checker.check.
 
         Raises
         ------
         InputError
-            if Cycles can't render the scene, or if the two can't be compared.
+            if the engine can't render the scene, or if the two can't be compared.
         """
-        camera_object = self.scene.camera
-        return self._checker.check(self.scene, camera_object, self._taken, self._stated, is_scenes=_is_scenes(shot))
+        if has_picture:
+            return self._checker.check_picture(job, self.scene, self.scene.camera, self._taken, self._stated)
+        self._set(job)
+        return self._checker.check(job, self.scene, self.scene.camera, self._settings.off, written, keep)
 
-    def _aim(self, shot: Shot) -> list[str]:
-        """Make the shot's camera the scene's; what a reader should know of it."""
-        if shot.eye is None:
+    def export(self, job: Job) -> Scene:
+        """The tracer's scene of a job.
+
+        Raises
+        ------
+        InputError
+            if there is no such camera, or one that is no pinhole.
+        NotModelledError
+            if `strict` and anything is approximated or left out.
+        """
+        self._set(job)
+        with staged(job, self.scene, self.scene.camera, self._settings.off) as stage:
+            return stage.export(job.strict)
+
+    def cycles(self, job: Job, path: str | os.PathLike[str]) -> tuple[LedgerEntry, ...]:
+        """Render a job with Cycles for a comparison; what the ledger tells. Raises as `export` does, or if it can't write."""
+        self._set(job)
+        with staged(job, self.scene, self.scene.camera, self._settings.off) as stage:
+            light = survey(stage.scene, stage.view_layer, stage.camera, stage.ledger, stage.is_lit)
+            told = stage.entries(job.strict)
+            stage.render(job, [path], light)
+            return told
+
+    def both_sides(self, job: Job, paths: Sequence[Path]) -> Scene:
+        """The scene of a job and, at these paths, the pictures of its engine, of one state. Raises as `cycles` does."""
+        self._set(job)
+        with numbered_indices(), staged(job, self.scene, self.scene.camera, self._settings.off) as stage:
+            return self._checker.both_sides(stage, job, paths)
+
+    def _set(self, job: Job) -> list[str]:
+        """Set the scene to a job, and make its camera the scene's; what a reader should know of it."""
+        self._settings.set(job)
+        if job.eye is None:
             among = obstacles.cameras_of(self.scene, self._own)
-            camera_object = obstacles.camera_of(shot, self.scene, among, self._settings)
+            camera_object = obstacles.camera_of(job, self.scene, among, self._settings)
             self._stated, warnings = None, datablocks.beyond_pinhole(camera_object, self.scene)
         else:
-            camera_object, self._stated = self._own, obstacles.stated(shot, self._settings.frame_of(shot))
+            camera_object, self._stated = self._camera_of_values(), obstacles.stated(job, self._settings.frame_of(job))
             warnings = cameras.apply(camera_object, self._stated, self.scene)
             warnings += datablocks.beyond_pinhole(camera_object, self.scene)
-        self._settings.look_through(camera_object, _is_scenes(shot))
+        self._settings.look_through(camera_object, job.is_of_scenes_camera)
         return warnings
 
+    def _camera_of_values(self) -> bpy.types.Object:
+        """The camera for the four values; made for the first of them, since objects are numbered by name."""
+        if self._own is None:
+            self._own = _own_camera(self._overrides, self.scene, self.scene.objects.get(self.scene_camera or ""))
+        return self._own
 
-def _is_scenes(shot: Shot) -> bool:
-    """True if the scene's own camera takes the shot."""
-    return shot.camera is None and shot.eye is None
+
+def export(job: Job) -> Scene:
+    """The tracer's scene of one job. Raises as BlenderRenderer.export does, and InputError if the file can't be opened."""
+    with BlenderRenderer(job.blend, job.trust) as renderer:
+        return renderer.export(job)
+
+
+def cycles(job: Job, path: str | os.PathLike[str]) -> tuple[LedgerEntry, ...]:
+    """Render one job with Cycles; what the ledger tells. Raises as `export` does, and InputError if it can't be written."""
+    with BlenderRenderer(job.blend, job.trust) as renderer:
+        return renderer.cycles(job, path)
+
+
+def both_sides(job: Job, paths: Sequence[Path]) -> Scene:
+    """The scene of one job and, at these paths, the pictures of its engine. Raises as `cycles` does."""
+    with BlenderRenderer(job.blend, job.trust) as renderer:
+        return renderer.both_sides(job, paths)
 
 
 def _own_camera(overrides: Overrides, scene: bpy.types.Scene, like: bpy.types.Object | None) -> bpy.types.Object:

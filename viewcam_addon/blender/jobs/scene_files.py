@@ -7,17 +7,18 @@ nothing else does. It is written when other things are in it than in those that 
 import contextlib
 import functools
 import tempfile
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
-import bpy
-
 from ...tracer.scene import Scene, scene_file
-from ...tracer.scene.sameness import same_things
+from ...tracer.scene.sameness import same
 from .. import datablocks
 from ..scenes.export import export_scene
 from ..scenes.ledger import Ledger
 from . import persistent_data
+from .stage import Stage
+
+_THINGS = [each.name for each in fields(Scene) if each.name not in ("camera", "stated_camera", "clip", "ledger")]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,23 +43,23 @@ class SceneFiles:
         self._files: list[tuple[Scene, Path]] = []
         self._written = 0
 
-    def exported(self, scene: bpy.types.Scene, layer: bpy.types.ViewLayer, camera_object: bpy.types.Object) -> Export:
-        """The scene as it is now, from a former shot if it can be no other."""
+    def exported(self, stage: Stage) -> Export:
+        """The geometry of the scene as it is now, from a former shot if it can be no other."""
+        scene, camera_object = stage.scene, stage.camera
         state = scene.frame_current, scene.frame_subframe, camera_object.name, datablocks.frame_of(scene)
         if self._changes:
             self._exports.clear()
         found = next((each for each in self._exports if each.state == state), None)
         if found is None:
-            ledger = Ledger()
-            seen = export_scene(scene, layer, camera_object, ledger)
-            found = Export(state, seen, ledger)
+            seen = export_scene(scene, stage.view_layer, camera_object, stage.ledger)
+            found = Export(state, seen, stage.ledger)
             self._exports = [*self._exports[-self._most + 1 :], found] if self._most > 1 else [found]
         return found
 
     def file_of(self, scene: Scene) -> Path:
         """A file of the scene, one that is there if the same things are in it; cameras don't count."""
         for known, path in self._files:
-            if same_things(scene, known):
+            if all(same(getattr(scene, name), getattr(known, name)) for name in _THINGS):
                 return path
         while len(self._files) >= self._most:
             _, former = self._files.pop(0)

@@ -11,8 +11,8 @@ What has no counterpart is noted in the ledger, with the remedy that takes it ou
 """
 
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import bpy
@@ -38,16 +38,18 @@ Matrix = NDArray[np.float64]
 class Surface:
     """A visible surface that stands in the world once or many times; two that are equal are one.
 
-    data : evaluated. key : the same for all that share a geometry in Cycles. slots : the materials, evaluated, at least 1.
-    hidden_from : the kinds of rays that don't see it. color : with its alpha; of instances that of what places them. receivers,
-    blockers : of its light, as of Object, where it shines.
+    is_mesh : or a point cloud. key : the same for all that share a geometry in Cycles. slots : the materials, evaluated, one or
+    more; used : the indices of those that some face, or the points, have. hidden_from : the kinds of rays that don't see it.
+    color : with its alpha; of instances that of what places them. receivers, blockers : of its light, as of Object, where it
+    shines.
     """
 
     name: str
-    data: bpy.types.Mesh | bpy.types.PointCloud = field(compare=False)
+    is_mesh: bool
     key: tuple[int, int]
     object_index: int
     slots: tuple[bpy.types.Material | None, ...]
+    used: tuple[int, ...]
     hidden_from: frozenset[str]
     color: tuple[float, float, float, float]
     receivers: frozenset[str] | None = None
@@ -65,9 +67,7 @@ class Surface:
     @property
     def used_slots(self) -> list[bpy.types.Material | None]:
         """The materials of `slots` that some face, or the points, have."""
-        if not isinstance(self.data, bpy.types.Mesh):
-            return [self.slots[0]]
-        return [self.slots[index] for index in sorted(export_geometry.used_slots(self.data, len(self.slots)))]
+        return [self.slots[index] for index in self.used]
 
 
 @dataclass(frozen=True)
@@ -160,22 +160,23 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
     names: dict[tuple[int, int], str] = {}
     geometries: dict[str, Mesh | Spheres] = {}
     objects = []
-    for source, matrices, random in placements(depsgraph, ledger, shading):
+
+    def read(source: Surface, shown: bpy.types.Object) -> None:
         if source.key not in names:
-            geometry = _geometry(source, ledger, shading)
-            names[source.key] = _free_name(source.data.name, geometries)
-            geometries[names[source.key]] = geometry
+            names[source.key] = _free_name(shown.data.name, geometries)
+            geometries[names[source.key]] = _geometry(source, shown, ledger, shading)
+
+    for source, matrices, random in placements(depsgraph, ledger, shading, read):
         materials = shading.names(source.slots) if shading else ()
         placed = (source.object_index, source.materials, materials, source.hidden_from, source.color, random)
         links = source.receivers, source.blockers
         matrix = matrices if len(matrices) > 1 else matrices[0]
         objects.append(Object(source.name, names[source.key], matrix, *placed, *links))
-    if shading:
-        _note_doubles(objects, geometries, ledger)
+    _note_doubles(objects, geometries, ledger)
     surfaces = {placed.name for placed in objects}
     return Scene(
         **_view_in(depsgraph, camera_object),
-        geometries=geometries,
+        geometries={name: geometries[name] for name in dict.fromkeys(placed.geometry for placed in objects)},
         objects=linking.among(objects, surfaces),
         **(_shown_by_light(depsgraph, ledger, shading, surfaces) if shading else {}),
         ledger=ledger.entries(),
@@ -183,25 +184,64 @@ def scene_in(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.Object, le
 
 
 def _note_doubles(objects: list[Object], geometries: dict[str, Mesh | Spheres], ledger: Ledger) -> None:
-    """Triangles that lie where others do: which of the two a ray of Cycles leaves or meets is its rounding's choice."""
-    keys, owners = [np.empty(0, np.uint64)], [np.empty(0, np.int64)]
+    """What lies exactly where something else does: which of the two a ray of Cycles meets or leaves is its rounding's choice.
+
+    Triangles of what stands in the scene once are sought in the world; those of instances, and points, among their own;
+    and instances of one geometry by their matrices. What overlaps otherwise is found where pictures differ.
+    """
+    tokens = {name: token for token, name in enumerate(geometries)}
+    keys, owners, places, placed_by = [], [], [], []
+    instanced = {
+        placed.geometry for placed in objects if len(placed.matrices) > 1 or isinstance(geometries[placed.geometry], Spheres)
+    }
+    within = {name: len(_pairs(_keys(geometries[name]))) for name in instanced}
     for number, placed in enumerate(objects):
-        made = geometries[placed.geometry]
-        if isinstance(made, Mesh) and len(placed.matrices) == 1:
-            places = (made.vertices @ placed.matrices[0, :3, :3].T + placed.matrices[0, :3, 3]).astype(np.float32)
-            bits = (places + np.float32(0)).view(np.uint32)  # 0 for −0
-            corners = np.sort(_hashed(bits.T.astype(np.uint64))[made.triangles], axis=1)
-            corners = corners[(corners[:, :-1] != corners[:, 1:]).all(axis=1)]
-            keys.append(_hashed(corners.T))
-            owners.append(np.full(len(corners), number))
-    key = np.concatenate(keys)
-    order = np.argsort(key, kind="stable")
-    owner, key = np.concatenate(owners)[order], key[order]
-    pairs = np.flatnonzero(key[1:] == key[:-1])
-    for (first, second), count in Counter(zip(owner[pairs].tolist(), owner[pairs + 1].tolist(), strict=True)).items():
-        whose = "others of it" if first == second else f"those of {objects[first].name!r}"
-        reason = f"{count} triangles lie exactly where {whose} do: in Cycles one shadows the other"
-        ledger.note(objects[second].name, "approximated", reason)
+        geometry, several = geometries[placed.geometry], len(placed.matrices) > 1
+        token = np.full((1, len(placed.matrices)), tokens[placed.geometry], np.uint64)
+        places.append(_hashed(np.concatenate([token, _bits(placed.matrices.reshape(-1, 16)).T])))
+        placed_by.append(np.full(len(placed.matrices), number))
+        if isinstance(geometry, Mesh) and not several:
+            keys.append(_keys(geometry, placed.matrices[0]))
+            owners.append(np.full(len(keys[-1]), number))
+        elif within[placed.geometry]:
+            what = "triangles" if isinstance(geometry, Mesh) else "points"
+            _note_double(ledger, placed.name, f"{within[placed.geometry]} {what}", "others of it")
+    for found, owner, what in (keys, owners, "triangles"), (places, placed_by, "instances"):
+        number = np.concatenate([np.empty(0, np.int64), *owner])
+        pairs = _pairs(np.concatenate([np.empty(0, np.uint64), *found]))
+        for (first, second), count in Counter(map(tuple, number[pairs].tolist())).items():
+            if what == "instances" and all(len(objects[i].matrices) == 1 for i in (first, second)):
+                continue  # its triangles tell
+            whose = "others of it" if first == second else f"those of {objects[first].name!r}"
+            _note_double(ledger, objects[second].name, f"{count} {what}", whose)
+
+
+def _note_double(ledger: Ledger, name: str, what: str, whose: str) -> None:
+    # All of it comes along: where it matters to a picture is the comparison's to find.
+    ledger.note(
+        name, "exported", f"{what} lie exactly where {whose} do: either may be seen, and in Cycles one shadows the other"
+    )
+
+
+def _keys(geometry: Mesh | Spheres, matrix: Matrix | None = None) -> NDArray[np.uint64]:
+    """(n,): of each triangle that is one, or of each point, the same for those in one place."""
+    if isinstance(geometry, Spheres):
+        return _hashed(_bits(np.column_stack([geometry.centers, geometry.radii])).T)
+    places = geometry.vertices if matrix is None else geometry.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+    corners = np.sort(_hashed(_bits(places).T)[geometry.triangles], axis=1)
+    return _hashed(corners[(corners[:, :-1] != corners[:, 1:]).all(axis=1)].T)
+
+
+def _bits(values: NDArray[np.float64]) -> NDArray[np.uint64]:
+    """Those of the numbers as float32 has them, 0 for −0."""
+    return (values.astype(np.float32) + np.float32(0)).view(np.uint32).astype(np.uint64)
+
+
+def _pairs(keys: NDArray[np.uint64]) -> NDArray[np.int64]:
+    """(m, 2): the indices of two each that are equal and follow one another."""
+    order = np.argsort(keys, kind="stable")
+    equal = np.flatnonzero(keys[order[1:]] == keys[order[:-1]])
+    return np.stack([order[equal], order[equal + 1]], axis=1)
 
 
 def _hashed(columns: NDArray[np.uint64]) -> NDArray[np.uint64]:
@@ -251,10 +291,16 @@ class Placement(NamedTuple):
     random: NDArray[np.float32] | None
 
 
-def placements(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading | None = None) -> list[Placement]:
+def placements(
+    depsgraph: bpy.types.Depsgraph,
+    ledger: Ledger,
+    shading: Shading | None = None,
+    read: Callable[[Surface, bpy.types.Object], None] | None = None,
+) -> list[Placement]:
     """Each surface that the camera may see.
 
-    shading : reads the materials, where there shall be light; then other rays than the camera's may see a surface.
+    shading : reads the materials, where there shall be light; then other rays than the camera's may see a surface. read : is
+    called with each surface as it is met first, and the object or instance that shows it, which is gone afterwards.
     """
     matrices = export_geometry.read(depsgraph.object_instances, "matrix_world", np.float32, 16)
     found: dict[Surface, list[int]] = {}
@@ -270,6 +316,8 @@ def placements(depsgraph: bpy.types.Depsgraph, ledger: Ledger, shading: Shading 
         identity = placed.real.as_pointer(), placed.parent.as_pointer(), data.as_pointer()
         if identity not in known:
             source = _source(placed, depsgraph, ledger, shading, links)
+            if read and source and source not in found:
+                read(source, shown)
             known[identity] = found.setdefault(source, []) if source else []
         known[identity].append(number)
     for source, numbers in found.items():
@@ -309,7 +357,7 @@ def _drawn(placed: list[Placement], ledger: Ledger) -> Iterator[Placement]:
     for source, matrices, random in placed:
         with np.errstate(invalid="ignore"):  # what is not finite is not flat
             drawn = np.linalg.det(matrices[:, :3, :3]) != 0
-        if not drawn.all() and (users[source.key] > 1 or not isinstance(source.data, bpy.types.Mesh)):
+        if not drawn.all() and (users[source.key] > 1 or not source.is_mesh):
             ledger.note(source.name, "exported", "flattened by its scale, and Cycles does not draw it")
             matrices, random = matrices[drawn], random if random is None else random[drawn]
         if len(matrices):
@@ -340,18 +388,19 @@ def _source(
         ledger.note(placed.name, "exported", "not visible to the camera")
         if not shading or len(hidden_from) == len(RAYS):
             return None
-    data = shown.data
-    if isinstance(data, bpy.types.Mesh):
-        if data.is_editmode:  # the file is in edit mode: what is edited must be made a mesh first
-            data = real.to_mesh()
-        if not data.polygons:
-            return None
-        if not layer.use_solid:
-            ledger.note(placed.name, "exported", "the view layer leaves out surfaces")
-            return None
+    is_mesh = isinstance(shown.data, bpy.types.Mesh)
+    if is_mesh and not layer.use_solid:
+        ledger.note(placed.name, "exported", "the view layer leaves out surfaces")
+        return None
     override = layer.material_override
     slots = [override or slot.material for slot in shown.material_slots] or [override]
-    features.note_object(placed, slots, depsgraph, ledger, shading)
+    used = {0}
+    if is_mesh:
+        with export_geometry.mesh_shown(shown) as mesh:
+            used = export_geometry.used_slots(mesh, len(slots))
+        if not used:  # it has no faces
+            return None
+    features.note_object(placed, slots, used, depsgraph, ledger, shading)
     receivers, blockers = None, None
     if links and linking.is_linked(placed.real.original) and shading.shines(slots):
         receivers, blockers = links.of(placed, ledger, True)
@@ -359,10 +408,11 @@ def _source(
     own = any(slot.link == "OBJECT" for slot in shown.material_slots)
     return Surface(
         name=placed.name,
-        data=data,
-        key=(data.as_pointer(), real.as_pointer() if own else 0),
+        is_mesh=is_mesh,
+        key=(shown.data.as_pointer(), real.as_pointer() if own else 0),
         object_index=shown.pass_index,
         slots=tuple(slots),
+        used=tuple(sorted(used)),
         hidden_from=hidden_from if shading else frozenset(),
         color=tuple(placed.parent.color) if shading else Object.color,
         receivers=receivers,
@@ -370,13 +420,15 @@ def _source(
     )
 
 
-def _geometry(source: Surface, ledger: Ledger, shading: Shading | None) -> Mesh | Spheres:
-    if not isinstance(source.data, bpy.types.Mesh):
-        return export_geometry.spheres_of(source.data)
+def _geometry(source: Surface, shown: bpy.types.Object, ledger: Ledger, shading: Shading | None) -> Mesh | Spheres:
+    if not source.is_mesh:
+        return export_geometry.spheres_of(shown.data)
     has_colours = shading is not None and shading.asks_for_colours(source.slots)
     attributes = shading.attributes(source.slots) if shading else ()
-    mesh = export_geometry.mesh_of(source.data, len(source.materials), has_colours, attributes)
-    if nowhere := len(source.data.loop_triangles) - len(mesh.triangles):
+    with export_geometry.mesh_shown(shown, split=True) as data:
+        mesh = export_geometry.mesh_of(data, len(source.materials), has_colours, attributes)
+        nowhere = len(data.loop_triangles) - len(mesh.triangles)
+    if nowhere:
         ledger.note(
             source.name, "exported", f"{nowhere} triangles have vertices that are not finite, and Cycles draws none of them"
         )

@@ -2,11 +2,17 @@
 
 As Cycles reads them (intern/cycles/blender/mesh.cpp and pointcloud.cpp, and what its Normal pass shows): Blender's own
 triangulation; material indices clamped to the slots; where all faces are flat, the normal of each triangle, else Blender's
-corner normals, in which a flat face has one normal for all of its triangles. Until 5.0 a mesh that is smooth but for flat faces
-is another case: they have the normals of their triangles, and their neighbours the normals of their vertices.
+corner normals, in which a flat face has one normal for all of its triangles.
+
+Until 5.0 Cycles has one normal a vertex. A mesh that is smooth but for flat faces has the normals of its vertices, and flat
+faces those of their triangles. Where an edge is sharp or a normal custom, Cycles splits the vertices first, along sharp edges
+and those of flat faces (`is_split`), and reads all from the mesh that comes of it; each vertex has the normal of its last
+corner. Blender's corner normals also stop at an edge whose faces are wound against each other, or are not two, and Cycles' do
+not: there no vertex is split.
 """
 
-from collections.abc import Collection
+import contextlib
+from collections.abc import Collection, Iterator
 
 import bpy
 import numpy as np
@@ -34,7 +40,7 @@ Array = NDArray[np.generic]
 
 
 def mesh_of(mesh: bpy.types.Mesh, slot_count: int, has_colours: bool = False, attributes: Collection[str] = ()) -> Mesh:
-    """The triangles of an evaluated mesh, object space.
+    """The triangles of an evaluated mesh, object space; of one that `is_split`, once it has been.
 
     slot_count : the object's material slots, which material indices are clamped to. has_colours : whether to bring along the
     colour attribute that is active for rendering, black where there is none. attributes : those to bring along by name, as in
@@ -54,7 +60,7 @@ def mesh_of(mesh: bpy.types.Mesh, slot_count: int, has_colours: bool = False, at
         vertices=vertices,
         triangles=triangles,
         materials=materials_of(mesh, slot_count)[faces],
-        corner_normals=_corner_normals(mesh, vertices, triangles, corners, faces),
+        corner_normals=_corner_normals(mesh, vertices, corner_vertices, corners, faces),
         corner_uvs=_corner_uvs(mesh, corners),
         corner_colours=_corner_colours(mesh, triangles, corners, faces) if has_colours else None,
         attributes={
@@ -63,6 +69,25 @@ def mesh_of(mesh: bpy.types.Mesh, slot_count: int, has_colours: bool = False, at
             if (values := _corner_values(mesh, name, triangles, corners, faces)) is not None
         },
     )
+
+
+@contextlib.contextmanager
+def mesh_shown(shown: bpy.types.Object, split: bool = False) -> Iterator[bpy.types.Mesh]:
+    """The mesh of an object or an instance in a depsgraph, as it is there, or a copy that lasts as long as the context.
+
+    What is edited is no mesh before it is copied. split : copies one that Cycles splits, too, and splits the copy.
+    """
+    mesh = shown.data
+    if not (mesh.is_editmode or (split and is_split(mesh))):
+        yield mesh
+        return
+    copy = shown.to_mesh()
+    try:
+        if split and is_split(copy):
+            copy.split_faces()
+        yield copy
+    finally:
+        shown.to_mesh_clear()
 
 
 def spheres_of(points: bpy.types.PointCloud) -> Spheres:
@@ -87,12 +112,22 @@ def materials_of(mesh: bpy.types.Mesh, slot_count: int) -> Array:
     return np.clip(indices, 0, max(slot_count - 1, 0))
 
 
-def _corner_normals(mesh: bpy.types.Mesh, vertices: Array, triangles: Array, corners: Array, faces: Array) -> Array | None:
+def is_split(mesh: bpy.types.Mesh) -> bool:
+    """True if Cycles splits the vertices of an evaluated mesh, as `mesh.split_faces()` does, or would if they were not yet."""
+    return versions.CYCLES_HAS_VERTEX_NORMALS and mesh.normals_domain == "CORNER" and not _only_faces_are_sharp(mesh)
+
+
+def _corner_normals(
+    mesh: bpy.types.Mesh, vertices: Array, corner_vertices: Array, corners: Array, faces: Array
+) -> Array | None:
     """(triangles, 3, 3) float32, or None where all faces are flat."""
     if mesh.normals_domain == "FACE":
         return None
-    if not (versions.CYCLES_KEEPS_FLAT_FACES and _only_faces_are_sharp(mesh)):
+    if is_split(mesh):
+        return read(mesh.corner_normals, "vector", np.float32, 3)[_last_of_each(corner_vertices)][corners]
+    if mesh.normals_domain == "POINT" or not versions.CYCLES_HAS_VERTEX_NORMALS:
         return read(mesh.corner_normals, "vector", np.float32, 3)[corners]
+    triangles = corner_vertices[corners]
     normals = read(mesh.vertex_normals, "vector", np.float32, 3)[triangles]
     flat = _attribute(mesh, "sharp_face", "value", np.bool_, domain="FACE")[faces]
     first, second, third = np.moveaxis(vertices[triangles[flat]], 1, 0)
@@ -102,9 +137,15 @@ def _corner_normals(mesh: bpy.types.Mesh, vertices: Array, triangles: Array, cor
     return normals
 
 
+def _last_of_each(numbers: Array) -> Array:
+    """(n,) the index of the last that has the same number."""
+    _, first, which = np.unique(numbers[::-1], return_index=True, return_inverse=True)
+    return (len(numbers) - 1 - first)[which.ravel()][::-1]
+
+
 def _only_faces_are_sharp(mesh: bpy.types.Mesh) -> bool:
-    """True if flat faces stand beside smooth ones, without sharp edges and without custom normals."""
-    if mesh.normals_domain != "CORNER" or mesh.has_custom_normals:
+    """True if in a mesh of corner normals flat faces stand beside smooth ones, without sharp edges and custom normals."""
+    if mesh.has_custom_normals:
         return False
     edges = _attribute(mesh, "sharp_edge", "value", np.bool_, domain="EDGE")
     return edges is None or not edges.any()

@@ -4,6 +4,7 @@ too.
 Hair and volumes need no remedy: the view layer is told to leave them out (cycles.py).
 """
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,7 +12,7 @@ import bpy
 
 from ...tracer.scene.lamps import RAYS
 from .. import datablocks, versions
-from . import charts, export_geometry, images, materials, nodes
+from . import charts, images, materials, nodes
 from .ledger import Ledger
 from .shading import Shading
 
@@ -102,11 +103,12 @@ def is_surface(placed: Placed, ledger: Ledger, shading: Shading | None) -> bool:
 def note_object(
     placed: Placed,
     slots: list[bpy.types.Material | None],
+    used: Collection[int],
     depsgraph: bpy.types.Depsgraph,
     ledger: Ledger,
     shading: Shading | None,
 ) -> None:
-    """Note what a visible surface is beyond its geometry. slots : its materials."""
+    """Note what a visible surface is beyond its geometry. slots : its materials; used : the indices of those that are seen."""
     shown, real, parent = placed
     name = placed.name
     if parent.holdout_get(view_layer=depsgraph.view_layer_eval):
@@ -122,7 +124,8 @@ def note_object(
     if adaptive:
         ledger.note(name, "approximated", "adaptive subdivision is subdivision at the render level on both sides")
         ledger.set_for_cycles(*adaptive, False)
-    if not shading and versions.DEFAULT_SURFACE_BENDS_NORMALS and _shows_empty_slot(shown.data, slots):
+    is_empty = isinstance(shown.data, bpy.types.Mesh) and any(slots[index] is None for index in used)
+    if not shading and versions.DEFAULT_SURFACE_BENDS_NORMALS and is_empty:
         ledger.call_for_cycles(real.original, materials.fill_empty_slots, stands_in=False)
         if any(modifier.type == "NODES" and modifier.show_render for modifier in real.modifiers):
             ledger.note(name, "approximated", "has no material, and Cycles may bend its normals where they graze")
@@ -171,11 +174,6 @@ def _note_light(placed: Placed, slots: list[bpy.types.Material | None], ledger: 
             ledger.set_for_cycles(owner, name, 0.0, stands_in=False)
         ledger.set_for_cycles(each.cycles, "is_caustics_caster", False, stands_in=False)
         ledger.set_for_cycles(each.cycles, "is_caustics_receiver", False, stands_in=False)
-
-
-def _shows_empty_slot(data: bpy.types.ID, slots: list[bpy.types.Material | None]) -> bool:
-    is_mesh = isinstance(data, bpy.types.Mesh)
-    return is_mesh and None in slots and any(slots[i] is None for i in export_geometry.used_slots(data, len(slots)))
 
 
 def note_hair(instance: bpy.types.DepsgraphObjectInstance, ledger: Ledger) -> None:

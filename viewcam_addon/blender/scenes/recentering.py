@@ -36,7 +36,7 @@ from ...tracer.scene.shader_nodes import KINDS
 from .. import camera as cameras
 from .. import conversion, datablocks, findings, pose
 from ..temporary_settings import Overrides, overridden
-from . import baked_inputs, features, linking, materials
+from . import baked_inputs, export_geometry, features, linking, materials
 from .depsgraph import visit_still
 from .export import Surface, light_in, placements
 from .film import CYCLES_SETTINGS
@@ -176,7 +176,15 @@ def _seen(
     copies: dict[tuple[int, int], _Copy] = {}
     placed = []
     shading = Shading(baked_inputs.baked_in(depsgraph)) if lit else None
-    shown = placements(depsgraph, ledger, shading)
+    found: dict[tuple[int, int], Geometry] = {}
+
+    def copy_of(source: Surface, shown: bpy.types.Object) -> None:
+        if source.key not in found:
+            with export_geometry.mesh_shown(shown) if source.is_mesh else contextlib.nullcontext(shown.data) as data:
+                found[source.key] = data.copy()
+            overrides.afterwards(bpy.data.batch_remove, [found[source.key]])
+
+    shown = placements(depsgraph, ledger, shading, copy_of)
     for source, *_ in shown if shading else ():
         _note_places(source, shading, ledger)
         if source.is_linked:
@@ -186,8 +194,7 @@ def _seen(
             raise InputError(f"the matrix of object {source.name!r} holds a number that is not finite: check its transform")
         matrix[:3, 3] -= eye
         if source.key not in copies:
-            data = source.data.copy()
-            overrides.afterwards(bpy.data.batch_remove, [data])
+            data = found[source.key]
             _set_materials(data, [(material and material.original) or plain for material in source.slots])
             copies[source.key] = _moved(data, matrix)
         copy = copies[source.key]

@@ -91,6 +91,11 @@ typedef struct {
     /* Whether anything is seen through the centres of a camera's pixels, whose axes need not have unit length: 0 or 1 each. */
     int (*silhouette)(const ViewcamScene*, const ViewcamCamera*, uint8_t* covered);
     int (*surface_at)(const ViewcamScene*, size_t count, const double* columns, const double* rows, float* const* planes);
+    /* Of each of some places in the picture all surfaces that lie up to `within` times the nearest one's depth beyond it, the
+     * nearest first; nothing is one, too. numbers: (count,), how many; written where planes is null, else read: the surfaces of the
+     * first place, then those of the next. Each with how much UV and normal change there with each pixel, slopes: (2, stride), and
+     * its object. */
+    int (*surfaces_at)(const ViewcamScene*, size_t count, const double* columns, const double* rows, double within, uint32_t* numbers, float* const* planes, size_t stride, double* slopes, uint32_t* objects);
     /* rays: (count, 8), origin, direction, t_min, t_max, in rendering space. packets: whether they are traced as such. */
     int (*closest)(const ViewcamScene*, size_t count, const double* rays, uint32_t kind, int packets, double* t, uint32_t* objects, uint32_t* primitives);
     int (*occluded)(const ViewcamScene*, size_t count, const double* rays, int packets, uint8_t* hidden);
@@ -110,6 +115,8 @@ typedef struct {
     /* What is made must be freed before its scene, or what gives light there, changes. */
     int (*light_create)(const ViewcamScene*, const ViewcamLightSettings*, ViewcamLight** made);
     void (*light_free)(ViewcamLight*);
+    /* The objects, two and two, that paths have met in one place, and how often: the first `most`. Returns how many there are. */
+    size_t (*light_pairs)(const ViewcamLight*, size_t most, uint32_t* objects, uint64_t* counts);
     /* A tile of 32 × 32 pixels, by its lowest row and its first column. */
     int (*trace_light)(const ViewcamLight*, uint32_t row, uint32_t column, const ViewcamLightPasses*, const volatile int* stop);
 

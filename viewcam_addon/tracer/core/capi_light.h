@@ -62,11 +62,12 @@ typedef struct {
     double filter_width, exposure;
 } ViewcamFilm;
 
-/* bounces: in all, diffuse, glossy, transmission; surfaces gone straight through. error: 0 for the same number of samples everywhere. */
+/* bounces: in all, diffuse, glossy, transmission; surfaces gone straight through. error: 0 for the same number of samples everywhere. coincident: 0 for all light, or of
+ * how many roundings of float32 surfaces are in one place, for the light alone that comes by these. */
 typedef struct {
     int32_t bounces[5];
     uint32_t seed, samples;
-    double error;
+    double error, coincident;
 } ViewcamLightSettings;
 
 /* Of a whole picture, rows from the bottom. Those that nobody wants are null; Combined is always wanted. */

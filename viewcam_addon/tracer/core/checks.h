@@ -113,6 +113,7 @@ inline void light(const Scene& scene, const ViewcamLightSettings& given) {
         that(slot.material < scene.illumination.materials.size(), "an object has a material that the scene does not have");
     for (int bounces : given.bounces) that(bounces >= 0, "the number of bounces is below 0");
     that(given.samples >= 1 && given.samples <= 1 << 24, "the number of samples is not between 1 and 2^24");
+    that(given.coincident >= 0 && given.coincident <= LARGEST, "surfaces in one place are less than 0 roundings apart, or too many");
     that(given.error >= 0 && std::isfinite(given.error), "the error is below 0, or no number");
 }
 inline void tile(const Camera& camera, uint32_t row, uint32_t column, const ViewcamLightPasses& to) {

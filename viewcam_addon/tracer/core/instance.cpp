@@ -155,6 +155,26 @@ const ViewcamCore core = {
                 }
             });
         },
+    .surfaces_at =
+        [](const ViewcamScene* scene, size_t count, const double* columns, const double* rows, double within, uint32_t* numbers,
+           float* const* planes, size_t stride, double* slopes, uint32_t* objects) {
+            return guarded([&] {
+                const Scene& from = scene_of(scene);
+                std::vector<Hit> hits;
+                for (size_t i = 0, to = 0; i < count; i++) {
+                    Ray ray = from.camera.ray(columns[i], rows[i]);
+                    from.surfaces(ray, CAMERA, within, hits);
+                    if (hits.empty()) hits.push_back({});
+                    if (!planes) numbers[i] = uint32_t(hits.size());
+                    for (size_t k = 0; planes && k < numbers[i]; k++, to++) {
+                        write_geometry(from, &ray, &hits[k], 1, {planes, stride}, &to);
+                        objects[to] = hits[k].object;
+                        slopes[to] = slopes[stride + to] = 0;
+                        if (hits[k]) slopes_at(from, columns[i], rows[i], hits[k], slopes[to], slopes[stride + to]);
+                    }
+                }
+            });
+        },
     .closest =
         [](const ViewcamScene* scene, size_t count, const double* rows, uint32_t kind, int packets, double* t, uint32_t* objects, uint32_t* primitives) {
             return guarded([&] {
@@ -246,6 +266,15 @@ const ViewcamCore core = {
             });
         },
     .light_free = [](ViewcamLight* light) { delete &light_of(light); },
+    .light_pairs = [](const ViewcamLight* light, size_t most, uint32_t* objects, uint64_t* counts) -> size_t {
+        auto pairs = light_of(light).integrator().coincident_pairs();
+        size_t i = 0;
+        for (auto& [pair, count] : pairs) {
+            if (i == most) break;
+            objects[2 * i] = pair.first, objects[2 * i + 1] = pair.second, counts[i++] = count;
+        }
+        return pairs.size();
+    },
     .trace_light =
         [](const ViewcamLight* light, uint32_t row, uint32_t column, const ViewcamLightPasses* passes, const volatile int* stop) {
             return guarded([&] {

@@ -86,7 +86,7 @@ inline void clear_light(Scene& scene) { scene.illumination = {}; }
 
 inline TileSampler* create_light(const Scene& scene, const ViewcamLightSettings& given) {
     Bounces bounces{given.bounces[0], given.bounces[1], given.bounces[2], given.bounces[3], given.bounces[4]};
-    return new TileSampler(scene, bounces, given.seed, given.samples, given.error);
+    return new TileSampler(scene, bounces, given.seed, given.samples, given.error, given.coincident);
 }
 inline void trace_light(const TileSampler& sampler, uint32_t row, uint32_t column, const ViewcamLightPasses& passes, const volatile int* stop) {
     sampler.trace(row, column, passes, stop);

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <vector>
 
 #include "math/vec.h"
 
@@ -63,6 +64,19 @@ struct Nearest {
         if (!(distance < t || (distance == t && other < name))) return false;
         t = distance;
         name = other;
+        return true;
+    }
+};
+
+// All hits that lie up to `within` times the nearest one's distance beyond it, taken as `Nearest` takes the nearest.
+struct NearestOnes {
+    double t, within;
+    std::vector<Hit> hits;
+
+    bool offer(double distance, uint32_t object, uint32_t primitive) {
+        if (!(distance <= t)) return false;
+        hits.push_back({distance, object, primitive});
+        t = std::min(t, distance * (1 + within));
         return true;
     }
 };

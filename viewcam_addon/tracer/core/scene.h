@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <tuple>
 #include <variant>
 #include <vector>
 
@@ -75,7 +76,21 @@ class Scene {
             if (some.visible & kind && some.triangles.intersect<true>(ray, NONE, nearest)) return true;
         return intersect_instances<true>(ray, kind, nearest);
     }
-    // The same for up to 64 rays, as packets where enough of them go the same way.
+    // What a ray meets first, and all that it meets up to `within` times as far beyond, the nearest first; of equal distances as
+    // `Nearest` has it.
+    void surfaces(const Ray& ray, RayKind kind, double within, std::vector<Hit>& hits) const {
+        NearestOnes nearest{ray.t_max, within, std::move(hits)};
+        nearest.hits.clear();
+        for (const Merged& some : merged_)
+            if (some.visible & kind) some.triangles.intersect<false>(ray, NONE, nearest);
+        intersect_instances<false>(ray, kind, nearest);
+        hits = std::move(nearest.hits);
+        std::erase_if(hits, [&](const Hit& hit) { return hit.t > nearest.t; });
+        std::sort(hits.begin(), hits.end(), [](const Hit& a, const Hit& b) {
+            return std::tie(a.t, a.object, a.primitive) < std::tie(b.t, b.object, b.primitive);
+        });
+    }
+    // The same as `closest` for up to 64 rays, as packets where enough of them go the same way.
     void closest(const Ray* rays, int count, RayKind kind, Hit* hits) const {
         Nearest nearest[PACKET];
         for (int i = 0; i < count; i++) nearest[i] = {rays[i].t_max};
@@ -278,7 +293,7 @@ class Scene {
         return box;
     }
 
-    template <bool ANY> bool intersect_instances(const Ray& ray, RayKind kind, Nearest& nearest) const {
+    template <bool ANY, class Found> bool intersect_instances(const Ray& ray, RayKind kind, Found& nearest) const {
         if (instances_.root == NOTHING) return false;
         return traverse<ANY>(instances_, ray, nearest.t, 0, [&](uint32_t leaf, BoxRay& box) {
             uint32_t number = instances_.leaves[leaf];

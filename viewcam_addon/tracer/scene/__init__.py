@@ -6,7 +6,8 @@ or rays (visibility.py, surface.py); the classes hold arrays and check their sha
 bounces matter from level `direct` on; a scene of level `geometry` leaves them out.
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -160,6 +161,22 @@ class LedgerEntry:
     def is_modelled(self) -> bool:
         """True if it was exported whole, as it is."""
         return self.status == "exported"
+
+
+def with_pairs(ledger: Sequence[LedgerEntry], pairs: Iterable[tuple[str, str]]) -> tuple[LedgerEntry, ...]:
+    """A ledger in which each object tells with which others it lies in one place. pairs : the names of two each."""
+    others: dict[str, list[str]] = {}
+    for first, second in pairs:
+        others.setdefault(first, []).append("itself" if first == second else repr(second))
+        if first != second:
+            others.setdefault(second, []).append(repr(first))
+    told = []
+    for entry in ledger:
+        if entry.object in others:
+            shares = f"lies in one place with {', '.join(others[entry.object])} where pixels show it"
+            entry = replace(entry, reason="; ".join(filter(None, (entry.reason, shares))))
+        told.append(entry)
+    return tuple(told)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,8 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from viewcam_addon.blender.camera import apply
-from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.jobs import renderer as jobs
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.scene import Mesh
 
@@ -125,7 +126,7 @@ def check(both_sides):
     """A function that fails unless both sides, recentred, are one picture of the file's scene; it returns them."""
 
     def compare(**request):
-        plain = job.export(job.Request(**request))
+        plain = jobs.export(Job(**request))
         sides = both_sides(recenter=True, **request)
         sides.check()
         position = sides.comparison.rows[0]

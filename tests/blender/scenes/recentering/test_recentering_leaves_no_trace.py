@@ -7,9 +7,11 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender.rendering import cycles, job
+from viewcam_addon.blender.jobs import renderer as jobs
+from viewcam_addon.blender.rendering import cycles
 from viewcam_addon.blender.scenes import recentering
 from viewcam_addon.errors import InputError, NotModelledError
+from viewcam_addon.jobs.job import Job
 
 UTM = (448262.25, 5411932.5, 42.0)
 ECEF = (4200952.5, 780362.0, 4720030.0)
@@ -40,17 +42,17 @@ def test_the_ledger_is_that_of_the_file(crowd, scene, add, mesh_from, check):
     bpy.data.objects["Map"].data.materials.append(glass)
     scene.camera.data.dof.use_dof = True
     add(bpy.data.hair_curves.new("Hair"), "Hair", UTM)
-    plain, sides = job.export(job.Request()), check()
+    plain, sides = jobs.export(Job()), check()
     assert sides.exported.ledger == plain.ledger
     assert {entry.status for entry in plain.ledger} == {"exported", "approximated", "skipped"}
     with pytest.raises(NotModelledError, match="Hair"):
-        job.export(job.Request(strict=True, recenter=True))
+        jobs.export(Job(strict=True, recenter=True))
 
 
 def test_rendering_alone_recentres_too(look, tmp_path, add_map):
     look(UTM)
     add_map(UTM)
-    told = job.render(job.Request(recenter=True), tmp_path / "picture.exr")
+    told = jobs.cycles(Job(recenter=True), tmp_path / "picture.exr")
     assert [(entry.object, entry.status) for entry in told] == [("Map", "exported")]
     assert (tmp_path / "picture.exr").stat().st_size > 1000
 
@@ -59,7 +61,7 @@ def test_the_file_is_as_it_was(crowd, both_sides):
     crowd(UTM)
     bpy.context.view_layer.objects.active = bpy.data.objects["Monkey"]
     bpy.data.objects["Monkey"].select_set(True)
-    job.export(job.Request())  # evaluates all, and leaves a render result
+    jobs.export(Job())  # evaluates all, and leaves a render result
     before = file_state()
     both_sides(recenter=True)
     assert file_state() == before
@@ -70,7 +72,7 @@ def test_the_file_is_as_it_was(crowd, both_sides):
 )
 def test_the_file_is_as_it_was_after_a_failure(crowd, monkeypatch, tmp_path, room, name):
     crowd(ECEF)
-    job.export(job.Request())
+    jobs.export(Job())
     before = file_state()
 
     def fails(*_arguments, **_options):
@@ -78,7 +80,7 @@ def test_the_file_is_as_it_was_after_a_failure(crowd, monkeypatch, tmp_path, roo
 
     monkeypatch.setattr(room, name, fails)
     with pytest.raises(InputError, match="out of luck"):
-        job.export_and_render(job.Request(recenter=True), [tmp_path / "picture.exr"])
+        jobs.both_sides(Job(recenter=True), [tmp_path / "picture.exr"])
     assert file_state() == before
 
 
@@ -116,7 +118,7 @@ def test_an_object_that_did_not_follow_is_named(sabotage, look, add, mesh_from, 
 
     monkeypatch.setattr(recentering, "_place", place_wrongly)
     with pytest.raises(InputError, match="object 'Cube' did not follow") as caught:
-        job.export(job.Request(recenter=True))
+        jobs.export(Job(recenter=True))
     assert "\n" not in str(caught.value)
 
 
@@ -138,10 +140,10 @@ def test_a_vertex_that_did_not_follow_and_an_object_that_is_gone_are_named(look,
 
     spoil(move_a_vertex)
     with pytest.raises(InputError, match="object 'Map' did not follow"):
-        job.export(job.Request(recenter=True))
+        jobs.export(Job(recenter=True))
     spoil(lambda block: setattr(block, "hide_render", True))
     with pytest.raises(InputError, match="object 'Map' is missing"):
-        job.export(job.Request(recenter=True))
+        jobs.export(Job(recenter=True))
 
 
 def test_objects_of_a_library_are_shown_and_stay_linked(look, add, mesh_from, scene, tmp_path, check):

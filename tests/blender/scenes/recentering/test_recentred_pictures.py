@@ -11,9 +11,10 @@ bpy = pytest.importorskip("bpy")
 from mathutils import Vector
 
 from viewcam_addon.blender.camera import apply
-from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.cli import main
 from viewcam_addon.errors import InputError
+from viewcam_addon.jobs.job import Job
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import scene_file
@@ -168,7 +169,7 @@ def test_instances_that_are_not_where_the_file_has_them_are_caught(change, told,
     for number in range(3):
         instance = add(None, f"Instance {number}", np.add(UTM, (40.0 * number, 0, 0)))
         instance.instance_type, instance.instance_collection = "COLLECTION", many
-    plain, moved = (job.export(job.Request(recenter=recenter)) for recenter in (False, True))
+    plain, moved = (jobs.export(Job(recenter=recenter)) for recenter in (False, True))
     check_moved(plain, moved)
     (maps,) = moved.objects
     with pytest.raises(AssertionError, match=told):
@@ -250,7 +251,7 @@ def test_an_object_that_is_nowhere_is_one_sentence(look, add, mesh_from):
     add(mesh_from("cube"), "Lost", UTM).scale.x = float("nan")
     for recenter in (False, True):
         with pytest.raises(InputError, match="'Lost' holds a number that is not finite"):
-            job.export(job.Request(recenter=recenter))
+            jobs.export(Job(recenter=recenter))
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
@@ -302,7 +303,7 @@ def test_materials_that_ask_where_they_are_are_the_same_on_both_sides_and_told(
         cube.data.materials.append(material)
         cube.pass_index = number
     add_lamp("SUN", rotation=(0.3, 0.4, 0), angle=0.0)
-    exported = job.export_and_render(job.Request(level="direct", samples=1, recenter=True, threads=2), [tmp_path / "0.exr"])
+    exported = jobs.both_sides(Job(level="direct", samples=1, recenter=True, threads=2), [tmp_path / "0.exr"])
     (theirs,) = (passes["Diffuse Color"] for passes in read_passes([tmp_path / "0.exr"]))
     ours = render(exported, "direct", 1, threads=2)["Diffuse Color"]
     assert np.percentile(np.abs(ours - theirs), 99.5) <= 1e-6 and theirs.max() > 0.01

@@ -32,11 +32,13 @@ class TileSampler {
 
     // samples: of each pixel, at most. error: the standard error that is wanted of each pixel's Combined, scene-linear: the root
     // of the mean of its channels' variances; 0 for the same number of samples everywhere.
-    TileSampler(const Scene& scene, const Bounces& bounces, uint32_t seed, uint32_t samples, double error)
-        : integrator_(scene, bounces, seed, int(samples)), filter_(scene.illumination.filter, scene.illumination.filter_width), film_(scene.illumination.film),
+    // coincident: as of PathIntegrator.
+    TileSampler(const Scene& scene, const Bounces& bounces, uint32_t seed, uint32_t samples, double error, double coincident)
+        : integrator_(scene, bounces, seed, int(samples), coincident), filter_(scene.illumination.filter, scene.illumination.filter_width), film_(scene.illumination.film),
           samples_(samples), error_(error), camera_(scene.camera) {}
 
     const Camera& camera() const { return camera_; }
+    const PathIntegrator& integrator() const { return integrator_; }
     // Traces the tile whose lowest row and first column are given. `*stop`, if there is one, ends it early.
     void trace(uint32_t row, uint32_t column, const ViewcamLightPasses& passes, const volatile int* stop) const {
         Tile tile{row, column, std::min(TILE, camera_.height - row), std::min(TILE, camera_.width - column), {}};

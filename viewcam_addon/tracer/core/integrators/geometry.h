@@ -66,6 +66,40 @@ inline void write_geometry(const Scene& scene, const Ray* rays, const Hit* hits,
     passes.write(VIEWCAM_MAGNITUDE, at, some, [&](int i) { return max(max_component(abs(scene.origin + met_by[i]->origin)), magnitudes[i]); });
 }
 
+// How much the UV and the normal of what the eye's ray through a place in the picture meets change with each pixel: of its own plane,
+// triangle or sphere, whatever lies beside it. The root of the sum of both axes' squares, which no direction exceeds. Of a flat triangle
+// the rounding of its corners turns the normal, too, by what a shift of the picture is of its height in pixels.
+inline void slopes_at(const Scene& scene, double column, double row, const Hit& hit, double& uv, double& normal) {
+    constexpr double STEP = 0x1p-16, FLAT = 1e-6;  // no triangle that shows is so small, and float64 has 20 digits to spare
+    const Ray rays[] = {scene.camera.ray(column, row), scene.camera.ray(column - STEP, row), scene.camera.ray(column + STEP, row),
+                        scene.camera.ray(column, row - STEP), scene.camera.ray(column, row + STEP)};
+    const Ray* met_by[] = {&rays[0], &rays[1], &rays[2], &rays[3], &rays[4]};
+    const Hit hits[] = {hit, hit, hit, hit, hit};
+    Interaction found[5];
+    scene.interactions(met_by, hits, 5, found);
+    uv = normal = 0;
+    for (int axis = 0; axis < 2; axis++) {
+        double of_uv = 0, of_normal = 0;
+        for (int side = 1; side < 3; side++) {
+            const Interaction& beside = found[2 * axis + side];
+            Vec2 moved{beside.uv.x - found[0].uv.x, beside.uv.y - found[0].uv.y};
+            of_uv = max(of_uv, moved.x * moved.x + moved.y * moved.y);
+            Vec3 turned = beside.shading - found[0].shading;
+            if (beside.t < INFINITE) of_normal = max(of_normal, dot(turned, turned));  // not of a ray that a sphere's rim is beside
+        }
+        uv += of_uv, normal += of_normal;
+    }
+    uv = std::sqrt(uv) / STEP, normal = std::sqrt(normal) / STEP;
+    Vec3 smooth = found[0].shading - found[0].normal;
+    if (scene.triangle_count(hit.object) && dot(smooth, smooth) < FLAT * FLAT) {
+        Vec3 corner[3];
+        scene.corners(hit.object, hit.primitive, corner);
+        Vec3 first = corner[1] - corner[0], second = corner[2] - corner[0], third = corner[2] - corner[1];
+        double longest = max(length(first), max(length(second), length(third)));
+        normal += longest / length(cross(first, second)) * hit.t / max(scene.camera.distance.x, scene.camera.distance.y);
+    }
+}
+
 // trace(rays, pixels, count) for the pixel centres of some rows, from the bottom, in blocks of 16 × 4, as many columns as fill the
 // cache lines of the passes; `*stop`, if there is one, ends it early.
 template <class Trace> void for_pixel_centers(const Camera& camera, uint32_t begin, uint32_t end, const volatile int* stop, const Trace& trace) {

@@ -19,8 +19,15 @@
 // no last ray, without either one ray a sample. What a path brings depends on its own numbers alone, and is added up in an order
 // of its own: whichever paths go along with it, and whether rays are traced in packets, changes no bit.
 //
+// Which of several surfaces in one place a ray of a float32 renderer meets, and which of them shadows the other, is its rounding's
+// choice. What light depends on that can be asked for: then that alone counts which comes by such a place, as much of it as all
+// surfaces there would scatter, none of which shadows another. No choice of a renderer's brings more, and any brings at least nothing.
+//
 // Rejected: splitting a path at glass, which makes work where light is faint.
 #pragma once
+#include <map>
+#include <mutex>
+
 #include "../film/film.h"
 #include "../lights/light_sampler.h"
 #include "../samplers/sobol.h"
@@ -48,9 +55,10 @@ class PathIntegrator {
    public:
     static constexpr int MOST = 64;  // paths at a time
 
-    // bounces: of the scene, or none at level `direct`.
-    PathIntegrator(const Scene& scene, const Bounces& bounces, uint32_t seed, int samples)
-        : scene_(scene), lights_(scene), sampler_(seed, samples, std::min(bounces.total, 15) + 1) {
+    // bounces: of the scene, or none at level `direct`. coincident: 0 for all light, or how many of float32's roundings apart
+    // surfaces are in one place, for what comes by these alone.
+    PathIntegrator(const Scene& scene, const Bounces& bounces, uint32_t seed, int samples, double coincident)
+        : scene_(scene), lights_(scene), sampler_(seed, samples, std::min(bounces.total, 15) + 1), coincident_(coincident) {
         most_ = bounces.total + 1;
         most_of_[DIFFUSE] = bounces.diffuse + 1;
         most_of_[GLOSSY] = bounces.glossy + 1;
@@ -77,6 +85,11 @@ class PathIntegrator {
 
     const SobolSampler& sampler() const { return sampler_; }
     const Scene& scene() const { return scene_; }
+    // Two objects, which may be one, that paths have met in one place, and how often.
+    std::map<std::pair<uint32_t, uint32_t>, uint64_t> coincident_pairs() const {
+        std::lock_guard lock(mutex_);
+        return pairs_;
+    }
 
     // Whether paths through the same point of the film may bring different light.
     bool is_random() const {
@@ -111,6 +124,7 @@ class PathIntegrator {
         int sample, from;
         Category category = COLOR;
         RayKind kind = CAMERA;
+        bool coincident = false;             // whether it has met surfaces in one place
         bool last = false, through = false;  // through: whether light from behind counts where it leaves
         bool diffuse = false;                // what its ray was scattered by
         int passed = 0;                      // surfaces that it has gone straight through
@@ -132,7 +146,7 @@ class PathIntegrator {
         Vec3 light, other;  // other: of what is not diffuse where the eye sees it
     };
     struct Block {
-        PathLight* light;
+        PathLight *light, ignored;
         int live = 0, lit[LightSampler::ASKED] = {};
         Path paths[MOST], onwards[MOST];
         Interaction tables[2][MOST], *points = tables[0], *next_points = tables[1];
@@ -146,6 +160,50 @@ class PathIntegrator {
     static Category after(Category category, bool is_diffuse, int depth) {
         if (depth == 1) return is_diffuse ? DIRECT : OTHER;
         return depth == 2 && category == DIRECT ? INDIRECT : category;
+    }
+
+    // What a path's light is added to.
+    PathLight& light_of(const Path& path, Block& block) const {
+        return coincident_ > 0 && !path.coincident ? block.ignored : block.light[path.sample];
+    }
+    // By how much rounding may move a surface along a ray that meets it, in world units. size: of what is rounded.
+    double coincident_reach(double size, double cosine) const {
+        constexpr double FLOAT32 = 0x1p-24, GRAZED = 0.05;
+        return coincident_ * FLOAT32 * size / larger(cosine, GRAZED);
+    }
+    // Where several surfaces lie in the place of what a path has met: one of them, by chance, in the place of all.
+    [[gnu::noinline]] void meet_coincident(Path& path, const Ray& ray, Hit& hit, Interaction& point, const CameraSample& sample, int depth) const {
+        constexpr double PARALLEL = 0.1;
+        static thread_local std::vector<Hit> hits;
+        const Ray* met_by = &ray;
+        Interaction met;
+        double magnitude, unit = length(ray.direction);
+        scene_.interactions(&met_by, &hit, 1, &met, &magnitude);
+        double reach = coincident_reach(magnitude + met.t * unit, met.cosine);
+        scene_.surfaces({ray.origin, ray.direction, larger(met.t - reach / unit, ray.t_min), met.t + reach / unit}, path.kind, INFINITE, hits);
+        // Where surfaces cross at an angle, that is as wide as rounding: no matter.
+        if (hits.size() > 1) std::erase_if(hits, [&](const Hit& other) { return length(cross(scene_.interaction(ray, other).normal, met.normal)) > PARALLEL; });
+        if (hits.size() < 2) return;
+        path.coincident = true;
+        {
+            std::lock_guard lock(mutex_);
+            for (size_t i = 1; i < hits.size(); i++) pairs_[std::minmax(hits[0].object, hits[i].object)]++;
+        }
+        // Any number does that the sampler does not use for anything else.
+        uint32_t chosen = ((sample.pixel * 0x9e3779b9u ^ sample.number) * 0x85ebca6bu ^ uint32_t(depth)) * 0xc2b2ae35u >> 16;
+        hit = hits[chosen % hits.size()];
+        point = scene_.interaction(ray, hit);
+        point.offset = larger(point.offset, 2 * reach * larger(point.cosine, 0.0));
+        path.weight = min(path.weight * double(hits.size()), MOST_WEIGHT);
+    }
+    // How far before its light a shadow ray must end, so that nothing in the light's place counts; 0 where nothing is there.
+    [[gnu::noinline]] double coincident_end(const Interaction& point, const LightSample& light) const {
+        static thread_local std::vector<Hit> hits;
+        if (!(light.distance < INFINITE)) return 0;
+        double largest = max_component(abs(point.position + scene_.origin)) + light.distance;
+        double reach = coincident_reach(largest, light.cosine);
+        scene_.surfaces({point.position, light.direction, larger(light.distance - reach, 0.0), light.distance + reach}, SHADOW, INFINITE, hits);
+        return hits.size() > 1 ? reach : 0;
     }
 
     const Material& material(const Interaction& point) const { return scene_.illumination.materials[point.material]; }
@@ -197,8 +255,9 @@ class PathIntegrator {
     // Takes a path from the first surface that its ray meets through all that lets it through, and adds what shines there. Whether it
     // is scattered at `point`, where it then is. depth: how often it has been scattered.
     bool follow(Path& path, Ray ray, Hit hit, Interaction& point, const CameraSample& sample, int depth, Block& block) const {
-        PathLight& light = block.light[path.sample];
         for (double u = -1;;) {
+            if (coincident_ > 0) meet_coincident(path, ray, hit, point, sample, depth + path.passed);
+            PathLight& light = light_of(path, block);
             const Material& made_of = material(point);
             ShadingPoint at = arriving(point, path, depth);
             if (made_of.emits() && (!shadow_linked_ || path.kind == CAMERA || scene_.objects[point.object].shadow_rays == SHADOW))
@@ -206,7 +265,7 @@ class PathIntegrator {
             if (has_ended(path)) return false;
             if (!made_of.is_transparent()) return made_of.scatters() && !path.last;
             BSDF bsdf = made_of.bsdf(at);
-            if (path.kind == CAMERA) light.add(COLOR, path.weight * bsdf.diffuse_color());
+            if (path.kind == CAMERA) block.light[path.sample].add(COLOR, path.weight * bsdf.diffuse_color());
             if (!passes(path, bsdf, sample, depth, u)) return made_of.scatters() && !path.last;
             ray.t_min = hit.t;
             hit = scene_.closest(ray, path.kind);
@@ -225,14 +284,14 @@ class PathIntegrator {
         LightRay seen{ray.origin, ray.direction / size, ray.t_min * size, smaller(ray.t_max, hit.t) * size, !hit, path.kind == CAMERA ? scene_.camera.t_min * size : 0};
         Vec3 radiance = path.kind == CAMERA ? lights_.le(seen, CAMERA)
                                             : lights_.le(seen, path.kind, block.points[path.from], path.pdf, depth == 1, path.through);
-        block.light[path.sample].add(path.kind == CAMERA ? EMISSION : path.category, path.weight * radiance);
+        light_of(path, block).add(path.kind == CAMERA ? EMISSION : path.category, path.weight * radiance);
     }
     // Adds what lights with blockers of their own bring along a path's ray: whatever else it meets, only these stand before them.
     [[gnu::noinline]] void meet_shadow_linked(const Path& path, int depth, Block& block) const {
         const Interaction& from = block.points[path.from];
         RayState state{SHADOW, false, false, depth, path.passed, path.scattered, 0, path.width};
         auto add = [&](Vec3 light, double distance, double cosine, RayKind shadow_rays) {
-            if (!is_black(light)) block.light[path.sample].add(path.category, light * unoccluded(shadow_ray(from, {path.ray.direction, distance, {}, 0, cosine}), shadow_rays, state));
+            if (!is_black(light)) light_of(path, block).add(path.category, light * unoccluded(shadow_ray(from, {path.ray.direction, distance, {}, 0, cosine}), shadow_rays, state));
         };
         Ray ray = path.ray;
         while (Hit hit = scene_.closest(ray, SHADOW_LINKED)) {
@@ -250,7 +309,7 @@ class PathIntegrator {
     }
     // Adds what the world brings to a path that leaves the scene.
     void leave(const Path& path, const Ray& ray, int depth, Block& block) const {
-        PathLight& light = block.light[path.sample];
+        PathLight& light = light_of(path, block);
         if (path.kind == CAMERA) {
             const auto& backdrop = scene_.illumination.backdrop;
             light.add(ENVIRONMENT, path.weight * (backdrop ? *backdrop : lights_.environment()).le(normalize(ray.direction), CAMERA));
@@ -292,7 +351,7 @@ class PathIntegrator {
             Path& path = block.paths[met];  // the rest is known when it is scattered
             path.sample = i, path.from = met;
             path.category = COLOR, path.kind = CAMERA, path.last = path.diffuse = false, path.pdf = INFINITE, path.passed = 0;
-            path.scattered = {}, path.inside = NONE, path.touches = false;
+            path.scattered = {}, path.inside = NONE, path.touches = path.coincident = false;
             path.weight = {1, 1, 1};
             meet_lamps(path, rays[i], hits[i], 0, block);
             if (!hits[i]) {
@@ -405,12 +464,16 @@ class PathIntegrator {
         if (depth > 1) light.diffuse += light.other, light.other = {};
         light.diffuse = light.diffuse * sample.weight, light.other = light.other * sample.weight;
         if (is_black(light.diffuse) && is_black(light.other)) return;
+        double end = coincident_ > 0 && choice.light->mesh() ? coincident_end(point, sample) : 0;
+        if (coincident_ > 0 && !path.coincident && end == 0) return;
         int place = block.lit[choice.slot]++;
         bool traced = choice.light->casts_shadow;
         block.shadowed[choice.slot][place] = {path.sample, after(path.category, true, depth), traced, choice.light->shadow_rays, {SHADOW, false, false, depth, path.passed, path.scattered},
                                               light.diffuse * path.weight / choice.chance, light.other * path.weight / choice.chance};
         if (has_pixels_) block.shadowed[choice.slot][place].ray.width = at.footprint();
-        if (traced) block.shadow_rays[choice.slot][place] = shadow_ray(point, sample);
+        if (!traced) return;
+        Ray& ray = block.shadow_rays[choice.slot][place] = shadow_ray(point, sample);
+        if (end > 0) ray.t_max = larger(smaller(ray.t_max, sample.distance - end), 0.0);
     }
 
     // Sends the shadow rays, and adds the light that nothing hides.
@@ -521,6 +584,9 @@ class PathIntegrator {
     bool has_pixels_ = false;                         // whether materials ask how wide pixels are
     int most_passed_, ended_after_;                   // surfaces that shadow rays, and paths, go straight through
     uint32_t kinds_ = 0, spread_ = 0;  // of rays that any material scatters, and all over
+    double coincident_;                // roundings
+    mutable std::mutex mutex_;
+    mutable std::map<std::pair<uint32_t, uint32_t>, uint64_t> pairs_;
 };
 
 }  // namespace viewcam::VIEWCAM_ISA

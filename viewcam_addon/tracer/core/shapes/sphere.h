@@ -113,7 +113,7 @@ inline bool passes(const LocalRay& local, Vec3 center, double radius, double con
     return dot(way, d) < -doubt * (std::fabs(d.x) + std::fabs(d.y) + std::fabs(d.z)) || dot(beside, beside) > reach * reach * dot(d, d);
 }
 
-template <bool ANY> bool intersect_spheres(const Spheres& spheres, const Object& object, const Ray& ray, uint32_t number, Nearest& nearest) {
+template <bool ANY, class Found> bool intersect_spheres(const Spheres& spheres, const Object& object, const Ray& ray, uint32_t number, Found& nearest) {
     if (object.flat) return false;
     LocalRay local = object.to_object(ray);
     return traverse<ANY>(spheres.bvh, local, nearest.t, local.origin_error, [&](uint32_t leaf, BoxRay& box) {

@@ -104,7 +104,7 @@ class TriangleBvh {
     size_t bytes() const { return bvh.bytes() + blocks.size() * sizeof(Block); }
 
     // object: whose the triangles are, NONE where the blocks tell. origin_error: see LocalRay.
-    template <bool ANY> bool intersect(const Ray& ray, uint32_t object, Nearest& nearest, double origin_error = 0) const {
+    template <bool ANY, class Found> bool intersect(const Ray& ray, uint32_t object, Found& nearest, double origin_error = 0) const {
         BoxRay box;
         if (bvh.root == NOTHING || !enter(bvh, ray, nearest.t, origin_error, box)) return false;
         Shear shear(ray.direction, box);

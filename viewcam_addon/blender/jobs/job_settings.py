@@ -1,11 +1,11 @@
-"""What of the file's settings a batch changes for its time, and why.
+"""What of the file's settings jobs change for their time, and why.
 
 **For all of it.** One camera must be had: stereoscopy and the sequencer's strips would choose others, and markers are bound to
 cameras only while the scene's own is wanted, which Blender then chooses as it does in an animation.
 Files are the batch's own: the compositor's File Output nodes are muted. What Blender and Cycles have built is kept between
 shots (persistent_data.py), and no camera of the file follows a picture of another size (resolution.py).
 
-**For each shot**, what it says: engine, size, frame, samples, level. What it does not say is as the file has it.
+**For each job**, what it says: engine, size, frame, samples, level, seed, threads. What it does not say is as the file has it.
 """
 
 import dataclasses
@@ -15,15 +15,22 @@ from pathlib import Path
 import bpy
 
 from ... import intrinsics
-from ...jobs.shot import Shot
+from ...jobs.job import Job
 from .. import datablocks, resolution, versions
 from ..rendering.engine import VIEWCAM_RenderEngine
 from ..temporary_settings import Overrides
 from . import origins, persistent_data, pictures
 
-_ENGINES = {"CYCLES": "CYCLES", "EEVEE": versions.EEVEE, "VIEWCAM": "VIEWCAM"}
+_ENGINES = {"CYCLES": "CYCLES", "EEVEE": versions.EEVEE, "VIEWCAM": "VIEWCAM", "WORKBENCH": "BLENDER_WORKBENCH"}
 
-_OF_RENDER = ("engine", "resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y")
+_OF_RENDER = (
+    "engine",
+    "resolution_x",
+    "resolution_y",
+    "resolution_percentage",
+    "pixel_aspect_x",
+    "pixel_aspect_y",
+)
 
 
 def engine_name(engine: str) -> str:
@@ -31,16 +38,15 @@ def engine_name(engine: str) -> str:
     return next((ours for ours, theirs in _ENGINES.items() if theirs == engine), engine)
 
 
-class ShotSettings:
+class JobSettings:
     """A scene while a batch has it. warnings : a sentence for each thing that is another in a render by itself.
 
-    threads, seed : of all shots, the file's where None. off : what is off because the file is not trusted (opening.py).
+    off : what is off because the file is not trusted (opening.py).
     """
 
-    def __init__(
-        self, overrides: Overrides, scene: bpy.types.Scene, threads: int | None, seed: int | None, off: Iterable[str] = ()
-    ) -> None:
-        self._scene = scene
+    def __init__(self, overrides: Overrides, scene: bpy.types.Scene, off: Iterable[str] = ()) -> None:
+        self._scene, self._overrides, self.off = scene, overrides, tuple(off)
+        self._threads_mode_of_file = scene.render.threads_mode
         self.warnings = (*_warnings(scene), *(f"{sentence[:1].upper()}{sentence[1:]}" for sentence in off))
         render = scene.render
         overrides.afterwards(setattr, scene, "camera", scene.camera)
@@ -56,9 +62,6 @@ class ShotSettings:
         for node in _file_outputs(scene):
             overrides.set(node, "mute", True)
         pictures.override_formats(overrides, scene)
-        if threads:
-            overrides.set(render, "threads_mode", "FIXED")
-            overrides.set(render, "threads", threads)
         for camera_object in (each for each in scene.objects if each.type == "CAMERA"):
             overrides.enter(resolution.lens_kept(camera_object, scene))
         self._of_file = {owner_name: getattr(*owner_name) for owner_name in self._properties()}
@@ -67,20 +70,17 @@ class ShotSettings:
         self._frame_of_file = datablocks.frame_of(scene)
         self._time_of_file = (scene.frame_current, scene.frame_subframe)
         overrides.afterwards(self._go_to, *self._time_of_file)
-        if seed is not None:
-            for owner in _seeds(scene).values():
-                overrides.set(owner, "seed", seed)
 
     @property
     def engine(self) -> str:
         """The name of the engine that renders."""
         return engine_name(self._scene.render.engine)
 
-    def engine_of(self, shot: Shot) -> str:
+    def engine_of(self, shot: Job) -> str:
         """The engine of a shot, as Blender calls it."""
         return _ENGINES[shot.engine] if shot.engine else self._of_file[self._scene.render, "engine"]
 
-    def frame_of(self, shot: Shot) -> intrinsics.Frame:
+    def frame_of(self, shot: Job) -> intrinsics.Frame:
         """The picture of a shot."""
         said: dict[str, float] = {}
         if shot.width is not None:
@@ -89,7 +89,7 @@ class ShotSettings:
             said |= _pixel_aspects(shot.pixel_aspect)
         return dataclasses.replace(self._frame_of_file, **said)
 
-    def set(self, shot: Shot) -> None:
+    def set(self, shot: Job) -> None:
         """Set the scene to a shot, but for its camera. What stands so already is not touched, so that nothing is built anew."""
         wanted = self._of_file | dict(self._said(shot))
         changed = [(owner, name) for (owner, name), value in wanted.items() if getattr(owner, name) != value]
@@ -97,7 +97,17 @@ class ShotSettings:
             setattr(owner, name, wanted[owner, name])
         if _samples(self._scene).get("CYCLES") in changed:
             persistent_data.drop(self._scene)
+        self._set_threads(shot.threads)
         self._go_to(*(self._time_of_file if shot.frame is None else (shot.frame, 0.0)))
+
+    def _set_threads(self, threads: int | None) -> None:
+        """As many as a job asks for, those of the file where None. Of automatic ones the file's number reads as another."""
+        render = self._scene.render
+        if threads is None:
+            render.threads_mode = self._threads_mode_of_file
+        elif render.threads_mode != "FIXED" or render.threads != threads:
+            self._overrides.set(render, "threads_mode", "FIXED")
+            self._overrides.set(render, "threads", threads)
 
     def scene_camera(self, frame: int | None = None) -> str | None:
         """The name of the scene's own camera at a frame, that of the file where None; None if it has none."""
@@ -122,7 +132,7 @@ class ShotSettings:
             self._scene.frame_set(frame, subframe=subframe)
             persistent_data.drop(self._scene)
 
-    def _said(self, shot: Shot) -> Iterator[tuple[tuple[bpy.types.bpy_struct, str], object]]:
+    def _said(self, shot: Job) -> Iterator[tuple[tuple[bpy.types.bpy_struct, str], object]]:
         """What a shot sets, by owner and name of the property."""
         scene, render = self._scene, self._scene.render
         engine = self.engine_of(shot)
@@ -138,6 +148,9 @@ class ShotSettings:
             yield samples[engine], shot.samples
             if engine == "CYCLES":
                 yield (scene.cycles, "use_layer_samples"), "IGNORE"
+        if shot.seed is not None:
+            for owner in _seeds(scene).values():
+                yield (owner, "seed"), shot.seed
         if shot.level is not None:
             yield (scene.virtual_pinhole_reference, "level"), shot.level.upper()
 
@@ -148,6 +161,7 @@ class ShotSettings:
         yield from _samples(scene).values()
         if hasattr(scene, "cycles"):
             yield scene.cycles, "use_layer_samples"
+        yield from ((owner, "seed") for owner in _seeds(scene).values())
         yield scene.virtual_pinhole_reference, "level"
 
     def rendered(self, by_engine: bool = True) -> dict[str, object]:

@@ -10,22 +10,22 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from viewcam_addon.errors import InputError
-from viewcam_addon.jobs import names
+from viewcam_addon.jobs import job, names
+from viewcam_addon.jobs.job import FIELDS, Job
 from viewcam_addon.jobs.problems import ShotsError
-from viewcam_addon.jobs.shot import Shot
 
 FOUR = {"eye": (1.0, 2.0, 3.0), "look_at": (0.0, 0.0, 0.0), "up": (0.0, 0.0, 1.0), "d": 400.0}
 
 
 def test_a_shot_keeps_plain_numbers_whatever_it_is_given():
-    shot = Shot("a", np.array([1, 2, 3]), [0, 0, 0], (0, 0, np.float32(1)), 400, width=np.int64(64), height=36.0)
-    assert shot == Shot("a", **FOUR, width=64, height=36)
+    shot = Job("a", np.array([1, 2, 3]), [0, 0, 0], (0, 0, np.float32(1)), 400, width=np.int64(64), height=36.0)
+    assert shot == Job("a", **FOUR, width=64, height=36)
     assert all(type(number) is float for number in (*shot.eye, *shot.look_at, *shot.up, shot.d))
     assert type(shot.width) is int and type(shot.height) is int
 
 
 def test_a_shot_and_its_problems_travel_to_other_processes():
-    shot, error = Shot("a", camera="Camera"), ShotsError("list.csv", ("line 1: wrong", "line 2: wrong"))
+    shot, error = Job("a", camera="Camera"), ShotsError("list.csv", ("line 1: wrong", "line 2: wrong"))
     assert pickle.loads(pickle.dumps(shot)) == shot
     assert str(pickle.loads(pickle.dumps(error))) == str(error)
 
@@ -41,7 +41,6 @@ def test_a_shot_and_its_problems_travel_to_other_processes():
         ({"eye": (1e39, 0, 0)}, "3.40282e"),
         ({"camera": "Camera"}, "either a camera"),
         ({"eye": None}, "eye of the shot 'a': missing"),
-        ({"name": None}, "missing, give each shot a name"),
         ({"width": 64}, "height of the shot 'a': missing"),
         ({"width": 64.5, "height": 36}, "whole number from 4 to 65536"),
         ({"frame": True}, "give a number"),
@@ -50,9 +49,9 @@ def test_a_shot_and_its_problems_travel_to_other_processes():
     ],
 )
 def test_a_shot_that_can_not_be_is_refused(changes, sentence):
-    Shot("a", **FOUR)
+    Job("a", **FOUR)
     with pytest.raises(InputError, match=sentence):
-        Shot(**{"name": "a", **FOUR, **changes})
+        Job(**{"name": "a", **FOUR, **changes})
 
 
 @given(st.text(max_size=40))
@@ -87,14 +86,14 @@ def test_a_name_that_is_taken_is_one_of_a_file(tmp_path_factory, name):
 )
 def test_a_name_that_some_system_does_not_take_is_refused(name):
     with pytest.raises(InputError, match=r"name is .*, which .*: "):
-        Shot(name, **FOUR)
+        Job(name, **FOUR)
 
 
 @pytest.mark.parametrize(
     "name", ["COM10", "console", "com", "a.con", "summary.left", "summary-1", "left-1-of-2", "α", "a'b", "50%", "{x}"]
 )
 def test_a_name_that_only_looks_like_a_device_or_is_merely_odd_is_taken(name):
-    assert Shot(name, **FOUR).name == name
+    assert Job(name, **FOUR).name == name
 
 
 @pytest.mark.parametrize(("one", "other"), [("Left", "lEFT"), ("é", "e\u0301"), ("É", "e\u0301"), ("straße", "STRASSE")])
@@ -103,6 +102,4 @@ def test_names_that_are_one_file_somewhere_are_known(one, other):
 
 
 def test_every_field_has_a_check():
-    from viewcam_addon.jobs.shot import FIELDS
-
-    assert [field.name for field in dataclasses.fields(Shot)] == list(FIELDS)
+    assert {field.name for field in dataclasses.fields(Job)} == FIELDS.keys() | job._MORE.keys()

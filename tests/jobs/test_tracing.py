@@ -1,4 +1,4 @@
-"""The comparer: right pictures pass, those of a wrong camera don't, and nothing of one shot shows in the verdict on the next.
+"""The tracer's process: right pictures pass, those of a wrong camera don't, and nothing of one shows in the next verdict.
 
 Cycles' side is traced here, with the camera that Blender is made to have.
 """
@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from viewcam_addon import child_process, image
 from viewcam_addon.errors import InputError
-from viewcam_addon.jobs.comparer import Comparer
+from viewcam_addon.jobs.job import Job
+from viewcam_addon.jobs.tracing import Tracing
 from viewcam_addon.pinhole import Pinhole
 from viewcam_addon.tracer.render import render
 from viewcam_addon.tracer.scene import Mesh, Object, Scene, Spheres, scene_file
@@ -77,6 +78,14 @@ def picture(tmp_path):
         return path
 
     return take
+
+
+class Comparer(Tracing):
+    """The process, asked for pictures of geometry alone."""
+
+    def verdict(self, scene, image, camera, clip, stated=None):
+        found = self.compare(scene, [image], Job(level="geometry"), camera, clip, stated, may_be_empty=True)
+        return {"passed": found["passed"], "verdict": found["sentence"], "figures": found["figures"]}
 
 
 @pytest.fixture(scope="module")
@@ -203,7 +212,7 @@ def test_a_comparer_that_was_lost_is_started_again(scene_path, picture):
     with Comparer() as comparer:
         assert comparer.verdict(scene_path, taken, CAMERA, CLIP)["passed"]
         comparer._server._process.end()
-        with pytest.raises(child_process.ProcessEnded, match="the comparer has ended"):
+        with pytest.raises(child_process.ProcessEnded, match="the tracer's process has ended"):
             comparer.verdict(scene_path, taken, CAMERA, CLIP)
         assert comparer.verdict(scene_path, taken, CAMERA, CLIP)["passed"]
 

@@ -7,9 +7,10 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from viewcam_addon.blender.rendering import job
+from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.scenes import export_geometry, images
 from viewcam_addon.errors import InputError
+from viewcam_addon.jobs.job import Job
 
 
 @pytest.fixture
@@ -30,7 +31,7 @@ def blend(scene, camera_object, tmp_path):
 
 def fails(request, words):
     with pytest.raises(InputError) as caught:
-        job.export(request)
+        jobs.export(request)
     message = str(caught.value)
     assert words in message and "\n" not in message, message
 
@@ -40,7 +41,7 @@ def test_a_file_is_exported_as_it_is(blend, compress):
     path = blend(compress=compress)
     before = path.read_bytes()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    exported = job.export(job.Request(path))
+    exported = jobs.export(Job(blend=path))
     assert [placed.name for placed in exported.objects] == ["Cube"]
     assert (exported.camera.width, exported.camera.height) == (160, 120)
     assert exported.stated_camera.eye == (0, -0.5, 6) and exported.stated_camera.distance == (180, 180)
@@ -55,7 +56,7 @@ def test_scripts_of_a_file_do_not_run(blend, scene, tmp_path):
     bpy.data.objects["Cube"].driver_add("location", 0).driver.expression = f"open({str(witness)!r}, 'w') and 3"
     path = blend()
     witness.unlink(missing_ok=True)
-    exported = job.export(job.Request(path))
+    exported = jobs.export(Job(blend=path))
     assert not witness.exists() and exported.objects[0].matrix[0, 3] == 0
 
 
@@ -63,7 +64,7 @@ def test_another_camera_by_its_name(blend, add_camera, scene):
     other = add_camera("Other")
     other.location = (1, 2, 9)
     scene.camera = bpy.data.objects["Camera"]
-    exported = job.export(job.Request(blend(), camera="Other"))
+    exported = jobs.export(Job(blend=blend(), camera="Other"))
     assert exported.camera.eye == (1, 2, 9) and exported.stated_camera is None
 
 
@@ -74,15 +75,15 @@ def test_the_camera_of_a_frames_marker(blend, add_camera, scene):
     for name, frame in (("Camera", 1), ("Other", 20)):
         scene.timeline_markers.new(name, frame=frame).camera = bpy.data.objects[name]
     path = blend()
-    assert job.export(job.Request(path, frame=25)).camera.eye == (1, 2, 9)
-    assert job.export(job.Request(path, frame=5)).camera.eye[2] == 6
-    assert job.export(job.Request(path, frame=25, camera="Camera")).camera.eye[2] == 6
+    assert jobs.export(Job(blend=path, frame=25)).camera.eye == (1, 2, 9)
+    assert jobs.export(Job(blend=path, frame=5)).camera.eye[2] == 6
+    assert jobs.export(Job(blend=path, frame=25, camera="Camera")).camera.eye[2] == 6
 
 
 @pytest.mark.parametrize("size", [(320, 240), (80, 60), (200, 60), (60, 200)])
 def test_another_size_shows_the_same_and_is_stated_so(blend, scene, size):
     path = blend()
-    exported = job.export(job.Request(path, size=size))
+    exported = jobs.export(Job(blend=path, width=size[0], height=size[1]))
     camera, stated = exported.camera, exported.stated_camera
     assert (camera.width, camera.height) == (stated.width, stated.height) == size
     assert camera.distance == pytest.approx((180 * max(size) / 160,) * 2, rel=1e-6)
@@ -103,7 +104,7 @@ def test_another_size_of_a_keyed_zoom_and_distance_shows_the_same(blend, both_si
         group.distance, group.zoom = distance, distance / 200
         group.keyframe_insert("distance", frame=frame)
         group.keyframe_insert("zoom", frame=frame)
-    both = both_sides(blend=blend(), frame=11, size=(80, 60))
+    both = both_sides(blend=blend(), frame=11, width=80, height=60)
     both.check()
     exported = both.exported
     assert exported.camera.distance == pytest.approx((225, 225), rel=1e-6)
@@ -112,14 +113,14 @@ def test_another_size_of_a_keyed_zoom_and_distance_shows_the_same(blend, both_si
 
 def test_another_size_than_the_percentage_of_the_scene(blend, scene):
     scene.render.resolution_percentage = 33
-    exported = job.export(job.Request(blend(), size=(160, 120)))
+    exported = jobs.export(Job(blend=blend(), width=160, height=120))
     assert exported.stated_camera.distance == pytest.approx((180, 180), rel=1e-6)
     assert bpy.context.scene.render.resolution_percentage == 33
 
 
 def test_the_job_on_the_open_file_leaves_it_as_it_was(blend, scene):
     scene.frame_set(3, subframe=0.25)
-    job.export(job.Request(frame=8, size=(64, 64)))
+    jobs.export(Job(frame=8, width=64, height=64))
     assert (scene.frame_current, scene.frame_subframe, scene.render.resolution_x) == (3, 0.25, 160)
 
 
@@ -163,39 +164,37 @@ def test_a_missing_library_is_told(blend, scene):
     scene.collection.objects.link(target.objects[0])
     path = blend("linking.blend")
     library.unlink()
-    (entry,) = [entry for entry in job.export(job.Request(path)).ledger if entry.status == "skipped"]
+    (entry,) = [entry for entry in jobs.export(Job(blend=path)).ledger if entry.status == "skipped"]
     assert entry.object == "library.blend" and "is missing" in entry.reason
 
 
 def test_bad_files_and_cameras_are_one_sentence(blend, scene, camera_object, tmp_path):
     path = blend()
-    fails(job.Request(tmp_path / "none.blend"), "does not exist")
-    fails(job.Request(tmp_path), "does not exist")
+    fails(Job(blend=tmp_path / "none.blend"), "does not exist")
+    fails(Job(blend=tmp_path), "does not exist")
     (tmp_path / "text.blend").write_text("not a blend")
-    fails(job.Request(tmp_path / "text.blend"), "is not a .blend file")
+    fails(Job(blend=tmp_path / "text.blend"), "is not a .blend file")
     (tmp_path / "empty.blend").touch()
-    fails(job.Request(tmp_path / "empty.blend"), "is not a .blend file")
+    fails(Job(blend=tmp_path / "empty.blend"), "is not a .blend file")
     (tmp_path / "short.blend").write_bytes(path.read_bytes()[: path.stat().st_size // 2])
-    fails(job.Request(tmp_path / "short.blend"), "can't be opened")
-    fails(job.Request(path, camera="Nobody"), "has no object 'Nobody': its cameras are Camera")
-    fails(job.Request(path, camera="Cube"), "'Cube' is no camera")
-    fails(job.Request(path, frame=10**9), "beyond Blender's last")
-    fails(job.Request(path, size=(2, 2)), "can't render 2 × 2")
+    fails(Job(blend=tmp_path / "short.blend"), "can't be opened")
+    fails(Job(blend=path, camera="Nobody"), "has no camera 'Nobody': choose from Camera")
+    fails(Job(blend=path, camera="Cube"), "has no camera 'Cube'")
 
 
 @pytest.mark.parametrize(("kind", "words"), [("ORTHO", "orthographic"), ("PANO", "panoramic")])
 def test_cameras_that_are_no_pinholes_are_one_sentence(blend, camera_object, kind, words):
     camera_object.data.type = kind
-    fails(job.Request(blend()), words)
+    fails(Job(blend=blend()), words)
 
 
 def test_no_camera_and_impossible_values_are_one_sentence(blend, scene, camera_object):
     group = camera_object.virtual_pinhole
     group.look_at = group.eye
-    fails(job.Request(blend()), "the same point")
+    fails(Job(blend=blend()), "the same point")
     scene = bpy.context.scene
     scene.camera = None
-    fails(job.Request(blend()), "has no camera")
+    fails(Job(blend=blend()), "has no camera")
 
 
 def test_a_sheared_camera_is_one_sentence(blend, scene):
@@ -205,14 +204,14 @@ def test_a_sheared_camera_is_one_sentence(blend, scene):
     camera = scene.camera
     camera.virtual_pinhole.enabled = False
     camera.parent, camera.rotation_euler = parent, (0.5, 0.6, 0.7)
-    fails(job.Request(blend()), "oblique")
+    fails(Job(blend=blend()), "oblique")
 
 
 def test_a_folder_that_can_not_be_written_leaves_nothing(blend, tmp_path):
     path = blend()
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="can't be written"):
-        job.render(job.Request(path), tmp_path / "file" / "picture.exr")
+        jobs.cycles(Job(blend=path), tmp_path / "file" / "picture.exr")
 
 
 @pytest.mark.skipif(
@@ -227,7 +226,7 @@ def test_a_full_disk_leaves_no_partial_file(blend, scene, tmp_path):
         pytest.skip("no right to mount a file system here; tests/test_cli.py fills no disk and tests the same")
     try:
         with pytest.raises(InputError) as caught:
-            job.render(job.Request(path), small / "picture.exr")
+            jobs.cycles(Job(blend=path), small / "picture.exr")
         assert "\n" not in str(caught.value) and not list(small.iterdir()), caught.value
     finally:
         os.system(f"umount {small}")
@@ -237,7 +236,7 @@ def test_a_full_disk_leaves_no_partial_file(blend, scene, tmp_path):
 def test_a_picture_of_any_name_relative_to_the_working_folder(blend, tmp_path, monkeypatch, name):
     path = blend()
     monkeypatch.chdir(tmp_path)
-    job.render(job.Request(path), name)
+    jobs.cycles(Job(blend=path), name)
     assert (tmp_path / name).stat().st_size > 1000
     assert {each.name for each in (tmp_path / name).parent.iterdir()} <= {(tmp_path / name).name, path.name}
 
@@ -246,8 +245,8 @@ def test_render_and_export_tell_the_same(blend, camera_object, tmp_path):
     camera_object.data.dof.use_dof = True
     bpy.data.objects["Cube"].is_shadow_catcher = True
     path = blend()
-    told = job.render(job.Request(path), tmp_path / "picture.exr")
-    assert told == job.export(job.Request(path)).ledger
+    told = jobs.cycles(Job(blend=path), tmp_path / "picture.exr")
+    assert told == jobs.export(Job(blend=path)).ledger
     assert {entry.object: entry.status for entry in told} == {"Camera": "approximated", "Cube": "approximated"}
     assert (tmp_path / "picture.exr").stat().st_size > 1000
 
@@ -273,12 +272,12 @@ def paint(cube, lit_by):
 def test_for_the_least_level_a_scene_is_exported_once(blend, monkeypatch, lit_by, level, recenter):
     paint(bpy.data.objects["Cube"], lit_by)
     path = blend()
-    wanted = job.export(job.Request(path, level=level, recenter=recenter))
+    wanted = jobs.export(Job(blend=path, level=level, recenter=recenter))
     read = []
     for module, name in ((export_geometry, "mesh_of"), (images, "picture_of")):
         function = getattr(module, name)
         monkeypatch.setattr(module, name, lambda *given, f=function, name=name: read.append(name) or f(*given))
-    found = job.export(job.Request(path, level="auto", recenter=recenter))
+    found = jobs.export(Job(blend=path, level="auto", recenter=recenter))
     assert sorted(read) == ["mesh_of"] + ["picture_of"] * (level != "geometry"), read
     assert (found.ledger, list(found.materials), len(found.lamps)) == (wanted.ledger, list(wanted.materials), len(wanted.lamps))
 
@@ -288,8 +287,8 @@ def test_what_is_flattened_so_that_cycles_does_not_draw_it_gives_no_light(blend,
     paint(cube, "surface")
     cube.scale.z = 0
     scene.collection.objects.link(cube.copy())
-    request = job.Request(blend(), level="auto")
-    exported = job.export(request)
+    request = Job(blend=blend(), level="auto")
+    exported = jobs.export(request)
     assert not exported.materials and not exported.objects and not exported.geometries
     assert {entry.reason for entry in exported.ledger} == {"flattened by its scale, and Cycles does not draw it"}
-    assert job.render(request, tmp_path / "picture.exr") == exported.ledger
+    assert jobs.cycles(request, tmp_path / "picture.exr") == exported.ledger

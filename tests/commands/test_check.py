@@ -1,0 +1,114 @@
+"""`viewcam check` of many pictures: each a shot of a batch, with one page, one JUnit case each, and nothing lost by a kill."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+pytest.importorskip("bpy")
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from batch_folders import assert_same
+
+from viewcam_addon.cli import main
+from viewcam_addon.commands.verification import DEMO_SCENE
+
+ROOT = Path(__file__).parents[2]
+FLIGHT = DEMO_SCENE.with_name("flight.blend")
+CORNELL = DEMO_SCENE.with_name("cornell.blend")
+SMALL = ("--size", "64x36", "--threads", "1")
+LEVELS = {"geometry": (), "path": ("--level", "path", "--samples", "8", "--clay")}
+
+
+def check(*words):
+    return main(["check", *map(str, words)])
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--frames", "1..3", "--cameras", "*"), "--frames and --cameras say each which pictures"),
+        (("--cameras", "*", "--camera", "Camera"), "--cameras says the cameras itself"),
+        (("--frames", "1..3", "--frame", "2"), "--frame and --frames say both which frame"),
+        (("--frames", "1..3", "--difference", "a.png"), "--difference is a picture of one check"),
+        (("--frames", "1..3", "--resume"), "name their folder with --report"),
+        (("--frames", "3..1"), "frames 3..1 run backwards"),
+        (("--cameras", "Nobody*"), "no camera is called 'Nobody*'"),
+        (("--resume",), "--resume is for many checks"),
+        (("--workers", "2"), "--workers is for many checks"),
+    ],
+)
+def test_words_that_contradict_each_other_are_one_sentence(capfd, words, sentence):
+    assert check(CORNELL, *words) == 2
+    told = capfd.readouterr().err
+    assert sentence in told and told.count("\n") == 1, told
+
+
+@pytest.mark.slow
+def test_each_camera_is_a_shot_with_its_report_and_a_junit_case(tmp_path, capfd):
+    out, junit, result = tmp_path / "out", tmp_path / "a.xml", tmp_path / "a.json"
+    words = ("--cameras", "*", *SMALL, "--report", out, "--junit", junit, "--json", result)
+    assert check(CORNELL, *words) == 0
+    assert "1 shot, in " in capfd.readouterr().out
+    (sidecar,) = (path for path in out.glob("*.json") if path.name != "summary.json")
+    name, told = sidecar.stem, json.loads(sidecar.read_text(encoding="utf-8"))
+    assert told["check"]["passed"] and told["check"]["answer"] == "same" and told["check"]["level"] == "geometry"
+    assert told["report"] == [f"{name}.html", f"{name}.test.png"] and told["bytes"].keys() == set(told["report"])
+    assert "viewcam" not in (out / f"{name}.html").read_text(encoding="utf-8").partition("check cornell.blend")[0][-20:]
+    assert f'href="{name.replace(" ", "%20")}.html"' in (out / "contact-sheet.html").read_text(encoding="utf-8")
+    (case,) = ElementTree.parse(junit).getroot().iter("testcase")
+    assert case.get("name") == name and not [child for child in case if child.tag != "properties"]
+    assert json.loads(result.read_text(encoding="utf-8"))["counts"]["checked"] == 1
+    assert check(CORNELL, *words) == 2, "what is there is not written over"
+    assert "--resume continues" in capfd.readouterr().err
+    assert check(CORNELL, *words, "--resume") == 0
+    assert "1 of them kept" in capfd.readouterr().out
+
+
+@pytest.mark.slow
+def test_a_picture_that_differs_fails_its_case_and_the_command(tmp_path, monkeypatch):
+    from viewcam_addon.blender.jobs import stage
+
+    render, junit = stage.cycles.render, tmp_path / "a.xml"
+
+    def magnified(scene, layer, camera_object, *rest, **options):
+        lens = scene.camera.data.lens
+        scene.camera.data.lens = lens * 1.001
+        try:
+            render(scene, layer, camera_object, *rest, **options)
+        finally:
+            scene.camera.data.lens = lens
+
+    monkeypatch.setattr(stage.cycles, "render", magnified)
+    assert check(FLIGHT, "--frames", "1..2", *SMALL, "--junit", junit) == 1
+    suite = next(ElementTree.parse(junit).getroot().iter("testsuite"))
+    assert (suite.get("tests"), suite.get("failures")) == ("2", "2")
+    assert all("Not the same picture" in failure.get("message") for failure in suite.iter("failure"))
+
+
+@pytest.mark.exhaustive
+@pytest.mark.skipif(sys.platform == "win32", reason="processes are killed here as POSIX has it")
+@pytest.mark.parametrize("level", LEVELS)
+def test_killed_in_its_middle_and_continued_by_two_workers_it_is_the_same_byte_for_byte(tmp_path, level):
+    pytest.importorskip("distributed")
+    words = [sys.executable, "-m", "viewcam_addon", "check", FLIGHT, "--frames", "1..4", *SMALL, *LEVELS[level]]
+    variables = os.environ | {"PYTHONPATH": str(ROOT)}
+    alone, out = tmp_path / "alone", tmp_path / "out"
+    subprocess.run([*words, "--report", alone], env=variables, check=True)
+    with subprocess.Popen([*words, "--report", out], env=variables, start_new_session=True) as killed:
+        ends = time.monotonic() + 300
+        while not list(out.glob("frame_*.json")) and time.monotonic() < ends:
+            time.sleep(0.05)
+        os.killpg(killed.pid, signal.SIGKILL)
+    assert 1 <= len(list(out.glob("frame_*.json"))) < 4, "it was not killed in its middle"
+    junit = tmp_path / "a.xml"
+    subprocess.run([*words, "--report", out, "--resume", "--workers", "2", "--junit", junit], env=variables, check=True)
+    (out / ".viewcam.lock").unlink(missing_ok=True)
+    (alone / ".viewcam.lock").unlink(missing_ok=True)
+    assert_same(out, alone)
+    assert len(list(ElementTree.parse(junit).getroot().iter("testcase"))) == 4

@@ -1,0 +1,205 @@
+"""Floors in one place and leaves of a pixel, in one place too: any of them is a right answer, and nothing else is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from viewcam_addon.comparison import tolerances
+from viewcam_addon.comparison.geometry import compare
+from viewcam_addon.image import Image
+from viewcam_addon.pinhole import Pinhole
+from viewcam_addon.tracer.render import Tracer
+from viewcam_addon.tracer.scene import Mesh, Object, Scene
+
+# What moves each ray of the renderer on paper, in roundings: as in conftest.py.
+ROUNDINGS_OF_A_RENDERER = 0.35
+CAMERA = Pinhole((0.3, -4.0, 3.1), (0.1, 0.2, 0.0), (0.0, 0.0, 1.0), 150.0, 120, 80)
+FLOORS = ("Floor", "Carpet", "Tiles")
+HAIR = 3e-4
+
+
+def square(half, uv_scale=1.0, turned=False, materials=(0,)):
+    """A square of two triangles along one of its diagonals, once for each material."""
+    vertices = np.array([(-half, -half, 0), (half, -half, 0), (half, half, 0), (-half, half, 0)], float)
+    triangles = np.array([(1, 2, 3), (1, 3, 0)] if turned else [(0, 1, 2), (0, 2, 3)], np.int32)
+    corners = vertices[triangles]
+    return Mesh(
+        vertices=vertices,
+        triangles=np.tile(triangles, (len(materials), 1)),
+        materials=np.repeat(np.array(materials, np.int32), 2),
+        corner_uvs=np.tile((corners[..., :2] / half * uv_scale / 2).astype(np.float32), (len(materials), 1, 1)),
+    )
+
+
+def turned_by(seed, count, scale=1.0):
+    """(n, 4, 4): places over the floor, turned at random, facing the camera more or less."""
+    random = np.random.default_rng(seed)
+    matrices = np.tile(np.eye(4), (count, 1, 1))
+    for matrix in matrices:
+        towards = np.array([0.0, -0.5, 0.8]) + random.normal(0.0, 0.2, 3)
+        towards /= np.linalg.norm(towards)
+        side = np.cross(towards, random.normal(size=3))
+        side /= np.linalg.norm(side)
+        matrix[:3, :3] = scale * np.stack([side, np.cross(towards, side), towards], axis=1)
+        matrix[:3, 3] = *random.uniform(-1.4, 1.4, 2), random.uniform(0.05, 0.6)
+    return matrices
+
+
+def tilted(matrix, lift=0.0):
+    """About x and y, so that no plane is one of float32's own."""
+    a, b = 0.21, 0.13
+    about_x = np.array([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]])
+    about_y = np.array([[np.cos(b), 0, np.sin(b)], [0, 1, 0], [-np.sin(b), 0, np.cos(b)]])
+    placed = np.array(matrix)
+    placed[..., :3, :] = about_x @ about_y @ placed[..., :3, :]
+    placed[..., :3, 3] += lift * (about_x @ about_y)[:, 2]
+    return placed
+
+
+def a_scene(lift=0.0):
+    """Three floors in one place, the second one higher by `lift`; 150 leaves of about a pixel, each in two materials."""
+    geometries = {
+        "floor": square(2.0),
+        "carpet": square(1.9, 3.0),
+        "tiles": square(1.8, 2.0, turned=True),
+        "leaf": square(0.018, 0.5, materials=(0, 1)),
+    }
+    leaves = tilted(turned_by(1, 150))
+    return Scene(
+        CAMERA,
+        geometries,
+        (
+            Object("Floor", "floor", tilted(np.eye(4)), 1, (11,)),
+            Object("Carpet", "carpet", tilted(np.eye(4), lift), 2, (12,)),
+            Object("Tiles", "tiles", tilted(np.eye(4)), 3, (13,)),
+            Object("Leaves", "leaf", leaves, 4, (14, 15)),
+        ),
+    )
+
+
+def rendered(tracer, seed=0, off=0.0, within=1e-12):
+    """A float32 renderer's picture: each ray beside its place, of surfaces `within` a share of a depth any; all rays `off`."""
+    random = np.random.default_rng(seed)
+    rows, columns = (places.ravel() for places in np.mgrid[: CAMERA.height, : CAMERA.width])
+    shift = tolerances.ray_shift(CAMERA, tracer.surface_at(columns, rows))
+    shift[~np.isfinite(shift) | (shift > 1)] = np.median(shift)
+    dx, dy = ROUNDINGS_OF_A_RENDERER * shift * random.normal(size=(2, len(shift)))
+    rays, _, passes = tracer.surfaces_at(columns, rows, 0.5 + off + dx, 0.5 + dy, within)
+    first, counts = np.unique(rays, return_index=True, return_counts=True)[1:]
+    chosen = first + random.integers(0, counts)
+    size = (CAMERA.height, CAMERA.width, -1)
+    names = [name for name in passes if name not in ("Magnitude", "Facing", "UV Slope", "Normal Slope")]
+    return Image({name: passes[name][chosen].reshape(size) for name in names})
+
+
+@pytest.fixture(scope="module")
+def tracer():
+    return Tracer(a_scene(), 1)
+
+
+@pytest.fixture(scope="module")
+def reference(tracer):
+    return Image(tracer.render())
+
+
+def compared(reference, test, tracer):
+    return compare(reference, test, CAMERA, tracer.surfaces_at)
+
+
+def test_any_of_several_surfaces_in_one_place_is_right_and_the_objects_are_named(tracer, reference):
+    test = rendered(tracer)
+    found = compared(reference, test, tracer)
+    assert found.passed, "\n".join(found.lines())
+    pairs = found.in_one_place.pairs()
+    assert set(pairs) == {("Carpet", "Floor"), ("Carpet", "Tiles"), ("Floor", "Tiles"), ("Leaves", "Leaves")}
+    another = reference["Material Index"] != test["Material Index"]
+    assert sum(pairs.values()) == pytest.approx(another.sum(), abs=0.02 * another.sum())
+    assert "pixels show another of several surfaces in one place: " in found.sentence
+    assert found.to_json()["in_one_place"]["pixels"] == len(found.in_one_place.columns)
+
+
+def test_leaves_of_a_pixel_are_seen(reference):
+    """Else the other tests prove nothing of them."""
+    shown = reference["Object Index"][..., 0] == 4
+    lonely = tolerances.lonely(np.where(shown, 4, -1))
+    assert lonely.sum() > 0.5 * shown.sum() > 60
+
+
+def test_nothing_is_explained_without_the_scene(tracer, reference):
+    assert not compare(reference, rendered(tracer), CAMERA).passed
+
+
+def a_pixel_of(reference, index, aside=0):
+    rows, columns = np.nonzero(reference["Object Index"][..., 0] == index)
+    i = len(rows) // 2 + aside
+    return rows[i], columns[i]
+
+
+def harmed(test, name, where, change):
+    passes = {**test.passes, name: test[name].copy()}
+    passes[name][where] = change(passes[name][where])
+    return replace(test, passes=passes)
+
+
+def floors(test):
+    return np.isin(test["Object Index"][..., 0], (1, 2, 3))
+
+
+def leaves(test):
+    return test["Object Index"][..., 0] == 4
+
+
+def mixed_up(test):
+    """The carpet's index with the floor's material, UV and normal, in one pixel."""
+    rows, columns = np.nonzero(test["Material Index"][..., 0] == 11)
+    return harmed(test, "Object Index", (rows[len(rows) // 2], columns[len(rows) // 2]), lambda _: 2.0)
+
+
+def one_of(where):
+    def of(test):
+        rows, columns = np.nonzero(where(test))
+        return rows[len(rows) // 2], columns[len(rows) // 2]
+
+    return of
+
+
+FAULTS = {
+    "all rays off by 1e-3 px": lambda tracer, test: rendered(tracer, off=1e-3),
+    "an index that is not there, on a floor": lambda _, test: harmed(test, "Object Index", one_of(floors)(test), lambda _: 4.0),
+    "an index that is not there, on a leaf": lambda _, test: harmed(test, "Object Index", one_of(leaves)(test), lambda _: 1.0),
+    "one floor's index with another's material": lambda _, test: mixed_up(test),
+    "a normal flipped on a floor": lambda _, test: harmed(test, "Normal", one_of(floors)(test), lambda n: -n),
+    "a normal flipped on a leaf": lambda _, test: harmed(test, "Normal", one_of(leaves)(test), lambda n: -n),
+    "a UV off by 1e-4 on a floor": lambda _, test: harmed(test, "UV", one_of(floors)(test), lambda uv: uv + np.float32(1e-4)),
+    "the leaves' UV off by 1e-4": lambda _, test: harmed(test, "UV", leaves(test), lambda uv: uv + np.float32(1e-4)),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_sabotage_is_found_amid_surfaces_in_one_place(tracer, reference, fault):
+    test = FAULTS[fault](tracer, rendered(tracer))
+    found = compared(reference, test, tracer)
+    assert not found.passed, f"{fault} was not found:\n" + "\n".join(found.lines())
+
+
+@pytest.mark.parametrize("lift", [HAIR, -HAIR])
+def test_a_twin_that_is_moved_by_a_hair_is_found(tracer, reference, lift):
+    """In the picture alone, where it lies above or has vanished below; and in the scene alone, where it is not seen."""
+    moved = Tracer(a_scene(lift), 1)
+    of_moved = Image(moved.render())
+    assert compared(of_moved, rendered(moved), moved).passed
+    assert not compared(of_moved, rendered(tracer), moved).passed, "the scene's carpet is moved, the picture's is not"
+    if lift > 0:
+        assert not compared(reference, rendered(moved), tracer).passed, "the picture's carpet is moved, the scene's is not"
+
+
+def test_a_hair_is_beyond_tolerance_and_a_hundredth_of_it_within(tracer, reference):
+    """Where surfaces are a hundredth of it apart a renderer may see either; where they are one apart it may not."""
+    for lift, passes in (HAIR / 100, True), (HAIR, False):
+        moved = Tracer(a_scene(lift), 1)
+        assert compared(Image(moved.render()), rendered(moved, within=lift), moved).passed == passes
+    hit = reference["Depth"][..., 0] < 1e10
+    seen = {name: values[hit] for name, values in reference.passes.items()}
+    allowed = tolerances.ROUNDINGS[-1] * tolerances.depth_error(CAMERA, seen) * seen["Depth"][:, 0]
+    assert HAIR / 100 < np.median(allowed) < HAIR / 2

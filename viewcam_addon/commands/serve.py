@@ -1,0 +1,25 @@
+"""`viewcam serve`: for our own processes, and no command for people."""
+
+import argparse
+from pathlib import Path
+
+from ..jobs import plan, render_server
+from . import Result, blender_room, verification
+from .carry_out import carry_out
+
+
+def run(options: argparse.Namespace) -> Result:
+    """Do what another process wants.
+
+    what : a handle, for a Blender that renders and checks the jobs of the process that started it; or a file of jobs and how
+    they are carried out, as jobs.plan.write has written it.
+    """
+    if options.what.isdecimal():
+        render_server.serve(options.what, blender_room("jobs.renderer").BlenderRenderer)
+        return 0, {}
+    jobs, how, files = plan.read(Path(options.what))
+    if how is None:
+        options.json = plan.result_of(Path(options.what))
+        return verification.check_one(jobs[0], options, **files)
+    summary = carry_out(how, lambda _: jobs, options.events)
+    return summary.exit_status, summary.to_json()

@@ -1,0 +1,89 @@
+"""Light that depends on surfaces in one place: what of a picture is taken out of the comparison for it.
+
+Which of several surfaces in one place a ray of Cycles meets, and whether one of them shadows the other, is what float32
+rounds: a ray leaves a surface at the distance 0, leaves out that one triangle (`intersection_skip_self` in kernel/bvh/util.h),
+and meets another in the same place where Embree's rounding has it at a distance above 0. Rejected: doing what Cycles does,
+which would be Embree's arithmetic to the bit, with fused products or without, as the processor has them.
+
+So the tracer tells how much light comes by such surfaces, at most (core/integrators/path.h). Pixels of which that is a share to
+speak of are taken out; the others keep it as a tolerance.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..image import Image
+from . import noise
+from .sides import Sides, values_of
+from .tolerances import Array
+
+SAMPLES = 64
+"""Of each pixel: what they leave uncertain counts as noise of the reference."""
+
+# Of a pixel's light, from which on the pixel says nothing of the rest. Less is a tolerance. Chosen: with a smaller share more
+# pixels are taken out that could still tell larger faults, with a larger one some stay that can tell nothing else.
+_SHARE = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class CoincidentLight:
+    """The light that comes by surfaces in one place, at most.
+
+    light : its passes. pairs : two names in order of the alphabet → how often rays found these in one place.
+    """
+
+    light: Image
+    pairs: Mapping[tuple[str, str], int]
+
+    def of(self, sides: Sides) -> Array:
+        """(height, width): of a quantity, the largest of its channels."""
+        if sides.name == "Alpha":
+            return np.zeros(sides.broken.shape)
+        values = np.nan_to_num(values_of(self.light, sides.name))
+        return np.maximum(values, noise.mean_around(values)).max(axis=-1)
+
+    def share_out(self, combined: Sides) -> NDArray[np.bool_]:
+        """(height, width): the pixels that are taken out."""
+        light = self.of(combined)
+        return (light > 0.0) & (light >= _SHARE * combined.reference.max(axis=-1))
+
+    def without(self, sides: Sides, out: NDArray[np.bool_]) -> Sides:
+        """The sides, the same where pixels are taken out, and with the noise of this light."""
+        test = np.where(out[..., None], sides.reference, sides.test)
+        variance = sides.variance
+        if sides.name == "Combined":
+            variance = variance + np.nan_to_num(self.light["Variance"].astype(np.float64))
+        return replace(sides, test=test, variance=variance)
+
+
+MakeCoincidentLight = Callable[[], CoincidentLight]
+
+
+@dataclass(frozen=True, eq=False)
+class TakenOut:
+    """What was taken out of a comparison of light.
+
+    pixels : (height, width) bool, that show surfaces in one place, or are lit by them. pairs : as of CoincidentLight.
+    """
+
+    pixels: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((1, 1), bool))
+    pairs: Mapping[tuple[str, str], int] = field(default_factory=dict)
+
+    @property
+    def count(self) -> int:
+        return int(self.pixels.sum())
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(name for pair in self.pairs for name in pair))
+
+    def to_json(self) -> dict:
+        """As InOnePlace of geometry."""
+        return {
+            "pixels": self.count,
+            "share": float(self.pixels.mean()),
+            "pairs": [{"objects": list(pair)} for pair in self.pairs],
+        }

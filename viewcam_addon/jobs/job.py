@@ -1,0 +1,295 @@
+"""What is to be rendered or checked, and how: one record, which command line, panel, Python, tests and workers make alike.
+
+`FIELDS` has the check of each value alone, `conflicts` what values can't be together. A Job raises the first problem; a list
+of jobs (rows.py) asks both for all problems there are, with the place of each. To JSON and back is here and nowhere else.
+"""
+
+import dataclasses
+import math
+import os
+import shlex
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Self
+
+from .. import checks
+from ..errors import InputError
+from ..pinhole import Triple, check_distance
+from ..tracer.scene import film
+from . import names
+
+ENGINES = ("CYCLES", "EEVEE", "VIEWCAM", "WORKBENCH")
+TESTED = ("CYCLES", "EEVEE", "WORKBENCH")
+"""The engines that are compared with the tracer; all but Cycles by their geometry."""
+DEVICES = ("CPU", "CUDA", "OPTIX", "HIP", "ONEAPI", "METAL")
+LEVELS = (*film.LEVELS, "auto")
+
+# Blender's limits: RNA's of the resolution and of frames, Cycles' of samples and seeds, and the float32 in which a camera is
+# stored.
+_SIZES = (4, 65536)
+_FRAMES = (-1048574, 1048574)
+_SAMPLES = (1, 2**24)
+_SEEDS = (0, 2**31 - 1)
+_THREADS = (1, 1024)
+_ASPECTS = (1 / 200, 200.0)
+_LARGEST_FLOAT32, _SMALLEST_FLOAT32 = (2.0 - 2.0**-23) * 2.0**127, 2.0**-126
+
+FOUR_VALUES = ("eye", "look_at", "up", "d")
+BESIDE_THEM = ("principal_point", "pixel_aspect", "mirrored")
+
+
+@dataclass(frozen=True)
+class Job:
+    """One picture, to be rendered, labelled or checked; immutable and validated.
+
+    Parameters
+    ----------
+    name : of its files, without a suffix; a job alone needs none.
+    eye, look_at, up : three floats, world space; d : view-plane distance in pixels, > 0. All four, or `camera`.
+    camera : the name of a camera of the .blend, in place of the four values. Without either it is the scene's own at the frame,
+        which markers may bind.
+    width, height : pixels of the picture, both or none.
+    frame : whole.
+    engine : one of ENGINES, who renders.
+    samples : a pixel; of a check at a level of light those of all of Cycles' pictures together.
+    level : one of LEVELS, how much the tracer models.
+    principal_point : (c_x, c_y), where the view axis meets the picture, pixels from its left and bottom edge; its middle where
+        None.
+    pixel_aspect : width of a pixel over its height, from 1/200 to 200.
+    mirrored : whether the picture is. These three go with the four values, `principal_point` with a size as well.
+    blend : the path of the file; the one that is open where None.
+    trust : whether what is in the file may run and write.
+    seed : of all noise.
+    threads : to render and trace with, all where None.
+
+    Of a check:
+
+    error : the standard error of each of the tracer's pixels, scene-linear, in place of its samples.
+    device : one of DEVICES, what Cycles renders on.
+    clay : whether one matte material covers everything, on both sides.
+    recenter : whether both sides see the scene with its origin at the eye.
+    strict : whether anything that is not modelled is an error; of a check, anything in the picture.
+    scene : the path of the scene file that the engine must show, in place of what the .blend holds.
+
+    None stands for what the .blend or the command line says.
+
+    Raises
+    ------
+    InputError
+        if a value is not one of these, or beyond Blender's limits.
+    """
+
+    name: str = ""
+    eye: Triple | None = None
+    look_at: Triple | None = None
+    up: Triple | None = None
+    d: float | None = None
+    camera: str | None = None
+    width: int | None = None
+    height: int | None = None
+    frame: int | None = None
+    engine: str | None = None
+    samples: int | None = None
+    level: str | None = None
+    principal_point: tuple[float, float] | None = None
+    pixel_aspect: float | None = None
+    mirrored: bool | None = None
+    blend: str | None = None
+    trust: bool = False
+    seed: int | None = None
+    threads: int | None = None
+    error: float | None = None
+    device: str = "CPU"
+    clay: bool = False
+    recenter: bool = False
+    strict: bool = False
+    scene: str | None = None
+
+    def __post_init__(self) -> None:
+        for field, check in (FIELDS | _MORE).items():
+            if getattr(self, field) is not None and (field, getattr(self, field)) != ("name", ""):
+                object.__setattr__(self, field, check(field, getattr(self, field)))
+        for fields, sentence in conflicts({field: value for field in FIELDS if (value := getattr(self, field)) is not None}):
+            of = f" of the shot {checks.shown(self.name)}" if self.name else ""
+            raise InputError(f"{', '.join(fields)}{of}: {sentence}")
+
+    @property
+    def size(self) -> tuple[int, int] | None:
+        """(width, height) in pixels, None where it is the file's."""
+        return (self.width, self.height) if self.width is not None and self.height is not None else None
+
+    @property
+    def is_of_scenes_camera(self) -> bool:
+        """Whether the scene's own camera takes the picture."""
+        return self.camera is None and self.eye is None
+
+    def refuse_unchecked(self) -> None:
+        """Raise InputError if no such check can be made."""
+        if self.engine not in (None, *TESTED):
+            raise InputError(f"engine {self.engine} is the tracer itself: choose from {', '.join(TESTED)}")
+        if self.engine in (None, "CYCLES"):
+            return
+        if self.level not in (None, LEVELS[0]) or self.error:
+            raise InputError(f"--engine {self.engine} is checked at level geometry alone: leave --level and --error out")
+        if self.device != "CPU":
+            raise InputError(f"--device is for Cycles, and {self.engine} renders on what the graphics driver has: leave it out")
+
+    def listed(self) -> dict[str, Any]:
+        """The fields that a list of shots can have, those that are not None."""
+        return {field: value for field in FIELDS if (value := getattr(self, field)) is not None}
+
+    def check_words(self) -> str:
+        """The words of the command line that check this job alone, by the file's name and no more of its path."""
+        flags = [f"--{name}" for name in ("clay", "recenter", "strict", "trust") if getattr(self, name)]
+        size = ["--size", f"{self.width}x{self.height}"] if self.size else []
+        stated = self.to_json()
+        for name in ("camera", "frame", "engine", "device", "level", "samples", "error", "seed", "scene"):
+            size += [f"--{name}", str(stated[name])] if name in stated else []
+        return shlex.join(["check", Path(self.blend or "FILE.blend").name, *size, *flags])
+
+    def to_json(self) -> dict[str, Any]:
+        """The fields that are not as they are by default, as JSON can hold them."""
+        stated = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        return {name: value for name, value in stated.items() if value != type(self).__dataclass_fields__[name].default}
+
+    @classmethod
+    def from_json(cls, document: Mapping[str, Any]) -> Self:
+        """The job that `to_json` gave. Raises InputError as the class does, and for a key that it does not know."""
+        if unknown := [key for key in document if key not in cls.__dataclass_fields__]:
+            raise InputError(f"there is no option {unknown[0]!r} of a job: give some of {', '.join(cls.__dataclass_fields__)}")
+        return cls(**document)
+
+
+def conflicts(values: Mapping[str, object], in_list: bool = False) -> list[tuple[tuple[str, ...], str]]:
+    """What the values of one job can't be together: (fields, sentence) of each problem.
+
+    values : what is stated, by field; None where it is wrong already, and no more is to be told of it. in_list : whether it is
+    one of several, which needs a name, and a camera that is not the scene's own.
+    """
+    found = []
+    if "name" not in values and in_list:
+        found.append((("name",), "missing, give each shot a name of its own for its files"))
+    given = tuple(field for field in (*FOUR_VALUES, *BESIDE_THEM) if field in values)
+    missing = tuple(field for field in FOUR_VALUES if field not in values)
+    if "camera" in values and given:
+        found.append((("camera", *given), "a shot has either a camera of the file or the four values, leave one of them out"))
+    elif "camera" not in values and missing and (given or in_list):
+        found.append((missing, "missing, give eye, look_at, up and d, or the name of a camera of the file"))
+    if "principal_point" in values and "width" not in values:
+        found.append((("width", "height"), "missing, the principal point counts pixels of a picture: give its size"))
+    if values.get("eye") is not None and values.get("eye") == values.get("look_at"):
+        found.append((("eye", "look_at"), "they are the same point, and the view has no direction: move one of them"))
+    for one, other in (("width", "height"), ("height", "width")):
+        if one in values and other not in values:
+            found.append(((other,), f"missing, give {one} and {other}, or neither"))
+    return found
+
+
+def _text(place: str, value: object) -> str:
+    if not isinstance(value, str) or not value:
+        raise InputError(f"{place} is {checks.shown(value)}: give a text")
+    if any("\udc80" <= character <= "\udcff" for character in value):
+        raise InputError(f"{place} is {checks.shown(value)}, which holds bytes that are not UTF-8: save the file as UTF-8")
+    return value
+
+
+def _path(place: str, value: object) -> str:
+    if not isinstance(value, str | os.PathLike):
+        raise InputError(f"{place} is {checks.shown(value)}: give the path of a file")
+    return os.fspath(value)
+
+
+def _above_zero(place: str, value: object) -> float:
+    number = checks.number(place, value)
+    if number <= 0:
+        raise InputError(f"{place} is {checks.shown(value)}: give a number above 0")
+    return number
+
+
+def _name(place: str, value: object) -> str:
+    names.check(place, _text(place, value))
+    return value
+
+
+def _choice(place: str, value: object, *, among: tuple[str, ...]) -> str:
+    if not isinstance(value, str) or value not in among:
+        raise InputError(f"{place} is {checks.shown(value)}: give one of {', '.join(among)}")
+    return value
+
+
+def _point(place: str, value: object) -> Triple:
+    point = checks.vector(place, value, 3)
+    for coordinate in point:
+        checks.number(place, coordinate, -_LARGEST_FLOAT32, _LARGEST_FLOAT32)
+    return point
+
+
+def _up(place: str, value: object) -> Triple:
+    up = _point(place, value)
+    if not any(up):
+        raise InputError(f"{place} is (0, 0, 0): it has no direction, give the vector that shall point up in the picture")
+    return up
+
+
+def _distance(place: str, value: object) -> float:
+    d = checks.number(place, value)
+    check_distance(d, place)
+    return checks.number(place, d, _SMALLEST_FLOAT32, _LARGEST_FLOAT32)
+
+
+def _pair(place: str, value: object) -> tuple[float, float]:
+    point = checks.vector(place, value, 2)
+    for coordinate in point:
+        checks.number(place, coordinate, -_LARGEST_FLOAT32, _LARGEST_FLOAT32)
+    return point
+
+
+def _aspect(place: str, value: object) -> float:
+    return checks.number(place, value, *_ASPECTS)
+
+
+def _truth(place: str, value: object) -> bool:
+    spoken = {"true": True, "false": False}.get(value.lower(), value) if isinstance(value, str) else value
+    return checks.truth(place, spoken)
+
+
+def _whole(place: str, value: object, *, limits: tuple[int, int]) -> int:
+    number = checks.number(place, value)
+    if not number.is_integer() or not limits[0] <= number <= limits[1]:
+        raise InputError(f"{place} is {checks.shown(value)}: give a whole number from {limits[0]} to {limits[1]}")
+    return math.trunc(number)
+
+
+FIELDS: dict[str, Callable[[str, object], object]] = {
+    "name": _name,
+    "eye": _point,
+    "look_at": _point,
+    "up": _up,
+    "d": _distance,
+    "camera": _text,
+    "width": partial(_whole, limits=_SIZES),
+    "height": partial(_whole, limits=_SIZES),
+    "frame": partial(_whole, limits=_FRAMES),
+    "engine": partial(_choice, among=ENGINES),
+    "samples": partial(_whole, limits=_SAMPLES),
+    "level": partial(_choice, among=LEVELS),
+    "principal_point": _pair,
+    "pixel_aspect": _aspect,
+    "mirrored": _truth,
+}
+"""The check of each field that a list may have: (what a sentence calls it, value) → the value as a Job keeps it; InputError."""
+
+_MORE: dict[str, Callable[[str, object], object]] = {
+    "blend": _path,
+    "trust": checks.truth,
+    "seed": partial(_whole, limits=_SEEDS),
+    "threads": partial(_whole, limits=_THREADS),
+    "error": _above_zero,
+    "device": partial(_choice, among=DEVICES),
+    "clay": checks.truth,
+    "recenter": checks.truth,
+    "strict": checks.truth,
+    "scene": _path,
+}

@@ -1,0 +1,90 @@
+"""How jobs are carried out: into which folder, by which processes, and what becomes of what is there already.
+
+What another process is to do stands in a file (`write`, `read`): its jobs, and a plan or the files of one check.
+"""
+
+import dataclasses
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Self
+
+from ..files import written_whole
+from .folder import Outputs
+from .job import Job
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """How the jobs of one file are carried out.
+
+    Parameters
+    ----------
+    out : the folder.
+    outputs : what is made of each job.
+    blend, trust : of the file, as of Job.
+    resume : whether what is there from the same settings is kept; resume_known the same, unless what it was made from can't
+        all be known; overwrite : nothing is kept. With none of them nothing may be there.
+    shard : "I/N", every N-th job from the I-th on.
+    transforms : "png" or "exr", the pictures of a dataset that is written of all jobs.
+    time_limit : seconds that a job may take.
+    workers : in so many processes of this machine. scheduler : on a Dask cluster, "" for one of this machine.
+    command : the one that sentences are said of.
+    """
+
+    out: Path
+    outputs: Outputs = dataclasses.field(default_factory=Outputs)
+    blend: Path | None = None
+    trust: bool = False
+    resume: bool = False
+    resume_known: bool = False
+    overwrite: bool = False
+    shard: str | None = None
+    transforms: str | None = None
+    time_limit: float | None = None
+    workers: int | None = None
+    scheduler: str | None = None
+    command: str = "batch"
+
+    @property
+    def is_on_cluster(self) -> bool:
+        return self.scheduler is not None or self.workers is not None
+
+    def to_json(self) -> dict[str, Any]:
+        """All of it, as JSON can hold it."""
+        return {**dataclasses.asdict(self), "out": str(self.out), "blend": self.blend and str(self.blend)}
+
+    @classmethod
+    def from_json(cls, document: Mapping[str, Any]) -> Self:
+        """The plan that `to_json` gave."""
+        outputs = Outputs(**{**document["outputs"], "labels": tuple(document["outputs"]["labels"])})
+        blend = document["blend"] and Path(document["blend"])
+        return cls(**{**document, "out": Path(document["out"]), "outputs": outputs, "blend": blend})
+
+
+def write(path: Path, jobs: Sequence[Job], plan: Plan | None = None, files: Mapping[str, str] | None = None) -> None:
+    """Write what another process is to do.
+
+    plan : how the jobs are carried out. Without it there is one, which is checked, with these files (Written) beside its
+    result, for which `result_of` has the place.
+
+    Raises
+    ------
+    InputError
+        if it can't be written.
+    """
+    document = {"jobs": [job.to_json() for job in jobs], "plan": plan and plan.to_json(), "files": dict(files or {})}
+    with written_whole(path) as temporary:
+        temporary.write_text(json.dumps(document), encoding="utf-8", newline="\n")
+
+
+def read(path: Path) -> tuple[list[Job], Plan | None, dict[str, str]]:
+    """The jobs, plan and files that were written."""
+    document = json.loads(path.read_text(encoding="utf-8"))
+    jobs = [Job.from_json(job) for job in document["jobs"]]
+    return jobs, document["plan"] and Plan.from_json(document["plan"]), document["files"]
+
+
+def result_of(path: Path) -> Path:
+    """Where the result of a check stands that was to be done by this file."""
+    return path.with_name("result.json")
