@@ -86,7 +86,7 @@ from . import (
     vtk,
 )
 from .axes import moved, moved_back
-from .camera import ANGLES, AXES, PIXELS, POSES, Camera, LeftOut, Options, choose
+from .camera import ANGLES, AXES, PIXELS, POSES, Camera, LeftOut, NoPinholeError, Options, choose
 from .source import Source
 
 __all__ = [
@@ -219,7 +219,8 @@ def _read(source: Source, module: ModuleType, options: Options) -> list[Camera]:
         cameras = module.read(source, options)
     except InputError as error:
         if source.path and source.path.name not in str(error):
-            raise InputError(f"{source.name}: {error}") from error.__cause__
+            kind = NoPinholeError if isinstance(error, NoPinholeError) else InputError
+            raise kind(f"{source.name}: {error}") from error.__cause__
         raise
     if not cameras:
         raise InputError(f"{source.name} holds no camera: give another file")
