@@ -57,6 +57,19 @@ def test_an_answer_is_what_was_asked_float_by_float(echo):
     assert [echo.ask(asked)["heard"] for _ in range(3)] == [asked] * 3
 
 
+def test_events_are_told_on_the_way():
+    heard = []
+
+    class Ear:
+        def tell(self, event, **fields):
+            heard.append((event, fields))
+
+    command = [sys.executable, "-c", ECHO]
+    with ServerProcess("the echo", command, child_process.environment(), events=Ear()) as server:
+        server.ask({"tells": 3})
+    assert heard == [("progress", {"share": number}) for number in range(3)]
+
+
 def test_one_process_answers_all(echo):
     assert len({echo.ask({})["process"] for _ in range(3)}) == 1
 

@@ -154,6 +154,7 @@ def compare(
         raise InputError(f"{of.source} does not tell its camera: give its scene with --scene, or trace it with viewcam render")
     # The picture may be of another size than the scene says, or of the stated camera.
     shown = scene and replace(scene, camera=camera)
+    stated = scene.stated_camera if scene and camera == scene.camera else None
     if radiance.carries_light(of):
         if shown is None:
             return radiance.compare(of, pictures, camera, test_samples)
@@ -164,7 +165,7 @@ def compare(
             light, pairs = makes_tracer().coincident_light(level, SAMPLES_OF_COINCIDENT, 0, ROUNDINGS[-1])
             return CoincidentLight(Image(light), pairs)
 
-        lit = radiance.compare(of, pictures, camera, test_samples, coincident)
+        lit = replace(radiance.compare(of, pictures, camera, test_samples, coincident), stated=stated)
         names = tuple(dict.fromkeys((*shown.not_modelled, *lit.taken_out.names)))
         if not names:
             return lit
@@ -178,7 +179,6 @@ def compare(
         found = geometry.compare(of, pictures[0], camera, renderer=by, partial=partial)
     else:
         tracer = (keeper or tracing.Keeper()).tracer(shown, threads)
-        stated = shown.stated_camera if scene and camera == scene.camera else None
         found = geometry.compare(of, pictures[0], camera, tracer.surfaces_at, stated, shown.origin, by, partial)
         names = shown.not_modelled
         found = replace(found, not_modelled=not_modelled(names, tracer.pixels_of(names), of, pictures, whole))

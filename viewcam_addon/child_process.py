@@ -2,8 +2,8 @@
 
 A process is one of two kinds, and both are started as a ProcessGroup, which ends with all that it has started itself.
 
-**It runs a command of viewcam to its end** (`run_viewcam`, or a ProcessGroup that is looked at now and then), and tells on the
-way what `--log-json` tells (events.py).
+**It carries out what a file tells it (jobs/plan.py) to its end**: a ProcessGroup that is looked at now and then, and prints on
+the way what `--log-json` tells (events.py).
 
 **It is kept open and asked one thing after another** (ServerProcess): a dict in, a dict out. Both ends of the connection exist
 before the process does, which inherits its own. So nothing has to be found, nobody else can call, and each side sees the end of
@@ -85,23 +85,6 @@ def blender_scripts() -> str:
     loaded, found = sys.modules.get("bpy"), importlib.util.find_spec("bpy")
     place = Path(getattr(loaded, "__file__", None) or (found and found.origin) or "")
     return str(place.parents[2]) if place.name == "__init__.py" else ""
-
-
-def run_viewcam(*arguments: str | Path, tell_on: Events | None = None, apart_from: str = "") -> int:
-    """Run a sub-command to its end in a Python process of its own, with the same modules in reach as here; its exit status.
-
-    tell_on : whom its events are told, with --log-json; else it prints what there is to say itself. apart_from : as for
-    environment.
-    """
-    sys.stdout.flush()
-    command, variables = viewcam(*arguments), environment(apart_from)
-    if tell_on is None:
-        return subprocess.run(command, env=variables, check=False).returncode
-    with subprocess.Popen([*command, "--log-json"], env=variables, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as child:
-        for event in events_in(child.stdout):
-            if event["event"] not in ("started", "finished"):
-                tell_on.tell(**event)
-    return child.returncode
 
 
 def events_in(lines: Iterable[str | bytes]) -> Iterator[dict[str, Any]]:

@@ -300,6 +300,33 @@ def test_no_fluid_is_simulated_into_a_folder_of_the_files_choice(tmp_path, way, 
         assert not left
 
 
+BAKED_FLUID = """
+import os, sys, bpy
+bpy.ops.mesh.primitive_cube_add(size=2)
+modifier = bpy.context.object.modifiers.new("Fluid", "FLUID")
+modifier.fluid_type = "DOMAIN"
+modifier.domain_settings.domain_type, modifier.domain_settings.cache_type = "LIQUID", "ALL"
+modifier.domain_settings.cache_directory = "//gone"
+camera = bpy.context.scene.camera
+camera.location, camera.rotation_euler = (0, 0, 9), (0, 0, 0)
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[-1])
+os._exit(0)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [[], ["--trust"]], ids=["untrusted", "trusted"])
+def test_a_fluid_whose_cache_is_missing_is_off_and_told(tmp_path, words):
+    """Blender aborted, and the sentence blamed the file and the memory."""
+    environment = child_process.environment(apart_from=bpy.utils.system_resource("SCRIPTS"))
+    blend, how = tmp_path / "fluid.blend", {"env": environment, "capture_output": True, "text": True}
+    subprocess.run([sys.executable, "-c", BAKED_FLUID, str(blend)], check=True, **how)
+    command = [*child_process.viewcam("check"), str(blend), "--size", "48x27", *words]
+    child = subprocess.run(command, check=False, **how)
+    assert child.returncode == 0, child.stderr
+    assert "the modifier 'Fluid' of 'Cube.001' is off: its cache //gone is missing" in child.stdout, child.stdout
+
+
 def test_what_is_off_is_told(fresh_blender, tmp_path):
     blend, _ = hostile_file(freestyle_script, tmp_path / "hostile")
     (tmp_path / "out").mkdir()

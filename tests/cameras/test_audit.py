@@ -98,6 +98,10 @@ MADE = {
     "eye_as_translation": lambda v, r: replace(v, eye=-np.einsum("nij,nj->ni", v.axes * OPENCV, v.eye)),
     "quaternion_order": lambda v, r: quaternions_in_another_order(v),
     "y_up": lambda v, r: replace(v, axes=Y_UP.T @ v.axes, eye=v.eye @ Y_UP),
+    "y_down": lambda v, r: (lambda turn: replace(v, axes=turn.T @ v.axes, eye=v.eye @ turn))(
+        np.diag(OPENCV) if r.random() < 0.5 else Y_UP @ np.diag(OPENCV)
+    ),
+    "focal_factor": lambda v, r: with_focal(v, r.choice([r.uniform(0.3, 0.9), r.uniform(1.1, 3)])),
     "late": lambda v, r: replace(v, axes=np.roll(v.axes, 1, axis=0), eye=np.roll(v.eye, 1, axis=0)),
     "fov_axis": lambda v, r: with_focal(v, v.size[:, 1:] / v.size[:, :1]),
     "size": lambda v, r: (lambda s: replace(v, focal=v.focal * s, center=v.center * s))(r.choice([2, 4, 0.5, 0.25, 1 / 0.75])),
@@ -212,7 +216,17 @@ def a_filmed_scene(seed=4, count=8):
 
 BY_DEPTH = [
     *("half_pixel", "center_swapped", "opencv_axes", "y_flipped", "z_flipped", "x_flipped", "inverse", "transposed"),
-    *("translation_as_eye", "late", "fov_axis", "focal_of_another_size", "center_of_another_size", "aspect", "unit"),
+    *(
+        "translation_as_eye",
+        "late",
+        "fov_axis",
+        "focal_factor",
+        "y_down",
+        "focal_of_another_size",
+        "center_of_another_size",
+        "aspect",
+        "unit",
+    ),
 ]
 
 
@@ -232,6 +246,17 @@ def test_a_mistake_is_named_by_depth_maps_alone(filmed, kind):
     views, maps = filmed
     verdict = _audited(MADE[kind](views, np.random.default_rng(5)), Depths(maps))
     assert kind in (verdict.kind, *verdict.others), verdict
+
+
+@pytest.mark.parametrize(("factor", "words"), [(1.5, "1.5 times too long"), (38 / 45, "1.184 times too short")])
+def test_a_focal_length_that_is_wrong_by_any_factor_is_told_with_it(tmp_path, capsys, factor, words):
+    """NeRF's data: the angle of a sensor of 36 mm for one of 24, a lens of 38 mm for one of 45."""
+    true = a_filmed_scene()
+    longer = [replace(c, pinhole=replace(c.pinhole, distance=tuple(d * factor for d in c.pinhole.distance))) for c in true]
+    for name, found in (("true", true), ("wrong", longer)):
+        cameras.save(found, tmp_path / f"{name}.json", "transforms")
+    assert run("audit", tmp_path / "wrong.json", "--against", tmp_path / "true.json") == 1
+    assert f"the focal length is {words}" in capsys.readouterr().out
 
 
 def test_distances_in_place_of_depths_are_named(filmed):

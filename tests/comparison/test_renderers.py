@@ -66,6 +66,41 @@ def test_nothing_is_nothing_however_a_renderer_writes_it(nothing, paper_scene):
     assert (found["Depth"] == reference["Depth"]).all() and (found["Position"][missed[..., 0]] == 0).all()
 
 
+@pytest.mark.parametrize("nothing", [0.0, np.inf, 1e10, 3e38])
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("Depth",),
+        ("Distance",),
+        ("Position",),
+        ("Depth", "Position"),
+        ("Distance", "Position"),
+        ("Depth", "Distance"),
+        ("Depth", "Distance", "Position", "Normal"),
+    ],
+)
+def test_pictures_are_the_same_whatever_their_passes_hold_where_nothing_is(names, nothing, paper_scene):
+    """Depth and Position together were taken as they are, and a distance of 1e10 for a surface at that depth."""
+    picture = only(paper_scene.rendered(), *names)
+    missed = paper_scene.picture()["Depth"] >= BACKGROUND_DEPTH
+    passes = {name: np.where(missed, np.float32(nothing), values) for name, values in picture.passes.items()}
+    comparison = judged(paper_scene, replace(picture, passes=passes))
+    assert comparison.passed, comparison.sentence
+    passes = {
+        name: np.where(missed & (np.arange(missed.shape[1]) == 7)[:, None], 5.0, values) for name, values in passes.items()
+    }
+    wrong = judged(paper_scene, replace(picture, passes={name: values.astype(np.float32) for name, values in passes.items()}))
+    assert not wrong.passed and "of coverage" in wrong.sentence, "a column of it is said to be a surface"
+
+
+def test_the_scene_is_not_asked_for_where_it_is_given(paper_scene):
+    """No ray explains a pixel without a number, and the sentence said: give the scene too."""
+    test = paper_scene.rendered()
+    test["Position"][50, 50:60] = np.nan
+    sentence = compare(paper_scene.picture(), test, paper_scene.pinhole, paper_scene.surface_at).sentence
+    assert "give the scene" not in sentence and "holds no number" in sentence
+
+
 @given(values=st.lists(st.floats(-60000, 60000, width=32), min_size=3, max_size=3), index=st.integers(0, 32767))
 def test_halves_add_up_to_what_was_written(values, index):
     """As the shader parts them: the nearest whole steps first, each part kept as half a float."""

@@ -75,6 +75,19 @@ def test_the_report_says_what_the_comparison_says(compared, tmp_path):
     assert not page.open, f"never closed: {page.open}"
 
 
+def test_the_two_sides_are_called_by_their_names_and_the_camera_is_told_as_typed_and_as_read_back(compared, tmp_path):
+    comparison, reference, test = compared
+    x, y, z = comparison.pinhole.eye
+    typed = replace(comparison.pinhole, eye=(float(np.float32(0.1)), y, z), distance=512.25)
+    _, page = written(tmp_path, replace(comparison, stated=typed), reference, test)
+    words = " ".join(page.text.split())
+    assert "Tracer" in words and "Cycles" in words and "test on the right" not in words
+    assert f"as typed e, eye 0.1 {y} {z}" in words and f"as read back from Blender e, eye {x:.9g}" in words, words[-900:]
+    assert "512.25 px" in words
+    _, page = written(tmp_path, replace(comparison, renderer="EEVEE", stated=None), reference, test)
+    assert "EEVEE" in page.text and "as typed" not in page.text, "nobody typed one"
+
+
 def test_a_failed_comparison_says_so_at_the_top(paper_scene, tmp_path):
     reference, test = paper_scene.picture(), paper_scene.picture(1.0, 0.5)
     text, page = written(tmp_path, compare(reference, test, paper_scene.pinhole, paper_scene.surfaces_at), reference, test)

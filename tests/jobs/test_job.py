@@ -1,14 +1,17 @@
 """A shot as a value: what it takes, what it keeps, what it refuses."""
 
 import dataclasses
+import json
 import math
 import pickle
+import shlex
 
 import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from viewcam_addon import cli
 from viewcam_addon.errors import InputError
 from viewcam_addon.jobs import job, names
 from viewcam_addon.jobs.job import FIELDS, Job
@@ -103,3 +106,48 @@ def test_names_that_are_one_file_somewhere_are_known(one, other):
 
 def test_every_field_has_a_check():
     assert {field.name for field in dataclasses.fields(Job)} == FIELDS.keys() | job._MORE.keys()
+
+
+OTHERS = {"blend": "a.blend", "trust": True, "seed": 7, "threads": 2, "error": 0.01, "device": "CUDA", "clay": True}
+OTHERS |= {"recenter": True, "strict": True, "scene": "b.json", "level": "path", "samples": 64, "width": 64, "height": 36}
+
+
+def test_a_job_comes_back_from_json_as_it_was():
+    for each in (Job(), Job("a", **FOUR), Job("a", camera="Camera", **OTHERS)):
+        assert Job.from_json(json.loads(json.dumps(each.to_json()))) == each
+    assert Job().to_json() == {}
+    with pytest.raises(InputError, match="no option 'cmera' of a job: give some of name, eye"):
+        Job.from_json({"cmera": "Camera"})
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"seed": 2**31}, "seed is 2147483648: give a whole number from 0"),
+        ({"threads": 0}, "threads is 0"),
+        ({"error": 0}, "error is 0: give a number above 0"),
+        ({"device": "GPU"}, "device is 'GPU': give one of CPU, CUDA"),
+        ({"clay": "yes"}, "clay is 'yes'"),
+        ({"scene": 3}, "scene is 3: give the path of a file"),
+    ],
+)
+def test_what_a_check_can_not_be_told_is_refused(changes, sentence):
+    with pytest.raises(InputError, match=sentence):
+        Job(**changes)
+
+
+def test_an_engine_is_checked_by_what_it_can_show():
+    Job(engine="EEVEE").refuse_unchecked()
+    for each in (Job(engine="EEVEE", level="direct"), Job(engine="WORKBENCH", error=0.1), Job(engine="VIEWCAM")):
+        with pytest.raises(InputError):
+            each.refuse_unchecked()
+
+
+def test_the_words_of_a_check_are_the_job(monkeypatch):
+    from viewcam_addon.commands import verification
+
+    asked = []
+    monkeypatch.setattr(verification, "check_one", lambda each, *_, **__: asked.append(each) or (0, {}))
+    wanted = Job(camera="Left eye", frame=-3, engine="CYCLES", **{**OTHERS, "threads": None})
+    assert cli.main(shlex.split(wanted.check_words())) == 0
+    assert asked == [wanted]

@@ -14,6 +14,7 @@ pytest PACKAGES …      runs pytest with these arguments, from the checkout, wi
 import importlib
 import json
 import os
+import subprocess
 import sys
 
 import bpy
@@ -96,7 +97,7 @@ def export(file, *arguments):
 
 def viewcam(*arguments):
     child_process = importlib.import_module(f"{enable().__name__}.child_process")
-    sys.exit(child_process.run_viewcam(*arguments))
+    sys.exit(subprocess.run(child_process.viewcam(*arguments), env=child_process.environment()).returncode)
 
 
 def apply(file, output, pinhole):

@@ -57,15 +57,16 @@ def opened(blend: str | os.PathLike[str] | None, trust: bool = False) -> Iterato
             yield overrides, off
             return
         _check_files()
+        lacking = tuple(_without_cache(overrides.set))
         if not trust:
-            off = _told(*_disarmed(overrides.set), *_unrun())
+            off = (*lacking, *_told(*_disarmed(overrides.set), *_unrun()))
         elif any(_unrun()):
             raise InputError(
                 "Blender has opened the file without running what is in it: write --enable-autoexec before the file, or leave "
                 "--trust out"
             )
         else:
-            off = ()
+            off = lacking
         yield overrides, off
 
 
@@ -88,6 +89,7 @@ def open_blend(path: str | os.PathLike[str], trust: bool = False) -> tuple[str, 
         nonlocal is_read
         is_read = True
         _check_files()
+        off.extend(_without_cache(setattr))
         if not trust:
             off.extend(_told(*_disarmed(setattr)))
 
@@ -192,6 +194,19 @@ def _disarmed(put: _Put) -> Iterator[str]:
             put(modifier, "show_viewport", False)
             put(modifier, "show_render", False)
             yield f"the modifier {modifier.name!r} of {each.name!r} is off: it is not baked, and would write what it simulates"
+
+
+def _without_cache(put: _Put) -> Iterator[str]:
+    """Switch off the fluids that are baked, and whose cache is nowhere: Blender would abort as it evaluates them."""
+    for each in bpy.data.objects:
+        for modifier in each.modifiers:
+            if modifier.type == "FLUID" and modifier.fluid_type == "DOMAIN" and not _writes_always(modifier):
+                folder = modifier.domain_settings.cache_directory
+                if not any(files for _, _, files in os.walk(bpy.path.abspath(folder, library=each.library))):
+                    put(modifier, "show_viewport", False)
+                    put(modifier, "show_render", False)
+                    name = f"the modifier {modifier.name!r} of {each.name!r}"
+                    yield f"{name} is off: its cache {folder} is missing, bake it again"
 
 
 def _unrun() -> Iterator[str]:

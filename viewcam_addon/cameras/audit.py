@@ -10,8 +10,9 @@ A mistake is named only if its inverse explains the evidence far better than the
 pictures may have; what explains it as well is named beside it. Else it is said that nothing is wrong, or that something is,
 of an unknown kind. Robust costs (Cauchy's) let outliers and hidden points be.
 
-Rejected: fitting free parameters, which explains whatever is there (but for a principal point that was left out), and judging
-poses by their looks (do cameras look at their middle?), which is right for most and a false alarm for the rest.
+Rejected: fitting free parameters, which explains whatever is there (but for a principal point that was left out, and one factor
+of all focal lengths), and judging poses by their looks (do cameras look at their middle?), which is right for most and a false
+alarm for the rest.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,6 +30,8 @@ Array = NDArray[np.float64]
 _SURE, _TIED = 14.0, 10.0
 _FEWEST = 40  # observations
 _LEFT_OUT = 2.0  # pixels: less may be anything's
+_FITTED = "focal_factor"
+_FACTORS, _STEPS, _FINEST = (1 / 8, 8.0), 25, 1e-5  # of depth maps: what is tried first, and how fine it is told
 _COUNTED = 2000  # at most: a systematic error repeats in each, so more of them add no certainty
 _FARTHEST = 1e6  # times the usual error: what is behind the camera counts as that
 _Y_TO_Z = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
@@ -333,6 +336,16 @@ def _mistakes() -> list[Mistake]:
         ),
         Mistake("y_up", "the cameras' world has y up and the scene's has z up", lambda v: _turned_world(v, _Y_TO_Z)),
         Mistake("y_up", "the cameras' world has z up and the scene's has y up", lambda v: _turned_world(v, _Y_TO_Z.T)),
+        Mistake(
+            "y_down",
+            "the cameras' world is turned upside down: it has y down where the scene has y up, or the reverse",
+            lambda v: _turned_world(v, np.diag(_OPENCV)),
+        ),
+        Mistake(
+            "y_down",
+            "the cameras' world has y down, as COLMAP's, and the scene's has z up",
+            lambda v: _turned_world(v, _Y_TO_Z @ np.diag(_OPENCV)),
+        ),
         Mistake("late", "each picture has the camera of the one before it", lambda v: replace(v, shifted=1)),
         Mistake("late", "each picture has the camera of the one after it", lambda v: replace(v, shifted=-1)),
         Mistake(
@@ -422,6 +435,7 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
         )
     of_depth = isinstance(evidence, Depths)
     tried = [mistake for mistake in MISTAKES if of_depth or not mistake.of_depth]
+    tried.append(_of_focal_factor(views, evidence))
     if not of_depth and np.abs(views.center - views.size / 2).max() <= 0.5:
         tried += _left_out(views, evidence)
     errors = [evidence.errors(mistake.undone(views)) for mistake in tried]
@@ -441,7 +455,7 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
             over = [
                 (max(float(cost - costs[0]), 0.0), mistake.kind)
                 for mistake, cost, each in zip(tried, costs[1:], errors, strict=True)
-                if _differ(each, as_is, evidence)
+                if _differ(each, as_is, evidence) and mistake.kind != _FITTED
             ]
             possible = tuple(dict.fromkeys(kind for sure, kind in over if sure < _SURE))
             if possible:
@@ -453,7 +467,8 @@ def _audited(views: Views, evidence: "Tracks | Depths") -> Verdict:
     mistake = tried[best - 1]
     tied = [tried[i - 1] for i in np.flatnonzero(costs - costs[best] < _TIED) if i and tried[i - 1] is not mistake]
     first = min([mistake, *tied], key=tried.index)
-    others = tuple(dict.fromkeys(each.kind for each in (mistake, *tied) if each.kind != first.kind))
+    # A fitted factor explains whatever a known one does, and tells nothing beside it.
+    others = tuple(dict.fromkeys(each.kind for each in (mistake, *tied) if each.kind not in (first.kind, _FITTED)))
     sentence = f"{first.sentence} (undone, the evidence fits to {error:.2g} {evidence.unit} in place of {error_as_is:.3g})"
     if others:
         sentence += f"; the evidence can't tell it from: {', '.join(others)}"
@@ -469,6 +484,34 @@ def _differ(errors: Array, others: Array, evidence: "Tracks | Depths") -> bool:
     """True if there was something to undo: swapped, a principal point in the middle of a square is as it was."""
     with np.errstate(invalid="ignore"):
         return bool((np.abs(errors - others) > evidence.floor).any())
+
+
+def _of_focal_factor(views: Views, evidence: "Tracks | Depths") -> Mistake:
+    """The mistake of a focal length that is wrong by the factor that the evidence asks for."""
+    factor = _factor_of_tracks(views, evidence) if isinstance(evidence, Tracks) else _factor_of_depths(views, evidence)
+    off = f"{factor:.4g} times too short" if factor > 1 else f"{1 / factor:.4g} times too long"
+    return Mistake(_FITTED, f"the focal length is {off}", lambda v: _scaled(v, factor))
+
+
+def _factor_of_tracks(views: Views, evidence: Tracks) -> float:
+    """How many times as far from the principal point as the cameras say pictures show a point, in the median."""
+    places, depth = views.project(evidence.which, evidence.points)
+    center = views.center[(evidence.which + views.shifted) % len(views.eye)]
+    with np.errstate(all="ignore"):
+        expected = places - center
+        factors = ((evidence.places - center) * expected).sum(axis=-1) / (expected * expected).sum(axis=-1)
+    usable = factors[(depth > 0) & np.isfinite(factors) & (factors > 0)]
+    return float(np.median(usable)) if len(usable) else 1.0
+
+
+def _factor_of_depths(views: Views, evidence: Depths) -> float:
+    """The factor with the least usual error: of some, then of those around the best, until it is told finely enough."""
+    logs = np.linspace(*np.log(_FACTORS), _STEPS)
+    while (step := logs[1] - logs[0]) > _FINEST:
+        usual = [_usual(evidence.errors(_scaled(views, factor)), evidence) for factor in np.exp(logs)]
+        best = logs[int(np.argmin(usual))]
+        logs = np.linspace(best - step, best + step, _STEPS // 3)
+    return float(np.exp(best))
 
 
 def _left_out(views: Views, evidence: Tracks) -> list[Mistake]:

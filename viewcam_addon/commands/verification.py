@@ -7,13 +7,17 @@ Blender brings a copy of OpenEXR of its own: `check` does the first where Blende
 
 import argparse
 import dataclasses
+import os
+import shlex
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
+from ..errors import InputError, NotModelledError
 from ..terminal import say, silent_libraries
 from . import Result, blender_room
 
@@ -23,6 +27,8 @@ DEMO_SCENE = Path(__file__).parents[2] / "sample_scenes" / "studio.blend"
 def export(options: argparse.Namespace) -> Result:
     from ..tracer.scene import scene_file
 
+    if (status := _in_another_blender(options)) is not None:
+        return status, {}
     with silent_libraries():
         scene = blender_room("jobs.renderer").export(_job(options))
     scene_file.write(scene, options.scene)
@@ -68,6 +74,8 @@ def render(options: argparse.Namespace) -> Result:
 
 
 def cycles(options: argparse.Namespace) -> Result:
+    if (status := _in_another_blender(options)) is not None:
+        return status, {}
     with silent_libraries():
         ledger = blender_room("jobs.renderer").cycles(_job(options), options.image)
     say(*ledger_lines(_ledger_json(ledger)))
@@ -188,6 +196,38 @@ def demo(options: argparse.Namespace) -> Result:
         raise InputError(f"{options.blend} is not here: run the demo in a clone of the project, where its sample scenes are")
     say(f"{options.blend.name}: a camera given by four values, rendered by Cycles and by the reference tracer")
     return check(options)
+
+
+def _in_another_blender(options: argparse.Namespace) -> int | None:
+    """Run the command in the Blender that VIEWCAM_BLENDER names, which tells and writes all there is; its exit status.
+
+    None where none is named, or this is a Blender that has a file open.
+
+    Raises
+    ------
+    InputError
+        if it can't be started, or ends otherwise than the command does.
+    """
+    from ..jobs.render_client import BLENDER
+
+    program = os.environ.get(BLENDER)
+    if not program or options.blend is None:
+        return None
+    words = shlex.split(options.words)
+    words.pop(next(place for place, word in enumerate(words) if place and Path(word) == options.blend))
+    scripts = "--enable-autoexec" if options.trust else "--disable-autoexec"
+    command = [program, "-b", scripts, str(options.blend), "--command", "viewcam", *words]
+    sys.stdout.flush()
+    try:
+        status = subprocess.run(command, check=False).returncode
+    except OSError as error:
+        raise InputError(f"{BLENDER} names {program}, which can't be started ({error.strerror}): correct it") from error
+    if status not in (0, InputError.exit_status, NotModelledError.exit_status):
+        raise InputError(
+            f"{program}, which {BLENDER} names, ended with status {status}: see that it is Blender 4.2 or newer with the "
+            "extension Virtual Pinhole, and that it can open the file"
+        )
+    return status
 
 
 def _told_level(scene: Any) -> dict[str, str]:

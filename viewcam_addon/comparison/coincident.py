@@ -45,17 +45,29 @@ class CoincidentLight:
         values = np.nan_to_num(values_of(self.light, sides.name))
         return np.maximum(values, noise.mean_around(values)).max(axis=-1)
 
-    def share_out(self, combined: Sides) -> NDArray[np.bool_]:
-        """(height, width): the pixels that are taken out."""
+    def rest(self, combined: Sides) -> "Rest":
+        """What is left of a comparison without the pixels of which this light is a share to speak of."""
         light = self.of(combined)
-        return (light > 0.0) & (light >= _SHARE * combined.reference.max(axis=-1))
+        return Rest(self, (light > 0.0) & (light >= _SHARE * combined.reference.max(axis=-1)))
 
-    def without(self, sides: Sides, out: NDArray[np.bool_]) -> Sides:
-        """The sides, the same where pixels are taken out, and with the noise of this light."""
-        test = np.where(out[..., None], sides.reference, sides.test)
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """A comparison without the light that comes by surfaces in one place. out : (height, width) bool, pixels taken out."""
+
+    coincident: CoincidentLight
+    out: NDArray[np.bool_]
+
+    def tolerance(self, sides: Sides) -> Array:
+        """(height, width): of a quantity, the light that may be there or not in the pixels that are left."""
+        return np.where(self.out, 0.0, self.coincident.of(sides))
+
+    def of(self, sides: Sides) -> Sides:
+        """The sides, the same where pixels are taken out, and with the noise of that light."""
+        test = np.where(self.out[..., None], sides.reference, sides.test)
         variance = sides.variance
         if sides.name == "Combined":
-            variance = variance + np.nan_to_num(self.light["Variance"].astype(np.float64))
+            variance = variance + np.nan_to_num(self.coincident.light["Variance"].astype(np.float64))
         return replace(sides, test=test, variance=variance)
 
 

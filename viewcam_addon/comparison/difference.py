@@ -22,6 +22,8 @@ from .light_verdict import RadianceComparison
 from .statistics import PassErrors
 from .verdict import GeometryComparison
 
+SIDES = ("reference", "test", "everything")
+
 # sRGB, where nothing was compared.
 _NOTHING = np.full((1, 3), 64, np.uint8)
 
@@ -45,16 +47,27 @@ def write_sides(
     reference: Image,
     tests: Sequence[Image],
     folder: str | os.PathLike[str],
+    everything: Image | None = None,
 ) -> None:
-    """Write what the report shows of both sides, FOLDER/reference.png and FOLDER/test.png, under one exposure.
+    """Write both sides, and Cycles' picture with everything in it, as files in the folder that begin with SIDES.
+
+    Geometry is shaded, as PNG. Light is as it was rendered, as arrays of NumPy: (height, width, 3) float32, scene linear, rows
+    from the bottom, for a view transform that only Blender has.
 
     Raises
     ------
     InputError
         if a file can't be written.
     """
-    for name, picture in zip(("reference", "test"), shown(comparison, reference, tests), strict=True):
-        _write(picture, Path(folder) / f"{name}.png")
+    light = {} if everything is None else {"everything": everything["Combined"][..., :3]}
+    if isinstance(comparison, RadianceComparison):
+        light |= {"reference": reference["Combined"][..., :3], "test": comparison.test}
+    else:
+        for name, picture in zip(SIDES, shown(comparison, reference, tests), strict=False):
+            _write(picture, Path(folder) / f"{name}.png")
+    for name, values in light.items():
+        with written_whole(Path(folder) / f"{name}.npy") as temporary, open(temporary, "wb") as file:
+            np.save(file, pictures.reduced(values)[::-1].astype(np.float32))
 
 
 @np.errstate(all="ignore")

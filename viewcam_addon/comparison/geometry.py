@@ -123,7 +123,20 @@ def compare(
     far = far_from_origin(pinhole, expected, chosen, rows[0]) if "Position" in measured else None
     lacking = tuple(name for name in PASSES if name in expected and name not in measured)
     return GeometryComparison(
-        pinhole, stated, hits, rows, mismatches, systematic, conversion, maps, roundings, far, origin, lacking, in_one_place
+        pinhole,
+        stated,
+        hits,
+        rows,
+        mismatches,
+        systematic,
+        conversion,
+        maps,
+        roundings,
+        far,
+        origin,
+        lacking,
+        in_one_place,
+        renderer.name,
     )
 
 

@@ -17,7 +17,7 @@ from .tolerances import ROUNDINGS
 
 # Under the loupe: one place for each test that failed, the first of them.
 _MOST_CROPS = 8
-_COLOURS = "blue where the test is darker, orange where it is brighter"
+_COLOURS = "blue where Cycles is darker, orange where it is brighter"
 
 
 @np.errstate(all="ignore")
@@ -39,7 +39,7 @@ def write_report(
         if the folder can't be written, or there is no Jinja2.
     """
     shown = difference.shown(comparison, reference, tests)
-    mean_of = f" The test is the mean of {len(tests)} pictures with other seeds." if len(tests) > 1 else ""
+    mean_of = f" Cycles' is the mean of {len(tests)} pictures with other seeds." if len(tests) > 1 else ""
     sides = dict(zip(("reference", "test"), map(pictures.png_uri, shown), strict=True))
     combined = page.Tab("picture", "Combined", f"{page.SWAP} Both under one exposure.{mean_of}", sides)
     asked = comparison.rows[0].hypothesis_tests
@@ -48,7 +48,7 @@ def write_report(
     else:
         chart = charts.histogram(comparison.maps["Combined: roundings"].ravel())
     values = {
-        **page.common(comparison, reference, tests[0], ledger, command, comparison.pinhole),
+        **page.common(comparison, reference, tests[0], ledger, command),
         "views": [combined, *(_view(comparison, name, values) for name, values in comparison.maps.items())],
         "worst": max(asked, key=lambda test: abs(test.worst.errors) / test.limit, default=None),
         "makers": (_maker(reference), _maker(tests[0])),
@@ -78,7 +78,7 @@ def _view(comparison: RadianceComparison, name: str, values: np.ndarray) -> page
         picture, legend = pictures.on_scale(values, 1e-2, high), page.logarithmic_legend(1e-2, high, limits, "roundings")
         return page.Tab(view, words, caption, {"image": pictures.png_uri(picture)}, legend)
     if kind == "difference":
-        caption = f"Test minus reference: {_COLOURS}."
+        caption = f"Cycles minus Tracer: {_COLOURS}."
         limit, unit, allowed = difference.spread(values), "radiance", None
     else:
         test = row.hypothesis_tests[1 if kind == "tiles" else 0]

@@ -85,6 +85,7 @@ class RadianceComparison:
     same to the last bit. appearance : relMSE and FLIP. test : the mean of the test pictures' Combined, (height, width, 3).
     maps : name to (height, width) float32, rows from the bottom: what differs in Combined and in quantities that fail.
     not_modelled : what of the picture neither side models as it is. taken_out : pixels that the rest says nothing of.
+    stated : the camera that was asked for, or None.
     """
 
     pinhole: Pinhole
@@ -98,6 +99,9 @@ class RadianceComparison:
     maps: dict[str, NDArray[np.float32]]
     not_modelled: NotModelled = field(default_factory=NotModelled)
     taken_out: TakenOut = field(default_factory=TakenOut)
+    stated: Pinhole | None = None
+    renderer = "Cycles"
+    """Who made the test: light is compared with Cycles' alone."""
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:

@@ -287,6 +287,8 @@ def settle(
             slope[pixel[other]] = own[other]
         pixels.append(pixel[other])
         objects.append(np.stack([names[nearest[rays[other]]], names[other]], axis=1))
+        if (kinds[batch] >= 0).sum() > len(batch) / 2:
+            break  # as in `explain`
     shown = np.concatenate(pixels)
     return kinds, expected, agreement, InOnePlace(shown % width, shown // width, np.concatenate(objects))
 

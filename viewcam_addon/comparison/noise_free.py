@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..image import Image
 from ..pinhole import Pinhole
 from . import tolerances
-from .coincident import CoincidentLight
+from .coincident import Rest
 from .mismatches import contrast, largest_around
 from .noise import poisson_allowance
 from .sides import Sides
@@ -87,13 +87,11 @@ class Rounding:
 
     test : one of the test pictures, which tells its Blender. samples : of each picture, the most.
     belongs : (height, width) the object of each pixel, 0 for none or where nobody knows.
-    coincident : of the light, how much comes by surfaces in one place, or None.
+    rest : what is compared where light comes by surfaces in one place, else None.
     """
 
-    def __init__(
-        self, pinhole: Pinhole, reference: Image, test: Image, samples: int, coincident: CoincidentLight | None = None
-    ) -> None:
-        self._coincident = coincident
+    def __init__(self, pinhole: Pinhole, reference: Image, test: Image, samples: int, rest: Rest | None = None) -> None:
+        self._rest = rest
         self._shift = _ray_shift(pinhole, reference)
         self._samples = samples
         self.belongs = np.zeros(self._shift.shape)
@@ -114,8 +112,8 @@ class Rounding:
         value = np.abs(sides.reference).max(axis=-1)
         error = tolerances.radiance_error(value, self._brightest, self._samples)
         floor = self._floor(sides.name, value)
-        if self._coincident is not None:
-            floor = floor + self._coincident.of(sides)
+        if self._rest is not None:
+            floor = floor + self._rest.tolerance(sides)
         return Allowance(self._shift * slope, error, floor, self._shift)
 
     def _floor(self, name: str, value: Array) -> Array:

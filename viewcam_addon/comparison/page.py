@@ -26,6 +26,9 @@ from . import pictures
 from .statistics import percentile_name
 from .tolerances import PERCENTILES
 
+TRACER = "Tracer"
+"""The name of the reference's side; that of the test's is its renderer's."""
+
 SWAP = "Point at the picture, tap it, or press the space bar to swap the two."
 
 
@@ -92,14 +95,13 @@ def common(
     test: Image,
     ledger: Sequence[Any],
     command: str,
-    pinhole: Pinhole,
     origin: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> dict[str, Any]:
     """The values that both reports give report.html; the views, the crops and their own parts are added to it.
 
-    comparison : whose `answer` is told. ledger : the scene's entries, with `object`, `status` and `reason`.
-    command : what repeats the comparison. pinhole : the camera that is told. origin : the point of the world that its
-    coordinates are counted from.
+    comparison : whose `answer` is told, with its `pinhole`, `stated` and `renderer`. ledger : the scene's entries, with
+    `object`, `status` and `reason`.
+    command : what repeats the comparison. origin : the point of the world that the camera's coordinates are counted from.
     """
     answer = comparison.answer
     names = [Path(image.source).name for image in (reference, test)]
@@ -111,14 +113,15 @@ def common(
         "about": _subject(test),
         "headline": f"{answer.headline}.",
         "intro": with_powers(answer.text[:1].upper() + answer.text[1:]),
-        "plates": {"reference": f"reference · {names[0]}", "test": f"test · {names[1]}"},
+        "sides": {"reference": TRACER, "test": comparison.renderer},
+        "plates": {"reference": f"{TRACER} · {names[0]}", "test": f"{comparison.renderer} · {names[1]}"},
         "width": width,
         "height": height,
         "percentile_names": [percentile_name(percentile) for percentile in PERCENTILES],
         "ledger": ledger,
-        "facts": _facts(reference, test),
+        "facts": _facts(reference, test, comparison.renderer),
         "command": command,
-        **_camera(pinhole, origin),
+        **_camera(comparison.pinhole, comparison.stated, origin),
     }
 
 
@@ -166,20 +169,29 @@ def _strip(scale: NDArray[np.uint8] | None = None) -> str:
     return pictures.png_uri(np.arange(1, pictures.LEVELS + 1, dtype=np.uint8)[None], scale)
 
 
-def _camera(pinhole: Pinhole, origin: Sequence[float]) -> dict[str, Any]:
+def _camera(pinhole: Pinhole, stated: Pinhole | None, origin: Sequence[float]) -> dict[str, Any]:
+    """pinhole : as it was read back. stated : as it was typed, None where nobody did."""
     angle = f"{math.degrees(math.asin(min(pinhole.sine_to_up, 1.0))):.4g}° from up"
     return {
         "pinhole": pinhole,
         "origin": origin if any(origin) else None,
-        "distance": " × ".join(f"{d:.9g}" for d in dict.fromkeys(pinhole.distance)),
+        "cameras": [
+            *([("as typed", stated, _as_typed)] if stated else []),
+            ("as read back from Blender" if stated else "", pinhole, "{:.9g}".format),
+        ],
         "centre": ", ".join(f"{c:.9g}" for c in pinhole.principal_point),
         "field_of_view": " × ".join(f"{math.degrees(angle):.4g}°" for angle in pinhole.field_of_view()[:2]),
         "angle_to_up": "exactly along up: canonical axes" if pinhole.is_singular else angle,
     }
 
 
-def _facts(reference: Image, test: Image) -> dict[str, str]:
-    told = {"Reference": reference.source, "Test": test.source}
-    for side, image in (("reference", reference), ("test", test)):
+def _as_typed(value: float) -> str:
+    """The fewest digits that tell a number; of one that went through float32, those that tell it among float32s."""
+    return f"{np.float32(value) if float(np.float32(value)) == value else value!s}"
+
+
+def _facts(reference: Image, test: Image, renderer: str) -> dict[str, str]:
+    told = {TRACER: reference.source, renderer: test.source}
+    for side, image in ((TRACER, reference), (renderer, test)):
         told |= {f"{key} ({side})": value for key, value in sorted(image.attributes.items())}
     return told | {"Compared with": f"Python {platform.python_version()}, NumPy {np.__version__}"}

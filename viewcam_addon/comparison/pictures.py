@@ -144,6 +144,12 @@ def crop(picture: Picture, full_size: tuple[int, int], column: int, row: int, si
     return padded[top : top + size, left : left + size]
 
 
+def reduced(linear: NDArray) -> NDArray:
+    """Light, rows from the bottom, with its rows from the top, and no wider than a screen; what is no number is black."""
+    step = _step(linear.shape[1])
+    return np.nan_to_num(linear[::-1][::step, ::step], posinf=0.0, neginf=0.0)
+
+
 def _step(width: int) -> int:
     return -(-width // _WIDEST)
 
@@ -189,9 +195,7 @@ def _in_gamut(lightness: NDArray, chroma: NDArray, hue: NDArray) -> NDArray[np.f
 
 def _to_screen(linear: NDArray[np.float64]) -> Picture:
     """Linear light, rows from the bottom, to a picture that is no wider than a screen."""
-    step = _step(linear.shape[1])
-    shown = np.nan_to_num(linear[::-1][::step, ::step])  # what is no number is black
-    return np.round(255 * _encoded(np.clip(shown, 0.0, 1.0))).astype(np.uint8)
+    return np.round(255 * _encoded(np.clip(reduced(linear), 0.0, 1.0))).astype(np.uint8)
 
 
 def _encoded(linear: NDArray[np.float64]) -> NDArray[np.float64]:

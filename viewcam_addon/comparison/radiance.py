@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..image import LIGHT_PASSES, Image
 from ..pinhole import Pinhole
 from . import hypothesis_tests, noise_free, perception
-from .coincident import CoincidentLight, MakeCoincidentLight, TakenOut
+from .coincident import MakeCoincidentLight, Rest, TakenOut
 from .light_verdict import FALSE_ALARMS, LightRow, RadianceComparison
 from .sides import Sides, all_sides, quiet, samples_of
 from .tolerances import Array, in_float32
@@ -56,8 +56,9 @@ def compare(
     compared = compare_quantities(reference, tests, pinhole, test_samples)
     combined, taken_out = compared.combined, TakenOut()
     if make_coincident is not None and not all(row.ok for row in compared.rows) and (coincident := make_coincident()).pairs:
-        compared = compare_quantities(reference, tests, pinhole, test_samples, coincident)
-        taken_out = TakenOut(coincident.share_out(combined), coincident.pairs)
+        rest = coincident.rest(combined)
+        compared = compare_quantities(reference, tests, pinhole, test_samples, rest)
+        taken_out = TakenOut(rest.out, coincident.pairs)
     maps = dict(compared.maps)
     appearance, flip = perception.appearance(combined)
     if flip is not None:
@@ -100,13 +101,12 @@ def compare_quantities(
     tests: Sequence[Image],
     pinhole: Pinhole,
     test_samples: int | None = None,
-    coincident: CoincidentLight | None = None,
+    rest: Rest | None = None,
 ) -> QuantityComparison:
-    """`compare` without what decides nothing. coincident : the light by surfaces in one place, which is taken out."""
+    """`compare` without what decides nothing. rest : what is compared where light comes by surfaces in one place."""
     found = list(all_sides(reference, tests))
-    if coincident is not None:
-        out = coincident.share_out(found[0])
-        found = [coincident.without(sides, out) for sides in found]
+    if rest is not None:
+        found = [rest.of(sides) for sides in found]
     combined, equal = found[0], tuple(sides.name for sides in found[1:] if sides.are_equal)
     unequal = [sides for sides in found if sides.name not in equal]
     samples, seeds = (samples_of(reference), test_samples or samples_of(tests[0])), len(tests)
@@ -114,13 +114,16 @@ def compare_quantities(
     # Where things shine as brightly as what is behind them, only the other passes have any.
     is_noisy |= seeds > 1 and any(not quiet(sides.test, sides.spread).all() for sides in (combined, *unequal))
     freedom = (max(min(samples[0] or 2, VARIANCE_BATCHES) - 1, 1), max(seeds - 1, 1))
-    rounding = noise_free.Rounding(pinhole, reference, tests[0], max(filter(None, samples), default=1), coincident)
+    rounding = noise_free.Rounding(pinhole, reference, tests[0], max(filter(None, samples), default=1), rest)
 
     rows: list[LightRow] = []
     maps: dict[str, NDArray] = {}
     for sides in unequal:
         if is_noisy:
             row, drawn = _noisy(sides, rounding, freedom, FALSE_ALARMS / len(unequal))
+            if rest is not None:
+                hidden = float(rest.tolerance(sides).mean())
+                row = replace(row, visible=row.visible + _relative(hidden, abs(row.reference)))
         else:
             row, drawn = _noise_free(sides, rounding)
         rows.append(row)

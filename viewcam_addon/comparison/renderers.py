@@ -110,29 +110,28 @@ def _decoded(picture: Image, engine: str) -> Image:
 def completed(picture: Image, pinhole: Pinhole) -> Image:
     """The picture with Depth and Position, each made from what there is where it lacks one: from Depth, Distance or Position.
 
-    A Position that is made lies on the ray through its pixel's centre. Nothing was hit where a depth or a distance is 0,
-    infinite or BACKGROUND_DEPTH and more, or where a Position alone is 0 in all of its coordinates or infinite.
+    A Position that is made lies on the ray through its pixel's centre. Nothing was hit where the first of these that is there
+    has 0 (a Position in all of its coordinates), BACKGROUND_DEPTH and more, or what is infinite; all passes hold there what the
+    tracer's do.
     """
     passes = dict(picture.passes)
-    if "Depth" in passes and "Position" in passes and "Distance" not in passes:
-        return picture
+    measure = next(passes[name].astype(np.float64) for name in ("Depth", "Distance", "Position") if name in passes)
+    missed = (measure == 0.0).all(axis=-1, keepdims=True) | (np.abs(measure) >= BACKGROUND_DEPTH).any(axis=-1, keepdims=True)
     w = pinhole.basis()[2]
     rows, columns = np.mgrid[: pinhole.height, : pinhole.width]
     directions = pinhole.ray_directions(columns.ravel(), rows.ravel()).reshape(*rows.shape, 3)
     cosine = -(directions @ w)[..., None]
     if "Depth" in passes:
-        depth = passes["Depth"].astype(np.float64)
+        depth = measure
     elif "Distance" in passes:
-        depth = passes["Distance"] * cosine
+        depth = measure * cosine
     else:
-        position = passes["Position"].astype(np.float64)
-        nothing = (position == 0.0).all(axis=-1) | np.isinf(position).any(axis=-1)
-        depth = np.where(nothing, np.inf, -(np.where(np.isfinite(position), position, np.nan) - pinhole.eye) @ w)[..., None]
-    missed = (depth == 0.0) | np.isinf(depth) | (depth >= BACKGROUND_DEPTH)
-    passes["Depth"] = np.where(missed, BACKGROUND_DEPTH, depth).astype(np.float32)
-    if "Position" in passes:
-        passes["Position"] = np.where(missed, np.float32(0.0), passes["Position"])
-    else:
+        depth = -(np.where(np.isfinite(measure), measure, np.nan) - pinhole.eye) @ w[:, None]
+    if "Position" not in passes:
         away = np.where(missed, 0.0, depth) / cosine
-        passes["Position"] = np.where(missed, 0.0, pinhole.eye + away * directions).astype(np.float32)
-    return replace(picture, passes=passes)
+        passes["Position"] = (pinhole.eye + away * directions).astype(np.float32)
+    passes["Depth"] = depth.astype(np.float32)
+    nothing = {"Depth": np.float32(BACKGROUND_DEPTH)}
+    return replace(
+        picture, passes={name: np.where(missed, nothing.get(name, np.float32(0)), values) for name, values in passes.items()}
+    )

@@ -35,9 +35,9 @@ def write_report(
         if the folder can't be written, or there is no Jinja2.
     """
     shades = difference.shown(comparison, reference, [test])
-    camera, far = comparison.stated or comparison.pinhole, comparison.far_from_origin
+    far = comparison.far_from_origin
     values = {
-        **page.common(comparison, reference, test, ledger, command, camera, comparison.origin),
+        **page.common(comparison, reference, test, ledger, command, comparison.origin),
         "mend": page.with_powers(far.sentence) if far else "",
         "views": _views(comparison, shades, reference, test),
         "marks": charts.marks(comparison.mismatches, (comparison.pinhole.width, comparison.pinhole.height)),

@@ -10,7 +10,7 @@ from ..pinhole import Pinhole
 from .answer import Answer, NotModelled, answered
 from .cameras import ConversionError, Systematic
 from .far_from_origin import FarFromOrigin
-from .mismatches import NOWHERE, PIXELS_PER_UNEXPLAINED, InOnePlace, Mismatches
+from .mismatches import KINDS, NOWHERE, PIXELS_PER_UNEXPLAINED, InOnePlace, Mismatches
 from .statistics import PassErrors, percentile_name
 from .tolerances import PERCENTILES, Array
 
@@ -40,7 +40,8 @@ class GeometryComparison:
     far_from_origin : what the distance from the origin costs, None where that is nothing to speak of.
     origin : the point of the world from which the coordinates of both pictures are counted.
     lacking : passes that only the reference has. in_one_place : pixels that show another of several surfaces in one place,
-    which is as right as the reference's. not_modelled : what of the picture neither side models as it is.
+    which is as right as the reference's. renderer : who made the test, by name. not_modelled : what of the picture neither
+    side models as it is.
     """
 
     pinhole: Pinhole
@@ -56,6 +57,7 @@ class GeometryComparison:
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     lacking: tuple[str, ...] = ()
     in_one_place: InOnePlace = NOWHERE
+    renderer: str = "Cycles"
     not_modelled: NotModelled = field(default_factory=NotModelled)
 
     @property
@@ -263,6 +265,8 @@ def _explained(comparison: GeometryComparison) -> str:
 
 
 def _why_unexplained(comparison: GeometryComparison) -> str:
+    if (comparison.mismatches.kinds == KINDS.index("not a number")).all():
+        return "where the test picture holds no number"
     if not comparison.mismatches.retraced:
         return "which may be edges: give the scene too, so that they can be re-traced"
     return "and no shift within tolerance explains it"

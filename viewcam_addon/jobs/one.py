@@ -148,5 +148,6 @@ def _checked(job: Job, renderer: Renderer, has_picture: bool, folder: Path | Non
     names = [f"{job.name}.html", f"{job.name}.{SIDES['test']}"]
     for name, made in zip(names, (PAGE, SIDES["test"]), strict=True):
         (folder / made).rename(folder / name)
-    (folder / SIDES["reference"]).unlink()
+    for side in ("reference", "everything"):
+        (folder / SIDES[side]).unlink(missing_ok=True)
     return {"check": {key: found[key] for key in _KEPT if key in found}, "report": names}

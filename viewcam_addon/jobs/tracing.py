@@ -32,8 +32,8 @@ _MOST_SCENES = 4
 """Kept: a frame, its neighbours, and the one that comes next."""
 
 PAGE = "index.html"
-SIDES = {"test": "test.png", "reference": "reference.png", "difference": "difference.png"}
-"""The pictures that `Written.sides` has beside the report."""
+SIDES = {"test": "test.png", "reference": "reference.png", "everything": "everything.png", "difference": "difference.png"}
+"""The pictures that `Written.sides` has beside the report; one of everything where not all of it is modelled."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -262,7 +262,7 @@ class _Server:
         comparison = api.compare(reference, pictures, *how)
         if partial:
             pictures = [renderers.completed(picture, comparison.pinhole) for picture in pictures]
-        told = _told(comparison, reference, pictures, entries, files)
+        told = _told(comparison, reference, pictures, entries, files, everything)
         return {**told, "seconds": seconds}
 
     def _label(
@@ -300,8 +300,10 @@ def _told(
     tests: "Sequence[Image]",
     ledger: "Sequence[LedgerEntry]",
     written: Written,
+    everything: str | None = None,
 ) -> dict[str, Any]:
     """What is told of a comparison, once its files are written."""
+    from .. import image
     from ..comparison import difference, light_report, report
     from ..comparison.light_verdict import RadianceComparison
     from ..tracer.scene import with_pairs
@@ -320,7 +322,8 @@ def _told(
     if written.difference:
         result["difference"] = difference.write(comparison, written.difference)
     if written.sides:
-        difference.write_sides(comparison, reference, tests, written.sides)
+        whole = image.read(everything) if everything else None
+        difference.write_sides(comparison, reference, tests, written.sides, whole)
     told = {**comparison.answer.to_json(), "lines": lines}
     return {**told, "result": checks.for_json(result), "figures": checks.for_json(figures)}
 

@@ -43,6 +43,26 @@ def test_the_render_menu_and_the_status_bar_are_as_before_without_the_add_on(reg
 WIDTH, HEIGHT = 12, 5
 
 
+def test_where_not_all_is_modelled_the_artists_own_picture_comes_first_and_the_others_say_so(outcome):
+    (outcome.folder / "everything.png").write_bytes(pictures.png(np.full((HEIGHT, WIDTH, 3), (0, 0, 255), np.uint8)))
+    gap = " " * proof_image._GAP
+    assert columns(proof_image.load(outcome, "ALL")) == gap.join(letter * WIDTH for letter in "brgb")
+    assert columns(proof_image.load(outcome, "EVERYTHING")) == "b" * WIDTH
+    assert proof_image.labels("ALL", outcome.pictures) == [
+        "Cycles, everything",
+        "Cycles with stand-ins",
+        "Tracer with stand-ins",
+        "Difference",
+    ]
+    assert proof_image.labels("SWIPE", outcome.pictures) == ["Cycles with stand-ins", "Tracer with stand-ins"]
+
+
+def test_where_all_is_modelled_cycles_picture_has_everything(outcome):
+    assert columns(proof_image.load(outcome, "EVERYTHING")) == "r" * WIDTH
+    assert proof_image.labels("EVERYTHING", outcome.pictures) == ["Cycles"]
+    assert proof_image.labels("ALL", outcome.pictures) == ["Cycles", "Tracer", "Difference"]
+
+
 @pytest.fixture
 def outcome(tmp_path, fresh_blender):
     """A verdict whose pictures are red (Cycles), green (the tracer) and blue (the difference) all over."""

@@ -5,7 +5,10 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from viewcam_addon.blender.jobs import renderer as jobs
 from viewcam_addon.blender.scenes import materials
+from viewcam_addon.jobs.job import Job
+from viewcam_addon.tracer import render
 
 
 @pytest.fixture
@@ -95,7 +98,6 @@ DEPARTURES = {
     make_turned: "turns the normals",
     make_displaced: "is displaced",
     make_misty: "has a volume",
-    make_volume_only: "has no surface",
     make_without_output: "has no output",
     make_bumpy_in_a_group: "turns the normals",
 }
@@ -109,6 +111,53 @@ def test_a_plain_material_stands_in(monkey, material, both_sides, depart):
     (entry,) = sides.exported.ledger
     assert entry.status == "approximated" and DEPARTURES[depart] in entry.reason and "'Skin'" in entry.reason
     assert not any(node.type == "BSDF_DIFFUSE" for node in material.node_tree.nodes)
+
+
+def test_a_box_of_fog_is_left_out_on_both_sides(monkey, material, both_sides):
+    """An opaque box stood in for it, and around a scene both sides were black and called the same."""
+    bpy.ops.mesh.primitive_cube_add(size=30)
+    fog = bpy.data.materials.new("Fog")
+    if not fog.node_tree:
+        fog.use_nodes = True
+    make_volume_only(fog)
+    box = bpy.context.object
+    box.data.materials.append(fog)
+    sides = both_sides()
+    sides.check()
+    told = {entry.object: (entry.status, entry.reason) for entry in sides.exported.ledger}
+    assert told[box.name] == ("skipped", "material 'Fog' is a volume without a surface, which is not modelled")
+    assert [placed.name for placed in sides.exported.objects] == [monkey.name]
+    assert fog.node_tree.nodes.get("Transparent BSDF") is None
+
+
+def test_faces_of_fog_beside_others_are_left_out_on_both_sides(monkey, material, both_sides):
+    fog = bpy.data.materials.new("Fog")
+    if not fog.node_tree:
+        fog.use_nodes = True
+    make_volume_only(fog)
+    monkey.data.materials.append(fog)
+    everything = both_sides().comparison.hits[1]
+    monkey.data.polygons.foreach_set("material_index", [face.index % 3 == 0 for face in monkey.data.polygons])
+    sides = both_sides()
+    sides.check()
+    assert sides.comparison.hits[1] < everything
+    assert [entry.status for entry in sides.exported.ledger] == ["approximated"]
+
+
+def test_a_lamp_shines_through_a_box_of_fog_on_both_sides(monkey, material, add_lamp, read_passes, tmp_path):
+    bpy.context.scene.render.resolution_x = bpy.context.scene.render.resolution_y = 32
+    add_lamp("SUN", energy=2.0)
+    bpy.ops.mesh.primitive_cube_add(size=3)
+    fog = bpy.data.materials.new("Fog")
+    if not fog.node_tree:
+        fog.use_nodes = True
+    make_volume_only(fog)
+    bpy.context.object.data.materials.append(fog)
+    exported = jobs.both_sides(Job(threads=2, level="direct", samples=16), [tmp_path / "lit.exr"])
+    (theirs,) = read_passes([tmp_path / "lit.exr"])
+    ours = render.render(exported, "direct", 16, threads=2)
+    means = [passes["Combined"][..., :3].mean() for passes in (ours, theirs)]
+    assert means[0] > 0.05 and means[0] == pytest.approx(means[1], rel=0.05), means  # 16 samples of 1,024 pixels
 
 
 @pytest.mark.parametrize("depart", [make_invisible, make_bumpy, make_displaced], ids=lambda depart: depart.__name__)

@@ -31,13 +31,14 @@ from ...jobs import plan as orders
 from ...jobs.job import Job
 from ...jobs.names import made_fit
 from ...jobs.plan import Plan
+from ...jobs.tracing import SIDES
 from ...pinhole import Pinhole
 from ...tracer.scene.film import LEVELS, SAMPLES, seeds
 from .. import camera as cameras
 from .. import datablocks, preferences
 
 _RESULT, _SAID, _REPORT = "result.json", "said.txt", "report"
-_PICTURES = {"cycles": "test.png", "tracer": "reference.png", "difference": "difference.png"}
+_PICTURES = {"cycles": SIDES["test"], "tracer": SIDES["reference"], "difference": SIDES["difference"]}
 _COMPRESSED = (b"\x1f\x8b", b"\x28\xb5\x2f\xfd")
 
 
@@ -71,9 +72,14 @@ class Outcome:
 
     @property
     def pictures(self) -> dict[str, Path]:
-        """The PNGs of Cycles, the tracer and what differs, by these names; empty where one is missing."""
+        """The PNGs of Cycles, the tracer and what differs, by these names; empty where one is missing.
+
+        And of everything, where not all of it is modelled: the artist's own picture, of which the others show stand-ins.
+        """
         found = {name: self._there(file) for name, file in _PICTURES.items()}
-        return found if all(found.values()) else {}
+        everything = self._there(SIDES["everything"])
+        more = {"everything": everything} if everything else {}
+        return more | found if all(found.values()) else {}
 
     def is_of(self, camera_object: bpy.types.Object, scene: bpy.types.Scene) -> bool:
         """True if the camera is still the one that was compared."""

@@ -1,12 +1,15 @@
 """The image of a comparison, and the Image Editor that shows it: Cycles, the tracer and what differs, side by side or swiped.
 
+Where not all that is in the picture is modelled, both sides show stand-ins and say so, and the artist's own picture is beside
+them. Light is as the scene's view transform displays it (rendering/displayed.py), and geometry shaded from its passes.
+
 It is one datablock of its own, packed: a file that is saved while an editor shows it keeps it, and names no folder that ends
 with Blender. Names and the legend of the colours are drawn over it, in the editor's own pixels, and are no part of it.
 Rejected: turning an area of the artist's layout into an Image Editor, and `render.view_show`, which makes a Render Result.
 """
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import bpy
@@ -19,14 +22,16 @@ from .comparing import Outcome
 
 NAME = "Virtual Pinhole Proof"
 VIEWS = (
-    ("ALL", "All Three", "Cycles, the tracer and what differs, side by side"),
+    ("ALL", "Side by Side", "All pictures: Cycles, the tracer and what differs"),
     ("SWIPE", "Swipe", "Cycles on the left and the tracer on the right of a line that can be moved"),
     ("CYCLES", "Cycles", "What Cycles renders"),
     ("TRACER", "Tracer", "What the reference tracer renders"),
     ("DIFFERENCE", "Difference", "What differs, pixel by pixel"),
+    ("EVERYTHING", "Everything", "The scene as Cycles renders it with everything in it, without any stand-in"),
 )
-_LABELS = {"CYCLES": ("Cycles",), "TRACER": ("Tracer",), "DIFFERENCE": ("Difference",)}
-_LABELS |= {"ALL": ("Cycles", "Tracer", "Difference"), "SWIPE": ("Cycles", "Tracer")}
+_SIDES = {"everything": "Cycles, everything", "cycles": "Cycles", "tracer": "Tracer", "difference": "Difference"}
+"""What each picture is called, in the order in which they stand."""
+_DIFFERENCE = _SIDES["difference"]
 _GAP = 8  # pixels between two pictures
 _MARGIN, _LETTERS, _STRIP = 10, 12, (240, 12)  # points: around a label, its size, and the legend's strip
 
@@ -40,16 +45,30 @@ _shown: Outcome | None = None
 def composed(sides: Mapping[str, NDArray[np.float32]], view: str, swipe: float = 0.5) -> NDArray[np.float32]:
     """The picture of a view.
 
-    sides : "cycles", "tracer" and "difference", (height, width, 4) of one size. view : one of VIEWS.
-    swipe : where the line is, from 0 at the left to 1.
+    sides : "cycles", "tracer", "difference" and, where there is more, "everything", (height, width, 4) of one size. view : one
+    of VIEWS. swipe : where the line is, from 0 at the left to 1.
     """
-    if view == "ALL":
-        gap = np.zeros((len(sides["cycles"]), _GAP, 4), np.float32)
-        return np.hstack([sides["cycles"], gap, sides["tracer"], gap, sides["difference"]])
+    shown = _shown_in(view, sides)
     if view == "SWIPE":
         at = round(swipe * sides["cycles"].shape[1])
-        return np.hstack([sides["cycles"][:, :at], sides["tracer"][:, at:]])
-    return sides[view.lower()]
+        return np.hstack([sides[shown[0]][:, :at], sides[shown[1]][:, at:]])
+    gap = np.zeros((len(sides["cycles"]), _GAP, 4), np.float32)
+    return np.hstack([part for name in shown for part in (gap, sides[name])][1:])
+
+
+def _shown_in(view: str, sides: Collection[str]) -> list[str]:
+    """The pictures of a view, of those that there are."""
+    if view == "ALL":
+        return [name for name in _SIDES if name in sides]
+    if view == "SWIPE":
+        return ["cycles", "tracer"]
+    return [view.lower() if view.lower() in sides else "cycles"]  # where all is modelled, Cycles' picture has everything
+
+
+def labels(view: str, sides: Collection[str]) -> list[str]:
+    """What the pictures of a view are called, from left to right."""
+    stand_ins = " with stand-ins" if "everything" in sides else ""
+    return [_SIDES[name] + (stand_ins if name in ("cycles", "tracer") else "") for name in _shown_in(view, sides)]
 
 
 def begins(number: int, count: int, width: int) -> float:
@@ -129,7 +148,7 @@ def _fit() -> None:
                     area.spaces.active.zoom_percentage *= max(0.5, 1 - margin)
 
 
-@functools.lru_cache(maxsize=3)
+@functools.lru_cache(maxsize=4)
 def _pixels(path: Path) -> NDArray[np.float32]:
     """A PNG, (height, width, 4), rows from the bottom, as it is stored."""
     image = bpy.data.images.load(str(path))
@@ -182,12 +201,12 @@ def _draw_labels() -> None:
     if _shown is None or not _is_shown_in(context.space_data):
         return
     settings, scale = context.window_manager.virtual_pinhole_proof, context.preferences.system.ui_scale
-    at, labels = context.region.view2d.view_to_region, _LABELS[settings.view]
+    at, words = context.region.view2d.view_to_region, labels(settings.view, _shown.pictures)
     swiped, width = settings.view == "SWIPE", context.space_data.image.size[0]
-    for number, label in enumerate(labels):
-        x, y = at(number * settings.swipe if swiped else begins(number, len(labels), width), 0.0, clip=False)
+    for number, label in enumerate(words):
+        x, y = at(number * settings.swipe if swiped else begins(number, len(words), width), 0.0, clip=False)
         _write(label, x + _MARGIN * scale, y + _MARGIN * scale, scale)
-        if label == "Difference":
+        if label == _DIFFERENCE:
             _draw_legend(x + _MARGIN * scale, y - (2 * _MARGIN + 2 * _LETTERS) * scale, scale)
         elif swiped and number:
             _fill(x - scale, y, 2 * scale, at(0.0, 1.0, clip=False)[1] - y, (1.0, 1.0, 1.0, 0.9))

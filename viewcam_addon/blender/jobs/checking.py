@@ -30,7 +30,7 @@ from ...tracer.scene import LedgerEntry, Scene, scene_file
 from ...tracer.scene.film import LEVELS, SAMPLES, seeds
 from ...tracer.scene.levels import least_level
 from .. import datablocks
-from ..rendering import cycles, exr
+from ..rendering import cycles, displayed, exr
 from ..scenes.export import Lighting
 from ..temporary_settings import numbered_indices
 from . import pictures
@@ -144,6 +144,8 @@ class Checker:
         else:
             camera, clip, stated = exported.camera, exported.clip, exported.stated_camera
             found = self._tracing.compare(path, tests, of, camera, clip, stated, ledger, written, whole)
+        for path in sorted(Path(written.sides).glob("*.npy")) if written and written.sides else ():
+            displayed.write_png(scene, path)
         told = {"result": found["result"], "lines": found["lines"], "level": level}
         told["seconds"] = {"rendered": rendered, "traced": found["seconds"]}
         if job.level == "auto":

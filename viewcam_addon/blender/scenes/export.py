@@ -26,7 +26,7 @@ from ...tracer.scene.levels import level_of
 from ...tracer.scene.materials import PLAIN, Picture
 from .. import camera as cameras
 from .. import versions
-from . import baked_inputs, cycles_attributes, export_geometry, features, film, lamps, linking, world
+from . import baked_inputs, cycles_attributes, export_geometry, features, film, lamps, linking, materials, world
 from .depsgraph import visit_still
 from .ledger import Ledger
 from .shading import Shading
@@ -39,7 +39,7 @@ class Surface:
     """A visible surface that stands in the world once or many times; two that are equal are one.
 
     is_mesh : or a point cloud. key : the same for all that share a geometry in Cycles. slots : the materials, evaluated, one or
-    more; used : the indices of those that some face, or the points, have. hidden_from : the kinds of rays that don't see it.
+    more; used : the indices of those that are seen. hidden_from : the kinds of rays that don't see it.
     color : with its alpha; of instances that of what places them. receivers, blockers : of its light, as of Object, where it
     shines.
     """
@@ -401,6 +401,9 @@ def _source(
         if not used:  # it has no faces
             return None
     features.note_object(placed, slots, used, depsgraph, ledger, shading)
+    used = {index for index in used if not materials.is_volume_alone(slots[index])}
+    if not used:
+        return None
     receivers, blockers = None, None
     if links and linking.is_linked(placed.real.original) and shading.shines(slots):
         receivers, blockers = links.of(placed, ledger, True)
@@ -432,7 +435,7 @@ def _geometry(source: Surface, shown: bpy.types.Object, ledger: Ledger, shading:
         ledger.note(
             source.name, "exported", f"{nowhere} triangles have vertices that are not finite, and Cycles draws none of them"
         )
-    return mesh
+    return export_geometry.of_slots(mesh, source.used)
 
 
 def _free_name(name: str, taken: dict[str, Mesh | Spheres]) -> str:

@@ -13,6 +13,7 @@ not: there no vertex is split.
 
 import contextlib
 from collections.abc import Collection, Iterator
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -97,6 +98,16 @@ def spheres_of(points: bpy.types.PointCloud) -> Spheres:
     if radii is None:
         radii = np.full(len(centers), DEFAULT_RADIUS, np.float32)
     return Spheres(centers.astype(np.float64), radii.astype(np.float64), np.zeros(len(centers), np.int32))
+
+
+def of_slots(mesh: Mesh, slots: Collection[int]) -> Mesh:
+    """The triangles of these material slots."""
+    kept = np.isin(mesh.materials, list(slots))
+    if kept.all():
+        return mesh
+    of_corners = ("triangles", "materials", "corner_normals", "corner_uvs", "corner_colours")
+    arrays = {name: values[kept] for name in of_corners if (values := getattr(mesh, name)) is not None}
+    return replace(mesh, attributes={name: values[kept] for name, values in mesh.attributes.items()}, **arrays)
 
 
 def used_slots(mesh: bpy.types.Mesh, slot_count: int) -> set[int]:

@@ -39,7 +39,7 @@ def note_render(
     ledger.set_for_cycles(camera_object.data.dof, "use_dof", False)
     for layer in scene.view_layers:
         if layer.use and layer != view_layer:
-            ledger.note(f"view layer {layer.name}", "skipped", f"only view layer {view_layer.name!r} is compared")
+            ledger.note(f"view layer {layer.name}", "exported", f"another picture than that of {view_layer.name!r}")
     for library in bpy.data.libraries:
         if not Path(bpy.path.abspath(library.filepath)).is_file():
             ledger.note(library.name, "skipped", f"the library {library.filepath} is missing, and all that is linked from it")
@@ -130,6 +130,10 @@ def note_object(
         if any(modifier.type == "NODES" and modifier.show_render for modifier in real.modifiers):
             ledger.note(name, "approximated", "has no material, and Cycles may bend its normals where they graze")
     for material in filter(None, slots):
+        if materials.is_volume_alone(material):
+            ledger.note(name, "skipped", f"material {material.name!r} is a volume without a surface, which is not modelled")
+            ledger.call_for_cycles(material.original, materials.make_transparent)
+            continue
         if not shading:  # the Normal pass; mirrors and glass bend normals on both sides (scattering.specular_normal)
             ledger.call_for_cycles(material.original, materials.keep_normals, stands_in=False)
         reasons = materials.departures(material, lit=shading is not None)

@@ -63,6 +63,20 @@ def departures(material: bpy.types.Material, lit: bool = False) -> list[str]:
     return reasons
 
 
+def is_volume_alone(material: bpy.types.Material | None) -> bool:
+    """True if a material fills what it covers with a volume and has no surface, as fog in a box."""
+    tree = material and versions.node_tree(material)
+    output = tree.get_output_node("CYCLES") if tree else None
+    return bool(output) and output.inputs["Volume"].is_linked and not output.inputs["Surface"].is_linked
+
+
+def make_transparent(overrides: Overrides, material: bpy.types.Material) -> None:
+    """Let Cycles see nothing where the material is until the overrides end."""
+    output, adder = nodes.override_output(overrides, material.node_tree, "ShaderNodeOutputMaterial")
+    adder.link(adder.add("ShaderNodeBsdfTransparent", Color=(1.0, 1.0, 1.0, 1.0)).outputs[0], output.inputs["Surface"])
+    overrides.set(material, "use_transparent_shadow", True)
+
+
 def make_plain(overrides: Overrides, material: bpy.types.Material) -> None:
     """Let Cycles see a diffuse surface of the viewport colour until the overrides end."""
     stand_in(overrides, material, shaders.in_the_viewport(material))
