@@ -41,6 +41,7 @@ from .source import Source
 
 TITLE = "code that places a camera (gluLookAt, three.js, VTK, lookfrom …)"
 SUFFIX = ".txt"
+SEVERAL = "a text"
 
 _COMMENT = r"//[^\n]*|/\*.*?(?:\*/|\Z)|#(?!\s*define)[^\n]*"
 _WINDOW = re.compile(r"renderer|ren\w{0,3}win|renderwindow")
@@ -889,7 +890,7 @@ def _written(camera: Camera) -> str:
     window = [-c_x / d_x * near, (width - c_x) / d_x * near, -c_y / d_y * near, (height - c_y) / d_y * near]
     vectors = ", ".join(texts.listed(vector, ", ") for vector in texts.look(pinhole))
     lines = [
-        f"// {own.comment(pinhole)}",
+        *own.beginning(camera, "//"),
         f"windowSize = ({width}, {height});",
         f"glFrustum({texts.listed([*window, near, far], ', ')});",
         f"gluLookAt({vectors});",

@@ -31,6 +31,7 @@ from .source import Source
 
 TITLE = "pbrt scene"
 SUFFIX = ".pbrt"
+SEVERAL = "a folder"
 
 _COMMENT = r"#[^\n]*"
 _WORDS = re.compile(
