@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from . import opencv, texts, tokens
+from . import opencv, own, texts, tokens
 from .camera import Camera, Options
 from .expressions import JOINTS, Expressions
 from .source import Source
@@ -59,6 +59,8 @@ class _Unknown:
 
 def recognises(source: Source) -> bool:
     if source.is_binary or source.is_folder or source.document or source.xml is not None or len(source.text) > _MOST_CHARACTERS:
+        return False
+    if own.lines_of(source):  # several cameras of our own, whose names look like a program's
         return False
     if source.json_problem and not {*"('"} & {*source.text}:  # JSON that is damaged, and no dictionary of Python
         return False

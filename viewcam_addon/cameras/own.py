@@ -87,7 +87,7 @@ class _Angle(float):
 def recognises(source: Source) -> bool:
     if source.is_binary or source.is_folder:
         return False
-    if _lines(source):
+    if lines_of(source):
         return True
     if isinstance(document := _document(source), dict):
         return any(isinstance(document.get(key), dict) for key in ("stated_camera", "camera")) or _is_camera(document)
@@ -100,7 +100,7 @@ def _is_camera(document: dict) -> bool:
 
 
 def read(source: Source, options: Options) -> list[Camera]:
-    if lines := _lines(source):
+    if lines := lines_of(source):
         return [
             replace(camera(_of_json(line), options, f"camera {number}"), name=str(line.get("name", f"camera {number}")))
             for number, line in enumerate(lines, start=1)
@@ -234,7 +234,7 @@ def _spelt(key: object) -> str | None:
 # ---- JSON
 
 
-def _lines(source: Source) -> list[dict]:
+def lines_of(source: Source) -> list[dict]:
     """The cameras of a text with one on each line; none if it is something else."""
     lines = [line for line in source.text.split("\n", _MOST_LINES) if line.strip()]
     if len(lines) < 2 or not all(line.startswith("{") and line.rstrip().endswith("}") for line in lines):
